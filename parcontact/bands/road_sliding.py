@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..columns import BANDS, names_of
 from ..effects.relaxation import temperature_of
 from ..errors import RunError
 from ..job import Job
@@ -24,10 +25,6 @@ from .limits import STRAIN
 
 SURE = 2.0  # accuracy: standard errors of the scatter of surfaces that count as an error
 TABLE = "bands.csv"
-COLUMNS = (
-    *("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength", "friction", "contact_area"),
-    *("rms_slope", "flash_temperature", "load_lost", "rms_slope_to", "strain_to"),
-)
 
 
 @dataclass(frozen=True)
@@ -57,7 +54,7 @@ class RoadSliding:
     It has what a friction curve asks of `steady_sliding.sliding.SteadySliding`.
     """
 
-    table: tuple[str, Sequence[str]] | None = (TABLE, COLUMNS)
+    table: tuple[str, Sequence[str]] | None = (TABLE, names_of(BANDS))
 
     def __init__(self, job: Job, slab: Slab) -> None:
         self.job, self.slab, self.cut = job, slab, choose(job)

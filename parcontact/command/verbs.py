@@ -43,7 +43,7 @@ def steady(options: argparse.Namespace) -> int:
 
 def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
     from ..bands.road_sliding import make_states
-    from ..report import prediction
+    from ..derived import prediction
     from ..steady_sliding import curve
 
     asked = [getattr(options, name, ()) for name in OF_A_CURVE]
@@ -141,7 +141,7 @@ def theory(options: argparse.Namespace) -> int:
 
 
 def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
-    from ..report import prediction
+    from ..derived import prediction
 
     told = on_root(slab.comm, lambda: prediction.foretell(job, options.gamma, options.waves))
     if slab.root and not options.quiet:
@@ -234,7 +234,7 @@ def plot(options: argparse.Namespace) -> int:
 def leak(options: argparse.Namespace) -> int:
     """Calculate what leaks through the gaps of a run, into leak.csv; draw it."""
     world = ranks.start()
-    from ..report.leak import write
+    from ..derived.leakage_over_time import write
 
     for directory in options.directories:
         print(*write(directory, options.at or "", options.over, world), sep="\n", end="\n" if world.rank == 0 else "")

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
 
+from ..columns import added_by
 from ..job.checks import limits
 from ..job.sections.calculation import Grid
 from ..job.sections.geometry import Sphere, Wave
@@ -144,7 +145,7 @@ class AdhesionColumns(Effect):
     lost in snaps [J]."""
 
     section: ClassVar[type[Part]] = Adhesion
-    columns: ClassVar[tuple[str, ...]] = ("tensile_area", "adhesive_force", "surface_energy", "snap_loss")
+    columns: ClassVar[tuple[str, ...]] = added_by("adhesion")
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("adhesion", "material"), _bodies),
         Rule(("adhesion", "grid", "material"), _zone_is_resolved),

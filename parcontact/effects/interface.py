@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
+from ..columns import added_by
 from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
@@ -65,7 +66,7 @@ class InterfaceColumns(Effect):
     """Columns of the parts of friction that the body and the interface make, which add up to it."""
 
     section: ClassVar[type[Part]] = Interface
-    columns: ClassVar[tuple[str, ...]] = ("friction_viscous", "friction_interface")
+    columns: ClassVar[tuple[str, ...]] = added_by("interface")
     rules: ClassVar[tuple[Rule, ...]] = (Rule(("interface", "material"), _incompressible),)
 
     @staticmethod

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
+from ..columns import added_by
 from ..job.sections.part import Part
 from ..job.sections.quantities import Count
 from ..leakage.flow import leak
@@ -32,7 +33,7 @@ class LeakageColumns(Effect):
     """
 
     section: ClassVar[type[Part]] = Leakage
-    columns: ClassVar[tuple[str, ...]] = ("flow_x", "flow_y", "constriction")
+    columns: ClassVar[tuple[str, ...]] = added_by("leakage")
 
     @staticmethod
     def decide(job: Any) -> Decision:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 from pydantic import Field
 
+from ..columns import added_by
 from ..errors import InputError, RunError
 from ..history.timeline import Timeline
 from ..job import Grid
@@ -113,7 +114,7 @@ class ThermalColumns:
     """
 
     section: ClassVar[type[Part]] = Thermal
-    columns: ClassVar[tuple[str, ...]] = ("flash_temperature", "max_temperature")
+    columns: ClassVar[tuple[str, ...]] = added_by("thermal")
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("thermal", "material"), _shifts),
         Rule(("thermal", "initial"), _no_warm_start),

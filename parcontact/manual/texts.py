@@ -1,7 +1,8 @@
 """The pages of the manual as text: which there are, and what is written into them of the program itself.
 
 A line `% written here: NAME` in a page is replaced by what the program says of NAME, so that it cannot grow old: the
-keys of a job (`reference.keys`), and what the caller adds, such as the options of the verbs.
+keys of a job (`reference.keys`), the columns of tables (`columns.TABLES`), and what the caller adds, such as the
+options of the verbs.
 """
 
 from __future__ import annotations
@@ -9,8 +10,10 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
+from ..columns import TABLES, describe_columns
 from ..errors import InputError
 from . import docstrings, reference, terminal
 
@@ -18,7 +21,10 @@ PAGES = Path(__file__).parent / "pages"
 MARK = re.compile(r"^% written here: (\w+)$", re.MULTILINE)
 FENCE = re.compile(r"^:::.*\n", re.MULTILINE)
 Writers = Mapping[str, Callable[[], str]]
-OURS: Writers = {"keys": reference.keys}
+OURS: Writers = {
+    "keys": reference.keys,
+    **{Path(file).stem: partial(describe_columns, table) for file, table in TABLES.items()},
+}
 
 
 def names() -> list[str]:

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..columns import UNITS
 from ..errors import InputError
 from ..parallel.slab import Array
 from ..storage import tables
-from ..storage.row import UNITS
 from . import conductivity, style, units
 from .charts import Axis, Chart, Series
 from .run import Run

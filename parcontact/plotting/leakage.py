@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 
+from ..columns import UNITS
 from ..leakage.flow import Flow, Map
-from ..storage.row import UNITS
 from . import charts, conductivity, style, units
 from .style import Panel
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bands.road_sliding import make_states
+from ..columns import STEADY
 from ..errors import JobError, RunError
 from ..job import log_range
 from ..job.checks.cells import more_points
@@ -20,7 +21,7 @@ from ..scene.sanity import ContactWatch
 from ..steady_sliding import curve
 from ..steady_sliding.heating import describe_hot
 from ..steady_sliding.point import Point
-from ..steady_sliding.table import describe_missed, value_of
+from ..steady_sliding.table import describe_missed
 from ..storage.curve_points import Wanted
 from .given_jobs import Given, all_ranks, read, warn
 from .wording import python_words
@@ -123,8 +124,10 @@ def _curve(wanted: Sequence[Wanted], points: Sequence[Point | None], failures: t
     """Return the columns of steady.csv by their names, as arrays; where a point is, it was asked for."""
     places = {"velocity": "speed", "pressure": "pressure", "temperature": "temperature"}
     found = {name: np.array([getattr(at, place) for at in wanted]) for name, place in places.items()}
-    for name in (each.name for each in fields(Curve) if each.name not in (*places, "power", "failures")):
-        found[name] = np.array([math.nan if point is None else value_of(point, name) for point in points])
+    wanted_names = {each.name for each in fields(Curve)} - {*places, "power", "failures"}
+    for column in (column for column in STEADY if column.name in wanted_names):
+        values = [math.nan if point is None else float(column.value(point)) for point in points]
+        found[column.name] = np.array(values)
     branches = max((len(point.dissipated) for point in points if point), default=0)
     power = np.array([(math.nan,) * branches if point is None else point.dissipated for point in points])
     return Curve(**found, power=power, failures=failures)

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+from ..columns import UNITS
 from ..errors import InputError
-from ..storage import fields, hdf5, row, tables
+from ..storage import fields, hdf5, tables
 from .given_jobs import path_of
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
 
 
 def _units(name: str) -> dict[str, str]:
-    kind = row.UNITS.get("dissipated" if name.startswith("dissipated_") else name)
+    kind = UNITS.get("dissipated" if name.startswith("dissipated_") else name)
     return {"units": kind} if kind else {}
 
 

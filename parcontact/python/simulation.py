@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
 
+from ..columns import cells
 from ..effects.effect import columns_of
 from ..errors import InputError
 from ..job import Job
@@ -26,7 +27,7 @@ from ..run.run import Options
 from ..scene import choices
 from ..scene.sanity import ContactWatch
 from ..steady_sliding import start
-from ..storage import checkpoint, heights, tables, wisdom
+from ..storage import checkpoint, heights, wisdom
 from ..storage.checkpoint import Contents, Facts, Table
 from ..storage.fields import UNITS
 from .given_jobs import Given, agree, all_ranks, path_of, read, warn, warn_of
@@ -164,7 +165,7 @@ class Simulation:
         file, march, slab = path_of(path), self._march, self._slab
         self._wait_for_all(f"saves {file}")
         plain = on_root(self.comm, lambda: plain_job(self.job))
-        last = ",".join(tables.texts(self.row.values()))
+        last = ",".join(cells(self.row.values()))
         provenance = runner.provenance_of(self.job, slab, self._saved)
         heights.store(self.job.surface, file.parent, slab)
         march.save(file, Facts(plain, provenance, table=Table(last=last)))

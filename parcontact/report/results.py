@@ -12,12 +12,12 @@ import numpy as np
 from PIL import Image
 
 from .. import progress
+from ..columns import STEADY, UNITS
 from ..job import Job
 from ..plotting import histories, maps, steady, style, sweep, units
 from ..plotting.plots import choose_evenly
 from ..plotting.run import Run, find_curve_job, find_free_area, label_frames, to_load
 from ..storage import hdf5, marker, tables
-from ..storage.row import UNITS
 from ..summary import pull_off, slide, sweep_table, theory_beside, theory_settings
 from .parts import RC, Browser, Section, Table, draw_chart, to_uri
 
@@ -29,7 +29,7 @@ POINTS = (
     *("contact_area_corrected", "error_area", "mean_gap", "max_pressure"),
 )
 DIGITS = 5
-LEAKAGE = {"time": "s", "pressure": "Pa", "flow_x": "m³", "flow_y": "m³", "constriction": "m"}
+LEAKAGE = ("time", "pressure", "flow_x", "flow_y", "constriction")
 MOST_ROWS = 200  # of a table: the whole is in the data
 MOST_MAPS = 24  # pictures of one map: instants in between are left out
 MAP_DPI = 100
@@ -74,7 +74,7 @@ def _leakage_of_stages(run: Run) -> list[Table]:
         return []
     known = [[row for row in rows if run.columns["flow_x"][row] >= 0.0] for rows in run.rows_of_stages.values()]
     rows = [[format_cell(float(run.columns[name][found[-1]])) for name in LEAKAGE] for found in known if found]
-    head = [f"{_to_words(name)} [{unit}]" for name, unit in LEAKAGE.items()]
+    head = [f"{_to_words(name)} [{UNITS[name]}]" for name in LEAKAGE]
     return [Table(head, rows, "leakage at the end of each stage")] * bool(rows)
 
 
@@ -90,8 +90,8 @@ def describe_curve(directory: Path) -> Section:
     """Return the points of a friction curve, and their maps."""
     columns = tables.read(directory / "steady.csv")
     names = [name for name in POINTS if name in columns]
-    known = {**UNITS, "velocity": "m/s", "temperature": "°C"}
-    head = [f"{_to_words(name)} [{known[name]}]" if name in known else _to_words(name) for name in names]
+    units_of = {column.name: column.unit for column in STEADY}
+    head = [f"{_to_words(name)} [{units_of[name]}]" if units_of[name] else _to_words(name) for name in names]
     table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
     pictures = [draw_chart(chart) for chart in steady.charts(directory)]
     states = partial(_label_states, find_free_area(directory))

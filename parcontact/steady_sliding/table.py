@@ -5,8 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from .. import progress
-from ..effects.interface import InterfaceColumns
-from ..effects.thermal import ThermalColumns
+from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
 from ..job import Job
 from ..job.checks.advice import describe_sample
 from ..job.sections.materials import describe_temperature
@@ -19,40 +18,8 @@ from ..storage.tables import GrowingTable
 from .heating import describe_hot
 from .point import Point
 
-COLUMNS = (
-    *("velocity", "pressure", "force_x", "force_y", "friction", "contact_area", "approach", "mean_gap", "max_pressure"),
-    *("residual", "penetration", "operator_calls", "seconds"),
-)
-LAST = ("friction_x", "contact_area_corrected")  # after the dissipation of the branches
-ERRORS = ("error_friction", "error_area", "friction_slopes")
-HEATED = ("temperature", "shift_factor")  # where temperatures are asked for
-QUARTILES = ("lower_temperature", "upper_temperature")  # of the rise over the contact, with `thermal`
-FEEDBACK = ("friction_cold", "flash_shift", "rounds")  # with the feedback of `thermal`
-WAVES = ("steady_waves.csv", ("velocity", "pressure", "wavelength", "share"))  # a further table
-FOUND: dict[str, Callable[[Point], float]] = {  # columns that are neither of the point nor of its measures by name
-    "velocity": lambda point: point.speed,
-    "pressure": lambda point: point.measures.pressure,
-    "friction_x": lambda point: point.friction * (point.velocity[0] / point.speed),
-    "friction_slopes": lambda point: point.measures.friction,
-    "friction_viscous": lambda point: point.friction - point.measures.friction_interface,
-    "residual": lambda point: point.certificate.worst,
-    "penetration": lambda point: point.certificate.penetration,
-    "operator_calls": lambda point: round(point.operator_calls, 2),
-    "seconds": lambda point: round(point.seconds, 3),
-    "error_area": lambda point: point.errors.area.total,
-    "flash_temperature": lambda point: point.flash.mean if point.flash else math.nan,
-    "max_temperature": lambda point: point.flash.highest if point.flash else math.nan,
-    "lower_temperature": lambda point: point.flash.lower if point.flash else math.nan,
-    "upper_temperature": lambda point: point.flash.upper if point.flash else math.nan,
-    "flash_shift": lambda point: point.shift_factor,
-}
+WAVES = ("steady_waves.csv", names_of(STEADY_WAVES))  # a further table
 HEAD = "velocity [m/s]    load [Pa] corr.area  error  friction  error  calls  residual"  # the area as corrected
-
-
-def value_of(point: Point, name: str) -> float:
-    """Return what a point has in a column, but those of the branches."""
-    own = getattr(point, name, None) if name not in FOUND else FOUND[name](point)
-    return float(getattr(point.measures, name) if own is None else own)
 
 
 class CurveTable:
@@ -64,12 +31,15 @@ class CurveTable:
         self._console, self._job = Console(directory / LOG, quiet, 0), setup.job
         self.path, self.heated, self.quiet = directory / "steady.csv", heated, quiet
         branches = setup.prony.moduli.size if self._job.grid.boundary == "periodic" else 0
-        self.interface = InterfaceColumns.columns if setup.choices.interface else ()
         thermal = self._job.section("thermal")
-        self.thermal = (*ThermalColumns.columns, *QUARTILES) if thermal else ()
-        self.thermal += FEEDBACK if thermal and thermal.feedback != "none" else ()
-        added = (*(HEATED if heated else ()), *self.interface, *self.thermal)
-        self._names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added, *ERRORS]
+        there = {
+            "temperatures": heated,
+            "interface": setup.choices.interface is not None,
+            "thermal": thermal is not None,
+            "feedback": thermal is not None and thermal.feedback != "none",
+        }
+        self._columns = choose_columns(STEADY, branches, [what for what, known in there.items() if known])
+        self._names = names_of(self._columns)
         self.known = self._read()
         self._file = GrowingTable(self.path, self._names)
         self._further = GrowingTable(directory / further[0], further[1]) if further else None
@@ -86,7 +56,7 @@ class CurveTable:
         if not self.path.exists():
             return []
         columns = tables.read(self.path)
-        if list(columns) != self._names:
+        if tuple(columns) != self._names:
             files.put_aside(self.path)
             return []
         whole = self.path.read_bytes()
@@ -127,10 +97,8 @@ class CurveTable:
             return
         if self._further:
             for row in rows:
-                self._further.append([repr(float(value)) for value in row])
-        lost = {f"dissipated_{k}": power for k, power in enumerate(point.dissipated)}
-        cells = [lost[name] if name in lost else value_of(point, name) for name in self._names]
-        self._file.append(tables.texts(float(value) for value in cells))
+                self._further.append(cells(map(float, row)))
+        self._file.append(cells(float(column.value(point)) for column in self._columns))
         self._points.append(point)
         self.say(
             f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area_corrected:9.5f} {_percent(point.errors.area.total)} "

@@ -12,13 +12,15 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..columns import FIELDS
 from ..errors import InputError
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from . import files, hdf5
 from .provenance import Provenance
 
-UNITS = {"pressure": "Pa", "displacement": "m", "gap": "m", "height": "m", "temperature": "K"}
+MAPS = ("pressure", "displacement", "gap", "height", "temperature")
+UNITS = {column.name: column.unit for column in FIELDS if column.name in MAPS}
 KIND = "parcontact fields"
 XDMF_SECONDS = 10.0  # tuning: at least between two versions of fields.xdmf, which grows with every instant
 

@@ -4,16 +4,17 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from operator import attrgetter
+from functools import cache
 from pathlib import Path
 
+from ..columns import MEASURES, Column, cells, choose_columns, names_of, values_of
 from ..errors import InputError
 from ..physics.budget import ErrorBudget
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate
 from . import files
 from .checkpoint import Table
-from .tables import MEND, GrowingTable, lines_of, texts
+from .tables import MEND, GrowingTable, lines_of
 
 
 @dataclass(frozen=True)
@@ -41,11 +42,6 @@ class Row:
     added: tuple[float, ...] = ()
 
     @property
-    def wall_time(self) -> float:
-        """The wall time of the step [s], to microseconds."""
-        return round(self.seconds, 6)
-
-    @property
     def error_friction(self) -> float:
         """The estimated relative error of friction, NaN where there is none."""
         return self.errors.friction.total if self.errors and self.errors.friction else math.nan
@@ -56,44 +52,12 @@ class Row:
         return self.errors.area.total if self.errors else math.nan
 
 
-COLUMNS = {  # of measures.csv: unit, and where a row has the number
-    "step": ("", "step"),
-    "time": ("s", "time"),
-    "distance": ("m", "distance"),
-    "pressure": ("Pa", "measures.pressure"),
-    "force_x": ("N", "measures.force_x"),
-    "force_y": ("N", "measures.force_y"),
-    "friction": ("", "measures.friction"),
-    "contact_area": ("", "measures.contact_area"),
-    "approach": ("m", "measures.approach"),
-    "mean_gap": ("m", "measures.mean_gap"),
-    "max_pressure": ("Pa", "measures.max_pressure"),
-    "iterations": ("", "iterations"),
-    "residual": ("", "certificate.worst"),
-    "penetration": ("", "certificate.penetration"),
-    "operator_calls": ("", "operator_calls"),
-    "work": ("J", "work"),
-    "stored": ("J", "stored"),
-    "dissipated": ("J", "dissipated"),
-    "seconds": ("s", "wall_time"),
-}
-LAST = {  # after the dissipation of the branches: columns that came later stand at the end
-    "friction_x": ("", "measures.friction_x"),
-    "contact_area_corrected": ("", "measures.contact_area_corrected"),
-    "error_friction": ("", "error_friction"),
-    "error_area": ("", "error_area"),
-}
-UNITS = {name: unit for name, (unit, _) in (COLUMNS | LAST).items() if unit}  # of the columns that have one
-_first = attrgetter(*(place for _, place in COLUMNS.values()))
-_last = attrgetter(*(place for _, place in LAST.values()))
-
-
 def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
     """Return the columns when the dissipation of so many branches is asked for, and effects have added some.
 
     Raises InputError for a name that is there twice.
     """
-    names = [*COLUMNS, *(f"dissipated_{k}" for k in range(branches)), *LAST, *added]
+    names = [*names_of(_always(branches)), *added]
     if twice := {name for name in added if names.count(name) > 1}:
         raise InputError(f"measures.csv has a column {', '.join(sorted(twice))}: an effect must name its own otherwise")
     return names
@@ -101,7 +65,12 @@ def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
 
 def numbers(row: Row, branches: int) -> list[float]:
     """Return the numbers of a row, in the order of `columns`; NaN for what was not asked for."""
-    return [*_first(row), *row.branch_dissipation[:branches], *_last(row), *row.added]
+    return [*values_of(_always(branches), row), *row.added]
+
+
+@cache
+def _always(branches: int) -> list[Column]:
+    return choose_columns(MEASURES, branches)
 
 
 class MeasuresFile(GrowingTable):
@@ -114,9 +83,9 @@ class MeasuresFile(GrowingTable):
 
     def write(self, row: Row) -> None:
         """Append a row; on an error the file is as it was before, but `table` has the row, which the next run adds."""
-        cells = texts(numbers(row, self._branches))
-        self.table = Table(self.table.rows + 1, ",".join(cells))
-        self.append(cells)
+        line = cells(numbers(row, self._branches))
+        self.table = Table(self.table.rows + 1, ",".join(line))
+        self.append(line)
 
 
 def cut_back_table(
@@ -136,8 +105,8 @@ def cut_back_table(
     last, kept, problems = -1, Table(), list[str]()
     with files.replaced(path) as new:
         new.write(f"{','.join(wanted)}\n".encode())
-        for number, cells in enumerate(found, 2):
-            row = dict(zip(names, cells, strict=True))
+        for number, line in enumerate(found, 2):
+            row = dict(zip(names, line, strict=True))
             if not row["step"].isdecimal():
                 raise InputError(f"{path}, line {number}: the step {row['step']!r} is not a whole number; {MEND}")
             if int(row["step"]) > step:

@@ -43,11 +43,6 @@ class GrowingTable:
             self._file.close()
 
 
-def texts(values: Iterable[float]) -> list[str]:
-    """Return the cells of a line: the shortest that read back to the same numbers, '' for what was not asked for."""
-    return ["" if value != value else repr(value) for value in values]
-
-
 def lines_of(path: Path) -> Iterator[list[str]]:
     """Yield the cells of each whole line, the names of the columns first, all as many; raises InputError."""
     count = 0

@@ -3,7 +3,6 @@ written when the case is done, with its errors once all are."""
 
 import contextlib
 import csv
-import io
 import math
 import re
 import time
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import scene
+from ..columns import STUDY, names_of, to_csv
 from ..job import AUTO, Job
 from ..march import loop
 from ..march.loop import March
@@ -48,7 +48,7 @@ class Outcome:
 
 QUANTITIES = ("mu_max", "mu_end", "area", "area_corrected")
 SETTINGS, RESULTS = (tuple(field.name for field in fields(kind)) for kind in (Settings, Outcome))
-COLUMNS = ("fingerprint", *SETTINGS, *RESULTS, *(f"error_{name}" for name in QUANTITIES))  # of study.csv
+COLUMNS = names_of(STUDY)  # the fingerprint, settings, results and errors
 WORDS, COUNTS = ("integrator", "precision", "kernel"), ("mesh", "steps", "operator_calls")
 
 
@@ -129,14 +129,12 @@ def write_outcomes(
     errors: Mapping[Settings, Mapping[str, float]] | None = None,
 ) -> None:
     """Put all outcomes into the table, in the place of the old one."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    rows = []
     for settings, outcome in outcomes.items():
         given = (AUTO if value is None else value for value in astuple(settings))
-        missed = [errors[settings].get(name, "") if errors else "" for name in QUANTITIES]
-        writer.writerow([fingerprints[settings], *given, *astuple(outcome), *missed])
-    files.write(path, text.getvalue())
+        missed = [errors[settings].get(name) if errors else None for name in QUANTITIES]
+        rows.append([fingerprints[settings], *given, *astuple(outcome), *missed])
+    files.write(path, to_csv(COLUMNS, rows))
 
 
 def _value(name: str, text: str) -> Any:

@@ -13,6 +13,7 @@ from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
 
+from ..columns import SWEEP, SWEEP_RESULTS, added_names, choose_columns, names_of, to_csv
 from ..errors import InputError
 from ..history.timeline import Timeline
 from ..job import Case, Steady
@@ -25,15 +26,11 @@ CURVES = "sweep_curves.csv"
 PLACES = ("velocity", "pressure", "temperature")  # of a point of a curve
 CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
 CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *slide.ERRORS, "residual")
-RESULTS = ("mu_max", "mu_max_distance", "mu_dyn", "contact_area", slide.CORRECTED)
-PULL_OFFS = ("pull_off", "pull_off_error", "pull_off_approach")
-FLOWS = ("flow_x", "flow_y", "constriction")  # with leakage
-DISSIPATED = "dissipated"  # where energies are counted
+RESULTS = names_of(SWEEP_RESULTS)
+SECTIONS = {section: added_names(SWEEP, section) for section in ("adhesion", "output.energy", "leakage")}
 FRICTION_ERRORS = ("mu_max_error", "mu_dyn_error")
-THEORY = tuple(f"theory_{name}" for name in RESULTS if name != slide.CORRECTED)
-COLUMNS = ("state", *RESULTS, *FRICTION_ERRORS, "residual", *slide.ERRORS, "seconds", *THEORY)
-OF_SOME = (*PULL_OFFS, DISSIPATED, *FLOWS)  # columns of jobs with sections of their own
-NUMBERS = {"case", *COLUMNS, *OF_SOME, *CURVE_COLUMNS} - {"state"}
+THEORY = tuple(name for name in names_of(SWEEP) if name.startswith("theory_"))
+NUMBERS = {*names_of(SWEEP), *CURVE_COLUMNS} - {"state"}
 MEND = "run the sweep again, which writes the table anew"
 MEANS = "mean", "std", "sem"
 SAMPLES = "seed", "centre"  # last words of keys over whose values means are taken: samples of one surface
@@ -50,8 +47,9 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
     with _alone(directory):
         keys, seeded = list(cases[0].settings), any(key.split(".")[-1] in SAMPLES for key in cases[0].settings)
         rows, points = [_row(case) for case in cases], [row for case in cases for row in _points(case)]
-        more = list(_columns_of_some(cases))
-        save(directory / TABLE, ["case", *keys, *COLUMNS, *more], rows)
+        there = {section for case in cases for section in SECTIONS if _asks_for(case, section)}
+        more = [name for section in SECTIONS if section in there for name in SECTIONS[section]]
+        save(directory / TABLE, ["case", *keys, *names_of(choose_columns(SWEEP, when=there))[1:]], rows)
         if points:
             save(directory / CURVES, ["case", *keys, *CURVE_COLUMNS], points)
         if seeded and any(case.job.history for case in cases):
@@ -60,15 +58,9 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
             save(directory / "sweep_curves_mean.csv", *_means(points, [*keys, *PLACES], CURVE_RESULTS))
 
 
-def _columns_of_some(cases: Sequence[Case]) -> Iterator[str]:
-    """Yield the columns of what the cases are about beside friction and area."""
-    jobs = [case.job for case in cases]
-    if any(job.section("adhesion") for job in jobs):
-        yield from PULL_OFFS
-    if any(job.output.energy for job in jobs):
-        yield DISSIPATED
-    if any(job.section("leakage") for job in jobs):
-        yield from FLOWS
+def _asks_for(case: Case, section: str) -> bool:
+    """Return whether a case has a section, or energies."""
+    return case.job.output.energy if section == "output.energy" else case.job.section(section) is not None
 
 
 def results(directory: Path) -> Path:
@@ -146,19 +138,14 @@ def _results(case: Case) -> dict[str, Any]:
             row |= {f"{prefix}{key}": value for key, value in known.items()}
         if not prefix:
             row |= _pull_off(case, columns) if case.job.section("adhesion") else {}
-            row |= {
-                name: _last(columns[name]) for name in (DISSIPATED, *FLOWS) if name in columns and _is_asked(case, name)
-            }
+            asked = [name for key in ("output.energy", "leakage") if _asks_for(case, key) for name in SECTIONS[key]]
+            row |= {name: _last(columns[name]) for name in asked if name in columns}
             row["seconds"] = math.fsum(columns["seconds"])
             row["residual"] = slide.largest(columns["residual"])
             row |= slide.mean_errors(case.job.history, columns)
             within = slide.absolute_errors(case.job.history, columns, case.job.grid.dx)
             row |= {name: within.get(name.removesuffix("_error"), math.nan) for name in FRICTION_ERRORS}
     return row
-
-
-def _is_asked(case: Case, name: str) -> bool:
-    return case.job.output.energy if name == DISSIPATED else case.job.section("leakage") is not None
 
 
 def _last(values: Sequence[float]) -> float:
@@ -174,7 +161,7 @@ def _pull_off(case: Case, columns: Mapping[str, Sequence[float]]) -> dict[str, f
         return {}
     pressure, approach = (columns[name][lost[-1].row] for name in ("pressure", "approach"))
     area = case.job.grid.lx * case.job.grid.ly
-    return dict(zip(PULL_OFFS, (-pressure * area, lost[-1].beside * area, approach), strict=True))
+    return dict(zip(SECTIONS["adhesion"], (-pressure * area, lost[-1].beside * area, approach), strict=True))
 
 
 def _points(case: Case) -> Iterator[dict[str, Any]]:
@@ -248,15 +235,7 @@ def _means(
 
 
 def save(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
-    text = StringIO()
-    writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({key: _text(value) for key, value in row.items()} for row in rows)
-    files.write(path, text.getvalue())
-
-
-def _text(value: Any) -> Any:
-    return ("" if value != value else repr(value)) if isinstance(value, float) else value
+    files.write(path, to_csv(columns, ([row.get(name) for name in columns] for row in rows)))
 
 
 def _number(text: str) -> Any:

@@ -18,20 +18,11 @@ from marching import ROOT
 from pydantic import TypeAdapter
 
 from parcontact import __main__, mesh
-from parcontact.bands import road_sliding
+from parcontact.columns import TABLES
 from parcontact.command.arguments import parse_arguments
-from parcontact.effects.adhesion import AdhesionColumns
-from parcontact.effects.interface import InterfaceColumns
-from parcontact.effects.leakage import LeakageColumns
-from parcontact.effects.thermal import ThermalColumns
 from parcontact.job import schema
 from parcontact.job.text import yamltext
 from parcontact.manual import reference, texts
-from parcontact.report import leak, prediction
-from parcontact.steady_sliding import table as steady_table
-from parcontact.storage import fields, row
-from parcontact.study import outcome
-from parcontact.summary import sweep_table
 
 PAGES = texts.names()
 NOTEBOOKS = sorted((texts.PAGES.parent / "notebooks").glob("*.ipynb"))
@@ -140,36 +131,13 @@ def test_the_page_has_range_unit_and_default() -> None:
 
 # -- columns ---------------------------------------------------------------------------------------------------------
 
-COLUMNS = {
-    "measures.csv": [
-        *row.columns(0, (*AdhesionColumns.columns, *InterfaceColumns.columns)),
-        *(*LeakageColumns.columns, *ThermalColumns.columns),
-        "dissipated_K",
-    ],
-    "leak.csv": leak.Instant._fields,
-    "steady.csv": [
-        *(*steady_table.COLUMNS, "dissipated_K", *steady_table.LAST),
-        *(*steady_table.HEATED, *InterfaceColumns.columns, *ThermalColumns.columns),
-        *(*steady_table.QUARTILES, *steady_table.FEEDBACK, *steady_table.ERRORS),
-    ],
-    "steady_waves.csv": steady_table.WAVES[1],
-    "bands.csv": road_sliding.COLUMNS,
-    "theory.csv": prediction.Instant._fields,
-    "steady_theory.csv": prediction.SteadyInstant._fields,
-    "sweep.csv": ["case", *sweep_table.COLUMNS, *sweep_table.OF_SOME],
-    "study.csv": outcome.COLUMNS,
-    "fields.h5": [*fields.UNITS, "t", "y", "x", "step"],
-}
 
-
-@pytest.mark.parametrize("file", COLUMNS)
-def test_every_column_is_documented(file: str) -> None:
-    """A column that was added needs a line in parcontact/manual/pages/outputs.md."""
+@pytest.mark.parametrize("file", TABLES)
+def test_every_table_is_on_its_page(file: str) -> None:
+    """The page has a section for each table, with all of its columns."""
     (section,) = re.findall(rf"^## {re.escape(file)}\n(.*?)(?=^## |\Z)", texts.page("outputs"), re.M | re.S)
-    rows = re.findall(r"^\| `(\w+)` \| *([^|]*?) *\| ", section, re.M)
-    assert sorted(name for name, _ in rows) == sorted(COLUMNS[file])
-    known = {"measures.csv": row.UNITS, "fields.h5": fields.UNITS}.get(file, {})
-    assert {name: unit for name, unit in rows if name in known} == known
+    rows = re.findall(r"^\| `(\w+)` \| *([^|]*?) *\| [^|]+ \|$", section, re.M)
+    assert rows == [(column.name, column.unit or "-") for column in TABLES[file]]
 
 
 # -- blocks ----------------------------------------------------------------------------------------------------------

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from parcontact.derived.leakage_over_time import Instant
 from parcontact.plotting import charts, conductivity, leakage
-from parcontact.report.leak import Instant
 
 
 def drawn(chart: charts.Chart) -> dict[str, np.ndarray]:

@@ -11,10 +11,10 @@ from mpi4py import MPI
 from scipy.special import gamma
 
 from parcontact import job as jobs
+from parcontact.derived import prediction
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
-from parcontact.report import prediction
 from parcontact.road import spectrum, statistics
 from parcontact.road.map_files import UNITS
 from parcontact.scene import rigid_surface

@@ -16,11 +16,11 @@ from marching import column, marched
 from numpy.testing import assert_allclose
 
 import parcontact as pc
+from parcontact.derived.leakage_over_time import Gaps
 from parcontact.effects import contact_law
 from parcontact.job import Job
 from parcontact.parallel.slab import Array, Slab
 from parcontact.plotting import maps
-from parcontact.report.leak import Gaps
 from parcontact.solve.constraint import Cells, Mask, NonNegative, Set
 
 FLUID, LOAD = 4e4, 6e4  # pressure of the fluid, and the load that it does not bear [Pa]

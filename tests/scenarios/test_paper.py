@@ -9,9 +9,9 @@ import pytest
 from marching import JOBS, load_script, marched
 from numpy.typing import NDArray
 
+from parcontact.derived import prediction
 from parcontact.job import Job, load, load_cases
 from parcontact.parallel.slab import Slab
-from parcontact.report import prediction
 from parcontact.summary import slide
 from parcontact.summary.slide import Slide
 from parcontact.theory import hertz

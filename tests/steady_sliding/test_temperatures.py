@@ -9,10 +9,10 @@ from conftest import Main, RunParcontact
 
 from parcontact import job as jobs
 from parcontact import scene
+from parcontact.derived import prediction
 from parcontact.errors import InputError, JobError
 from parcontact.parallel.slab import Slab
 from parcontact.plotting import steady
-from parcontact.report import prediction
 from parcontact.steady_sliding.curve import request
 from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.storage.tables import read

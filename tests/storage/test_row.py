@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from parcontact.columns import MEASURES, choose_columns
 from parcontact.physics.measures import Measures
 from parcontact.storage import tables
 from parcontact.storage.checkpoint import Table
-from parcontact.storage.row import COLUMNS, LAST, MeasuresFile, Row, cut_back_table
+from parcontact.storage.row import MeasuresFile, Row, cut_back_table
 
 
 def row(step: int, lost: tuple[float, ...] = ()) -> Row:
@@ -26,7 +27,7 @@ def test_numbers_read_back(tmp_path: Path) -> None:
     path = tmp_path / "measures.csv"
     written(path, 3)
     found = tables.read(path)
-    assert list(found) == [*COLUMNS, *LAST]
+    assert list(found) == [column.name for column in choose_columns(MEASURES)]
     assert found["step"] == [0, 1, 2]
     assert found["time"] == [0.0, 0.1, 0.2]
     assert found["pressure"] == [1 / 3] * 3
@@ -77,9 +78,9 @@ def test_other_columns(tmp_path: Path) -> None:
     path = tmp_path / "measures.csv"
     written(path, 3)
     assert cut_back_table(path, 2, Table(), 2)[1] == []
-    assert list(tables.read(path)) == [*COLUMNS, "dissipated_0", "dissipated_1", *LAST]
+    assert list(tables.read(path)) == [column.name for column in choose_columns(MEASURES, 2)]
     assert math.isnan(tables.read(path)["dissipated_1"][2])
     assert cut_back_table(path, 2, Table(), 0)[1] == []
-    assert list(tables.read(path)) == [*COLUMNS, *LAST]
+    assert list(tables.read(path)) == [column.name for column in choose_columns(MEASURES)]
     written(tmp_path / "split.csv", 2, branches=2)
     assert tables.read(tmp_path / "split.csv")["dissipated_1"] == [0.1, 0.1]

@@ -1,7 +1,7 @@
 """Predictions of Persson's theory for a job with one rough surface: friction and contact area at each instant."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 from .. import job as jobs
 from .. import scene
 from ..bands.choice import choose
+from ..columns import STEADY_THEORY, THEORY, Table, names_of, to_csv, values_of
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import InputError
 from ..history.timeline import Span, Timeline
@@ -117,7 +118,7 @@ def write_steady(job: Job, wanted: Request) -> SteadyInstant:
     """Write the prediction for a curve as steady_theory.csv, and draw both if the curve is there; returns the point of
     the highest friction."""
     rows = list(predict_steady(job, wanted))
-    _write(job.output.directory / STEADY_FILE, SteadyInstant._fields, iter(rows))
+    _write(job.output.directory / STEADY_FILE, STEADY_THEORY, rows)
     if (curve := job.output.directory / "steady.csv").is_file():
         from ..plotting import plots  # matplotlib is slow to import, and for pictures only
 
@@ -152,19 +153,16 @@ def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
 
 def write(job: Job, rows: Iterator[Instant], settings: TheorySettings) -> Path:
     """Write the rows as theory.csv, and theory.yaml beside it, for the job; returns the table's path."""
-    return _write(job.output.directory / theory_settings.TABLE, Instant._fields, rows, settings)
+    return _write(job.output.directory / theory_settings.TABLE, THEORY, rows, settings)
 
 
-def _write(
-    path: Path, columns: Sequence[str], rows: Iterator[Sequence[float]], settings: TheorySettings | None = None
-) -> Path:
+def _write(path: Path, table: Table, rows: Iterable[object], settings: TheorySettings | None = None) -> Path:
     """Write a table, and its settings beside it; raises InputError for a path that cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with files.replaced(path, theory_settings.is_own_table if settings else _is_own_curve) as file:
-            file.write(f"{','.join(columns)}\n".encode())
-            for row in rows:
-                file.write(f"{','.join(repr(float(value)) for value in row)}\n".encode())
+            lines = (map(float, values_of(table, row)) for row in rows)
+            file.write(to_csv(names_of(table), lines).encode())
         if settings:
             theory_settings.write(path.parent, settings)
     except OSError as error:
@@ -173,7 +171,7 @@ def _write(
 
 
 def _is_own_curve(path: Path) -> bool:
-    return path.read_bytes().startswith(",".join(SteadyInstant._fields).encode())
+    return path.read_bytes().startswith(",".join(names_of(STEADY_THEORY)).encode())
 
 
 def _refuse_unknown(job: Job) -> None:

@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from .. import scene
+from ..columns import LEAK, names_of, to_csv, values_of
 from ..effects.contact_law import touching_of
 from ..errors import InputError
 from ..job import reading
@@ -146,10 +147,9 @@ def write(directory: Path, at: str, over: str, comm: MPI.Intracomm) -> Iterator[
         return
     bare, missing = _bare_flow(gaps)
     rows = [gaps.row(index, leaks[index], bare) for index in gaps.shown]
-    lines = [",".join(Instant._fields), *(",".join(tables.texts(row)) for row in rows)]
     name = f"leak.{gaps.fields.steps[gaps.shown[0]]}" if at else "leak"
     table, picture = (directory / f"{name}.{kind}" for kind in ("csv", "png"))
-    files.write(table, "\n".join(lines) + "\n")
+    files.write(table, to_csv(names_of(LEAK), (values_of(LEAK, row) for row in rows)))
     instant = Run(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
     flows = leaks[drawn].leak.along_x, leaks[drawn].leak.along_y
     leakage.draw(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)

@@ -13,8 +13,9 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact import __main__
+from parcontact.derived import leakage_over_time as leak
 from parcontact.leakage.flow import mesh_error, solve_flow
-from parcontact.report import leak, results
+from parcontact.report import results
 
 POINTS = 64
 PRESS = {"pressure": {"from": 1e4, "to": 8e4}, "duration": 1.0, "time_step": 0.25}
