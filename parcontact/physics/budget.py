@@ -52,6 +52,7 @@ NOISE = 0.4  # of the slope of the surface, times the complementarity: tangentia
 BY_ENERGY = 0.3  # of the difference of the views, in steady sliding
 PRESSURES = 0.3  # of the slope: friction that is less is not wrong by a larger share, as its power is a sum of squares
 ROUNDING = 1e-12  # of the slope of the surface: friction of pressures that are right to all digits
+UNKNOWN = 0.5  # accuracy: of friction: one whose error is estimated as more cannot be told from 0
 AT_REST, AT_ONCE = 1e-100, 1e-200  # m/s and m: what a second at rest weighs against a way, and what a jump does
 LEAST_WAY = 1e-60  # m: smaller weights are those of rest
 
@@ -74,6 +75,15 @@ class Parts:
     @property
     def total(self) -> float:
         return self.solver + self.time + self.folded + self.mesh + self.method + self.scatter
+
+    @property
+    def of_friction(self) -> float:
+        """The error of friction as it is stated: 1 or more where it is more than UNKNOWN.
+
+        Such a friction is the small difference of forces that are known, and its error to an order of magnitude only:
+        six times friction where 0.76 was estimated.
+        """
+        return max(self.total, 1.0) if self.total > UNKNOWN else self.total
 
     @property
     def along(self) -> float:
@@ -232,6 +242,8 @@ class ErrorSums:
         """Return as plain data the accuracy that was asked for, and the relative errors by part, and in all."""
         found = {"friction": self.friction, "contact_area_corrected": self.area}
         parts = {name: each.plain() for name, each in found.items() if each is not None}
+        if self.friction is not None:
+            parts["friction"]["total"] = self.friction.of_friction
         return {"accuracy": accuracy, **parts}
 
     def lines(self, asked: tuple[float, float], chosen: Collection[str] = ()) -> list[str]:
@@ -240,11 +252,11 @@ class ErrorSums:
         found = zip(("friction", "the corrected contact area"), (self.friction, self.area), asked, strict=True)
         way = "the distance slid" if self.sums[1, 0] > LEAST_WAY else "time"
         lines = [
-            f"estimated error of {name}: {describe(parts)}, mean over {way}{advice(parts, accuracy, chosen)}"
+            f"estimated error of {name}: {describe(parts, name)}, mean over {way}{advice(parts, accuracy, chosen)}"
             for name, parts, accuracy in found
             if parts is not None
         ]
-        if self.friction is not None and self.friction.total >= 1.0:
+        if self.friction is not None and self.friction.of_friction >= 1.0:
             lines.append(f"friction is 0 +- {self.friction_within:.2g}: it is smaller than its estimated error")
         return lines
 
@@ -265,11 +277,13 @@ def exceeds(error: float, accuracy: float) -> bool:
     return error > ROUNDED * accuracy
 
 
-def describe(parts: Parts) -> str:
-    """Return the total in per cent, and the parts that it is made of; of the mesh also those of both directions, where
-    neither is small."""
+def describe(parts: Parts, name: str) -> str:
+    """Return the total error of "friction", or of another quantity, in per cent, and the parts that it is made of; of
+    the mesh also those of both directions, where neither is small."""
     there = [name for name in NAMES if getattr(parts, name)]
     shares = ", ".join(f"{SHOWN.get(name, name)} {per_cent(getattr(parts, name))}" for name in there)
     both = min(parts.across, parts.along) > LITTLE * parts.mesh
     split = f": {per_cent(parts.along)} along, {per_cent(parts.across)} across the sliding" if both else ""
-    return f"{per_cent(parts.total, 3)} ({shares or 'no part'}{split})"
+    total = parts.of_friction if name == "friction" else parts.total
+    more = " or more" if name == "friction" and total >= 1.0 else ""
+    return f"{per_cent(total, 3)}{more} ({shares or 'no part'}{split})"

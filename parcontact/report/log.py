@@ -11,7 +11,7 @@ from ..storage.curve_points import LOG
 LOGS = ("run.log", LOG)
 COUNTS = "counts on root: "
 MACHINE = re.compile(r"parcontact |machine: |batch job: |\d+ ranks?, ")  # how lines about it begin
-ESTIMATE = re.compile(r"estimated error of ([^:]*): (?:up to )?(\S+) % \(([^)]*)\)")
+ESTIMATE = re.compile(r"estimated error of ([^:]*): (?:up to )?(\S+) %(?: or more)? \(([^)]*)\)")
 PART = re.compile(r"([a-z ]+) (\S+) %")
 
 

@@ -47,5 +47,5 @@ class Point:
 
     @property
     def error_friction(self) -> float:
-        """The relative error of friction; NaN where there is none."""
-        return self.errors.friction.total if self.errors.friction else math.nan
+        """The relative error of friction, 1 or more where it cannot be told from 0; NaN where there is none."""
+        return self.errors.friction.of_friction if self.errors.friction else math.nan

@@ -154,7 +154,7 @@ def describe_missed(points: Sequence[Point], job: Job) -> Iterator[str]:
             _, point, parts = max(missed, key=lambda one: one[0])
             place = Wanted(point.speed, point.pressure, point.temperature)
             yield (
-                f"estimated error of {name} at {len(missed)} of {len(points)} points: up to {describe(parts)}, "
+                f"estimated error of {name} at {len(missed)} of {len(points)} points: up to {describe(parts, name)}, "
                 f"at {place}{advice(parts, accuracy, chosen)}"
             )
 

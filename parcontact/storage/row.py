@@ -43,8 +43,8 @@ class Row:
 
     @property
     def error_friction(self) -> float:
-        """The estimated relative error of friction, NaN where there is none."""
-        return self.errors.friction.total if self.errors and self.errors.friction else math.nan
+        """The estimated relative error of friction; 1 or more if that may be 0, NaN where there is none."""
+        return self.errors.friction.of_friction if self.errors and self.errors.friction else math.nan
 
     @property
     def error_area(self) -> float:
