@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from closed_forms import adhesion
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 from scipy.integrate import simpson
@@ -27,7 +28,6 @@ from sticking import (
 )
 
 import parcontact as pc
-from parcontact.theory import adhesion
 
 ALPHA, AMPLITUDE, WAVELENGTH = 0.3, 5e-6, 1e-3  # of Johnson's wave
 

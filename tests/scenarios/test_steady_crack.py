@@ -8,11 +8,11 @@ the edge turns back, the layer is open for so long that it is relaxed there, too
 
 import numpy as np
 import pytest
+from closed_forms import viscoelastic_adhesion
 from numpy.testing import assert_allclose
 from sticking import MODULUS, WORK, Job, Map, ramp, steps
 
 from parcontact.python.row import Row
-from parcontact.theory import viscoelastic_adhesion
 
 RATIO, TIME = 10.0, 1e-2  # k = E_inf/E_0, relaxation time [s]
 CREEP = RATIO * TIME  # [s]

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from closed_forms import cylinder_sliding
 from mpi4py import MPI
 from steady_scenes import CREEP_TIME, G0, RADIUS, sliding
 
 from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.theory import cylinder_sliding
 
 LINE_LOAD = 10.0  # N/m
 LINE = float(np.sqrt(4 * LINE_LOAD * RADIUS / (np.pi * 4 * G0)))  # a0, Hertz with the instantaneous modulus [m]

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from closed_forms import adhesion
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize_scalar
 
-from parcontact.theory import adhesion, hertz
+from parcontact.theory import hertz
 
 RADIUS, WORK, MODULUS = 2e-3, 0.05, 4e6  # m, J/m^2, Pa
 SPHERE = (RADIUS, WORK, MODULUS)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from closed_forms.cylinder_sliding import pressure, sliding_cylinder
 from numpy.polynomial import chebyshev
 from numpy.testing import assert_allclose
 
-from parcontact.theory.cylinder_sliding import pressure, sliding_cylinder
 from parcontact.theory.quadrature import graded_rule
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from closed_forms import flash
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -13,7 +14,6 @@ from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding.point import Point
 from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.theory import flash
 
 KAPPA, D = 0.2, 1e-7
 

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
+from closed_forms import viscoelastic_adhesion
 from numpy.testing import assert_allclose
 from rubbers import TWELVE_DECADES
-
-from parcontact.theory import viscoelastic_adhesion
 
 RATIO = 10.0
 SOLID = (1.0, [RATIO - 1], [1.0])  # creeps with tau_c = k tau = 10 s

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from ..physics.prony import Moduli, creep_spectrum
-from .arrays import Array
-from .quadrature import graded_rule
+from parcontact.physics.prony import Moduli, creep_spectrum
+from parcontact.theory.arrays import Array
+from parcontact.theory.quadrature import graded_rule
 
 
 def opening_crack(velocity: float, *material: *Moduli) -> float:

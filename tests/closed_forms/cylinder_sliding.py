@@ -25,8 +25,8 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import i0e, i1e, k0e, k1e
 
-from .arrays import Array
-from .quadrature import graded_rule
+from parcontact.theory.arrays import Array
+from parcontact.theory.quadrature import graded_rule
 
 
 class SlidingCylinder(NamedTuple):

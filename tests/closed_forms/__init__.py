@@ -1,0 +1,1 @@
+"""Closed forms against which results are tested; those that users call are in `parcontact.theory`."""
