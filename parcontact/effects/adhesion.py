@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
@@ -17,13 +17,19 @@ from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
 from ..physics.adhesion import AdhesionLaw, ramp_of, smallest_range
+from ..physics.entries import Entry, Saved
+from ..physics.units import Units
+from . import adhesive_energies
 from .adhesion_doubts import sizes
-from .effect import Decision, Effect, Instant
+from .adhesive_energies import NO_ENERGIES, AdhesiveEnergies
+from .contact_protocol import ContactLaw
+from .effect import Changes, Decision, Effect, Instant
 
 MOST_CELLS = 2.0  # physics: process zones in a cell; with more, nothing can be said about rates
 SAME = 1e-9  # rounding: of a range
 JKR_LIKE, DMT_LIKE = 3.0, 0.3  # physics: Tabor's parameter, above and below which spheres are as in these theories
 FULL_CONTACT = 0.56988  # physics: Johnson's parameter, from which a wave is in full contact without load
+SNAP_FRONT = 2.0  # accuracy: half process zones by which an edge moves in the shortest step of a snap
 CELLS = 2.0  # accuracy: of the process zone with the range `auto`; pull-off is then right to 0.6 %
 AUTO: Literal["auto"] = "auto"
 LENGTH: TypeAdapter[float] = TypeAdapter(Positive)
@@ -140,7 +146,18 @@ def _kind(tabor: float) -> str:
     return "between the theories of Johnson, Kendall and Roberts (1.5 pi w R) and of Derjaguin, Muller and Toporov (2)"
 
 
-class AdhesionColumns(Effect):
+@dataclass(frozen=True)
+class AdhesionMemory:
+    """Memory of energies, of the number of steps in which the contact `snaps`, of a warning given, and the values of
+    the columns."""
+
+    energies: AdhesiveEnergies = NO_ENERGIES
+    snaps: int = 0
+    front_warning_given: bool = False
+    columns: tuple[float, ...] = (0.0, 0.0, math.nan, math.nan)
+
+
+class AdhesionColumns(Effect[AdhesionMemory]):
     """The share of the area under tension, the force of all tension [N], the energy of the surfaces [J] and the energy
     lost in snaps [J]."""
 
@@ -184,11 +201,49 @@ class AdhesionColumns(Effect):
         yield from _facts(job)
 
     def __init__(self, scene: Any) -> None:
-        self._values: tuple[float, ...] = (0.0, 0.0, math.nan, math.nan)
+        self._scene, self._area = scene, scene.choices.grid.lx * scene.choices.grid.ly
 
-    def follow(self, instant: Instant) -> None:
-        if instant.sticking is not None:
-            self._values = instant.sticking
+    def law(self) -> ContactLaw[Any]:
+        from .adhesive_law import AdhesiveLaw  # what solves is not loaded to check a job
 
-    def values(self) -> Sequence[float]:
-        return self._values
+        return AdhesiveLaw(self._scene)
+
+    def at_rest(self) -> AdhesionMemory:
+        return AdhesionMemory()
+
+    def follow(self, instant: Instant, memory: AdhesionMemory) -> Changes[AdhesionMemory]:
+        """Return the energies after a step; errors are not stated across a snap, and a step is warned of once in which
+        the edges of contact of a viscoelastic body move too far."""
+        solved, energies = instant.solved, memory.energies
+        columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan
+        if self._scene.energy is not None:
+            if solved.end != "open":
+                energies = adhesive_energies.advance(energies, instant, self._area)
+            columns = (*columns[:2], energies.surfaces, energies.lost)
+        far = instant.front > SNAP_FRONT and not instant.untouched
+        chosen = instant.step.judge is not None
+        snapped = solved.snapped or (chosen and far)
+        snapped |= energies.lost > memory.energies.lost and not instant.untouched
+        warns = far and not (chosen or memory.front_warning_given or instant.step.jump)
+        warns = warns and self._scene.material.branched is not None
+        memory = AdhesionMemory(energies, memory.snaps + snapped, memory.front_warning_given or warns, columns)
+        remark = (
+            f"the edge of contact moves by {0.5 * instant.front:.2g} times a process zone, and rates are resolved up "
+            "to half of one: use shorter steps, or time_step: auto; further steps are not looked at"
+        )
+        return Changes(memory, remark if warns else "", not snapped)
+
+    def values(self, memory: AdhesionMemory) -> Sequence[float]:
+        return memory.columns
+
+    def work(self, memory: AdhesionMemory) -> float:
+        return memory.energies.work
+
+    def entries(self, memory: AdhesionMemory, units: Units) -> dict[str, Entry]:
+        """Return the energies, and the number of steps in which the contact snapped."""
+        energies = {name: Entry(value, 1.0, "J") for name, value in memory.energies._asdict().items()}
+        return energies | {"snaps": Entry(float(memory.snaps))}
+
+    def restored(self, memory: AdhesionMemory, saved: Saved) -> AdhesionMemory:
+        energies = AdhesiveEnergies(*(float(saved[name]) for name in AdhesiveEnergies._fields))
+        return AdhesionMemory(energies, int(saved["snaps"]))

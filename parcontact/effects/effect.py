@@ -1,14 +1,14 @@
 """The interface of effects: a decision from the job alone, and what is made, remembered and written where it is on.
 
-An effect that follows the steps is one class, found by the section that it adds to a job (`job.added_sections`): no
-other file knows it. One that takes the place of a part (another body, operator or path) has its decision in
-`scene/choices.py`, and `scene/scene.py` makes it where it makes that part.
+An effect is one class, found by the section that it adds to a job (`job.added_sections`): no other file knows it. It
+may bring the contact law of the steps, and it follows each step that was made.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from numpy.typing import DTypeLike, NDArray
 
@@ -16,9 +16,12 @@ from ..errors import InputError
 from ..history.timeline import Step
 from ..job.sections.part import Part
 from ..parallel.slab import Array
-from ..physics.entries import Entry, Saved
+from ..physics.entries import Entry, Memory, Saved
 from ..physics.measures import Measures
 from ..physics.units import Units
+from .contact_protocol import ContactLaw, SolvedContact
+
+Remembered = TypeVar("Remembered", covariant=True)
 
 
 @dataclass(frozen=True)
@@ -35,21 +38,49 @@ class Instant:
     """A step just made, in the run's units unless others are given; maps are valid until the next step begins.
 
     The pressure on this rank's rows is `modulus pressure`, `displacement` that of the body, and `touching` is not 0
-    where the surfaces touch; they have the shape (ny_loc, nx). `slid` [m] is by how much the surface moved in the step.
+    where the surfaces touch; they have the shape (ny_loc, nx). `before` and `measures` are those of the step before and
+    of this one. The surface moved by `moved` [m] in the step, in which the energy of the body, stored and dissipated,
+    changed by `gained` [J], NaN where none is asked for. Edges of a contact with adhesion moved by `front` half process
+    zones; `untouched` says that nothing touched, and nothing was pulled, before and after the step.
     """
 
     step: Step
-    pressure: Array
+    solved: SolvedContact[Any]
     modulus: float
     displacement: Array
-    touching: NDArray[Any]
-    slid: float
+    before: Measures
     measures: Measures
-    sticking: tuple[float, ...] | None = None
+    moved: tuple[float, float]
+    gained: float
+    front: float
+    untouched: bool
+
+    @property
+    def pressure(self) -> Array:
+        return self.solved.contact.p
+
+    @property
+    def touching(self) -> NDArray[Any]:
+        return self.solved.touching
+
+    @property
+    def slid(self) -> float:
+        """By how much the surface moved [m]."""
+        return math.hypot(*self.moved)
 
 
-class Effect(Protocol):
-    """The class of an effect that is told of every step made; made with a `Scene`, only where the job asks for it.
+@dataclass(frozen=True)
+class Changes(Generic[Remembered]):
+    """Changes that an effect makes in a step: its memory, a sentence for run.log or '', and whether errors can be
+    stated across the step."""
+
+    memory: Remembered
+    remark: str = ""
+    states_errors: bool = True
+
+
+class Effect(Protocol[Memory]):
+    """The class of an effect; made with a `Scene`, only where the job asks for it, and a part of the run.
 
     It may have `rules` for the whole job, as sections have them, `lifts`: checks of other jobs that do not hold with
     it, and `doubts` and `facts`: functions of a job that give warnings, and what the section means in it. Methods are
@@ -58,6 +89,7 @@ class Effect(Protocol):
 
     section: ClassVar[type[Part]]  # what it adds to a job
     columns: ClassVar[tuple[str, ...]]  # what it adds to measures.csv
+    fields: ClassVar[tuple[str, ...]] = ()  # maps that it adds to those of output.fields
 
     @staticmethod
     def decide(job: Any) -> Decision:
@@ -71,42 +103,66 @@ class Effect(Protocol):
 
     def __init__(self, scene: Any) -> None: ...
 
-    def follow(self, instant: Instant) -> None:
-        """Take note of a step that was made."""
+    def law(self) -> ContactLaw[Any] | None:
+        """Return the contact law of the steps, None if the effect has none."""
+        return None
+
+    def at_rest(self) -> Memory:
+        """Return the memory before the first step, in new maps."""
+        return None  # type: ignore[return-value]
+
+    def follow(self, instant: Instant, memory: Memory) -> Changes[Memory]:
+        """Return the changes that a step makes which was made."""
         ...
 
-    def values(self) -> Sequence[float]:
+    def values(self, memory: Memory) -> Sequence[float]:
         """Return what its columns have in the row of the last step, the same on every rank; NaN leaves one empty.
 
         Local to this rank.
         """
         ...
 
-    def entries(self, units: Units) -> dict[str, Entry]:
-        """Return what it remembers after the last step, by name; maps are its own, or made for a checkpoint."""
+    def field(self, memory: Memory, name: str) -> Array:
+        """Return this rank's rows of one of its maps in SI units, a new array."""
+        ...
+
+    def time_factor(self, memory: Memory) -> float:
+        """Return relaxation times from now on over those of the job's temperature. Raises RunError."""
+        return 1.0
+
+    def work(self, memory: Memory) -> float | None:
+        """Return the work of the load since the start [J], None where it is that on the body."""
+        return None
+
+    def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:
+        """Return what a checkpoint has of a memory, by name; maps are its own, or made for a checkpoint."""
         return {}
 
-    def restore(self, saved: Saved) -> None:
-        """Go on from what a checkpoint has of the entries, in the run's units, numbers as arrays.
+    def restored(self, memory: Memory, saved: Saved) -> Memory:
+        """Return the memory of a checkpoint, in the run's units, numbers as arrays.
 
         Maps have been read into those of `entries`.
         """
-        ...
+        return memory
 
 
-def columns_of(effects: Mapping[str, Effect]) -> tuple[str, ...]:
+Effects = Mapping[str, Effect[Any]]
+Memories = Mapping[str, Any]
+
+
+def columns_of(effects: Effects) -> tuple[str, ...]:
     """Return the columns that effects add to measures.csv."""
     return tuple(name for effect in effects.values() for name in effect.columns)
 
 
-def values_of(effects: Mapping[str, Effect]) -> tuple[float, ...]:
+def values_of(effects: Effects, memories: Memories) -> tuple[float, ...]:
     """Return what effects have for their columns in the row of the last step; raises InputError for what does not
     fit."""
-    return tuple(number for name, effect in effects.items() for number in _numbers(name, effect))
+    return tuple(number for name, effect in effects.items() for number in _numbers(name, effect, memories[name]))
 
 
-def _numbers(name: str, effect: Effect) -> list[float]:
-    values, found = effect.values(), list[float]()
+def _numbers(name: str, effect: Effect[Any], memory: Any) -> list[float]:
+    values, found = effect.values(memory), list[float]()
     with suppress(TypeError, ValueError):
         found = [float(value) for value in values]
     if len(found) != len(effect.columns):

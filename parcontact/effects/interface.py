@@ -14,7 +14,7 @@ from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
 from ..physics.interface import InterfaceFriction
 from ..physics.measures import Measures
-from .effect import Decision, Effect, Instant
+from .effect import Changes, Decision, Effect, Instant
 
 LEAST_POISSON = 0.49  # physics: below it shear moves the surface, and the solve would have to be coupled
 
@@ -62,7 +62,7 @@ def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, fl
     return measures.friction - own, own
 
 
-class InterfaceColumns(Effect):
+class InterfaceColumns(Effect[tuple[float, float]]):
     """Columns of the parts of friction that the body and the interface make, which add up to it."""
 
     section: ClassVar[type[Part]] = Interface
@@ -75,11 +75,13 @@ class InterfaceColumns(Effect):
         why = "there is no interface section" if law is None else f"a shear stress of {law.shear_stress:g} Pa at most"
         return Decision("interface", law is not None, why)
 
-    def __init__(self, scene: Any) -> None:
-        self._values = (0.0, 0.0)
+    def __init__(self, scene: Any) -> None: ...
 
-    def follow(self, instant: Instant) -> None:
-        self._values = shares(instant.measures, instant.step.velocity)
+    def at_rest(self) -> tuple[float, float]:
+        return 0.0, 0.0
 
-    def values(self) -> Sequence[float]:
-        return self._values
+    def follow(self, instant: Instant, memory: tuple[float, float]) -> Changes[tuple[float, float]]:
+        return Changes(shares(instant.measures, instant.step.velocity))
+
+    def values(self, memory: tuple[float, float]) -> Sequence[float]:
+        return memory

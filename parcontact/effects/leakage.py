@@ -14,7 +14,7 @@ from ..job.sections.part import Part
 from ..job.sections.quantities import Count
 from ..leakage.flow import leak
 from ..parallel.root import on_root
-from .effect import Decision, Effect, Instant
+from .effect import Changes, Decision, Effect, Instant
 
 NOTHING = (math.nan, math.nan, math.nan)
 
@@ -26,7 +26,7 @@ class Leakage(Part):
     every: Count = Field(default=1, description="a positive whole number of steps")
 
 
-class LeakageColumns(Effect):
+class LeakageColumns(Effect[tuple[float, ...]]):
     """The conductivity K [m^3] of the gap along x and along y, and its critical constriction [m].
 
     The gap is gathered on root, which solves for the flow.
@@ -45,12 +45,13 @@ class LeakageColumns(Effect):
 
     def __init__(self, scene: Any) -> None:
         self._scene, self._every = scene, scene.job.section("leakage").every
-        self._values = NOTHING
 
-    def follow(self, instant: Instant) -> None:
-        self._values = NOTHING
+    def at_rest(self) -> tuple[float, ...]:
+        return NOTHING
+
+    def follow(self, instant: Instant, memory: tuple[float, ...]) -> Changes[tuple[float, ...]]:
         if instant.step.number % self._every:
-            return
+            return Changes(NOTHING)
         scene, setup = self._scene, self._scene.setup
         approach = (instant.measures.approach + setup.surface.datum) / scene.units.height
         gap = scene.gap(instant.displacement, instant.step.position, approach)
@@ -61,7 +62,7 @@ class LeakageColumns(Effect):
             found = leak(whole, setup.grid.size, setup.grid.boundary == "periodic")
             return found.flow_x, found.flow_y, found.constriction
 
-        self._values = on_root(scene.slab.comm, act)
+        return Changes(on_root(scene.slab.comm, act))
 
-    def values(self) -> Sequence[float]:
-        return self._values
+    def values(self, memory: tuple[float, ...]) -> Sequence[float]:
+        return memory

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -28,7 +28,7 @@ from ..physics.heat import Conductor, Depths, depths_of
 from ..physics.heat_memory import Heating, HeatMemory
 from ..physics.prony import Prony
 from ..physics.units import Units
-from .effect import Decision, Effect, Instant
+from .effect import Changes, Decision, Effect, Instant
 from .relaxation import factor_at, feeds_back, temperature_of
 
 LOOSEST, SHARE = 1e-3, 0.1  # accuracy: of the memory of heat: a share of the job's accuracy, this at most
@@ -107,14 +107,32 @@ def exponentials_of(job: Any) -> Exponentials:
     return fit(min(step for step in steps if step > 0.0), longest, min(LOOSEST, SHARE * job.numerics.asked.strictest))
 
 
-class ThermalColumns:
+@dataclass(frozen=True)
+class ThermalMemory:
+    """Memory of heat: the waves of `heat`, the map `rise` of the surface [K], the flash temperature and the highest one
+    [K]; the force of the body [N] and the contact area at the end of the last step; whether there was any heat, the
+    depths of the last heat, and the share of it that the body makes."""
+
+    heat: HeatMemory
+    rise: Array
+    flash: float = 0.0
+    highest: float = 0.0
+    force: tuple[float, float] = (0.0, 0.0)
+    area: float = 0.0
+    warmed: bool = False
+    depths: Depths = field(default_factory=lambda: Depths(np.zeros(0), np.zeros(0)))
+    share: float = 0.0
+
+
+class ThermalColumns(Effect[ThermalMemory]):
     """The mean temperature rise of the contact, weighted by heat, and the highest one of the surface [K].
 
-    Under a surface at rest the weights are as in the last sliding. `rise` is the map of the surface [K].
+    Under a surface at rest the weights are as in the last sliding.
     """
 
     section: ClassVar[type[Part]] = Thermal
     columns: ClassVar[tuple[str, ...]] = added_by("thermal")
+    fields: ClassVar[tuple[str, ...]] = ("temperature",)
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("thermal", "material"), _shifts),
         Rule(("thermal", "initial"), _no_warm_start),
@@ -145,17 +163,18 @@ class ThermalColumns:
         return [np.float64] * (count + rubs + math.ceil(count / spectra.per_map(job.grid.nx)))
 
     def __init__(self, scene: Any) -> None:
-        self._scene, self._setup, self._slab, job = scene, scene.setup, scene.slab, scene.job
-        self._feeds_back, self._factor = feeds_back(job), 1.0  # of relaxation times over those of the job's temperature
-        self._rubs, self._pulled = scene.choices.interface is not None, job.section("adhesion") is not None
-        body = job.section("thermal").conductor
-        self.memory = HeatMemory(scene.setup.fft, job.grid.size, body, exponentials_of(job), self._rubs)
-        self.rise, self._flash, self._highest = self._slab.zeros(), 0.0, 0.0
-        self._force, self._area = np.zeros(2), 0.0  # of the body [N], and in contact, at the end of the last step
-        self._warmed = False  # whether there was any heat
-        self._depths, self._share = Depths(np.zeros(0), np.zeros(0)), 0.0  # of the last heat, and that in the body
+        self._setup, self._slab, self._job = scene.setup, scene.slab, scene.job
+        self._feeds_back = feeds_back(scene.job)
+        self._rubs, self._pulled = scene.choices.interface is not None, scene.job.section("adhesion") is not None
 
-    def follow(self, instant: Instant) -> None:
+    def at_rest(self) -> ThermalMemory:
+        job, fft = self._job, self._setup.fft
+        body = job.section("thermal").conductor
+        heat = HeatMemory(fft, job.grid.size, body, exponentials_of(job), self._rubs)
+        return ThermalMemory(heat, self._slab.zeros())
+
+    def follow(self, instant: Instant, memory: ThermalMemory) -> Changes[ThermalMemory]:
+        """Return the temperatures after a step; the waves of heat and the map of temperatures are advanced in place."""
         step, pressure = instant.step, instant.pressure
         if self._pulled:
             pressure = np.maximum(pressure, 0.0)
@@ -163,100 +182,108 @@ class ThermalColumns:
         sums = float(np.count_nonzero(instant.touching)), float(pressure.sum(dtype=np.float64))
         area, mean = (value / self._slab.points for value in self._slab.sum(*sums))
         scales = 1.0 / area if area > 0.0 else 0.0, 1.0 / mean if mean > 0.0 else 0.0
-        heating = self._heat(instant)
-        begins = any(step.velocity) and not self._warmed
-        self._warmed |= begins
-        if begins or (self._warmed and not step.dt):
-            self.memory.take(rubbed, pressure, scales)
-        if self._warmed and step.dt:
+        begins = any(step.velocity) and not memory.warmed
+        now = replace(memory, warmed=memory.warmed or begins)
+        heating, now = self._heat(instant, now)
+        if begins or (now.warmed and not step.dt):
+            now.heat.take(rubbed, pressure, scales)
+        if now.warmed and step.dt:
             pressed = self._setup.fft.forward(pressure)
             if any(step.velocity):
-                at = self._setup.half_space, self._setup.units.length, step.velocity, self._prony
-                self._depths = depths_of(pressed, self._setup.fft, *at)
-                self._share = heating.pressed[1] / (heating.whole[1] or 1.0)
-            heating = replace(heating, depths=self._depths)
-            inside = self.memory.advance(step.dt, heating, rubbed, pressed, scales, self.rise)
-            outside = 0.0 if rubbed is None else float((self.rise * rubbed).sum()) * scales[0] / self._slab.points
-            outside, self._highest = self._slab.reduce([outside], [float(self.rise.max(initial=-math.inf))])
-            self._flash = self._share * inside + (1.0 - self._share) * outside
-            self._feed_back()
+                at = self._setup.half_space, self._setup.units.length, step.velocity, self._prony(memory)
+                share = heating.pressed[1] / (heating.whole[1] or 1.0)
+                now = replace(now, depths=depths_of(pressed, self._setup.fft, *at), share=share)
+            heating = replace(heating, depths=now.depths)
+            inside = now.heat.advance(step.dt, heating, rubbed, pressed, scales, now.rise)
+            outside = 0.0 if rubbed is None else float((now.rise * rubbed).sum()) * scales[0] / self._slab.points
+            outside, highest = self._slab.reduce([outside], [float(now.rise.max(initial=-math.inf))])
+            now = replace(now, flash=now.share * inside + (1.0 - now.share) * outside, highest=highest)
+        return Changes(now)
 
-    @property
-    def _prony(self) -> Prony:
-        """The relaxation function as it is now, in the run's units."""
+    def _prony(self, memory: ThermalMemory) -> Prony:
+        """Return the relaxation function of the last step, in the run's units."""
         cold = self._setup.prony
-        return cold._replace(relaxation_times=cold.relaxation_times * self._factor)
+        return cold._replace(relaxation_times=cold.relaxation_times * self.time_factor(memory))
 
-    def _feed_back(self) -> None:
-        """Let the rubber relax as at the flash temperature, if the job asks for that. Raises RunError."""
-        if self._feeds_back:
-            try:
-                self._factor = factor_at(self._scene.job.material, self._flash)
-            except InputError as error:
-                raise RunError(f"the flash temperature leaves what the material allows: {error}") from None
-            self._scene.warm(self._factor)
+    def time_factor(self, memory: ThermalMemory) -> float:
+        """Return relaxation times at the flash temperature over those of the job's, if the job asks for that. Raises
+        RunError."""
+        if not (self._feeds_back and memory.warmed):
+            return 1.0
+        try:
+            return factor_at(self._job.material, memory.flash)
+        except InputError as error:
+            raise RunError(f"the flash temperature leaves what the material allows: {error}") from None
 
-    def _heat(self, instant: Instant) -> Heating:
-        """Return the heat of a step, by the forces at both of its ends, and remember those of its end."""
+    def _heat(self, instant: Instant, memory: ThermalMemory) -> tuple[Heating, ThermalMemory]:
+        """Return the heat of a step, by the forces at both of its ends, and the memory of those of its end."""
         measures, velocity = instant.measures, instant.step.velocity
         speed, box = math.hypot(*velocity), self._setup.grid.lx * self._setup.grid.ly
         own = measures.force_interface
-        force = np.array([measures.force_x, measures.force_y]) + own * np.array(velocity) / (speed or 1.0)
-        pressed = tuple(max(0.0, -float(each @ velocity)) / box for each in (self._force, force))
-        share = self._area / measures.contact_area if measures.contact_area > 0.0 else 0.0
-        self._force, self._area = force, measures.contact_area
-        return Heating((own * speed / box * (share if self._warmed else 1.0), own * speed / box), pressed)
+        along = tuple(own * each / (speed or 1.0) for each in velocity)
+        force = measures.force_x + along[0], measures.force_y + along[1]
+        pressed = tuple(max(0.0, -float(np.dot(each, velocity))) / box for each in (memory.force, force))
+        share = memory.area / measures.contact_area if measures.contact_area > 0.0 else 0.0
+        rubbed = own * speed / box * (share if memory.warmed else 1.0), own * speed / box
+        return Heating(rubbed, pressed), replace(memory, force=force, area=measures.contact_area)
 
-    def values(self) -> Sequence[float]:
-        return self._flash, self._highest
+    def values(self, memory: ThermalMemory) -> Sequence[float]:
+        return memory.flash, memory.highest
+
+    def field(self, memory: ThermalMemory, name: str) -> Array:
+        """Return this rank's rows of the temperature rise [K]."""
+        return memory.rise.copy()
 
     # -- checkpoints --------------------------------------------------------------------------------------------------
 
-    def entries(self, units: Units) -> dict[str, Entry]:
+    def entries(self, memory: ThermalMemory, units: Units) -> dict[str, Entry]:
         """Return the map, all spectra as maps, and what has no room in these; collective."""
-        known, depths = self.memory.sum, self._depths
+        known, depths = memory.heat.sum, memory.depths
         found = {
-            "rise": Entry(self.rise, 1.0, "K"),
-            "mean": Entry(self.memory.mean.waves, 1.0, "J/m^2"),
-            "temperatures": Entry(np.array([self._flash, self._highest]), 1.0, "K"),
-            "force": Entry(self._force.copy(), 1.0, "N"),
-            "state": Entry(np.array([self._warmed, self._area, self._share])),
+            "rise": Entry(memory.rise, 1.0, "K"),
+            "mean": Entry(memory.heat.mean.waves, 1.0, "J/m^2"),
+            "flash temperature": Entry(memory.flash, 1.0, "K"),
+            "highest temperature": Entry(memory.highest, 1.0, "K"),
+            "force": Entry(np.array(memory.force), 1.0, "N"),
+            "is warmed": Entry(float(memory.warmed)),
+            "contact area": Entry(memory.area),
+            "share of the body": Entry(memory.share),
             "depths": Entry(np.concatenate([depths.wavenumbers, depths.shares])),
             "grid": Entry(np.array([known.first, known.spacing]), given=True),
         }
         per = spectra.per_map(self._slab.nx)
         columns = spectra.edges(self._slab.nx)
-        for number, name, spectrum in self._spectra():
+        for number, name, spectrum in self._spectra(memory):
             rest = found.setdefault(f"edges {number // per}", Entry(np.zeros(self._slab.shape), optional=True))
             where, field = columns * (number % per), np.empty(self._slab.shape)
             spectra.to_map(self._setup.fft, spectrum, field, np.asarray(rest.value)[:, where : where + columns])
             found[name] = Entry(field, optional=True)
         return found
 
-    def _spectra(self) -> Iterator[tuple[int, str, Spectrum]]:
+    def _spectra(self, memory: ThermalMemory) -> Iterator[tuple[int, str, Spectrum]]:
         """Yield all spectra with a number and a name; more waves along the depth come last."""
-        yield 0, "pressed", self.memory.pressed
+        yield 0, "pressed", memory.heat.pressed
         if self._rubs:
-            yield 1, "rubbed", self.memory.rubbed
-        yield from ((2 + number, f"wave {number}", wave) for number, wave in enumerate(self.memory.waves))
+            yield 1, "rubbed", memory.heat.rubbed
+        yield from ((2 + number, f"wave {number}", wave) for number, wave in enumerate(memory.heat.waves))
 
-    def restore(self, saved: Saved) -> None:
-        """Go on from a checkpoint; collective. Waves of shorter steps than before, which it lacks, begin at 0."""
+    def restored(self, memory: ThermalMemory, saved: Saved) -> ThermalMemory:
+        """Return the memory of a checkpoint; collective. Waves of shorter steps than before, which it lacks, begin at
+        0."""
         per, columns = spectra.per_map(self._slab.nx), spectra.edges(self._slab.nx)
-        for number, name, spectrum in self._spectra():
+        for number, name, spectrum in self._spectra(memory):
             if name in saved:
                 rest, where = saved[f"edges {number // per}"], columns * (number % per)
                 spectra.from_map(self._setup.fft, saved[name], rest[:, where : where + columns], spectrum)
-        self.memory.mean.waves[...] = saved["mean"]
-        self._flash, self._highest = map(float, saved["temperatures"])
-        self._force, (warmed, self._area, self._share) = np.array(saved["force"]), map(float, saved["state"])
-        self._warmed, self._depths = bool(warmed), Depths(*np.split(np.array(saved["depths"]), 2))
-        self._feed_back()
-
-
-def rise_of(effects: Mapping[str, Effect]) -> Array:
-    """Return this rank's rows of the temperature rise [K]; raises InputError without the effect that has it."""
-    thermal = effects.get("thermal")
-    if not isinstance(thermal, ThermalColumns):
-        raise InputError("there is no field 'temperature' without a thermal section in the job")
-    return thermal.rise.copy()
+        memory.heat.mean.waves[...] = saved["mean"]
+        x, y = saved["force"].tolist()
+        return replace(
+            memory,
+            flash=float(saved["flash temperature"]),
+            highest=float(saved["highest temperature"]),
+            force=(x, y),
+            area=float(saved["contact area"]),
+            warmed=bool(saved["is warmed"]),
+            share=float(saved["share of the body"]),
+            depths=Depths(*np.split(np.array(saved["depths"]), 2)),
+        )

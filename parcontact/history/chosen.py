@@ -22,7 +22,6 @@ LEAST_SHARE = 2.0**-20  # tuning: of its duration, in the shortest step of a sta
 MOST_CELLS = 4  # tuning: slid in the longest step
 WAVE_STEPS = 8  # accuracy: in which the shortest wave passes, at least
 RAMP_STEPS = 16  # accuracy: at least, while a load changes
-SYMBOLS = {"clock/stages": "1", "clock/counts": "1", "clock/ends": "s", "clock/next": "s"}  # in checkpoints
 
 
 def reached(time: float, until: float) -> bool:
@@ -163,11 +162,11 @@ class ChosenSteps:
     def of(cls, job: Planned, saved: Mapping[str, Any] | None = None) -> "ChosenSteps":
         """Return those that the stages of a job had chosen when a checkpoint with these arrays was written."""
         found = cls(most_cells(job))
-        if saved is not None and SYMBOLS.keys() <= saved.keys():
-            ends = iter(saved["clock/ends"].tolist())
-            for stage, count in zip(saved["clock/stages"], saved["clock/counts"], strict=True):
+        if saved is not None and "ends" in saved:
+            ends = iter(saved["ends"].tolist())
+            for stage, count in zip(saved["stages"], saved["counts"], strict=True):
                 found.ends[int(stage)] = list(islice(ends, int(count)))
-            found.next = float(saved["clock/next"])
+            found.next = float(saved["next"])
         return found
 
     def add(self, step: "MadeStep") -> None:
@@ -189,14 +188,14 @@ class ChosenSteps:
         longest = min(limits.most, one_cell(stage, grid)) if stage.speed else limits.most
         return ChosenEnds(made, stops, Ladder(first, max(first, longest), left), limits)
 
-    def numbers(self) -> dict[str, list[float] | float]:
-        """Return all this by the names that it has in a checkpoint."""
+    def numbers(self) -> dict[str, tuple[list[float] | float, str]]:
+        """Return all this, with units, by the names that it has in a checkpoint."""
         stages = sorted(self.ends)
         return {
-            "clock/stages": [float(stage) for stage in stages],
-            "clock/counts": [float(len(self.ends[stage])) for stage in stages],
-            "clock/ends": [end for stage in stages for end in self.ends[stage]],
-            "clock/next": self.next,
+            "stages": ([float(stage) for stage in stages], "1"),
+            "counts": ([float(len(self.ends[stage])) for stage in stages], "1"),
+            "ends": ([end for stage in stages for end in self.ends[stage]], "s"),
+            "next": (self.next, "s"),
         }
 
 

@@ -2,24 +2,25 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from ..effects.contact_protocol import SolvedContact
 from ..history.timeline import Step
 from ..job import Cylinder, Flat, Rough, Wave
 from ..physics.body import BodyMemory, Trial, surface_of
-from ..physics.budget import ErrorBudget, estimate
+from ..physics.budget import ErrorBudget, ErrorSums, estimate
 from ..physics.embedded import EmbeddedPair, IntegratorDifference
+from ..physics.entries import Entry, Saved
 from ..physics.measures import Measures
 from ..physics.prony import Prony
 from ..physics.slopes import friction_by_energy
 from ..physics.time_error import RunProperties, StepObservation, error_of_rise, time_error
+from ..physics.units import Units
 from ..scene import Scene, Setup
-from ..solve.constraint import Mask
 from ..solve.contact import Contact
-from .sticking import StuckContact
 
 REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are all alike
 NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
@@ -40,20 +41,43 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Solved:
-    """A step that has been solved: its contact, a map that is not 0 where the surfaces touch, what it measures and the
-    memory of the body after it.
-
-    `remark` says what was unusual about it; `stuck` is what a contact with adhesion has besides.
-    """
+    """A step that has been solved: the contact by its law, its measures, and the memory of the body after it."""
 
     step: Step
     trial: Trial
-    contact: Contact
-    touching: Mask
+    of_law: SolvedContact[Any]
     measures: Measures
     body: BodyMemory
-    remark: str = ""
-    stuck: StuckContact | None = None
+
+    @property
+    def contact(self) -> Contact:
+        return self.of_law.contact
+
+
+@dataclass(frozen=True)
+class ErrorMemory:
+    """Memory of errors: the friction of the body in the last step, infinite where that was a jump, and the sums of the
+    budget."""
+
+    friction: float = math.inf
+    sums: ErrorSums = field(default_factory=ErrorSums)
+
+
+@dataclass(frozen=True)
+class ErrorPart:
+    """The errors of a run, whose body `relaxes` or not; a checkpoint may lack them."""
+
+    relaxes: bool
+
+    def at_rest(self) -> ErrorMemory:
+        return ErrorMemory()
+
+    def entries(self, memory: ErrorMemory, units: Units) -> dict[str, Entry]:
+        friction = {"friction": Entry(memory.friction, optional=True)} if self.relaxes else {}
+        return friction | memory.sums.entries()
+
+    def restored(self, memory: ErrorMemory, saved: Saved) -> ErrorMemory:
+        return ErrorMemory(float(saved.get("friction", math.inf)), ErrorSums.restored(saved))
 
 
 def estimate_errors(scene: Scene, friction: float, solved: Solved) -> Estimate:
@@ -117,8 +141,8 @@ def _compare_integrators(scene: Scene, solved: Solved) -> IntegratorDifference:
         return pair.compare_without_load(step.dt, trial, solved.body) if step.judge is not None else NO_DIFFERENCE
     load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)
     pressure = contact.p
-    if solved.touching is not pressure:  # tension counts as pressure does
-        pressure = np.abs(contact.p) if solved.stuck else np.where(solved.touching, contact.p, 0.0)
+    if (touching := solved.of_law.touching) is not pressure:  # tension counts as pressure does
+        pressure = np.abs(contact.p) if solved.of_law.pull else np.where(touching, contact.p, 0.0)
         load = scene.slab.sum(float(pressure.sum()))[0]
     return pair.compare(step.dt, trial, solved.body, pressure, contact.u, load, measures.contact_area)
 

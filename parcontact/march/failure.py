@@ -37,9 +37,9 @@ class DetachedError(Exception):
         self.time, self.load = time, load
 
 
-def nothing_holds(control: str, load: float) -> str:
-    """Return what is said where surfaces come off under a prescribed load."""
-    return f"nothing holds the surfaces under a {control} of {load:g}{UNITS[control]} any more"
+def accepts(scene: Scene, contact: Contact) -> bool:
+    """Return whether the job takes a solve that did not reach the tolerance."""
+    return scene.choices.numerics.accept_unconverged and math.isfinite(contact.certificate.worst)
 
 
 def where(scene: Scene, step: Step) -> str:

@@ -1,10 +1,11 @@
 """A march: a scene, its state, and the loop over the steps of a timeline with the tasks that a caller has."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
-from ..effects.thermal import rise_of
+from ..effects.adhesive_law import nothing_holds
+from ..effects.contact_protocol import Detached
+from ..errors import InputError
 from ..history.timeline import Step, Timeline
 from ..parallel.slab import Array
 from ..physics.budget import ErrorSums
@@ -13,10 +14,13 @@ from ..scene import Scene
 from ..storage.checkpoint import Contents, Facts
 from ..storage.row import Row
 from .choosing import StepChooser
-from .failure import DetachedError, nothing_holds
+from .dry_law import law_of
+from .errors import ErrorMemory
+from .failure import DetachedError
 from .state import State, entries, first_state, restored, save
 from .step import make_step
-from .sticking import NEVER
+
+FIELDS_OF_EFFECTS = {"temperature": "a thermal section"}
 
 
 class March:
@@ -32,11 +36,11 @@ class March:
 
     @property
     def detached(self) -> str:
-        """Say that surfaces which stick have come off under their load: there is no further step then; '' otherwise."""
-        memory, row = self.state.sticking, self.row
-        if memory is None or memory.detached == NEVER:
+        """Return the sentence on surfaces that nothing holds under their load, with no further step; '' otherwise."""
+        row, end = self.row, law_of(self.scene).detached(self.state.law)
+        if end is None:
             return ""
-        time, load = memory.detached
+        time, load = end
         lost = nothing_holds(self.timeline(time).span(row.step + 1).stage.control, load)
         return f"detached at t = {time:g} s: {lost}; {row.measures.pressure:g} Pa at t = {row.time:g} s was held"
 
@@ -59,9 +63,8 @@ class March:
         try:
             self.state = self._weighed(make_step(self.scene, self.state, step), self.row)
         except DetachedError as end:
-            assert self.state.sticking is not None
-            memory = replace(self.state.sticking, detached=(end.time, end.load))
-            self.state = replace(self.state, sticking=memory)
+            memory = law_of(self.scene).with_end(self.state.law, Detached(end.time, end.load))
+            self.state = self.state.after(law=memory)
         return self.row
 
     def _weighed(self, state: State, since: Row | None = None) -> State:
@@ -71,9 +74,13 @@ class March:
             return state
         friction = row.measures.friction if row.distance > 0.0 else 0.0
         if since is None:
-            return replace(state, errors=ErrorSums().plus(row.errors, friction, 0.0))
+            return self._with_sums(state, ErrorSums().plus(row.errors, friction, 0.0))
         seconds, slid = row.time - since.time, row.distance - since.distance
-        return replace(state, errors=state.errors.plus(row.errors, friction, seconds, slid))
+        return self._with_sums(state, state.errors.plus(row.errors, friction, seconds, slid))
+
+    @staticmethod
+    def _with_sums(state: State, sums: ErrorSums) -> State:
+        return state.after(errors=ErrorMemory(state.friction, sums))
 
     def restore(self, contents: Contents) -> None:
         """Go on from a checkpoint; collective. Raises InputError for one that does not fit."""
@@ -94,23 +101,27 @@ class March:
         `height` is that of the rigid surface where it is now, so that `gap = displacement - height - approach`.
         """
         scene, state, units = self.scene, self.state, self.scene.units
-        if name == "temperature":
-            return rise_of(scene.followers)
-        if name == "gap" and state.sticking is not None and state.sticking.pasts[0].known:
-            return state.sticking.pasts[0].gap * units.height
+        last, gap = state.contact.last, law_of(scene).gap(state.law)
+        for part, effect in scene.effects.items():
+            if name in effect.fields:
+                return effect.field(state.memories[part], name)
+        if name in FIELDS_OF_EFFECTS:
+            raise InputError(f"there is no field {name!r} without {FIELDS_OF_EFFECTS[name]} in the job")
+        if name == "gap" and gap is not None:
+            return gap * units.height
         if name == "pressure":
-            return state.pressure * (state.alpha * units.pressure)
+            return last.pressure * (last.alpha * units.pressure)
         if name == "displacement":
             return self._displacement() * units.height
         if name == "height":
-            return scene.heights(state.position) * units.height + scene.setup.surface.datum
-        return scene.gap(self._displacement(), state.position, state.approach)
+            return scene.heights(last.position) * units.height + scene.setup.surface.datum
+        return scene.gap(self._displacement(), last.position, state.contact.approach)
 
     def _displacement(self) -> Array:
         """Return the displacement of the body, from the pressure where it is not at hand; collective."""
-        scene, state = self.scene, self.state
+        scene, last = self.scene, self.state.contact.last
         image, apply = scene.solver.workspace.displacement, scene.operators.operator.apply
-        return scene.material.displacement(state.body, lambda: apply(state.pressure, image), state.alpha)
+        return scene.material.displacement(self.state.body, lambda: apply(last.pressure, image), last.alpha)
 
 
 def next_step(scene: Scene, state: State, timeline: Timeline, stop: int) -> Step:

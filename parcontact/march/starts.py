@@ -10,8 +10,8 @@ Where no such pressure is known, the last two are extrapolated in the body's fra
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
+from ..effects.contact_protocol import PreviousPressure
 from ..history.timeline import Step
 from ..parallel import rows
 from ..parallel.slab import Array
@@ -20,16 +20,7 @@ from ..physics.motion import are_whole, cells_between
 from ..scene import Scene
 
 
-class Past(NamedTuple):
-    """The pressure after a step: a map of p with the pressure `alpha p`, and where the surface was [m]; with an alpha
-    of 0 none is known."""
-
-    pressure: Array
-    alpha: float = 0.0
-    position: tuple[float, float] = (0.0, 0.0)
-
-
-def make_start(scene: Scene, pasts: Sequence[Past], step: Step, alpha: float, out: Array) -> None:
+def make_start(scene: Scene, pasts: Sequence[PreviousPressure], step: Step, alpha: float, out: Array) -> None:
     """Put the start of a step, a map of p for the modulus `alpha`, into `out`.
 
     `pasts` are the last pressures, the newest first.
@@ -51,7 +42,7 @@ def cells_moved(scene: Scene, step: Step, since: tuple[float, float]) -> tuple[f
     return cells_between(since, step.position, (grid.dx, grid.dy))
 
 
-def _whole_cells_ago(scene: Scene, pasts: Sequence[Past], step: Step) -> Past | None:
+def _whole_cells_ago(scene: Scene, pasts: Sequence[PreviousPressure], step: Step) -> PreviousPressure | None:
     """Return the newest pressure since which the surface has moved by whole cells; None if it is the last one."""
     last, *older = pasts
     if are_whole(cells_moved(scene, step, last.position)):
@@ -60,7 +51,9 @@ def _whole_cells_ago(scene: Scene, pasts: Sequence[Past], step: Step) -> Past | 
     return next((past for past in known if are_whole(cells_moved(scene, step, past.position))), None)
 
 
-def _travel(scene: Scene, step: Step, now: Past, before: Past, growth: float, alpha: float, out: Array) -> None:
+def _travel(
+    scene: Scene, step: Step, now: PreviousPressure, before: PreviousPressure, growth: float, alpha: float, out: Array
+) -> None:
     """Form `out = (1 + growth) now - growth before`, moved with the surface by whole cells."""
     slab, points = scene.slab, scene.choices.grid.points
     along_x, along_y = (

@@ -1,137 +1,255 @@
-"""The state of a run: all that one step hands to the next, and the one list of what a checkpoint has of it."""
+"""The state of a run: all that one step hands to the next. A checkpoint is one loop over its parts."""
 
 import math
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.effect import values_of
+from ..effects.contact_protocol import PreviousContacts, PreviousPressure
+from ..effects.effect import Memories, values_of
 from ..errors import InputError
-from ..history.chosen import SYMBOLS, ChosenSteps
+from ..history.chosen import ChosenSteps
 from ..parallel.slab import Array
 from ..physics.body import BodyMemory
 from ..physics.budget import ErrorSums
 from ..physics.energy import EnergyMemory
-from ..physics.entries import Entry, MapCount, Saved, part_of, prefixed
+from ..physics.entries import Entry, MapCount, RunPart, Saved, part_of, prefixed
 from ..physics.measures import Measures
 from ..physics.units import Units
 from ..scene import Scene
 from ..storage import checkpoint, wisdom
 from ..storage.checkpoint import Contents, Facts
 from ..storage.row import Row
-from . import sticking
-from .starts import Past
-from .sticking import StickingMemory
-from .tolerance import StepTolerance, follows
+from .dry_law import law_of
+from .errors import ErrorMemory, ErrorPart
+from .tolerance import StepTolerance, TolerancePart, follows
 
 FURTHER = 2  # tuning: pressures before the earlier one that are kept for starts, of three and of four steps ago
-FRICTION = "budget/friction"  # in a checkpoint
-MODULI, POSITIONS = "contact/further moduli", "clock/further positions"  # in a checkpoint, of these
 
 
 @dataclass(frozen=True)
 class State:
     """A run after a step. `make_step` returns another one and leaves this one as it was.
 
-    `row` is what the step is recorded as. `pasts` are the last pressures, the newest first: a history of single solves
-    keeps one, others two or more. `approach` is the d of the body, `body` and `energy` are their memories; `friction`
-    is that of the body in the last step, infinite where that was a jump, `errors` the sums of the error budget,
-    `chosen` the record of the steps that stages have chosen, which grows; `sticking` is the memory of a contact with
-    adhesion, `tolerance` that of the tolerance of solves. The next pressure will be in the map `spare`. Effects that
-    follow the steps keep what they remember themselves, as they are told only of steps that were made.
+    `memories` are those of the parts of the run, by name (`parts_of`), those of effects among them.
 
     Two states share most maps, and the oldest ones of a state are spare in the next: a state can be used until a step
     begins from the one after it. Maps are in the run's units.
     """
 
-    row: Row
-    pasts: tuple[Past, ...]
-    spare: Array
-    body: BodyMemory
-    energy: EnergyMemory | None
-    approach: float = 0.0
-    friction: float = math.inf
-    errors: ErrorSums = field(default_factory=ErrorSums)
-    chosen: ChosenSteps | None = None
-    sticking: StickingMemory | None = None
-    tolerance: StepTolerance = field(default_factory=StepTolerance)
+    memories: Memories
 
-    @staticmethod
-    def count_maps(lasts: bool, keeps_further: bool) -> MapCount:
-        """Count the maps of pressures and the spare one; there is an earlier pressure if stages last."""
-        earlier = lasts + FURTHER * keeps_further
-        return MapCount(held=2 + earlier, saved=1 + earlier)
+    def after(self, **changes: Any) -> "State":
+        """Return the state with other memories of some parts."""
+        return State({**self.memories, **changes})
 
     @property
-    def pressure(self) -> Array:
-        """The map of p, whose pressure is `alpha p`."""
-        return self.pasts[0].pressure
+    def row(self) -> Row:
+        """What the last step is recorded as."""
+        row: Row = self.memories["row"]
+        return row
 
     @property
-    def alpha(self) -> float:
-        """The modulus of the last step, 0 before the first one."""
-        return self.pasts[0].alpha
+    def contact(self) -> PreviousContacts:
+        """The last pressures and the last approach."""
+        contact: PreviousContacts = self.memories["contact"]
+        return contact
 
     @property
-    def position(self) -> tuple[float, float]:
-        """The way of the surface so far [m]."""
-        return self.pasts[0].position
+    def law(self) -> Any:
+        """What the contact law remembers."""
+        return self.memories["law"]
+
+    @property
+    def body(self) -> BodyMemory:
+        memory: BodyMemory = self.memories["material"]
+        return memory
+
+    @property
+    def energy(self) -> EnergyMemory | None:
+        """The energies of the body, None where none are asked for."""
+        return self.memories.get("energy")
+
+    @property
+    def friction(self) -> float:
+        """The friction of the body in the last step, infinite where that was a jump."""
+        memory: ErrorMemory = self.memories["errors"]
+        return memory.friction
+
+    @property
+    def errors(self) -> ErrorSums:
+        """The sums of the error budget."""
+        memory: ErrorMemory = self.memories["errors"]
+        return memory.sums
+
+    @property
+    def chosen(self) -> ChosenSteps | None:
+        """The record of the steps that stages have chosen, which grows; None where none does."""
+        return self.memories.get("steps")
+
+    @property
+    def tolerance(self) -> StepTolerance:
+        """What is known of the tolerance that solves may have."""
+        return self.memories.get("tolerance") or StepTolerance()
+
+
+# -- parts ------------------------------------------------------------------------------------------------------------
+
+
+def parts_of(scene: Scene) -> dict[str, RunPart[Any]]:
+    """Return all that a run of a scene remembers, by the names of its parts in checkpoints."""
+    choices = scene.choices
+    found: dict[str, RunPart[Any]] = {
+        "row": _RowPart(scene),
+        "contact": _ContactPart(scene),
+        "law": law_of(scene),
+        "material": scene.material,
+        "errors": ErrorPart(scene.material.branched is not None),
+    }
+    if scene.energy is not None:
+        found["energy"] = scene.energy
+    if choices.timeline.chooses:
+        found["steps"] = _ChosenStepsPart(scene)
+    if follows(scene):
+        found["tolerance"] = TolerancePart()
+    return found | dict(scene.effects)
+
+
+@dataclass(frozen=True)
+class _RowPart:
+    """The record of the last step: distance and measures; step and time a checkpoint says itself."""
+
+    scene: Scene
+
+    def at_rest(self) -> Row:
+        """Return the record of the initial state: at no load the surface just touches the body."""
+        setup = self.scene.setup
+        highest = setup.heights.highest
+        return Row(
+            measures=Measures(approach=0.0 - highest - setup.surface.datum, mean_gap=highest - setup.heights.mean)
+        )
+
+    def entries(self, memory: Row, units: Units) -> dict[str, Entry]:
+        measures = {name: Entry(float(value)) for name, value in asdict(memory.measures).items()}
+        return {"distance": Entry(memory.distance, 1.0, "m"), **measures}
+
+    def restored(self, memory: Row, saved: Saved) -> Row:
+        kinds: dict[str, type] = {each.name: type(each.default) for each in fields(Measures)}
+        measures = Measures(**{name: kind(saved[name]) for name, kind in kinds.items()})
+        return Row(distance=float(saved["distance"]), measures=measures)
+
+
+@dataclass(frozen=True)
+class _ContactPart:
+    """The last pressures, where the surface was, and the last approach."""
+
+    scene: Scene
+
+    def at_rest(self) -> PreviousContacts:
+        choices, setup, slab = self.scene.choices, self.scene.setup, self.scene.slab
+        count = 1 + choices.extrapolated_starts.on + FURTHER * choices.further_starts.on
+        pressures = tuple(PreviousPressure(slab.zeros()) for _ in range(count))
+        return PreviousContacts(pressures, slab.zeros(), -setup.heights.highest / setup.units.height)
+
+    def entries(self, memory: PreviousContacts, units: Units) -> dict[str, Entry]:
+        """Return the pressures with their moduli and positions, by how many steps ago they were: a checkpoint may lack
+        all but the last one."""
+        found = {"approach": Entry(memory.approach, units.height, "m")}
+        for ago, past in enumerate(memory.pressures):
+            of_past = {
+                "pressure": Entry(past.pressure, units.height / units.length, optional=ago > 0),
+                "modulus": Entry(past.alpha, units.modulus, "Pa", optional=ago > 0),
+                "position": Entry(np.array(past.position), 1.0, "m", optional=ago > 0),
+            }
+            found |= {_name(name, ago): entry for name, entry in of_past.items()}
+        return found
+
+    def restored(self, memory: PreviousContacts, saved: Saved) -> PreviousContacts:
+        """Return the pressures of a checkpoint, whose maps have been read; those that it lacks are not known."""
+        pasts = []
+        for ago, past in enumerate(memory.pressures):
+            known = all(_name(name, ago) in saved for name in ("pressure", "modulus", "position"))
+            x, y = saved[_name("position", ago)].tolist() if known else (0.0, 0.0)
+            alpha = float(saved[_name("modulus", ago)]) if known else 0.0
+            pasts.append(PreviousPressure(past.pressure, alpha, (x, y)))
+        return replace(memory, pressures=tuple(pasts), approach=float(saved["approach"]))
+
+
+def _name(what: str, ago: int) -> str:
+    """Return the name in a checkpoint of something `ago` steps before the last one."""
+    return f"{what} {ago} steps before" if ago else what
+
+
+@dataclass(frozen=True)
+class _ChosenStepsPart:
+    """The steps that stages have chosen."""
+
+    scene: Scene
+
+    def at_rest(self) -> ChosenSteps:
+        return ChosenSteps.of(self.scene.job)
+
+    def entries(self, memory: ChosenSteps, units: Units) -> dict[str, Entry]:
+        numbers = memory.numbers().items()
+        return {name: Entry(np.array(value), 1.0, symbol, optional=True) for name, (value, symbol) in numbers}
+
+    def restored(self, memory: ChosenSteps, saved: Saved) -> ChosenSteps:
+        return ChosenSteps.of(self.scene.job, saved)
+
+
+def count_maps(lasts: bool, keeps_further: bool) -> MapCount:
+    """Count the maps of pressures and the spare one; there is an earlier pressure if stages last."""
+    earlier = lasts + FURTHER * keeps_further
+    return MapCount(held=2 + earlier, saved=1 + earlier)
+
+
+# -- first states -----------------------------------------------------------------------------------------------------
 
 
 def first_state(scene: Scene, body: BodyMemory | None = None) -> State:
-    """Return the state before the first step, in new maps: at no load the surface just touches the body."""
-    setup, slab = scene.setup, scene.slab
-    highest = setup.heights.highest
-    touching = Measures(approach=0.0 - highest - setup.surface.datum, mean_gap=highest - setup.heights.mean)
-    further = FURTHER * scene.choices.further_starts.on
-    pasts = tuple(Past(slab.zeros()) for _ in range(1 + scene.choices.extrapolated_starts.on + further))
-    chosen = ChosenSteps.of(scene.job) if scene.choices.timeline.chooses else None
-    state = State(
-        Row(measures=touching),
-        pasts,
-        slab.zeros(),
-        scene.material.at_rest() if body is None else body,
-        scene.energy.at_rest() if scene.energy is not None else None,
-        -highest / setup.units.height,
-        chosen=chosen,
-        sticking=sticking.at_rest(scene) if scene.sticking is not None else None,
-    )
-    return completed(scene, state)
+    """Return the state before the first step, in new maps but those of a `body`."""
+    parts = parts_of(scene)
+    given = {} if body is None else {"material": body}
+    return completed(scene, State({name: part.at_rest() for name, part in parts.items() if name not in given} | given))
 
 
 def pressed_state(scene: Scene, state: State, row: Row, pressure: Array, approach: float) -> State:
     """Return a first state under a pressure, which is copied into its maps, and that had been there before, with the
     friction of a row."""
-    for past in state.pasts[:2]:
+    newest, others = state.contact.pressures[:2], state.contact.pressures[2:]
+    for past in newest:
         past.pressure[...] = pressure
-    pasts = (*(past._replace(alpha=1.0) for past in state.pasts[:2]), *state.pasts[2:])
+    pasts = (*(past._replace(alpha=1.0) for past in newest), *others)
+    contact = PreviousContacts(pasts, state.contact.spare, approach)
     friction = row.measures.friction - row.measures.friction_interface
-    return completed(scene, replace(state, row=row, pasts=pasts, approach=approach, friction=friction))
+    return completed(scene, state.after(row=row, contact=contact, errors=ErrorMemory(friction, state.errors)))
 
 
 def completed(scene: Scene, state: State) -> State:
     """Return the state with the energies [J] and the columns of effects in its row."""
-    work, stored, lost, split = energies_of(scene, state.energy, state.sticking)
-    added = values_of(scene.followers)
+    work, stored, lost, split = energies_of(scene, state.energy, state.memories)
+    added = values_of(scene.effects, state.memories)
     row = replace(state.row, work=work, stored=stored, dissipated=lost, branch_dissipation=split, added=added)
-    return replace(state, row=row)
+    return state.after(row=row)
 
 
 def energies_of(
-    scene: Scene, memory: EnergyMemory | None, stuck: StickingMemory | None
+    scene: Scene, memory: EnergyMemory | None, of_effects: Memories
 ) -> tuple[float, float, float, tuple[float, ...]]:
     """Return work, stored and dissipated energy [J], and the dissipation of each branch; NaN if not asked for.
 
-    The work is that on the body, with adhesion that of the load.
+    The work is that on the body, unless an effect counts that of the load.
     """
     if scene.energy is None or memory is None:
         return math.nan, math.nan, math.nan, ()
     unit = scene.energy.unit
     lost = tuple(float(value) * unit for value in memory.dissipated)
-    work = memory.work * unit if stuck is None else stuck.energies.work
+    counted = (effect.work(of_effects[name]) for name, effect in scene.effects.items())
+    work = next((work for work in counted if work is not None), memory.work * unit)
     return work, memory.stored * unit, math.fsum(lost), lost
 
 
@@ -140,22 +258,10 @@ def energies_of(
 
 def entries(scene: Scene, state: State) -> dict[str, Entry]:
     """Return everything that a run remembers, by the names `part/name` that checkpoints have; maps are no copies."""
-    found = _contact_entries(state, scene.units) | prefixed("material", scene.material.entries(state.body, scene.units))
-    if scene.energy is not None and state.energy is not None:
-        found |= scene.energy.entries(state.energy, scene.units)
-    for name, effect in scene.followers.items():
-        found |= prefixed(name, effect.entries(scene.units))
-    if state.chosen is not None:
-        numbers = state.chosen.numbers()
-        found |= {name: Entry(np.array(value), 1.0, SYMBOLS[name], optional=True) for name, value in numbers.items()}
-    if scene.material.branched is not None:
-        found[FRICTION] = Entry(state.friction, optional=True)
-    if follows(scene):
-        found |= state.tolerance.entries()
-    if state.sticking is not None:
-        units = scene.units.height, scene.units.modulus
-        found |= prefixed("sticking", sticking.entries(state.sticking, state.row.measures, *units))
-    return found | state.errors.entries()
+    found: dict[str, Entry] = {}
+    for name, part in parts_of(scene).items():
+        found |= prefixed(name, part.entries(state.memories[name], scene.units))
+    return found
 
 
 def save(path: Path, scene: Scene, state: State, facts: Facts) -> None:
@@ -175,71 +281,12 @@ def restored(scene: Scene, state: State, contents: Contents) -> State:
     _compare(contents, wanted)
     checkpoint.read(contents, scene.slab, wanted)
     saved = {name: _value(name, entry, contents) for name, entry in wanted.items()}
-    energy = state.energy
-    if scene.energy is not None and energy is not None:
-        energy = scene.energy.restored(energy, saved)
-    for name, effect in scene.followers.items():
-        effect.restore(part_of(name, saved))
-    row = Row(contents.step, contents.time, float(saved["clock/distance"]))
-    stuck = state.sticking
-    if stuck is not None:
-        of_stuck = part_of("sticking", saved)
-        row = replace(row, measures=sticking.restored_measures(of_stuck))
-        stuck = sticking.restored(stuck, of_stuck, sticking.came_off(contents, scene.job))
-    found = replace(
-        state,
-        row=row,
-        pasts=_restored_pasts(state.pasts, saved),
-        body=scene.material.restored(state.body, part_of("material", saved)),
-        energy=energy,
-        approach=float(saved["contact/approach"]),
-        friction=float(saved.get(FRICTION, math.inf)),
-        errors=ErrorSums.restored(saved),
-        chosen=None if state.chosen is None else ChosenSteps.of(scene.job, saved),
-        sticking=stuck,
-        tolerance=StepTolerance.restored(saved),
-    )
-    return completed(scene, found)
-
-
-def _contact_entries(state: State, units: Units) -> dict[str, Entry]:
-    """Return the pressures and where the surface was; step and time a checkpoint says itself."""
-    strain = units.height / units.length
-    last, *older = state.pasts
-    found = {
-        "clock/distance": Entry(state.row.distance, 1.0, "m"),
-        "clock/position": Entry(np.array(last.position), 1.0, "m"),
-        "contact/pressure": Entry(last.pressure, strain),
-        "contact/modulus": Entry(last.alpha, units.modulus, "Pa"),
-        "contact/earlier modulus": Entry(older[0].alpha if older else 0.0, units.modulus, "Pa"),
-        "contact/approach": Entry(state.approach, units.height, "m"),
+    memories: Mapping[str, Any] = {
+        name: part.restored(state.memories[name], part_of(name, saved)) for name, part in parts_of(scene).items()
     }
-    if older:
-        found["contact/earlier pressure"] = Entry(older[0].pressure, strain, optional=True)
-        found["clock/earlier position"] = Entry(np.array(older[0].position), 1.0, "m", optional=True)
-    if further := older[1:]:
-        found |= {_name(k): Entry(past.pressure, strain, optional=True) for k, past in enumerate(further)}
-        found[MODULI] = Entry(np.array([past.alpha for past in further]), units.modulus, "Pa", optional=True)
-        found[POSITIONS] = Entry(np.array([past.position for past in further]).ravel(), 1.0, "m", optional=True)
-    return found
-
-
-def _name(index: int) -> str:
-    """Return the name of a further pressure in a checkpoint."""
-    return f"contact/pressure {index + 3} steps ago"
-
-
-def _restored_pasts(pasts: tuple[Past, ...], saved: Saved) -> tuple[Past, ...]:
-    """Return the pressures of a checkpoint, whose maps have been read; those that it lacks are not known."""
-    numbers = [(float(saved["contact/modulus"]), saved["clock/position"])]
-    if "contact/earlier pressure" in saved:
-        place = saved.get("clock/earlier position", saved["clock/position"])
-        numbers.append((float(saved["contact/earlier modulus"]), place))
-        if MODULI in saved:
-            numbers += zip(saved[MODULI].tolist(), np.reshape(saved[POSITIONS], (-1, 2)), strict=True)
-    known = zip(pasts, numbers, strict=False)
-    found = [Past(past.pressure, alpha, (float(x), float(y))) for past, (alpha, (x, y)) in known]
-    return (*found, *(Past(past.pressure) for past in pasts[len(found) :]))
+    row = replace(memories["row"], step=contents.step, time=contents.time)
+    scene.relax(memories)
+    return completed(scene, State({**memories, "row": row}))
 
 
 def _value(name: str, entry: Entry, contents: Contents) -> NDArray[Any]:

@@ -16,13 +16,12 @@ first step, which may be far above the one with which the surface passed before:
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..history.chosen import reached
 from ..history.timeline import Step
 from ..job.sections.calculation import Accuracy
 from ..physics.budget import ErrorBudget, Parts
 from ..physics.entries import Entry, Saved
+from ..physics.units import Units
 from ..scene import Scene
 from ..scene.choices import Choices
 from ..solve.contact import Contact
@@ -34,7 +33,7 @@ LOOSEST = 0.05  # accuracy: the largest tolerance, with which single steps may b
 CLOSE = 2.5e-4  # accuracy: before a change, if the tolerance is not smaller: 1 % over a rise of the modulus by 40
 FIRST = 0.01  # accuracy: in the first step of a stage, at most
 NEWEST = 0.25  # tuning: weight of the last step in the mean
-NAME = "contact/tolerance over that of the job"  # in a checkpoint
+NAME = "mean logarithm"  # in a checkpoint
 
 
 @dataclass(frozen=True)
@@ -65,14 +64,18 @@ class StepTolerance:
         now = min(max(math.log2(ratio) if ratio > 0.0 else 0.0, 0.0), math.log2(MOST))
         return StepTolerance(self.mean + NEWEST * (now - self.mean))
 
-    def entries(self) -> dict[str, Entry]:
-        """Return its entry; a checkpoint may lack it."""
-        return {NAME: Entry(np.array(self.mean), optional=True)}
 
-    @classmethod
-    def restored(cls, saved: Saved) -> "StepTolerance":
-        """Return the memory of a checkpoint; with one that has none all is to be learnt again."""
-        return cls(float(saved[NAME])) if NAME in saved else cls()
+class TolerancePart:
+    """The tolerance of solves; with a checkpoint that lacks it all is to be learnt again."""
+
+    def at_rest(self) -> StepTolerance:
+        return StepTolerance()
+
+    def entries(self, memory: StepTolerance, units: Units) -> dict[str, Entry]:
+        return {NAME: Entry(memory.mean, optional=True)}
+
+    def restored(self, memory: StepTolerance, saved: Saved) -> StepTolerance:
+        return StepTolerance(float(saved[NAME])) if NAME in saved else StepTolerance()
 
 
 def tolerance_before(chosen: Choices, stage: int) -> float:

@@ -181,7 +181,7 @@ class ZenerBody:
     def branched(self) -> "ZenerBody":
         return self
 
-    def warm(self, factor: float) -> None:
+    def set_time_factor(self, factor: float) -> None:
         """Relax from now on with so many times the relaxation times that it was made with."""
         self.prony = self.prony._replace(relaxation_times=self._cold * factor)
         self._coefficients = None

@@ -97,7 +97,7 @@ class Parts:
 
 NAMES = ("solver", "time", "folded", "mesh", "method", "scatter")  # that add up
 LITTLE = 0.05  # of the error by the mesh: what one direction makes is not told
-SUMS = "budget/sums"  # in a checkpoint
+SUMS = "sums"  # in a checkpoint
 REMEDIES = {
     "solver": "a smaller numerics.tolerance",
     "time": "shorter time steps",

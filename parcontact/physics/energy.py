@@ -20,7 +20,7 @@ import numpy as np
 from ..parallel.slab import Array, Slab
 from . import loops
 from .body import BodyMemory, Heights, ZenerBody, surface_of
-from .entries import Entry, MapCount, Saved, part_of, prefixed
+from .entries import Entry, MapCount, Saved
 from .prony import Prony
 from .units import Units
 
@@ -111,11 +111,11 @@ class ElasticEnergy:
 
     def entries(self, memory: EnergyMemory, units: Units) -> dict[str, Entry]:
         """Return what is stored; it follows anew from each contact, so that a run can go on without."""
-        return {"energy/stored": Entry(memory.stored, self.unit, "J", optional=True)}
+        return {"stored": Entry(memory.stored, self.unit, "J", optional=True)}
 
     def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
         """Return what is stored in a checkpoint, which is the work."""
-        stored = float(saved.get("energy/stored", 0.0))
+        stored = float(saved.get("stored", 0.0))
         return EnergyMemory(work=stored, stored=stored)
 
 
@@ -228,22 +228,25 @@ class ZenerEnergy:
         """Return the energies, the sums over maps that they go on from, and the memory of `ElasticPressure`."""
         spring = units.height**2 / units.length
         return {
-            "energy/work": Entry(memory.work, self.unit, "J"),
-            "energy/stored": Entry(memory.stored, self.unit, "J"),
-            "energy/dissipated": Entry(memory.dissipated, self.unit, "J"),
-            "energy/spring": Entry(memory.spring, spring, "m"),
-            "energy/branches": Entry(memory.branches, units.modulus**2 * spring, "Pa^2 m"),
-            **prefixed("memory", self.inverse.entries(memory.elastic, units)),
+            "work": Entry(memory.work, self.unit, "J"),
+            "stored": Entry(memory.stored, self.unit, "J"),
+            "dissipated": Entry(memory.dissipated, self.unit, "J"),
+            "spring": Entry(memory.spring, spring, "m"),
+            "branches": Entry(memory.branches, units.modulus**2 * spring, "Pa^2 m"),
+            **{f"elastic {name}": entry for name, entry in self.inverse.entries(memory.elastic, units).items()},
         }
 
     def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
         """Return the energies of a checkpoint, whose maps have been read into those of this memory."""
-        work, stored, spring = (float(saved[f"energy/{name}"]) for name in ("work", "stored", "spring"))
-        dissipated, branches = (
-            np.array(saved[f"energy/{name}"], dtype=np.float64) for name in ("dissipated", "branches")
-        )
-        elastic = self.inverse.restored(memory.elastic, part_of("memory", saved))
+        work, stored, spring = (float(saved[name]) for name in ("work", "stored", "spring"))
+        dissipated, branches = (np.array(saved[name], dtype=np.float64) for name in ("dissipated", "branches"))
+        elastic = self.inverse.restored(memory.elastic, _of_elastic(saved))
         return EnergyMemory(work, stored, dissipated, spring, branches, elastic)
+
+
+def _of_elastic(saved: Saved) -> Saved:
+    """Return the entries of the elastic memory, by its own names."""
+    return {name.removeprefix("elastic "): value for name, value in saved.items() if name.startswith("elastic ")}
 
 
 def _weighted(weights: tuple[Array, ...], *terms: Array) -> Array:

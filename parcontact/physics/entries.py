@@ -1,17 +1,20 @@
 """Entries: what a part of a run remembers from one step to the next, with units, as checkpoints have it.
 
-Each part names its entries and how it goes on from them where its memory is defined, for any number of ranks;
-`march.state` has the one list of all parts.
+Each part has its first memory, the entries of a memory, and the way back from them, for any number of ranks, in one
+place (`RunPart`); `march.state.parts_of` lists all parts.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .units import Units
+
 Saved = Mapping[str, NDArray[Any]]
+Memory = TypeVar("Memory")
 
 
 class MapCount(NamedTuple):
@@ -43,6 +46,23 @@ class Entry:
     def nbytes(self) -> int:
         """The bytes of this rank's part."""
         return np.asarray(self.value).nbytes
+
+
+class RunPart(Protocol[Memory]):
+    """A part of a run that remembers something from one step to the next.
+
+    Its memory is a value: a step returns another one. Maps of two memories may be the same, as `march.state` says.
+    """
+
+    def at_rest(self) -> Memory:
+        """Return the memory before the first step, in new maps."""
+
+    def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:
+        """Return what a checkpoint has of a memory, by the part's own names; maps are no copies."""
+
+    def restored(self, memory: Memory, saved: Saved) -> Memory:
+        """Return the memory of a checkpoint, whose maps have been read into those of another memory; numbers are
+        arrays in the run's units."""
 
 
 def prefixed(part: str, entries: Mapping[str, Entry]) -> dict[str, Entry]:

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import DTypeLike
 
+from ..effects import adhesive_law
 from ..job import Job
 from ..job.checks.size import machines
-from ..march import sticking
-from ..march.state import State
+from ..march import state
 from ..march.tolerance import tolerance_before
 from ..parallel.fft import footprint
 from ..parallel.regrid import coarser_points
@@ -217,7 +217,7 @@ def _maps(job: Job) -> Iterator[tuple[str, MapCount, DTypeLike]]:
     """Whole maps, held or in checkpoints: their purpose, count and type."""
     chosen = choices(job)
     yield "heights", MapCount(1), np.float64
-    yield "pressures", State.count_maps(chosen.extrapolated_starts.on, chosen.further_starts.on), np.float64
+    yield "pressures", state.count_maps(chosen.extrapolated_starts.on, chosen.further_starts.on), np.float64
     if chosen.viscoelasticity.on:
         yield "branches", ZenerBody.count_maps(len(chosen.folded.kept)), np.float64
     else:
@@ -225,7 +225,7 @@ def _maps(job: Job) -> Iterator[tuple[str, MapCount, DTypeLike]]:
     if chosen.energy_memory.on:
         yield "energy memory", ElasticPressure.count_maps(chosen.prony.moduli.size), np.float64
     if chosen.adhesion is not None:
-        yield "gaps", sticking.count_maps(chosen.isolated.on), np.float64
+        yield "gaps", adhesive_law.count_maps(chosen.isolated.on), np.float64
     for name, effect in chosen.followers.items():
         for dtype in effect.maps(job):
             yield name, MapCount(held=1, saved=1), dtype

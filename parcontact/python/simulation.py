@@ -111,7 +111,7 @@ class Simulation:
     def row(self) -> Row:
         """The measures of the last step, also one before a restart; of the initial state before the first."""
         march, saved = self._march, self._saved
-        added = columns_of(march.scene.followers)
+        added = columns_of(march.scene.effects)
         if saved is not None and saved.table.last and march.row.step == saved.step:
             return Row.of_line(saved.table.last, added)
         return Row.of(march.row, added)

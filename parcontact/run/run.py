@@ -6,6 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from .. import scene
+from ..effects.adhesion import AdhesionMemory
 from ..errors import InputError, RunError
 from ..history.chosen import reached
 from ..job import Job
@@ -195,10 +196,11 @@ class Run:
 
     def _log_summary(self) -> int:
         """Say how the run has ended and how wrong it is, and note it in its directory; returns the exit code."""
-        row, console, errors, stuck = self.march.row, self.console, self.march.state.errors, self.march.state.sticking
+        row, console, errors = self.march.row, self.console, self.march.state.errors
+        adhesion: AdhesionMemory | None = self.march.state.memories.get("adhesion")
         slides = any(stage.speed for stage in self.job.history)
         self._log_counts()
-        if self.slab.root and (slides or stuck is not None) and not self.stop:
+        if self.slab.root and (slides or adhesion is not None) and not self.stop:
             grid = self.job.grid
             with suppress(OSError, InputError):  # a table that cannot be read now ends no run
                 rows = tables.read(self.directory.path / "measures.csv")
@@ -214,8 +216,8 @@ class Run:
             console.say(
                 "no error is stated of steps whose contact reaches the edge of the box: their results are wrong"
             )
-        if stuck is not None and stuck.snaps:
-            console.say(f"the contact snapped in {stuck.snaps} of the steps: no error is stated across them")
+        if adhesion is not None and adhesion.snaps:
+            console.say(f"the contact snapped in {adhesion.snaps} of the steps: no error is stated across them")
         if self.stop:
             of = f"at least {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
             console.say(f"stopped after step {row.step} of {of}: {self.stop}; run again to go on")

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from ..effects.adhesive_law import end_of
 from ..effects.effect import columns_of
 from ..errors import InputError
 from ..history.chosen import ChosenSteps, reached
@@ -10,10 +11,10 @@ from ..history.timeline import Timeline
 from ..job import Job, Rough, RoughSpectrum
 from ..job.sections import listing
 from ..march.loop import March
-from ..march.sticking import NEVER, came_off
 from ..parallel.root import on_root
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
+from ..physics.entries import part_of
 from ..scene import choices, sanity
 from ..steady_sliding import start as steadystart
 from ..storage import header, heights, marker, row, wisdom
@@ -86,7 +87,7 @@ def _find_origin(
     reason = restart.finished_before(job, plain, slab, directory, options.restart, timeline)
     origin, warnings = (None, []) if reason else restart.choose(job, plain, slab, directory, options.restart)
     if origin:
-        timeline = Timeline.of(job, until or 0.0, ChosenSteps.of(job, origin.contents.numbers))
+        timeline = Timeline.of(job, until or 0.0, ChosenSteps.of(job, part_of("steps", origin.contents.numbers)))
     if until is not None and not reached(timeline.end, until):
         raise InputError(
             f"--until {until:g} is beyond the end of the history, t = {timeline.end:g} s, and its last stage is one "
@@ -96,8 +97,8 @@ def _find_origin(
     if origin and origin.contents.step >= len(timeline):
         when = f"at t = {origin.contents.time:g} s"
         reason = f"finished before, {when} (--restart never: run it afresh; --until T: go on)"
-    elif origin and (off := came_off(origin.contents, job)) != NEVER:
-        reason = f"detached before, at t = {off[0]:g} s (--restart never: run it afresh)"
+    elif origin and (end := end_of(job, part_of("law", origin.contents.numbers))):
+        reason = f"detached before, at t = {end.time:g} s (--restart never: run it afresh)"
     elif origin and until is not None and reached(origin.contents.time, until):
         reason = f"is at t = {origin.contents.time:g} s already, and --until {until:g} is not later"
     if reason and (lost := on_root(slab.comm, lambda: marker.find_lost_rows(directory.path))):
@@ -118,7 +119,7 @@ def _open_files(
     march: March, directory: Directory, claim: Claim, facts: Facts, origin: Origin | None, options: Options
 ) -> Recorder:
     """Make the output directory ready, and the files in it; collective."""
-    job, slab, added = march.scene.job, march.scene.slab, columns_of(march.scene.followers)
+    job, slab, added = march.scene.job, march.scene.slab, columns_of(march.scene.effects)
     timeline = march.timeline(options.until or 0.0)
     row.columns(0, added)  # refuses names that are taken
     directory.make(job.path, job.resolved(), claim)

@@ -51,7 +51,7 @@ class Choices:
         return own + [effect.decide(self.job) for effect in added_sections.find_effects().values()]
 
     @cached_property
-    def followers(self) -> dict[str, type[Effect]]:
+    def followers(self) -> dict[str, type[Effect[Any]]]:
         """The effects that the job's further sections ask for, by their names in checkpoints."""
         found = added_sections.effects_of(type(self.job).model_fields).values()
         return {effect.decide(self.job).name: effect for effect in found if effect.decide(self.job).on}

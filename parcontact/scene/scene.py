@@ -1,17 +1,20 @@
-"""From a job to what steps are made of: bodies, solver, energies, probe and followers are made here and nowhere else.
+"""From a job to what steps are made of: bodies, solver, energies, probe and effects are made here and nowhere else.
 
 What is made follows from the job alone, as `choices.py` decides; what a job does not call for is never made.
 Steady sliding takes the setup from here and brings a solver of its own.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ..effects import contact_law
-from ..effects.effect import Effect, values_of
+from ..effects.contact_protocol import ContactLaw
+from ..effects.effect import Effect, Memories
 from ..effects.folded_branches import FoldedBranches, describe_folded_branches
 from ..history.chosen import describe_steps
 from ..job import Grid, Job
@@ -30,10 +33,6 @@ from ..physics.tile_operator import TileOperator
 from ..physics.tiles import SIDE, TileConvolution, Tiles
 from ..physics.units import Units
 from ..printed import quantity
-from ..solve.adhesive.iterate import GapOperators
-from ..solve.adhesive.law import DUGDALE, EXPONENTIAL, Law
-from ..solve.adhesive.solver import GapSolver
-from ..solve.adhesive.sticking import StickingSolver
 from ..solve.constraint import Constraint
 from ..solve.contact import ContactSolver
 from ..solve.preconditioner.extension import grids_for
@@ -104,8 +103,7 @@ class Setup:
 
 @dataclass
 class Scene:
-    """Everything a march needs. `sticking` solves contacts with adhesion, None without; where nothing holds a load any
-    more, a run that `goes_on_open` goes on."""
+    """Everything a march needs. `law` is the contact law of an effect, None for that of the constraint."""
 
     setup: Setup
     motion: Motion
@@ -115,9 +113,9 @@ class Scene:
     operators: Operators
     probe: Probe
     energy: ElasticEnergy | ZenerEnergy | None
-    sticking: StickingSolver | None = None
-    goes_on_open: bool = False
-    followers: dict[str, Effect] = field(default_factory=dict)
+    law: ContactLaw[Any] | None = None
+    effects: dict[str, Effect[Any]] = field(default_factory=dict)
+    time_factor: float = 1.0
 
     @property
     def choices(self) -> Choices:
@@ -135,12 +133,16 @@ class Scene:
     def units(self) -> Units:
         return self.setup.units
 
-    def warm(self, factor: float) -> None:
-        """Let the body, its energies and its interface relax from now on with so many times the relaxation times of the
-        job's temperature, as an effect has found it."""
+    def relax(self, memories: Memories) -> None:
+        """Let the body, its energies and its interface relax from now on as effects say, with their memories: with so
+        many times the relaxation times of the job's temperature. Raises RunError."""
+        factor = math.prod(effect.time_factor(memories[name]) for name, effect in self.effects.items())
+        if factor == self.time_factor:
+            return
+        self.time_factor = factor
         for body in (self.material.branched, *(() if self.energy is None else self.energy.bodies)):
             if body is not None:
-                body.warm(factor)
+                body.set_time_factor(factor)
         if (own := self.choices.interface) is not None:
             self.probe = replace(self.probe, interface=replace(own, shift=own.shift * factor))
 
@@ -162,14 +164,6 @@ class Scene:
     def constraint(self, alpha: float) -> Constraint:
         """Return which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure."""
         return contact_law.constraint_of(self.job, alpha * self.units.pressure)
-
-    def law(self, alpha: float) -> Law | None:
-        """Return the law of adhesion in a step with the modulus alpha, None without adhesion."""
-        law = self.choices.adhesion
-        if law is None:
-            return None
-        kind, unit = DUGDALE if law.kind == "dugdale" else EXPONENTIAL, self.units.height
-        return Law(kind, law.strength / (alpha * self.units.pressure), law.range / unit, law.ramp / unit)
 
 
 def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:
@@ -197,11 +191,8 @@ def build_on(setup: Setup) -> Scene:
     inverse = AppliedInverse(operators.preconditioner, lambda: solver.workspace.other_displacement)
     material, energy = _body_and_energy(setup, folded, inverse)
     scene = Scene(setup, _motion(setup), folded, material, solver, operators, setup.probe(), energy)
-    if chosen.adhesion is not None:
-        scene.sticking = _sticking(setup, solver.workspace, operators)
-        scene.goes_on_open = chosen.job.section("adhesion").detached == "open"
-    scene.followers = {name: effect(scene) for name, effect in chosen.followers.items()}
-    values_of(scene.followers)  # refuses those that do not fit, before anything is written
+    scene.effects = {name: effect(scene) for name, effect in chosen.followers.items()}
+    scene.law = next((law for effect in scene.effects.values() if (law := effect.law())), None)
     return scene
 
 
@@ -271,15 +262,6 @@ def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:
         return Operators(body.operator(setup.fft), body.inverse(setup.fft))
     single = FFT(setup.slab, dtype=np.float32, measured=setup.fft.measured, sharing=setup.fft)
     return Operators(body.operator(single if operator_type == np.float32 else setup.fft), body.inverse(single))
-
-
-def _sticking(setup: Setup, workspace: Workspace, operators: Operators) -> StickingSolver:
-    """Make the solver of contacts that stick."""
-    numerics = setup.choices.numerics
-    by_gap = GapOperators(*setup.half_space.gap_operators(setup.fft))
-    gaps = GapSolver(setup.slab, by_gap, numerics.max_iterations)
-    free = operators.operator if setup.choices.isolated.on else None
-    return StickingSolver(gaps, workspace, numerics.tolerance, free)
 
 
 def _body_and_energy(

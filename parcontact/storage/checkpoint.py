@@ -28,7 +28,7 @@ from ..physics.entries import Entry
 from . import files, hdf5
 from .provenance import Link, Provenance, read_chain
 
-FORMAT = 1
+FORMAT = 2
 TITLE = "parcontact checkpoint, format "
 SEAL = 4096  # tuning: bytes set aside for it
 SUMS = "checksums"
@@ -168,8 +168,9 @@ def _broken(path: Path) -> str:
         title, facts, *_ = [*file.read(SEAL).split(b"\n"), b""]
         if not title.startswith(TITLE.encode()):
             return "is incomplete or damaged: it has no seal"
-        if (version := int(title[len(TITLE) :])) > FORMAT:
-            return f"is of format {version}, written by a newer parcontact: this one reads up to {FORMAT}"
+        if (version := int(title[len(TITLE) :])) != FORMAT:
+            other = "a newer" if version > FORMAT else "an older"
+            return f"is of format {version}, written by {other} parcontact, and this one reads format {FORMAT} only"
         try:
             wanted, regions, checksum = itemgetter("bytes", "maps", "checksum")(json.loads(facts))
         except (ValueError, KeyError, TypeError):

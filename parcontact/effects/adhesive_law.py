@@ -1,0 +1,350 @@
+"""The contact law with adhesion: the gap is the unknown, and a part of the state.
+
+Under the same load there are several equilibria, and history decides which one. A solve starts from the last two gaps,
+extrapolated in time and moved with the surface by whole cells.
+"""
+
+import math
+import zlib
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..history.timeline import Step
+from ..parallel import rows
+from ..parallel.slab import Array
+from ..physics import loops
+from ..physics.body import Trial
+from ..physics.entries import Entry, MapCount, Saved
+from ..physics.measures import SIDE, Measures
+from ..physics.motion import cells_between
+from ..physics.units import Units
+from ..solve.adhesive import kernels
+from ..solve.adhesive.iterate import GapOperators
+from ..solve.adhesive.law import DUGDALE, EXPONENTIAL, Law
+from ..solve.adhesive.solver import GapSolver
+from ..solve.adhesive.sticking import StickingSolver
+from ..solve.certificate import Certificate
+from ..solve.contact import Contact
+from ..solve.problem import Approach, Control, MeanPressure
+from .adhesion import cell_of, modulus_of
+from .adhesive_energies import JUMPS, PUSHED, SURFACES, PathWork
+from .contact_protocol import Detached, End, Motion, PreviousContacts, SolvedContact
+
+JUMP_STRIDE = 1.0 / 8.0  # accuracy: of a jump: the longest part in which it is made
+LEAST_STRIDE = 1.0 / 16.0  # accuracy: of these, and of a step: the shortest part in which a hard one is made
+PART_TOLERANCE = 0.05  # tuning: of the parts of a step but for the last
+OPEN = 10.0  # physics: ranges of attraction between surfaces that are detached
+LEAST_TENSION = 1e-2  # physics: of the largest attraction: less is not counted as an area under tension
+NEVER = -1.0  # a time [s] in a checkpoint
+UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
+
+
+class PastGap(NamedTuple):
+    """The gap after a step, and where the surface was [m]; one that is not `known` has not been."""
+
+    gap: Array
+    position: tuple[float, float] = (0.0, 0.0)
+    known: bool = False
+
+
+@dataclass(frozen=True)
+class AdhesiveMemory:
+    """Memory of a contact with adhesion: the last gaps, the newest first, a spare map and a backup of the gap.
+
+    `free_correction` is what a free body lacks (`solve.adhesive.sticking`) per pressure, for the modulus `modulus`,
+    None of a periodic one. `end` is when nothing held the surfaces any more, None while they are held.
+    """
+
+    pasts: tuple[PastGap, PastGap]
+    spare: Array
+    gap_backup: Array
+    free_correction: Array | None
+    modulus: float = 0.0
+    end: Detached | None = None
+
+
+@dataclass(frozen=True)
+class LoadPath:
+    """The way of the prescribed load from the last step to this one; approach and mean pressure of the last one; in the
+    units of the solver. A load that presses surfaces which are apart `closes_gap_first`."""
+
+    before: float
+    control: Control
+    approach: float
+    pressure: float
+    closes_gap_first: bool = False
+
+    def at(self, share: float) -> Control:
+        """Return what is prescribed at a share of the way; exact at its end."""
+        if share == 1.0:
+            return self.control
+        return replace(self.control, value=self.before + share * (self.control.value - self.before))
+
+
+class _Walk(NamedTuple):
+    """Result of solving along the path of a load: contact, whether it is detached, work and whether it has snapped."""
+
+    contact: Contact
+    detached: bool
+    work: float
+    snapped: bool
+
+
+class AdhesiveLaw:
+    """The law `solve.adhesive.law` of the adhesion section, for the steps of a scene."""
+
+    may_shorten = True
+
+    def __init__(self, scene: Any) -> None:
+        setup, numerics = scene.setup, scene.choices.numerics
+        by_gap = GapOperators(*setup.half_space.gap_operators(setup.fft))
+        gaps = GapSolver(setup.slab, by_gap, numerics.max_iterations)
+        free = scene.operators.operator if scene.choices.isolated.on else None
+        self.solver = StickingSolver(gaps, scene.solver.workspace, numerics.tolerance, free)
+        self.scene, self.slab, self.grid = scene, setup.slab, scene.choices.grid
+        self._goes_on_open = scene.job.section("adhesion").detached == "open"
+
+    def law(self, alpha: float) -> Law:
+        """Return the law in a step with the modulus alpha, in the units of the solver."""
+        law = self.scene.choices.adhesion
+        kind, unit = DUGDALE if law.kind == "dugdale" else EXPONENTIAL, self.scene.units.height
+        return Law(kind, law.strength / (alpha * self.scene.units.pressure), law.range / unit, law.ramp / unit)
+
+    # -- a step --------------------------------------------------------------------------------------------------------
+
+    def solve(
+        self,
+        trial: Trial,
+        step: Step,
+        control: Control,
+        memory: AdhesiveMemory,
+        past: PreviousContacts,
+        before: Measures,
+        tolerance: float | None,
+    ) -> SolvedContact[AdhesiveMemory]:
+        """Solve a step from the gap of the one before; `effects.contact_protocol.ContactLaw.solve`.
+
+        Solves have the tolerance of the job. Where nothing holds the load the surfaces are far apart afterwards, if the
+        job goes on then.
+        """
+        law, path = self.law(trial.alpha), self._path(trial, control, past, before)
+        walk = self._walk(law, memory, step, trial, path, past.spare)
+        contact, gap = walk.contact, memory.spare
+        pasts = PastGap(gap, step.position, True), memory.pasts[0]
+        now = AdhesiveMemory(pasts, memory.pasts[1].gap, memory.gap_backup, memory.free_correction, trial.alpha)
+        changed = self._count_changes(law, *now.pasts)
+        end: End = "detached" if walk.detached else "equilibrium"
+        snapped, remark = walk.snapped, ""
+        if walk.detached and self._goes_on_open:
+            contact, now = self._open_up(contact, now, law, trial)
+            apart = before.contact_area == before.pressure == 0.0
+            end, snapped = ("open", False) if apart else ("opened", snapped)
+            remark = "" if apart else nothing_holds(step.control, step.load)
+        numbers = self._tension(law, contact.p, trial.alpha) | {"points_changed": changed}
+        if self.scene.energy is not None:
+            sum_gamma = 0.0 if walk.detached else self.slab.sum(kernels.surface_energy(law, gap))[0]
+            numbers[SURFACES] = sum_gamma * trial.alpha * self.scene.energy.unit
+            numbers[PUSHED] = walk.work * trial.alpha
+            numbers[JUMPS] = float(walk.detached or path.closes_gap_first)
+        touching = law.touches(now.pasts[0].gap)
+        return SolvedContact(contact, now, touching, numbers, numbers["adhesive_force"], end, snapped, remark)
+
+    def _walk(
+        self, law: Law, memory: AdhesiveMemory, step: Step, trial: Trial, path: LoadPath, pressure: Array
+    ) -> _Walk:
+        """Solve along the path of the load, up to its end, with gap and pressure in maps; collective.
+
+        A jump goes along its path in parts, so that it does not pass over an equilibrium on its way, and so does a step
+        that is not solved at once, or detaches. Where shorter parts are of no help that stands.
+        """
+        gap, correction = memory.spare, memory.free_correction
+        if correction is not None and memory.modulus:
+            correction *= memory.modulus / trial.alpha
+        whole = JUMP_STRIDE if step.jump else 1.0
+        self._start(memory, step, trial, path, gap, still=step.jump)
+        reached, stride, iterations, backup, snapped = 0.0, whole, 0, memory.gap_backup, False
+        work = PathWork(self.scene, path.approach, path.pressure)
+        while True:
+            share = min(reached + stride, 1.0)
+            loose = 1.0 if share == 1.0 else max(1.0, PART_TOLERANCE / self.scene.choices.numerics.tolerance)
+            contact, detached = self.solver.solve(
+                law, trial.effective, path.at(share), gap, correction, pressure, loose
+            )
+            iterations += contact.iterations
+            hard = detached or (bool(contact.failure) and share == 1.0)
+            if hard and stride > LEAST_STRIDE * whole:
+                if reached == 0.0:
+                    self._start(memory, step, trial, path, gap, still=True)
+                else:
+                    gap[...] = backup
+                stride *= 0.5
+                continue
+            if not detached and not path.closes_gap_first:
+                work.add(contact)
+            snapped |= hard and memory.pasts[0].known
+            if detached or share == 1.0:
+                return _Walk(replace(contact, iterations=iterations), detached, work.total, snapped)
+            reached = share
+            backup[...] = gap
+
+    def motion(self, solved: SolvedContact[AdhesiveMemory], before: Measures, now: Measures) -> Motion:
+        """Return by how many half process zones the edge of the contact has moved in a step, in the mean.
+
+        In cells that is the number of points that came into contact or left it, over the length of the edge, which is
+        pi/4 of the sides of cells along it. What is left of the load of an `untouched` contact is the solver's error.
+        """
+        if not (before.contact_area or now.contact_area or solved.numbers["tensile_area"]):
+            return Motion(0.0, True)
+        excess = max(each.contact_area - each.contact_area_corrected for each in (before, now))
+        sides = excess * self.slab.points / SIDE
+        if sides <= 0.0:
+            return Motion()
+        moved = solved.numbers["points_changed"] / (0.25 * math.pi * sides) * cell_of(self.grid)
+        zone = self.scene.choices.adhesion.process_zone(modulus_of(self.scene.job.material))
+        return Motion(2.0 * moved / zone if zone > 0.0 else 0.0)
+
+    def _path(self, trial: Trial, control: Control, past: PreviousContacts, before: Measures) -> LoadPath:
+        """Return the way of what is prescribed since the last step, in the run's units."""
+        pressure = before.pressure / (trial.alpha * self.scene.units.pressure)
+        if isinstance(control, MeanPressure):
+            closes = control.value >= 0.0 and before.contact_area == 0.0
+            return LoadPath(0.0 if closes else pressure, control, past.approach, pressure, closes)
+        approach = past.approach if past.last.alpha else min(past.approach, control.value)  # nothing came nearer
+        return LoadPath(approach, control, approach, pressure)
+
+    def _start(
+        self, memory: AdhesiveMemory, step: Step, trial: Trial, path: LoadPath, out: Array, still: bool = False
+    ) -> None:
+        """Put the gap from which a step starts into a map: extrapolated, or `still` that of the last step; collective.
+
+        Before the first step it is the gap under a body that nothing has deformed, at the approach, or where the
+        surface touches.
+        """
+        now, before = memory.pasts
+        if not now.known:
+            control = path.at(0.0 if still else 1.0)
+            highest = self._highest(trial)
+            np.maximum(-trial.effective - (control.value if isinstance(control, Approach) else -highest), 0.0, out=out)
+            return
+        growth = step.growth if before.known and not still else 0.0
+        cells = cells_between(now.position, step.position, (self.grid.dx, self.grid.dy))
+        along_x, along_y = (round(moved) % count for moved, count in zip(cells, self.grid.points, strict=True))
+        older = before.gap
+        if along_y and growth > 0.0:
+            older = rows.roll(self.slab, before.gap, along_y, out)
+        loops.travel(now.gap, older, 1.0 + growth, growth, along_x, 0.0, np.inf, out)
+        if along_y:
+            out[...] = rows.roll(self.slab, out, along_y, self.scene.solver.workspace.pressure)
+        if path.closes_gap_first:
+            out += self.slab.reduce((), [-float(out.min(initial=np.inf))])[0]
+
+    def _open_up(
+        self, contact: Contact, memory: AdhesiveMemory, law: Law, trial: Trial
+    ) -> tuple[Contact, AdhesiveMemory]:
+        """Return the contact with the surfaces apart, and its memory; collective."""
+        now, before = memory.pasts
+        contact.p.fill(0.0)
+        contact.u.fill(0.0)
+        d = -self._highest(trial) - OPEN * law.range
+        np.subtract(-d, trial.effective, out=now.gap)
+        if memory.free_correction is not None:
+            memory.free_correction.fill(0.0)
+        memory = replace(memory, pasts=(now, before._replace(known=False)))
+        return replace(contact, d=d, failure="", certificate=Certificate(0.0, 0.0, 0.0)), memory
+
+    def _highest(self, trial: Trial) -> float:
+        return self.slab.reduce((), [float(trial.effective.max(initial=-np.inf))])[0]
+
+    def _count_changes(self, law: Law, now: PastGap, before: PastGap) -> float:
+        """Return the number of points that came into contact or left it; collective."""
+        if not before.known:
+            return 0.0
+        return self.slab.sum(float(np.count_nonzero(law.touches(before.gap) != law.touches(now.gap))))[0]
+
+    def _tension(self, law: Law, p: Array, alpha: float) -> dict[str, float]:
+        """Return the share of points under tension and the force of all tension [N]; collective."""
+        count, pull = self.slab.sum(*kernels.tension(p, LEAST_TENSION * law.strength))
+        unit = alpha * self.scene.units.pressure * self.grid.lx * self.grid.ly / self.slab.points
+        return {"tensile_area": count / self.slab.points, "adhesive_force": pull * unit}
+
+    # -- as a part of the run ------------------------------------------------------------------------------------------
+
+    def gap(self, memory: AdhesiveMemory) -> Array | None:
+        """Return the map of the last gap, None before the first step."""
+        return memory.pasts[0].gap if memory.pasts[0].known else None
+
+    def detached(self, memory: AdhesiveMemory) -> Detached | None:
+        """Return when nothing held the surfaces any more; None where they are held."""
+        return memory.end
+
+    def with_end(self, memory: AdhesiveMemory, end: Detached) -> AdhesiveMemory:
+        """Return the memory of a run in which nothing holds the surfaces any more."""
+        return replace(memory, end=end)
+
+    def at_rest(self) -> AdhesiveMemory:
+        """Return the memory before the first step, in new maps."""
+        correction = self.slab.zeros() if self.scene.choices.isolated.on else None
+        pasts = PastGap(self.slab.zeros()), PastGap(self.slab.zeros())
+        return AdhesiveMemory(pasts, self.slab.zeros(), self.slab.zeros(), correction)
+
+    def entries(self, memory: AdhesiveMemory, units: Units) -> dict[str, Entry]:
+        """Return the gaps, where the surface was, and when nothing held it any more."""
+        now, before = memory.pasts
+        end = memory.end or (NEVER, 0.0)
+        found = {
+            "gap": Entry(now.gap, units.height, "m"),
+            "earlier gap": Entry(before.gap, units.height, "m"),
+            "position": Entry(np.array(now.position), 1.0, "m"),
+            "earlier position": Entry(np.array(before.position), 1.0, "m"),
+            "gap is known": Entry(float(now.known)),
+            "earlier gap is known": Entry(float(before.known)),
+            "modulus": Entry(memory.modulus, units.modulus, "Pa"),
+            "detached at": Entry(end[0], 1.0, "s"),
+            "detached under": Entry(end[1]),
+            "history": Entry(_mark(self.scene.job)),
+        }
+        if memory.free_correction is None:
+            return found
+        return {**found, "free correction": Entry(memory.free_correction, units.height, "m")}
+
+    def restored(self, memory: AdhesiveMemory, saved: Saved) -> AdhesiveMemory:
+        """Return the memory of a checkpoint, whose maps have been read into those of this one."""
+        now, before = (
+            PastGap(past.gap, _place(saved[f"{age}position"]), bool(saved[f"{age}gap is known"]))
+            for age, past in zip(("", "earlier "), memory.pasts, strict=True)
+        )
+        end = end_of(self.scene.job, saved)
+        return replace(memory, pasts=(now, before), modulus=float(saved["modulus"]), end=end)
+
+
+def end_of(job: Any, saved: Saved) -> Detached | None:
+    """Return when nothing held the surfaces of a checkpoint any more, from the entries of the law; None where they were
+    held, or where the job goes on then or has another history ahead."""
+    section = job.section("adhesion")
+    if section is None or section.detached == "open" or "detached at" not in saved or saved["detached at"] == NEVER:
+        return None
+    if float(saved["history"]) != _mark(job):
+        return None
+    return Detached(float(saved["detached at"]), float(saved["detached under"]))
+
+
+def _place(saved: Array) -> tuple[float, float]:
+    x, y = saved.tolist()
+    return x, y
+
+
+def _mark(job: Any) -> float:
+    """Return a number that tells the history of a job from others."""
+    return float(zlib.crc32(repr(job.history).encode()))
+
+
+def nothing_holds(control: str, load: float) -> str:
+    """Return the sentence on surfaces that detach under a prescribed load."""
+    return f"nothing holds the surfaces under a {control} of {load:g}{UNITS[control]} any more"
+
+
+def count_maps(free: bool) -> MapCount:
+    """Count the maps of a memory, in a `free` box or a periodic one."""
+    return MapCount(held=4 + free, saved=2 + free)

@@ -1,0 +1,100 @@
+"""The contact law without adhesion: a constraint on pressures (`solve.constraint`), solved from the last pressures."""
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..effects.contact_protocol import ContactLaw, Detached, Motion, PreviousContacts, SolvedContact
+from ..history.timeline import Step
+from ..parallel.slab import Array
+from ..physics.body import Trial
+from ..physics.entries import Entry, Saved
+from ..physics.measures import Measures
+from ..physics.units import Units
+from ..scene import Scene, solver_on, solver_on_tiles
+from ..solve.contact import Contact
+from ..solve.fallback import cold_start, retry
+from ..solve.problem import Control, Problem
+from . import failure
+from .starts import cells_moved, make_start
+
+
+def law_of(scene: Scene) -> ContactLaw[Any]:
+    """Return the contact law of a scene: that of one of its effects, or else that of its constraint."""
+    return scene.law or DryLaw(scene)
+
+
+@dataclass(frozen=True)
+class DryLaw:
+    """The law of a scene's constraint, which remembers nothing but the last pressures."""
+
+    scene: Scene
+    may_shorten = False
+
+    def solve(
+        self,
+        trial: Trial,
+        step: Step,
+        control: Control,
+        memory: None,
+        past: PreviousContacts,
+        before: Measures,
+        tolerance: float | None,
+    ) -> SolvedContact[None]:
+        """Solve a step; `effects.contact_protocol.ContactLaw.solve`. Raises StepError."""
+        scene, contact, remark = self.scene, None, ""
+        problem = Problem(*scene.operators, trial.effective, scene.constraint(trial.alpha), control)
+        make_start(scene, past.pressures, step, trial.alpha, past.spare)
+        if past.last.alpha == 0.0:  # nothing has been solved before
+            on = partial(solver_on, scene.setup)
+            contact = cold_start.prepare(scene.solver, problem, past.spare, on, solver_on_tiles(scene.setup))
+        contact = contact or scene.solver.solve(problem, past.spare, tolerance=tolerance)
+        if contact.failure:
+            contact, remark = self._retry(step, past, problem, contact)
+        return SolvedContact(contact, None, problem.constraint.touches(contact.p), remark=remark)
+
+    def _retry(self, step: Step, past: PreviousContacts, problem: Problem, failed: Contact) -> tuple[Contact, str]:
+        """Retry a solve that failed, unless the job takes it as it is: then only in double precision.
+
+        Returns the contact, and a sentence on what helped; collective. Raises StepError when nothing helps.
+        """
+        scene, would_do = self.scene, failure.accepts(self.scene, failed)
+        in_double = (lambda: scene.in_double) if failed.u.dtype == np.float32 else None
+        if would_do and in_double is None:
+            return failed, ""
+        on, most = partial(solver_on, scene.setup), 1 if would_do else None
+        contact, tried = retry.retry_solve(scene.solver, problem, failed, on, in_double, most)
+        if contact.failure:
+            if would_do and failure.accepts(scene, contact):
+                return contact, ""
+            moved = math.hypot(*cells_moved(scene, step, past.last.position))
+            raise failure.of_solve(scene, step, failed, contact, tried, problem.heights, moved)
+        return contact, f"the contact solve {failed.failure}; solved when retried with {', with '.join(tried)}"
+
+    def motion(self, solved: SolvedContact[None], before: Measures, now: Measures) -> Motion:
+        """Return no motion: edges may move by any way in a step."""
+        return Motion()
+
+    def gap(self, memory: None) -> Array | None:
+        """Return None: pressures are solved for."""
+        return None
+
+    def detached(self, memory: None) -> Detached | None:
+        """Return None: a load that presses is always held."""
+        return None
+
+    def with_end(self, memory: None, end: Detached) -> None:
+        """Return the memory as it is."""
+
+    def at_rest(self) -> None:
+        """Return None: there is nothing to remember."""
+
+    def entries(self, memory: None, units: Units) -> dict[str, Entry]:
+        """Return no entries."""
+        return {}
+
+    def restored(self, memory: None, saved: Saved) -> None:
+        """Return None."""
