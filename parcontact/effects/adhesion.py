@@ -16,7 +16,7 @@ from ..job.sections.geometry import Sphere, Wave
 from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
-from ..physics.adhesion import AdhesionLaw, ramp_of, smallest_range
+from ..physics.adhesion import AdhesionLaw, cell_of, modulus_of, ramp_of, smallest_range
 from ..physics.entries import Entry, Saved
 from ..physics.units import Units
 from . import adhesive_energies
@@ -51,11 +51,6 @@ class Adhesion(Part):
     detached: Literal["end", "open"] = "end"
 
 
-def modulus_of(material: Any) -> float:
-    """Return E* = 2 G/(1 - nu) of the relaxed body [Pa]."""
-    return float(2.0 * material.fitted.long_modulus / (1.0 - material.poisson))
-
-
 def law_of(section: Adhesion | None, grid: Grid, material: Any) -> AdhesionLaw | None:
     """Return the law of a section; the range `auto` is the smallest that the cells of the grid resolve."""
     if section is None:
@@ -72,11 +67,6 @@ def chosen_range(job: Any) -> float | None:
     section = job.section("adhesion")
     law = None if section is None or section.range != AUTO else law_of(section, job.grid, job.material)
     return None if law is None else law.range
-
-
-def cell_of(grid: Grid) -> float:
-    """Return the longer side of a cell [m], along directions that have several points."""
-    return max((step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1), default=grid.dx)
 
 
 def _bodies(adhesion: Adhesion | None, material: Any) -> Iterator[Fault]:

@@ -15,6 +15,7 @@ from ..history.timeline import Step
 from ..parallel import rows
 from ..parallel.slab import Array
 from ..physics import loops
+from ..physics.adhesion import cell_of, modulus_of
 from ..physics.body import Trial
 from ..physics.entries import Entry, MapCount, Saved
 from ..physics.measures import SIDE, Measures
@@ -28,7 +29,6 @@ from ..solve.adhesive.sticking import StickingSolver
 from ..solve.certificate import Certificate
 from ..solve.contact import Contact
 from ..solve.problem import Approach, Control, MeanPressure
-from .adhesion import cell_of, modulus_of
 from .adhesive_energies import JUMPS, PUSHED, SURFACES, PathWork
 from .contact_protocol import Detached, End, Motion, PreviousContacts, SolvedContact
 

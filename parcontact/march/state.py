@@ -180,8 +180,8 @@ class _ContactPart:
 
 
 def _name(what: str, ago: int) -> str:
-    """Return the name in a checkpoint of something `ago` steps before the last one."""
-    return f"{what} {ago} steps before" if ago else what
+    """Return the name in a checkpoint of what was some steps before the last one."""
+    return f"earlier {what} {ago}" if ago else what
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,9 @@ are 2 h above its troughs (K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423).
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
+
+from ..job.sections.calculation import Grid
 
 KINDS = ("exponential", "dugdale")
 
@@ -60,3 +62,13 @@ def ramp_of(law: AdhesionLaw, modulus: float, cell: float) -> float:
 def smallest_range(work: float, modulus: float, cell: float, cells: float) -> float:
     """Return the range [m] whose process zone is so many cells long, for E* [Pa] and the side of a cell [m]."""
     return math.sqrt(cells * cell * work / modulus)
+
+
+def modulus_of(material: Any) -> float:
+    """Return E* = 2 G/(1 - nu) of the relaxed body [Pa]."""
+    return float(2.0 * material.fitted.long_modulus / (1.0 - material.poisson))
+
+
+def cell_of(grid: Grid) -> float:
+    """Return the longer side of a cell [m], along directions that have several points."""
+    return max((step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1), default=grid.dx)

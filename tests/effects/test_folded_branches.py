@@ -1,6 +1,5 @@
 """Branches without a map in whole runs: what they save and cost, and that restarts wake them."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -251,7 +250,7 @@ def test_bound_of_a_frozen_branch_where_contacts_keep_their_tracks(pressure: flo
     marches = [begun(sliding(slide, times=(MIDDLE, 0.1), numerics=numerics)) for _ in range(2)]
     base = marches[1].scene.setup
     marches[1].scene.material = ZenerBody(base.slab, base.prony, "exponential", frozen=[1])
-    marches[1].state = replace(marches[1].state, body=marches[1].scene.material.at_rest())
+    marches[1].state = marches[1].state.after(material=marches[1].scene.material.at_rest())
     timeline = list(Timeline.of(base.job))
     friction = [[march.advance(step).measures.friction for step in timeline] for march in marches]
     wrong = np.max(np.abs(np.diff(friction, axis=0))) / friction[0][-1]

@@ -59,11 +59,11 @@ def run(comm: MPI.Intracomm, where: Path, name: str, **options: Any) -> Rows:
 def test_column_is_archards_law(installed: Path, comm: MPI.Intracomm) -> None:
     """Worn off in all: the constant times the mean pressure times the distance slid, to rounding."""
     march, rows = marched(WEAR, comm=comm)
-    slab, wear = march.scene.slab, march.scene.followers["wear"]
-    worn = slab.sum(float(wear.depth.sum()))[0] / slab.points  # type: ignore[attr-defined]
+    slab, (depth, _) = march.scene.slab, march.state.memories["wear"]
+    worn = slab.sum(float(depth.sum()))[0] / slab.points
     assert_allclose(worn, COEFFICIENT * 1e5 * 0.5e-3, rtol=1e-12)
     assert [row.added[0] for row in rows[:4]] == [0.0] * 4  # nothing slides before
-    assert rows[-1].added[0] == slab.reduce((), [float(wear.depth.max(initial=0.0))])[0] > worn  # type: ignore[attr-defined]
+    assert rows[-1].added[0] == slab.reduce((), [float(depth.max(initial=0.0))])[0] > worn
 
 
 def test_restart_on_another_number_of_ranks(installed: Path, comm: MPI.Intracomm) -> None:
@@ -107,7 +107,7 @@ def test_absent_it_costs_nothing(installed: Path, comm: MPI.Intracomm) -> None:
     """Its file is not even imported; where it is on, one map and a reduction in each step are all that is more."""
     off, rows = marched(DATA, comm=comm)
     assert "tread_wear" not in sys.modules
-    assert off.scene.followers == {}
+    assert off.scene.effects == {}
     assert rows[-1].added == ()
     on, _ = marched(WEAR, comm=comm)
     more, less = on.scene.slab.tally, off.scene.slab.tally

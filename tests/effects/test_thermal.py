@@ -211,7 +211,7 @@ def test_heat_in_is_heat_stored() -> None:
         ages = np.sqrt(np.maximum(row.time - starts, 0.0))
         exact = 2 / math.sqrt(math.pi) * float(changes @ ages) / math.sqrt(0.2**2 / 1e-7)
         assert mean == pytest.approx(exact, rel=1e-6)
-    heat = march.scene.followers["thermal"].memory.mean.stored * area  # type: ignore[attr-defined]
+    heat = march.state.memories["thermal"].heat.mean.stored * area
     distances = np.diff([row.distance for row in rows])
     assert heat == pytest.approx(float(np.sum(np.array(work[2:]) * distances)), rel=1e-9)
 
@@ -276,15 +276,15 @@ def test_without_it_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*given: Any, **named: Any) -> None:
         raise AssertionError("called without a thermal section")
 
-    warm = marched(march_data())[0].scene
+    warm = marched(march_data())[0]
     for place in ("effects.thermal.HeatMemory", "effects.thermal.depths_of", "steady_sliding.sliding.warm"):
         monkeypatch.setattr(f"parcontact.{place}", refuse)
-    plain = marched(march_data(thermal=None))[0].scene
+    plain = marched(march_data(thermal=None))[0]
     assert states(job(thermal=None)).solve((SPEED, 0.0), PRESSURE).flash is None
-    assert "thermal" not in plain.followers
-    held = warm.slab.tally["map bytes"] - plain.slab.tally["map bytes"]
+    assert "thermal" not in plain.scene.effects
+    held = warm.scene.slab.tally["map bytes"] - plain.scene.slab.tally["map bytes"]
     spectrum = 16 * 4 * 17  # bytes, of 32 x 4 points
-    assert held == (exponentials_of(warm.job).kept + 1) * spectrum + 8 * 32 * 4
+    assert held == (exponentials_of(warm.scene.job).kept + 1) * spectrum + 8 * 32 * 4
 
 
 KEYS = "thermal: {conductivity: 0.2, diffusivity: 1.0e-7"

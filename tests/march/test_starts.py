@@ -19,9 +19,9 @@ SCENE = {"grid": {"points": 32, "size": 1e-3}, "surface": WAVES, "material": SLS
 
 def start_of(march: March, step: Step) -> Array:
     """The start of the next step for a modulus of 2."""
-    state = march.state
-    make_start(march.scene, state.pasts, step, 2.0, state.spare)
-    return state.spare.copy()
+    contact = march.state.contact
+    make_start(march.scene, contact.pressures, step, 2.0, contact.spare)
+    return contact.spare.copy()
 
 
 SLIDE = {"pressure": 1e4, "velocity": 0.1, "distance": 6 * CELL}
@@ -43,7 +43,7 @@ def test_half_cells_start_from_a_whole_cell_earlier() -> None:
     for step in itertools.islice(march.steps(), 5):
         if step.number > 3:
             start = start_of(march, step)
-            earlier = march.state.pasts[1]
+            earlier = march.state.contact.pressures[1]
             moved = np.roll(earlier.pressure, (1, 1), (0, 1)) * (earlier.alpha / 2.0)
             np.testing.assert_array_equal(start, moved)
         march.advance(step)
@@ -60,8 +60,8 @@ def test_parts_of_a_cell_start_from_a_whole_cell_ago(parts: int, ago: int) -> No
     for step in itertools.islice(given, 8):
         start = start_of(march, step)
         if step.number > ago + 2:
-            past = march.state.pasts[ago - 1]
+            past = march.state.contact.pressures[ago - 1]
             np.testing.assert_array_equal(past.pressure, pressures[-ago])
             np.testing.assert_array_equal(start, np.roll(pressures[-ago], 1, 1) * (past.alpha / 2.0))
         march.advance(step)
-        pressures.append(march.state.pressure.copy())
+        pressures.append(march.state.contact.last.pressure.copy())

@@ -14,7 +14,7 @@ from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job.sections.listing import plain
 from parcontact.march.loop import March, run
-from parcontact.march.state import POSITIONS, State
+from parcontact.march.state import count_maps
 from parcontact.physics.units import Units
 from parcontact.storage import checkpoint
 from parcontact.storage.checkpoint import Facts
@@ -81,20 +81,20 @@ def test_a_checkpoint_of_another_material_is_refused(tmp_path: Path, off: float,
 def test_further_pressures_are_named_by_their_age() -> None:
     """As the manual has them, of slides that choose their steps."""
     march = begun(job(RUBBER, CHOSEN))
-    further = [name for name in march.entries() if name.endswith("steps ago")]
-    assert further == ["contact/pressure 3 steps ago", "contact/pressure 4 steps ago"]
+    further = [name for name in march.entries() if name.startswith("contact/earlier pressure")]
+    assert further == [f"contact/earlier pressure {ago}" for ago in (1, 2, 3)]
 
 
 def test_ways_in_a_checkpoint_are_in_metres(tmp_path: Path) -> None:
     """Where the surface was after the last steps of a slide along x, the latest first."""
     march, rows = marched(job(RUBBER, CHOSEN))
     contents = checkpoint.inspect(written(march, tmp_path / "step.h5"))
-    names = ("clock/position", "clock/earlier position", POSITIONS)
+    names = ("contact/position", *(f"contact/earlier position {ago}" for ago in (1, 2, 3)))
     found = np.concatenate([contents.numbers[name] * contents.units[name] for name in names]).reshape(-1, 2)
     expected = [row.distance for row in rows[: -len(found) - 1 : -1]]
     np.testing.assert_allclose(found[:, 0], expected, rtol=1e-12)
     assert not found[:, 1].any()
-    assert contents.numbers["clock/distance"] * contents.units["clock/distance"] == expected[0]
+    assert contents.numbers["row/distance"] * contents.units["row/distance"] == expected[0]
 
 
 def test_pressures_and_times_in_a_checkpoint_are_in_si_units(tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_pressures_and_times_in_a_checkpoint_are_in_si_units(tmp_path: Path) -> 
     with h5py.File(tmp_path / "step.h5") as file:
         strain = file["contact/pressure"][...] * contents.units["contact/pressure"]
     np.testing.assert_allclose(strain * values["contact/modulus"], march.field("pressure"), rtol=1e-12)
-    assert values["clock/ends"].tolist() == pytest.approx([row.time for row in rows[2:]], rel=1e-12)
+    assert values["steps/ends"].tolist() == pytest.approx([row.time for row in rows[2:]], rel=1e-12)
 
 
 @pytest.mark.parametrize("material", [ELASTIC, RUBBER])
@@ -131,7 +131,7 @@ def test_pressures_of_a_checkpoint_are_counted(data: dict[str, Any]) -> None:
     """As many maps as are planned for."""
     march = begun(data)
     chosen = march.scene.choices
-    counted = State.count_maps(chosen.extrapolated_starts.on, chosen.further_starts.on).saved
+    counted = count_maps(chosen.extrapolated_starts.on, chosen.further_starts.on).saved
     assert sum(entry.is_map for name, entry in march.entries().items() if name.startswith("contact/")) == counted
 
 

@@ -163,17 +163,17 @@ def test_no_adhesion_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("called without an adhesion section")
 
     places = ["solve.adhesive.solver.GapSolver.__init__", "physics.halfspace.HalfSpace.gap_operators"]
-    places += ["march.sticking_energies.after_step", "scene.scene.Scene.law"]
-    places += [f"march.sticking.{name}" for name in ("at_rest", "solve", "front_of", "is_apart", "open_up")]
+    places += ["effects.adhesive_energies.advance"]
+    places += [f"effects.adhesive_law.AdhesiveLaw.{name}" for name in ("__init__", "at_rest", "solve", "motion")]
     for place in places:
         monkeypatch.setattr(f"parcontact.{place}", refuse)
     grid, history = {"points": [20, 14], "size": [1e-3, 7e-4]}, [{**LOAD, "pressure": 2e3}, SLIDE]
     job = {"grid": grid, "surface": ROUGH, "material": ZENER, "history": history, "output": {"energy": True}}
     planned = Job.model_validate(job)
     march, _ = marched(planned)
-    assert march.scene.sticking is None
-    assert march.state.sticking is None
-    assert not [name for name in march.entries() if name.startswith("sticking")]
+    assert march.scene.law is None
+    assert march.state.law is None
+    assert not [name for name in march.entries() if name.startswith(("law", "adhesion"))]
     assert march.scene.slab.tally["map bytes"] == memory.total(planned)
     with pytest.raises(AssertionError, match="without an adhesion section"):
         marched({**job, "adhesion": STICK})
@@ -241,14 +241,13 @@ def test_chosen_steps_follow_the_edge() -> None:
     stages.append({"approach": {"from": 1e-6, "to": -2e-6}, "duration": 4.0})
     grid = {"points": 32, "size": 4e-4, "boundary": "free"}
     job = {"grid": grid, "surface": {"shape": "sphere", "radius": 1e-3}, "material": rubber, "history": stages}
-    march, found = marched({**job, "adhesion": {"work": 0.05, "range": 6e-7}})
+    _, found = marched({**job, "adhesion": {"work": 0.05, "range": 6e-7}})
     assert found[-1].time == 8.0
     areas = column(found, "contact_area")
     zone, cell = 4e6 * 6e-7**2 / 0.05, 4e-4 / 32
     radius = np.sqrt(areas * 32**2 / np.pi) * cell
     moved = np.abs(np.diff(radius)) / (0.5 * zone)
     snapped = np.array([row.errors is None for row in found[1:]])
-    assert march.state.sticking is not None
     assert 0.1 < moved[(areas[:-1] > 0.01) & ~snapped].max() < 1.5
 
 
@@ -274,8 +273,7 @@ def test_chosen_steps_of_surfaces_apart_are_long() -> None:
     job = {"grid": grid, "surface": surface, "material": body, "adhesion": STICK, "history": history}
     march, made = marched({**job, "numerics": {"accuracy": 0.05}})
     assert len(made) < 100
-    assert march.state.sticking is not None
-    assert march.state.sticking.snaps == 0
+    assert march.state.memories["adhesion"].snaps == 0
 
 
 def test_a_fluid_flows_where_the_gap_is_open() -> None:

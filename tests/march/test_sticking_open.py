@@ -90,5 +90,4 @@ def test_a_cycle_under_a_load_loses_what_the_touch_sets_free(boundary: str, coun
     assert_allclose(lost[ends[0]], lost[1], rtol=1e-3)
     assert_allclose([found[end].work for end in ends], lost[ends], rtol=1e-4)
     assert len(set(lost[ends[0] : ends[0] + 3])) == len(set(lost[ends[1] :])) == 1
-    assert march.state.sticking is not None
-    assert march.state.sticking.snaps == 4
+    assert march.state.memories["adhesion"].snaps == 4

@@ -79,6 +79,6 @@ def test_advice_names_the_direction_that_pays() -> None:
 def test_a_checkpoint_without_directions_goes_on() -> None:
     """Sums of an earlier version: solver, time, folded branches, mesh."""
     old = ErrorSums().plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4)
-    found = ErrorSums.restored({"budget/sums": old.sums[:, :5].ravel()})
+    found = ErrorSums.restored({"sums": old.sums[:, :5].ravel()})
     assert found.friction == old.friction
     assert found.plus(estimate(KNOWN, SEEN, 10_000), 0.02, 3.0, 3e-4).area == old.area

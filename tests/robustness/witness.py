@@ -119,7 +119,8 @@ class Witness:
         grid, prony = scene.job.grid, scene.setup.prony
         stiffest = prony.modulus_inf + float(prony.moduli.sum())
         scales.energy = max(scales.energy, abs(row.work), abs(row.stored), abs(row.dissipated))
-        scales.force = max(scales.force, row.measures.pressure * grid.lx * grid.ly * stiffest / self.march.state.alpha)
+        load, alpha = row.measures.pressure * grid.lx * grid.ly, self.march.state.contact.last.alpha
+        scales.force = max(scales.force, load * stiffest / alpha)
         slack = ENERGY * scales.energy + ROUNDINGS * EPS * scales.length * scales.force
         sums = f"work {row.work:g}, stored {row.stored:g}, dissipated {row.dissipated:g} J"
         closes = scene.job.numerics.integrator == "exponential"
@@ -144,7 +145,7 @@ class Witness:
         return scene.setup.height if math.isnan(length) else length * scene.units.height
 
     def _blur(self) -> tuple[float, float]:
-        scene, modulus = self.march.scene, self.march.state.alpha * self.march.scene.units.modulus
+        scene, modulus = self.march.scene, self.march.state.contact.last.alpha * self.march.scene.units.modulus
         self.scales.certified = max(self.scales.certified, self._length())
         return 2.0 * scene.job.numerics.tolerance * self.scales.certified * modulus, 2.0 * self.scales.length * modulus
 

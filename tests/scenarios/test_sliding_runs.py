@@ -141,7 +141,7 @@ def test_quarters_of_cells() -> None:
         data["history"][0]["pressure"] = data["history"][1]["pressure"] = 3e4
         data["surface"] = [{"shape": "wave", "amplitude": a, "waves": w} for w, a in waves]
         march, rows = marched(data)
-        base, offset = march.scene.motion.at(march.state.position).parts
+        base, offset = march.scene.motion.at(march.state.contact.last.position).parts
         found.append((np.roll(base, offset, axis=1), rows[-1].measures, len(rows)))
     (heights, whole, steps), (same, quarters, more) = found
     assert (steps, more) == (19, 67)

@@ -31,7 +31,7 @@ from marching import begun, marched
 
 from parcontact import scene
 from parcontact.history.timeline import Timeline
-from parcontact.march import step
+from parcontact.march.dry_law import DryLaw
 from parcontact.solve import contact as contact_solver
 from parcontact.solve.constraint import NonNegative
 from parcontact.solve.problem import Approach, Problem
@@ -148,7 +148,7 @@ def test_preconditioner_of_loose_solves(changes: Json, on: bool) -> None:
 def test_single_operator(monkeypatch: pytest.MonkeyPatch) -> None:
     """On, only the surface and the forces are transformed in double precision, as often as with other tolerances; these
     solves, which are all given up, would be tried again with an operator in double precision."""
-    monkeypatch.setattr(step, "_retry", lambda scene, state, step, problem, failed: (failed, ""))
+    monkeypatch.setattr(DryLaw, "_retry", lambda law, step, past, problem, failed: (failed, ""))
     off, on, _ = ROWS["operator in single precision"]
     double, single = whole(job(**off)), whole(job(**on))
     assert double["fft"] == single["fft"]
@@ -183,7 +183,7 @@ def test_isolated_contact() -> None:
 def test_extrapolated_starts() -> None:
     """Off: no earlier pressure is kept; the same solves otherwise."""
     single, lasts = job(history=[STAND, {"pressure": 4e3}]), job(history=[STAND, {**PRESS, "time_step": 1e-3}])
-    assert len(begun(single).state.pasts) == 1
+    assert len(begun(single).state.contact.pressures) == 1
     assert extra(lasts, single) == {"map bytes": MAP}
     assert [row(planned, "extrapolated starts").on for planned in (single, lasts)] == [False, True]
 
@@ -198,7 +198,7 @@ def test_starts_from_whole_cells_ago() -> None:
         True,
         False,
     ]
-    assert [len(begun(planned).state.pasts) for planned in (off, on, elastic)] == [2, 4, 2]
+    assert [len(begun(planned).state.contact.pressures) for planned in (off, on, elastic)] == [2, 4, 2]
 
 
 def test_rest_cut_short() -> None:
@@ -235,8 +235,8 @@ def test_adhesion() -> None:
     off, on = job(history=[PRESS]), job(history=[PRESS], adhesion={"work": 1e-9, "range": 1e-6})
     assert [row(planned, "adhesion").on for planned in (off, on)] == [False, True]
     march = begun(off)
-    assert march.scene.sticking is None
-    assert march.state.sticking is None
+    assert march.scene.law is None
+    assert march.state.law is None
 
 
 def test_yielding_counterbody() -> None:
