@@ -19,9 +19,9 @@ JOB = {**short_job.JOB, "wear": {"coefficient": 1e-12}}
 BAD_INPUT = 2
 MEMBER = 'section, columns = WearSection, ("wear_depth",)'
 CHANGES = {
-    "a value too many": ("return (self.deepest,)", "return 1.0, 2.0", r"number for each of its columns \(wear_depth\)"),
-    "no value": ("return (self.deepest,)", "return None", r"number for each of its columns \(wear_depth\), got None"),
-    "words": ("return (self.deepest,)", "return ['deep']", "number for each of its columns"),
+    "a value too many": ("return memory[1:]", "return 1.0, 2.0", r"number for each of its columns \(wear_depth\)"),
+    "no value": ("return memory[1:]", "return None", r"number for each of its columns \(wear_depth\), got None"),
+    "words": ("return memory[1:]", "return ['deep']", "number for each of its columns"),
     "a column of ours": (MEMBER, MEMBER.replace("wear_depth", "friction"), "has a column friction: an effect must"),
     "a comma": (MEMBER, MEMBER.replace("wear_depth", "a,b"), "its columns must be a tuple of different names"),
     "no columns": (MEMBER, "section = WearSection", "has no attribute 'columns'"),
