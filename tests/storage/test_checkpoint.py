@@ -167,7 +167,11 @@ def test_every_bit_counts(comm: MPI.Intracomm, tmp_path: Path) -> None:
 
 
 def _newer(data: bytes) -> bytes:
-    return data.replace(b"format 1", b"format 2", 1)
+    return data.replace(b"format 2", b"format 3", 1)
+
+
+def _older(data: bytes) -> bytes:
+    return data.replace(b"format 2", b"format 1", 1)
 
 
 def _unsealed(data: bytes) -> bytes:
@@ -180,7 +184,8 @@ DAMAGE: list[tuple[Callable[[bytes], bytes], str]] = [
     (lambda data: data + b"more", "is damaged: it has .* bytes instead of"),
     (lambda data: b"", "is incomplete or damaged: it has no seal"),
     (_unsealed, "is incomplete or damaged: it has no seal"),
-    (_newer, "is of format 2, written by a newer parcontact: this one reads up to 1"),
+    (_newer, "is of format 3, written by a newer parcontact, and this one reads format 2 only"),
+    (_older, "is of format 1, written by an older parcontact, and this one reads format 2 only"),
     (lambda data: data.replace(b'"bytes"', b'"butes"', 1), "is damaged: its seal cannot be read"),
 ]
 
