@@ -22,6 +22,7 @@ from ..solve.interface_law import InterfaceLaw
 from ..solve.nonsymmetric.splitting import Splitting, step_for
 from ..steady_sliding.losses import branch_powers
 from ..steady_sliding.sliding import SteadyState, judge_state, tolerance_of
+from .band_heat import Warming, warming_of
 from .choice import Cut
 from .ladder import Ladder
 
@@ -34,8 +35,9 @@ Vector = tuple[float, float]
 class Rung:
     """Steady state of one band under a mean `pressure` [Pa]: friction of its waves by energy and by slopes [-], area as
     a share, counted and corrected, approach [m], highest pressure [Pa]; weights of the rungs of the next finer band and
-    the share of the load above them; power [W/m^2] that each branch loses; relative errors of friction and area by the
-    solver and by the grid; residual, and calls of the operator."""
+    the share of the load above them; power [W/m^2] that each branch loses; rises of temperature by its waves
+    (`band_heat`), 0 without `thermal`; relative errors of friction and area by the solver and by the grid; residual,
+    and calls of the operator."""
 
     pressure: float
     friction: float
@@ -47,6 +49,7 @@ class Rung:
     weights: Array
     load_lost: float
     powers: Array
+    warming: Array
     errors: Array  # friction by solver and by grid, area by solver and by grid
     residual: float
     penetration: float
@@ -76,13 +79,14 @@ class Band:
         self.probe = replace(setup.probe(), interface=None)
         self._known = properties_of(setup, 0.0, True, None)
         self._velocity: Vector = (math.nan, math.nan)
+        self.warming: Warming | None = None
 
     def heat(self, temperature: float) -> None:
         """Take the material at this temperature [deg C] from now on. Raises InputError where it has no shift."""
         self._take(replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature))))
 
-    def slide(self, velocity: Vector) -> None:
-        """Slide at a velocity [m/s] from now on."""
+    def slide(self, velocity: Vector, seconds: float) -> None:
+        """Slide at a velocity [m/s] from now on, which has lasted so long [s] where there is heat."""
         if velocity != self._velocity:
             body, moved = self.setup.half_space, (self.setup.fft, self.setup.in_units(velocity), self.setup.prony)
             self.operator: Convolution = body.sliding_operator(*moved)
@@ -90,12 +94,19 @@ class Band:
             self._full = float(np.std(pressure))
             sizes = np.abs(np.concatenate([np.abs(part).ravel() for part in self.operator.symbols]))
             self._stiffest, self._softest = (sizes[sizes > 0.0].min(), sizes.max()) * np.full(2, self.setup.slab.points)
+            if (section := self.setup.job.section("thermal")) is not None:
+                self.warming = warming_of(self.setup, section, seconds, pressure, velocity)
             self._velocity = velocity
 
     @property
     def full_contact_rms(self) -> float:
         """The rms pressure [Pa] that its waves have in full contact."""
         return self._full * self.setup.units.pressure
+
+    @property
+    def warming_depth(self) -> float:
+        """The wavenumber [1/m] of the depth where its heat lies."""
+        return math.inf if self.warming is None else self.warming.depth
 
     @cached_property
     def rms_slope(self) -> float:
@@ -131,6 +142,7 @@ class Band:
             weights,
             above,
             branch_powers(setup, contact, velocity).sum(axis=1) / area,
+            np.zeros(3) if self.warming is None else self.warming.of(setup, contact.p),
             np.array(parts).ravel(),
             contact.certificate.worst,
             contact.certificate.penetration,

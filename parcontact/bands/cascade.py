@@ -3,11 +3,11 @@
 Upward each band is solved on the rungs of its ladder with the closing of all finer bands as the law of its interface;
 its own approach is the law of the next coarser one. Downward the distribution of pressure goes through the bands,
 
-    P_0 = delta(p - p0),    P_k(p') = sum_j W_j F_k(p'|p_j),    W_j = int P_(k-1)(p) hat_j(p) dp,
+    P_0 = delta(p - p0),    P_k(p') = sum_j W_j F_k(p'|p_j),    W_j = int P_(k-1)(p) w_j(p) dp,
     mu = (1/p0) sum_k sum_j W_j tau_k(p_j),    area = sum_j W_j a_K(p_j),
 
-with the friction stress tau_k and the share of contact a_k of band k under p_j, and the distribution F_k of pressure
-within it. Contacts of one pass are independent: ranks share them, each a whole one at a time.
+with the friction stress tau_k and the share of contact a_k of band k under p_j, the distribution F_k of pressure
+within it, and the weights w_j of `ladder`. Contacts of one pass are independent: ranks share them, whole ones each.
 """
 
 import math
@@ -39,10 +39,10 @@ class Task(NamedTuple):
 
 @dataclass(frozen=True)
 class BandResult:
-    """What one band comes to under a distribution of pressure: the load [Pa] on it and its weights; friction of its
-    waves over the whole load [-], by energy and by slopes; area down to it, counted and corrected; shares of the load
-    above its ladder; power [W/m^2] per branch; errors of friction [-, absolute] and of area (absolute) by solver and
-    grid."""
+    """What one band comes to under a distribution of pressure: its weights and the load [Pa] on it; friction of its
+    waves over the whole load [-], by energy and by slopes; area down to it, counted and corrected; share of the load
+    above its ladder; power [W/m^2] per branch; rises of temperature by its waves (`band_heat`) in the mean over the
+    load; absolute errors of friction and of area by solver and grid."""
 
     weights: Array
     load: float
@@ -52,6 +52,7 @@ class BandResult:
     contact_area_corrected: float
     load_lost: float
     powers: Array
+    warming: Array
     errors: Array
 
 
@@ -80,8 +81,14 @@ class Cascade:
             if not math.isnan(temperature := self._temperatures[number]):
                 self._bands[number, sample].heat(temperature)
         found = self._bands[number, sample]
-        found.slide(self.velocity)
+        found.slide(self.velocity, self.seconds)
         return found
+
+    @property
+    def seconds(self) -> float:
+        """For how long the rubber has slid [s]: over the distance of `thermal`, or the box of the coarsest band."""
+        section, box = self.job.section("thermal"), self.cut.waves * self.cut.spectrum.longest
+        return ((section and section.distance) or box) / math.hypot(*self.velocity)
 
     def heat(self, temperatures: Sequence[float]) -> None:
         """Take these temperatures [deg C] of the bands from now on; NaN for that of the material."""
@@ -142,6 +149,8 @@ class Cascade:
             min(float(areas.sum()), 1.0),
             0.0,
             np.sum([w * rung.powers for w, rung in zip(weights, rungs, strict=True)], axis=0),
+            np.sum([w * rung.warming for w, rung in zip(loads * ladder.rungs, rungs, strict=True)], axis=0)
+            / self.pressure**2,
             np.array([*((loads * energy) @ errors[:, :2] / self.pressure), *(areas @ errors[:, 2:])]),
         )
 
@@ -150,7 +159,7 @@ class Cascade:
 
         def solve(number: int, weights: Array) -> Sequence[Rung]:
             ladder = self.ladders[number]
-            there = np.flatnonzero(weights * ladder.rungs > NEGLIGIBLE * self.pressure)
+            there = np.flatnonzero(np.abs(weights) * ladder.rungs > NEGLIGIBLE * self.pressure)
             solved = self.solve_tasks([Task(number, sample, int(rung), HARD) for rung in there])
             nothing = replace(solved[0], friction=0.0, friction_slopes=0.0, contact_area=0.0)
             found = [nothing] * len(ladder.rungs)

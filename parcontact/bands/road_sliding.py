@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..columns import BANDS, names_of
-from ..effects.relaxation import temperature_of
-from ..errors import RunError
+from ..effects.relaxation import feeds_back, temperature_of
+from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.slab import Array, Slab
 from ..physics.budget import ErrorBudget, Parts
@@ -19,10 +19,13 @@ from ..solve.certificate import Certificate
 from ..steady_sliding.curve import States, on_one_grid
 from ..steady_sliding.point import Point
 from .band import Rung, Vector
+from .band_heat import flash_of_bands, rises_of
 from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, choose, describe_cut, doubts_of_bands
 from .limits import STRAIN
 
+MOST_ROUNDS = 20  # tuning: of temperatures, more than any case has needed
+LEAST_ERROR, RELATIVE = 0.1, 0.02  # accuracy: of the rise of a band [K], and relative
 SURE = 2.0  # accuracy: standard errors of the scatter of surfaces that count as an error
 TABLE = "bands.csv"
 
@@ -48,6 +51,14 @@ class Outcome:
         return abs(self.hard[0] - self.with_laws[0]), abs(self.hard[1] - self.with_laws[1])
 
 
+@dataclass(frozen=True)
+class Warm:
+    """How temperatures of bands were found: in how many `rounds`, and friction without them."""
+
+    rounds: int = 1
+    friction_cold: float = math.nan
+
+
 class RoadSliding:
     """Steady states of a job in bands, on the ranks of `slab`; making and calling it are collective.
 
@@ -63,6 +74,7 @@ class RoadSliding:
         self.temperature, self._own_temperature = math.nan, temperature_of(job.material)
         self._point: Point | None = None
         self._results: Results = ()
+        self._rises: list[float] = []
 
     def doubts(self, temperatures: Sequence[float]) -> list[str]:
         """Return warnings about the job."""
@@ -86,10 +98,18 @@ class RoadSliding:
         """Return the steady state at a velocity [m/s] under a mean pressure [Pa]; raises RunError."""
         began = time.perf_counter()
         self._cascade.press(velocity, pressure)
+        warm = self._settle() if feeds_back(self.job) else Warm()
         outcome = self._solve()
         self._results = outcome.results
-        self._point = self._to_point(outcome, velocity, pressure, time.perf_counter() - began)
-        return self._point
+        point = self._to_point(outcome, velocity, pressure, time.perf_counter() - began)
+        if self.job.section("thermal") is not None:
+            self._rises = self._rises_of(outcome.results, point.measures.force_interface)
+            heats = [result.friction for result in outcome.results]
+            heats[-1] += point.measures.friction_interface
+            flash = flash_of_bands(self._rises, heats)
+            point = replace(point, flash=flash, rounds=warm.rounds, friction_cold=warm.friction_cold)
+        self._point = point
+        return point
 
     def rows(self, velocity: Vector) -> list[list[float]]:
         """Return the lines of bands.csv for the last state."""
@@ -100,9 +120,62 @@ class RoadSliding:
             friction = result.friction + (point.measures.friction_interface if last else 0.0)
             slope_to = cut.rms_slope(number, 0)
             place = point.speed, point.measures.pressure, point.temperature, float(number)
-            found = friction, result.contact_area, cut.rms_slope(number), math.nan, result.load_lost
+            rise = self._rises[number] if self._rises else math.nan
+            found = friction, result.contact_area, cut.rms_slope(number), rise, result.load_lost
             rows.append([*place, *cut.wavelengths(number), *found, slope_to, STRAIN * slope_to])
         return rows
+
+    # -- temperatures -------------------------------------------------------------------------------------------------
+
+    def _rises_of(self, results: Results, rubbing: float) -> list[float]:
+        """Return the rises [K] of all bands; `rubbing` [N] is the force of the interface on the coarsest box."""
+        cascade, section = self._cascade, self.job.section("thermal")
+        speed, box = math.hypot(*cascade.velocity), self.setup.grid.lx * self.setup.grid.ly
+        heats = [result.friction * cascade.pressure * speed for result in results]
+        depths = [cascade.band(k, 0).warming_depth for k in range(self.cut.count)]
+        warmings = [result.warming for result in results]
+        return rises_of((section.conductor, cascade.seconds), depths, warmings, heats, rubbing / box * speed)
+
+    def _settle(self) -> "Warm":
+        """Find the temperatures of bands that make themselves, with one surface of each band, and leave them in the
+        cascade. Raises RunError where none are found.
+
+        Rounds go by Aitken's relaxation: a first one with cold bands, then from those of the last state.
+        """
+        cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
+        rises, last, relax, friction_cold = np.zeros(self.cut.count), np.zeros(0), 1.0, math.nan
+        for rounds in range(1, MOST_ROUNDS + 1):
+            self._warm(cold + rises)
+            rungs = self._cascade.climb([0])
+            results = self._cascade.fall(lambda band, _: rungs[band, 0])  # noqa: B023
+            over = (
+                np.array(self._rises_of(results, self._rub(results) * self.setup.grid.lx * self.setup.grid.ly)) - rises
+            )
+            if rounds == 1:
+                friction_cold = sum(result.friction for result in results)
+            if np.all(np.abs(over) <= np.maximum(LEAST_ERROR, RELATIVE * rises)):
+                return Warm(rounds, friction_cold)
+            if last.size:
+                change = over - last
+                relax = float(np.clip(-relax * (last @ change) / (change @ change), 0.1, 1.0))
+            rises, last = np.maximum(rises + relax * over, 0.0), over
+        raise RunError(f"temperatures of bands did not settle in {MOST_ROUNDS} rounds. Try feedback: none")
+
+    def _warm(self, temperatures: Array) -> None:
+        """Take these temperatures [deg C] of the bands; raises RunError where the material's shift ends."""
+        try:
+            self._cascade.heat(temperatures.tolist())
+            finest = self.setup.job.at_temperature(float(temperatures[-1]))
+            self.setup = replace(self.setup, choices=choices(finest))
+            self._cascade.press(self._cascade.velocity, self._cascade.pressure)
+        except InputError as error:
+            raise RunError(f"the flash temperature leaves what the material allows: {error}") from None
+
+    def _rub(self, results: Results) -> float:
+        """Return the shear stress [Pa] of the interface, in the mean over the whole."""
+        interface = self.setup.choices.interface
+        area = results[-1].contact_area_corrected
+        return 0.0 if interface is None else math.hypot(*interface.force(area, self._cascade.velocity))
 
     # -- samples and errors -------------------------------------------------------------------------------------------
 
@@ -111,7 +184,9 @@ class RoadSliding:
         asked, fixed = self.job.numerics.asked, self.cut.samples
         samples = list(range(fixed or FEWEST))
         rungs: dict[tuple[int, int], list[Rung]] = dict(self._cascade.climb(samples))
-        hard = _sums(self._cascade.hard(0))
+        alone = self.cut.count == 1
+        first = self._cascade.fall(lambda band, _: rungs[band, 0]) if alone else self._cascade.hard(0)
+        hard = _sums(first)
         while True:
             outcome = self._outcome(rungs, samples, hard)
             found = zip(outcome.scatter, _sums(outcome.results), asked.both, strict=True)
@@ -138,8 +213,7 @@ class RoadSliding:
 
     def _to_point(self, outcome: Outcome, velocity: Vector, pressure: float, seconds: float) -> Point:
         results, finest, coarsest = outcome.results, outcome.results[-1], outcome.rungs[0][0]
-        interface, box = self.setup.choices.interface, self.setup.grid.lx * self.setup.grid.ly
-        rubbed = 0.0 if interface is None else math.hypot(*interface.force(finest.contact_area_corrected, velocity))
+        box, rubbed = self.setup.grid.lx * self.setup.grid.ly, self._rub(results)
         slopes = sum(result.friction_slopes for result in results) + rubbed / pressure
         friction = outcome.friction + rubbed / pressure
         direction = (velocity[0] / math.hypot(*velocity), velocity[1] / math.hypot(*velocity))

@@ -48,9 +48,11 @@ def _no_warm_start(thermal: Thermal | None, initial: Any) -> Iterator[Fault]:
         yield Fault("does not go with thermal.feedback: slide into the steady state with a stage", ("initial",))
 
 
-def _in_curves(thermal: Thermal | None, history: Any, grid: Grid) -> Iterator[Fault]:
+def _in_curves(thermal: Thermal | None, history: Any, grid: Grid, bands: Any) -> Iterator[Fault]:
     if thermal is None or thermal.counterbody is None:
         return
+    if bands is not None:
+        yield Fault("does not go with bands: all heat goes into the rubber", ("thermal", "counterbody"))
     if history:
         yield Fault(
             "is for friction curves: leave out the history, or the counterbody, and all heat goes into the rubber",
@@ -136,7 +138,7 @@ class ThermalColumns(Effect[ThermalMemory]):
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("thermal", "material"), _shifts),
         Rule(("thermal", "initial"), _no_warm_start),
-        Rule(("thermal", "history", "grid"), _in_curves),
+        Rule(("thermal", "history", "grid", "bands"), _in_curves),
     )
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_temperature,)
 
@@ -154,6 +156,7 @@ class ThermalColumns(Effect[ThermalMemory]):
         if job.section("thermal").distance is None:
             free = job.grid.boundary == "free"
             way = "without end" if free else f"{max(job.grid.size):g} m, the longer side of the box, since it was cold"
+            way = "the box of the coarsest band, since it was cold" if job.bands is not None else way
             yield f"thermal.distance is not given: in friction curves the rubber has slid {way}"
 
     @staticmethod

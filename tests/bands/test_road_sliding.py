@@ -6,12 +6,14 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact.bands.band import Band
+from parcontact.bands.band_heat import uniform_rise
 from parcontact.bands.cascade import Cascade, mean_rungs
 from parcontact.bands.choice import choose
 from parcontact.bands.road_sliding import RoadSliding
 from parcontact.bands.wave_spectrum import spectrum_of
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.parallel.slab import Slab
+from parcontact.physics.heat import Conductor
 from parcontact.physics.prony import complex_modulus
 from parcontact.scene import set_up
 from parcontact.steady_sliding.sliding import SteadySliding
@@ -64,11 +66,14 @@ def full_contact(job: jobs.Job, speed: float, pressure: float) -> float:
 @pytest.mark.parametrize("count", [1, 2, 3, 6])
 def test_full_contact_is_the_closed_form(count: int) -> None:
     """Each wave loses on its own. What is left are the directions of the few waves of a box: 0.2 %."""
-    changes = {"surface": {**ROUGH, "rms_slope": 0.02}, "bands": {"count": count, "samples": 1}}
+    changes = {
+        "surface": {**ROUGH, "short_wavelength": SHORT if count == 6 else 2 * SHORT, "rms_slope": 0.02},
+        "bands": {"count": count, "samples": 1},
+    }
     found = sliding(changes)
     point = found.solve((0.1, 0.0), 1e7)
     assert point.friction == pytest.approx(full_contact(found.job, 0.1, 1e7), rel=2e-3)
-    assert point.measures.contact_area == pytest.approx(1.0, abs=1e-9)
+    assert point.measures.contact_area == pytest.approx(1.0, abs=1e-5)  # of the interpolation between rungs
 
 
 def test_load_is_kept_from_band_to_band() -> None:
@@ -91,3 +96,54 @@ def test_ranks_agree() -> None:
     assert other.friction == pytest.approx(one.friction, rel=1e-9)
     assert other.measures.contact_area == pytest.approx(one.measures.contact_area, rel=1e-9)
     assert together.rows((0.1, 0.0)) == [pytest.approx(row, rel=1e-9, nan_ok=True) for row in alone.rows((0.1, 0.0))]
+
+
+SHIFTED = {
+    "include": "synthetic_tyre",
+    "shift": {"law": "wlf", "C1": 8.86, "C2": 101.6, "reference": 20.0},
+}
+THERMAL = {"conductivity": 0.2, "diffusivity": 1e-7, "distance": 0.02}
+
+
+@pytest.mark.parametrize("feedback", ["none", "mean"])
+def test_heat_of_one_band_is_that_of_one_grid(feedback: str) -> None:
+    """The flash temperature within 5 %: a band takes its heat to lie where it does in full contact. Friction with
+    feedback within 0.1 %, as 3 % of 1.2 K change it by less."""
+    job = {"material": SHIFTED, "thermal": {**THERMAL, "feedback": feedback}, "numerics": {"tolerance": 1e-3}}
+    one = {"surface": {**ROUGH, "short_wavelength": 1e-3}, "bands": {"count": 1, "points": 64, "samples": 1}}
+    found = sliding({**job, **one})
+    bands, band = found.solve((1.0, 0.0), 1e6), Band(found.job, found.cut, 0, 0).setup
+    heights = band.surface.heights((0.0, 0.0), band.slab.empty()) * band.units.height
+    on_grid = jobs.load({**JOB, **job, "surface": heights, "grid": {"points": 64, "size": 4 * LONG}})
+    grid = SteadySliding(set_up(on_grid, Slab.alone(64, 64))).solve((1.0, 0.0), 1e6)
+    assert bands.flash is not None
+    assert grid.flash is not None
+    assert bands.flash.mean == pytest.approx(grid.flash.mean, rel=0.05)
+    assert bands.friction == pytest.approx(grid.friction, rel=1e-3)
+    assert (bands.rounds > 1) == (feedback == "mean")
+
+
+def test_uniform_heat_of_bands() -> None:
+    """On the surface the rise is `2 sqrt(t/pi)/e`; at one depth of both, after a time much shorter than it takes
+    through the depth, heat stays where it is: `g^2` integrates to `15 q/(16 e...)`, here by its own sum over depths."""
+    body, q, time = Conductor(0.2, 1e-7), 1e4, 0.3
+    assert uniform_rise(body, np.inf, np.inf, time) == pytest.approx(
+        2 * np.sqrt(time / np.pi) / body.effusivity, rel=1e-3
+    )
+    z = (np.arange(4000) + 0.5) * 1e-6
+    spread = 4 * q**3 * z**2 * np.exp(-2 * q * z)
+    short = 1e-3  # s, in which heat goes 0.01 mm, a tenth of the depth
+    stays = short * np.sum(spread**2) * 1e-6 * body.diffusivity / body.conductivity
+    assert uniform_rise(body, q, q, short) == pytest.approx(stays, rel=0.05)
+
+
+def test_finer_bands_are_warmer() -> None:
+    """Each feels the heat of all coarser scales too, and its own feedback: less friction than that of cold rubber."""
+    job = {"material": SHIFTED, "thermal": {**THERMAL, "feedback": "mean"}, "numerics": {"tolerance": 1e-2}}
+    found = sliding({**job, "bands": {"count": 3, "points": 40, "samples": 1}})
+    point = found.solve((1.0, 0.0), 1e6)
+    rises = [row[9] for row in found.rows((1.0, 0.0))]
+    assert 0.0 < rises[0] < rises[1] < rises[2]
+    assert point.friction < point.friction_cold
+    assert point.flash is not None
+    assert rises[0] < point.flash.mean < rises[2]

@@ -1,0 +1,120 @@
+"""Bands against one grid that holds all waves: random cases in two dimensions, or --line for three decades in one.
+
+Both have four cells per shortest wave, and the coarsest band has the waves of the one grid, so that what differs is the
+method and the chance of finer surfaces. `--cases 20` takes some twenty minutes on one core. Each line is a case; the
+last lines count how often friction is within 5 %, the area within 6 %, and how often the stated error of method and
+surfaces covers the difference.
+
+    python scripts/band_errors.py --cases 20 --seed 1
+"""
+
+import math
+import sys
+import time
+from typing import Any
+
+import numpy as np
+from campaign import numbers, parser
+from numpy.typing import NDArray
+
+from parcontact import job as jobs
+from parcontact.bands.band import Band
+from parcontact.bands.choice import choose
+from parcontact.bands.road_sliding import RoadSliding
+from parcontact.parallel.slab import Slab
+from parcontact.physics.budget import Parts
+from parcontact.steady_sliding.point import Point
+
+COMPOUNDS: dict[str, dict[str, Any]] = {
+    "tyre": {"include": "synthetic_tyre"},
+    "one branch": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 2e7, "relaxation_time": 1e-3}]},
+    "broad": {
+        "model": "zener",
+        "modulus_inf": 2e6,
+        "branches": [{"modulus": 3e6 * 1.6**k, "relaxation_time": 10.0 ** (1 - k)} for k in range(9)],
+    },
+}
+LONG = 4e-3  # m
+POINTS = (320, 512, 512, 1024)  # of the one grid, four boxes of whose longest waves have 16 cells times the decades
+LINE = 16384
+
+
+def case_of(number: int, seed: int, line: bool) -> tuple[dict[str, Any], int, float, float]:
+    """Return a job without bands, the points of the one grid, a velocity [m/s] and a pressure [Pa]."""
+    chance = np.random.default_rng([seed, number])
+    name = list(COMPOUNDS)[number % 3]
+    points = LINE if line else int(chance.choice(POINTS))
+    slope, hurst = float(10 ** chance.uniform(-1.3, -0.3)), round(float(chance.uniform(0.5, 0.9)), 2)
+    speed = float(10 ** chance.uniform(-2.5, 1.0))
+    surface = {
+        **{"shape": "rough", "hurst": hurst, "long_wavelength": LONG, "short_wavelength": LONG * 16 / points},
+        **{"rms_slope": round(slope, 3), "seed": int(chance.integers(1000)), "amplitudes": "fixed"},
+    }
+    load = float(10 ** chance.uniform(-2.0, 0.5))  # over the rms pressure of full contact
+    job = {
+        **{"surface": surface, "material": COMPOUNDS[name], "numerics": {"tolerance": 2e-3}},
+        **{"steady": {"velocities": [speed], "pressures": [1e5]}},
+    }
+    shape = [points, 1] if line else points
+    of_all = jobs.load({**job, "bands": {"count": 1, "points": shape}})
+    band = Band(of_all, choose(of_all), 0, 0)
+    band.slide((speed, 0.0), 1.0)
+    text = f"{name:10} H {hurst:4} slope {slope:5.3f} v {speed:7.3g} points {points}"
+    return {**job, "title": text}, points, speed, load * band.full_contact_rms
+
+
+def solve(job: dict[str, Any], count: int, points: int, samples: int, line: bool, speed: float, load: float) -> Point:
+    along = points if count == 1 else 2 * round(8 * (points / 16) ** (1 / count))
+    shape = [along, 1] if line else along
+    bands = {"count": count, "points": shape, "samples": samples}
+    return RoadSliding(jobs.load({**job, "bands": bands}), Slab.alone(1, 1)).solve((speed, 0.0), load)
+
+
+def compare(whole: Point, found: Point, text: str) -> list[float]:
+    """Print how bands differ from one grid; return the differences of friction and area, and the stated errors."""
+    parts = [part or Parts(0.0, 0.0, 0.0, 0.0) for part in (found.errors.friction, found.errors.area)]
+    errors = [found.friction / whole.friction - 1, found.measures.contact_area / whole.measures.contact_area - 1]
+    told = [
+        f"{name} {100 * error:+5.1f} % (method {100 * part.method:.1f}, surfaces {100 * part.scatter:.1f})"
+        for name, error, part in zip(("friction", "area"), errors, parts, strict=True)
+    ]
+    print(f"{text}: {', '.join(told)}, {whole.seconds:.0f} s and {found.seconds:.0f} s", flush=True)
+    return [*errors, *(part.method + part.scatter for part in parts)]
+
+
+def conclude(count: int, table: NDArray[np.float64]) -> None:
+    """Print the differences of all cases, how many are small, and how many are within the stated errors."""
+    for column, (name, most) in enumerate((("friction", 0.05), ("area", 0.06))):
+        error = table[:, column]
+        print(
+            f"{count} bands, {name}: mean {100 * error.mean():+.1f} %, rms {100 * math.sqrt(np.mean(error**2)):.1f} %, "
+            f"largest {100 * abs(error).max():.1f} %; within {100 * most:g} % in {np.sum(abs(error) <= most)} of "
+            f"{len(error)}; within the stated error in {np.sum(abs(error) <= table[:, 2 + column])}"
+        )
+
+
+def main() -> int:
+    asked = parser(
+        *(__doc__, 20, "cases"),
+        bands=("2,3", "numbers of bands"),
+        samples=(2, "surfaces"),
+        line=(False, "profiles of three decades along the sliding"),
+    ).parse_args()
+    counts, began = [int(count) for count in asked.bands.split(",")], time.monotonic()
+    rows: dict[int, list[list[float]]] = {count: [] for count in counts}
+    for number in numbers(asked):
+        if time.monotonic() - began > 60 * asked.minutes:
+            break
+        job, points, speed, load = case_of(number, asked.seed, asked.line)
+        place = asked.samples, asked.line, speed, load
+        whole = solve(job, 1, points, *place)
+        text = f"{number:3} {job['title']} area {whole.measures.contact_area:6.4f} mu {whole.friction:7.4f}"
+        for count in counts:
+            rows[count].append(compare(whole, solve(job, count, points, *place), f"{text} {count}"))
+    for count, table in rows.items():
+        conclude(count, np.array(table))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
