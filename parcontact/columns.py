@@ -134,9 +134,7 @@ CERTIFIED = (
         attrgetter("certificate.penetration"),
     ),
 )
-CORRECTED = _measured(
-    "contact_area_corrected", "", "`contact_area` without the excess by cells on the edge of contact"
-)
+CORRECTED = _measured("contact_area_corrected", "", "`contact_area` without the excess by cells on the edge of contact")
 FLASH = (
     Column(
         *("flash_temperature", "K"),
@@ -181,9 +179,7 @@ MEASURES: Table = (
     Column(
         PER_BRANCH, "J", "by branch K of the material (`output.branch_dissipation`)", attrgetter("branch_dissipation")
     ),
-    _measured(
-        "friction_x", "", "tangential over normal force along x; positive where it opposes motion along +x"
-    ),
+    _measured("friction_x", "", "tangential over normal force along x; positive where it opposes motion along +x"),
     CORRECTED,
     ERROR_FRICTION,
     ERROR_AREA,
@@ -454,6 +450,8 @@ STUDY: Table = (
     Column("error_area_corrected", "", "relative, over the extrapolated limit"),
 )
 
+BANDS_THEORY: Table = (*BANDS[:6], *THEORY[-2:])
+
 TABLES: Mapping[str, Table] = {
     "measures.csv": MEASURES,
     "fields.h5": FIELDS,
@@ -463,6 +461,7 @@ TABLES: Mapping[str, Table] = {
     "leak.csv": LEAK,
     "theory.csv": THEORY,
     "steady_theory.csv": STEADY_THEORY,
+    "bands_theory.csv": BANDS_THEORY,
     "sweep.csv": SWEEP,
     "study.csv": STUDY,
 }

@@ -12,7 +12,7 @@ import numpy as np
 from .. import job as jobs
 from .. import scene
 from ..bands.choice import choose
-from ..columns import STEADY_THEORY, THEORY, Table, names_of, to_csv, values_of
+from ..columns import BANDS_THEORY, STEADY_THEORY, THEORY, Table, names_of, to_csv, values_of
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import InputError
 from ..history.timeline import Span, Timeline
@@ -34,7 +34,7 @@ ONE_ROUGH = (
     "surface: the theory takes the power spectrum of one rough surface, and this job has none, or other shapes beside "
     "it; with --waves lattice it takes the waves of the heights themselves, whatever they are made of"
 )
-STEADY_FILE = "steady_theory.csv"
+STEADY_FILE, BANDS_FILE = "steady_theory.csv", "bands_theory.csv"
 WavesOf = Literal["continuum", "lattice"]
 
 
@@ -97,12 +97,15 @@ def _only_rough(job: Job) -> jobs.Rough | jobs.RoughSpectrum | None:
     return part if isinstance(part, jobs.Rough | jobs.RoughSpectrum) else None
 
 
-def predict_steady(job: Job, wanted: Request, gamma: float = persson.GAMMA) -> Iterator[SteadyInstant]:
-    """Yield the steady states of a curve for the spectrum of the job, as an unbounded surface has it.
+def predict_steady(
+    job: Job, wanted: Request, gamma: float = persson.GAMMA, shortest: float = 0.0
+) -> Iterator[SteadyInstant]:
+    """Yield the steady states of a curve for the spectrum of the job, as an unbounded surface has it; of a job in bands
+    without waves that are shorter than the `shortest` [m].
 
     Raises InputError for jobs that the theory does not know.
     """
-    rings = _on_body(job, _continuum(job, 0.0))
+    rings = _on_body(job, _continuum(job, 0.0, shortest))
     _, kx, ky = rings.waves
     for speed, pressure, temperature in wanted.points:
         at = job if math.isnan(temperature) else job.at_temperature(temperature)
@@ -114,10 +117,40 @@ def predict_steady(job: Job, wanted: Request, gamma: float = persson.GAMMA) -> I
         yield SteadyInstant(speed, pressure, temperature, time_factor_of(at.material), float(friction), float(area))
 
 
+class BandInstant(NamedTuple):
+    """One row of bands_theory.csv: m/s, Pa, deg C (NaN: that of the job), the number of the band, its wavelengths [m],
+    friction of its waves, and the share in contact down to its shortest."""
+
+    velocity: float
+    pressure: float
+    temperature: float
+    band: float
+    long_wavelength: float
+    short_wavelength: float
+    friction: float
+    contact_area: float
+
+
+def predict_bands(job: Job, wanted: Request) -> Iterator[BandInstant]:
+    """Yield friction and area of each band of a job: what the theory adds where finer waves are seen, too."""
+    cut = choose(job)
+    rows = dict[Wanted, list[SteadyInstant]]()
+    for number in range(cut.count):
+        shown = predict_steady(job, wanted, shortest=cut.wavelengths(number)[1])
+        for point, row in zip(wanted.points, shown, strict=True):
+            rows.setdefault(point, []).append(row)
+    for point, found in rows.items():
+        for number, row in enumerate(found):
+            own = row.friction - (found[number - 1].friction if number else 0.0)
+            yield BandInstant(*point, float(number), *cut.wavelengths(number), own, row.contact_area)
+
+
 def write_steady(job: Job, wanted: Request) -> SteadyInstant:
     """Write the prediction for a curve as steady_theory.csv, and draw both if the curve is there; returns the point of
     the highest friction."""
     rows = list(predict_steady(job, wanted))
+    if job.bands is not None:
+        _write(job.output.directory / BANDS_FILE, BANDS_THEORY, predict_bands(job, wanted))
     _write(job.output.directory / STEADY_FILE, STEADY_THEORY, rows)
     if (curve := job.output.directory / "steady.csv").is_file():
         from ..plotting import plots  # matplotlib is slow to import, and for pictures only
@@ -171,7 +204,9 @@ def _write(path: Path, table: Table, rows: Iterable[object], settings: TheorySet
 
 
 def _is_own_curve(path: Path) -> bool:
-    return path.read_bytes().startswith(",".join(names_of(STEADY_THEORY)).encode())
+    return path.read_bytes().startswith(
+        tuple(",".join(names_of(one)).encode() for one in (STEADY_THEORY, BANDS_THEORY))
+    )
 
 
 def _refuse_unknown(job: Job) -> None:
@@ -206,10 +241,10 @@ def _on_body(job: Job, rings: Rings) -> Rings:
     return replace(rings, stiffness=1.0 / layer.compliance_ratio(np.hypot(rings.waves.kx, rings.waves.ky)))
 
 
-def _continuum(job: Job, slide: float) -> Rings:
+def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
     """Return the spectrum between the limits of the job; the box holds no waves longer than its longer side."""
     if job.bands is not None:
-        spectrum = choose(job).spectrum
+        spectrum = choose(job).spectrum.without_shorter(shortest)
         phi = lambda k: np.asarray(spectrum.phi(k), float)  # noqa: E731
         return persson_rings.rings_of_spectrum(phi, *spectrum.ends, slide, spectrum.kinks)
     part = _only_rough(job)

@@ -21,6 +21,7 @@ LEVELS = 3  # of names above each other, before they are turned
 FEW_NAMES, MANY_NAMES = 2, 4  # of lines, for which a legend finds room among them: always, and in half the width
 HEADROOM, PEAK_ROOM = 1.08, 1.25  # of a panel over its highest point, and over one that the legend names
 FRACTION = "contact area /\nnominal area"
+BAR_SHARE = 0.8  # of the room of a bar, in the logarithm
 LEAST = 0.99  # of a value, which its bar of errors leaves at most
 ZERO_ROW = 0.05  # of the height of a panel, for the marks of a line that is 0
 FEW_DECADES = 1.5  # of a logarithmic axis, on which more than powers of ten are told
@@ -49,7 +50,8 @@ class Axis:
 class Chart:
     """One panel. `key` is how users ask for it; `spikes`: whether one at the beginning may leave the picture; `stages`
     are names, starts and ends over `x`, `named` whether their names are shown; `peak`: whether the highest point is
-    named, and so stays in the picture; `zeros`: what a value of 0 means, if the vertical axis is logarithmic."""
+    named, and so stays in the picture; `zeros`: what a value of 0 means, if the vertical axis is logarithmic; the
+    first `stacked` series are bars on top of each other."""
 
     key: str
     x: Axis
@@ -63,6 +65,7 @@ class Chart:
     legend_title: str = ""
     log_x: bool = False
     zeros: str = ""
+    stacked: int = 0
 
 
 def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
@@ -74,7 +77,9 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
     )
     series = [_drop_hidden_points(one, log_x, log_y) for one in chart.series]
     lonely = all(np.isfinite(one.x * one.y).sum() < 2 for one in series)
-    for one in series:
+    if chart.stacked:
+        _draw_bars(axes, series[: chart.stacked])
+    for one in series[chart.stacked :]:
         axes.plot(one.x, one.y, label=one.name or None, **one.look | ({"marker": "o"} if lonely else {}))
         if one.error is not None:
             _draw_errors(axes, one, one.error)
@@ -93,6 +98,16 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
         if names > MANY_NAMES and not place:
             place = style.ABOVE
         axes.legend(title=chart.legend_title or None, **place)
+
+
+def _draw_bars(axes: Axes, series: Sequence[Series]) -> None:
+    """Draw bars at common places, the first series at the bottom, as wide as most of what is between two places."""
+    x = series[0].x
+    half = (float(np.diff(np.log(x)).min()) if x.size > 1 else 1.0) * BAR_SHARE / 2.0
+    left, width, bottom = x * np.exp(-half), x * (np.exp(half) - np.exp(-half)), np.zeros_like(x)
+    for one in series:
+        axes.bar(left, one.y, width, bottom, align="edge", label=one.name, color=one.look["color"])
+        bottom = bottom + one.y
 
 
 def _drop_hidden_points(one: Series, log_x: bool, log_y: bool) -> Series:
@@ -139,7 +154,8 @@ def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
 
 def _set_limits(axes: Axes, chart: Chart, series: Sequence[Series], log_x: bool) -> None:
     """Show zero, and room above bars of errors up to the whole of a value; leave out a spike, whose height is told."""
-    ys = np.concatenate([one.y for one in series])
+    whole = np.sum([one.y for one in series[: chart.stacked]], axis=0) if chart.stacked else np.zeros(0)
+    ys = np.concatenate([whole, *(one.y for one in series)])
     highest = _highest(ys)
     if chart.bottom and not (ys < 0.0).any():
         bars = [one.y * (1.0 + np.nan_to_num(np.minimum(one.error, 1.0))) for one in series if one.error is not None]

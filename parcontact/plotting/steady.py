@@ -10,7 +10,7 @@ import numpy as np
 
 from ..job.resolved import STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
-from . import style, units
+from . import band_charts, style, units
 from .charts import Axis, Chart, Series
 from .run import find_free_area, read_table, to_contact_area, to_load
 
@@ -57,7 +57,7 @@ def charts(directory: Path, over: str = "") -> list[Chart]:
             series += _make_thin(columns | {name: columns[COLD]}, along, name, by, "without feedback", "--")
         series += _make_theory(theory, along, name, by) if theory and name in theory else ()
         found.append(Chart(key, axes[along], axes[name], series, log_x=True, legend_title=title))
-    return found
+    return found + (band_charts.charts(directory) if x == "velocity" else [])
 
 
 def title(directory: Path) -> str:

@@ -22,7 +22,7 @@ KINDS = {  # by the table that each of them has
 }
 JOBS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
 MORE_TABLES = (
-    *("leak.csv", "theory.csv", "steady_waves.csv", "steady_theory.csv"),
+    *("leak.csv", "theory.csv", "steady_waves.csv", "steady_theory.csv", "bands.csv", "bands_theory.csv"),
     *("sweep_mean.csv", "sweep_curves.csv", "sweep_curves_mean.csv"),
 )
 ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys that other sections show

@@ -25,7 +25,15 @@ from .marker import SCENE, VERBS, Claim
 MAX_SECONDS_TO_RELEASE = 3.0  # tuning: seconds: a run that was killed may need a moment to let go
 RESULTS = {
     "run": ("measures.csv", "fields.h5", "fields.xdmf", "run.log"),
-    "steady": ("steady.csv", "steady_waves.csv", "bands.csv", "steady.h5", "steady_theory.csv", curve_points.LOG),
+    "steady": (
+        "steady.csv",
+        "steady_waves.csv",
+        "bands.csv",
+        "steady.h5",
+        "steady_theory.csv",
+        "bands_theory.csv",
+        curve_points.LOG,
+    ),
     "study": ("study.csv", "study.txt", "convergence.png", "work_precision.png"),
 }
 COPIES = {  # of the job: as given, and with every default
@@ -34,7 +42,13 @@ COPIES = {  # of the job: as given, and with every default
     "study": ("study.job.yaml", "study.resolved.yaml"),
 }
 LOCK = ".lock"
-BESIDE = (stopfile.NAME, "theory.csv", "theory.yaml", "steady_theory.csv")  # may be there before the first run
+BESIDE = (
+    stopfile.NAME,
+    "theory.csv",
+    "theory.yaml",
+    "steady_theory.csv",
+    "bands_theory.csv",
+)  # may be there before the first run
 SHOWN = 4  # tuning: names of files that a message lists
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 ADVICE = "give --restart never to start afresh, or --out for another directory"

@@ -1,0 +1,98 @@
+"""Pictures of a curve in bands: friction of each band over velocity, area over magnification, temperature by band.
+
+Persson's theory for the same spectrum is drawn beside them where `bands_theory.csv` is there.
+"""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..parallel.slab import Array
+from . import style, units
+from .charts import Axis, Chart, Series
+from .run import read_table
+
+TABLE, THEORY = "bands.csv", "bands_theory.csv"
+NEEDED = ("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength")
+SHOWN = 4  # of velocities, as lines
+THIN = 1.0  # tuning: width of the lines of the theory
+
+
+def charts(directory: Path) -> list[Chart]:
+    """Return panels of a table of bands: of its first pressure and temperature, where there are several."""
+    if not (directory / TABLE).is_file():
+        return []
+    columns = _choose(read_table(directory / TABLE, (*NEEDED, "friction", "contact_area", "flash_temperature")))
+    if not columns["velocity"].size:
+        return []
+    theory = None
+    if (directory / THEORY).is_file():
+        theory = _choose(read_table(directory / THEORY, ("velocity", "pressure", "temperature", "band")))
+    found = [_friction(columns, theory), _over_bands(columns, theory, "contact_area")]
+    if np.isfinite(columns["flash_temperature"]).any():
+        found.append(_over_bands(columns, None, "flash_temperature"))
+    return found
+
+
+def _choose(columns: dict[str, Array]) -> dict[str, Array]:
+    """Return the rows of the first pressure and temperature."""
+    if not columns["velocity"].size:
+        return columns
+    same = np.ones(columns["velocity"].size, bool)
+    for name in ("pressure", "temperature"):
+        first = columns[name][0]
+        same &= np.isclose(columns[name], first, rtol=1e-6, equal_nan=True)
+    return {name: values[same] for name, values in columns.items()}
+
+
+def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Chart:
+    """Return friction of each band, stacked from the coarsest, over velocity; the sum of the theory as a line."""
+    series = []
+    for band in np.unique(columns["band"]):
+        rows = _sorted(columns, columns["band"] == band)
+        ends = (columns[f"{end}_wavelength"][rows[0]] for end in ("long", "short"))
+        name = " to ".join(units.text(float(end), "m") for end in ends)
+        series.append(Series(name, columns["velocity"][rows], columns["friction"][rows], style.line(int(band))))
+    if theory is not None:
+        speeds = np.unique(theory["velocity"])
+        sums = np.array([theory["friction"][theory["velocity"] == speed].sum() for speed in speeds])
+        look = {"color": style.GREY, "linestyle": ":", "linewidth": 2 * THIN}
+        series.append(Series("theory", speeds, sums, look))
+    bands = len(series) - (theory is not None)
+    return Chart("bands", Axis("sliding velocity", "m/s"), Axis("friction by band"), series, log_x=True, stacked=bands)
+
+
+def _over_bands(columns: dict[str, Array], theory: dict[str, Array] | None, name: str) -> Chart:
+    """Return area over magnification, or the temperature over the wavelength of bands, for some velocities."""
+    area, longest = name == "contact_area", float(columns["long_wavelength"].max())
+    x = Axis("magnification") if area else Axis("shortest wave of the band", "m")
+    series = []
+    for number, speed in enumerate(_some(np.unique(columns["velocity"]))):
+        for table, look in _tables(columns, theory, number):
+            rows = np.flatnonzero(np.isclose(table["velocity"], speed, rtol=1e-6))
+            rows = rows[np.argsort(table["band"][rows])]
+            short = table["short_wavelength"][rows]
+            label = units.text(speed, "m/s") if table is columns else "theory" if number == 0 else ""
+            series.append(Series(label, longest / short if area else short, table[name][rows], look))
+    y = Axis("contact area /\nnominal area") if area else Axis("temperature rise", "K")
+    return Chart("bands area" if area else "bands heat", x, y, series, log_x=True)
+
+
+def _tables(
+    columns: dict[str, Array], theory: dict[str, Array] | None, number: int
+) -> Iterator[tuple[dict[str, Array], dict[str, object]]]:
+    yield columns, style.line(number) | {"marker": "o"}
+    if theory is not None:
+        yield theory, {"color": style.line(number)["color"], "linestyle": ":", "linewidth": THIN}
+
+
+def _some(speeds: Array) -> Sequence[float]:
+    places = np.unique(np.linspace(0, speeds.size - 1, min(SHOWN, speeds.size)).round().astype(int))
+    return [float(speed) for speed in speeds[places]]
+
+
+def _sorted(columns: dict[str, Array], chosen: NDArray[np.bool_]) -> NDArray[np.intp]:
+    rows = np.flatnonzero(chosen)
+    return rows[np.argsort(columns["velocity"][rows], kind="stable")]
