@@ -426,9 +426,6 @@ STUDY: Table = (
         "cells slid in a step; `auto` where the stages of the slide choose their steps and there is no ladder",
     ),
     Column("integrator", "", "integrator"),
-    Column("tolerance", "", "of the solver"),
-    Column("precision", "", "of the maps"),
-    Column("kernel", "", "kernel"),
     Column("mu_max", "", "highest friction"),
     Column(
         *("mu_end", ""),

@@ -1,33 +1,29 @@
 """The settings of a study: which are combined, and what they change in the job.
 
 All meshes, cells per step and integrators are combined with each other. For each integrator the mesh is also refined
-alone, with the time steps of the finest mesh. Tolerance, precision and kernel are changed one at a time, on the mesh
-next to the job's own. A rough surface of one seed has the same waves on every mesh.
+alone, with the time steps of the finest mesh. A rough surface of one seed has the same waves on every mesh.
 
 Stages that choose their own steps do so in every case, unless there is a ladder of cells per step: it takes their
 place where the surface slides.
 """
 
 import itertools
-from collections.abc import Iterator, Sequence
-from dataclasses import astuple, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
 
 from ..effects.adhesion import chosen_range
 from ..errors import InputError
-from ..job import AUTO, GeometricStep, Job, OnOneMesh, Stage, Study
+from ..job import AUTO, GeometricStep, Job, OnOneMesh, Stage
 from ..job.checks.cells import one_cell
 
 
 @dataclass(frozen=True)
 class Settings:
-    """One combination: points along x, cells per step (of its own mesh; None if steps are chosen), and the numerics."""
+    """One combination: points along x, cells per step (of its own mesh; None if steps are chosen), and integrator."""
 
     mesh: int
     cells_per_step: float | None
     integrator: str
-    tolerance: float
-    precision: str
-    kernel: str
 
     @property
     def time_step(self) -> float:
@@ -40,8 +36,7 @@ class Settings:
         return self.mesh**2 / self.time_step
 
     def __str__(self) -> str:
-        rest = [f"tolerance {self.tolerance:g}", self.precision, self.kernel]
-        return ", ".join([f"mesh {self.mesh}", self.steps, self.integrator, *rest])
+        return f"mesh {self.mesh}, {self.steps}, {self.integrator}"
 
     @property
     def steps(self) -> str:
@@ -61,39 +56,23 @@ class Ladders:
     meshes: tuple[int, ...]
     cells: tuple[float | None, ...]
     integrators: tuple[str, ...]
-    study: Study
     own: Settings
     shared: float = 0.0
     slides: bool = True
 
     def combine(self) -> list[Settings]:
         """All combinations, each once, the cheapest first."""
-        return sorted(set(self._combinations()), key=lambda case: (case.effort, str(astuple(case))))
-
-    def _combinations(self) -> Iterator[Settings]:
-        for integrator, mesh, cells in itertools.product(self.integrators, self.meshes, self.cells):
-            yield replace(self.own, mesh=mesh, cells_per_step=cells, integrator=integrator)
-        for integrator in self.integrators:
-            finest = replace(self.own, mesh=self.meshes[-1], cells_per_step=self.cells[0], integrator=integrator)
-            yield from (at_time_step(finest, mesh) for mesh in self.meshes)
-        mesh = min(self.meshes, key=lambda points: abs(points - self.own.mesh))
-        base = replace(self.own, mesh=mesh, cells_per_step=self.cells[0], integrator=self.integrators[0])
-        for name in ("tolerance", "precision", "kernel"):
-            for value in getattr(self.study, name):
-                yield replace(base, **{name: value})
+        found = set(itertools.starmap(Settings, itertools.product(self.meshes, self.cells, self.integrators)))
+        coarse, finest = self.cells[0], self.meshes[-1]  # the mesh alone has the time step of these
+        for mesh, integrator in itertools.product(self.meshes, self.integrators):
+            found.add(Settings(mesh, coarse and coarse * mesh / finest, integrator))
+        return sorted(found, key=lambda case: (case.effort, str(astuple(case))))
 
 
 def _cells_of_time_steps(job: Job) -> float:
     """The cells that the time step of the first slide with one comes to; 1 where nothing slides so."""
     steps = ((stage, stage.time_step) for stage in job.history if stage.speed)
     return next((dt / one_cell(stage, job.grid) for stage, dt in steps if isinstance(dt, float)), 1.0)
-
-
-def at_time_step(case: Settings, mesh: int) -> Settings:
-    """Return the settings with the same time step on another mesh; steps that are chosen are so there too."""
-    if case.cells_per_step is None:
-        return replace(case, mesh=mesh)
-    return replace(case, mesh=mesh, cells_per_step=case.cells_per_step * mesh / case.mesh)
 
 
 def ladders(job: Job) -> Ladders:
@@ -113,20 +92,20 @@ def ladders(job: Job) -> Ladders:
         own = _cells_of_time_steps(job)
     if own is None and study.cells_per_step:
         own = 1.0
-    case = Settings(job.grid.nx, own, numerics.integrator, numerics.tolerance, numerics.precision, numerics.kernel)
+    case = Settings(job.grid.nx, own, numerics.integrator)
     meshes = tuple(sorted(study.mesh)) or (job.grid.nx,)
     cells: tuple[float | None, ...] = tuple(sorted(study.cells_per_step, reverse=True)) or (own,)
     shared = numerics.asked.of_steps if _sliding(job) and not study.cells_per_step else 0.0
     slides = any(stage.speed for stage in job.history)
-    return Ladders(meshes, cells, study.integrator or (numerics.integrator,), study, case, shared, slides)
+    return Ladders(meshes, cells, study.integrator or (numerics.integrator,), case, shared, slides)
 
 
 def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
     """Return the overrides that make a case of the job; time steps of all kinds change in the same proportion."""
     ny = 1 if job.grid.ny == 1 else case.mesh * job.grid.ny // job.grid.nx
     words = [f"grid.points=[{case.mesh}, {ny}]", "output.fields=[]", "output.every=1", "output.energy=false"]
-    words += ["output.branch_dissipation=false"]
-    words += [f"numerics.{name}={getattr(case, name)}" for name in ("integrator", "tolerance", "precision", "kernel")]
+    words += ["output.branch_dissipation=false", f"numerics.integrator={case.integrator}"]
+    words.append(f"numerics.tolerance={job.numerics.tolerance!r}")  # that of the job, also where accuracy chose it
     words += [f"adhesion.range={reach!r}"] if (reach := chosen_range(job)) is not None else []
     factor = case.time_step / own.time_step
     replaced = _sliding(job) if job.study and job.study.cells_per_step else []

@@ -49,7 +49,7 @@ class Outcome:
 QUANTITIES = ("mu_max", "mu_end", "area", "area_corrected")
 SETTINGS, RESULTS = (tuple(field.name for field in fields(kind)) for kind in (Settings, Outcome))
 COLUMNS = names_of(STUDY)  # the fingerprint, settings, results and errors
-WORDS, COUNTS = ("integrator", "precision", "kernel"), ("mesh", "steps", "operator_calls")
+COUNTS = ("mesh", "steps", "operator_calls")
 
 
 def warm_up(job: Job, slab: Slab) -> None:
@@ -138,6 +138,6 @@ def write_outcomes(
 
 
 def _value(name: str, text: str) -> Any:
-    if name in WORDS:
+    if name == "integrator":
         return text
     return None if text == AUTO else int(text) if name in COUNTS else float(text)

@@ -56,7 +56,7 @@ class _Study:
         self.prints = {case: _fingerprint(one) for case, one in jobs.items()}
         known = read_outcomes(self.path, self.prints) if self.slab.root else {}
         self.outcomes: dict[Settings, Outcome] = self.slab.agree(known)
-        self.warm: set[str] = set()
+        self.warm = False
 
     def say(self, text: str) -> None:
         if self.slab.root and not self.quiet:
@@ -80,14 +80,14 @@ class _Study:
         return True
 
     def _say_line(self, case: str, friction: str, area: str, seconds: str) -> None:
-        self.say(f"  {case:80}" + f" {friction:>13}" * self.refined.slides + f" {area:>9} {seconds:>8}")
+        self.say(f"  {case:50}" + f" {friction:>13}" * self.refined.slides + f" {area:>9} {seconds:>8}")
 
     def _one(self, case: Settings, job: Job, stopped: Callable[[], bool]) -> Outcome | None:
         slab = self.slab.resized(*job.grid.points)
         try:
-            if case.precision not in self.warm:
+            if not self.warm:
                 outcome.warm_up(job, slab)
-                self.warm.add(case.precision)
+                self.warm = True
             return outcome.run(job, slab, stopped)
         except RunError as error:
             raise RunError(f"{case}: {error}") from error

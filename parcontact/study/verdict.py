@@ -38,11 +38,7 @@ class Found:
 def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str, tuple[list[float], list[Settings]]]:
     """Cases that differ in one thing, from coarse to fine: mesh and time together, mesh alone, time alone; with the
     sizes that belong to them. With steps that are chosen there is the mesh only."""
-    usual = [
-        case
-        for case in outcomes
-        if replace(ladders.own, mesh=case.mesh, cells_per_step=case.cells_per_step, integrator=integrator) == case
-    ]
+    usual = [case for case in outcomes if case.integrator == integrator]
     coarse, finest = ladders.cells[0], ladders.meshes[-1]
     together = sorted((c for c in usual if _alike(c.cells_per_step, coarse)), key=lambda case: case.mesh)
     if coarse is None:
@@ -83,7 +79,7 @@ def limits(ladders: Ladders, outcomes: Outcomes) -> list[Found]:
 
 def _finer(outcomes: Outcomes, last: Settings) -> list[Settings]:
     """The cases that are in mesh and time as fine as the last one of a ladder, or finer, with all else the same."""
-    alike = [c for c in outcomes if replace(c, mesh=last.mesh, cells_per_step=last.cells_per_step) == last]
+    alike = [case for case in outcomes if case.integrator == last.integrator]
     return [case for case in alike if case.mesh >= last.mesh and case.time_step <= last.time_step]
 
 
@@ -106,7 +102,7 @@ def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
     if len(ladders.meshes) > 1:
         each = [replace(ladders, cells=(cells,)) for cells in ladders.cells]
         found = [one for part in each for one in limits(part, outcomes) if one.ladder in (TOGETHER, CHOSEN)]
-    dearest = max(outcomes, key=lambda case: (case.effort, -case.tolerance, case.precision == "double"))
+    dearest = max(outcomes, key=lambda case: case.effort)
     best = {name: Limit(getattr(outcomes[dearest], name), math.nan, math.nan) for name in judged(ladders)}
     for quantity in best:
         choices = [one.limit for one in found if one.quantity == quantity and one.limit.value]

@@ -37,25 +37,16 @@ def refined(path: Path, study: str) -> tuple[Job, Ladders]:
 
 
 def test_cases(path: Path) -> None:
-    """Meshes, steps and integrators combined; the mesh alone; the rest one at a time; each once, the cheapest first."""
+    """Meshes, steps and integrators combined; the mesh alone; each once, the cheapest first."""
     _, found = refined(
-        path,
-        "{mesh: [128, 64, 32], cells_per_step: [2, 1], integrator: [exponential, backward-euler], "
-        "tolerance: [1e-3, 5e-3], precision: [mixed, double], kernel: [love]}",
+        path, "{mesh: [128, 64, 32], cells_per_step: [2, 1], integrator: [exponential, backward-euler]}"
     )
     cases = found.combine()
-    assert len(cases) == len(set(cases)) == 3 * 2 * 2 + 2 * 1 + 3  # of the mesh alone, half a cell on 32 points is new
+    assert len(cases) == len(set(cases)) == 3 * 2 * 2 + 2 * 1  # of the mesh alone, half a cell on 32 points is new
     assert {case.mesh for case in cases} == {32, 64, 128}
     alone = [case for case in cases if case.time_step == 2 / 128]
     assert {(case.mesh, case.cells_per_step) for case in alone} == {(128, 2.0), (64, 1.0), (32, 0.5)}
     assert [case.effort for case in cases] == sorted(case.effort for case in cases)
-    others = [case for case in cases if (case.tolerance, case.precision, case.kernel) != (5e-3, "double", "spectral")]
-    assert {(case.tolerance, case.precision, case.kernel) for case in others} == {
-        (1e-3, "double", "spectral"),
-        (5e-3, "mixed", "spectral"),
-        (5e-3, "double", "love"),
-    }
-    assert {(case.mesh, case.cells_per_step, case.integrator) for case in others} == {(64, 2.0, "exponential")}
 
 
 @pytest.mark.parametrize(
@@ -64,11 +55,10 @@ def test_cases(path: Path) -> None:
 def test_steps_of_all_kinds_change_alike(path: Path, mesh: int, cells: float, factor: float) -> None:
     """Twice as fine in time: each stage has twice the steps; growing ones are rounded up."""
     job, found = refined(path, "{mesh: [64, 128]}")
-    case = Settings(mesh, cells, "backward-euler", 1e-3, "mixed", "love")
+    case = Settings(mesh, cells, "backward-euler")
     changed = load(path, overrides(job, found.own, case))
     assert changed.grid.points == (mesh, mesh // 2)
-    assert (changed.numerics.integrator, changed.numerics.tolerance) == ("backward-euler", 1e-3)
-    assert (changed.numerics.precision, changed.numerics.kernel) == ("mixed", "love")
+    assert (changed.numerics.integrator, changed.numerics.tolerance) == ("backward-euler", 5e-3)
     before, after = ([span.count for span in Timeline.of(one).spans] for one in (job, changed))
     assert after[1:] == [round(count / factor) for count in before[1:]]
     assert abs(after[0] - before[0] / factor) <= 2
@@ -95,7 +85,7 @@ def test_refused(path: Path, changes: list[str], sentence: str) -> None:
         ("{}", "study needs at least one ladder: mesh, cells_per_step"),
         ("{mesh: [32, 32]}", "study.mesh.1 names 32 a second time"),
         ("{mesh: [0]}", "study.mesh.0 must be a list of positive whole numbers"),
-        ("{tolerance: [2.0]}", "study.tolerance.0 must be a list of tolerances"),
+        ("{mesh: [32], tolerance: [0.1]}", "a `sweep:` compares values of numerics.tolerance"),
         ("{mesh: [32], cells: [1]}", "study.cells is not a known key"),
     ],
 )
@@ -108,7 +98,7 @@ def test_mistakes(path: Path, study: str, sentence: str) -> None:
 def test_defaults_of_a_study(path: Path) -> None:
     """One ladder is enough; the rest is the job's own, with the cells per step of its first stage that has them."""
     _, found = refined(path, "{mesh: 32}")
-    assert found.combine() == [Settings(32, 2.0, "exponential", 5e-3, "double", "spectral")]
+    assert found.combine() == [Settings(32, 2.0, "exponential")]
 
 
 def chosen(path: Path, study: str) -> tuple[Job, Ladders]:
@@ -132,9 +122,9 @@ def test_a_ladder_takes_the_place_of_chosen_steps(path: Path) -> None:
 
 def test_steps_without_a_ladder_are_chosen_in_every_case(path: Path) -> None:
     """They say so, and on every mesh there is one case, not another with the time step of the finest mesh."""
-    job, found = chosen(path, "{mesh: [32, 64], tolerance: [1e-3]}")
+    job, found = chosen(path, "{mesh: [32, 64]}")
     cases = found.combine()
-    assert [(case.mesh, case.steps) for case in cases] == [(32, "auto steps"), (64, "auto steps"), (64, "auto steps")]
+    assert [(case.mesh, case.steps) for case in cases] == [(32, "auto steps"), (64, "auto steps")]
     assert all(load(path, overrides(job, found.own, case)).history[2].chooses for case in cases)
     assert "study.cells_per_step would show" in describe_chosen_steps(job)[0]
     assert found.shared == 0.01
@@ -143,8 +133,8 @@ def test_steps_without_a_ladder_are_chosen_in_every_case(path: Path) -> None:
 def test_a_time_step_of_a_slide_is_told_in_cells(path: Path) -> None:
     """1e-6 s at 1 m/s over cells of 1e-3/64 m, and a ladder that refines it takes those cells."""
     path.write_text(TEXT.replace(", cells_per_step: 2", ", time_step: 1.0e-6"))
-    _, found = refined(path, "{tolerance: [1e-3]}")
-    assert [case.steps for case in found.combine()] == ["0.064 cell per step"] * 2
+    _, found = refined(path, "{mesh: [64]}")
+    assert [case.steps for case in found.combine()] == ["0.064 cell per step"]
     job, found = refined(path, "{cells_per_step: [0.5, 0.25]}")
     jobs = [load(path, overrides(job, found.own, case)) for case in found.combine()]
     assert [one.history[1].time_step for one in jobs] == pytest.approx([0.5e-3 / 64, 0.25e-3 / 64], rel=1e-12)

@@ -13,7 +13,6 @@ from csv_rows import rows
 from mpi4py import MPI
 
 from parcontact.job import Job, load
-from parcontact.job.sections.calculation import Study
 from parcontact.parallel.slab import Slab
 from parcontact.study import outcome, study, verdict
 from parcontact.study.extrapolation import Limit
@@ -92,7 +91,7 @@ def test_refining_one_of_mesh_and_time_is_wasted(tmp_path: Path, integrator: str
     own = ladders(job).own
 
     def errors(mesh: int, cells: float, integrator: str = integrator) -> tuple[float, float]:
-        case = Settings(mesh, cells, integrator, own.tolerance, "double", "spectral")
+        case = Settings(mesh, cells, integrator)
         found = outcome.run(load(path, overrides(job, own, case)), Slab.alone(mesh, mesh), lambda: False)
         assert found is not None
         return found.mu_end - limit[0], found.area_corrected - limit[1]
@@ -114,7 +113,7 @@ def make(work: float, error: float) -> Outcome:
 def test_front_and_sentences() -> None:
     """The cheapest settings that are accurate enough, and no others."""
     results = [make(1.0, 0.1), make(2.0, 0.02), make(3.0, 0.04), make(4.0, 0.002)]
-    cases = {Settings(2**k, 1.0, "exponential", 1e-4, "double", "spectral"): one for k, one in enumerate(results)}
+    cases = {Settings(2**k, 1.0, "exponential"): one for k, one in enumerate(results)}
     first, second, _, last = cases
     reference = {
         "mu_max": Limit(1.0, 1.0, 0.004),
@@ -137,12 +136,10 @@ def test_front_and_sentences() -> None:
 
 def test_a_limit_without_an_order_covers_finer_cases() -> None:
     """Meshes come to 1, 1.02 and 1.01; on the finest one half as long steps give 1.2."""
-    own = Settings(32, 1.0, "exponential", 1e-4, "double", "spectral")
+    own = Settings(32, 1.0, "exponential")
     cases = {replace(own, mesh=mesh): make(1.0, error) for mesh, error in ((32, 0.0), (64, 0.02), (128, 0.01))}
     cases[replace(own, mesh=128, cells_per_step=0.5)] = make(2.0, 0.2)
-    ladders = Ladders(
-        (32, 64, 128), (1.0, 0.5), ("exponential",), Study.model_validate({"mesh": [32, 64, 128]}), own, 0.0
-    )
+    ladders = Ladders((32, 64, 128), (1.0, 0.5), ("exponential",), own)
     found = {(one.quantity, one.ladder): one.limit for one in verdict.limits(ladders, cases)}
     limit = found["mu_max", verdict.TOGETHER]
     assert (limit.value, math.isnan(limit.order)) == (1.01, True)

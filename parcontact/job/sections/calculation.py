@@ -211,7 +211,8 @@ class Checkpoint(Part):
         return data if data.keys() & {"every", "minutes"} else {"minutes": 10.0, **data}
 
 
-LADDERS = ("mesh", "cells_per_step", "integrator", "tolerance", "precision", "kernel")
+LADDERS = ("mesh", "cells_per_step", "integrator")
+SWEPT = "it went; a `sweep:` compares values of numerics.{}"
 
 
 def _some_ladder(*ladders: tuple[Any, ...]) -> Iterator[Fault]:
@@ -229,10 +230,6 @@ class Study(Part):
         default=(), description="a list of positive numbers of cells (fractions are allowed)"
     )
     integrator: Annotated[tuple[Integrator, ...], BeforeValidator(listed)] = ()
-    tolerance: Annotated[tuple[Fraction, ...], BeforeValidator(listed)] = Field(
-        default=(), description="a list of tolerances [-] above 0 and below 1"
-    )
-    precision: Annotated[tuple[Precision, ...], BeforeValidator(listed)] = ()
-    kernel: Annotated[tuple[Kernel, ...], BeforeValidator(listed)] = ()
 
+    foreign = MappingProxyType({key: Instead(SWEPT.format(key)) for key in ("tolerance", "precision", "kernel")})
     rules = (*map(_different, LADDERS), Rule(LADDERS, _some_ladder))
