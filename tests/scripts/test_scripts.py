@@ -39,9 +39,6 @@ SMALL = {
     "error_coverage": Small(
         ["--scenes", "2", "--from", "13"], r"(?s)first half: 2 \| both .*2 scenes, .*written: ", (0, 1)
     ),
-    "faults": Small(
-        ["--kinds", "kill,damage", "--trials", "2", "--flips", "4", "--shorter", "12"], r"2 made: 0 with faults; "
-    ),
     "fuzz_jobs": Small(["--jobs", "40"], r"(?m)^40 made: 0 with faults; "),
     "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_disturbed.py
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^\d\d pages in pages"),
