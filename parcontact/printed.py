@@ -39,6 +39,11 @@ def per_cent(share: float, digits: int = 2) -> str:
     return f"{percent:.{digits}g} %" if percent < 10.0**digits - 0.5 else f"{percent:.0f} %"
 
 
+def stated_error(error: float, digits: int = 2) -> str:
+    """Return an estimated relative error in per cent; beyond 100 % it says no more than that it is not known."""
+    return per_cent(error, digits) if error <= 1.0 else "unknown"
+
+
 def with_error(value: float, error: float) -> str:
     """Return a number and its error: two digits of the error, and the number as far as these: 0.01483 +- 0.00036.
 

@@ -20,7 +20,7 @@ from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..plotting import conductivity, leakage
 from ..plotting.run import Fields, Run
-from ..printed import per_cent, quantity
+from ..printed import per_cent, quantity, stated_error
 from ..storage import files, hdf5, tables
 
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
@@ -195,10 +195,10 @@ def _describe(rows: Sequence[Instant], axis: str) -> Iterator[str]:
     yield _describe_closure(rows, axis)
     errors = [error for row in rows if (error := getattr(row, f"error_{axis}")) == error]
     if errors:
-        much = per_cent(median(errors))
+        much = stated_error(median(errors))
         if len(errors) > 1:
-            much += f" in the median of the instants, and by {per_cent(max(errors))} at most"
-        yield f"along {axis} K of every second point of the gap differs by {much}"
+            much += f" in the median of the instants, at worst {stated_error(max(errors))}"
+        yield f"along {axis} the error of K by the mesh, from every second point of the gap: {much}"
     thin = [row for row in rows if conductivity.is_thin(getattr(row, f"constriction_{axis}"))]
     if thin:
         where = f"{len(thin)} of {len(rows)} instants, first at t = {quantity(thin[0].time, 's')}"

@@ -31,6 +31,7 @@ from ..parallel.slab import Array
 from ..physics.prony import Integrator, Prony, coefficients, complex_modulus, relaxation
 from ..printed import per_cent
 
+LEAST_BOUND = 1e-6  # of an error: smaller ones are said to be at most that
 PER_DECADE = 4  # accuracy: frequencies at which errors of friction are looked at
 MEMORYLESS_SHARE = 0.5  # tuning: of the error for memoryless branches, which must not depend on how long a job is
 
@@ -117,8 +118,15 @@ def frozen_errors(prony: Prony, scales: TimeScales) -> Array:
     return np.asarray(errors)
 
 
-def describe_folded_branches(found: FoldedBranches, prony: Prony) -> list[str]:
-    """Return what a user should know about the branches of a material [Pa, s]: nothing if they are as the job says."""
+def bounded_error(found: FoldedBranches, slides: bool) -> str:
+    """Return what the error of folded branches is of, and its bound: no closer to 0 than matters."""
+    what = "friction" if slides else "the modulus"
+    return f"error of {what} at most {per_cent(max(found.bound, LEAST_BOUND))}"
+
+
+def describe_folded_branches(found: FoldedBranches, prony: Prony, slides: bool) -> list[str]:
+    """Return what a user should know about the branches of a material [Pa, s] under a surface that `slides` or not:
+    nothing if they are as the job says."""
     count = prony.moduli.size
     if not found.folded:
         return [f"branches: all {count} are followed in time: {found.reason}"] if found.reason and count > 1 else []
@@ -129,6 +137,5 @@ def describe_folded_branches(found: FoldedBranches, prony: Prony) -> list[str]:
     )
     return [
         f"branches: {len(found.kept)} of {count} are followed in time; {folded}. "
-        f"Error of friction by this, at rest of the modulus: at most {per_cent(found.bound)} "
-        f"(numerics.branch_error allows {per_cent(found.allowed)})"
+        f"{bounded_error(found, slides).capitalize()} (numerics.branch_error allows {per_cent(found.allowed)})"
     ]

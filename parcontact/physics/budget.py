@@ -96,6 +96,7 @@ class Parts:
 
 
 NAMES = ("solver", "time", "folded", "mesh", "method", "scatter")  # that add up
+ALIKE = 0.1  # of the error by the mesh along the sliding and across it, which are then mended together
 LITTLE = 0.05  # of the error by the mesh: what one direction makes is not told
 SUMS = "sums"  # in a checkpoint
 REMEDIES = {
@@ -267,7 +268,8 @@ def advice(parts: Parts, accuracy: float, chosen: Collection[str] = ()) -> str:
         return f"; within the {100 * accuracy:g} % that numerics.accuracy asks for"
     worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
     if worst == "mesh" and worst not in chosen and parts.across:
-        worst = "along" if parts.along >= parts.across else "across"
+        both = math.isclose(parts.along, parts.across, rel_tol=ALIKE)
+        worst = "mesh" if both else "along" if parts.along > parts.across else "across"
     remedy = SMALLER if worst in chosen else REMEDIES[worst]
     return f"; more than the {100 * accuracy:g} % that numerics.accuracy asks for: try {remedy}"
 

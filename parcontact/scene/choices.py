@@ -12,7 +12,7 @@ import numpy as np
 
 from ..effects.adhesion import law_of
 from ..effects.effect import Decision, Effect
-from ..effects.folded_branches import FoldedBranches, fold_branches, time_scales
+from ..effects.folded_branches import FoldedBranches, bounded_error, fold_branches, time_scales
 from ..effects.interface import interface_of
 from ..effects.relaxation import feeds_back, relaxation_of, time_factor_of
 from ..history.chosen import describe_steps
@@ -21,7 +21,6 @@ from ..job import Grid, Job, Numerics, Output, Spectral, added_sections
 from ..physics.adhesion import AdhesionLaw
 from ..physics.interface import InterfaceFriction
 from ..physics.prony import Prony
-from ..printed import per_cent
 from ..solve.precision import LOOSE, VERY_LOOSE
 from .decided import Decided, Verdict, decided
 
@@ -107,7 +106,7 @@ class Choices:
         if not found.folded:
             return False, found.reason or "no branch is far faster or slower than all that happens"
         folded = f"{found.folded} of {self.prony.moduli.size} are too fast or too slow to need a map"
-        return True, f"{folded}; error of friction at most {per_cent(found.bound)}"
+        return True, f"{folded}; {bounded_error(found, bool(self.job.directions))}"
 
     @decided("isolated contact")
     def isolated(self) -> Verdict:

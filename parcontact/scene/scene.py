@@ -224,7 +224,7 @@ def solver_on_tiles(setup: Setup) -> SolverOnTiles | None:
 def describe_scene(scene: Scene) -> Iterator[str]:
     """Yield what a user should know: how maps were prepared, branches folded, steps chosen; the surface's moments."""
     yield from scene.setup.told.notes
-    yield from describe_folded_branches(scene.folded, scene.choices.prony)
+    yield from describe_folded_branches(scene.folded, scene.choices.prony, bool(scene.job.directions))
     yield from scene.job.facts
     if steps := describe_steps(scene.job):
         yield f"chosen time steps: {steps}"

@@ -117,7 +117,7 @@ class Recorder:
         wanted: list[int] = []
         if step >= total:
             wanted = [step]
-        elif step % every == 0 and step not in file.steps:
+        elif step and step % every == 0 and step not in file.steps:
             wanted = list(range(step, max(total, 2 * step) + 1, every))
         if wanted and wanted != [last for last in file.steps if last >= step]:
             file.make_place(wanted)

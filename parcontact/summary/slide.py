@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..job import Initial, Ramp, Stage
-from ..printed import per_cent, quantity, with_error
+from ..printed import quantity, stated_error, with_error
 
 LATE = 0.9  # accuracy: of the distance; a maximum beyond may be none
 DYNAMIC = 0.75  # physics: share of the distance, counted from its end, over which friction is averaged
@@ -181,7 +181,7 @@ def describe(
     known = {name: value for name, value in errors(so_far, columns).items() if value == value}
     if known:
         what = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
-        parts = ", ".join(f"{what[name]} {per_cent(value)}" for name, value in known.items())
+        parts = ", ".join(f"{what[name]} {stated_error(value)}" for name, value in known.items())
         yield f"largest estimated errors of single steps of the slide: {parts}"
     if known.get(ERRORS[0], 0.0) >= 1.0:
         yield "in some steps of the slide friction is smaller than its estimated error"

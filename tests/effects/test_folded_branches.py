@@ -18,6 +18,7 @@ from parcontact import scene
 from parcontact.effects.folded_branches import (
     FoldedBranches,
     TimeScales,
+    bounded_error,
     fold_branches,
     frozen_errors,
     memoryless_errors,
@@ -378,4 +379,11 @@ def test_the_log_says_what_is_folded(tmp_path: Path) -> None:
     log = (tmp_path / "out" / "run.log").read_text()
     bound = scene.choices(sliding(numerics={"branch_error": 1e-2})).folded.bound
     assert "branches: 1 of 4 are followed in time; those of 1e-06 s are too fast to remember; those of 3, 10" in log
-    assert f"of the modulus: at most {100 * bound:.2g} % (numerics.branch_error allows 1 %)" in log
+    assert f"Error of friction at most {100 * bound:.2g} % (numerics.branch_error allows 1 %)" in log
+
+
+@pytest.mark.parametrize(("bound", "told"), [(2e-3, "0.2 %"), (1e-131, "0.0001 %")])
+def test_a_bound_is_no_closer_to_0_than_matters(bound: float, told: str) -> None:
+    found = FoldedBranches((), (0,), (), bound, 1e-2)
+    assert bounded_error(found, slides=True) == f"error of friction at most {told}"
+    assert bounded_error(found, slides=False) == f"error of the modulus at most {told}"

@@ -17,9 +17,16 @@ def test_warning_of_few_long_waves_and_few_cells(tmp_path: Path) -> None:
     assert "only 2 of the longest waves fit into the box along x" in long
     assert "a grid.size of 0.002 m or a long_wavelength of 0.00025 m" in long
     assert "only 4 cells per shortest wave along x" in short
-    assert (
-        "128 points (4 times the memory, some 8 times the time in sliding) or a short_wavelength of 0.000125 m" in short
-    )
+    assert "needs 8: use 128 points (4 times the memory) or a short_wavelength of 0.000125 m" in short
+    stage = "{pressure: 1e5, velocity: 1.0, distance: 1e-4, cells_per_step: 1}"
+    _, short, *_ = job_of(tmp_path, replaced(SMALL, surface=ROUGH).replace("{pressure: 1e5}", stage)).warnings
+    assert "128 points (2.9 times the memory, some 5.7 times the time in sliding)" in short
+
+
+def test_where_nothing_slides_friction_asks_for_no_cells(tmp_path: Path) -> None:
+    """Its accuracy is of no meaning there: 4 cells do for an error of the area of 3 %, 8 (1/3)^(1/1.6)."""
+    strict = replaced(SMALL, surface=ROUGH, numerics="{accuracy: {friction: 0.001, area: 0.031}}")
+    assert not any("cells per shortest wave" in text for text in job_of(tmp_path, strict).warnings)
 
 
 @pytest.mark.parametrize(("size", "warned"), [("[5e-2, 5e-2]", False), ("[1.0, 5e-2]", True)])

@@ -17,7 +17,7 @@ from parcontact.errors import InputError, RunError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job, JobError, load
 from parcontact.job.checks import size as size_advice
-from parcontact.job.checks.cells import cells_per_wave
+from parcontact.job.checks.cells import cells_for_area
 from parcontact.parallel.slab import Slab
 from parcontact.scene import sanity
 
@@ -192,7 +192,7 @@ def test_the_limit_of_resolution_is_that_of_rough_surfaces(tmp_path: Path, cells
     x = np.arange(400)
     wave = 1e-8 * np.cos(2 * np.pi * round(400 / cells) / 400 * x) * np.ones((400, 1))
     found = of_file(tmp_path / "road.npy", wave, numerics={"accuracy": accuracy})
-    assert bool(found) == (cells < cells_per_wave(accuracy))
+    assert bool(found) == (cells < cells_for_area(accuracy))
 
 
 def test_a_contact_that_reaches_the_edge_of_the_box() -> None:

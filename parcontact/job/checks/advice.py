@@ -106,7 +106,7 @@ def _few_cells(
     yield (
         f"{key}: only {wave / cell:.3g} cells per shortest wave along {name}{known}; {reason} needs "
         f"{max(wants[name]):.3g}: use {math.ceil((1 - SAME_LENGTH) * max(wants[name]) * length / wave)} points "
-        f"({more:.2g} times the memory, some {more * finer:.2g} times the time in sliding)"
+        f"({more:.2g} times the memory{f', some {more * finer:.2g} times the time in sliding' * bool(directions)})"
         f"{otherwise.format(max(wants[name]) * cell)}"
     )
 

@@ -123,8 +123,10 @@ def cells_for_area(accuracy: float) -> float:
 
 def needed(axis: int, directions: Sequence[Vector], asked: Accuracy) -> tuple[float, float]:
     """Return how many cells the shortest wave needs along an axis, for friction and for the contact area, of a surface
-    that slides along these directions (unit vectors); without any as many as along the sliding."""
-    if not directions or any(abs(way[axis]) > ASIDE for way in directions):
+    that slides along these directions (unit vectors); without any as many for the area."""
+    if not directions:
+        return cells_for_area(asked.area), cells_for_area(asked.area)
+    if any(abs(way[axis]) > ASIDE for way in directions):
         return cells_per_wave(asked.friction), cells_for_area(asked.area)
     for_area = max(LEAST_CELLS, 4.0 * (AREA_ASIDE / asked.area) ** (1.0 / AREA_ASIDE_ORDER))
     return cells_across(asked.friction), for_area

@@ -280,9 +280,10 @@ def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[str]:
         start = _round_trip(grid, velocity, seconds + near / speed, near) - near
         if speed * seconds > start * (1.0 + SAME) and memory > REMEMBERS * start / speed:
             yield (
-                f"history.{index}: after {start:.3g} m of its {speed * seconds:.3g} m the surface has gone once round "
-                f"the periodic box and slides over its own imprint, which the body remembers for {memory:.3g} s. From "
-                "there on friction depends on the box, and so does mu_dyn; use a shorter distance or a larger grid.size"
+                f"history.{index}: after {start:.3g} m of its {speed * seconds:.3g} m the surface is back within "
+                f"{near:.3g} m of where it began, once round the periodic box, and slides over its own imprint, which "
+                f"the body remembers for {memory:.3g} s. From there on friction and mu_dyn depend on the box; "
+                "use a shorter distance or a larger grid.size"
             )
 
 
