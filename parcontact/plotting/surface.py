@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..parallel.slab import Array
-from ..road.statistics import Statistics
+from ..physics.surface_statistics import Statistics
 from . import style, units
 
 BINS = 60

@@ -11,9 +11,10 @@ from ..job import Job, Topography
 from ..job.sections import listing
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
+from ..physics import surface_statistics as statistics
 from ..plotting import style, surface, units
 from ..printed import per_cent, quantity
-from ..road import statistics, treatment
+from ..road import treatment
 from ..road.prepared_map import prepare
 from ..scene import rigid_surface
 from .parts import Section, Table, draw_panel

@@ -1,1 +1,1 @@
-"""Measured roads: files of many instruments, their treatment, statistics, and heights on a grid."""
+"""Measured roads: files of many instruments, their treatment, their spectra, and heights on a grid."""

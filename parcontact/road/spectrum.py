@@ -1,7 +1,7 @@
 """Measured isotropic spectra: a table of C1D or C2D over wavenumbers, and the density of waves that follows from it.
 
 The names of the columns say which spectrum it is, and their units: `q[1/m] C2D[m^4]` or `q[1/m] C1D[m^3]`, and the same
-in mm, um or nm. As in `road.statistics`, q = 2 pi/wavelength, and C1D is that of profiles, one-sided:
+in mm, um or nm. As in `physics.surface_statistics`, q = 2 pi/wavelength, and C1D is that of profiles, one-sided:
 
     <h^2> = int C2D d2q = int_0^inf C1D dq,        Phi = 4 pi^2 C2D, the density of `physics.roughness`,
     C2D(k) = -1/(2 pi) int_k^inf C1D'(q)/sqrt(q^2 - k^2) dq       (Abel's equation, with q = k cosh t)
@@ -28,7 +28,7 @@ from .map_files import UNITS
 POWERS = {"C1D": 3, "C2D": 4}  # of a length, in the unit of a spectrum
 LARGER = {3: np.pi, 4: 4 * np.pi**2}  # factors of spectra written by SurfaceTopography, by the same power
 FEWEST = 3  # accuracy: rows of numbers
-ABEL_NODES = 12  # accuracy: of Gauss' rule, in each piece of Abel's integral
+ABEL_POINTS = 20_001  # accuracy: of Abel's integral, whose integrand jumps between power laws
 ABEL_DECADES = 4.0  # accuracy: beyond the last point, where C1D' has fallen by more than 8
 NOTHING = 1e-20  # accuracy: of the largest C2D, whose square root is the precision of a height
 EDGE = 1e-9  # accuracy: relative: wavelengths that differ by this are the same
@@ -75,26 +75,20 @@ def of(part: RoughSpectrum) -> tuple[Measured, tuple[float, float]]:
 
 
 def _read(path: Path) -> tuple[Array, Array, int]:
-    """Wavenumbers [rad/m], the spectrum in SI units, and the power of m in its unit."""
-    said = read_lines(path, f"a table with {FORMS}")
-    lines = [(number, re.split(r"[,;\s]+", line.strip())) for number, line in said]
-    factors, power = _header(path, *lines[0])
-    rows = np.array([_numbers(path, number, cells) for number, cells in lines[1:]])
+    """Return wavenumbers [rad/m], the spectrum in SI units, and the power of m in its unit."""
+    (number, head), *lines = [
+        (number, re.split(r"[,;\s]+", line.strip())) for number, line in read_lines(path, f"a table with {FORMS}")
+    ]
+    found = HEADER.fullmatch(" ".join(head))
+    if not found or not {found[1], found[3]} <= UNITS.keys() or int(found[4]) != POWERS[found[2]]:
+        raise InputError(f"{path}, line {number}: {FORMS} were expected, got {' '.join(head)[:60]!r}")
+    rows = np.array([_numbers(path, number, cells) for number, cells in lines])
     if len(rows) < FEWEST:
         raise InputError(f"{path} has {len(rows)} rows of numbers; at least {FEWEST} were expected")
-    wrong = np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)
-    if wrong.size:
-        raise InputError(f"{path}, line {lines[wrong[0] + 2][0]}: q must rise from line to line")
-    return rows[:, 0] * factors[0], rows[:, 1] * factors[1], power
-
-
-def _header(path: Path, number: int, cells: list[str]) -> tuple[tuple[float, float], int]:
-    """Factors that make SI units of both columns, and the power of m in that of the spectrum."""
-    found = HEADER.fullmatch(" ".join(cells))
-    if not found or not {found[1], found[3]} <= UNITS.keys() or int(found[4]) != POWERS[found[2]]:
-        raise InputError(f"{path}, line {number}: {FORMS} were expected, got {' '.join(cells)[:60]!r}")
+    if (wrong := np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)).size:
+        raise InputError(f"{path}, line {lines[wrong[0] + 1][0]}: q must rise from line to line")
     power = POWERS[found[2]]
-    return (1.0 / UNITS[found[1]], UNITS[found[3]] ** power), power
+    return rows[:, 0] / UNITS[found[1]], rows[:, 1] * UNITS[found[3]] ** power, power
 
 
 def _numbers(path: Path, number: int, cells: list[str]) -> tuple[float, float]:
@@ -117,8 +111,7 @@ def _over_directions(path: Path, q: Array, c1: Array, hurst: float | None) -> tu
     if fall <= 0.0:
         raise InputError(f"{path}: C1D rises in its last decade; such profiles are not those of an isotropic surface")
     slopes = np.append(np.diff(log_c) / np.diff(log_q), -fall)
-    end = log_q[-1] + ABEL_DECADES * np.log(10.0)
-    c2 = np.array([_abel(k, np.append(log_q[i:], end), log_c[i:], slopes[i:]) for i, k in enumerate(q)])
+    c2 = np.array([_abel(k, log_q, log_c, slopes) for k in log_q])
     good = c2 > 0.0
     if good.sum() < FEWEST:
         raise InputError(f"{path}: C1D does not fall with q; such profiles are not those of an isotropic surface")
@@ -126,14 +119,10 @@ def _over_directions(path: Path, q: Array, c1: Array, hurst: float | None) -> tu
     return q[used], np.where(good, c2, NOTHING * c2.max())[used]
 
 
-def _abel(k: float, edges: Array, logs: Array, slopes: Array) -> float:
-    """-1/(2 pi) int C1D'(k cosh t) dt from k on, for power laws between the edges (of log q); Gauss' rule in each."""
-    nodes, weights = np.polynomial.legendre.leggauss(ABEL_NODES)
-    t = np.arccosh(np.exp(np.maximum(edges - np.log(k), 0.0)))
-    total = 0.0
-    for start, end, edge, log, slope in zip(t, t[1:], edges, logs, slopes, strict=False):
-        ends = np.linspace(start, end, max(1, int(np.ceil(end - start))) + 1)
-        half = np.diff(ends)[:, None] / 2
-        log_q = np.log(k) + np.log(np.cosh(ends[:-1, None] + half * (1 + nodes)))
-        total += float(np.sum(half * weights * slope * np.exp(log + slope * (log_q - edge) - log_q)))
-    return -total / (2 * np.pi)
+def _abel(log_k: float, log_q: Array, log_c: Array, slopes: Array) -> float:
+    """Return -1/(2 pi) int C1D'(k cosh t) dt, for power laws between the points, by the trapezoidal rule in t."""
+    t = np.linspace(0.0, log_q[-1] - log_k + ABEL_DECADES * np.log(10.0), ABEL_POINTS)
+    log = log_k + np.log(np.cosh(t))
+    piece = np.clip(np.searchsorted(log_q, log, "right") - 1, 0, None)
+    derivative = slopes[piece] * np.exp(log_c[piece] + slopes[piece] * (log - log_q[piece]) - log)
+    return -float(np.trapezoid(derivative, t)) / (2 * np.pi)

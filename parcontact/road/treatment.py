@@ -46,14 +46,11 @@ def treat(heights: Array, detrend: str, periodic: str, clip: bool = False) -> Tr
     return Treated(filled, int((~known).sum()), odd, tuple(map(float, trend)), enlarged)
 
 
-def repeated(heights: Array) -> tuple[float, int]:
-    """Return the lowest or highest value and its count if it occurs several times, further from all others than their
-    range, as a number that marks missing points does; (0, 0) if there is none."""
-    for height in (np.nanmin(heights), np.nanmax(heights)):
-        others, count = heights[np.isfinite(heights) & (heights != height)], np.count_nonzero(heights == height)
-        if count > 1 and others.size and np.abs(others - height).min() > np.ptp(others):
-            return float(height), int(count)
-    return 0.0, 0
+def rms_slope(heights: Array, size: tuple[float, float]) -> float:
+    """Return the rms of the gradient of a periodic map on a box of `size` = (lx, ly) [m], by its Fourier series."""
+    qy, qx = (2 * np.pi * fft.fftfreq(n, length / n) for n, length in zip(heights.shape, size[::-1], strict=True))
+    power = np.abs(fft.fft2(heights) / heights.size) ** 2
+    return float(np.sqrt(np.sum(power * (qy[:, None] ** 2 + qx**2))))
 
 
 def remove_trend(heights: Array, known: NDArray[np.bool_], detrend: str) -> tuple[Array, Array]:

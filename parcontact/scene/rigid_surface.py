@@ -25,8 +25,8 @@ FLAT = 1e-14  # accuracy: a surface whose highest and lowest points differ by th
 
 
 class Told(NamedTuple):
-    """Sentences on measured maps: root has notes on how they were prepared, and every rank has doubts and the names of
-    maps with points that stick out."""
+    """Sentences on measured maps: root has notes on how they were prepared, and every rank has doubts, of which
+    those about points that stick out are in `spiky`, too."""
 
     notes: list[str]
     doubts: list[str]
@@ -108,13 +108,7 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: Told) -> Spectrum:
     if isinstance(part, jobs.RoughSpectrum):
         return _measured_spectrum(part, grid, fft, told.notes)
     if isinstance(part, jobs.Topography):
-        from ..road import prepared_map as road  # with much of scipy, which is slow to import
-
-        rows, done, doubts, spiky = road.rows_of(part, grid, fft.slab)
-        told.notes.extend(done)
-        told.doubts.extend(doubts)
-        told.spiky.extend([part.path.name] if spiky else [])
-        return _transform(rows, fft)
+        return _transform(_measured_map(part, grid, fft.slab, told), fft)
     if isinstance(part, jobs.HeightFile):
         return _transform(heightfile.read(part.path, part.dataset, fft.slab, part.scale), fft)
     if isinstance(part, jobs.HeightArray):
@@ -122,6 +116,25 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: Told) -> Spectrum:
     limits = part.long_wavelength, part.rolloff_wavelength, part.short_wavelength
     amplitude = part.rms_slope, part.rms_height, part.psd_constant
     return Roughness(part.hurst, *limits, part.seed, part.amplitudes == "random", *amplitude).spectrum(fft, grid.size)
+
+
+def _measured_map(part: jobs.Topography, grid: Grid, slab: Slab, told: Told) -> Array:
+    """Return this rank's rows of the heights [m] of a map, adding to what is `told` of it; collective."""
+    from ..road.prepared_map import prepare  # with much of scipy, which is slow to import
+    from . import map_sentences
+
+    found: list[Array] = []
+
+    def make() -> tuple[list[str], list[str]]:
+        prepared = prepare(part, grid)
+        found.append(prepared.heights)
+        told.notes.extend(map_sentences.describe_treatment(prepared))
+        return map_sentences.doubt_sizes(prepared), map_sentences.doubt_outliers(prepared)
+
+    sizes, outliers = on_root(slab.comm, make)
+    told.doubts.extend([*sizes, *outliers])
+    told.spiky.extend(outliers)
+    return slab.from_root(found[0] if found else None)
 
 
 def _measured_spectrum(part: jobs.RoughSpectrum, grid: Grid, fft: FFT, notes: list[str]) -> Spectrum:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from parcontact.physics import surface_statistics as statistics
 from parcontact.plotting import surface
-from parcontact.road import statistics
 
 
 def test_a_map_has_the_proportions_of_its_box() -> None:

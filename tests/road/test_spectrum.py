@@ -15,7 +15,8 @@ from parcontact.derived import prediction
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
-from parcontact.road import spectrum, statistics
+from parcontact.physics import surface_statistics as statistics
+from parcontact.road import spectrum
 from parcontact.road.map_files import UNITS
 from parcontact.scene import rigid_surface
 from parcontact.theory import persson_rings

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from parcontact.road import statistics
+from parcontact.physics import surface_statistics as statistics
 
 from . import truth
 

@@ -140,12 +140,3 @@ def test_outliers_are_clipped() -> None:
     assert np.argwhere(done.outliers).tolist() == [[10, 20]]
     assert abs(done.heights[10, 20] - plain[10, 20]) < step
     assert np.abs(done.heights - plain)[rest].max() < 1e-3 * step  # one point of 16384 has moved by less than a step
-
-
-def test_a_number_that_stands_for_missing_points() -> None:
-    """It occurs several times, far from all other heights; a single low point is none."""
-    heights = np.random.default_rng(1).normal(size=(16, 16))
-    heights[0, 0] = -9999.0
-    assert treatment.repeated(heights) == (0.0, 0)
-    heights[5, 3:6] = -9999.0
-    assert treatment.repeated(heights) == (-9999.0, 4)

@@ -1,0 +1,76 @@
+"""Sentences about measured maps: what was done to them, and what is doubted."""
+
+import numpy as np
+
+from ..printed import per_cent, quantity
+from ..road import treatment
+from ..road.prepared_map import Prepared
+
+LARGEST = 1.0  # m: a map that is longer is doubted
+FLATTEST = 1e-5  # physics: range of heights over the shorter side; a polished wafer has some 1e-5
+OBLONG = 1.5  # of the sides of a pixel: instruments have squares, with few exceptions
+
+
+def describe_treatment(prepared: Prepared) -> list[str]:
+    """Return sentences on what was done to a prepared."""
+    part, cut, done, size = prepared.part, prepared.cut, prepared.treated, prepared.size
+    (ny, nx), (lx, ly), odd = cut.shape, (quantity(length, "m", 4) for length in size), int(done.outliers.sum())
+    lines = [f"road: {nx} x {ny} points of the map, {lx} x {ly}, are used"]
+    if done.missing:
+        lines.append(f"road: {done.missing} missing points ({per_cent(done.missing / cut.size)}) were filled")
+    if odd and part.outliers == "clip":
+        lines.append(f"road: {odd} points that stuck out were set to the median of their neighbours")
+    if len(done.trend) > 1:
+        tilt = [2.0 * slope / length for slope, length in zip(done.trend[1:3], size, strict=True)]
+        lines.append(f"road: a tilt of {tilt[0]:.3g} along x and {tilt[1]:.3g} along y was taken off")
+    if done.enlarged > 1.0:
+        lines.append(
+            f"road: the window fades out {per_cent(treatment.TAPER)} of each side. Heights and slopes inside are "
+            f"{per_cent(done.enlarged - 1.0)} larger than measured, so that the rms height of the box stays"
+        )
+    if part.short_wavelength:
+        lines.append(
+            f"road: waves shorter than {quantity(part.short_wavelength, 'm', 4)} were taken out (ideal low-pass)"
+        )
+    return lines
+
+
+def doubt_sizes(prepared: Prepared) -> list[str]:
+    """Return doubts about the size of a map, in which units may be confused."""
+    found = prepared.whole
+    (ny, nx), (lx, ly), doubts = found.heights.shape, found.size, []
+    dx, dy = lx / nx, ly / ny
+    span = float(np.nanmax(found.heights) - np.nanmin(found.heights))
+    if max(lx, ly) > LARGEST:
+        doubts.append(f"the map is {lx:.4g} x {ly:.4g} m; are lengths in m?")
+    if 0.0 < span < FLATTEST * min(lx, ly):
+        doubts.append(
+            f"the map is {quantity(lx, 'm', 4)} x {quantity(ly, 'm', 4)}, and its heights differ by "
+            f"{quantity(span, 'm', 3)} only; do heights and lengths have the right units?"
+        )
+    if max(dx, dy) > OBLONG * min(dx, dy):
+        doubts.append(
+            f"points of the map are {quantity(dx, 'm', 4)} apart along x and {quantity(dy, 'm', 4)} along y; is the "
+            "order of x and y right?"
+        )
+    return [f"surface: {prepared.part.path.name}: {text}" for text in doubts]
+
+
+def doubt_outliers(prepared: Prepared) -> list[str]:
+    """Return a doubt about points that stick out of their neighbours, if there are any and they are kept."""
+    odd, cut = prepared.treated.outliers, prepared.cut
+    if not odd.any() or prepared.part.outliers == "clip":
+        return []
+    slope, without = (
+        treatment.rms_slope(treatment.treat(heights, "tilt", "smooth").heights, prepared.size)
+        for heights in (cut, np.where(odd, np.nan, cut))
+    )
+    furthest = cut[odd][np.argmax(np.abs(cut[odd] - np.nanmedian(cut)))]
+    count = int(np.count_nonzero(cut == furthest))
+    repeated = f"; {quantity(furthest, 'm', 4)} occurs {count} times" if count > 1 else ""
+    return [
+        f"surface: {odd.sum()} points of the map stick out of their neighbours by more than {treatment.OUTLIER:g} "
+        f"times the median deviation{repeated}. Its rms slope is {slope:.3g} with them and {without:.3g} without, "
+        "and they carry load; where they are no part of the surface, give outliers: clip, or nodata: NUMBER if one "
+        "number marks missing points"
+    ]
