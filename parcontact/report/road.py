@@ -14,7 +14,7 @@ from ..parallel.slab import Array, Slab
 from ..physics import surface_statistics as statistics
 from ..plotting import style, surface, units
 from ..printed import per_cent, quantity
-from ..road import treatment
+from ..road import map_files, treatment
 from ..road.prepared_map import prepare
 from ..scene import rigid_surface
 from .parts import Section, Table, draw_panel
@@ -32,8 +32,9 @@ def describe(job: Job, heights: Array, told: list[str], shortest: float | None, 
         raise InputError(f"--out must end in .{', .'.join(style.MARKED)}, got {str(picture)!r}")
     found, part, measured = statistics.describe(heights, job.grid.size), job.surface[0], None
     lines = []
-    if isinstance(part, Topography) and len(job.surface) == 1:  # the map at its own points, its edges joined smoothly
-        prepared = prepare(part, job.grid)
+    whole = map_files.read(part) if isinstance(part, Topography) and len(job.surface) == 1 else None
+    if isinstance(part, Topography) and whole and not whole.is_line:  # at its own points, its edges joined smoothly
+        prepared = prepare(part, job.grid, whole)
         (ny, nx), (lx, ly) = prepared.cut.shape, prepared.size
         measured = statistics.describe(treatment.treat(prepared.cut, part.detrend, "smooth").heights, prepared.size)
         lines = [f"size           {quantity(lx, 'm', 5)} x {quantity(ly, 'm', 5)}", f"points         {nx} x {ny}"]

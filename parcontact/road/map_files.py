@@ -32,19 +32,25 @@ MOST_MISSING = 2  # tuning: times as many points of the grid as of the file
 
 @dataclass(frozen=True)
 class Map:
-    """Heights [m] of shape (ny, nx), NaN where nothing was measured, on a box of `size` = (lx, ly) [m]."""
+    """Heights [m] of shape (ny, nx), NaN where nothing was measured, on a box of `size` = (lx, ly) [m]. A line scan has
+    one row."""
 
     heights: Array
     size: tuple[float, float]
 
+    @property
+    def is_line(self) -> bool:
+        return len(self.heights) == 1
+
 
 @dataclass(frozen=True)
 class Contents:
-    """Numbers of a file, shape (ny, nx), and what it says: their unit [m], the size of the map, and its unit [m]."""
+    """Numbers of a file, shape (ny, nx) or (nx,), and what it says: their unit [m], the size of the map along x and y,
+    or of the line, and its unit [m]."""
 
     values: Array
     unit: float | None = None
-    size: tuple[float, float] | None = None
+    size: tuple[float, ...] | None = None
     unit_xy: float | None = None
 
 
@@ -67,7 +73,7 @@ def read(part: Topography) -> Map:
     except Exception as error:  # readers of damaged files raise anything
         said = str(error).partition("\n")[0] or type(error).__name__
         raise InputError(f"{path} cannot be read: {said}") from error
-    if min(found.heights.shape) < FEWEST:
+    if found.heights.shape[1] < FEWEST or (len(found.heights) < FEWEST and not found.is_line):
         raise InputError(f"{path} has {found.heights.shape[::-1]} points; at least {FEWEST} each way were expected")
     if np.isfinite(found.heights).sum() < found.heights.size / 2:
         raise InputError(f"{path}: more than half of its points are missing")
@@ -81,20 +87,20 @@ def _in_metres(part: Topography, found: Contents) -> Map:
         raise InputError(f"{path} has a unit of its own: give no unit")
     if (unit := found.unit or given) is None:
         raise InputError(f"{path} does not say the unit of its heights: give unit: {TO_GIVE}")
-    if found.values.ndim != 2:
-        raise InputError(f"{path} has {found.values.ndim} dimensions; a map of two was expected")
+    values = np.ma.masked_invalid(np.asarray(found.values, dtype=np.float64)).filled(np.nan)
+    if (values := np.atleast_2d(values)).ndim != 2:
+        raise InputError(f"{path} has {values.ndim} dimensions; a map of two, or a line, was expected")
     if found.size is not None:
         if part.size or part.pixel:
             raise InputError(f"{path} has a size of its own: give no {'size' if part.size else 'pixel'}")
         unit_xy = found.unit_xy or (UNITS[part.units.xy] if part.units else unit)
-        lx, ly = (float(length * unit_xy) for length in found.size)
-    elif given_size := part.size_of(found.values.shape[::-1]):
+        lx, ly = float(found.size[0] * unit_xy), float(found.size[-1] * unit_xy)
+    elif given_size := part.size_of(values.shape[::-1]):
         lx, ly = given_size
     else:
         raise InputError(f"{path} does not say how large its map is: give size: [lx, ly], or pixel [m]")
     if not (0.0 < lx < np.inf and 0.0 < ly < np.inf):
         raise InputError(f"{path}: its map would be {lx:g} x {ly:g} m, which is no size")
-    values = np.ma.masked_invalid(np.asarray(found.values, dtype=np.float64)).filled(np.nan)
     heights = np.where(values == part.nodata, np.nan, values) * unit
     largest = float(np.abs(heights, where=np.isfinite(heights), out=np.zeros_like(heights)).max(initial=0.0))
     datafiles.refuse_extreme(path, largest)
@@ -106,7 +112,8 @@ def _array(part: Topography) -> Contents:
 
 
 def _text(part: Topography) -> Contents:
-    """Read a matrix of heights, rows of x, y and z, or an ESRI grid; those with another header are of instruments."""
+    """Read a matrix of heights, rows of x, y, z, an ESRI grid, or a line (rows of x, z or z); text with another header
+    is read as one of an instrument."""
     with part.path.open(encoding="latin-1") as file:
         start = [*islice(file, LONGEST_HEAD)]
     first = next((number for number, line in enumerate(start) if _numbers(line)), None)
@@ -124,10 +131,11 @@ def _text(part: Topography) -> Contents:
     if "cellsize" in said:  # of ESRI, whose first row is the northernmost
         missing, (cell,) = said.get("nodata_value") or [np.nan], said["cellsize"]
         return Contents(np.where(table == missing, np.nan, table)[::-1], None, (cell * columns, cell * len(table)))
-    if columns > 3:
-        return Contents(table)
-    units = [UNITS[word] for word in re.findall(r"[\[(]\s*([mnuµμ]?m)\s*[\])]", head[-1] if head else "")]
-    return _positions(part.path, table, *((units[0], units[2]) if len(units) == 3 else (None, None)))
+    if columns > 3 or columns == 1:
+        return Contents(table.squeeze())
+    words = re.findall(r"[\[(]\s*([mnuµμ]?m)\s*[\])]", head[-1] if head else "")
+    units = [UNITS[word] for word in words] if len(words) == columns else [None, None]
+    return _positions(part.path, table, units[0], units[-1])
 
 
 def _numbers(line: str) -> list[float]:
@@ -139,22 +147,25 @@ def _numbers(line: str) -> list[float]:
 
 
 def _positions(path: Path, table: Array, unit_xy: float | None, unit: float | None) -> Contents:
-    """Return a map from rows of x, y and z in any order; points that are not there are missing."""
-    if table.shape[1] != 3:
-        raise InputError(f"{path} has {table.shape[1]} columns; x, y and z were expected")
-    if (wrong := np.flatnonzero(~np.isfinite(table[:, :2]).all(axis=1))).size:
-        x, y = table[wrong[0], :2]
-        raise InputError(f"{path}: its point {wrong[0] + 1} is at x = {x:g}, y = {y:g}, which is no position")
-    (x, nx, dx), (y, ny, dy) = (_steps(path, name, values) for name, values in zip("xy", table.T[:2], strict=True))
-    if nx * ny > MOST_MISSING * len(table):
-        far = max((np.abs(values - np.median(values)).argmax() for values in table.T[:2]), key=lambda n: x[n] * y[n])
+    """Return a map from rows of x, y, z, or a line from rows of x, z, in any order; points that are not there are
+    missing."""
+    if (wrong := np.flatnonzero(~np.isfinite(table[:, :-1]).all(axis=1))).size:
+        raise InputError(f"{path}: its point {wrong[0] + 1} is at {_place(table, wrong[0])}, which is no position")
+    places, counts, steps = zip(*(_steps(path, *pair) for pair in zip("xy", table.T[:-1], strict=False)), strict=True)
+    if np.prod(counts) > MOST_MISSING * len(table):
+        ends = (int(np.abs(values - np.median(values)).argmax()) for values in table.T[:-1])
+        far = max(ends, key=lambda point: sum(place[point] for place in places))
         raise InputError(
-            f"{path}: its {len(table)} points reach over a grid of {nx} x {ny}, of which more than half would be "
-            f"missing; is point {far + 1}, at x = {table[far, 0]:g}, y = {table[far, 1]:g}, one of them?"
+            f"{path}: its {len(table)} points reach over a grid of {' x '.join(map(str, counts))}, of which more than "
+            f"half would be missing; is point {far + 1}, at {_place(table, far)}, one of them?"
         )
-    heights = np.full((ny, nx), np.nan)
-    heights[y, x] = table[:, 2]
-    return Contents(heights, unit, (nx * dx, ny * dy), unit_xy)
+    heights = np.full(counts[::-1], np.nan)
+    heights[places[::-1]] = table[:, -1]
+    return Contents(heights, unit, tuple(n * step for n, step in zip(counts, steps, strict=True)), unit_xy)
+
+
+def _place(table: Array, row: int) -> str:
+    return ", ".join(f"{name} = {value:g}" for name, value in zip("xy", table[row, :-1], strict=False))
 
 
 def _steps(path: Path, name: str, values: Array) -> tuple[NDArray[np.intp], int, float]:
@@ -214,10 +225,13 @@ def _instrument(part: Topography) -> Contents:
         raise InputError(f"{path} has no channel {part.channel!r}; it has {', '.join(map(str, names))}")
     chosen = reader.channels[names.index(part.channel)] if part.channel is not None else reader.default_channel
     size = chosen.physical_sizes
-    topography = chosen.topography(**({"physical_sizes": chosen.nb_grid_pts} if size is None else {}))
-    if len(topography.nb_grid_pts) != 2:
-        raise InputError(f"{path} is a line scan; a map was expected")
+    unsized = size is None and chosen.is_uniform
+    topography = chosen.topography(**({"physical_sizes": chosen.nb_grid_pts} if unsized else {}))
     unit = _scale(path, chosen.unit) if chosen.unit is not None else None
+    if not topography.is_uniform:
+        x, z = topography.positions_and_heights()
+        places = np.linspace(x[0], x[-1], len(x))
+        return Contents(np.interp(places, x, z), unit, (places[1] * len(x) - x[0] * len(x),), unit)
     heights = np.ma.filled(np.ma.masked_invalid(topography.heights()), np.nan).T
     return Contents(heights, unit, None if size is None else tuple(topography.physical_sizes), unit)
 
@@ -230,21 +244,22 @@ def _scale(path: Path, unit: Any) -> float:
 
 
 def extent_of(part: Topography, box: Any = None) -> tuple[tuple[int, int], tuple[float, float]]:
-    """Points along x and y and size (lx, ly) [m] of a map, or of the part of it that is as large as a `box` [m]; a
-    mirrored map is twice as long. Raises InputError."""
-    points, size = _extent(part, part.path.stat().st_mtime_ns)
+    """Return points along x and y and size (lx, ly) [m] of a map, or of the part of it that is as large as a `box` [m];
+    a mirrored map is twice as long. Raises InputError, also for line scans."""
+    ny, nx, whole = _extent(part, part.path.stat().st_mtime_ns)
+    if ny == 1:
+        raise InputError(f"{part.path} is a line scan, which gives no grid: give grid.points and grid.size")
     copies = 2 if part.periodic == "mirror" else 1
-    size = copies * size[0], copies * size[1]
+    lx, ly = (copies * length for length in whole)
     lengths = box if isinstance(box, list | tuple) and len(box) == 2 else (box, box)
-    x, y = (
-        max(1, round(copies * n * (length / whole if isinstance(length, int | float) and length > 0 else 1.0)))
-        for n, length, whole in zip(points, lengths, size, strict=True)
-    )
-    return (x, y), size
+    shares = [
+        length / size if isinstance(length, int | float) and length > 0 else 1.0
+        for length, size in zip(lengths, (lx, ly), strict=True)
+    ]
+    return (max(1, round(copies * nx * shares[0])), max(1, round(copies * ny * shares[1]))), (lx, ly)
 
 
 @lru_cache(maxsize=4)  # the cases of a sweep have the same map
-def _extent(part: Topography, _: int) -> tuple[tuple[int, int], tuple[float, float]]:
+def _extent(part: Topography, _: int) -> tuple[int, int, tuple[float, float]]:
     found = read(part)
-    ny, nx = found.heights.shape
-    return (nx, ny), found.size
+    return (*found.heights.shape, found.size)

@@ -26,10 +26,8 @@ class Prepared:
     size: tuple[float, float]
 
 
-def prepare(part: Topography, grid: Grid) -> Prepared:
-    """Return the map of a job on its grid; root only. Raises InputError for a map that cannot be read or is smaller
-    than the box."""
-    found = map_files.read(part)
+def prepare(part: Topography, grid: Grid, found: map_files.Map) -> Prepared:
+    """Return the map of a job on its grid; root only. Raises InputError for a map that is smaller than the box."""
     periodic = part.periodic or ("smooth" if grid.boundary == "periodic" else "none")
     copies = 2 if periodic == "mirror" else 1
     rows, columns = (

@@ -21,12 +21,14 @@ import numpy as np
 
 from ..datafiles import read_lines
 from ..errors import InputError
-from ..job import RoughSpectrum
+from ..job import RoughSpectrum, Topography
 from ..parallel.slab import Array
-from .map_files import UNITS
+from . import treatment
+from .map_files import UNITS, Map
 
 POWERS = {"C1D": 3, "C2D": 4}  # of a length, in the unit of a spectrum
 LARGER = {3: np.pi, 4: 4 * np.pi**2}  # factors of spectra written by SurfaceTopography, by the same power
+BINS = 10  # tuning: per decade of wavenumbers of a line scan
 FEWEST = 3  # accuracy: rows of numbers
 ABEL_POINTS = 20_001  # accuracy: of Abel's integral, whose integrand jumps between power laws
 ABEL_DECADES = 4.0  # accuracy: beyond the last point, where C1D' has fallen by more than 8
@@ -72,6 +74,27 @@ def of(part: RoughSpectrum) -> tuple[Measured, tuple[float, float]]:
             "continue them by a power law"
         )
     return Measured(q, 4 * np.pi**2 * values, fall), wanted
+
+
+def of_line(part: Topography, line: Map) -> tuple[Measured, tuple[float, float]]:
+    """Return the spectrum of an isotropic surface whose profiles have the C1D of a line scan, with its longest and
+    shortest wavelengths [m]: levelled, through Hann's window, in means over BINS bins a decade. Raises InputError."""
+    heights, length = line.heights, line.size[0]
+    level = treatment.remove_trend(heights, np.isfinite(heights), part.detrend)[0][0]
+    known = np.isfinite(level)
+    places = np.arange(level.size)
+    level = np.interp(places, places[known], level[known])
+    window = np.sin(np.pi * (places + 0.5) / level.size) ** 2
+    level -= np.average(level, weights=window)
+    power = np.abs(np.fft.rfft(level * window) / level.size) ** 2 / np.mean(window**2)
+    waves = np.arange(2, (level.size + 1) // 2)  # one wave in the window is not told from none
+    bins = np.floor(BINS * np.log10(waves / 2)).astype(int)
+    q, c1 = (
+        (np.bincount(bins, values) / np.maximum(np.bincount(bins), 1))[np.unique(bins)]
+        for values in (2 * np.pi / length * waves, length / np.pi * power[waves])
+    )
+    kept, c2 = _over_directions(part.path, q, c1, None)
+    return Measured(kept, 4 * np.pi**2 * c2, 0.0), (2 * np.pi / kept[0], part.short_wavelength or 2 * np.pi / kept[-1])
 
 
 def _read(path: Path) -> tuple[Array, Array, int]:

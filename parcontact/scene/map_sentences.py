@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from ..job import Topography
 from ..printed import per_cent, quantity
 from ..road import treatment
+from ..road.map_files import Map
 from ..road.prepared_map import Prepared
 
 LARGEST = 1.0  # m: a map that is longer is doubted
@@ -33,6 +35,15 @@ def describe_treatment(prepared: Prepared) -> list[str]:
             f"road: waves shorter than {quantity(part.short_wavelength, 'm', 4)} were taken out (ideal low-pass)"
         )
     return lines
+
+
+def describe_line(part: Topography, line: Map) -> str:
+    """Return a sentence on the surface that a line scan stands for."""
+    length = quantity(line.size[0], "m", 4)
+    return (
+        f"road: {part.path.name} is a line scan of {line.heights.size} points over {length}; the surface is a random "
+        "isotropic one with its spectrum (C1D)"
+    )
 
 
 def doubt_sizes(prepared: Prepared) -> list[str]:

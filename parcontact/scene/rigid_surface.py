@@ -1,5 +1,6 @@
 """The rigid surface of a job: shapes, waves, roughness, and maps from files, added up."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import reduce
 from operator import add
@@ -108,7 +109,7 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: Told) -> Spectrum:
     if isinstance(part, jobs.RoughSpectrum):
         return _measured_spectrum(part, grid, fft, told.notes)
     if isinstance(part, jobs.Topography):
-        return _transform(_measured_map(part, grid, fft.slab, told), fft)
+        return _measured_map(part, grid, fft, told)
     if isinstance(part, jobs.HeightFile):
         return _transform(heightfile.read(part.path, part.dataset, fft.slab, part.scale), fft)
     if isinstance(part, jobs.HeightArray):
@@ -118,39 +119,60 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: Told) -> Spectrum:
     return Roughness(part.hurst, *limits, part.seed, part.amplitudes == "random", *amplitude).spectrum(fft, grid.size)
 
 
-def _measured_map(part: jobs.Topography, grid: Grid, slab: Slab, told: Told) -> Array:
-    """Return this rank's rows of the heights [m] of a map, adding to what is `told` of it; collective."""
-    from ..road.prepared_map import prepare  # with much of scipy, which is slow to import
+def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, told: Told) -> Spectrum:
+    """Return the transform of a map, or of a surface with the spectrum of a line scan, adding to what is `told` of it;
+    collective."""
+    from ..road import map_files, prepared_map, spectrum  # with much of scipy, which is slow to import
     from . import map_sentences
 
-    found: list[Array] = []
+    heights: list[Array] = []
 
-    def make() -> tuple[list[str], list[str]]:
-        prepared = prepare(part, grid)
-        found.append(prepared.heights)
+    def make() -> tuple[list[str], list[str], tuple[spectrum.Measured, tuple[float, float]] | None]:
+        found = map_files.read(part)
+        if found.is_line:
+            told.notes.append(map_sentences.describe_line(part, found))
+            return [], [], spectrum.of_line(part, found)
+        prepared = prepared_map.prepare(part, grid, found)
+        heights.append(prepared.heights)
         told.notes.extend(map_sentences.describe_treatment(prepared))
-        return map_sentences.doubt_sizes(prepared), map_sentences.doubt_outliers(prepared)
+        return map_sentences.doubt_sizes(prepared), map_sentences.doubt_outliers(prepared), None
 
-    sizes, outliers = on_root(slab.comm, make)
+    sizes, outliers, line = on_root(fft.slab.comm, make)
+    if line is not None:
+        return _random_surface(*line, grid, fft, told.notes)
     told.doubts.extend([*sizes, *outliers])
     told.spiky.extend(outliers)
-    return slab.from_root(found[0] if found else None)
+    return _transform(fft.slab.from_root(heights[0] if heights else None), fft)
 
 
 def _measured_spectrum(part: jobs.RoughSpectrum, grid: Grid, fft: FFT, notes: list[str]) -> Spectrum:
     from ..road import spectrum
 
     found, (long, short) = on_root(fft.slab.comm, lambda: spectrum.of(part))
-    cell = max(length / n for length, n in zip(grid.size, grid.points, strict=True) if n > 1)
     if fft.slab.root:
         notes.append(f"spectrum: waves from {long:.4g} to {short:.4g} m of {part.spectrum.name}")
+    return _random_surface(found, (long, short), grid, fft, notes, part.seed, part.amplitudes == "random")
+
+
+def _random_surface(
+    found: Callable[[Array], Array],
+    ends: tuple[float, float],
+    grid: Grid,
+    fft: FFT,
+    notes: list[str],
+    seed: int = 0,
+    random: bool = True,
+) -> Spectrum:
+    """Return the transform of a random surface with a measured spectrum between its longest and shortest wavelengths
+    [m], adding to the notes on root; collective."""
+    (long, short), cell = ends, max(length / n for length, n in zip(grid.size, grid.points, strict=True) if n > 1)
+    if fft.slab.root:
         if short < 2 * cell:
             notes.append(f"spectrum: the grid has no waves shorter than two cells, {2 * cell:.4g} m")
         if long > max(grid.size) * (1.0 + ROUNDING):
             notes.append(f"spectrum: the box has no waves longer than {max(grid.size):.4g} m")
     limits = long, long, short * (1.0 - ROUNDING)  # the last point of a table is among its waves
-    random = part.amplitudes == "random"
-    made = Roughness(1.0, *limits, part.seed, random, psd_constant=1.0, measured=found).spectrum(fft, grid.size)
+    made = Roughness(1.0, *limits, seed, random, psd_constant=1.0, measured=found).spectrum(fft, grid.size)
     has = moments(made, fft, grid.size)
     if fft.slab.root:
         height = quantity(has.rms_height, "m", 4)

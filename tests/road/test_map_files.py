@@ -121,6 +121,34 @@ def test_a_simple_field_of_gwyddion(tmp_path: Path, more: str) -> None:
     assert_allclose(found.size, SIZE, rtol=1e-12)
 
 
+LINES: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "heights": ("line.txt", "".join(f"{z!r}\n" for z in HEIGHTS[0].tolist()), {"unit": "m", "pixel": (2.5e-6, 2.5e-6)}),
+    "positions": ("line.csv", "x[um], z[m]\n" + "".join(f"{2.5 * i},{z}\n" for i, z in enumerate(HEIGHTS[0])), {}),
+}
+
+
+@pytest.mark.parametrize("case", LINES)
+def test_line_scans(tmp_path: Path, case: str) -> None:
+    name, text, given = LINES[case]
+    (tmp_path / name).write_text(text)
+    found = read(tmp_path / name, **given)
+    assert found.is_line
+    assert_allclose(found.heights, HEIGHTS[:1], rtol=1e-12)
+    assert found.size[0] == pytest.approx(SIZE[0], rel=1e-12)
+
+
+def test_a_line_scan_of_an_instrument(tmp_path: Path) -> None:
+    """As SurfaceTopography reads it; heights of a scan that is not uniform are interpolated."""
+    x = 2.5e-6 * np.arange(24.0)
+    SurfaceTopography.UniformLineScan(HEIGHTS[0], SIZE[0], unit="m").to_netcdf(str(tmp_path / "even.nc"))
+    SurfaceTopography.NonuniformLineScan(x**2, 2.0 * x**2, unit="m").to_netcdf(str(tmp_path / "odd.nc"))
+    even, odd = read(tmp_path / "even.nc"), read(tmp_path / "odd.nc")
+    assert_allclose(even.heights, HEIGHTS[:1], rtol=1e-12)
+    assert even.size[0] == pytest.approx(SIZE[0], rel=1e-7)  # single precision in the file
+    assert np.ptp(np.diff(odd.heights[0])) <= 1e-12 * np.ptp(odd.heights)
+    assert odd.size[0] == pytest.approx(x[-1] ** 2 * 24 / 23, rel=1e-12)
+
+
 def test_size_by_pixels_and_a_mark_of_missing_points(tmp_path: Path) -> None:
     marked = HEIGHTS * 1e6
     marked[0, 1] = -9999.0
@@ -154,7 +182,6 @@ SQUARE = "".join(f"{x} {y} 0\n" for x in range(6) for y in range(6))
 BAD = {
     "no unit": ("road.npy", HEIGHTS, (None, SIZE, None), "does not say the unit of its heights"),
     "no size": ("road.npy", HEIGHTS, ("m", None, None), "does not say how large its map is"),
-    "a line": ("road.npy", HEIGHTS[0], ("m", SIZE, None), "has 1 dimensions; a map of two"),
     "a block": ("road.npy", HEIGHTS[None], ("m", SIZE, None), "has 3 dimensions; a map of two"),
     "words": ("road.npy", [["a", "b"]], ("m", SIZE, None), "holds values of type <U1, which are no heights"),
     "complex": ("road.npy", HEIGHTS * 1j, ("m", SIZE, None), "holds values of type complex128, which are no heights"),
@@ -196,7 +223,7 @@ BAD = {
         "decimal commas; write them with points",
     ),
     "semicolons": ("road.txt", "1,2;3,4;5,6;7\n" * 4, ("m", SIZE, None), "decimal commas; write them with points"),
-    "two columns": ("road.xyz", "1 2\n3 4\n", ("m", None, None), "has 2 columns; x, y and z"),
+    "one row": ("road.xyz", "1 2\n3 4\n", ("m", None, None), "has 2 positions along x"),
     "a word": ("road.xyz", "1 2 x\n", ("m", None, None), "cannot be read"),
     "no grid": (
         "road.xyz",

@@ -16,7 +16,7 @@ from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics import surface_statistics as statistics
-from parcontact.road import spectrum
+from parcontact.road import map_files, spectrum
 from parcontact.road.map_files import UNITS
 from parcontact.scene import rigid_surface
 from parcontact.theory import persson_rings
@@ -158,6 +158,43 @@ def test_spectra_that_surface_topography_writes(tmp_path: Path, main: "Main", ki
     (found,) = re.findall(r"an rms height of (\S+) (nm|um) and an rms slope of (\S+)", out)
     assert float(found[0]) * UNITS[found[1]] == pytest.approx(made.std(), rel=1e-3, abs=0.0)
     assert float(found[2]) == pytest.approx(truth.rms_slope(made.astype(float), L), rel=1e-3, abs=0.0)
+
+
+def test_the_spectrum_of_line_scans() -> None:
+    """Sixteen rows of an isotropic surface with waves of 40 to 250 um, 4 mm long: surfaces with their spectra have its
+    mean square height and slope to 15 %. Bins are 26 % wide, and values of Abel's integral that scatter makes negative
+    count as 0."""
+    heights = truth.rough(512, 4 * L, L / 4, L / 25, 0.05)
+    part = jobs.Topography.model_construct(path=Path("line.npy"))
+    found = []
+    for row in heights[::32]:
+        density, ends = spectrum.of_line(part, map_files.Map(row[None] + np.linspace(0.0, 1e-5, 512), (4 * L, 4 * L)))
+        q = np.geomspace(2 * np.pi / ends[0], 2 * np.pi / ends[1], 4001)
+        weight = q**2 * density(q) / (2 * np.pi)
+        found.append([np.trapezoid(weight, np.log(q)), np.trapezoid(q**2 * weight, np.log(q))])
+    height, slope = np.mean(found, axis=0)
+    assert height == pytest.approx(np.mean(heights**2), rel=0.15, abs=0.0)
+    assert slope == pytest.approx(0.05**2, rel=0.15)
+
+
+@pytest.mark.mpi
+def test_a_line_scan_is_the_surface(shared_path: Path, communicators: list[MPI.Intracomm], comm: MPI.Intracomm) -> None:
+    """The same random surface on any ranks, and a sentence on root."""
+    if comm.rank == 0:
+        np.save(shared_path / "line.npy", truth.rough(256, 2 * L, L / 4, L / 16, 0.05)[7])
+        surface = "{shape: topography, path: line.npy, unit: m, pixel: 7.8125e-6}"
+        (shared_path / "job.yaml").write_text(re.sub("(?<=surface: ).*", surface, JOB.format(more="")))
+    comm.barrier()
+    job = jobs.load(shared_path / "job.yaml")
+    whole, _, told = heights_of(job)
+    assert told[0].startswith(
+        "road: line.npy is a line scan of 256 points over 2 mm; the surface is a random isotropic one"
+    )
+    assert 0.0 < whole.std() < 1e-5
+    for group in communicators:
+        rows, slab, told = heights_of(job, group)
+        assert rows == pytest.approx(whole[slab.rows], abs=1e-12 * np.abs(whole).max())
+        assert bool(told) == (group.rank == 0)
 
 
 def test_continued_by_a_power_law(tmp_path: Path) -> None:
