@@ -149,6 +149,13 @@ FLASH = (
         lambda point: _worst(point, "highest"),
         "thermal",
     ),
+    Column(
+        *("error_flash", ""),
+        "estimated relative error of `flash_temperature`: that of friction, which makes the heat (with `thermal`); "
+        "empty where it is 0",
+        lambda point: point.error_friction if point.flash and point.flash.mean else math.nan,
+        "thermal",
+    ),
 )
 ERROR_FRICTION = Column(
     *("error_friction", ""),

@@ -41,7 +41,8 @@ class Instant:
     where the surfaces touch; they have the shape (ny_loc, nx). `before` and `measures` are those of the step before and
     of this one. The surface moved by `moved` [m] in the step, in which the energy of the body, stored and dissipated,
     changed by `gained` [J], NaN where none is asked for. Edges of a contact with adhesion moved by `front` half process
-    zones; `untouched` says that nothing touched, and nothing was pulled, before and after the step.
+    zones; `untouched` says that nothing touched, and nothing was pulled, before and after the step. `error_friction` is
+    the estimated relative error of friction, infinite where there is none.
     """
 
     step: Step
@@ -54,6 +55,7 @@ class Instant:
     gained: float
     front: float
     untouched: bool
+    error_friction: float = math.inf
 
     @property
     def pressure(self) -> Array:

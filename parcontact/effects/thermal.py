@@ -113,7 +113,8 @@ def exponentials_of(job: Any) -> Exponentials:
 class ThermalMemory:
     """Memory of heat: the waves of `heat`, the map `rise` of the surface [K], the flash temperature and the highest one
     [K]; the force of the body [N] and the contact area at the end of the last step; whether there was any heat, the
-    depths of the last heat, and the share of it that the body makes."""
+    depths of the last heat, and the share of it that the body makes; the relative error of the friction that made it,
+    infinite where that is not known."""
 
     heat: HeatMemory
     rise: Array
@@ -124,6 +125,7 @@ class ThermalMemory:
     warmed: bool = False
     depths: Depths = field(default_factory=lambda: Depths(np.zeros(0), np.zeros(0)))
     share: float = 0.0
+    error: float = math.inf
 
 
 class ThermalColumns(Effect[ThermalMemory]):
@@ -196,6 +198,7 @@ class ThermalColumns(Effect[ThermalMemory]):
                 at = self._setup.half_space, self._setup.units.length, step.velocity, self._prony(memory)
                 share = heating.pressed[1] / (heating.whole[1] or 1.0)
                 now = replace(now, depths=depths_of(pressed, self._setup.fft, *at), share=share)
+                now = replace(now, error=instant.error_friction)
             heating = replace(heating, depths=now.depths)
             inside = now.heat.advance(step.dt, heating, rubbed, pressed, scales, now.rise)
             outside = 0.0 if rubbed is None else float((now.rise * rubbed).sum()) * scales[0] / self._slab.points
@@ -231,7 +234,12 @@ class ThermalColumns(Effect[ThermalMemory]):
         return Heating(rubbed, pressed), replace(memory, force=force, area=measures.contact_area)
 
     def values(self, memory: ThermalMemory) -> Sequence[float]:
-        return memory.flash, memory.highest
+        """Return the flash temperature, the highest one, and the relative error of the former, NaN if it is not known.
+
+        It is that of the friction that makes the heat.
+        """
+        known = memory.flash != 0.0 and math.isfinite(memory.error)
+        return memory.flash, memory.highest, memory.error if known else math.nan
 
     def field(self, memory: ThermalMemory, name: str) -> Array:
         """Return this rank's rows of the temperature rise [K]."""
@@ -251,6 +259,7 @@ class ThermalColumns(Effect[ThermalMemory]):
             "is warmed": Entry(float(memory.warmed)),
             "contact area": Entry(memory.area),
             "share of the body": Entry(memory.share),
+            "error of friction": Entry(memory.error, optional=True),
             "depths": Entry(np.concatenate([depths.wavenumbers, depths.shares])),
             "grid": Entry(np.array([known.first, known.spacing]), given=True),
         }
@@ -288,5 +297,6 @@ class ThermalColumns(Effect[ThermalMemory]):
             area=float(saved["contact area"]),
             warmed=bool(saved["is warmed"]),
             share=float(saved["share of the body"]),
+            error=float(saved.get("error of friction", math.inf)),
             depths=Depths(*np.split(np.array(saved["depths"]), 2)),
         )

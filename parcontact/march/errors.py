@@ -38,6 +38,11 @@ class Estimate:
     friction: float
     lasting: ErrorBudget | None
 
+    @property
+    def of_friction(self) -> float:
+        """The relative error of friction, infinite where there is none."""
+        return math.inf if self.budget is None or self.budget.friction is None else self.budget.friction.of_friction
+
 
 @dataclass(frozen=True)
 class Solved:

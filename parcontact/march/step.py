@@ -166,6 +166,7 @@ def _follow(scene: Scene, state: State, made: _Made, energy: EnergyMemory | None
         (x - x_before, y - y_before),
         gained,
         *made.motion,
+        made.errors.of_friction,
     )
     changes = {name: effect.follow(instant, state.memories[name]) for name, effect in scene.effects.items()}
     scene.relax({name: each.memory for name, each in changes.items()})

@@ -42,7 +42,7 @@ class Curve:
     `power` [W] of shape (points, branches): what each branch of the material dissipates, none for a free scene;
     `temperature` [deg C, NaN if none was asked for], `shift_factor` [-, relaxation times over those of the reference];
     `flash_temperature`, `max_temperature` [K, rise in the mean over the contact and the highest one; NaN without
-    `thermal`].
+    `thermal`], `error_flash` [-, relative, of the former].
 
     A point that could not be solved is NaN, and `failures` says why.
     """
@@ -66,6 +66,7 @@ class Curve:
     shift_factor: Array
     flash_temperature: Array
     max_temperature: Array
+    error_flash: Array
     failures: tuple[str, ...] = ()
 
 
