@@ -58,6 +58,8 @@ class Compound:
 
     @property
     def _weighed(self) -> str:
+        if self.measured.kind == "creep":
+            return "compliances"
         return "moduli" if self.weigh == "both" else f"{self.weigh} modulus"
 
     def doubts(self) -> list[str]:
@@ -194,6 +196,8 @@ def fitted(
     shift: Shift | None = None if isinstance(law, str) else law
     found: Superposition | None = None
     try:
+        if shift is not None and measured.has_short_sets and vertical in ("auto", "free"):
+            vertical = "none"  # nothing overlaps
         if len(temperatures) > 1 and (shift is None or shift.vertical is None):
             middle = temperatures[len(temperatures) // 2] if reference is None else reference
             found = superpose(measured, middle if shift is None else shift.reference, law, vertical, weigh)

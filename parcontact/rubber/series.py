@@ -37,7 +37,7 @@ PER_DECADE = 10  # accuracy: frequencies at which a short series is held to the 
 ENDS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # accuracy: decades beyond the data that are tried for a short series
 NEAR_END = 0.5  # accuracy: decades of the band that count as its ends
 EARLIEST = 20.0  # accuracy: a relaxation or creep from t on shows the loss up to a frequency of 1/(20 t)
-NEGLIGIBLE = 1e-4  # accuracy: of the storage modulus, for a branch that is left out
+NEGLIGIBLE = 1e-4  # accuracy: of the storage modulus, for a branch that is left out and a loss modulus
 Errors = tuple[float, float, float]
 
 
@@ -215,14 +215,16 @@ class Spectrum:
 
     def modulus(self, omega: Array) -> tuple[ComplexArray, Array]:
         """Return G* [Pa] at angular frequencies [rad/s], shape (n,), and the relative standard deviation of its
-        imaginary part."""
+        imaginary part. Both parts are at least a share of the absolute value that nobody would see."""
         found = complex_kernel(omega, self.kind, self.times)
         modulus = found @ self.weights
         if self.kind == "creep":
             modulus = 1.0 / modulus
             found = -(modulus[:, None] ** 2) * found
         deviation = np.sqrt(np.sum((found.imag @ self.deviations) ** 2, axis=1))
-        return modulus, deviation / modulus.imag
+        least = NEGLIGIBLE * np.abs(modulus)
+        storage, loss = np.maximum(modulus.real, least), np.maximum(modulus.imag, least)
+        return storage + 1j * loss, deviation / loss
 
 
 def _prior(inside: int, beyond: int, rest: int) -> Array:
@@ -266,7 +268,7 @@ def fit(data: Measured, error: float, sweeps: Sequence[tuple[Array, Array]] = ()
         found = tried[int(np.argmin(judged))]
         if min(judged) <= 1.0:
             break
-    times, weights = found
+    times, weights = _thin(omega, goal, judge, allowed, found, least)
     omega = _frequencies(low, high)
     goal, deviation = spectrum.modulus(omega)
     missed = (complex_kernel(omega, "frequency", times) @ weights).imag / goal.imag - 1.0
@@ -325,6 +327,21 @@ def _distance(omega: Array, goal: ComplexArray, allowed: Array, times: Array, we
     found = complex_kernel(omega, "frequency", times) @ weights
     loss, storage = np.abs(found.imag / goal.imag - 1.0), np.abs(found.real / goal.real - 1.0)
     return float(max((loss / allowed).max(), storage.max() / allowed.min()))
+
+
+def _thin(
+    omega: Array, goal: ComplexArray, judge: slice, allowed: Array, found: tuple[Array, Array], least: int
+) -> tuple[Array, Array]:
+    """Return times and weights without the weakest branches, as long as the series meets the goal without them."""
+    while found[0].size > least:
+        times, moduli = found[0], found[1][:-1]
+        z = times / times[:, None]
+        weakest = int(np.argmin(moduli / ((z / (1.0 + z**2)) @ moduli)))
+        fewer = _short(omega, goal, np.delete(times, weakest))
+        if _distance(omega[judge], goal[judge], allowed, *fewer) > 1.0:
+            break
+        found = fewer
+    return found
 
 
 def _negligible(moduli: Array, times: Array, spring: float) -> Array:

@@ -24,6 +24,7 @@ from ..errors import InputError
 GAS = 8.314462618  # physics: J/(mol K)
 ENERGY = 1e3, 1e7  # physics: J/mol: energies of activation are some 1e5
 CONSTANT = 1e-3, 1e4  # physics: C1 [-] and C2 [K] of WLF
+SHOWN = 12  # factors that are printed one by one
 ZERO = 273.15  # physics: K at 0 deg C
 
 
@@ -96,8 +97,9 @@ class Factors:
     vertical: "Density | Factors | None" = None
 
     def __str__(self) -> str:
-        pairs = ", ".join(f"{log:.3g} at {t:g} C" for t, log in zip(self.temperatures, self.logs, strict=True))
-        return f"factors, log10: {pairs}, reference {self.reference:g} C"
+        pairs = [f"{log:.3g} at {t:.4g} C" for t, log in zip(self.temperatures, self.logs, strict=True)]
+        shown = pairs if len(pairs) <= SHOWN else [pairs[0], "...", pairs[-1]]
+        return f"{len(pairs)} factors, log10: {', '.join(shown)}, reference {self.reference:.4g} C"
 
     def log_factor(self, temperature: float) -> float:
         """log10 of a_T; raises InputError beyond the temperatures given."""

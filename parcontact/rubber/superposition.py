@@ -21,7 +21,7 @@ from scipy.optimize import least_squares
 
 from .. import progress
 from ..errors import InputError
-from .series import Measured, Weigh, best_residuals, reduce_sets
+from .series import DENSE, Measured, Weigh, best_residuals, reduce_sets
 from .shift import WLF, Arrhenius, Density, Factors, Shift, log_vertical
 from .tables import Measurement, Set
 
@@ -29,15 +29,18 @@ Array = NDArray[np.float64]
 Vertical = Literal["auto", "density", "free", "none"]
 VERTICAL: tuple[Vertical, ...] = get_args(Vertical)
 WIDEST = 8.0  # tuning: decades: the largest shift between neighbouring temperatures that is looked for
-MOST_DECADES = 30.0  # tuning: of shift between the coldest and the warmest set
+MOST_DECADES = 45.0  # tuning: of shift between the coldest and the warmest set
+CLOSE = 1e-4  # accuracy: relative, of constants and of the misfit, at which a search ends
+FAR = 1e3  # accuracy: residual of shifts that are out of question: no step goes there
 Ranges = tuple[tuple[float, float, int], ...]  # from, to, how many: where the constants of a law are looked for
 WLF_CONSTANTS: Ranges = ((2.0, 60.0, 16), (20.0, 600.0, 16))  # physics: C1 [-], C2 [K]
 ENERGIES: Ranges = ((1e4, 1e6, 40),)  # physics: J/mol
 EXPANSION = 6e-4  # physics: 1/K: of rubbers, 5e-4 to 7e-4, which moduli hardly tell apart from the shift
-APART = 0.1  # accuracy: rms of the differences of the logarithms of two sets that do not overlap
+APART = 0.3  # accuracy: rms of the differences of the logarithms of two sets that do not overlap, whatever b_T is
 SHORTEST = 0.3  # accuracy: share of a sweep that must overlap with its neighbour's
-COARSE = 3  # accuracy: times per decade of the series by which the first constants are judged
+COARSE = 3  # accuracy: times per decade of the series by which first constants and warnings are judged
 STEP = 1e-4  # accuracy: of finite differences, relative to constants and to factors
+ROUNDING = 1e-6  # accuracy: of misfits, below which no law is better
 BETTER = 0.7  # accuracy: misfit with free vertical factors over that without, below which it is told
 
 
@@ -72,9 +75,9 @@ def superpose(
     start = search.start()
     if vertical != "auto":
         return search.refine(start, vertical)
-    kinds: tuple[Vertical, ...] = ("none", "density", "free")
-    none, density, free = (search.refine(start, kind) for kind in progress.with_bar(kinds, "vertical shift", "law"))
-    chosen = density if density.misfit <= none.misfit else none
+    none, density = search.refine(start, "none"), search.refine(start, "density")
+    free = search.refine(start, "free", COARSE)  # which only warns
+    chosen = density if density.misfit < none.misfit - ROUNDING else none
     return replace(chosen, free=free if free.misfit < BETTER * chosen.misfit else None)
 
 
@@ -123,8 +126,9 @@ class _Search:
             return _factors(self._known, [0.0, *constants], self.reference)
         return Density(EXPANSION, self.reference) if kind == "density" else None
 
-    def refine(self, start: Array, kind: Vertical) -> Superposition:
-        """Return the best shift near to constants, with a vertical law of a kind."""
+    def refine(self, start: Array, kind: Vertical, per_decade: int = DENSE) -> Superposition:
+        """Return the best shift near to constants, with a vertical law of a kind; shifts are compared by series of so
+        many times per decade."""
         begin = np.concatenate([start, np.zeros(len(self._known) - 1 if kind == "free" else 0)])
 
         def shift(constants: Array) -> Shift:
@@ -134,14 +138,17 @@ class _Search:
 
         def missed(constants: Array) -> Array:
             try:
-                return best_residuals(self._reduced(shift(constants)))
+                tried = shift(constants)
+                if self._spread(tried) <= MOST_DECADES:
+                    return best_residuals(self._reduced(tried), per_decade)
             except InputError:  # where a law ends
-                return np.full(self._reduced(None).counted, 1e3)
+                pass
+            return np.full(self._reduced(None).counted, FAR)
 
         if begin.size:
-            begin = least_squares(missed, begin, x_scale=0.1, diff_step=STEP, xtol=1e-6, ftol=1e-6).x
-        residuals = missed(begin)
-        return Superposition(shift(begin), float(np.sqrt(np.mean(residuals**2))))
+            begin = least_squares(missed, begin, x_scale=0.1, diff_step=STEP, xtol=CLOSE, ftol=CLOSE).x
+        found = shift(begin)
+        return Superposition(found, float(np.sqrt(np.mean(best_residuals(self._reduced(found)) ** 2))))
 
     def _reduced(self, shift: Shift | None) -> Measured:
         sets, kind = self.measured.sets, self.measured.kind
@@ -149,12 +156,15 @@ class _Search:
             return reduce_sets(sets, kind, weigh=self.weigh)
         return reduce_sets(sets, kind, log_factors(shift, self._known), self.weigh)
 
+    def _spread(self, shift: Shift) -> float:
+        """Return the decades of shift between the measured temperatures."""
+        return float(np.ptp([shift.log_factor(t) for t in self._known]))
+
     def _misfit(self, shift: Shift, vertical: Density) -> float:
         try:
-            logs = [shift.log_factor(t) for t in self._known]
+            if not self._spread(shift) <= MOST_DECADES:
+                return math.inf
         except InputError:
-            return math.inf
-        if max(logs) - min(logs) > MOST_DECADES:
             return math.inf
         data = self._reduced(replace(shift, vertical=vertical))
         return float(np.mean(best_residuals(data, COARSE) ** 2))
@@ -166,8 +176,10 @@ def log_factors(shift: Shift, temperatures: Sequence[float]) -> tuple[list[float
 
 
 def _factors(temperatures: Sequence[float], logs: Sequence[float], reference: float) -> Factors:
+    """Return factors that are 1 at the reference, and beyond the temperatures as at the nearest one."""
+    known = sorted({*temperatures, min(reference, temperatures[0]), max(reference, temperatures[-1])})
     there = float(np.interp(reference, temperatures, logs))
-    return Factors(tuple(temperatures), tuple(float(log - there) for log in logs), reference)
+    return Factors(tuple(known), tuple(float(log - there) for log in np.interp(known, temperatures, logs)), reference)
 
 
 def _overlaps(measured: Measurement) -> list[float]:

@@ -95,6 +95,11 @@ class Measurement:
         """At which it was measured [deg C], rising; none if the file does not say."""
         return [each.temperature for each in self.sets if each.temperature is not None]
 
+    @property
+    def has_short_sets(self) -> bool:
+        """Whether a set is too short to tell a shift from, as all of a temperature sweep are."""
+        return any(each.at.size < LEAST_ROWS for each in self.sets)
+
     def without_short_sets(self) -> "Measurement":
         """Leave out sets that are too short to tell a shift from; raises InputError where none is long enough."""
         long = tuple(each for each in self.sets if each.at.size >= LEAST_ROWS)

@@ -143,3 +143,41 @@ def test_a_short_sweep_is_left_out(tmp_path: Path) -> None:
     assert made.doubts() == ["the sweep at 90 C is left out: it has less than 3 rows (1)"]
     assert made.measured.temperatures == whole.measured.temperatures
     assert_allclose(made.series.moduli, whole.series.moduli, rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["G", "GT", "t", "J"])
+@pytest.mark.filterwarnings("error")
+def test_random_tables_are_fitted_or_refused(tmp_path: Path, kind: str) -> None:
+    """Few rows, one rate, rubbers without relaxation, noise of 0 to 100 %: a fit has finite positive numbers, and what
+    cannot be fitted is one sentence. Numpy's warnings are errors."""
+    dice = np.random.default_rng(7)
+    fits = 0
+    for _ in range(20):
+        count, decades, noise = (
+            int(dice.integers(1, 20)),
+            dice.choice([0.0, 1.0, 4.0]),
+            dice.choice([0.0, 0.01, 0.1, 1.0]),
+        )
+        at, times = (
+            np.geomspace(1e-3, 1e-3 * 10.0**decades, count),
+            10.0 ** dice.uniform(-6, 4, int(dice.integers(0, 5))),
+        )
+        moduli, spring = 10.0 ** dice.uniform(5, 8, times.size), float(dice.choice([1e3, 1e6]))
+        head = {"G": "omega[rad/s] G'[Pa] G''[Pa]", "GT": "T[C] omega[rad/s] G'[Pa] G''[Pa]"}
+        decay = spring + np.exp(-at[:, None] / times) @ moduli
+        g = spring * (1 + 1e-3j) + (moduli * 1j * at[:, None] * times / (1 + 1j * at[:, None] * times)).sum(axis=1)
+        columns = {"t": [decay], "J": [1.0 / decay]}.get(kind, [g.real, g.imag])
+        columns = [each * (1.0 + noise * dice.standard_normal(count)) for each in columns]
+        degrees = [np.sort(dice.choice([0.0, 10.0, 11.0, 30.0], count))] if kind == "GT" else []
+        path = write(tmp_path / "table.txt", head.get(kind, f"t[s] {kind}"), *degrees, at, *columns)
+        path.write_text(path.read_text().replace("t[s] t", "t[s] G(t)[Pa]").replace("t[s] J", "t[s] J(t)[1/Pa]"))
+        try:
+            made = compound.fitted(path, 0.5, None, "wlf", 0.02)
+        except InputError:
+            continue
+        fits += 1
+        numbers = [made.series.modulus_inf, made.series.error, *made.series.moduli, *made.series.loss_errors]
+        assert np.isfinite(numbers).all()
+        assert (np.array(numbers) >= 0.0).all()
+        assert "nan" not in made.text()
+    assert fits > 2

@@ -1,6 +1,6 @@
 """The vertical shift: moduli of rubber go with density times temperature, or constants of the shift come out wrong."""
 
-import shutil
+import re
 from pathlib import Path
 
 import numpy as np
@@ -85,7 +85,7 @@ def test_moduli_with_a_law_of_their_own(tmp_path: Path, law: str) -> None:
     """Free factors are found to 5 %, and a_T to 0.1 decades of 8; without them the constants are wrong, and told so."""
     path = sweeps(tmp_path / "table.txt", "own")
     (text,) = compound.fitted(path, 0.5, None, "wlf", 0.02).doubts()[-1:]
-    assert text.startswith("free vertical factors b_T would join the sweeps with a misfit of 0.")
+    assert re.match(r"free vertical factors b_T would join the sweeps with a misfit of \S+ %, not 4\.\d %, and", text)
     made = compound.fitted(path, 0.5, None, law, 0.02, vertical="free")
     assert made.shift is not None
     assert isinstance(made.shift.vertical, Factors)
@@ -190,8 +190,7 @@ def test_a_table_of_both_shifts_in_a_fit(tmp_path: Path) -> None:
     made = compound.fitted(path, 0.5, None, law, 0.02)
     assert made.shift == law
     assert made.series.best < 0.01
-    assert "# Horizontal shift, given: factors, log10: " in made.text()
-    shutil.copy(path, tmp_path / "same.txt")
+    assert "# Horizontal shift, given: 9 factors, log10: " in made.text()
     (tmp_path / "rubber.yaml").write_text(made.text())
     cold = load(tmp_path, "{include: rubber, temperature: -30}").material.fitted
     assert cold.long_modulus == pytest.approx(density_factor(-30.0) * made.series.modulus_inf, rel=1e-4)
