@@ -141,8 +141,8 @@ def sections() -> list[Section]:
 
 
 def _parts_of(annotation: Any) -> Iterator[type[Part]]:
-    """Yield the parts that an annotation or a field names, in their order."""
-    kind = getattr(annotation, "annotation", annotation)
+    """Yield the parts that an annotation or a field names, or a validator takes, in their order."""
+    kind = getattr(annotation, "annotation", getattr(annotation, "json_schema_input_type", annotation))
     if isinstance(kind, type) and issubclass(kind, Part):
         yield kind
     for inner in get_args(kind):

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, ValidationInfo
+from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, ValidationInfo, model_validator
 
 from ...errors import InputError
 from ...rubber import compound
@@ -20,6 +20,7 @@ from .temperature import Celsius, Shift, shifted
 Modulus = Annotated[NonNegative, Field(description="a shear modulus [Pa] of zero or more")]
 Hardness = Annotated[Positive | None, Field(description="a positive pressure [Pa] at which the counterbody yields")]
 Poisson = Annotated[Number, Field(gt=-1, le=0.5, description="a Poisson ratio [-] above -1 and up to 0.5")]
+ROUNDED = 1e-9  # rounding: of fractions that add up to 1
 YOUNG = ("young_modulus", "youngs_modulus", "elastic_modulus", "young", "e")
 BY_THREE = "moduli here are shear moduli: {} is E/(2 (1 + poisson)), a third of Young's modulus E for rubber"
 
@@ -66,23 +67,41 @@ class PronyBranch(Part):
         return 0.0
 
 
-def _branch(data: Any, info: ValidationInfo) -> ZenerBranch | PronyBranch:
+class FractionBranch(Part):
+    """A term of a Prony series of finite-element programs: `G(t) = modulus_0 (1 - sum g (1 - exp(-t/tau)))`."""
+
+    label: ClassVar[str] = "a branch of the form g, tau"
+    g: Number = Field(ge=0, le=1, description="a fraction of modulus_0 [-] from 0 to 1")
+    tau: Positive = Field(description="a positive relaxation time [s]")
+
+    def times(self, modulus: float) -> PronyBranch:
+        """Return the branch of a body with this modulus at a sudden strain [Pa]."""
+        return PronyBranch(modulus=self.g * modulus, relaxation_time=self.tau)
+
+
+MadeBranch = ZenerBranch | PronyBranch
+AnyBranch = MadeBranch | FractionBranch
+FORMS: tuple[type[AnyBranch], ...] = (ZenerBranch, PronyBranch, FractionBranch)
+
+
+def _branch(data: Any, info: ValidationInfo) -> AnyBranch:
     """Return a branch of the form that its keys have."""
-    if isinstance(data, ZenerBranch | PronyBranch):
+    if isinstance(data, AnyBranch):
         return data
-    forms = f"{', '.join(ZenerBranch.words())} or {', '.join(PronyBranch.words())}"
+    names = [", ".join(form.words()) for form in FORMS]
+    forms = f"{', '.join(names[:-1])} or {names[-1]}"
     if not isinstance(data, dict):
         refuse(Fault(f"must be a mapping of {forms}, got {quote(data)}"))
-    zener = [key for key in ZenerBranch.words() if key in data]
-    prony = [key for key in PronyBranch.words() if key in data]
-    if zener and prony:
-        refuse(Fault(f"mixes the two forms of a branch: give {forms}, got {', '.join(zener + prony)}"))
-    if not zener and not prony:
+    meant = [form for form in FORMS if any(key in data for key in form.words())]
+    if len(meant) > 1:
+        given = [key for form in meant for key in form.words() if key in data]
+        refuse(Fault(f"mixes forms of a branch: give {forms}, got {', '.join(given)}"))
+    if not meant:
         refuse(Fault(f"must have the keys {forms}, got {', '.join(data) or 'none'}"))
-    return (ZenerBranch if zener else PronyBranch).model_validate(data, context=info.context)
+    return meant[0].model_validate(data, context=info.context)
 
 
-Branch = Annotated[ZenerBranch | PronyBranch, PlainValidator(_branch, json_schema_input_type=ZenerBranch | PronyBranch)]
+Branch = Annotated[MadeBranch, PlainValidator(_branch, json_schema_input_type=AnyBranch)]
 
 
 class Elastic(Part):
@@ -130,8 +149,28 @@ Measured = Annotated[
 ]
 
 
-def _stiff(modulus_inf: float, branches: tuple[ZenerBranch | PronyBranch | None, ...]) -> Iterator[Fault]:
-    if None not in branches and modulus_inf + sum(branch.instant_modulus for branch in branches if branch) == 0:
+def _fractions(modulus_0: float | None, modulus_inf: float, branches: tuple[AnyBranch | None, ...]) -> Iterator[Fault]:
+    """Fractions need the modulus of which they are, and are all that then makes the body relax."""
+    fractions = [branch.g for branch in branches if isinstance(branch, FractionBranch)]
+    if fractions and modulus_0 is None:
+        yield Fault(
+            "is missing: g of branches is a fraction of it; give the modulus at a sudden strain", ("modulus_0",)
+        )
+    if modulus_0 is None:
+        return
+    if modulus_inf:
+        rest = "modulus_inf is what fractions leave of modulus_0: leave one of the two out"
+        yield Fault(f"does not go with modulus_0: {rest}", ("modulus_inf",), at_key=True)
+    if len(fractions) < len(branches) and None not in branches:
+        yield Fault("needs branches of the form g, tau", ("modulus_0",), at_key=True)
+    if sum(fractions) > 1.0 + ROUNDED:
+        yield Fault(f"have fractions g that add up to {sum(fractions):.6g}, more than 1", ("branches",))
+
+
+def _stiff(modulus_0: float | None, modulus_inf: float, branches: tuple[AnyBranch | None, ...]) -> Iterator[Fault]:
+    own = [branch for branch in branches if not isinstance(branch, FractionBranch)]
+    moduli = [branch.instant_modulus for branch in own if branch is not None]
+    if modulus_0 is None and len(own) == len(branches) and None not in branches and modulus_inf + sum(moduli) == 0:
         yield Fault("has no stiffness at all: modulus_inf and all branches are zero; give one of them a modulus [Pa]")
 
 
@@ -140,12 +179,13 @@ class Zener(Part):
 
     The long-term modulus may be zero: the body is then a fluid in the long run. With a `shift` all relaxation times and
     moduli are those of its reference temperature; at another `temperature` times are a_T times as long, and moduli b_T
-    times as large.
+    times as large. With `modulus_0`, the modulus at a sudden strain, branches are fractions of it.
     """
 
     model: Literal["zener"] = "zener"
     poisson: Poisson = 0.5
     modulus_inf: Modulus = 0.0
+    modulus_0: Positive | None = Field(default=None, description="a positive shear modulus at a sudden strain [Pa]")
     branches: tuple[Branch, ...] = Field(default=(), description="a list of branches")
     shift: Shift | None = Field(default=None, description="a mapping with law: wlf | arrhenius | factors")
     temperature: Celsius | None = Field(default=None, description="a temperature [deg C], up to 5000")  # the reference
@@ -154,7 +194,23 @@ class Zener(Part):
     hardness: Hardness = None
 
     foreign = dict.fromkeys(YOUNG, Instead(BY_THREE.format("each of modulus_inf and branches")))
-    rules = (Rule(("modulus_inf", "branches"), _stiff), Rule(("shift", "temperature"), shifted))
+    rules = (
+        Rule(("modulus_0", "modulus_inf", "branches"), _fractions),
+        Rule(("modulus_0", "modulus_inf", "branches"), _stiff),
+        Rule(("shift", "temperature"), shifted),
+    )
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _with_moduli(cls, data: Any, handler: Callable[[Any], Zener]) -> Zener:
+        """Put moduli in place of fractions of `modulus_0`."""
+        found = handler(data)
+        if (whole := found.modulus_0) is None:
+            return found
+        fractions = [branch for branch in found.branches if isinstance(branch, FractionBranch)]
+        rest = 1.0 - math.fsum(branch.g for branch in fractions)
+        changes = {"branches": tuple(branch.times(whole) for branch in fractions), "modulus_0": None}
+        return found.model_copy(update={**changes, "modulus_inf": whole * (rest if rest > ROUNDED else 0.0)})
 
     @property
     def fitted(self) -> Zener:
