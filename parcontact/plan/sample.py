@@ -213,8 +213,6 @@ def _errors(errors: ErrorBudget | None, far: float, friction: float) -> Iterator
             yield f"{name} weight", weight
             yield f"{name} time error", weight * parts.time
             yield f"{name} mesh error", weight * parts.mesh
-            yield f"{name} across error", weight * parts.across
-            yield f"{name} edges error", weight * parts.edges
 
 
 def _cost(slab: Slab, call: Callable[[], T]) -> tuple[T, dict[str, float]]:

@@ -99,7 +99,7 @@ def test_heights_from_a_file_stay(tmp_path: Any) -> None:
 
 @pytest.mark.parametrize(("integrator", "order"), [("exponential", TIME_ORDER), ("backward-euler", 1.0)])
 def test_steps_go_by_the_order_of_the_integrator(integrator: str, order: float) -> None:
-    """On the own mesh: the error of steps three times as long. Steps of a slide are cells, halves, thirds, ..."""
+    """On the own mesh: the error of steps three times as long."""
     stage = {"pressure": 1e4, "duration": 1e-3, "time_step": 1e-5}
     planned = job(grid=FINE, history=[stage, SLIDE], numerics={"integrator": integrator})
     found = price.offer(costs(planned, time=3.0**order * price.TIME_SHARE * 0.01), 0.01)
@@ -129,7 +129,7 @@ def test_single_solves_stay() -> None:
 
 
 def test_calls_grow_with_the_decades_of_the_tolerance() -> None:
-    """1.5 times for a tenth; steps of half a cell 1.4 times more; time with N log N."""
+    """1.5 times for a tenth; time with N log N."""
     planned = job(grid=FINE)
     one, ten = (price.offer(costs(planned), accuracy) for accuracy in (1e-2, 1e-3))
     seconds = [each.marching / each.sample.steps for each in (one, ten)]
@@ -137,8 +137,6 @@ def test_calls_grow_with_the_decades_of_the_tolerance() -> None:
     work = [count * math.log(count + 1) for count in points]
     assert seconds[0] == pytest.approx(work[1] / work[0])
     assert seconds[1] == pytest.approx(1.5 * work[2] / work[0])
-    halves = price.offer(costs(planned, time=2.0**TIME_ORDER * price.TIME_SHARE * 0.01), 1e-2)
-    assert halves.marching / halves.sample.steps == pytest.approx(price.BETWEEN_CELLS * seconds[0])
 
 
 def test_from_a_coarser_grid() -> None:
@@ -147,7 +145,7 @@ def test_from_a_coarser_grid() -> None:
     tried = costs(job(grid=FINE), time=2.0**TIME_ORDER * price.TIME_SHARE * 0.01).sample
     seen = costs_of(own, tried, 1e30)
     assert seen.sample.steps == 1 + 160
-    assert price.offer(seen, 0.01).sample.steps == 1 + 160  # on 80 points: halves of a cell
+    assert price.offer(seen, 0.01).sample.steps == 1 + 160
 
 
 @pytest.mark.parametrize("accuracy", [0.05, 0.01])

@@ -38,9 +38,7 @@ def refined(path: Path, study: str) -> tuple[Job, Ladders]:
 
 def test_cases(path: Path) -> None:
     """Meshes, steps and integrators combined; the mesh alone; each once, the cheapest first."""
-    _, found = refined(
-        path, "{mesh: [128, 64, 32], cells_per_step: [2, 1], integrator: [exponential, backward-euler]}"
-    )
+    _, found = refined(path, "{mesh: [128, 64, 32], cells_per_step: [2, 1], integrator: [exponential, backward-euler]}")
     cases = found.combine()
     assert len(cases) == len(set(cases)) == 3 * 2 * 2 + 2 * 1  # of the mesh alone, half a cell on 32 points is new
     assert {case.mesh for case in cases} == {32, 64, 128}
