@@ -16,7 +16,8 @@ COUNT = 10**8
 
 @pytest.mark.parametrize("way", ["", "velocity: 1, ", "velocity: [0.3, 0.2], "])
 def test_a_timeline_of_so_many_steps(tmp_path: Path, way: str) -> None:
-    """Its length, any of its steps, what a plan asks of it: in less than a second of CPU time."""
+    """Its length, any of its steps, what a plan asks of it: in less than 10 s of CPU time;
+    a list of all steps takes minutes."""
     text = with_stage(f"{{pressure: 1e5, {way}duration: {COUNT}.0, time_step: 1.0}}")
     job = job_of(tmp_path, text)
     began = time.process_time()
@@ -26,7 +27,7 @@ def test_a_timeline_of_so_many_steps(tmp_path: Path, way: str) -> None:
     assert timeline[timeline.count // 2].time == pytest.approx(COUNT / 2, rel=2e-8)
     assert timeline[timeline.count].dt == 1.0
     assert scene.choices(job).effects
-    assert time.process_time() - began < 1.0
+    assert time.process_time() - began < 10.0
 
 
 def test_the_first_step_between_cells_of_so_many(tmp_path: Path) -> None:

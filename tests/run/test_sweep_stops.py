@@ -30,7 +30,7 @@ def begin(job: Job, begun: list[int], groups: Groups) -> None:
 
 def wait_for_others(groups: Groups, stop: StopFile) -> None:
     """Let the first group, where there are two, wait until the other one asks it to stop."""
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + 100.0
     while groups.number == 0 and groups.count > 1 and not stop.asks and time.monotonic() < deadline:
         time.sleep(0.01)
 

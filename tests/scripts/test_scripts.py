@@ -54,7 +54,7 @@ SMALL = {
 def test_a_small_run(script: Path, tmp_path: Path, outside_mpi: dict[str, str]) -> None:
     small = SMALL[script.stem]  # a new script needs a small run
     command = [sys.executable, str(script), *small.words]
-    done = subprocess.run(command, cwd=tmp_path, env=outside_mpi, capture_output=True, text=True, timeout=240)
+    done = subprocess.run(command, cwd=tmp_path, env=outside_mpi, capture_output=True, text=True, timeout=290)
     assert "Traceback" not in done.stderr
     assert done.returncode in small.codes, done.stderr
     assert re.search(small.printed, done.stdout), done.stdout
