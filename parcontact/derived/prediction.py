@@ -31,8 +31,8 @@ from ..theory.persson_history import Leg, Memory, follow
 from ..theory.persson_rings import Rings
 
 ONE_ROUGH = (
-    "surface: the theory takes the power spectrum of one rough surface, and this job has none, or other shapes beside "
-    "it; with --waves lattice it takes the waves of the heights themselves, whatever they are made of"
+    "surface: the theory takes the power spectrum of one isotropic rough surface, and this job has none, or other "
+    "shapes with it; with --waves lattice it takes the waves of the heights themselves, whatever they are made of"
 )
 STEADY_FILE, BANDS_FILE = "steady_theory.csv", "bands_theory.csv"
 WavesOf = Literal["continuum", "lattice"]
@@ -94,7 +94,8 @@ def _only_rough(job: Job) -> jobs.Rough | jobs.RoughSpectrum | None:
     """Return the one rough surface of a job that has nothing else."""
     parts = [part for part in job.surface if not isinstance(part, jobs.Flat)]
     part = parts[0] if len(parts) == 1 else None
-    return part if isinstance(part, jobs.Rough | jobs.RoughSpectrum) else None
+    isotropic = getattr(part, "anisotropy", None) is None
+    return part if isinstance(part, jobs.Rough | jobs.RoughSpectrum) and isotropic else None
 
 
 def predict_steady(

@@ -25,7 +25,11 @@ EDGE = 1.0 - 1e-9  # accuracy: wavenumbers equal to a limit up to round-off are 
 
 @dataclass(frozen=True)
 class Roughness:
-    """Parameters of one random surface; lengths in m. Exactly one of the last three is given."""
+    """Parameters of one random surface; lengths in m. One of rms slope, rms height and spectral constant is given.
+
+    `stretch` is a ratio and an angle [rad]: Phi depends on the length of (ratio k_along, k_across), so that waves along
+    the angle are longer by that ratio than waves across it.
+    """
 
     hurst: float
     long_wavelength: float
@@ -36,6 +40,7 @@ class Roughness:
     rms_slope: float | None = None
     rms_height: float | None = None
     psd_constant: float | None = None
+    stretch: tuple[float, float] = (1.0, 0.0)
     measured: Callable[[Array], Array] | None = None  # Phi/C at k instead of the power law
 
     def density(self, k: Array) -> Array:
@@ -53,8 +58,10 @@ class Roughness:
 
         Raises InputError when no wave of the box lies within the limits.
         """
-        k = np.hypot(*wavenumbers(fft, size))
-        waves = np.sqrt(self.density(k)) * self._random(fft, size)
+        kx, ky = wavenumbers(fft, size)
+        k, (ratio, angle) = np.hypot(kx, ky), self.stretch
+        along, across = kx * np.cos(angle) + ky * np.sin(angle), ky * np.cos(angle) - kx * np.sin(angle)
+        waves = np.sqrt(self.density(k if ratio == 1.0 else np.hypot(ratio * along, across))) * self._random(fft, size)
         power = fft.multiplicity * np.abs(waves) ** 2
         square_height, square_slope = fft.slab.sum(float(power.sum()), float((power * k**2).sum()))
         if square_height == 0.0:

@@ -52,7 +52,8 @@ def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
         waves = [2.0 * math.pi * n / length for n, length in zip(shape.waves, grid.size, strict=True)]
         return (math.hypot(*waves),) if any(waves) else ()
     if isinstance(shape, Rough):
-        return max(2.0 * math.pi / shape.long_wavelength, longest), 2.0 * math.pi / shape.short_wavelength
+        ratio = shape.anisotropy.ratio if shape.anisotropy else 1.0
+        return max(2.0 * math.pi / (ratio * shape.long_wavelength), longest), 2.0 * math.pi / shape.short_wavelength
     return longest, max(math.pi / min(cells, default=math.inf), longest)
 
 

@@ -1,5 +1,6 @@
 """The rigid surface of a job: shapes, waves, roughness, and maps from files, added up."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import reduce
@@ -115,8 +116,10 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: Told) -> Spectrum:
     if isinstance(part, jobs.HeightArray):
         return _transform(fft.slab.from_root(part.heights.values), fft)
     limits = part.long_wavelength, part.rolloff_wavelength, part.short_wavelength
-    amplitude = part.rms_slope, part.rms_height, part.psd_constant
-    return Roughness(part.hurst, *limits, part.seed, part.amplitudes == "random", *amplitude).spectrum(fft, grid.size)
+    amplitude, lay = (part.rms_slope, part.rms_height, part.psd_constant), part.anisotropy
+    stretch = (lay.ratio, math.radians(lay.angle)) if lay else (1.0, 0.0)
+    random = part.amplitudes == "random"
+    return Roughness(part.hurst, *limits, part.seed, random, *amplitude, stretch).spectrum(fft, grid.size)
 
 
 def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, told: Told) -> Spectrum:

@@ -133,8 +133,9 @@ def test_steady_friction_of_the_continuum() -> None:
     ("changes", "words"),
     [
         ({"history": [{"approach": 1e-6}]}, "history.0.approach"),
-        ({"surface": [WAVE]}, "one rough surface"),
-        ({"surface": [ROUGH, ROUGH]}, "one rough surface"),
+        ({"surface": [WAVE]}, "one isotropic rough surface"),
+        ({"surface": [ROUGH, ROUGH]}, "one isotropic rough surface"),
+        ({"surface": [{**ROUGH, "anisotropy": {"ratio": 2.0}}]}, "one isotropic rough surface"),
         ({"grid": {"points": 16, "size": 1e-3, "boundary": "free"}}, "grid.boundary"),
     ],
 )

@@ -190,3 +190,19 @@ def test_a_single_point_has_no_wave() -> None:
     """On a grid of one point the only wave is the mean, whatever the shape of the box."""
     fft = FFT(Slab.alone(1, 1))
     assert shortest_wave(fft.forward(np.full((1, 1), 2.0)), fft, (1e-3, 2e-5)) == np.inf
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5, np.pi / 2])
+def test_a_stretched_surface(angle: float) -> None:
+    """Each wave has Phi of the length of (ratio k_along, k_across), exactly where amplitudes are fixed. Mean square
+    slopes along and across differ by ratio^2: to 10 %, as a sum over waves is compared with an integral."""
+    ratio, n = 3.0, 256
+    plain = Roughness(0.8, L / 2, L / 2, L / 60, seed=2, random_amplitudes=False, psd_constant=C)
+    heights = heights_of(replace(plain, stretch=(ratio, angle)), MPI.COMM_SELF, n, n)
+    k = 2 * np.pi * np.fft.fftfreq(n, L / n)
+    along = k * np.cos(angle) + k[:, None] * np.sin(angle)
+    across = k[:, None] * np.cos(angle) - k * np.sin(angle)
+    power = np.abs(np.fft.fft2(heights) / n**2) ** 2 * L**2
+    expected = C * plain.density(np.hypot(ratio * along, across))
+    assert_allclose(power, expected, rtol=1e-9, atol=1e-20 * C)
+    assert np.sum(power * across**2) / np.sum(power * along**2) == pytest.approx(ratio**2, rel=0.1)

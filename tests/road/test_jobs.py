@@ -197,6 +197,18 @@ def test_clipped_outliers_are_no_doubt(road: Path) -> None:
     assert "road: 1 points that stuck out were set to the median of their neighbours" in setup.told.notes
 
 
+def test_bands_have_no_direction() -> None:
+    part = {"shape": "rough", "hurst": 0.8, "long_wavelength": 1e-3, "short_wavelength": 1e-5, "rms_slope": 0.1}
+    job = {
+        "bands": "auto",
+        "material": {"include": "synthetic_tyre"},
+        "steady": {"velocities": [0.1], "pressures": [1e5]},
+    }
+    assert jobs.load({**job, "surface": part}).bands is not None
+    with pytest.raises(jobs.JobError, match=r"surface\.anisotropy does not go with bands"):
+        jobs.load({**job, "surface": {**part, "anisotropy": {"ratio": 3}}})
+
+
 # -- the grid of the map, and a map without a job ---------------------------------------------------------------------
 
 

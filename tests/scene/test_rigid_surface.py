@@ -56,3 +56,13 @@ def test_kept_waves_are_all_there_are(
     assert (columns.max(), np.abs(np.fft.fftfreq(NY, 1 / NY))[rows_of(NY, NY)][rows].max()) == highest
     few, all_heights = (np.asarray(surface.heights((0.0, 0.0), np.empty((NY, NX)))) for surface in (kept, whole))
     assert_allclose(few, all_heights, rtol=0.0, atol=1e-14 * float(np.ptp(all_heights)))
+
+
+@pytest.mark.parametrize(("angle", "axis"), [(0.0, 1), (90.0, 0), (180.0, 1)])
+def test_an_anisotropic_surface_of_a_job(angle: float, axis: int) -> None:
+    """Slopes along the angle [deg], from x towards y, are the smaller ones; the rms slope is as asked."""
+    _, surface = surface_of({**ROUGH, "anisotropy": {"ratio": 4.0, "angle": angle}})
+    heights = surface.heights((0.0, 0.0), surface.slab.empty())
+    gentle = np.std(np.diff(heights, axis=axis)) / (SIZE[1 - axis] / heights.shape[axis])
+    steep = np.std(np.diff(heights, axis=1 - axis)) / (SIZE[axis] / heights.shape[1 - axis])
+    assert gentle < 0.5 * steep

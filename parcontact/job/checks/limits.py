@@ -81,6 +81,8 @@ def bands_fit(bands: Any, surface: tuple[Any, ...], steady: Steady | None, outpu
         if not isinstance(shape, BY_SPECTRUM) and not (index == 0 and isinstance(shape, Topography)) and shape:
             sentence = "must be rough in a job with bands (self-affine, or a spectrum); a topography comes first"
             yield Fault(sentence, ("surface", index, "shape"))
+        if getattr(shape, "anisotropy", None) is not None:
+            yield Fault("does not go with bands, which are rings of wavenumbers", ("surface", index, "anisotropy"))
     if not any(shape is None or isinstance(shape, Rough | RoughSpectrum) for shape in surface):
         yield Fault("needs a rough shape in a job with bands: finer waves follow from a spectrum", ("surface",))
     if steady is not None and steady.waves:

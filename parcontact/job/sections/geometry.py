@@ -34,6 +34,13 @@ def _ordered(name: str, than: str) -> Rule:
     return Rule((name, than), check)
 
 
+class Anisotropy(Part):
+    """Waves along `angle` are `ratio` times longer than those across it, with the same power."""
+
+    ratio: Number = Field(ge=1, le=1e6, description="a number of 1 or more")
+    angle: Real = Field(default=0.0, description="a finite angle [deg]")
+
+
 class Rough(Part):
     """Self-affine roughness with a roll-off, Eqs. (12)-(13) of the paper; scaled by one of rms slope, rms height or C.
 
@@ -49,6 +56,7 @@ class Rough(Part):
     rms_slope: Positive | None = Field(default=None, description="a positive rms slope [-]")
     rms_height: Positive | None = Field(default=None, description="a positive rms height [m]")
     psd_constant: Positive | None = Field(default=None, description="a positive spectral constant [m^4]")
+    anisotropy: Anisotropy | None = Field(default=None, description="a mapping {ratio: 3, angle: 30}")
     seed: Seed = 0
     amplitudes: Literal["random", "fixed"] = "random"
 
