@@ -64,11 +64,15 @@ class Band:
     """
 
     def __init__(self, job: Job, cut: Cut, number: int, sample: int) -> None:
-        (nx, ny), side = cut.points, cut.waves * cut.wavelengths(number)[0]
-        grid = Grid(points=cut.points, size=(side, side if ny > 1 else side / nx))
-        slab = Slab.alone(nx, ny)
-        fft = FFT(slab, measured=False)
-        heights = fft.backward(_make_waves(cut, number, _seed(job, number, sample), fft, side), slab.empty())
+        if cut.measured is not None and number == 0:
+            grid, heights = cut.measured.grid, cut.measured.heights
+        else:
+            (nx, ny), side = cut.points, cut.waves * cut.wavelengths(number)[0]
+            grid = Grid(points=cut.points, size=(side, side if ny > 1 else side / nx))
+            fft = FFT(Slab.alone(nx, ny), measured=False)
+            waves = _make_waves(cut, number, _seed(job, number, sample), fft, side)
+            heights = fft.backward(waves, fft.slab.empty())
+        slab = Slab.alone(*grid.points)
         surface = (HeightArray(heights=Heights(np.asarray(heights))),)
         own = job.model_copy(update={"grid": grid, "surface": surface, "bands": None})
         self._take(set_up(own, slab))

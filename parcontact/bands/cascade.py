@@ -87,8 +87,8 @@ class Cascade:
     @property
     def seconds(self) -> float:
         """For how long the rubber has slid [s]: over the distance of `thermal`, or the box of the coarsest band."""
-        section, box = self.job.section("thermal"), self.cut.waves * self.cut.spectrum.longest
-        return ((section and section.distance) or box) / math.hypot(*self.velocity)
+        section = self.job.section("thermal")
+        return ((section and section.distance) or self.cut.box) / math.hypot(*self.velocity)
 
     def heat(self, temperatures: Sequence[float]) -> None:
         """Take these temperatures [deg C] of the bands from now on; NaN for that of the material."""

@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..errors import InputError
 from ..job import Grid, Job
 from ..job.checks.cells import fast_length
@@ -12,10 +14,10 @@ from ..parallel.slab import Array
 from ..physics.roughness import EDGE
 from ..scene.measured_range import describe_beyond
 from .limits import describe_slopes
+from .measured_band import MapBand, band_of_map
 from .wave_spectrum import WaveSpectrum, spectrum_of
 
-NARROW, WIDE = 0.75, 1.0  # accuracy: decades of a band, for an accuracy of FINE or better, and for less
-FINE = 0.03  # accuracy: bands of NARROW to WIDE decades are right to 4 % in friction, as far as was compared
+WIDTH = 0.75  # accuracy: decades of a band, about; 0.65 to 1 are right to 4 % in friction, 0.45 to 7 %
 WAVES, CELLS = 4, 4.0  # accuracy: longest waves along a box, cells per shortest wave
 FEWEST, MOST = 2, 8  # tuning: surfaces of each band, where the scatter chooses them
 SAMPLE_SHARE = 0.3  # accuracy: of the accuracy asked for, which the scatter of surfaces may have
@@ -24,13 +26,20 @@ SAMPLE_SHARE = 0.3  # accuracy: of the accuracy asked for, which the scatter of 
 @dataclass(frozen=True)
 class Cut:
     """Bands as they are solved: their `edges` [rad/m], the points along x and y of each, the longest waves along its
-    box, and surfaces of each: as many as `samples`, or until their scatter is below an accuracy where that is 0."""
+    box, and surfaces of each: as many as `samples`, or until their scatter is below an accuracy where that is 0. With a
+    `measured` map that is the coarsest band, and the `spectrum` that of all others."""
 
     spectrum: WaveSpectrum
     edges: Array
     points: tuple[int, int]
     waves: int
     samples: int
+    measured: MapBand | None = None
+
+    @property
+    def box(self) -> float:
+        """The longer side of the box of the coarsest band [m]."""
+        return self.waves * self.spectrum.longest if self.measured is None else max(self.measured.grid.size)
 
     @property
     def count(self) -> int:
@@ -39,7 +48,7 @@ class Cut:
     @property
     def cells(self) -> float:
         """Cells per shortest wave of a band."""
-        return self.points[0] * float(self.edges[0] / self.edges[1]) / self.waves
+        return self.points[0] * float(self.edges[-2] / self.edges[-1]) / self.waves
 
     def wavelengths(self, band: int) -> tuple[float, float]:
         """Return the longest and the shortest wavelength [m] of a band."""
@@ -47,8 +56,12 @@ class Cut:
 
     def rms_slope(self, band: int, first: int | None = None) -> float:
         """Return the rms slope of a band, or of all from the `first` to it."""
-        low = self.edges[band if first is None else first]
-        return math.sqrt(self.spectrum.moment(float(low), float(self.edges[band + 1]), 2))
+        start = band if first is None else first
+        of_map = self.measured is not None and start == 0
+        square = self.measured.rms_slope**2 if self.measured and of_map else 0.0
+        if band > 0 or not of_map:
+            square += self.spectrum.moment(float(self.edges[start + of_map]), float(self.edges[band + 1]), 2)
+        return math.sqrt(square)
 
 
 def choose(job: Job) -> Cut:
@@ -60,8 +73,9 @@ def choose(job: Job) -> Cut:
     if asked.cutoff_slope is not None and (shortest := spectrum.steep_beyond(asked.cutoff_slope)):
         spectrum = spectrum.without_shorter(shortest)
     decades = math.log10(spectrum.longest / spectrum.shortest)
-    each = NARROW if job.numerics.asked.friction <= FINE else WIDE
-    count = asked.count or max(1, math.ceil(decades / each * EDGE))
+    measured = band_of_map(job, spectrum.longest, CELLS)
+    count = asked.count or 0
+    count = max(1, count - bool(measured) if count else round(decades / WIDTH))
     waves, ratio = asked.waves or WAVES, 10.0 ** (decades / count)
     along = fast_length(CELLS * waves * ratio * EDGE)
     points = asked.points or (along, along)
@@ -71,18 +85,29 @@ def choose(job: Job) -> Cut:
             f"bands.points: a band from {spectrum.longest:.3g} to {spectrum.longest / ratio:.3g} m with {waves} of its "
             f"longest waves needs {math.ceil(least)} points or more along a side, got {min(points)}"
         )
-    return Cut(spectrum, spectrum.cut(count), points, waves, asked.samples or 0)
+    edges = spectrum.cut(count)
+    if measured:
+        edges = np.concatenate([[2.0 * np.pi / max(measured.grid.size)], edges])
+    return Cut(spectrum, edges, points, waves, asked.samples or 0, measured)
 
 
 def describe_cut(cut: Cut, job: Job) -> list[str]:
     """Return what was chosen, in a sentence."""
     many = f"{cut.samples}" if cut.samples else f"{FEWEST} to {MOST}, as their scatter asks for"
-    decades = math.log10(float(cut.edges[1] / cut.edges[0]))
+    decades, count = math.log10(float(cut.edges[-1] / cut.edges[-2])), cut.count - bool(cut.measured)
+    of_map = []
+    if cut.measured:
+        grid = cut.measured.grid
+        of_map = [
+            *cut.measured.notes,
+            f"bands: the map is the coarsest, down to {cut.spectrum.longest:.3g} m, on {grid.nx} x {grid.ny} points",
+        ]
     return [
-        f"bands: {cut.count} of {decades:.2g} decades from {cut.spectrum.longest:.3g} to {cut.spectrum.shortest:.3g} "
+        *of_map,
+        f"bands: {count} of {decades:.2g} decades from {cut.spectrum.longest:.3g} to {cut.spectrum.shortest:.3g} "
         f"m, each on {cut.points[0]} x {cut.points[1]} points with {cut.waves} of its longest waves along the box "
         f"({cut.cells:.3g} cells per shortest wave), for a numerics.accuracy of {job.numerics.asked.friction:g}; "
-        f"surfaces of each: {many}"
+        f"surfaces of each: {many}",
     ]
 
 
@@ -91,4 +116,5 @@ def doubts_of_bands(job: Job, cut: Cut, temperatures: Sequence[float] = ()) -> l
     side = WAVES * cut.spectrum.longest
     points = 2 * math.ceil(side / cut.spectrum.shortest)
     whole = job.model_copy(update={"grid": Grid(points=(points, points), size=(side, side)), "bands": None})
-    return [*job.warnings, *describe_beyond(whole, temperatures), *describe_slopes(cut.spectrum)]
+    of_map = cut.measured.doubts if cut.measured else ()
+    return [*job.warnings, *of_map, *describe_beyond(whole, temperatures), *describe_slopes(cut.spectrum)]

@@ -34,6 +34,7 @@ ONE_ROUGH = (
     "surface: the theory takes the power spectrum of one isotropic rough surface, and this job has none, or other "
     "shapes with it; with --waves lattice it takes the waves of the heights themselves, whatever they are made of"
 )
+OF_SPECTRA = "surface: the theory takes the spectra of rough shapes, and this job has a measured map beside them"
 STEADY_FILE, BANDS_FILE = "steady_theory.csv", "bands_theory.csv"
 WavesOf = Literal["continuum", "lattice"]
 
@@ -87,7 +88,9 @@ class SteadyInstant(NamedTuple):
 
 def has_spectrum(job: Job) -> bool:
     """Return whether the theory can do without the heights of a job: one in bands, or with one rough surface."""
-    return job.bands is not None or (job.grid.boundary == "periodic" and _only_rough(job) is not None)
+    if job.bands is not None:
+        return not isinstance(job.surface[0], jobs.Topography)
+    return job.grid.boundary == "periodic" and _only_rough(job) is not None
 
 
 def _only_rough(job: Job) -> jobs.Rough | jobs.RoughSpectrum | None:
@@ -176,7 +179,7 @@ def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
         raise InputError("--gamma and --waves are for histories, and this job has a friction curve alone")
     _refuse_free(job)
     if not has_spectrum(job):
-        raise InputError(ONE_ROUGH.partition(";")[0])
+        raise InputError(f"{ONE_ROUGH.partition(';')[0]}" if job.bands is None else OF_SPECTRA)
     highest = write_steady(job, request(job))
     place = Wanted(highest.velocity, highest.pressure, highest.temperature)
     return [

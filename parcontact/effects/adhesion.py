@@ -147,6 +147,11 @@ class AdhesionMemory:
     columns: tuple[float, ...] = (0.0, 0.0, math.nan, math.nan)
 
 
+def _no_bands(adhesion: Any, bands: Any) -> Iterator[Fault]:
+    if adhesion is not None and bands is not None:
+        yield Fault("does not go with bands: they are coupled by pressures alone", ("adhesion",))
+
+
 class AdhesionColumns(Effect[AdhesionMemory]):
     """The share of the area under tension, the force of all tension [N], the energy of the surfaces [J] and the energy
     lost in snaps [J]."""
@@ -157,6 +162,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         Rule(("adhesion", "material"), _bodies),
         Rule(("adhesion", "grid", "material"), _zone_is_resolved),
         Rule(("adhesion", "initial", "steady"), _no_steady),
+        Rule(("adhesion", "bands"), _no_bands),
     )
     lifts: ClassVar[tuple[Any, ...]] = (limits.loads_press, limits.some_load)
 

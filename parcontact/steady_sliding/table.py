@@ -42,6 +42,8 @@ class CurveTable:
         self._names = names_of(self._columns)
         self.known = self._read()
         self._file = GrowingTable(self.path, self._names)
+        if further:
+            self._keep_known(directory / further[0], heated)
         self._further = GrowingTable(directory / further[0], further[1]) if further else None
         self._points: list[Point] = []
         self._bar = progress.Bar(0, "")
@@ -64,6 +66,19 @@ class CurveTable:
             with files.replaced(self.path) as new:
                 new.write(whole[: whole.rfind(b"\n") + 1])
         return curve_points.of_table(columns)
+
+    def _keep_known(self, path: Path, heated: bool) -> None:
+        """Remove the lines of a further table whose points are not there: those of one that was being solved."""
+        if not path.exists():
+            return
+        head, *lines = tables.lines_of(path)
+        places = [head.index(name) for name in ("velocity", "pressure", "temperature") if name in head]
+        kept = []
+        for line in lines:
+            speed, pressure, *degrees = (float(line[place] or "nan") for place in places)
+            point = Wanted(speed, pressure, degrees[0] if heated and degrees else math.nan)
+            kept += [] if curve_points.lacking([point], self.known) else [line]
+        files.write(path, "".join(f"{','.join(line)}\n" for line in [head, *kept]))
 
     def lacking(self, points: Sequence[Wanted], bare: Sequence[int] = ()) -> list[int]:
         """Return the numbers of the points that are not there, or are `bare` of the maps that are asked for."""

@@ -1,10 +1,15 @@
 """Surfaces in bands: one band against the steady solver on one grid, full contact against its closed form."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
+import yaml
 from mpi4py import MPI
 
 from parcontact import job as jobs
+from parcontact.__main__ import main
 from parcontact.bands.band import Band
 from parcontact.bands.band_heat import uniform_rise
 from parcontact.bands.cascade import Cascade, mean_rungs
@@ -12,11 +17,13 @@ from parcontact.bands.choice import choose
 from parcontact.bands.road_sliding import RoadSliding
 from parcontact.bands.wave_spectrum import spectrum_of
 from parcontact.effects.relaxation import relaxation_of
+from parcontact.errors import JobError
 from parcontact.parallel.slab import Slab
 from parcontact.physics.heat import Conductor
 from parcontact.physics.prony import complex_modulus
 from parcontact.scene import set_up
 from parcontact.steady_sliding.sliding import SteadySliding
+from parcontact.storage import tables
 
 LONG, SHORT = 4e-3, 5e-4
 ROUGH = {
@@ -147,3 +154,79 @@ def test_finer_bands_are_warmer() -> None:
     assert point.friction < point.friction_cold
     assert point.flash is not None
     assert rises[0] < point.flash.mean < rises[2]
+
+
+def test_a_measured_map_is_the_coarsest_band(tmp_path: Path) -> None:
+    """Its waves down to the longest of the spectrum, as measured; a wave of the map that is shorter is taken out, and
+    slopes add up as squares."""
+    points, side = 128, 4 * LONG
+    x = np.arange(points) * side / points
+    long, short = 2 * np.pi * 8 / side, 2 * np.pi * 40 / side
+    heights = 1e-4 * np.cos(long * x)[None, :] * np.cos(long * x)[:, None] + 1e-6 * np.cos(short * x)[None, :]
+    np.save(tmp_path / "road.npy", heights)
+    road = {"shape": "topography", "path": str(tmp_path / "road.npy"), "unit": "m", "size": [side, side]}
+    fine = {**ROUGH, "long_wavelength": LONG / 4, "short_wavelength": LONG / 16, "rms_slope": 0.1}
+    road |= {"detrend": "mean", "periodic": "none"}
+    job = jobs.load({**JOB, "surface": [road, fine], "bands": {"samples": 1}})
+    found = RoadSliding(job, Slab.alone(1, 1))
+    assert found.cut.count == 2
+    assert found.cut.wavelengths(0) == pytest.approx((side, LONG / 4))
+    assert found.cut.rms_slope(0) == pytest.approx(1e-4 * long / np.sqrt(2), rel=2e-3)  # of the resampling
+    assert found.cut.rms_slope(1, 0) == pytest.approx(np.hypot(found.cut.rms_slope(0), 0.1), rel=1e-4)
+    band = Band(job, found.cut, 0, 0).setup
+    own = band.surface.heights((0.0, 0.0), band.slab.empty()) * band.units.height
+    waves = np.abs(np.fft.rfft2(own)) / own.size
+    assert waves[8, 8] == pytest.approx(2.5e-5, rel=1e-2)
+    assert waves[0, 17:].max() < 1e-3 * waves[8, 8]  # it has 5e-7 in the map, which two cells cannot show
+    point = found.solve((0.1, 0.0), 1e6)
+    rows = found.rows((0.1, 0.0))
+    assert sum(row[6] for row in rows) == pytest.approx(point.friction, rel=1e-12)
+    assert rows[0][7] > rows[1][7] > 0.0
+
+
+def test_a_cut_off_leaves_steep_waves_out() -> None:
+    """Down to the wavelength from which the rms slope is larger, which is then that of all."""
+    full, cut = sliding({"bands": {"count": 2, "samples": 1}}), sliding({"bands": {"cutoff_slope": 0.15, "count": 2}})
+    assert full.cut.rms_slope(1, 0) == pytest.approx(0.2, rel=1e-3)
+    assert cut.cut.rms_slope(1, 0) == pytest.approx(0.15, rel=2e-3)
+    assert cut.cut.spectrum.shortest == pytest.approx(full.cut.spectrum.steep_beyond(0.15))
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"history": [{"pressure": 1e5}]}, "history does not go with bands"),
+        ({"grid": {"points": 64, "size": 1e-2}}, "takes at most one of grid | bands, got grid and bands"),
+        ({"adhesion": {"work": 0.05, "range": 1e-7}}, "adhesion does not go with bands"),
+        ({"surface": {"shape": "sphere", "radius": 1e-2}}, "must be rough in a job with bands"),
+        ({"output": {"fields": ["pressure"]}}, "there is no map of all waves"),
+        ({"bands": "all"}, "bands must be auto, or a mapping with count, points and waves, got 'all'"),
+        ({"bands": {"counts": 3}}, "did you mean count?"),
+    ],
+)
+def test_what_does_not_go_with_bands(changes: dict[str, object], sentence: str) -> None:
+    with pytest.raises(JobError, match=re.escape(sentence)):
+        jobs.load({**JOB, "bands": "auto", **changes})
+
+
+def test_a_curve_that_was_killed_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Points that are there are not solved again; lines of bands.csv without their point in steady.csv, and a line that
+    was not finished, are replaced."""
+    monkeypatch.chdir(tmp_path)
+    job = {**JOB, "bands": {"count": 2, "points": 24, "samples": 1}, "numerics": {"tolerance": 5e-2}}
+    Path("job.yaml").write_text(yaml.safe_dump({**job, "surface": {**ROUGH, "short_wavelength": 1e-3}}))
+    assert main(["steady", "job.yaml", "--velocities", "0.1", "--quiet"]) == 0
+    first = Path("out/job/bands.csv").read_text()
+    row = first.splitlines()[1].split(",")
+    with Path("out/job/bands.csv").open("a") as file:
+        file.write(",".join(["0.2", *row[1:]]) + "\n0.2,1e6")
+    assert main(["steady", "job.yaml", "--velocities", "0.1,0.2", "--quiet"]) == 0
+    lines = Path("out/job/bands.csv").read_text().splitlines()
+    assert lines[:3] == first.splitlines()
+    assert [line.split(",")[0] for line in lines[1:]] == ["0.1", "0.1", "0.2", "0.2"]
+    found, of_bands = tables.read(Path("out/job/steady.csv")), tables.read(Path("out/job/bands.csv"))
+    for k, friction in enumerate(found["friction"]):
+        assert sum(of_bands["friction"][2 * k : 2 * k + 2]) == pytest.approx(friction, rel=1e-12)
+    assert len(tables.read(Path("out/job/bands_theory.csv"))["friction"]) == 4
+    assert main(["report", "out/job"]) == 0
+    assert "bands.csv" in Path("out/job/report.html").read_text()

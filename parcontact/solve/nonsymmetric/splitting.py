@@ -27,7 +27,7 @@ from ..problem import Operator
 from .steady import SteadyContact
 
 LEAST_STEPS, LATER = 10, 0.1  # tuning: steps before a certificate, and the share of all steps before the next one
-SLOWEST, FASTEST, AT_UNIT = 2.0, 16.0, 8.0  # tuning: of `step_for`, found on grids of 96 x 96 from 1 % to full contact
+SLOWEST, FASTEST, AT_UNIT = 0.35, 16.0, 8.0  # tuning: of `step_for`, found on bands of six decades at 1 mm/s to 10 m/s
 
 
 def step_for(stiffest: float, softest: float, ratio: float) -> float:

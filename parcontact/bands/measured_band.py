@@ -1,0 +1,49 @@
+"""The coarsest band of a job whose surface begins with a measured map: the map itself, without finer waves.
+
+A road is not Gaussian, so that its long waves are not known by their spectrum alone.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..job import Grid, Job, Topography
+from ..job.checks.cells import fast_length
+from ..parallel.slab import Array
+from ..road import map_files
+from ..road.prepared_map import prepare
+from ..scene import map_sentences
+
+
+@dataclass(frozen=True)
+class MapBand:
+    """Heights [m] of the map on its `grid`, shape (ny, nx), its rms slope, and what was done with it."""
+
+    grid: Grid
+    heights: Array
+    rms_slope: float
+    notes: tuple[str, ...]
+    doubts: tuple[str, ...]
+
+
+def band_of_map(job: Job, shortest: float, cells: float) -> MapBand | None:
+    """Return the measured map that a job's surface begins with, with waves down to the `shortest` [m], which has so
+    many cells; None without a map. Raises InputError for a map that cannot be read."""
+    part = job.surface[0]
+    if not isinstance(part, Topography):
+        return None
+    _, size = map_files.extent_of(part)
+    nx, ny = (fast_length(cells * length / shortest) for length in size)
+    grid = Grid(points=(nx, ny), size=size)
+    whole = map_files.read(part)
+    if whole.is_line:
+        raise InputError(f"{part.path} is a line scan; bands take a map, or the spectrum of the scan in a table")
+    smooth = part.model_copy(update={"short_wavelength": max(shortest, part.short_wavelength or 0.0)})
+    found = prepare(smooth, grid, whole)
+    doubts = [*map_sentences.doubt_sizes(found), *map_sentences.doubt_outliers(found)]
+    waves = np.fft.fft2(found.heights) / found.heights.size
+    qy, qx = (2.0 * np.pi * np.fft.fftfreq(n, length / n) for n, length in zip((ny, nx), size[::-1], strict=True))
+    slope = math.sqrt(float(np.sum(np.abs(waves) ** 2 * (qx[None, :] ** 2 + qy[:, None] ** 2))))
+    return MapBand(grid, found.heights, slope, tuple(map_sentences.describe_treatment(found)), tuple(doubts))
