@@ -20,7 +20,7 @@ FAST = 1.0 / (K * RELAXATION)  # m/s, at which the wave passes in one relaxation
 
 RADIUS = 1e-2  # m, of spheres
 CELL = np.arcsinh(1.0) / np.pi  # displacement in the middle of a square cell under a pressure, over p side/G
-INTEGRATORS: tuple[Integrator, ...] = ("exponential", "backward-euler")
+INTEGRATORS: tuple[Integrator, ...] = ("exponential", "exponential-linear", "backward-euler")
 
 
 def zener(modulus_inf: float, moduli: Sequence[float], times: Sequence[float]) -> Json:

@@ -98,7 +98,7 @@ def memoryless_errors(prony: Prony, scales: TimeScales, integrator: Integrator) 
     """Return the relative error of each branch without memory; infinite where a jump reads what it remembers."""
     if scales.jumps or not scales.shortest:
         return np.full_like(prony.moduli, np.inf)
-    decay, gain = coefficients(prony, integrator, scales.shortest)
+    decay, gain, _ = coefficients(prony, integrator, scales.shortest)
     waves = np.maximum(1.0, np.pi * prony.relaxation_times / scales.shortest)
     return np.asarray(decay * (2.0 * waves + prony.moduli / gain))
 

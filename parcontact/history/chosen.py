@@ -20,7 +20,7 @@ SAME_TIME = 1e-9  # accuracy: a duration this close, relatively, to a whole numb
 HALVINGS = 10  # tuning: of a cell, in the shortest step of a surface that slides
 LEAST_SHARE = 2.0**-20  # tuning: of its duration, in the shortest step of a stage
 MOST_CELLS = 4  # tuning: slid in the longest step
-WAVE_STEPS = 8  # accuracy: in which the shortest wave passes, at least
+WAVE_STEPS = 4  # accuracy: in which the shortest wave passes, at least
 RAMP_STEPS = 16  # accuracy: at least, while a load changes
 
 
@@ -51,7 +51,7 @@ class Bounds:
 
 
 def most_cells(job: Planned) -> int:
-    """Return how many cells the longest step slides, a power of two: an eighth of the shortest wave.
+    """Return how many cells the longest step slides, a power of two: a quarter of the shortest wave.
 
     It is one cell where that is shorter, or where a file may have any wave.
     """

@@ -1,8 +1,8 @@
 """Time steps that follow the error of a step.
 
 The error E of a step of length dt is estimated from that step alone (`physics.time_error`). It is to be `allowed` E0, a
-share of `numerics.accuracy`. As E goes with dt^p (p = 1.7 for the exponential integrator, 1 for backward Euler), the
-next is
+share of `numerics.accuracy`. As E goes with dt^p (p = 3 for steps in which the displacement is quadratic, 1.7 where it
+is linear, 1 for backward Euler), the next is
 
     dt <- dt clip(SAFETY (E0/E)^(1/p), 1, MOST_GROWTH),
 
@@ -24,7 +24,7 @@ from functools import partial
 from ..history.chosen import Bounds, ChosenEnds, ChosenSteps, MadeStep, reached
 from ..history.timeline import Span, Step
 from ..job.checks.cells import one_cell
-from ..physics.time_error import TIME_ORDER
+from ..physics.time_error import order_of_time_error
 from ..scene import Scene
 
 TIME_SHARE = 0.8  # accuracy: of numerics.accuracy, for the error of a step
@@ -74,7 +74,7 @@ class StepChooser:
         with adhesion has moved by so many half process zones, of which one is allowed, but where it snaps.
         """
         numerics = self.scene.choices.numerics
-        order = TIME_ORDER if numerics.integrator == "exponential" else 1.0
+        order = order_of_time_error(numerics.integrator, step.growth > 0.0)
         ratio = error / (TIME_SHARE * numerics.asked.of_steps)
         if step.dt > SNAP_SHARE * self._bounds(span).most:
             ratio = max(ratio, front**order)

@@ -91,12 +91,16 @@ def estimate_errors(scene: Scene, friction: float, solved: Solved) -> Estimate:
     step, measures, certificate = solved.step, solved.measures, solved.contact.certificate
     points, branches, grid = scene.slab.points, scene.material.branched, scene.choices.grid
     prony = None if branches is None else branches.prony
-    run = properties_of(scene.setup, scene.folded.bound, scene.choices.numerics.integrator == "exponential", prony)
+    integrator = scene.choices.numerics.integrator
+    curved = integrator == "exponential" and step.growth > 0.0
+    run = properties_of(scene.setup, scene.folded.bound, integrator != "backward-euler", prony)
     integrators, apart = _compare_integrators(scene, solved), _compare_views(scene, solved)
     own = measures.friction - measures.friction_interface
     change, own = own - friction, math.inf if step.jump else own
     if measures.contact_area == 0.0:
-        still = StepObservation(0.0, integrators.difference, integrators.order, 0.0, 0.0, 0.0, 0.0)
+        still = StepObservation(
+            0.0, integrators.difference, integrators.order, 0.0, 0.0, 0.0, 0.0, seconds=step.dt, curved=curved
+        )
         return Estimate(None, time_error(run, still, points), own, None)
     observed = StepObservation(
         complementarity=certificate.complementarity,
@@ -113,6 +117,7 @@ def estimate_errors(scene: Scene, friction: float, solved: Solved) -> Estimate:
         views_apart=apart,
         interface=measures.friction_interface,
         way=step.velocity,
+        curved=curved,
     )
     time = time_error(run, observed, points)
     lasting = estimate(run, observed, points, time)
@@ -143,13 +148,14 @@ def _compare_integrators(scene: Scene, solved: Solved) -> IntegratorDifference:
         return NO_DIFFERENCE
     pair = EmbeddedPair(scene.slab, branches, scene.choices.grid.dx / scene.units.length)
     if measures.contact_area == 0.0:
-        return pair.compare_without_load(step.dt, trial, solved.body) if step.judge is not None else NO_DIFFERENCE
+        return pair.compare_without_load(step.dt, trial, solved.body, step.growth) if step.judge else NO_DIFFERENCE
     load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)
     pressure = contact.p
     if (touching := solved.of_law.touching) is not pressure:  # tension counts as pressure does
         pressure = np.abs(contact.p) if solved.of_law.pull else np.where(touching, contact.p, 0.0)
         load = scene.slab.sum(float(pressure.sum()))[0]
-    return pair.compare(step.dt, trial, solved.body, pressure, contact.u, load, measures.contact_area)
+    share = measures.contact_area
+    return pair.compare(step.dt, trial, solved.body, pressure, contact.u, load, share, step.growth)
 
 
 def _compare_views(scene: Scene, solved: Solved) -> float:

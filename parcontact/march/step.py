@@ -111,7 +111,7 @@ def _accepted(scene: Scene, state: State, step: Step) -> _Made:
 def _solve(scene: Scene, state: State, step: Step) -> Solved:
     """Solve a step, measure it and let the body go on; collective. Raises StepError and DetachedError."""
     body, law, before = scene.material, law_of(scene), state.row.measures
-    trial = body.begin(state.body, step.dt, scene.motion.at(step.position))
+    trial = body.begin(state.body, step.dt, scene.motion.at(step.position), step.growth)
     control, tolerance = _control(scene, step, trial), state.tolerance.of(scene, step)
     of_law = law.solve(trial, step, control, state.law, state.contact, before, tolerance)
     contact = of_law.contact
@@ -144,7 +144,8 @@ def _advance_energy(scene: Scene, state: State, solved: Solved) -> EnergyMemory 
         return None
     last = state.contact.last
     now, before = Pressed(solved.contact.p, solved.trial.alpha), Pressed(last.pressure, last.alpha)
-    energy = scene.energy.advance(state.energy, solved.step.dt, now, before, solved.contact.u, solved.body)
+    step, body = solved.step, solved.body
+    energy = scene.energy.advance(state.energy, step.dt, now, before, solved.contact.u, body, step.growth)
     return energy.without_work(state.energy) if solved.of_law.end == "open" else energy
 
 

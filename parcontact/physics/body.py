@@ -4,20 +4,30 @@ With `G(t) = G_inf + sum_k G_k exp(-t/tau_k)` and the elastic operator A of shea
 
     A p = G_inf u + sum_k h_k,     dh_k/dt = G_k du/dt - h_k/tau_k,     h_k the part of branch k [Pa m].
 
-A step advances `h_k <- decay_k h_k + gain_k (u_new - u)` with, for z = dt/tau_k,
+A step advances `h_k <- decay_k h_k + gain_k du + back_k du_before` with the increments of u in this step and in the one
+before, and for z = dt/tau_k, phi(z) = (1 - exp(-z))/z,
 
-    exponential      decay = exp(-z),     gain = G_k (1 - exp(-z))/z    exact for u linear in time,
-    backward-euler   decay = 1/(1 + z),   gain = G_k/(1 + z)            the paper's Eqs. (7)-(9), in another form,
+    exponential          decay = exp(-z),     gain = G_k (phi + kappa q),   back = -G_k kappa q r,
+    exponential-linear   decay = exp(-z),     gain = G_k phi,               back = 0,
+    backward-euler       decay = 1/(1 + z),   gain = G_k/(1 + z),           back = 0.
 
-so that `A p = alpha u_new + r`, `alpha = G_inf + sum gain_k`, `r = sum decay_k h_k - (sum gain_k) u`. The contact
-problem of a step is then that of an elastic body of modulus alpha under the effective heights `h + r/alpha` (paper,
-Eq. 9).
+The first is exact for u quadratic in time, through its last two values and the new one: with r = dt/dt_before,
+
+    u(s) = u + s du + s (s - 1) kappa/2 (du - r du_before),   kappa = 2 r/(1 + r),   0 <= s <= 1,
+    q(z) = (1 + exp(-z))/(2 z) - (1 - exp(-z))/z^2.
+
+After a jump and in the first step of a stage kappa is 0. The second is exact for u linear in time, the last is that of
+the paper's Eqs. (7)-(9), in another form. So `A p = alpha u_new + r`, with `alpha = G_inf + sum gain_k` and
+`r = sum decay_k h_k - (sum gain_k) u + (sum back_k) du_before`. The contact problem of a step is then that of an
+elastic body of modulus alpha under the effective heights `h + r/alpha` (paper, Eq. 9). Displacements are those of
+points of the body, however the surface moves.
 
 A body is what has `begin` and `commit`. What it remembers from one step to the next is a `BodyMemory`, which these take
 and return: a step that is dropped leaves the memory from which it began.
 
 Two kinds of branches have no map (`effects.folded_branches` says which and what it costs): of a memoryless one
-`gain (u_new - u)` is all there is, its decay being 0 to the error allowed; a frozen one is the spring `h_k = G_k u`.
+`gain du + back du_before` is all there is, its decay being 0 to the error allowed; a frozen one is the spring
+`h_k = G_k u`.
 """
 
 import math
@@ -29,7 +39,7 @@ import numpy as np
 from ..parallel.slab import Array, Slab, allocate
 from . import loops
 from .entries import Entry, MapCount, Saved
-from .prony import Prony, coefficients, elapsed
+from .prony import Advance, Prony, coefficients, elapsed
 from .units import Units
 
 
@@ -45,23 +55,22 @@ class Heights:
         return self.base, self.offset
 
 
-Advance = tuple[Array, Array]  # decay and gain of the branches that have a map
-
-
 @dataclass
 class BodyMemory:
-    """Memory of a body between two steps: the displacement of its surface, and this rank's rows of its branch maps.
+    """Memory of a body between two steps: the displacement of its surface, its `increment` in the last step, and this
+    rank's rows of its branch maps.
 
     `displacement` is None where it follows from the pressure and is not at hand. The advance of the branches over the
-    last step is `pending`: the pass that begins the next step makes it, with the `increment` of the displacement in
-    that step, and forms the effective heights in the map of the latter. This changes how the memory is written, not
-    what it means, so that a step may begin from the same memory again. The memories before and after a step share all
-    maps but the displacement: the former is no more once a step has begun from the latter.
+    last step is `pending`: the pass that begins the next step makes it, with the increment of the displacement in that
+    step and the one `before`, and forms the effective heights in the map of the latter. This changes how the memory is
+    written, not what it means, so that a step may begin from the same memory again. The memories before and after a
+    step share all maps but the displacement: the former is no more once a step has begun from the latter.
     """
 
     displacement: Array | None
     branches: Array
     increment: Array
+    before: Array
     pending: Advance
 
 
@@ -79,7 +88,7 @@ class Trial:
     advance: Advance
 
 
-NO_BRANCHES: Advance = np.ones(0), np.zeros(0)
+NO_BRANCHES = Advance(np.ones(0), np.zeros(0), np.zeros(0))
 NO_MAP = np.zeros((0, 0))
 
 
@@ -100,12 +109,12 @@ class ElasticBody:
 
     def at_rest(self) -> BodyMemory:
         """Return the memory of a body into which nothing has been pressed."""
-        return BodyMemory(None, np.zeros((0, *self.slab.shape)), NO_MAP, NO_BRANCHES)
+        return BodyMemory(None, np.zeros((0, *self.slab.shape)), NO_MAP, NO_MAP, NO_BRANCHES)
 
     def start_from(self, memory: BodyMemory, displacement: Array, branches: Iterable[Array]) -> None:
         """Do nothing: the displacement follows from the pressure."""
 
-    def begin(self, memory: BodyMemory, dt: float, heights: Heights) -> Trial:
+    def begin(self, memory: BodyMemory, dt: float, heights: Heights, growth: float = 0.0) -> Trial:
         """Begin a step under the heights themselves; local to this rank.
 
         The displacement is that in a map of the solver, which the solve of the step overwrites.
@@ -139,12 +148,14 @@ class ElasticBody:
 
 @dataclass(frozen=True)
 class _Coefficients:
-    """Coefficients of a step dt: its modulus, how the kept branches advance, their and u's weights in the heights."""
+    """Coefficients of a step dt: its modulus, how the kept branches advance, and the weights of these, of u and of the
+    last increment in the heights."""
 
     dt: float
+    growth: float
     alpha: float
     advance: Advance
-    weights: tuple[Array, float]
+    weights: tuple[Array, float, float]
 
 
 class ZenerBody:
@@ -169,13 +180,14 @@ class ZenerBody:
         self.moving = [k for k in numbers if k not in frozen]
         self.shortest_time = float(prony.relaxation_times[self.kept].min(initial=math.inf))
         self._spring = prony.modulus_inf + float(prony.moduli[list(frozen)].sum())
-        self._still: Advance = np.ones(len(self.kept)), np.zeros(len(self.kept))
+        none = np.zeros(len(self.kept))
+        self._still = Advance(np.ones(len(self.kept)), none, none)
         self._coefficients: _Coefficients | None = None
 
     @staticmethod
     def count_maps(kept: int) -> MapCount:
-        """Count the maps of a body with so many branch maps; the others are the displacement and its increment."""
-        return MapCount(held=kept + 2, saved=kept + 1)
+        """Count the maps of a body with so many branch maps; the others are the displacement and two increments."""
+        return MapCount(held=kept + 3, saved=kept + 2)
 
     @property
     def branched(self) -> "ZenerBody":
@@ -190,15 +202,15 @@ class ZenerBody:
         """Return `z = dt/tau` of each branch."""
         return elapsed(self.prony, dt)
 
-    def coefficients(self, dt: float) -> tuple[Array, Array]:
-        """Return `decay` and `gain` of each branch over a step dt."""
-        return coefficients(self.prony, self.integrator, dt)
+    def coefficients(self, dt: float, growth: float = 0.0) -> Advance:
+        """Return how each branch advances over a step dt, which is `growth` times as long as the one before."""
+        return coefficients(self.prony, self.integrator, dt, growth)
 
     def at_rest(self) -> BodyMemory:
         """Return the memory of a body into which nothing has been pressed, in new maps."""
         branches = allocate((len(self.kept), *self.slab.shape), np.float64, self.slab.tally)
         branches.fill(0.0)
-        return BodyMemory(self.slab.zeros(), branches, self.slab.zeros(), self._still)
+        return BodyMemory(self.slab.zeros(), branches, self.slab.zeros(), self.slab.zeros(), self._still)
 
     def start_from(self, memory: BodyMemory, displacement: Array, branches: Iterable[Array]) -> None:
         """Put a displacement and the map of each branch of `prony`, in order, into the maps of a memory."""
@@ -208,22 +220,26 @@ class ZenerBody:
                 memory.branches[self.kept.index(k)] = branch
         memory.pending = self._still
 
-    def begin(self, memory: BodyMemory, dt: float, heights: Heights) -> Trial:
+    def begin(self, memory: BodyMemory, dt: float, heights: Heights, growth: float = 0.0) -> Trial:
         """Begin a step of modulus alpha under the effective heights `h + r/alpha`, in place of one that has begun from
-        the same memory; local to this rank."""
-        if self._coefficients is None or self._coefficients.dt != dt:
-            self._coefficients = self._coefficients_of(dt)
-        step, u = self._coefficients, surface_of(memory)
-        loops.begin(memory.branches, *memory.pending, memory.increment, *step.weights, u, *heights.parts)
-        memory.pending = self._still
-        return Trial(step.alpha, memory.increment, heights, step.advance)
+        the same memory; local to this rank.
 
-    def _coefficients_of(self, dt: float) -> _Coefficients:
-        decay, gain = self.coefficients(dt)
-        total = float(gain[self.moving].sum())
+        The step is `growth` times as long as the one before; 0 after a jump and where a stage begins.
+        """
+        if self._coefficients is None or (self._coefficients.dt, self._coefficients.growth) != (dt, growth):
+            self._coefficients = self._coefficients_of(dt, growth)
+        step, u = self._coefficients, surface_of(memory)
+        maps = memory.increment, memory.before
+        loops.begin(memory.branches, *memory.pending, *maps, *step.weights, u, *heights.parts)
+        memory.pending = self._still
+        return Trial(step.alpha, memory.before, heights, step.advance)
+
+    def _coefficients_of(self, dt: float, growth: float) -> _Coefficients:
+        decay, gain, back = self.coefficients(dt, growth)
+        total, past = float(gain[self.moving].sum()), float(back[self.moving].sum())
         alpha = self._spring + total
-        decay, gain = decay[self.kept], gain[self.kept]
-        return _Coefficients(dt, alpha, (decay, gain), (decay / alpha, total / alpha))
+        advance = Advance(decay[self.kept], gain[self.kept], back[self.kept])
+        return _Coefficients(dt, growth, alpha, advance, (advance.decay / alpha, total / alpha, past / alpha))
 
     def commit(self, memory: BodyMemory, trial: Trial, displacement: Array, out: Array) -> BodyMemory:
         """Return the memory after a step, with its displacement in the map `out`; local to this rank.
@@ -231,7 +247,7 @@ class ZenerBody:
         `displacement` is `A p/alpha`, which under the effective heights stands for that of the surface.
         """
         loops.commit(displacement, trial.effective, surface_of(memory), *trial.heights.parts, out)
-        return BodyMemory(out, memory.branches, memory.increment, trial.advance)
+        return BodyMemory(out, memory.branches, trial.effective, memory.increment, trial.advance)
 
     def displacement(self, memory: BodyMemory, of_pressure: Callable[[], Array], alpha: float) -> Array:
         return surface_of(memory)
@@ -239,7 +255,8 @@ class ZenerBody:
     def settle(self, memory: BodyMemory) -> None:
         """Advance the branch maps now, for somebody who reads them; the run goes on to the same digits."""
         u = surface_of(memory)
-        loops.begin(memory.branches, *memory.pending, memory.increment, self._still[0], 0.0, u, u, 0)
+        maps = memory.increment, memory.before
+        loops.begin(memory.branches, *memory.pending, *maps, self._still.decay, 0.0, 0.0, u, u, 0)
         memory.pending = self._still
 
     def entries(self, memory: BodyMemory, units: Units) -> dict[str, Entry]:
@@ -253,7 +270,8 @@ class ZenerBody:
     def memory_entries(
         self, memory: BodyMemory, unit: float, symbol: str, branch_unit: float, branch_symbol: str
     ) -> dict[str, Entry]:
-        """Return the displacement, the branch maps and which branches are frozen, with the units of both kinds of maps.
+        """Return the displacement and its last increment, the branch maps and which branches are frozen, with the units
+        of both kinds of maps.
 
         Maps of branches that had none when a checkpoint was written are restored without.
         """
@@ -261,7 +279,9 @@ class ZenerBody:
         frozen = np.array([float(k not in self.moving) for k in range(len(self.prony.moduli))])
         maps = zip(self.kept, memory.branches, strict=True)
         branches = {f"branch {k}": Entry(branch, branch_unit, branch_symbol, optional=True) for k, branch in maps}
-        return {"displacement": Entry(surface_of(memory), unit, symbol), "frozen": Entry(frozen), **branches}
+        increment = Entry(memory.increment, unit, symbol)
+        surface = {"displacement": Entry(surface_of(memory), unit, symbol), "increment": increment}
+        return {**surface, "frozen": Entry(frozen), **branches}
 
     def restored(self, memory: BodyMemory, saved: Saved) -> BodyMemory:
         """Return the memory that a checkpoint has, whose maps have been read into those of this one.

@@ -4,11 +4,16 @@ With `<a, b>` the sum over points, branch k stores `<h_k, A^-1 h_k>/(2 G_k)` and
 `<h_k, A^-1 h_k>/(G_k tau_k)` per time; the parallel spring stores `G_inf <u, A^-1 u>/2`. All of them follow from
 `w = A^-1 du` of each step by products with the maps that are there anyway.
 
-The exponential integrator moves a body whose u is linear in time within a step: work and dissipation are the exact
-integrals over that motion, and the balance closes but for rounding. How well the motion itself is resolved shows in the
-work against that of the forces on the surface, the integral of `W dd - F ds`. Backward Euler knows no motion within a
-step: its work is that of the trapezoidal rule, its dissipation that of the end of the step, and the balance closes to
-first order in the time step.
+The exponential integrators move a body whose u is linear or quadratic in time within a step (`physics.body`): work and
+dissipation are the exact integrals over that motion, and the balance closes but for rounding. With `0 <= s <= 1`,
+`z = dt/tau` and the bend `c = kappa/2 (du - r du_before)`,
+
+    u' = du + (2 s - 1) c,     h = exp(-z s) h_0 + G a du + G b c,                                                (1)
+    a = (1 - exp(-z s))/z,     b = int_0^s exp(-z (s - x)) (2 x - 1) dx.
+
+How well the motion itself is resolved shows in the work against that of the forces on the surface, the integral of
+`W dd - F ds`. Backward Euler knows no motion within a step: its work is that of the trapezoidal rule, its dissipation
+that of the end of the step, and the balance closes to first order in the time step.
 """
 
 from collections.abc import Callable
@@ -21,18 +26,20 @@ from ..parallel.slab import Array, Slab
 from . import loops
 from .body import BodyMemory, Heights, ZenerBody, surface_of
 from .entries import Entry, MapCount, Saved
-from .prony import Prony
+from .prony import Prony, bend
 from .units import Units
 
-SMALL = 1e-2  # rounding: z below which differences of exponentials are summed as series, here to ten digits
+SMALL = 1.0  # rounding: z below which integrals over a step are sums of Gauss's rule, to fifteen digits
+NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.legendre.leggauss(10), (1, 0), strict=True))
 
 
 @dataclass(frozen=True)
 class EnergyMemory:
     """Memory of the energies of a body: sums since the start, in the unit of the scene, `dissipated` by branch.
 
-    A body with branches goes on from `spring`, `<u, A^-1 u>`, and `branches`, `<h_k, A^-1 h_k>`; `elastic` is the
-    memory of `ElasticPressure` where there is one.
+    A body with branches goes on from `spring`, `<u, A^-1 u>`, `branches`, `<h_k, A^-1 h_k>`, and from what the last
+    increment of u makes: `increment`, `<du, A^-1 du>`, and `crossed`, `<h_k, A^-1 du>`. `elastic` is the memory of
+    `ElasticPressure` where there is one.
     """
 
     work: float = 0.0
@@ -40,6 +47,8 @@ class EnergyMemory:
     dissipated: Array = field(default_factory=lambda: np.zeros(0))
     spring: float = 0.0
     branches: Array = field(default_factory=lambda: np.zeros(0))
+    increment: float = 0.0
+    crossed: Array = field(default_factory=lambda: np.zeros(0))
     elastic: BodyMemory | None = None
 
     def without_work(self, before: "EnergyMemory") -> "EnergyMemory":
@@ -64,30 +73,61 @@ class Inverse(Protocol):
     def apply(self, field: Array, out: Array) -> Array: ...
 
 
-def dissipation_weights(z: Array) -> tuple[Array, Array, Array]:
-    """Weights of `S = <h, A^-1 h>/G`, `X = <h, w>` and `D = G <du, w>` in the dissipation over a step `z = dt/tau`.
-
-    With h the branch map before the step: the integral of `<h, A^-1 h>/(G tau)` over it, u being linear in time.
+class StepProducts(NamedTuple):
+    """Products of a branch and of the motion (1) in a step: `S = <h_0, A^-1 h_0>/G`, `X = <h_0, A^-1 du>`,
+    `D = G <du, A^-1 du>`, `Y = <h_0, A^-1 c>`, `E = G <du, A^-1 c>` and `F = G <c, A^-1 c>`; or their weights in a sum.
     """
-    e = -np.expm1(-z)
-    safe = np.where(z > 0.0, z, 1.0)
-    closed = (z - e - 0.5 * e**2) / safe / safe
-    x = np.minimum(z, SMALL)
-    series = x * (1 / 3 - x * (1 / 4 - x * (7 / 60 - x * (1 / 24 - 31 / 2520 * x))))
-    return 0.5 * e * (2.0 - e), e * (e / safe), np.where(z < SMALL, series, closed)
+
+    s: Array
+    x: Array
+    d: Array
+    y: Array
+    e: Array
+    f: Array
+
+    def dot(self, other: "StepProducts") -> Array:
+        return np.asarray(sum(one * two for one, two in zip(self, other, strict=True)))
 
 
-def bend_weights(z: Array) -> tuple[Array, Array]:
-    """Weights of X and D, as above, in what the work over a step `z = dt/tau` exceeds that of the trapezoidal rule by.
+def dissipation_weights(z: Array) -> StepProducts:
+    """Return the weights in the dissipation over a step `z = dt/tau`, the integral of `<h, A^-1 h>/(G tau)`."""
+    z = np.asarray(z, np.float64)
+    safe, small = np.maximum(z, SMALL), np.minimum(z, SMALL)
+    lost, q = -np.expm1(-safe), bend(safe)
+    twice = 0.5 * lost * (2.0 - lost)
+    crossed = -2.0 * q - 2.0 * lost / safe / safe + (1.0 + 2.0 / safe) * twice / safe
+    closed = StepProducts(
+        twice,
+        lost * (lost / safe),
+        (safe - lost - 0.5 * lost**2) / safe / safe,
+        2.0 * crossed,
+        -2.0 * (2.0 * q + crossed) / safe,
+        2.0 * (1.0 / (6.0 * safe) - q / safe * (1.0 + 2.0 / safe) - q**2),
+    )
+    past, change, bent = motion_at_nodes(small)
+    parts = past * past, 2.0 * past * change, change * change, 2.0 * past * bent, 2.0 * change * bent, bent * bent
+    return StepProducts(
+        *(np.where(z < SMALL, small * (part @ WEIGHTS), one) for part, one in zip(parts, closed, strict=True))
+    )
 
-    It is the mean of the branch's `h(t)` over the step, u being linear in time, less the mean of its two ends.
-    """
-    e = -np.expm1(-z)
-    safe = np.where(z > 0.0, z, 1.0)
-    x = np.minimum(z, SMALL)
-    series = x * (1 / 12 - x * (1 / 24 - x * (1 / 80 - x / 360)))
-    of_change = np.where(z < SMALL, series, (1.0 - 0.5 * e - e / safe) / safe)
-    return -z * of_change, of_change
+
+def bend_weights(z: Array) -> StepProducts:
+    """Return the weights in what the work over a step `z = dt/tau` exceeds that of the trapezoidal rule by: the
+    integral of `<h, A^-1 u'>` less the mean of `<h, A^-1 du>` at both ends."""
+    z = np.asarray(z, np.float64)
+    safe, small = np.maximum(z, SMALL), np.minimum(z, SMALL)
+    q = bend(z)
+    closed = 1.0 / (3.0 * safe) - 2.0 * bend(safe) * (1.0 + 2.0 / safe) / safe
+    series = motion_at_nodes(small)[2] @ (WEIGHTS * (2.0 * NODES - 1.0))
+    return StepProducts(np.zeros_like(z), -z * q, q, -2.0 * q, -q, np.where(z < SMALL, series, closed))
+
+
+def motion_at_nodes(z: Array) -> tuple[Array, Array, Array]:
+    """Return `exp(-z s)`, a and b of (1) at NODES, along a further axis, for z up to SMALL."""
+    x = z[..., None] * NODES
+    change = NODES * (np.exp(-x[..., None] * NODES) @ WEIGHTS)
+    later = 2.0 * NODES[:, None] * (1.0 - NODES) - 1.0  # 2 x - 1 at x = s - s y
+    return np.exp(-x), change, NODES * ((np.exp(-x[..., None] * NODES) * later) @ WEIGHTS)
 
 
 class ElasticEnergy:
@@ -103,7 +143,14 @@ class ElasticEnergy:
         return EnergyMemory()
 
     def advance(
-        self, memory: EnergyMemory, dt: float, now: Pressed, before: Pressed, u: Array, body: BodyMemory
+        self,
+        memory: EnergyMemory,
+        dt: float,
+        now: Pressed,
+        before: Pressed,
+        u: Array,
+        body: BodyMemory,
+        growth: float = 0.0,
     ) -> EnergyMemory:
         """Return the energies after a solve for a pressure and the displacement u; one reduction; collective."""
         stored = 0.5 * now.modulus * self.slab.sum(loops.dot(now.p, u))[0]
@@ -130,7 +177,7 @@ class AppliedInverse:
     def at_rest(self) -> None:
         """Return no memory."""
 
-    def advance(self, memory: BodyMemory | None, dt: float, p: Array, du: Array) -> tuple[Array, None]:
+    def advance(self, memory: BodyMemory | None, dt: float, p: Array, du: Array, growth: float) -> tuple[Array, None]:
         """Return `A^-1 du`, and no memory; collective."""
         return self._inverse.apply(du, self._scratch()), None
 
@@ -165,12 +212,14 @@ class ElasticPressure:
     def at_rest(self) -> BodyMemory:
         return self.body.at_rest()
 
-    def advance(self, memory: BodyMemory | None, dt: float, p: Array, du: Array) -> tuple[Array, BodyMemory]:
+    def advance(
+        self, memory: BodyMemory | None, dt: float, p: Array, du: Array, growth: float
+    ) -> tuple[Array, BodyMemory]:
         """Return what v has grown by in a step to the pressure `alpha p`, which is `A^-1 du`, and the memory after it,
         in the maps of the one before; local to this rank."""
         assert memory is not None
         v = surface_of(memory)
-        now = self.body.commit(memory, self.body.begin(memory, dt, Heights(v)), p, v)
+        now = self.body.commit(memory, self.body.begin(memory, dt, Heights(v), growth), p, v)
         return now.increment, now
 
     def entries(self, memory: BodyMemory | None, units: Units) -> dict[str, Entry]:
@@ -197,32 +246,48 @@ class ZenerEnergy:
     def at_rest(self) -> EnergyMemory:
         """Return the energies of a body into which nothing has been pressed."""
         count = len(self.material.prony.moduli)
-        return EnergyMemory(dissipated=np.zeros(count), branches=np.zeros(count), elastic=self.inverse.at_rest())
+        none = np.zeros(count)
+        return EnergyMemory(dissipated=none, branches=none, crossed=none, elastic=self.inverse.at_rest())
 
     def advance(
-        self, memory: EnergyMemory, dt: float, now: Pressed, before: Pressed, u: Array, body: BodyMemory
+        self,
+        memory: EnergyMemory,
+        dt: float,
+        now: Pressed,
+        before: Pressed,
+        u: Array,
+        body: BodyMemory,
+        growth: float = 0.0,
     ) -> EnergyMemory:
         """Return the energies after a step to the pressure `now` from `before`, with the memory of the body after it;
-        one reduction; collective. The maps of an `elastic` memory are those of the one before."""
+        one reduction; collective. The step is `growth` times as long as the one before (`physics.body`). The maps of an
+        `elastic` memory are those of the one before."""
         material, du, moduli = self.material, body.increment, self.material.prony.moduli
-        w, elastic = self.inverse.advance(memory.elastic, dt, now.p, du)
+        w, elastic = self.inverse.advance(memory.elastic, dt, now.p, du, growth)
         sums = [loops.dot(branch, w) for branch in body.branches]
-        work = loops.work(*now, *before, du)
-        *products, own, total, work = self.slab.sum(*sums, loops.dot(du, w), loops.dot(surface_of(body), w), work)
-        crossed, past = np.array(products), memory.branches
-        decay, gain = material.coefficients(dt)
-        branches = decay**2 * past + 2 * decay * gain * crossed + gain**2 * own
+        sums += [loops.dot(body.before, w), loops.dot(du, w), loops.dot(surface_of(body), w)]
+        *products, past, own, total, work = self.slab.sum(*sums, loops.work(*now, *before, du))
+        crossed = np.array(products)
+        decay, gain, back = material.coefficients(dt, growth)
+        branches = decay**2 * memory.branches + 2 * decay * (gain * crossed + back * memory.crossed)
+        branches += gain**2 * own + 2 * gain * back * past + back**2 * memory.increment
         spring = memory.spring + (2 * total - own)
         stored = 0.5 * (material.prony.modulus_inf * spring + float(np.sum(branches / moduli)))
         z, dissipated = material.elapsed(dt), memory.dissipated
         if dt == 0.0:  # a jump is elastic: nothing is lost in it
             work = stored - memory.stored
-        elif material.integrator == "exponential":
-            work = work + float(np.sum(_weighted(bend_weights(z), crossed, moduli * own)))
-            dissipated = dissipated + _weighted(dissipation_weights(z), past / moduli, crossed, moduli * own)
-        else:
+        elif material.integrator == "backward-euler":
             dissipated = dissipated + z * branches / moduli
-        return EnergyMemory(memory.work + work, stored, dissipated, spring, branches, elastic)
+        else:
+            half = growth / (1.0 + growth) if material.integrator == "exponential" else 0.0  # kappa/2
+            y = half * (crossed - growth * memory.crossed)
+            e = half * (own - growth * past)
+            f = half**2 * (own - 2.0 * growth * past + growth**2 * memory.increment)
+            seen = StepProducts(memory.branches / moduli, crossed, moduli * own, y, moduli * e, moduli * f)
+            work = work + float(np.sum(bend_weights(z).dot(seen)))
+            dissipated = dissipated + dissipation_weights(z).dot(seen)
+        crossed = decay * crossed + gain * own + back * past
+        return EnergyMemory(memory.work + work, stored, dissipated, spring, branches, own, crossed, elastic)
 
     def entries(self, memory: EnergyMemory, units: Units) -> dict[str, Entry]:
         """Return the energies, the sums over maps that they go on from, and the memory of `ElasticPressure`."""
@@ -233,21 +298,20 @@ class ZenerEnergy:
             "dissipated": Entry(memory.dissipated, self.unit, "J"),
             "spring": Entry(memory.spring, spring, "m"),
             "branches": Entry(memory.branches, units.modulus**2 * spring, "Pa^2 m"),
+            "increment": Entry(memory.increment, spring, "m"),
+            "crossed": Entry(memory.crossed, units.modulus * spring, "Pa m"),
             **{f"elastic {name}": entry for name, entry in self.inverse.entries(memory.elastic, units).items()},
         }
 
     def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
         """Return the energies of a checkpoint, whose maps have been read into those of this memory."""
-        work, stored, spring = (float(saved[name]) for name in ("work", "stored", "spring"))
-        dissipated, branches = (np.array(saved[name], dtype=np.float64) for name in ("dissipated", "branches"))
+        work, stored, spring, increment = (float(saved[name]) for name in ("work", "stored", "spring", "increment"))
+        names = "dissipated", "branches", "crossed"
+        dissipated, branches, crossed = (np.array(saved[name], dtype=np.float64) for name in names)
         elastic = self.inverse.restored(memory.elastic, _of_elastic(saved))
-        return EnergyMemory(work, stored, dissipated, spring, branches, elastic)
+        return EnergyMemory(work, stored, dissipated, spring, branches, increment, crossed, elastic)
 
 
 def _of_elastic(saved: Saved) -> Saved:
     """Return the entries of the elastic memory, by its own names."""
     return {name.removeprefix("elastic "): value for name, value in saved.items() if name.startswith("elastic ")}
-
-
-def _weighted(weights: tuple[Array, ...], *terms: Array) -> Array:
-    return np.asarray(sum(weight * term for weight, term in zip(weights, terms, strict=True)))

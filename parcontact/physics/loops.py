@@ -16,9 +16,9 @@ def roll(source, offset, target):
 
 
 @loop
-def begin(branches, decay, gain, buffer, weight, weight_u, u, heights, offset):
-    """Advance the branches, `h_k <- decay_k h_k + gain_k buffer`, and form the next effective heights in `buffer`:
-    `heights(i - offset) + sum weight_k h_k - weight_u u`.
+def begin(branches, decay, gain, back, du, buffer, weight, weight_u, weight_du, u, heights, offset):
+    """Advance the branches, `h_k <- decay_k h_k + gain_k du + back_k buffer`, and form the next effective heights in
+    `buffer`: `heights(i - offset) + sum weight_k h_k - weight_u u + weight_du du`.
 
     Four branches at once keep more of the memory's channels busy than one after the other.
     """
@@ -28,31 +28,32 @@ def begin(branches, decay, gain, buffer, weight, weight_u, u, heights, offset):
     for j in range(ny):
         effective[start:] = heights[j, : nx - start]
         effective[:start] = heights[j, nx - start :]
-        change = buffer[j]
+        change, before = du[j], buffer[j]
         for i in range(nx):
-            effective[i] -= weight_u * u[j, i]
+            effective[i] += weight_du * change[i] - weight_u * u[j, i]
         for k in range(0, count - 3, 4):
             rows = branches[k, j], branches[k + 1, j], branches[k + 2, j], branches[k + 3, j]
-            _advance_four(*rows, decay[k:], gain[k:], weight[k:], change, effective)
+            _advance_four(*rows, decay[k:], gain[k:], back[k:], weight[k:], change, before, effective)
         for k in range(count - count % 4, count):
-            a, b, c = 1.0 - decay[k], gain[k], weight[k]
+            a, b, c, e = 1.0 - decay[k], gain[k], weight[k], back[k]
             for i in range(nx):
-                branches[k, j, i] += b * change[i] - a * branches[k, j, i]
+                branches[k, j, i] += b * change[i] + e * before[i] - a * branches[k, j, i]
                 effective[i] += c * branches[k, j, i]
-        change[:] = effective
+        before[:] = effective
 
 
 @loop
-def _advance_four(a, b, c, d, decay, gain, weight, change, effective):
+def _advance_four(a, b, c, d, decay, gain, back, weight, change, before, effective):
     """The same of four branches in one row."""
     fall_a, fall_b, fall_c, fall_d = 1.0 - decay[0], 1.0 - decay[1], 1.0 - decay[2], 1.0 - decay[3]
     rise_a, rise_b, rise_c, rise_d = gain[0], gain[1], gain[2], gain[3]
+    back_a, back_b, back_c, back_d = back[0], back[1], back[2], back[3]
     weight_a, weight_b, weight_c, weight_d = weight[0], weight[1], weight[2], weight[3]
     for i in range(change.size):
-        a[i] += rise_a * change[i] - fall_a * a[i]
-        b[i] += rise_b * change[i] - fall_b * b[i]
-        c[i] += rise_c * change[i] - fall_c * c[i]
-        d[i] += rise_d * change[i] - fall_d * d[i]
+        a[i] += rise_a * change[i] + back_a * before[i] - fall_a * a[i]
+        b[i] += rise_b * change[i] + back_b * before[i] - fall_b * b[i]
+        c[i] += rise_c * change[i] + back_c * before[i] - fall_c * c[i]
+        d[i] += rise_d * change[i] + back_d * before[i] - fall_d * d[i]
         effective[i] += weight_a * a[i] + weight_b * b[i] + weight_c * c[i] + weight_d * d[i]
 
 
@@ -103,10 +104,10 @@ def measure(p, u, h, mask, above, cyclic):
 
 
 @loop
-def embedded(branches, decay, increment, gain, p, u, heights, offset, first, stride):
-    """Over every so many rows: sums of p, of p e^2 with `e = sum decay_k h_k + gain increment`, of p u^2, of p times
-    the squared difference of the heights h on both sides, those of `heights(i - offset)`, cyclic, of p h, of p h^2
-    and of p increment^2.
+def embedded(branches, decay, increment, gain, before, past, p, u, heights, offset, first, stride):
+    """Over every so many rows: sums of p, of p e^2 with `e = sum decay_k h_k + gain increment + past before`, of p u^2,
+    of p times the squared difference of the heights h on both sides, those of `heights(i - offset)`, cyclic, of p h, of
+    p h^2 and of p increment^2.
 
     Points without pressure are passed over: each run of those with pressure is looked at for itself.
     """
@@ -125,7 +126,7 @@ def embedded(branches, decay, increment, gain, p, u, heights, offset, first, str
                 end += 1
             here, moved, flat, run = p[j, start:end], increment[j, start:end], u[j, start:end], e[start:end]
             for i in range(here.size):
-                run[i] = gain * moved[i]
+                run[i] = gain * moved[i] + past * before[j, start + i]
             for k in range(count):
                 branch = branches[k, j, start:end]
                 for i in range(here.size):

@@ -7,14 +7,17 @@ paper "Transient frictionless contact of a rough rigid surface on a viscoelastic
 time 0 (no stress after the first instant) or infinity (a spring).
 """
 
-from typing import Literal, NamedTuple
+import math
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-Integrator = Literal["backward-euler", "exponential"]
+BEND_SERIES = 1.0  # rounding: z below which q is summed as a series, to sixteen digits
+BEND_TERMS = [0.5 * n / math.factorial(n + 2) for n in range(1, 18)]
+Integrator = Literal["exponential", "exponential-linear", "backward-euler"]
 Moduli = tuple[float, ArrayLike, ArrayLike]  # long-term modulus (Pa), moduli (Pa), relaxation times (s); a Prony is one
 
 
@@ -124,20 +127,23 @@ def discrete_modulus(
     """The complex modulus (Pa) that time steps dt > 0 (s) give to a displacement sampled from exp(i omega t).
 
     With z = exp(i omega dt) the terms of G_inf + sum_j H_j are
-        backward Euler: H_j = G_j (1 - 1/z) / (1 + dt/tau_j - 1/z)
-        exponential:    H_j = G_j phi_j (1 - 1/z) / (1 - exp(-dt/tau_j)/z),   phi_j = (1 - exp(-dt/tau_j)) tau_j/dt
-    (z-transforms of the two one-step recursions, the latter being exact for piecewise linear displacement.)
+        backward Euler:      H_j = G_j (1 - 1/z) / (1 + dt/tau_j - 1/z)
+        exponential-linear:  H_j = G_j phi_j (1 - 1/z) / (1 - exp(-dt/tau_j)/z)
+        exponential:         H_j = G_j (phi_j + q_j (1 - 1/z)) (1 - 1/z) / (1 - exp(-dt/tau_j)/z)
+    (z-transforms of the recursions that `coefficients` has, for steps of one length.)
     N steps per period is dt = 2 pi/(N omega). omega and dt broadcast.
     """
     spring, terms, times = normal_form(*material)
     omega, dt = (np.asarray(value, float)[..., None] for value in (omega, dt))
     ratio, turn = dt / times, 1j * omega * dt
+    change = -np.expm1(-turn)
     if integrator == "backward-euler":
-        gains = -np.expm1(-turn) / (ratio - np.expm1(-turn))
-    elif integrator == "exponential":
-        gains = -np.expm1(-ratio) / ratio * np.expm1(-turn) / np.expm1(-ratio - turn)
+        gains = change / (ratio + change)
+    elif integrator in ("exponential", "exponential-linear"):
+        weight = -np.expm1(-ratio) / ratio + (bend(ratio) * change if integrator == "exponential" else 0.0)
+        gains = weight * change / -np.expm1(-ratio - turn)
     else:
-        raise ValueError(f'The integrator must be "backward-euler" or "exponential", not "{integrator}".')
+        raise ValueError(f"The integrator must be one of {', '.join(get_args(Integrator))}, not {integrator}.")
     return np.asarray(spring + gains @ terms)
 
 
@@ -146,13 +152,38 @@ def elapsed(prony: Prony, dt: float) -> Array:
     return np.asarray(dt / np.maximum(prony.relaxation_times, 1e-100 * dt))
 
 
-def coefficients(prony: Prony, integrator: str, dt: float) -> tuple[Array, Array]:
-    """`decay` and `gain` of each branch over a step dt; dt = 0 is a jump, in which nothing relaxes."""
+class Advance(NamedTuple):
+    """Coefficients of branches over a step: `h <- decay h + gain du + back du_before`, with the increments du of the
+    displacement in this step and in the step before."""
+
+    decay: Array
+    gain: Array
+    back: Array
+
+
+def coefficients(prony: Prony, integrator: str, dt: float, growth: float = 0.0) -> Advance:
+    """Return how each branch advances over a step dt; dt = 0 is a jump, in which nothing relaxes.
+
+    `growth` is dt over the length of the step before, 0 where the displacement was not smooth: with it the exponential
+    integrator takes u to be quadratic in time (`physics.body`), else linear.
+    """
     z = elapsed(prony, dt)
     if integrator == "backward-euler":
-        return 1.0 / (1.0 + z), prony.moduli / (1.0 + z)
+        return Advance(1.0 / (1.0 + z), prony.moduli / (1.0 + z), np.zeros_like(z))
     phi = np.divide(-np.expm1(-z), z, out=np.ones_like(z), where=z > 0.0)
-    return np.exp(-z), prony.moduli * phi
+    curved = 2.0 * growth / (1.0 + growth) * bend(z) if integrator == "exponential" else np.zeros_like(z)
+    return Advance(np.exp(-z), prony.moduli * (phi + curved), -growth * prony.moduli * curved)
+
+
+def bend(z: ArrayLike) -> Array:
+    """Return `q(z) = int_0^1 exp(-z x) (1/2 - x) dx`, `(1 + exp(-z))/(2 z) - (1 - exp(-z))/z^2`: what a branch keeps of
+    a bend of the displacement within a step `z = dt/tau`."""
+    z = np.asarray(z, float)
+    safe = np.maximum(z, BEND_SERIES)
+    lost = np.expm1(-safe)
+    closed = (0.5 * (2.0 + lost) + lost / safe) / safe
+    small = np.minimum(z, BEND_SERIES)
+    return np.asarray(np.where(z < BEND_SERIES, small * np.polynomial.polynomial.polyval(-small, BEND_TERMS), closed))
 
 
 def creep_spectrum(*material: *Moduli) -> CreepSpectrum:

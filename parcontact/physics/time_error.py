@@ -1,6 +1,6 @@
 """How wrong friction is by the length of a time step, part of the error budget (`budget`), from two looks at it.
 
-The displacement is taken to change evenly within a step. Of a harmonic wave, which turns by an angle theta in a step,
+A linear step takes the displacement to change evenly. Of a harmonic wave, which turns by an angle theta in a step,
 the force of a branch with z = dt/tau is then wrong by theta^2/12 of its loss where the branch is slow, by theta^2/6
 where it is fast, and late by L/2 of a step,
 
@@ -14,20 +14,27 @@ forces are late by:
 
     E = PASSING_FRICTION (1 - A^4) x (<L> + PASSING_LOSS x),      omega = x/dt.
 
+A quadratic step follows the bend of the motion as well. In full contact its loss is wrong by 0.25 to 0.33 of
+theta^2 <L> and by theta^4/75 (`prony.discrete_modulus`), of which CURVED_TURN and CURVED_TURN_4 are 1.5 times as much.
+Edges leave an error of third order in what passes in a step, CURVED_PASSING x^3 (`scripts/march_errors.py`).
+
 It knows nothing else of the material or of the speed. Jumps, loads that change and creep are seen by the embedded pair
 (`embedded`). Together they are 0.5 to 2.7 times the true error of 36 slides in steps of a cell, a half and a quarter:
 spheres, cylinders and rough surfaces from 0.8 % to full contact, 0.005 to 10 m/s, bodies of one branch, of five and of
 twelve, steady or at three hundred times the speed of before; but for one error of 42 % (0.43). The constants are
 fitted to these; most scenes of `scripts/error_coverage.py` are others.
 
-Over one step the pair differs in the second order of the step where all branches are slow, in the first where some are
-as fast as the step is short; the error that all steps of the exponential integrator leave in the end is of an order of
+After a jump at rest a quadratic step is as wrong as it differs from a linear one, 0.3 to 1.2 times.
+
+Over one step the pair of a linear step differs in the second order of the step where all branches are slow, in the
+first where some are as fast as the step is short; the error that all linear steps leave in the end is of an order of
 1.7. In a slide in partial contact the pair is as a rule two or three times too large, and ten times too small where the
 branches are far slower or faster than the contact passes: PAIR_SHARE of it counts there, for what edges do not show.
 
-Friction that changes from step to step comes late, by <L> of the change at most (`error_of_rise`). Right after a jump
-of the load it is that of an elastic body: none, but for errors of the mesh. So the next change is not known. In all of
-155 slides over a few cells from rest, one cell in a step, the estimate in all was at least half of the true error.
+Friction that changes from step to step comes late, by <L> of the change at most, CURVED_RISE of it in quadratic steps
+(`error_of_rise`). Right after a jump of the load it is that of an elastic body: none, but for errors of the mesh. So
+the next change is not known. In all of 155 slides over a few cells from rest, one cell in a step, the estimate in all
+was at least half of the true error.
 
 Backward Euler is of the first order, its error goes with the root of the difference. The area, which is wrong now by
 more and now by less than none, has a share of the error of friction: less where little is open.
@@ -51,7 +58,12 @@ FULL_LOSS = 1.0 / 8.0  # times the square of the angle by which waves turn in a 
 SLOW = 1e-3  # of its relaxation time: a step that is shorter, in which L has no digits left
 EXPONENTIAL_FRICTION = 1.7  # times the difference of the pair
 LEAST_POWER = 0.25  # by which the error falls faster than the difference of the pair, at least
-TIME_ORDER = 1.7  # of the error of the exponential integrator in the step, with contacts that begin and end
+TIME_ORDER = 1.7  # of the error of linear steps in their length, with contacts that begin and end
+CURVED_ORDER = 3.0  # of the error of quadratic steps
+CURVED_PASSING = 0.4  # times the cube of the share of the radius of a spot that a step is
+CURVED_TURN, CURVED_TURN_4 = 0.45, 0.02  # times <L> and the square of the angle, and its fourth power
+CURVED_PAIR = 1.0  # times the difference of the pair
+CURVED_RISE = 0.25  # of what comes late in a linear step
 EQUAL_DIFFERENCE = 0.0072  # of the pair, at which a material of many branches is no worse than one of a single branch
 FULL_POWER = 4  # of the area: so much of the error is as in full contact, where no edges pass
 PAIR_SHARE = 0.3  # of the error that the pair shows, at least, where something slides
@@ -99,7 +111,8 @@ class StepObservation:
     shares; by how many cells (of mean sides) the surface slid in it, in how many seconds; the points that penetrate
     without pressure, as a share of those in contact; by what angle a wave turned that is as high as the surface under
     the pressure and changes as much; by how much friction by the slopes of the rigid surface and of the body differ;
-    what an interface adds to friction; the direction in which the surface slides, 0 at rest."""
+    what an interface adds to friction; the direction in which the surface slides, 0 at rest; whether the displacement
+    is quadratic in time within the step."""
 
     complementarity: float
     difference: float
@@ -115,6 +128,7 @@ class StepObservation:
     views_apart: float = 0.0
     interface: float = 0.0
     way: Vector = (0.0, 0.0)
+    curved: bool = False
 
     @property
     def correction(self) -> float:
@@ -146,11 +160,16 @@ def count_spots(run: RunProperties, observed: StepObservation, points: int) -> f
 def time_error(run: RunProperties, observed: StepObservation, points: int) -> float:
     """Return what the length of a step adds to the error of friction, or would where something slides.
 
-    In contacts the error of the exponential integrator goes with the power TIME_ORDER of the step, the difference of
-    the pair with `order`.
+    In contacts the error of linear steps goes with the power TIME_ORDER of the step, the difference of the pair with
+    `order`.
     """
     if not run.exponential:
         return EULER_FRICTION * observed.difference**0.5
+    if observed.curved:
+        pair = CURVED_PAIR * observed.difference
+        if not observed.slid or run.prony is None:
+            return pair
+        return max(_error_of_curved(run, run.prony, observed, points), PAIR_SHARE * pair)
     power = max(LEAST_POWER, TIME_ORDER / max(observed.order, 1.0) - 1.0)
     fixed = 1.0 - FIXED_EDGES * observed.area**2
     pair = fixed * EXPONENTIAL_FRICTION * observed.difference * (observed.difference / EQUAL_DIFFERENCE) ** power
@@ -165,6 +184,13 @@ def _passing(run: RunProperties, prony: Prony, observed: StepObservation, points
     """Return the error of friction as edges of contact pass a point within a step: by a share x of the spot radius."""
     x = _share_passed(run, observed, points)
     return PASSING_FRICTION * x * (_late(prony, x, observed.seconds) + PASSING_LOSS * x)
+
+
+def _error_of_curved(run: RunProperties, prony: Prony, observed: StepObservation, points: int) -> float:
+    """Return the error of friction in a quadratic step, as edges of contact pass and as waves turn."""
+    full, late = observed.area**FULL_POWER, _late(prony, observed.angle, observed.seconds)
+    turning = CURVED_TURN * late * observed.angle**2 + CURVED_TURN_4 * observed.angle**4
+    return (1.0 - full) * CURVED_PASSING * _share_passed(run, observed, points) ** 3 + full * turning
 
 
 def _share_passed(run: RunProperties, observed: StepObservation, points: int) -> float:
@@ -188,7 +214,8 @@ def error_of_rise(run: RunProperties, observed: StepObservation, points: int, ch
     if math.isinf(change):
         modulus = complex_modulus(np.array(x / observed.seconds), *run.prony)
         change = uneven * observed.slope * float(modulus.imag / abs(modulus))
-    return _late(run.prony, x, observed.seconds) * abs(change) / observed.friction
+    late = _late(run.prony, x, observed.seconds) * (CURVED_RISE if observed.curved else 1.0)
+    return late * abs(change) / observed.friction
 
 
 def _turning(prony: Prony, observed: StepObservation) -> float:
@@ -204,6 +231,13 @@ def _late(prony: Prony, angle: float, seconds: float) -> float:
     lost = prony.moduli * angle * z / (z**2 + angle**2)
     total = float(lost.sum())
     return float((lost * late).sum()) / total if total > 0.0 else 0.0
+
+
+def order_of_time_error(integrator: str, curved: bool) -> float:
+    """Return the order of the error in the length of a step, which is `curved` or linear."""
+    if integrator == "backward-euler":
+        return 1.0
+    return CURVED_ORDER if integrator == "exponential" and curved else TIME_ORDER
 
 
 def share_of_area(run: RunProperties, observed: StepObservation) -> float:

@@ -2,7 +2,7 @@
 
 The mesh may make MESH_SHARE of an accuracy, time steps TIME_SHARE of it, or CHOSEN_SHARE where stages choose them. What
 the mesh makes of friction falls with the power SPOTS_ORDER of the cell, and of the contact area with the first; what
-time steps make with the power TIME_ORDER of the step, or the first for backward Euler. Nothing more is tried.
+time steps make with the order of the integrator (`physics.time_error`). Nothing more is tried.
 """
 
 import math
@@ -19,7 +19,7 @@ from ..job.checks.cells import cells_per_wave, fast_length, one_cell
 from ..job.sections.listing import plain
 from ..mesh import points_for
 from ..physics.mesh_error import SPOTS_ORDER
-from ..physics.time_error import TIME_ORDER
+from ..physics.time_error import order_of_time_error
 from ..printed import per_cent
 from .costs import Costs
 from .report import duration_text, ranks_text, unit_of
@@ -99,7 +99,7 @@ def _steps_for(
     of them takes. A slide that gives its steps has one for each cell at least."""
     if not span.count:
         return cost, calls
-    order = TIME_ORDER if own.numerics.integrator == "exponential" else 1.0
+    order = order_of_time_error(own.numerics.integrator, curved=True)
     share = CHOSEN_SHARE if isinstance(span.ends, ChosenEnds) else TIME_SHARE
     error = time_error(cost, sample) / (share * job.numerics.asked.of_steps)
     coarser = Timeline.of(sample.job).spans[span.index].count / span.count  # steps of the trial over the own ones

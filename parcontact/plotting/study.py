@@ -16,7 +16,7 @@ from . import charts, style
 
 NAMES = {"mu_max": "largest friction", "mu_end": "friction in the end", "area_corrected": "contact area, corrected"}
 MARKS = {"mesh and time together": "o-", "mesh with auto steps": "o-", "mesh alone": "s--", "time alone": "^:"}
-INTEGRATORS = {"exponential": style.BLUE, "backward-euler": style.RED}
+INTEGRATORS = {"exponential": style.BLUE, "exponential-linear": style.GREEN, "backward-euler": style.RED}
 COSTS = {"work": "transforms × N log₂ N", "seconds": "CPU time"}
 BAND = 5.0  # times the upper edge of the grey band over its lower one
 LEAST = 1e-7  # smaller errors are drawn here

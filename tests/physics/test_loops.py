@@ -28,16 +28,17 @@ def test_roll(offset: int) -> None:
 
 
 @pytest.mark.parametrize("offset", OFFSETS)
-@pytest.mark.parametrize("count", [0, 1, 3])
+@pytest.mark.parametrize("count", [0, 1, 3, 5])
 def test_begin(offset: int, count: int) -> None:
-    work, u, heights, *rest = maps(3 + count)
-    branches = np.array(rest).reshape(count, NY, NX)
-    decay, gain, weight = np.random.default_rng(1).uniform(size=(3, count))
-    advanced = decay[:, None, None] * branches + gain[:, None, None] * work
-    effective = roll(heights, offset) + np.tensordot(weight, advanced, 1) - 0.7 * u
-    loops.begin(branches, decay, gain, work, weight, 0.7, u, heights, offset)
+    du, work, u, heights, *rest = maps(4 + count)
+    branches, kept = np.array(rest).reshape(count, NY, NX), du.copy()
+    decay, gain, back, weight = np.random.default_rng(1).uniform(size=(4, count))
+    advanced = decay[:, None, None] * branches + gain[:, None, None] * du + back[:, None, None] * work
+    effective = roll(heights, offset) + np.tensordot(weight, advanced, 1) - 0.7 * u + 0.3 * du
+    loops.begin(branches, decay, gain, back, du, work, weight, 0.7, 0.3, u, heights, offset)
     assert_allclose(branches, advanced, rtol=1e-14, atol=1e-15)
     assert_allclose(work, effective, rtol=1e-14, atol=1e-14)
+    assert_array_equal(du, kept)
 
 
 @pytest.mark.parametrize("offset", OFFSETS)

@@ -34,14 +34,14 @@ def test_discrete_modulus_table(
 ) -> None:
     """Errors in per cent of a body of twelve decades, printed to 0.001."""
     exact = complex_modulus(omega, *TWELVE_DECADES)
-    for integrator, table in (("backward-euler", (storage_euler, loss_euler)), ("exponential", (storage, loss))):
+    for integrator, table in (("backward-euler", (storage_euler, loss_euler)), ("exponential-linear", (storage, loss))):
         dt = 2 * np.pi / (steps * omega)
         stepped = discrete_modulus(omega, dt, *TWELVE_DECADES, integrator=integrator)  # type: ignore[arg-type]
         errors = 100 * np.array([stepped.real / exact.real - 1, stepped.imag / exact.imag - 1])
         assert_allclose(errors, table, rtol=0, atol=6e-4)
 
 
-@pytest.mark.parametrize("integrator", ["backward-euler", "exponential"])
+@pytest.mark.parametrize("integrator", ["backward-euler", "exponential-linear", "exponential"])
 @pytest.mark.parametrize(("omega", "dt"), [(1e3, 1e-4), (100.0, 1e-3), (np.pi * 1e3, 1e-3), (5.0, 0.1)])
 def test_discrete_modulus_is_that_of_a_march(integrator: Integrator, omega: float, dt: float) -> None:
     """After 40 relaxation times nothing but rounding is left of the start; the last case takes steps of 100 of them."""
@@ -49,20 +49,20 @@ def test_discrete_modulus_is_that_of_a_march(integrator: Integrator, omega: floa
     parts = []
     for displacement in (phase.real, phase.imag):
         point = body(ZENER, integrator)
-        parts.append([push(point, now, dt) for now in displacement][-1])
+        parts.append([push(point, now, dt, float(n > 0)) for n, now in enumerate(displacement)][-1])
     assert_allclose(
         (parts[0] + 1j * parts[1]) / phase[-1], discrete_modulus(omega, dt, *ZENER, integrator=integrator), rtol=1e-10
     )
 
 
-@pytest.mark.parametrize("integrator", ["backward-euler", "exponential"])
+@pytest.mark.parametrize("integrator", ["backward-euler", "exponential-linear", "exponential"])
 def test_limits_of_discrete_modulus(integrator: Integrator) -> None:
-    """Short steps give the complex modulus (at first and second order), long ones the long-term spring."""
-    order = {"backward-euler": 1, "exponential": 2}[integrator]
+    """Short steps give the complex modulus (at first, second and third order), long ones the long-term spring."""
+    order = {"backward-euler": 1, "exponential-linear": 2, "exponential": 3}[integrator]
     exact = complex_modulus(1e3, *ZENER)
     errors = [abs(discrete_modulus(1e3, dt, *ZENER, integrator=integrator) - exact) for dt in (1e-5, 5e-6)]
     assert_allclose(errors[0] / errors[1], 2**order, rtol=0.01)
     for dt in (1e6, 1e300):
         lasting = discrete_modulus(1.0 / dt, dt, *ZENER, integrator=integrator)
-        assert_allclose(lasting, ZENER.modulus_inf, rtol=10 * 1e-3 / dt + 1e-15)
+        assert_allclose(lasting, ZENER.modulus_inf, rtol=20 * 1e-3 / dt + 1e-15)
     assert_allclose(discrete_modulus(1e3, 1e-13, *ZENER, integrator=integrator), exact, rtol=1e-9)

@@ -17,7 +17,7 @@ from parcontact.mesh import load_cases
 from parcontact.parallel.slab import Slab
 from parcontact.physics.budget import ErrorSums
 from parcontact.physics.mesh_error import SPOTS_ORDER
-from parcontact.physics.time_error import TIME_ORDER
+from parcontact.physics.time_error import CURVED_ORDER, TIME_ORDER
 from parcontact.plan import price
 from parcontact.plan.costs import Costs, costs_of
 from parcontact.plan.planning import only_steady_states
@@ -97,7 +97,10 @@ def test_heights_from_a_file_stay(tmp_path: Any) -> None:
     assert all(price.offer(seen, accuracy).job.grid == given.grid for accuracy in price.ACCURACIES)
 
 
-@pytest.mark.parametrize(("integrator", "order"), [("exponential", TIME_ORDER), ("backward-euler", 1.0)])
+@pytest.mark.parametrize(
+    ("integrator", "order"),
+    [("exponential", CURVED_ORDER), ("exponential-linear", TIME_ORDER), ("backward-euler", 1.0)],
+)
 def test_steps_go_by_the_order_of_the_integrator(integrator: str, order: float) -> None:
     """On the own mesh: the error of steps three times as long."""
     stage = {"pressure": 1e4, "duration": 1e-3, "time_step": 1e-5}
@@ -108,12 +111,12 @@ def test_steps_go_by_the_order_of_the_integrator(integrator: str, order: float) 
 
 
 def test_chosen_steps_make_what_they_are_chosen_for() -> None:
-    """The same error at the same accuracy takes as many; a tenth of it 10^(1/1.7) times as many."""
+    """The same error at the same accuracy takes as many; a tenth of it 10^(1/3) times as many."""
     chosen = {key: value for key, value in SLIDE.items() if key != "cells_per_step"}
     planned = job(grid={"points": 240, "size": 1e-3}, history=[chosen])
     seen = costs(planned, time=price.CHOSEN_SHARE * 0.01)
     lasting = Timeline.of(planned).spans[0].count
-    for accuracy, times in ((0.01, 1.0), (1e-3, 10 ** (1 / TIME_ORDER))):
+    for accuracy, times in ((0.01, 1.0), (1e-3, 10 ** (1 / CURVED_ORDER))):
         assert price.offer(seen, accuracy).sample.steps == pytest.approx(1 + lasting * times, abs=1.0)
 
 
@@ -140,9 +143,9 @@ def test_calls_grow_with_the_decades_of_the_tolerance() -> None:
 
 
 def test_from_a_coarser_grid() -> None:
-    """What was tried on twice the cell, and so twice the step, has 2^1.7 times the error of the own steps."""
+    """What was tried on twice the cell, and so twice the step, has 2^3 times the error of the own steps."""
     own = job(grid={"points": 160, "size": 1e-3})
-    tried = costs(job(grid=FINE), time=2.0**TIME_ORDER * price.TIME_SHARE * 0.01).sample
+    tried = costs(job(grid=FINE), time=2.0**CURVED_ORDER * price.TIME_SHARE * 0.01).sample
     seen = costs_of(own, tried, 1e30)
     assert seen.sample.steps == 1 + 160
     assert price.offer(seen, 0.01).sample.steps == 1 + 160

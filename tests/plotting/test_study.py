@@ -67,5 +67,5 @@ def test_how_errors_fall(tmp_path: Path, drawn: list[Figure]) -> None:
     assert not touching(figure)
     assert not outside(figure)
     assert len(figure.axes) == 3
-    assert len(figure.legends[0].get_texts()) == 6
+    assert len(figure.legends[0].get_texts()) == 9
     assert all(len(axes.patches) == 1 for axes in figure.axes)

@@ -116,18 +116,22 @@ def drift(periods: int, contact: str, modulus_inf: float = 1e6) -> Drift:
 def in_full_contact() -> Array:
     """Displacement [m] and branch maps [Pa m] at the end of a period, after infinitely many.
 
-    There u is the surface, less its mean. A period of increments adds `H = sum_j decay^j gain du_(N-j)` to a branch and
-    leaves `decay^N` of what was before it: `h = H/(1 - decay^N)`.
+    There u is the surface, less its mean. A period of N increments du adds to a branch
+    `H = sum_j decay^j G (phi du_(N-j) + q (du_(N-j) - du_(N-j-1)))` (`physics.body`), the latter not in the first step
+    of a way, and leaves `decay^N` of what was before it: `h = H/(1 - decay^N)`.
     """
     x, y = 2 * np.pi * np.arange(POINTS)[None, :] / POINTS, 2 * np.pi * np.arange(POINTS)[:, None] / POINTS
     surface = 5e-6 * np.cos(x) + 3e-6 * np.cos(2 * x + y + 0.3)
     places = [*range(WAY + 1), *range(WAY - 1, -1, -1)]
-    change = np.diff([np.roll(surface, place, axis=1) for place in places], axis=0)[::-1]
+    change = np.diff([np.roll(surface, place, axis=1) for place in places], axis=0)
+    bent = change - np.roll(change, 1, axis=0)
+    bent[::WAY] = 0.0
     maps = [surface]
     for modulus, tau in BRANCHES:
-        decay = np.exp(-DT / tau)
-        added = np.tensordot(decay ** np.arange(PERIOD), change, axes=1)
-        maps.append(modulus * (1.0 - decay) * tau / DT * added / (1.0 - decay**PERIOD))
+        z, decay = DT / tau, np.exp(-DT / tau)
+        phi, q = (1.0 - decay) / z, (1.0 + decay) / (2.0 * z) - (1.0 - decay) / z**2
+        added = np.tensordot(decay ** np.arange(PERIOD), (phi * change + q * bent)[::-1], axes=1)
+        maps.append(modulus * added / (1.0 - decay**PERIOD))
     return np.array(maps)
 
 

@@ -14,7 +14,7 @@ from parcontact.physics.prony import Integrator
 from parcontact.storage.row import Row
 from parcontact.theory import full_contact
 
-INTEGRATORS: tuple[Integrator, ...] = ("exponential", "backward-euler")
+INTEGRATORS: tuple[Integrator, ...] = ("exponential", "exponential-linear", "backward-euler")
 
 # velocity and the friction of steady sliding at one cell per step, of exponential and of backward Euler steps
 STEADY = [
@@ -36,13 +36,15 @@ def traction(rows: list[Row]) -> NDArray[np.float64]:
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize(("velocity", "exponential", "euler"), STEADY)
 def test_steady_friction(integrator: Integrator, velocity: float, exponential: float, euler: float) -> None:
-    """After 25 relaxation times the friction that these steps must give: printed to 7 digits, computed to 1e-9."""
+    """After 25 relaxation times the friction that these steps must give: computed to 1e-9, and printed to 7 digits but
+    for the quadratic steps."""
     cells = max(60, np.ceil(25e-3 * velocity / CELL))
     data = wave([{"velocity": velocity, "distance": cells * CELL, "cells_per_step": 1}], integrator=integrator)
     data["grid"]["size"][1] = 1e-4 * WAVELENGTH  # a very long and narrow box is all right
     _, rows = marched(data)
     found = rows[-1].measures.friction
-    assert found == pytest.approx(exponential if integrator == "exponential" else euler, rel=3e-7)
+    if integrator != "exponential":
+        assert found == pytest.approx(exponential if integrator == "exponential-linear" else euler, rel=3e-7)
     waves = (MEAN, HEIGHT, np.array([K]), np.array([0.0]), velocity, 0.0)
     exact = full_contact.discrete_friction_coefficient(*waves, CELL / velocity, *PRONY, integrator=integrator)
     assert found == pytest.approx(float(exact), rel=1e-9)
@@ -74,9 +76,9 @@ def transient(before: float, after: float, steps: int, integrator: Integrator) -
 
 
 def test_start_after_a_rest() -> None:
-    """Load, 1 ms of rest, sliding: within 1e-6 of the peak at 2000 steps in 5 ms, with order 2."""
+    """Load, 1 ms of rest, sliding: within 1e-6 of the peak at 500 steps in 5 ms, with order 3."""
     errors = []
-    for steps in (500, 1000, 2000):
+    for steps in (125, 250, 500):
         sliding = {"duration": 5e-3, "time_step": 5e-3 / steps, "velocity": FAST}
         stages = [{"duration": 1e-3, "time_step": 1e-3}, sliding]
         _, rows = marched(wave(stages, points=(8, 1)))
@@ -86,13 +88,15 @@ def test_start_after_a_rest() -> None:
         exact = full_contact.traction(HEIGHT, np.array([K]), np.array([0.0]), modulus)[:, 0] / MEAN
         errors.append(float(np.abs(traction(late) - exact).max() / np.abs(exact).max()))
     assert errors[-1] < 1e-6
-    assert_allclose(np.log2(errors[:-1]) - np.log2(errors[1:]), 2.0, rtol=0.01)
+    assert_allclose(np.log2(errors[:-1]) - np.log2(errors[1:]), 3.0, rtol=0.05)
     printed = [0, -1.20719, -2.35062, -5.32082, -8.62804, -10.6389, -9.73556]
     at = np.array([0, 0.1, 0.2, 0.5, 1, 2, 5]) * 1e-3
     assert_allclose(np.interp(at, t, traction(late)), 1e-4 * np.array(printed), rtol=0, atol=5e-6 * 1e-4 * 11)
 
 
-@pytest.mark.parametrize(("integrator", "order"), [("exponential", 2.0), ("backward-euler", 1.0)])
+@pytest.mark.parametrize(
+    ("integrator", "order"), [("exponential", 3.0), ("exponential-linear", 2.0), ("backward-euler", 1.0)]
+)
 def test_order_of_a_velocity_step(integrator: Integrator, order: float) -> None:
     errors = [transient(0.004, FAST, steps, integrator) for steps in (100, 200, 400)]
     assert_allclose(np.log2(errors[:-1]) - np.log2(errors[1:]), order, rtol=0.05)

@@ -56,9 +56,9 @@ ROWS: dict[str, tuple[Json, Json, dict[str, int] | None]] = {  # off, on, and wh
         {"history": [PRESS]},
         {"history": [PRESS], "material": RUBBER},
         {
-            "map bytes": 3 * MAP,
+            "map bytes": 4 * MAP,
             "allreduce": 10,
-        },  # branch, displacement, effective heights; at each of 5 steps the embedded pair and both views of friction
+        },  # branch, displacement, two increments; at each of 5 steps the embedded pair and both views of friction
     ),
     "layer": ({"history": [PRESS]}, {"history": [PRESS], "body": {"thickness": 1e-2}}, {}),
     "folded branches": (
@@ -84,7 +84,7 @@ ROWS: dict[str, tuple[Json, Json, dict[str, int] | None]] = {  # off, on, and wh
     "energy memory": (
         {"history": [PRESS], "material": RUBBER, "numerics": {"kernel": "love"}},
         {"history": [PRESS], "material": RUBBER, "numerics": {"kernel": "love"}, "output": {"energy": True}},
-        {"allreduce": 5, "map bytes": 3 * MAP},
+        {"allreduce": 5, "map bytes": 4 * MAP},
     ),
     "preconditioner in single precision": (
         {},

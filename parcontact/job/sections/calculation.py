@@ -33,7 +33,7 @@ from .quantities import (
     listed,
 )
 
-Integrator = Literal["exponential", "backward-euler"]
+Integrator = Literal["exponential", "exponential-linear", "backward-euler"]
 Kernel = Literal["spectral", "love"]
 Precision = Literal["double", "mixed"]
 FieldName = Literal["pressure", "displacement", "gap", "height", "temperature"]
