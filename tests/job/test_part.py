@@ -121,7 +121,7 @@ MATERIALS = {
         "3:37: material.branches.0 must have the keys G0, G1, eta1, modulus, relaxation_time or g, tau, got g0"
     ),
     "material: {model: zener, branches: [{G0: 1, modulus: 5}]}": (
-        "3:37: material.branches.0 mixes forms of a branch: give G0, G1, eta1 or modulus, "
+        "3:37: material.branches.0 mixes forms of a branch: give G0, G1, eta1, modulus, "
         "relaxation_time, got G0, modulus"
     ),
     "material: {model: zener, branches: [{G0: 1, G1: 1, eta1: .nan}]}": (
