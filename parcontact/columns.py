@@ -372,6 +372,10 @@ LEAK: Table = (
         "by what share K along x differs if only every second point of the gap counts; empty where contact closes",
     ),
     Column("error_y", "", "the same along y"),
+    Column(
+        *("flow_rate", "m³/s", "flow of the fluid of `--fluid` at the low side, in the direction that leaks more"),
+        when="--fluid",
+    ),
 )
 
 

@@ -135,6 +135,10 @@ def _leak(add: Add) -> None:
     add("--at", metavar="TIME|STEP", type=values.instant, help=text)
     text = "what is along the x axis (default: pressure, or time if the pressure stays)"
     add("--over", choices=("pressure", "time"), default="", help=text)
+    text = "a fluid, by its name (water, air, nitrogen, helium) or viscosity [Pa s]: adds its flow to the table"
+    add("--fluid", metavar="FLUID", type=values.fluid, help=text)
+    text = "pressures of the fluid at both ends [Pa], absolute ones of a gas"
+    add("--pressures", metavar="HIGH:LOW", type=values.pressure_drop, help=text)
 
 
 def _report(add: Add) -> None:

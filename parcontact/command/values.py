@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 INFINITE = float("inf")
@@ -87,3 +87,24 @@ def _spaced(text: str) -> tuple[float, ...]:
     if int(number) < 2 and first != last:
         raise argparse.ArgumentTypeError(f"a range first:last:count must have a count of 2 or more, got {text!r}")
     return log_range(text)
+
+
+def fluid(text: str) -> Any:
+    """A fluid of a name, or of a viscosity [Pa s]."""
+    from ..leakage.fluids import FLUIDS, Fluid
+
+    if text in FLUIDS:
+        return FLUIDS[text]
+    known = f"a fluid ({', '.join(FLUIDS)}) or a positive viscosity [Pa s]"
+    return Fluid("the fluid", checked(float, lambda value: 0.0 < value < INFINITE, known)(text))
+
+
+def pressure_drop(text: str) -> tuple[float, float]:
+    """Two pressures [Pa], the higher one first."""
+    try:
+        high, low = map(float, text.split(":"))
+    except ValueError:
+        high, low = 0.0, 0.0
+    if not 0.0 <= low < high < INFINITE:
+        raise argparse.ArgumentTypeError(f"must be HIGH:LOW [Pa], such as 2e5:1e5, got {text!r}")
+    return high, low

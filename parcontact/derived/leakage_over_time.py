@@ -10,12 +10,13 @@ import h5py
 import numpy as np
 
 from .. import scene
-from ..columns import LEAK, names_of, to_csv, values_of
+from ..columns import LEAK, choose_columns, names_of, to_csv, values_of
 from ..effects.contact_law import touching_of
 from ..errors import InputError
 from ..job import reading
 from ..job.resolved import RESOLVED, shown_job
 from ..leakage.flow import Flow, Leak, Map, leak, mesh_error, solve_flow
+from ..leakage.fluids import PressureDrop
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..plotting import conductivity, leakage
@@ -32,7 +33,8 @@ class Instant(NamedTuple):
 
     `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` these over K of the surface that just
     touches, NaN where that is not known; `constriction` [m] is the smallest gap on the widest path of the direction
-    that leaks more; `error_x` and `error_y` are by what share K differs on half the mesh (`flow.mesh_error`).
+    that leaks more; `error_x` and `error_y` are by what share K differs on half the mesh (`flow.mesh_error`);
+    `flow_rate` [m^3/s] is that of a fluid in this direction (`leakage.fluids`), NaN without one.
     """
 
     time: float
@@ -49,19 +51,24 @@ class Instant(NamedTuple):
     constriction_y: float
     error_x: float
     error_y: float
+    flow_rate: float = np.nan
 
 
 class Solved(NamedTuple):
-    """The flow at an instant, without its maps, and the error that the mesh makes along x and along y."""
+    """The flow at an instant, without its maps, the error that the mesh makes along x and along y, and the flow rates
+    [m^3/s] of a fluid."""
 
     leak: Leak
     errors: tuple[float, float]
+    rates: tuple[float, float]
 
 
 class Gaps:
-    """The saved gaps of a run, 0 in contact; those of the instant that is asked for, else all."""
+    """The saved gaps of a run, 0 in contact; those of the instant that is asked for, else all; `drop` is that of a
+    fluid which flows through them."""
 
-    def __init__(self, directory: Path, at: str = "") -> None:
+    def __init__(self, directory: Path, at: str = "", drop: PressureDrop | None = None) -> None:
+        self.drop = drop
         if not (directory / "measures.csv").is_file():
             what = (
                 "output directory of a run; those of a sweep are in its cases/" if directory.is_dir() else "directory"
@@ -106,12 +113,23 @@ class Gaps:
     def solve(self, index: int) -> tuple[Solved, list[Map]]:
         """Return the flow at a saved instant, and for both directions where it is."""
         gap, flows, errors, shown = self.read(index), list[Flow](), list[float](), list[Map]()
+        rates = list[float]()
         for axis in ("x", "y"):
             flow = solve_flow(gap, self.size, axis, self.periodic)
             shown.append(leakage.flux(gap, flow.pressure, self.size))
             flows.append(replace(flow, pressure=np.empty((0, 0))))
+            rates.append(self._rate(gap, flow, axis))
             errors.append(mesh_error(gap, flow, self.size, axis, self.periodic))
-        return Solved(Leak(*flows), (errors[0], errors[1])), shown
+        return Solved(Leak(*flows), (errors[0], errors[1]), (rates[0], rates[1])), shown
+
+    def _rate(self, gap: Map, flow: Flow, axis: str) -> float:
+        """Return the flow of the fluid along an axis [m^3/s], NaN without one."""
+        if self.drop is None:
+            return np.nan
+        length, width = self.size if axis == "x" else self.size[::-1]
+        slipping = self.drop.mean_free_path > 0.0
+        found = solve_flow(self.drop.conducting_gap(gap), self.size, axis, self.periodic) if slipping else flow
+        return self.drop.flow_rate(found.conductivity, length, width)
 
     def row(self, index: int, solved: Solved, bare: Leak | None) -> Instant:
         found = solved.leak
@@ -131,16 +149,18 @@ class Gaps:
             found.along_x.constriction,
             found.along_y.constriction,
             *solved.errors,
+            solved.rates[int(found.along_y.constriction > found.along_x.constriction)],
         )
 
 
-def write(directory: Path, at: str, over: str, comm: MPI.Intracomm) -> Iterator[str]:
+def write(directory: Path, at: str, over: str, comm: MPI.Intracomm, drop: PressureDrop | None = None) -> Iterator[str]:
     """Solve for the flow of the saved instants and write leak.csv and leak.png; of one instant leak.STEP.csv and
-    leak.STEP.png, with K `over` pressure or time, "" for a choice. Collective: ranks take an instant each.
+    leak.STEP.png, with K `over` pressure or time, "" for a choice; with the flow of a fluid under a pressure `drop`.
+    Collective: ranks take an instant each.
 
     Yields, on root, what to say. Raises InputError for a directory without gaps.
     """
-    gaps = Gaps(directory, at)
+    gaps = Gaps(directory, at, drop)
     gaps.shown = comm.bcast(gaps.shown)  # a run that goes on may have saved more since another rank has looked
     leaks, drawn, maps = _solve_all(gaps, comm)
     if comm.rank > 0:
@@ -149,12 +169,14 @@ def write(directory: Path, at: str, over: str, comm: MPI.Intracomm) -> Iterator[
     rows = [gaps.row(index, leaks[index], bare) for index in gaps.shown]
     name = f"leak.{gaps.fields.steps[gaps.shown[0]]}" if at else "leak"
     table, picture = (directory / f"{name}.{kind}" for kind in ("csv", "png"))
-    files.write(table, to_csv(names_of(LEAK), (values_of(LEAK, row) for row in rows)))
+    columns = choose_columns(LEAK, when={"--fluid"} if drop else ())
+    files.write(table, to_csv(names_of(columns), (values_of(columns, row) for row in rows)))
     instant = Run(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
     flows = leaks[drawn].leak.along_x, leaks[drawn].leak.along_y
     leakage.draw(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
     yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
     yield from (text for axis in "xy" for text in _describe(rows, axis))
+    yield from _describe_fluid(gaps, rows[-1], leaks[gaps.shown[-1]]) if drop else ()
     yield from _describe_missing(gaps, at)
     if missing:
         yield f"share_x and share_y are left empty, as the undeformed surface cannot be made: {missing}"
@@ -205,6 +227,23 @@ def _describe(rows: Sequence[Instant], axis: str) -> Iterator[str]:
         yield f"along {axis} the constriction is below 10 nm at {where}: K means little, as no fluid is a continuum"
 
 
+def _describe_fluid(gaps: Gaps, last: Instant, solved: Solved) -> Iterator[str]:
+    """Say how much of the fluid flows at the last instant, and where it is no continuum."""
+    drop = gaps.drop
+    assert drop is not None
+    pressures = f"from {quantity(drop.high, 'Pa')} to {quantity(drop.low, 'Pa')}"
+    for axis, rate, size in zip("xy", solved.rates, (gaps.size, gaps.size[::-1]), strict=True):
+        box = f"a length of {quantity(size[0], 'm')} and a width of {quantity(size[1], 'm')}"
+        flows = f"along {axis} {drop.describe_rate(rate)} at the low side, over {box}"
+        yield f"{drop.fluid.name} {pressures} at t = {quantity(last.time, 's')}: {flows}"
+        narrow, path = getattr(last, f"constriction_{axis}"), drop.mean_free_path
+        if 0.0 < narrow < path:
+            yield (
+                f"along {axis} the constriction, {quantity(narrow, 'm')}, is below the mean free path of "
+                f"{drop.fluid.name}, {quantity(path, 'm')}: the flow is stated for a gas that slips, and is larger"
+            )
+
+
 def _describe_missing(gaps: Gaps, at: str) -> Iterator[str]:
     """Name the stages at whose end no gap is saved, of a run all of whose instants are shown."""
     run = Run(gaps.directory)
@@ -222,9 +261,13 @@ def _describe_closure(rows: Sequence[Instant], axis: str) -> str:
         return f"along {axis} contact {'closes the gap' if closed[0] else 'leaves the gap open'}"
     if not any(closed):
         return f"along {axis} contact leaves the gap open at all instants"
-    first = rows[closed.index(True)]
+    index = closed.index(True)
+    first = rows[index]
     known = first.pressure == first.pressure  # its row of measures.csv is there
-    under = f"under {quantity(first.pressure, 'Pa')}, with {per_cent(first.contact_area)} of the area in contact"
+    load = f"under {quantity(first.pressure, 'Pa')}"
+    if index and rows[index - 1].pressure < first.pressure:
+        load = f"between {quantity(rows[index - 1].pressure, 'Pa')} and {quantity(first.pressure, 'Pa')}"
+    under = f"{load}, with {per_cent(first.contact_area)} of the area in contact"
     where = f", {under}" if known else ""
     found = f"closes the gap at {sum(closed)} of {len(rows)} instants, first at t = {quantity(first.time, 's')}"
     return f"along {axis} contact {found}{where}"

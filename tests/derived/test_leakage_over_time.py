@@ -219,3 +219,25 @@ def test_random_contacts_close_between_40_and_45_percent() -> None:
     assert len(closed_at) == 40
     assert np.mean(closed_at) - 2.0 * error > 0.40
     assert np.mean(closed_at) + 2.0 * error < 0.45
+
+
+def test_a_fluid(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The column flow_rate is that of K for a liquid; of a gas it is larger, as it slips; what lacks is said."""
+    out = run(MPI.COMM_SELF, tmp_path)
+    assert __main__.main(["leak", str(out), "--fluid", "1e-3", "--pressures", "2e5:1e5"]) == 0
+    rows = table(out / "leak.csv")
+    for row in rows:
+        more = max(("x", "y"), key=lambda axis: float(row[f"constriction_{axis}"]))  # called at once
+        expected = float(row[f"flow_{more}"]) / 12e-3 * 1e5  # the box is a square
+        assert float(row["flow_rate"]) == pytest.approx(expected, rel=1e-12)
+    assert __main__.main(["leak", str(out), "--fluid", "helium", "--pressures", "2e5:1e5"]) == 0
+    assert "helium from 200 kPa to 100 kPa" in capsys.readouterr().out
+    gas = [float(row["flow_rate"]) * 1.96e-5 / 1.5 for row in table(out / "leak.csv")]
+    liquid = [float(row["flow_rate"]) * 1e-3 for row in rows]
+    assert all(one > other for one, other in zip(gas, liquid, strict=True) if other)
+    assert __main__.main(["leak", str(out), "--fluid", "water"]) == 2
+    assert "--fluid and --pressures HIGH:LOW [Pa] go together" in capsys.readouterr().err
+    assert __main__.main(["leak", str(out), "--fluid", "air", "--pressures", "1e5:0"]) == 2
+    with pytest.raises(SystemExit):
+        __main__.main(["leak", str(out), "--fluid", "beer", "--pressures", "2e5:1e5"])
+    assert "a fluid (water, air, nitrogen, helium) or a positive viscosity [Pa s]" in capsys.readouterr().err
