@@ -6,8 +6,11 @@ is kept in a private directory, so that only a first run waits for the compiler;
 
 import hashlib
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from glob import escape
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -77,3 +80,27 @@ def _compiled(compiler: Callable[[bool], Any]) -> Any:
     files = _cache_of(compiled)._cache_file
     files.save = partial(_save_data_first, files)
     return compiled
+
+
+def _import_numba_arrays() -> None:
+    """Import what numba has for loops over arrays, without scipy.linalg.
+
+    numba imports that only to see whether there is a BLAS, which takes a fifth of a second of every short run. There is
+    one if scipy is there, and a loop that multiplies matrices still imports it.
+    """
+    with suppress(ImportError, AttributeError):  # another numba, which asks otherwise
+        algebra: Any = import_module("numba.np.linalg")
+        asks, algebra.ensure_blas = algebra.ensure_blas, _find_scipy
+        try:
+            arrays: Any = import_module("numba.np.arraymath")
+            arrays.ensure_blas = asks
+        finally:
+            algebra.ensure_blas = asks
+
+
+def _find_scipy() -> None:
+    if find_spec("scipy") is None:
+        raise ImportError("there is no scipy")
+
+
+_import_numba_arrays()
