@@ -34,12 +34,12 @@ def band_of_map(job: Job, shortest: float, cells: float) -> MapBand | None:
     part = job.surface[0]
     if not isinstance(part, Topography):
         return None
-    _, size = map_files.extent_of(part)
-    nx, ny = (fast_length(cells * length / shortest) for length in size)
-    grid = Grid(points=(nx, ny), size=size)
     whole = map_files.read(part)
     if whole.is_line:
         raise InputError(f"{part.path} is a line scan; bands take a map, or the spectrum of the scan in a table")
+    size = part.copies * whole.size[0], part.copies * whole.size[1]
+    nx, ny = (fast_length(cells * length / shortest) for length in size)
+    grid = Grid(points=(nx, ny), size=size)
     smooth = part.model_copy(update={"short_wavelength": max(shortest, part.short_wavelength or 0.0)})
     found = prepare(smooth, grid, whole)
     doubts = [*map_sentences.doubt_sizes(found), *map_sentences.doubt_outliers(found)]

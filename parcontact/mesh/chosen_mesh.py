@@ -9,6 +9,7 @@ STEADY_SHARE of that of a friction curve.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 from pydantic import Field, ValidationError
@@ -151,8 +152,8 @@ def _take_grid(source: Source, origin: Origin) -> None:
 
 
 def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
-    """Return points of the box along x and y, and its size [m]; the box is the whole map unless it is given. Raises
-    InputError."""
+    """Return points of the box along x and y, and its size [m]; the box is the whole map unless it is given, and a
+    mirrored map is twice as long. Raises InputError, also for line scans."""
     shapes = surface if isinstance(surface, list) else [surface]
     heights: list[Any] = [shape.get("heights") if isinstance(shape, dict) else shape for shape in shapes]
     arrays = [given for given in heights if is_array(given)]
@@ -163,6 +164,23 @@ def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
         if arrays[0].ndim != 2:
             raise InputError(f"an array of two dimensions is needed, got {arrays[0].ndim}")
         return tuple(arrays[0].shape[::-1]), None
+    part = Topography.model_validate(maps[0], context=origin)
+    ny, nx, whole = _extent_of_file(part, part.path.stat().st_mtime_ns)
+    if ny == 1:
+        raise InputError(f"{part.path} is a line scan, which gives no grid: give grid.points and grid.size")
+    lx, ly = (part.copies * length for length in whole)
+    lengths = box if isinstance(box, list | tuple) and len(box) == 2 else (box, box)
+    shares = [
+        length / size if isinstance(length, int | float) and length > 0 else 1.0
+        for length, size in zip(lengths, (lx, ly), strict=True)
+    ]
+    return (max(1, round(part.copies * nx * shares[0])), max(1, round(part.copies * ny * shares[1]))), (lx, ly)
+
+
+@lru_cache(maxsize=4)  # the cases of a sweep have the same map
+def _extent_of_file(part: Topography, _: int) -> tuple[int, int, tuple[float, float]]:
+    """Return the points along y and x of a measured map, and its size (lx, ly) [m]. Raises InputError."""
     from ..road import map_files  # reads maps: jobs that name none do without
 
-    return map_files.extent_of(Topography.model_validate(maps[0], context=origin), box)
+    found = map_files.read(part)
+    return (*found.heights.shape, found.size)

@@ -5,13 +5,11 @@ Heights point up, out of the road: the highest points touch first.
 
 import re
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import datafiles
 from ..errors import InputError
@@ -26,7 +24,6 @@ LARGEST_FILE = 4_000_000_000  # tuning: bytes
 LONGEST_HEAD = 200  # tuning: lines before the first number of a text
 IRREGULAR = 0.1  # accuracy: of a step: positions further from a grid than this are on none; others are rounded
 FEWEST = 4  # tuning: points along a direction
-MOST_POSITIONS = 10**6  # tuning: along a direction
 MOST_MISSING = 2  # tuning: times as many points of the grid as of the file
 
 
@@ -151,40 +148,34 @@ def _positions(path: Path, table: Array, unit_xy: float | None, unit: float | No
     missing."""
     if (wrong := np.flatnonzero(~np.isfinite(table[:, :-1]).all(axis=1))).size:
         raise InputError(f"{path}: its point {wrong[0] + 1} is at {_place(table, wrong[0])}, which is no position")
-    places, counts, steps = zip(*(_steps(path, *pair) for pair in zip("xy", table.T[:-1], strict=False)), strict=True)
-    if np.prod(counts) > MOST_MISSING * len(table):
-        ends = (int(np.abs(values - np.median(values)).argmax()) for values in table.T[:-1])
-        far = max(ends, key=lambda point: sum(place[point] for place in places))
+    lowest, steps = zip(*(_steps(path, *pair) for pair in zip("xy", table.T[:-1], strict=False)), strict=True)
+    index = np.round((table[:, :-1] - lowest) / steps)
+    if np.prod(counts := index.max(axis=0) + 1.0) > MOST_MISSING * len(table):
+        far = int(np.abs(index - np.median(index, axis=0)).max(axis=1).argmax())
         raise InputError(
-            f"{path}: its {len(table)} points reach over a grid of {' x '.join(map(str, counts))}, of which more than "
-            f"half would be missing; is point {far + 1}, at {_place(table, far)}, one of them?"
+            f"{path}: its {len(table)} points reach over a grid of {' x '.join(f'{n:.6g}' for n in counts)}, of which "
+            f"more than half would be missing; is point {far + 1}, at {_place(table, far)}, one of them?"
         )
-    heights = np.full(counts[::-1], np.nan)
-    heights[places[::-1]] = table[:, -1]
-    return Contents(heights, unit, tuple(n * step for n, step in zip(counts, steps, strict=True)), unit_xy)
+    heights = np.full(counts[::-1].astype(int), np.nan)
+    heights[tuple(index.T[::-1].astype(int))] = table[:, -1]
+    return Contents(heights, unit, tuple(counts * steps), unit_xy)
 
 
 def _place(table: Array, row: int) -> str:
     return ", ".join(f"{name} = {value:g}" for name, value in zip("xy", table[row, :-1], strict=False))
 
 
-def _steps(path: Path, name: str, values: Array) -> tuple[NDArray[np.intp], int, float]:
-    """Return indices, their number, and the step of positions on a regular grid, rounded as a file has them."""
+def _steps(path: Path, name: str, values: Array) -> tuple[float, float]:
+    """Return the lowest and the step of positions on a regular grid, which may be rounded to fixed digits."""
     distinct = np.unique(values)
     if distinct.size < FEWEST:
         raise InputError(f"{path} has {distinct.size} positions along {name}; at least {FEWEST} were expected")
     gaps = np.diff(distinct)
-    steps = np.round(gaps / np.median(gaps))  # columns may be missing altogether
-    if not steps.sum() < MOST_POSITIONS:
-        raise InputError(
-            f"{path}: its positions along {name} reach from {distinct[0]:g} to {distinct[-1]:g} in steps of "
-            f"{np.median(gaps):g}, which is more than {MOST_POSITIONS:.0e} of them"
-        )
-    step = float((distinct[-1] - distinct[0]) / steps.sum())
-    index = (values - distinct[0]) / step
+    step = float((distinct[-1] - distinct[0]) / np.round(gaps / np.median(gaps)).sum())  # columns may be missing
+    index = (distinct - distinct[0]) / step
     if np.abs(index - np.round(index)).max() > IRREGULAR:
         raise InputError(f"{path}: its positions along {name} are not equally spaced")
-    return np.round(index).astype(np.intp), int(steps.sum()) + 1, step
+    return float(distinct[0]), step
 
 
 def _simple_field(part: Topography) -> Contents:
@@ -241,25 +232,3 @@ def _scale(path: Path, unit: Any) -> float:
     if unit not in UNITS:
         raise InputError(f"{path}: its unit {unit} is no length that is known")
     return UNITS[unit]
-
-
-def extent_of(part: Topography, box: Any = None) -> tuple[tuple[int, int], tuple[float, float]]:
-    """Return points along x and y and size (lx, ly) [m] of a map, or of the part of it that is as large as a `box` [m];
-    a mirrored map is twice as long. Raises InputError, also for line scans."""
-    ny, nx, whole = _extent(part, part.path.stat().st_mtime_ns)
-    if ny == 1:
-        raise InputError(f"{part.path} is a line scan, which gives no grid: give grid.points and grid.size")
-    copies = 2 if part.periodic == "mirror" else 1
-    lx, ly = (copies * length for length in whole)
-    lengths = box if isinstance(box, list | tuple) and len(box) == 2 else (box, box)
-    shares = [
-        length / size if isinstance(length, int | float) and length > 0 else 1.0
-        for length, size in zip(lengths, (lx, ly), strict=True)
-    ]
-    return (max(1, round(copies * nx * shares[0])), max(1, round(copies * ny * shares[1]))), (lx, ly)
-
-
-@lru_cache(maxsize=4)  # the cases of a sweep have the same map
-def _extent(part: Topography, _: int) -> tuple[int, int, tuple[float, float]]:
-    found = read(part)
-    return (*found.heights.shape, found.size)

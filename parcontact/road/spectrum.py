@@ -29,6 +29,7 @@ from .map_files import UNITS, Map
 POWERS = {"C1D": 3, "C2D": 4}  # of a length, in the unit of a spectrum
 LARGER = {3: np.pi, 4: 4 * np.pi**2}  # factors of spectra written by SurfaceTopography, by the same power
 BINS = 10  # tuning: per decade of wavenumbers of a line scan
+FEWEST_OF_LINE = 32  # tuning: points
 FEWEST = 3  # accuracy: rows of numbers
 ABEL_POINTS = 20_001  # accuracy: of Abel's integral, whose integrand jumps between power laws
 ABEL_DECADES = 4.0  # accuracy: beyond the last point, where C1D' has fallen by more than 8
@@ -80,6 +81,8 @@ def of_line(part: Topography, line: Map) -> tuple[Measured, tuple[float, float]]
     """Return the spectrum of an isotropic surface whose profiles have the C1D of a line scan, with its longest and
     shortest wavelengths [m]: levelled, through Hann's window, in means over BINS bins a decade. Raises InputError."""
     heights, length = line.heights, line.size[0]
+    if heights.size < FEWEST_OF_LINE or np.nanmin(heights) == np.nanmax(heights):
+        raise InputError(f"{part.path}: a line scan of at least {FEWEST_OF_LINE} points that is not flat was expected")
     level = treatment.remove_trend(heights, np.isfinite(heights), part.detrend)[0][0]
     known = np.isfinite(level)
     places = np.arange(level.size)

@@ -199,7 +199,7 @@ BAD = {
         "its 37 points reach over a grid of 100001 x 90001, of which more than half would be missing; is point 37, "
         "at x = 100000, y = 90000, one of them?",
     ),
-    "a point far away": ("road.xyz", SQUARE + "1e300 0 0\n", ("m", None, None), "from 0 to 1e+300 in steps of 1, whi"),
+    "a point far away": ("road.xyz", SQUARE + "1e300 0 0\n", ("m", None, None), "is point 37, at x = 1e+300, y = 0"),
     "objects": ("road.npy", [[None, {}]], ("m", SIZE, None), "cannot be read"),
     "few points": ("road.npy", HEIGHTS[:3], ("m", SIZE, None), "at least 4 each way"),
     "mostly missing": ("road.npy", np.where(HEIGHTS > -1e-7, np.nan, HEIGHTS), ("m", SIZE, None), "more than half"),

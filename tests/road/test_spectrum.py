@@ -177,6 +177,14 @@ def test_the_spectrum_of_line_scans() -> None:
     assert slope == pytest.approx(0.05**2, rel=0.15)
 
 
+@pytest.mark.parametrize("heights", [np.zeros(64), np.arange(16.0), np.linspace(0.0, 1.0, 64)])
+def test_line_scans_that_give_no_spectrum(heights: Array) -> None:
+    """Flat, short, or a straight line: one sentence."""
+    part = jobs.Topography.model_construct(path=Path("line.npy"))
+    with pytest.raises(InputError, match=r"line\.npy"):
+        spectrum.of_line(part, map_files.Map(heights[None], (L, L)))
+
+
 @pytest.mark.mpi
 def test_a_line_scan_is_the_surface(shared_path: Path, communicators: list[MPI.Intracomm], comm: MPI.Intracomm) -> None:
     """The same random surface on any ranks, and a sentence on root."""

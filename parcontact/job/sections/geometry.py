@@ -164,6 +164,11 @@ class Topography(Part):
     at_most_one = (("unit", "units"), ("size", "pixel"))
 
     @property
+    def copies(self) -> int:
+        """Return how many times the map lies along each direction: a mirrored one twice."""
+        return 2 if self.periodic == "mirror" else 1
+
+    @property
     def unit_of_heights(self) -> MapUnit | None:
         return self.units.z if self.units else self.unit
 
