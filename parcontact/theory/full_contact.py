@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..physics.prony import Integrator, Moduli, complex_modulus, discrete_modulus, normal_form
+from ..physics.prony import Moduli, complex_modulus
 from .arrays import Array, ComplexArray, ComplexValues, Values
 
 
@@ -63,11 +63,6 @@ def pressure_amplitude(amplitude: ComplexValues, kx: Values, ky: Values, modulus
     return 2 * np.hypot(kx, ky) * amplitude * np.conj(modulus)
 
 
-def pressure_variance(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexValues) -> Array:
-    """The mean square fluctuation of the pressure in Pa^2, summed over waves on the last axis."""
-    return np.asarray(np.sum(np.abs(pressure_amplitude(amplitude, kx, ky, modulus)) ** 2, axis=-1) / 2)
-
-
 def traction(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexValues) -> Array:
     """<p grad h> = -sum k |A|^2 (kx, ky) Im M in Pa, shape (..., 2); the last axis of `modulus` (M) holds the waves."""
     strength = np.hypot(kx, ky) * np.abs(amplitude) ** 2 * np.imag(modulus)
@@ -83,66 +78,6 @@ def friction_coefficient(
     """mu = sum k |A|^2 omega G''(omega)/(|v| p0) of all waves together in steady sliding at (vx, vy) m/s, not 0."""
     modulus = complex_modulus(frequency(kx, ky, vx, vy), *material)
     return _friction(traction(amplitude, kx, ky, modulus), vx, vy, mean_pressure)
-
-
-def discrete_friction_coefficient(
-    mean_pressure: Values,
-    amplitude: ComplexValues,
-    kx: Values,
-    ky: Values,
-    vx: float,
-    vy: float,
-    dt: float,
-    *material: *Moduli,
-    integrator: Integrator = "exponential",
-) -> Array:
-    """The mu that a code with exact derivatives and Fourier kernel finds in steady sliding with time steps dt (s).
-
-    The surface goes by n cells of size c per step when dt = n c/|v|.
-    """
-    omega = frequency(kx, ky, vx, vy)
-    modulus = discrete_modulus(omega, dt, *material, integrator=integrator)
-    return _friction(traction(amplitude, kx, ky, modulus), vx, vy, mean_pressure)
-
-
-# changes of velocity
-
-
-def velocity_step_modulus(
-    t: ArrayLike, omega_before: ComplexValues, omega_after: ArrayLike, *material: *Moduli
-) -> ComplexArray:
-    """M(t) in Pa at times t >= 0 (s) after steady sliding at omega_before became sliding at omega_after.
-
-    M = G_inf + sum_j G_j [b_j + (a_j - b_j) exp(-t/tau_j - i omega_after t)], with i omega tau_j/(1 + i omega tau_j)
-    before (a) and after (b). The frequencies (rad/s, one per wave) are those of `frequency`. The shape is that of t
-    followed by that of the frequencies.
-    """
-    before = _memory(omega_before, normal_form(*material).relaxation_times)
-    return _modulus_after(t, before, omega_after, *material)
-
-
-def load_rest_slide_modulus(t: ArrayLike, rest: float, omega: ArrayLike, *material: *Moduli) -> ComplexArray:
-    """M(t) in Pa at times t >= 0 (s) of sliding at omega (rad/s) after `rest` (s) in full contact of a virgin body.
-
-    As `velocity_step_modulus` with a_j = exp(-rest/tau_j). The shape is that of t followed by that of omega.
-    """
-    before = np.exp(-rest / normal_form(*material).relaxation_times)
-    return _modulus_after(t, before, omega, *material)
-
-
-def _modulus_after(t: ArrayLike, before: ComplexValues, omega: ArrayLike, *material: *Moduli) -> ComplexArray:
-    """M(t), given by the shares of the moduli that are `before` in memory at t = 0 (last axis: terms of the series)."""
-    spring, terms, times = normal_form(*material)
-    t, omega = np.asarray(t, float), np.asarray(omega, float)
-    t = t.reshape(t.shape + (1,) * (omega.ndim + 1))
-    after = _memory(omega, times)
-    fading = np.exp(-t / times - 1j * omega[..., None] * t)
-    return np.asarray(spring + (after + (before - after) * fading) @ terms)
-
-
-def _memory(omega: ArrayLike, times: Array) -> ComplexArray:
-    phase = 1j * np.asarray(omega, float)[..., None] * times
-    return phase / (1 + phase)
 
 
 def _friction(traction: Array, vx: float, vy: float, mean_pressure: Values) -> Array:

@@ -18,58 +18,10 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from scipy.special import hyp1f1
 
-from ..physics.prony import CreepSpectrum, Moduli, creep_spectrum, normal_form, relaxation, relaxation_integral
+from ..physics.prony import Moduli, normal_form, relaxation_integral
 from .arrays import Array
-from .quadrature import graded_rule
-
-# a force put on at t = 0 and held
-
-
-def load_step_contact_radius(t: ArrayLike, force: float, radius: float, *material: *Moduli) -> Array:
-    """a(t) = (3 R W J(t)/16)^(1/3) in m at times t >= 0 (s, any shape)."""
-    compliance = creep_spectrum(*material).compliance(t)
-    return np.cbrt(3 * radius * force * compliance / 16)
-
-
-def load_step_pressure(r: ArrayLike, t: ArrayLike, force: float, radius: float, *material: *Moduli) -> Array:
-    """p(r, t) in Pa at distances r (m) from the axis and times t >= 0 (s), which broadcast, for a force > 0.
-
-    With f(s) = sqrt(a^2(s) - r^2)_+ and the time t_r at which the edge of the contact passes r, the history integral is
-    G(t - t_r) f(t) + int_{t_r}^t (f(t) - f(s)) sum_j G_j/tau_j exp(-(t-s)/tau_j) ds, all of it positive. It is computed
-    by Gauss rules on panels that shrink towards both ends; the relative error is about 1e-13 G(0)/G(t).
-    """
-    spring, terms, times = normal_form(*material)
-    spectrum = creep_spectrum(spring, terms, times)
-
-    def pressure(r: float, t: float) -> float:
-        past = min(spectrum.time(16 * r**3 / (3 * radius * force)), t)
-        elapsed, remaining, weights = (t - past) * graded_rule()
-        chords = [_half_chord(s, r, force, radius, spectrum) for s in (past + elapsed, t)]
-        forgotten = np.exp(-remaining[:, None] / times) @ (terms / times)
-        lasting = relaxation(t - past, spring, terms, times) * chords[1]
-        return float(8 / (np.pi * radius) * (lasting + np.sum(weights * forgotten * (chords[1] - chords[0]))))
-
-    return np.asarray(np.vectorize(pressure, otypes=[float])(r, t))
-
-
-# an approach put on at t = 0 and held
-
-
-def displacement_step_force(t: ArrayLike, approach: float, radius: float, *material: *Moduli) -> Array:
-    """W(t) = (16/3) sqrt(R) d^(3/2) G(t) in N at times t >= 0 (s, any shape)."""
-    modulus = relaxation(t, *material)
-    return np.asarray(16 / 3 * np.sqrt(radius * approach) * approach * modulus)
-
 
 # an approach that rises evenly to `peak_approach` in `rise_time` and falls back as fast
-
-
-def triangle_contact_radius(
-    t: ArrayLike, peak_approach: float, rise_time: float, radius: float, *material: *Moduli
-) -> Array:
-    """a(t) in m at times t >= 0 (s, any shape); zero from lift-off on."""
-    earlier = _time_of_equal_radius(t, rise_time, *material)
-    return np.sqrt(radius * peak_approach / rise_time * earlier)
 
 
 def triangle_force(t: ArrayLike, peak_approach: float, rise_time: float, radius: float, *material: *Moduli) -> Array:
@@ -113,9 +65,3 @@ def _time_of_equal_radius(t: ArrayLike, rise_time: float, *material: *Moduli) ->
         return t - float(age)
 
     return np.asarray(np.vectorize(earlier, otypes=[float])(t))
-
-
-def _half_chord(s: ArrayLike, r: float, force: float, radius: float, spectrum: CreepSpectrum) -> Array:
-    """sqrt(a^2(s) - r^2), zero outside the contact, after a load step."""
-    contact_radius = np.cbrt(3 * radius * force * spectrum.compliance(s) / 16)
-    return np.asarray(np.sqrt(np.maximum(contact_radius**2 - r * r, 0)))

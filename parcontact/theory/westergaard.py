@@ -14,9 +14,7 @@ Arguments are in SI units and broadcast.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..physics.prony import Moduli, creep_spectrum
 from .arrays import Array, Values
 
 
@@ -79,24 +77,6 @@ def mean_gap(
     load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
     s = np.clip(load, np.finfo(float).tiny, 1)
     return amplitude * (1 - s + s * np.log(s))
-
-
-def load_step_contact_fraction(
-    t: ArrayLike, mean_pressure: float, amplitude: float, wavelength: float, *material: *Moduli
-) -> Array:
-    """The contact fraction at times t >= 0 (s) after `mean_pressure` was put on a virgin viscoelastic body.
-
-    Contact only grows, so that the elastic solution holds with 1/E* = J(t)/4, where J is the creep compliance
-    (E. H. Lee, J. R. M. Radok, J. Appl. Mech. 27 (1960) 438).
-    """
-    compliance = creep_spectrum(*material).compliance(t)
-    return _fraction(mean_pressure * compliance * wavelength / (4 * np.pi * amplitude))
-
-
-def load_step_full_contact_time(mean_pressure: float, amplitude: float, wavelength: float, *material: *Moduli) -> float:
-    """When `load_step_contact_fraction` reaches 1, in s: J(t) = 4 pi Delta/(p lambda); 0 or inf if always or never."""
-    spectrum = creep_spectrum(*material)
-    return spectrum.time(4 * np.pi * amplitude / (mean_pressure * wavelength))
 
 
 def _fraction(load: Values) -> Array:

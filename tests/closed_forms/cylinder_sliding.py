@@ -26,7 +26,8 @@ from scipy.optimize import brentq
 from scipy.special import i0e, i1e, k0e, k1e
 
 from parcontact.theory.arrays import Array
-from parcontact.theory.quadrature import graded_rule
+
+from .quadrature import graded_rule
 
 
 class SlidingCylinder(NamedTuple):

@@ -21,7 +21,8 @@ from scipy.optimize import brentq
 
 from parcontact.physics.prony import Moduli, creep_spectrum
 from parcontact.theory.arrays import Array
-from parcontact.theory.quadrature import graded_rule
+
+from .quadrature import graded_rule
 
 
 def opening_crack(velocity: float, *material: *Moduli) -> float:

@@ -6,6 +6,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from closed_forms import step_responses
 from csv_rows import rows
 from marching import begun, column, marched
 from mpi4py import MPI
@@ -30,7 +31,6 @@ from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import Heights, ZenerBody
 from parcontact.physics.prony import Prony, creep, normal_form
-from parcontact.theory import full_contact
 
 Json = dict[str, Any]
 Array = NDArray[np.float64]
@@ -107,7 +107,7 @@ def test_friction_of_a_wave_with_frozen_branches(rest: float, duration: float) -
     found = fold_branches(DECADES, TimeScales(rest + duration, 1e-9, 2 if rest else 1), "exponential", 0.2)
     t = np.linspace(0.0, duration, 400)
     whole, fewer = (
-        full_contact.load_rest_slide_modulus(t, rest, 1.0, *body).imag for body in (DECADES, frozen(DECADES, found))
+        step_responses.load_rest_slide_modulus(t, rest, 1.0, *body).imag for body in (DECADES, frozen(DECADES, found))
     )
     wrong = np.max(np.abs(fewer - whole)) / complex_modulus(1.0, *DECADES).imag
     assert len(found.frozen) >= 2

@@ -2,6 +2,7 @@
 
 import jgh
 import numpy as np
+from closed_forms import step_responses
 
 from parcontact.doctor.bench import Bench
 from parcontact.doctor.small_jobs import (
@@ -71,7 +72,9 @@ def long_box(bench: Bench) -> None:
     cell, size = WAVELENGTH / 16, [WAVELENGTH, 1e-4 * WAVELENGTH]
     stage = {"velocity": FAST, "distance": 60 * cell, "cells_per_step": 1}
     dt = cell / FAST
-    mu = full_contact.discrete_friction_coefficient(MEAN, HEIGHT, np.array([K]), np.array([0.0]), FAST, 0.0, dt, *PRONY)
+    mu = step_responses.discrete_friction_coefficient(
+        MEAN, HEIGHT, np.array([K]), np.array([0.0]), FAST, 0.0, dt, *PRONY
+    )
     for rows_of_points in (1, 5):
         job = wave([stage], points=(16, rows_of_points), grid={"points": [16, rows_of_points], "size": size})
         _, rows = bench.march(job)
@@ -96,7 +99,7 @@ def reversal(bench: Bench) -> None:
     stage = {"velocity": -FAST, "duration": 10 * RELAXATION, "time_step": 10 * RELAXATION / steps}
     _, rows = bench.march(wave([stage], initial=start))
     t = np.array([row.time for row in rows])
-    modulus = full_contact.velocity_step_modulus(t, K * FAST, np.array([-K * FAST]), *PRONY)
+    modulus = step_responses.velocity_step_modulus(t, K * FAST, np.array([-K * FAST]), *PRONY)
     exact = full_contact.traction(HEIGHT, np.array([K]), np.array([0.0]), modulus)[:, 0] / MEAN
     found = np.array([row.measures.force_x for row in rows]) / MEAN / WAVELENGTH**2
     bench.expect_all("force", found, exact, 5e-3)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from closed_forms import step_responses
 from marching import PRONY, column, marched
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
@@ -46,7 +47,7 @@ def test_steady_friction(integrator: Integrator, velocity: float, exponential: f
     if integrator != "exponential":
         assert found == pytest.approx(exponential if integrator == "exponential-linear" else euler, rel=3e-7)
     waves = (MEAN, HEIGHT, np.array([K]), np.array([0.0]), velocity, 0.0)
-    exact = full_contact.discrete_friction_coefficient(*waves, CELL / velocity, *PRONY, integrator=integrator)
+    exact = step_responses.discrete_friction_coefficient(*waves, CELL / velocity, *PRONY, integrator=integrator)
     assert found == pytest.approx(float(exact), rel=1e-9)
     assert rows[-1].measures.force_x < 0.0
     assert rows[-1].operator_calls <= 4
@@ -70,7 +71,7 @@ def transient(before: float, after: float, steps: int, integrator: Integrator) -
     _, rows = marched(wave(stages, points=(8, 1), integrator=integrator))
     late = [row for row in rows if row.time > 20.0001e-3]
     t = column(late, "time") - 20e-3
-    modulus = full_contact.velocity_step_modulus(t, K * before, np.array([K * after]), *PRONY)
+    modulus = step_responses.velocity_step_modulus(t, K * before, np.array([K * after]), *PRONY)
     exact = full_contact.traction(HEIGHT, np.array([K]), np.array([0.0]), modulus)[:, 0] / MEAN
     return float(np.abs(traction(late) - exact).max() / np.abs(exact).max())
 
@@ -84,7 +85,7 @@ def test_start_after_a_rest() -> None:
         _, rows = marched(wave(stages, points=(8, 1)))
         late = rows[2:]
         t = column(late, "time") - 1e-3
-        modulus = full_contact.load_rest_slide_modulus(t, 1e-3, np.array([K * FAST]), *PRONY)
+        modulus = step_responses.load_rest_slide_modulus(t, 1e-3, np.array([K * FAST]), *PRONY)
         exact = full_contact.traction(HEIGHT, np.array([K]), np.array([0.0]), modulus)[:, 0] / MEAN
         errors.append(float(np.abs(traction(late) - exact).max() / np.abs(exact).max()))
     assert errors[-1] < 1e-6
@@ -113,7 +114,7 @@ def test_oblique_waves(waves: tuple[int, int]) -> None:
     data = rows[-1].measures
     dt = cell / velocity
     moment = (MEAN, HEIGHT, np.array([kx]), np.array([ky]), velocity, 0.0, dt, *PRONY)
-    mu = float(full_contact.discrete_friction_coefficient(*moment))
+    mu = float(step_responses.discrete_friction_coefficient(*moment))
     settled = np.exp(-50 * dt / 1e-3)
     load = MEAN * WAVELENGTH**2
     assert_allclose([-data.force_x / load, -data.force_y / load], [mu, mu * ky / kx], rtol=1e-9 + 3 * settled)

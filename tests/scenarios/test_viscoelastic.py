@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from closed_forms import step_responses
 from marching import PRONY, SLS, column, example, marched
 from numpy.testing import assert_allclose
 
 from parcontact.march.loop import March
 from parcontact.storage.row import Row
-from parcontact.theory import lee_radok, westergaard
+from parcontact.theory import lee_radok
 
 Json = dict[str, Any]
 FORCE, RADIUS = 0.15, 1e-2  # N, m
@@ -55,13 +56,13 @@ def test_creep_under_a_load() -> None:
     history = [{"force": FORCE, "duration": 3e-2, "time_step": {"first": 1e-4, "growth": 1.05}}]
     march, rows = marched(sphere(256, 3e-3, history), [keep])
     t = column(rows[1:], "time")
-    radius = lee_radok.load_step_contact_radius(t, FORCE, RADIUS, *PRONY)
+    radius = step_responses.load_step_contact_radius(t, FORCE, RADIUS, *PRONY)
     assert_allclose(contact_radius(march, column(rows[1:], "contact_area")), radius, rtol=5e-3)
     assert_allclose(column(rows[1:], "approach"), radius**2 / RADIUS, rtol=5e-3)
     assert_allclose(column(rows[1:], "friction"), 0.0, atol=1e-4)
     r = np.arange(128) * march.scene.job.grid.dx
     for n in range(0, len(t), 6):
-        exact = lee_radok.load_step_pressure(r, t[n], FORCE, RADIUS, *PRONY)
+        exact = step_responses.load_step_pressure(r, t[n], FORCE, RADIUS, *PRONY)
         inner = r < 0.9 * radius[n]
         assert_allclose(profiles[n][inner], exact[inner], rtol=0, atol=5e-3 * exact.max())
 
@@ -72,7 +73,7 @@ def test_relaxation_at_an_approach() -> None:
     history = [{"approach": depth, "duration": 5e-3, "time_step": {"first": 1e-5, "growth": 1.5}}]
     march, rows = marched(sphere(96, 2e-3, history, tolerance=1e-8))
     found = force(march, column(rows[1:], "pressure"))
-    exact = lee_radok.displacement_step_force(column(rows[1:], "time"), depth, RADIUS, *PRONY)
+    exact = step_responses.displacement_step_force(column(rows[1:], "time"), depth, RADIUS, *PRONY)
     assert_allclose(found, exact, rtol=1e-3)
     assert_allclose(found / found[0], exact / exact[0], rtol=1e-6)
     assert len(set(column(rows[1:], "contact_area"))) == 1
@@ -150,11 +151,11 @@ def test_contact_that_spreads_until_it_is_full() -> None:
     _, rows = marched(data)
     t, found = column(rows[1:], "time"), column(rows[1:], "contact_area")
     low, high = (
-        westergaard.load_step_contact_fraction(factor * t, pressure, amplitude, wavelength, *PRONY)
+        step_responses.load_step_contact_fraction(factor * t, pressure, amplitude, wavelength, *PRONY)
         for factor in (0.99, 1.01)
     )
     assert np.all((found > low - 1.5 / cells) & (found < high + 1.5 / cells))
-    full = westergaard.load_step_full_contact_time(pressure, amplitude, wavelength, *PRONY)
+    full = step_responses.load_step_full_contact_time(pressure, amplitude, wavelength, *PRONY)
     assert full == pytest.approx(10.69e-3, rel=1e-3)
     assert np.all((found == 1.0) == (t > full))
 

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from closed_forms.cylinder_sliding import pressure, sliding_cylinder
+from closed_forms.quadrature import graded_rule
 from numpy.polynomial import chebyshev
 from numpy.testing import assert_allclose
-
-from parcontact.theory.quadrature import graded_rule
 
 
 @pytest.mark.parametrize(

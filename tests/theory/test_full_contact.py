@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from closed_forms import step_responses
 from numpy.testing import assert_allclose
 from rubbers import TWELVE_DECADES, ZENER, complex_modulus, relaxation
 from scipy.integrate import quad
@@ -55,7 +56,7 @@ def test_friction_table(row: tuple[float, ...]) -> None:
 def stepped_friction(v: float, cells: float, integrator: Integrator) -> np.ndarray:
     """Friction of the table's wave with a number of cells per step."""
     wave, dt = (HEIGHT, ALONG, ACROSS), cells * CELL / v
-    return full_contact.discrete_friction_coefficient(MEAN, *wave, v, 0.0, dt, *ZENER, integrator=integrator)
+    return step_responses.discrete_friction_coefficient(MEAN, *wave, v, 0.0, dt, *ZENER, integrator=integrator)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +93,7 @@ def test_velocity_step_table(before: float, after: float, table: list[float], pe
     """Printed to 5 digits, and to 1 us."""
 
     def friction(t: float | np.ndarray) -> np.ndarray:
-        return signed_friction(full_contact.velocity_step_modulus(t, before * ALONG, after * ALONG, *ZENER))
+        return signed_friction(step_responses.velocity_step_modulus(t, before * ALONG, after * ALONG, *ZENER))
 
     assert_allclose(friction(TIMES), table, rtol=6e-5, atol=1e-15)
     bounds = (max(0, 1e-3 * (peak_time - 1)), 1e-3 * (peak_time + 1))
@@ -120,7 +121,7 @@ def test_velocity_step_by_boltzmann_integral(before: float, after: float) -> Non
     t = 0.7e-3
     stress = remembered(before, -0.04, 0, t) + remembered(after, 0, t, t)
     stress += TWO_TERMS.modulus_inf * np.exp(1j * after * t)
-    expected = full_contact.velocity_step_modulus(t, before, after, *TWO_TERMS)
+    expected = step_responses.velocity_step_modulus(t, before, after, *TWO_TERMS)
     assert_allclose(stress * np.exp(-1j * after * t), expected, rtol=1e-9)
 
 
@@ -129,7 +130,7 @@ def test_load_rest_slide_by_boltzmann_integral() -> None:
     t, rest, omega = 0.7e-3, 0.4e-3, 2000.0
     stress = relaxation(t + rest, *TWO_TERMS) + remembered(omega, 0, t, t)
     stress = stress + TWO_TERMS.modulus_inf * (np.exp(1j * omega * t) - 1)
-    expected = full_contact.load_rest_slide_modulus(t, rest, omega, *TWO_TERMS)
+    expected = step_responses.load_rest_slide_modulus(t, rest, omega, *TWO_TERMS)
     assert_allclose(stress * np.exp(-1j * omega * t), expected, rtol=1e-9)
 
 
@@ -137,9 +138,9 @@ def test_velocity_step_ends() -> None:
     """It starts from the steady state before, whatever comes after, and ends in the steady state after."""
     before, after = np.array([10.0, 300.0, -5.0]), np.array([2e3, 0.0, 5.0])
     steady = [complex_modulus(omega, *ZENER) for omega in (before, after)]
-    modulus = full_contact.velocity_step_modulus(np.array([0.0, 1.0]), before, after, *ZENER)
+    modulus = step_responses.velocity_step_modulus(np.array([0.0, 1.0]), before, after, *ZENER)
     assert_allclose(modulus, steady, rtol=1e-13)
-    assert full_contact.velocity_step_modulus(TIMES, before, after, *TWELVE_DECADES).shape == (11, 3)
+    assert step_responses.velocity_step_modulus(TIMES, before, after, *TWELVE_DECADES).shape == (11, 3)
 
 
 # maps of many waves
@@ -187,7 +188,7 @@ def test_sums_over_waves_are_means_over_the_map(heights: np.ndarray) -> None:
     waves = full_contact.waves(heights, LX, LY)
     modulus = complex_modulus(full_contact.frequency(waves.kx, waves.ky, VX, VY), *TWELVE_DECADES)
     assert_allclose(full_contact.traction(*waves, modulus), traction, rtol=1e-12)
-    assert_allclose(full_contact.pressure_variance(*waves, modulus), p.var(), rtol=1e-12)
+    assert_allclose(step_responses.pressure_variance(*waves, modulus), p.var(), rtol=1e-12)
     mu = full_contact.friction_coefficient(MEAN, *waves, VX, VY, *TWELVE_DECADES)
     assert_allclose(mu, -(traction @ [VX, VY]) / np.hypot(VX, VY) / MEAN, rtol=1e-12)
 
@@ -204,7 +205,7 @@ def test_march_of_a_map(heights: np.ndarray) -> None:
     p = np.fft.ifft2(2 * np.hypot(kx, ky) * (ZENER.modulus_inf * now + memory)).real
     mu = -np.mean(p * np.fft.ifft2(1j * kx * now).real) / MEAN
     waves = full_contact.waves(heights, LX, LY)
-    expected = full_contact.discrete_friction_coefficient(
+    expected = step_responses.discrete_friction_coefficient(
         MEAN, *waves, VX, 0.0, dt, *ZENER, integrator="backward-euler"
     )
     assert_allclose(mu, expected, rtol=1e-11)

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from closed_forms import step_responses
 from numpy.testing import assert_allclose
 from rubbers import TWELVE_DECADES, ZENER, relaxation
 from scipy.integrate import quad
@@ -38,17 +39,17 @@ LOAD_STEP = [
 def test_load_step_table(time: float, radius: float, ratio: float, approach: float, pressures: list[float]) -> None:
     """Radii and approaches printed to 6 digits, pressures to 4 digits and with an error of 1e-4."""
     case = (FORCE, RADIUS, *ZENER)
-    a = lee_radok.load_step_contact_radius(time * CREEP_TIME, *case)
+    a = step_responses.load_step_contact_radius(time * CREEP_TIME, *case)
     assert_allclose(a, 1e-3 * radius, rtol=6e-6)
     assert_allclose(a / HERTZ_RADIUS, ratio, rtol=6e-7)
     assert_allclose(a**2 / RADIUS, 1e-6 * approach, rtol=6e-6)
-    computed = lee_radok.load_step_pressure(DISTANCES * HERTZ_RADIUS, time * CREEP_TIME, *case) / MEAN_PRESSURE
+    computed = step_responses.load_step_pressure(DISTANCES * HERTZ_RADIUS, time * CREEP_TIME, *case) / MEAN_PRESSURE
     assert_allclose(computed, pressures, rtol=5e-4, atol=1e-4)
 
 
 def carried(time: float, material: Prony) -> float:
     """The force of the load step's pressure, by a rule that is graded towards the edges of its smooth parts."""
-    edges = lee_radok.load_step_contact_radius(np.array([0, time]), FORCE, RADIUS, *material)
+    edges = step_responses.load_step_contact_radius(np.array([0, time]), FORCE, RADIUS, *material)
     nodes, weights = np.polynomial.legendre.leggauss(40)
     angle = np.pi / 4 * (1 + nodes)
     force = 0.0
@@ -56,7 +57,7 @@ def carried(time: float, material: Prony) -> float:
         # r^2 = inner^2 + (outer^2 - inner^2) sin^2 takes the square roots out at both ends
         r = np.sqrt(inner**2 + (outer**2 - inner**2) * np.sin(angle) ** 2)
         share = (outer**2 - inner**2) * np.sin(angle) * np.cos(angle) * np.pi / 4 * weights
-        force += 2 * np.pi * np.sum(share * lee_radok.load_step_pressure(r, time, FORCE, RADIUS, *material))
+        force += 2 * np.pi * np.sum(share * step_responses.load_step_pressure(r, time, FORCE, RADIUS, *material))
     return force
 
 
@@ -74,7 +75,7 @@ def test_load_step_pressure_carries_the_force_over_twelve_decades(time: float) -
 def test_displacement_step() -> None:
     """50 um held; printed to 6 digits."""
     times = np.array([0, 1e-3, 1.0])
-    forces = lee_radok.displacement_step_force(times, 50e-6, RADIUS, *ZENER)
+    forces = step_responses.displacement_step_force(times, 50e-6, RADIUS, *ZENER)
     assert_allclose(forces[[0, 2]], [0.518545, 0.0518545], rtol=2e-6)
     assert_allclose(forces, forces[0] * relaxation(times, *ZENER) / 2.75e6, rtol=1e-14)
 
@@ -97,7 +98,7 @@ def test_triangle_samples() -> None:
     case = (50e-6, 1e-3, RADIUS, *ZENER)
     forces = lee_radok.triangle_force(np.array([0.5e-3, 1e-3, 1.259e-3]), *case)
     assert_allclose(forces, [0.154568, 0.375215, 0.136800], rtol=2e-5)
-    radii = lee_radok.triangle_contact_radius(np.array([1.259e-3, 1.51499e-3]), *case)
+    radii = step_responses.triangle_contact_radius(np.array([1.259e-3, 1.51499e-3]), *case)
     assert_allclose(radii, [0.576611e-3, 0.206653e-3], rtol=1e-4)
     assert_allclose(lee_radok.triangle_force(1.51499e-3, *case), 0.00399031, rtol=2e-4)
 
@@ -109,7 +110,7 @@ def test_triangle_by_quadrature(material: Prony, rise_time: float) -> None:
     case = (50e-6, rise_time, RADIUS, *material)
     lift_off = lee_radok.triangle_lift_off_time(rise_time, *material)
     for t in (0.3 * rise_time, 0.5 * (rise_time + lift_off), 0.1 * rise_time + 0.9 * lift_off):
-        earlier = float(lee_radok.triangle_contact_radius(t, *case)) ** 2 / RADIUS / 50e-6 * rise_time
+        earlier = float(step_responses.triangle_contact_radius(t, *case)) ** 2 / RADIUS / 50e-6 * rise_time
         if t > rise_time:
             down, up = history(material, t, rise_time, t, 0), history(material, t, earlier, rise_time, 0)
             assert_allclose(up, down, rtol=1e-9)
@@ -134,7 +135,7 @@ def test_triangle_ends_at_lift_off() -> None:
     case = (50e-6, 1e-3, RADIUS, *ZENER)
     time = lee_radok.triangle_lift_off_time(1e-3, *ZENER)
     t = np.linspace(0, 3e-3, 301)
-    forces, radii = lee_radok.triangle_force(t, *case), lee_radok.triangle_contact_radius(t, *case)
+    forces, radii = lee_radok.triangle_force(t, *case), step_responses.triangle_contact_radius(t, *case)
     assert np.all(forces >= 0)
     assert np.all((forces > 0) == ((t > 0) & (t < time)))
     assert np.all((radii > 0) == ((t > 0) & (t < time)))
@@ -142,9 +143,9 @@ def test_triangle_ends_at_lift_off() -> None:
 
 def test_elastic_body_is_hertz() -> None:
     r, t = np.linspace(0, 1e-3, 9), np.array([0.0, 1.0, 1e5])
-    radii = lee_radok.load_step_contact_radius(t, FORCE, RADIUS, *ELASTIC)
+    radii = step_responses.load_step_contact_radius(t, FORCE, RADIUS, *ELASTIC)
     assert_allclose(radii, hertz.contact_radius(FORCE, RADIUS, 2e6), rtol=1e-14)
-    pressures = lee_radok.load_step_pressure(r, t[:, None], FORCE, RADIUS, *ELASTIC)
+    pressures = step_responses.load_step_pressure(r, t[:, None], FORCE, RADIUS, *ELASTIC)
     assert_allclose(pressures, np.tile(hertz.pressure(r, FORCE, RADIUS, 2e6), (3, 1)), rtol=1e-12)
     assert_allclose(lee_radok.triangle_lift_off_time(1e-3, *ELASTIC), 2e-3, rtol=1e-11)
     t = np.array([0.5e-3, 1e-3, 1.5e-3])
@@ -157,6 +158,6 @@ def test_early_and_late_are_elastic() -> None:
     """With the instantaneous and the long-term modulus."""
     r = np.linspace(0, 1.2e-3, 13)
     for time, modulus in ((1e-16, 2.75e6), (1e3, 0.275e6)):
-        pressures = lee_radok.load_step_pressure(r, time, FORCE, RADIUS, *ZENER)
+        pressures = step_responses.load_step_pressure(r, time, FORCE, RADIUS, *ZENER)
         peak = float(hertz.peak_pressure(FORCE, RADIUS, modulus))
         assert_allclose(pressures, hertz.pressure(r, FORCE, RADIUS, modulus), rtol=0, atol=1e-6 * peak)

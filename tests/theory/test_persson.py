@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from closed_forms import step_responses
 from numpy.testing import assert_allclose
 from rubbers import TWELVE_DECADES, complex_modulus
 from scipy.integrate import cumulative_simpson, simpson
@@ -74,7 +75,7 @@ def test_velocities(road: Rings, row: tuple[float, ...]) -> None:
     """5 digits are printed; friction is that of another quadrature, to the 1e-5 that this one promises."""
     v, area, *frictions, full, variance = row
     modulus = steady(road, v)
-    assert_allclose(full_contact.pressure_variance(*road.waves, modulus), variance, rtol=6e-5)
+    assert_allclose(step_responses.pressure_variance(*road.waves, modulus), variance, rtol=6e-5)
     assert_allclose(persson.contact_area(PRESSURE, road, modulus), area, rtol=6e-5)
     found = full_contact.friction_coefficient(PRESSURE, *road.waves, v, 0.0, *TWELVE_DECADES)
     assert_allclose(found, full, rtol=6e-5)
@@ -138,7 +139,7 @@ def test_full_contact_is_exact(gamma: float, direction: float) -> None:
     rings = rings_of_surface(waves)
     vx, vy = 0.3 * np.cos(direction), 0.3 * np.sin(direction)
     modulus = complex_modulus(full_contact.frequency(rings.waves.kx, rings.waves.ky, vx, vy), *TWELVE_DECADES)
-    pressure = 10 * float(np.sqrt(full_contact.pressure_variance(*rings.waves, modulus)))
+    pressure = 10 * float(np.sqrt(step_responses.pressure_variance(*rings.waves, modulus)))
     found = persson.friction_coefficient(pressure, rings, vx, vy, modulus, gamma)
     expected = full_contact.friction_coefficient(pressure, *waves, vx, vy, *TWELVE_DECADES)
     assert_allclose(found, expected, rtol=1e-13)

@@ -4,6 +4,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from closed_forms import step_responses
 from numpy.testing import assert_allclose
 from rubbers import TWELVE_DECADES, ZENER
 
@@ -35,7 +36,7 @@ def test_load_rest_slide(memory: Memory) -> None:
     """In closed form, to rounding."""
     instants = np.array([0.0, 1e-4, 1e-3, 7e-3])
     memory.slide((0.0, 0.0), 2e-3)
-    exact = full_contact.load_rest_slide_modulus(instants, 2e-3, frequencies(memory, OBLIQUE), *ZENER)
+    exact = step_responses.load_rest_slide_modulus(instants, 2e-3, frequencies(memory, OBLIQUE), *ZENER)
     assert_allclose(memory.moduli(OBLIQUE, instants), exact, rtol=1e-13)
 
 
@@ -44,7 +45,7 @@ def test_velocity_step(memory: Memory, after: tuple[float, float]) -> None:
     """Also a reversal and a stop: in closed form, to rounding."""
     instants = np.array([0.0, 1e-4, 1e-3, 7e-3])
     memory.slide_for_ever(OBLIQUE)
-    exact = full_contact.velocity_step_modulus(
+    exact = step_responses.velocity_step_modulus(
         instants, frequencies(memory, OBLIQUE), frequencies(memory, after), *ZENER
     )
     assert_allclose(memory.moduli(after, instants), exact, rtol=1e-13)

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from .arrays import Array
+from parcontact.theory.arrays import Array
 
 
 @cache
