@@ -176,6 +176,7 @@ VERBS: dict[Callable[[argparse.Namespace], int], tuple[Callable[[Add], None], ..
     verbs.schema: (),
     verbs.cite: (_cite,),
 }
+COMPLETION = "--print-completion"
 NAMES = tuple(verb.__name__ for verb in VERBS)
 
 
@@ -186,7 +187,7 @@ def parse_arguments(words: Sequence[str]) -> argparse.Namespace:
     first, *rest = words
     if first == "help":
         words = [*(word for word in rest if word in NAMES), "--help"]
-    elif first not in (*NAMES, "-h", "--help", "--version"):
+    elif first not in (*NAMES, "-h", "--help", "--version", COMPLETION):
         _refuse_misspelt(first)
         words = ["run", *words]
     return make_parser().parse_args(words)
@@ -198,6 +199,16 @@ def _refuse_misspelt(word: str) -> None:
     close = difflib.get_close_matches(word.lower(), (*NAMES, "help"), n=1)
     if close and not path.suffix and path.name == word and not path.exists():
         raise InputError(f"{word!r} is neither a verb nor a job file; did you mean {close[0]}?")
+
+
+class _PrintCompletion(argparse.Action):
+    """Prints what a shell needs to complete verbs, options and files, and ends the program."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, shell: Any, option: str | None = None) -> None:
+        import shtab  # for this alone
+
+        print(shtab.complete(parser, shell=shell))
+        parser.exit()
 
 
 class _Parser(argparse.ArgumentParser):
@@ -220,6 +231,8 @@ def make_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"parcontact {__version__}")
+    text = "print what the shell needs to complete verbs and options (see parcontact manual install)"
+    parser.add_argument(COMPLETION, choices=("bash", "zsh", "tcsh"), action=_PrintCompletion, help=text)
     found = parser.add_subparsers(dest="verb", required=True, metavar="verb")
     for verb in VERBS:
         said = str(verb.__doc__)

@@ -1,6 +1,7 @@
 """The program as a user starts it: exit codes, messages, nothing written for bad input."""
 
 import os
+import subprocess
 import time
 from collections.abc import Sequence
 from functools import partial
@@ -15,6 +16,8 @@ from conftest import Main, RunParcontact
 from csv_rows import measures
 from short_job import JOB, STEPS
 
+from parcontact import __main__
+from parcontact.command.arguments import NAMES
 from parcontact.command.values import wall_seconds
 from parcontact.run import watch
 
@@ -264,3 +267,14 @@ def test_out_is_taken_literally(main: Main, tmp_path: Path, name: str) -> None:
     assert main("check", path, "--out", name)[0] == 0
     assert main(path, "--quiet", "--until", "0", "--out", name)[0] == 0
     assert sorted(found.name for found in tmp_path.iterdir()) == sorted(["job.yaml", name])
+
+
+def test_completion_knows_every_verb_and_is_bash(capsys: pytest.CaptureFixture[str]) -> None:
+    """Bash reads it without a mistake, and the verbs and an option of one are in it."""
+    with pytest.raises(SystemExit) as end:
+        __main__.main(["--print-completion", "bash"])
+    script = capsys.readouterr().out
+    assert end.value.code == 0
+    assert subprocess.run(["bash", "-n"], input=script, text=True, check=False).returncode == 0
+    assert all(f"'{verb}'" in script for verb in NAMES)
+    assert "--velocities" in script
