@@ -207,7 +207,7 @@ def fitted(
         raise failure if str(failure).startswith(str(path)) else InputError(f"{path}: {failure}") from failure
     data = series.reduce_sets(measured.sets, measured.kind, logs, weigh)
     sweeps = [(each.at, moduli) for each in measured.sets for moduli in (each.storage, each.loss) if moduli.size]
-    best = series.fit(data, error, sweeps)
+    best = series.fit_series(data, error, sweeps)
     _refuse_misfit(path, best, data)
     return Compound(measured, best, shift, poisson, weigh, found if isinstance(law, str) else None)
 

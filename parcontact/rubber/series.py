@@ -42,7 +42,7 @@ Errors = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Series:
+class PronySeries:
     """`modulus_inf` [Pa], `moduli` [Pa] and `times` [s], shape (n,), at the reference temperature.
 
     `error` is the rms of the relative misfit of the data that count; `best` the smallest one of any series; `alone` the
@@ -106,7 +106,7 @@ def complex_kernel(omega: Array, kind: Kind, times: Array) -> ComplexArray:
 
 
 @dataclass(frozen=True)
-class Measured:
+class ReducedData:
     """The data of all sets, reduced to one temperature: `at`, shape (n,), frequencies [rad/s] or times [s], and
     `moduli` [Pa], shape (n,) of G(t) or 1/J(t), or (2 n,), storage before loss, of which those in `counts` are met."""
 
@@ -158,17 +158,17 @@ def reduce_sets(
     kind: Kind,
     logs: tuple[Sequence[float], Sequence[float]] | None = None,
     weigh: Weigh = "both",
-) -> Measured:
+) -> ReducedData:
     """Return the data of all sets at one temperature; `logs` are log10 of a_T and of b_T of each set."""
     sign, (horizontal, vertical) = 1.0 if kind == "frequency" else -1.0, logs or [[0.0] * len(sets)] * 2
     shifted = list(zip(sets, horizontal, vertical, strict=True))
     at = np.concatenate([each.at * 10.0 ** (sign * a) for each, a, _ in shifted])
     moduli = [np.concatenate([getattr(each, part) / 10.0**b for each, _, b in shifted]) for part in ("storage", "loss")]
     counts = {"both": slice(None), "storage": slice(at.size), "loss": slice(at.size, None)}
-    return Measured(kind, at, np.concatenate(moduli), counts[weigh if kind == "frequency" else "both"])
+    return ReducedData(kind, at, np.concatenate(moduli), counts[weigh if kind == "frequency" else "both"])
 
 
-def best_residuals(data: Measured, per_decade: int = DENSE) -> Array:
+def best_residuals(data: ReducedData, per_decade: int = DENSE) -> Array:
     """Return by how much the best series of any number of branches misses the data that count, relative to them."""
     low, high = data.rates
     first, last = (round(per_decade * (math.log10(1.0 / rate) + side)) for rate, side in ((high, -SPARE), (low, SPARE)))
@@ -192,7 +192,7 @@ class Spectrum:
     deviations: Array
 
     @staticmethod
-    def of(data: Measured) -> "Spectrum":
+    def of(data: ReducedData) -> "Spectrum":
         """Return the smooth spectrum that meets the data within their noise."""
         high, low = (-math.log10(rate) for rate in data.rates)
         inside = max(2, math.ceil((high - low) * DENSE)) + 1
@@ -248,12 +248,12 @@ def _scale(times: Array, weights: Array, inside: slice) -> Array:
     return np.concatenate([max(share, 1e-3) * np.exp(logs), np.ones(weights.size - times.size) * weights.max()])
 
 
-def fit(data: Measured, error: float, sweeps: Sequence[tuple[Array, Array]] = ()) -> Series:
+def fit_series(data: ReducedData, error: float, sweeps: Sequence[tuple[Array, Array]] = ()) -> PronySeries:
     """Return the shortest series that meets the data as closely as the smooth spectrum within them does.
 
     At all rates of the data its moduli differ from those of the spectrum by `error` at most, beside the standard
-    deviation of the loss modulus. It has a branch per decade at least. `sweeps`, rates and moduli, are what the scatter
-    is found from.
+    deviation of the loss modulus as far as that is smaller. It has a branch per decade at least. `sweeps`, rates and
+    moduli, are what the scatter is found from.
     """
     spectrum, (low, high), (slow, fast) = Spectrum.of(data), data.band, data.rates
     decades = math.log10(fast / slow)
@@ -261,7 +261,7 @@ def fit(data: Measured, error: float, sweeps: Sequence[tuple[Array, Array]] = ()
     omega = np.concatenate([within, _frequencies(slow / 10.0**NEAR_END, fast * 10.0**NEAR_END)])
     goal, deviation = spectrum.modulus(omega)
     least, judge = min(max(1, math.ceil(decades)), MOST), slice(within.size)
-    allowed = np.hypot(error, deviation[judge])
+    allowed = np.hypot(error, np.minimum(deviation[judge], error))
     for count in progress.with_bar(range(least, MOST + 1), "number of branches", "branch"):
         tried = [_short(omega, goal, _times(data.rates, count, spare)) for spare in ENDS]
         judged = [_distance(omega[judge], goal[judge], allowed, *each) for each in tried]
@@ -274,7 +274,7 @@ def fit(data: Measured, error: float, sweeps: Sequence[tuple[Array, Array]] = ()
     missed = (complex_kernel(omega, "frequency", times) @ weights).imag / goal.imag - 1.0
     errors = 2.0 * np.hypot(deviation, missed)
     inner = (omega >= low * 10.0**NEAR_END) & (omega <= high / 10.0**NEAR_END)
-    series = Series(
+    series = PronySeries(
         float(weights[-1]),
         weights[:-1],
         times,
@@ -292,7 +292,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _alone(data: Measured) -> tuple[float, float]:
+def _alone(data: ReducedData) -> tuple[float, float]:
     """Return how closely storage and loss moduli could be met without the other."""
     if data.kind != "frequency":
         return math.nan, math.nan

@@ -12,7 +12,6 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Literal, get_args
 
 import numpy as np
@@ -21,14 +20,13 @@ from scipy.optimize import least_squares
 
 from .. import progress
 from ..errors import InputError
-from .series import DENSE, Measured, Weigh, best_residuals, reduce_sets
+from .series import DENSE, ReducedData, Weigh, best_residuals, reduce_sets
 from .shift import WLF, Arrhenius, Density, Factors, Shift, log_vertical
-from .tables import Measurement, Set
+from .tables import Measurement
 
 Array = NDArray[np.float64]
 Vertical = Literal["auto", "density", "free", "none"]
 VERTICAL: tuple[Vertical, ...] = get_args(Vertical)
-WIDEST = 8.0  # tuning: decades: the largest shift between neighbouring temperatures that is looked for
 MOST_DECADES = 45.0  # tuning: of shift between the coldest and the warmest set
 CLOSE = 1e-4  # accuracy: relative, of constants and of the misfit, at which a search ends
 FAR = 1e3  # accuracy: residual of shifts that are out of question: no step goes there
@@ -36,8 +34,6 @@ Ranges = tuple[tuple[float, float, int], ...]  # from, to, how many: where the c
 WLF_CONSTANTS: Ranges = ((2.0, 60.0, 16), (20.0, 600.0, 16))  # physics: C1 [-], C2 [K]
 ENERGIES: Ranges = ((1e4, 1e6, 40),)  # physics: J/mol
 EXPANSION = 6e-4  # physics: 1/K: of rubbers, 5e-4 to 7e-4, which moduli hardly tell apart from the shift
-APART = 0.3  # accuracy: rms of the differences of the logarithms of two sets that do not overlap, whatever b_T is
-SHORTEST = 0.3  # accuracy: share of a sweep that must overlap with its neighbour's
 COARSE = 3  # accuracy: times per decade of the series by which first constants and warnings are judged
 STEP = 1e-4  # accuracy: of finite differences, relative to constants and to factors
 ROUNDING = 1e-6  # accuracy: of misfits, below which no law is better
@@ -93,33 +89,30 @@ class _Search:
         return self.measured.temperatures
 
     def start(self) -> Array:
-        """Return constants of the horizontal law to begin from: logarithms, or log10 of the factors of all sets but the
-        first."""
+        """Return logarithms of the constants of the horizontal law to begin from, of WLF for free factors."""
         if not isinstance(self.law, str):
             return np.zeros(0)
-        if self.law == "free":
-            return np.array(_overlaps(self.measured)[1:])
-        ranges = WLF_CONSTANTS if self.law == "wlf" else ENERGIES
+        ranges = ENERGIES if self.law == "arrhenius" else WLF_CONSTANTS
         grid = [np.array(point) for point in itertools.product(*(np.log(np.geomspace(*each)) for each in ranges))]
         first = Density(EXPANSION, self.reference)
-        errors = [
-            self._misfit(self._horizontal(point), first)
-            for point in progress.with_bar(grid, "shift with temperature", "law")
-        ]
-        best = grid[int(np.argmin(errors))]
+        points = progress.with_bar(grid, "shift with temperature", "law")
+        errors = [self._misfit(replace(self._named(point), vertical=first)) for point in points]
         if not math.isfinite(min(errors)):
             raise InputError(
                 f"{self.measured.path}: no constants of this law join the sweeps to one curve at {self.reference:g} C"
             )
-        return best
+        return grid[int(np.argmin(errors))]
+
+    def _named(self, constants: Array) -> WLF | Arrhenius:
+        values = [float(value) for value in np.exp(constants)]
+        return Arrhenius(values[0], self.reference) if len(values) == 1 else WLF(values[0], values[1], self.reference)
 
     def _horizontal(self, constants: Array) -> Shift:
         if not isinstance(self.law, str):
             return self.law
         if self.law == "free":
             return _factors(self._known, [0.0, *constants], self.reference)
-        values = [float(value) for value in np.exp(constants)]
-        return WLF(values[0], values[1], self.reference) if self.law == "wlf" else Arrhenius(values[0], self.reference)
+        return self._named(constants)
 
     def _vertical(self, kind: Vertical, constants: Array) -> Density | Factors | None:
         if kind == "free":
@@ -129,7 +122,12 @@ class _Search:
     def refine(self, start: Array, kind: Vertical, per_decade: int = DENSE) -> Superposition:
         """Return the best shift near to constants, with a vertical law of a kind; shifts are compared by series of so
         many times per decade."""
-        begin = np.concatenate([start, np.zeros(len(self._known) - 1 if kind == "free" else 0)])
+        count = len(self._known) - 1
+        begin = np.concatenate([start, np.zeros(count if kind == "free" else 0)])
+        if self.law == "free":  # from WLF, with the same vertical law
+            logs = log_factors(replace(self, law="wlf").refine(start, kind, per_decade).shift, self._known)
+            begin = np.concatenate([np.array(log[1:]) - log[0] for log in logs[: 2 if kind == "free" else 1]])
+            start = begin[:count]
 
         def shift(constants: Array) -> Shift:
             return replace(
@@ -150,7 +148,7 @@ class _Search:
         found = shift(begin)
         return Superposition(found, float(np.sqrt(np.mean(best_residuals(self._reduced(found)) ** 2))))
 
-    def _reduced(self, shift: Shift | None) -> Measured:
+    def _reduced(self, shift: Shift | None) -> ReducedData:
         sets, kind = self.measured.sets, self.measured.kind
         if shift is None:
             return reduce_sets(sets, kind, weigh=self.weigh)
@@ -160,14 +158,13 @@ class _Search:
         """Return the decades of shift between the measured temperatures."""
         return float(np.ptp([shift.log_factor(t) for t in self._known]))
 
-    def _misfit(self, shift: Shift, vertical: Density) -> float:
+    def _misfit(self, shift: Shift) -> float:
         try:
             if not self._spread(shift) <= MOST_DECADES:
                 return math.inf
         except InputError:
             return math.inf
-        data = self._reduced(replace(shift, vertical=vertical))
-        return float(np.mean(best_residuals(data, COARSE) ** 2))
+        return float(np.mean(best_residuals(self._reduced(shift), COARSE) ** 2))
 
 
 def log_factors(shift: Shift, temperatures: Sequence[float]) -> tuple[list[float], list[float]]:
@@ -180,33 +177,3 @@ def _factors(temperatures: Sequence[float], logs: Sequence[float], reference: fl
     known = sorted({*temperatures, min(reference, temperatures[0]), max(reference, temperatures[-1])})
     there = float(np.interp(reference, temperatures, logs))
     return Factors(tuple(known), tuple(float(log - there) for log in np.interp(known, temperatures, logs)), reference)
-
-
-def _overlaps(measured: Measurement) -> list[float]:
-    """log10 of the shift of each set against the first, one neighbour after the other."""
-    logs = [0.0]
-    for colder, warmer in pairwise(measured.sets):
-        steps = np.linspace(-WIDEST, WIDEST, 16 * int(WIDEST) + 1)
-        apart = [_apart(colder, warmer, step, measured.kind) for step in steps]
-        if not min(apart) < APART**2:
-            raise InputError(
-                f"{measured.path}: the sweeps at {colder.temperature:g} and {warmer.temperature:g} C do not overlap at "
-                "any shift; measure at temperatures nearer to each other, or fit a law: --shift wlf"
-            )
-        logs.append(logs[-1] + float(steps[int(np.argmin(apart))]))
-    return logs
-
-
-def _apart(colder: Set, warmer: Set, log: float, kind: str) -> float:
-    """Mean square of the differences of the logarithms where two sets overlap; infinite where they do so too little."""
-    sign = 1.0 if kind == "frequency" else -1.0
-    own, other = np.log10(colder.at), np.log10(warmer.at) + sign * log
-    low, high = max(own[0], other[0]), min(own[-1], other[-1])
-    if high - low < SHORTEST * min(np.ptp(own), np.ptp(other)):
-        return math.inf
-    points = np.linspace(low, high, 40)
-    pairs = [(colder.storage, warmer.storage), *([(colder.loss, warmer.loss)] if colder.loss.size else [])]
-    squares = [
-        np.mean((np.interp(points, own, np.log(a)) - np.interp(points, other, np.log(b))) ** 2) for a, b in pairs
-    ]
-    return float(np.mean(squares))

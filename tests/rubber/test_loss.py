@@ -6,31 +6,31 @@ import numpy as np
 import pytest
 
 from parcontact.rubber import compound
-from parcontact.rubber.series import Series, Weigh
+from parcontact.rubber.series import PronySeries, Weigh
 
 from .bodies import BROAD, DENSE, STEEP, TEN, Array, Body, branches, noisy, write
 
 
-def miss(series: Series, body: Body, low: float, high: float) -> Array:
+def miss(series: PronySeries, body: Body, low: float, high: float) -> Array:
     """The relative errors of the loss modulus between two frequencies [Hz], 20 in a decade."""
     omega = 2 * np.pi * np.geomspace(low, high, round(20 * np.log10(high / low)) + 1)
     return np.asarray(series.modulus(omega).imag / body.modulus(omega).imag - 1.0)
 
 
-def relaxed(path: Path, body: Body, first: float, last: float, noise: float = 0.0) -> Series:
+def relaxed(path: Path, body: Body, first: float, last: float, noise: float = 0.0) -> PronySeries:
     """The fit of G(t), with eight points in a decade."""
     t = np.geomspace(first, last, round(8 * np.log10(last / first)) + 1)
     made = compound.fitted(write(path, "t[s] G(t)[Pa]", t, noisy(body.relaxation(t), noise)), 0.5, None, "wlf", 0.02)
-    series: Series = made.series
+    series: PronySeries = made.series
     return series
 
 
-def swept(path: Path, body: Body, low: float, high: float, weigh: Weigh, noise: float = 0.0) -> Series:
+def swept(path: Path, body: Body, low: float, high: float, weigh: Weigh, noise: float = 0.0) -> PronySeries:
     """The fit of moduli between two frequencies [Hz], with eight points in a decade."""
     f = np.geomspace(low, high, round(8 * np.log10(high / low)) + 1)
     g = body.modulus(2 * np.pi * f)
     table = write(path, "f[Hz] G'[Pa] G''[Pa]", f, noisy(g.real, noise), noisy(g.imag, noise, seed=2))
-    series: Series = compound.fitted(table, 0.5, None, "wlf", 0.02, weigh).series
+    series: PronySeries = compound.fitted(table, 0.5, None, "wlf", 0.02, weigh).series
     return series
 
 

@@ -128,9 +128,10 @@ def test_sets_that_have_no_shift(
 
 
 def test_free_factors_need_an_overlap(tmp_path: Path) -> None:
+    """Sweeps of three decades, nine decades from one another."""
     path = measured.write_sweeps(tmp_path / "rubber.csv", temperatures=(-45.0, 20.0))
-    with pytest.raises(InputError, match="do not overlap"):
-        superposition.superpose(tables.read(path), 20.0, "free", "none")
+    with pytest.raises(InputError, match="the sweeps do not shift onto one another"):
+        compound.fitted(path, 0.5, 20.0, "free", 0.05)
 
 
 JOB = """
