@@ -37,7 +37,8 @@ PER_DECADE = 10  # accuracy: frequencies at which a short series is held to the 
 ENDS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # accuracy: decades beyond the data that are tried for a short series
 NEAR_END = 0.5  # accuracy: decades of the band that count as its ends
 EARLIEST = 20.0  # accuracy: a relaxation or creep from t on shows the loss up to a frequency of 1/(20 t)
-NEGLIGIBLE = 1e-4  # accuracy: of the storage modulus, for a branch that is left out and a loss modulus
+NEGLIGIBLE = 1e-4  # accuracy: of the storage modulus, for a branch that is left out
+NOTHING = 1e-9  # rounding: of the absolute modulus: the least of both parts, by which others are divided
 Errors = tuple[float, float, float]
 
 
@@ -215,14 +216,14 @@ class Spectrum:
 
     def modulus(self, omega: Array) -> tuple[ComplexArray, Array]:
         """Return G* [Pa] at angular frequencies [rad/s], shape (n,), and the relative standard deviation of its
-        imaginary part. Both parts are at least a share of the absolute value that nobody would see."""
+        imaginary part. Neither part is 0."""
         found = complex_kernel(omega, self.kind, self.times)
         modulus = found @ self.weights
         if self.kind == "creep":
             modulus = 1.0 / modulus
             found = -(modulus[:, None] ** 2) * found
         deviation = np.sqrt(np.sum((found.imag @ self.deviations) ** 2, axis=1))
-        least = NEGLIGIBLE * np.abs(modulus)
+        least = NOTHING * np.abs(modulus)
         storage, loss = np.maximum(modulus.real, least), np.maximum(modulus.imag, least)
         return storage + 1j * loss, deviation / loss
 

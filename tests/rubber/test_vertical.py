@@ -71,6 +71,22 @@ def test_moduli_that_go_with_density_and_temperature(tmp_path: Path) -> None:
     assert abs(without.shift.C1 / RIGHT[0] - 1.0) > 0.08
 
 
+def test_relaxations_at_several_temperatures(tmp_path: Path) -> None:
+    """G(t) with a noise of 0.3 %: C1 and C2 to 4 %; without b_T C1 is a tenth and more off."""
+    t, rows = np.geomspace(0.1, 300.0, 30), []
+    for number, temperature in enumerate(TEMPERATURES):
+        above = temperature - REFERENCE
+        moduli = density_factor(temperature) * RUBBER.relaxation(t * 10.0 ** (C1 * above / (C2 + above)))
+        rows.append(np.array([np.full(30, temperature), t, noisy(moduli, 0.003, number)]))
+    path = write(tmp_path / "table.txt", "T[C] t[s] G(t)[Pa]", *np.hstack(rows))
+    made = compound.fitted(path, 0.5, None, "wlf", 0.02)
+    assert isinstance(made.shift, WLF)
+    assert_allclose([made.shift.C1, made.shift.C2], RIGHT, rtol=0.04)
+    without = compound.fitted(path, 0.5, None, "wlf", 0.02, vertical="none").shift
+    assert isinstance(without, WLF)
+    assert abs(without.C1 / RIGHT[0] - 1.0) > 0.1
+
+
 def test_moduli_that_do_not_change(tmp_path: Path) -> None:
     """A table that has been reduced already: no b_T is found, and the constants are right to 3 %."""
     made = compound.fitted(sweeps(tmp_path / "table.txt", "none"), 0.5, None, "wlf", 0.02)
