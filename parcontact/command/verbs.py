@@ -187,8 +187,8 @@ def surface(options: argparse.Namespace) -> int:
     """Say what the surface of a job, or a measured map, is like; draw it."""
     from pathlib import Path
 
+    from ..derived.surface_summary import describe_surface
     from ..parallel.slab import Slab
-    from ..report import road as drawing
     from ..scene import sanity, set_up
     from . import measured_maps
 
@@ -203,7 +203,7 @@ def surface(options: argparse.Namespace) -> int:
     doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
-    told = drawing.describe(job, heights, base.told.notes, base.shortest, picture)
+    told = describe_surface(job, heights, base.told.notes, base.shortest, picture)
     started = measured_maps.start(job, given, options.start) if alone else ()
     print("\n".join([*told, *(f"warning: {text}" for text in doubts), *started]))
     return DONE

@@ -1,62 +1,19 @@
-"""The rigid surface of a job: what `parcontact surface` says and draws of it, and its section of a report."""
+"""The section about the rigid surface of a job."""
 
-from collections.abc import Iterator
 from functools import partial
-from pathlib import Path
 
-import numpy as np
-
-from ..errors import InputError, RunError
-from ..job import Job, Topography
+from ..derived.surface_summary import NOT_SELF_AFFINE
+from ..errors import InputError
+from ..job import Job
 from ..job.sections import listing
 from ..parallel.fft import FFT
-from ..parallel.slab import Array, Slab
+from ..parallel.slab import Slab
 from ..physics import surface_statistics as statistics
-from ..plotting import style, surface, units
-from ..printed import per_cent, quantity
-from ..road import map_files, treatment
-from ..road.prepared_map import prepare
+from ..plotting import surface, units
 from ..scene import rigid_surface
 from .parts import Section, Table, draw_panel
 
 MOST_POINTS = 2**22  # of a surface that is made anew for a report
-NOT_SELF_AFFINE = "no self-affine range was found"
-
-
-def describe(job: Job, heights: Array, told: list[str], shortest: float | None, picture: Path) -> Iterator[str]:
-    """Draw the picture and say what the heights [m], shape (ny, nx), are like, line by line; root only.
-
-    `shortest` [m] is the shortest wave of a measured surface, None of others. Raises InputError and RunError.
-    """
-    if picture.suffix[1:] not in style.MARKED:
-        raise InputError(f"--out must end in .{', .'.join(style.MARKED)}, got {str(picture)!r}")
-    found, part, measured = statistics.describe(heights, job.grid.size), job.surface[0], None
-    lines = []
-    whole = map_files.read(part) if isinstance(part, Topography) and len(job.surface) == 1 else None
-    if isinstance(part, Topography) and whole and not whole.is_line:  # at its own points, its edges joined smoothly
-        prepared = prepare(part, job.grid, whole)
-        (ny, nx), (lx, ly) = prepared.cut.shape, prepared.size
-        measured = statistics.describe(treatment.treat(prepared.cut, part.detrend, "smooth").heights, prepared.size)
-        lines = [f"size           {quantity(lx, 'm', 5)} x {quantity(ly, 'm', 5)}", f"points         {nx} x {ny}"]
-        lines.append(f"pixel          {quantity(lx / nx, 'm', 4)} x {quantity(ly / ny, 'm', 4)}")
-        lines.append(f"missing        {per_cent(float(np.isnan(prepared.cut).mean()))} of its points")
-    try:
-        picture.parent.mkdir(parents=True, exist_ok=True)
-        surface.draw(surface.Sketch(heights, job.grid.size, found, measured), picture)
-    except OSError as error:
-        raise RunError(f"{picture} cannot be written: {error}") from error
-    yield from (*lines, *told)
-    yield f"rms height     {quantity(found.rms_height, 'm', 4)}"
-    yield f"rms slope      {found.rms_slope:.4g}"
-    yield f"rms curvature  {found.rms_curvature:.4g} 1/m"
-    yield f"Nayak          {found.nayak:.4g}"
-    longest, two_cells = max(job.grid.size), 2.0 * max(job.grid.dx, job.grid.dy)
-    yield f"spectrum       waves of {quantity(longest, 'm', 4)} to {quantity(two_cells, 'm', 4)}"
-    yield f"Hurst          {f'{found.hurst:.3g}' if found.hurst == found.hurst else NOT_SELF_AFFINE}"
-    if shortest is not None:
-        cells = shortest / max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
-        yield f"shortest wave  {quantity(shortest, 'm', 4)}, {cells:.3g} cells"
-    yield f"picture: {picture}"
 
 
 def section(job: Job) -> Section:
