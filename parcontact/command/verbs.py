@@ -94,13 +94,13 @@ def _doubts(job: Job, notes: list[list[str]]) -> list[str]:
     if not job.depends_on_heights and not job.measured:
         return list(job.warnings)
     from ..parallel.slab import Slab
-    from ..scene import sanity, set_up
+    from ..scene import describe_roughness, sanity, set_up
     from ..scene.measured_range import describe_beyond
 
     if not sanity.is_quickly_made(job):
         return [*job.warnings, *describe_beyond(job)]
     setup = set_up(job, Slab.alone(*job.grid.points))
-    notes[-1] += setup.told.notes
+    notes[-1] += [*setup.told.notes, *describe_roughness(setup)]
     sanity.refuse_beyond_full_contact(setup)
     return sanity.find_doubts(setup)
 

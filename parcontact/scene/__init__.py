@@ -1,7 +1,7 @@
 """From a job to what is calculated with: the choices that follow from it, the rigid surface, the body, the solver."""
 
 from .choices import Choices, choices
-from .scene import Scene, Setup, build, build_on, describe_scene, set_up, solver_on, solver_on_tiles
+from .scene import Scene, Setup, build, build_on, describe_roughness, describe_scene, set_up, solver_on, solver_on_tiles
 
 __all__ = [
     "Choices",
@@ -10,6 +10,7 @@ __all__ = [
     "build",
     "build_on",
     "choices",
+    "describe_roughness",
     "describe_scene",
     "set_up",
     "solver_on",

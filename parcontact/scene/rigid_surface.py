@@ -17,10 +17,9 @@ from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from ..physics import heightfile
 from ..physics.lowest import lowest
-from ..physics.roughness import Roughness, moments, shortest_wave
+from ..physics.roughness import Roughness, shortest_wave
 from ..physics.shapes import Round
 from ..physics.surface import Surface, single_wave
-from ..printed import quantity
 
 ROUNDING = 1e-8  # accuracy: relative, of the shortest wavelength of a table
 FLAT = 1e-14  # accuracy: a surface whose highest and lowest points differ by this, relative to their heights, is flat
@@ -175,12 +174,7 @@ def _random_surface(
         if long > max(grid.size) * (1.0 + ROUNDING):
             notes.append(f"spectrum: the box has no waves longer than {max(grid.size):.4g} m")
     limits = long, long, short * (1.0 - ROUNDING)  # the last point of a table is among its waves
-    made = Roughness(1.0, *limits, seed, random, psd_constant=1.0, measured=found).spectrum(fft, grid.size)
-    has = moments(made, fft, grid.size)
-    if fft.slab.root:
-        height = quantity(has.rms_height, "m", 4)
-        notes.append(f"spectrum: the surface has an rms height of {height} and an rms slope of {has.rms_slope:.4g}")
-    return made
+    return Roughness(1.0, *limits, seed, random, psd_constant=1.0, measured=found).spectrum(fft, grid.size)
 
 
 def _transform(heights: Array, fft: FFT) -> Spectrum:

@@ -228,7 +228,12 @@ def describe_scene(scene: Scene) -> Iterator[str]:
     yield from scene.job.facts
     if steps := describe_steps(scene.job):
         yield f"chosen time steps: {steps}"
-    if (found := scene.setup.roughness) and found.m0:
+    yield from describe_roughness(scene.setup)
+
+
+def describe_roughness(setup: Setup) -> Iterator[str]:
+    """Yield a sentence on the moments of a surface that has waves."""
+    if (found := setup.roughness) and found.m0:
         yield (
             f"surface: rms height {quantity(found.rms_height, 'm', 4)}, rms slope {found.rms_slope:.4g}, Nayak's "
             f"parameter {found.nayak:.3g} (moments m0 {found.m0:.4g} m^2, m2 {found.m2:.4g}, m4 {found.m4:.4g} m^-2)"

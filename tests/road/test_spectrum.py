@@ -155,7 +155,7 @@ def test_spectra_that_surface_topography_writes(tmp_path: Path, main: "Main", ki
     code, out, _ = main("check", tmp_path / "job.yaml")
     assert code == 0
     assert told[-1] in out
-    (found,) = re.findall(r"an rms height of (\S+) (nm|um) and an rms slope of (\S+)", out)
+    (found,) = re.findall(r"surface: rms height (\S+) (nm|um), rms slope (\S+),", out)
     assert float(found[0]) * UNITS[found[1]] == pytest.approx(made.std(), rel=1e-3, abs=0.0)
     assert float(found[2]) == pytest.approx(truth.rms_slope(made.astype(float), L), rel=1e-3, abs=0.0)
 
