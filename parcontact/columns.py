@@ -218,6 +218,12 @@ MEASURES: Table = (
         "energy lost in snaps since the start (with `adhesion` and `output.energy`)",
         when="adhesion",
     ),
+    Column(
+        *("error_energy", "J"),
+        "estimated error of `work` and `dissipated`: by how much the work of the load along its path and the energies "
+        "differ, summed over steps without snaps (with `adhesion` and `output.energy`)",
+        when="adhesion",
+    ),
     Column("flow_x", "m³", "conductivity of the gap along x (with `leakage`, {doc}`seals`)", when="leakage"),
     Column("flow_y", "m³", "conductivity of the gap along y (with `leakage`)", when="leakage"),
     Column(

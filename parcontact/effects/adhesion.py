@@ -144,7 +144,7 @@ class AdhesionMemory:
     energies: AdhesiveEnergies = NO_ENERGIES
     snaps: int = 0
     front_warning_given: bool = False
-    columns: tuple[float, ...] = (0.0, 0.0, math.nan, math.nan)
+    columns: tuple[float, ...] = (0.0, 0.0, math.nan, math.nan, math.nan)
 
 
 def _no_bands(adhesion: Any, bands: Any) -> Iterator[Fault]:
@@ -153,8 +153,8 @@ def _no_bands(adhesion: Any, bands: Any) -> Iterator[Fault]:
 
 
 class AdhesionColumns(Effect[AdhesionMemory]):
-    """The share of the area under tension, the force of all tension [N], the energy of the surfaces [J] and the energy
-    lost in snaps [J]."""
+    """The share of the area under tension, the force of all tension [N], the energy of the surfaces, the energy lost in
+    snaps, and the error of energies [J]."""
 
     section: ClassVar[type[Part]] = Adhesion
     columns: ClassVar[tuple[str, ...]] = added_by("adhesion")
@@ -211,11 +211,11 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         """Return the energies after a step; errors are not stated across a snap, and a step is warned of once in which
         the edges of contact of a viscoelastic body move too far."""
         solved, energies = instant.solved, memory.energies
-        columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan
+        columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan, math.nan
         if self._scene.energy is not None:
             if solved.end != "open":
                 energies = adhesive_energies.advance(energies, instant, self._area)
-            columns = (*columns[:2], energies.surfaces, energies.lost)
+            columns = (*columns[:2], energies.surfaces, energies.lost, energies.error)
         far = instant.front > SNAP_FRONT and not instant.untouched
         chosen = instant.step.judge is not None
         snapped = solved.snapped or (chosen and far)

@@ -27,12 +27,14 @@ SURFACES, PUSHED, JUMPS = "surface_energy", "work_of_load", "leaves_equilibrium"
 
 
 class AdhesiveEnergies(NamedTuple):
-    """Energies [J] since the start: the `work` of the rigid surface, the energy of the `surfaces`, 0 far apart, and
-    the energy `lost` in snaps."""
+    """Energies [J] since the start: the `work` of the rigid surface, the energy of the `surfaces`, 0 far apart, the
+    energy `lost` in snaps, and the estimated `error` of the others: by how much the work along the path of the load
+    and the energies differ, summed over all steps without a snap."""
 
     work: float = 0.0
     surfaces: float = 0.0
     lost: float = 0.0
+    error: float = 0.0
 
 
 NO_ENERGIES = AdhesiveEnergies()
@@ -69,7 +71,9 @@ def advance(past: AdhesiveEnergies, instant: Instant, area: float) -> AdhesiveEn
         doubt += 0.5 * area * abs((measures.pressure - before.pressure) * way)
     lost = work - gained
     snaps = lost > doubt + LEAST_SNAP * (abs(gained) + abs(surfaces))
-    return AdhesiveEnergies(past.work + (work if snaps else gained), surfaces, past.lost + (lost if snaps else 0.0))
+    if snaps:
+        return AdhesiveEnergies(past.work + work, surfaces, past.lost + lost, past.error)
+    return AdhesiveEnergies(past.work + gained, surfaces, past.lost, past.error + abs(lost))
 
 
 def _drag(before: Measures, now: Measures, moved: tuple[float, float]) -> tuple[float, float]:

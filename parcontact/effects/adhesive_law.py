@@ -197,13 +197,14 @@ class AdhesiveLaw:
         """
         if not (before.contact_area or now.contact_area or solved.numbers["tensile_area"]):
             return Motion(0.0, True)
+        begins = (before.contact_area == 0.0) != (now.contact_area == 0.0)
         excess = max(each.contact_area - each.contact_area_corrected for each in (before, now))
         sides = excess * self.slab.points / SIDE
         if sides <= 0.0:
-            return Motion()
+            return Motion(begins=begins)
         moved = solved.numbers["points_changed"] / (0.25 * math.pi * sides) * cell_of(self.grid)
         zone = self.scene.choices.adhesion.process_zone(modulus_of(self.scene.job.material))
-        return Motion(2.0 * moved / zone if zone > 0.0 else 0.0)
+        return Motion(2.0 * moved / zone if zone > 0.0 else 0.0, begins=begins)
 
     def _path(self, trial: Trial, control: Control, past: PreviousContacts, before: Measures) -> LoadPath:
         """Return the way of what is prescribed since the last step, in the run's units."""

@@ -72,11 +72,12 @@ class SolvedContact(Generic[Remembered]):
 
 
 class Motion(NamedTuple):
-    """Motion of a contact in a step: half process zones by which its edges moved, and whether nothing touches before
-    and after the step, nor is under tension."""
+    """Motion of a contact in a step: half process zones by which its edges moved; whether nothing touches before and
+    after the step, nor is under tension; and whether an adhesive contact begins or ends."""
 
     front: float = 0.0
     untouched: bool = False
+    begins: bool = False
 
 
 class Detached(NamedTuple):

@@ -36,7 +36,7 @@ REST_LEVELS = 4  # tuning: the same at rest
 LEAST_WAY = 0.35  # tuning: of a step that ends at a multiple of its length
 STRETCH = 1.1  # tuning: of the last step of a stage: no step shorter than a tenth of the one before is left over
 SNAP_SHARE = 1.0 / 64.0  # accuracy: of the longest step of a stage: in a shorter one the edge of contact may snap
-RELAXING = 0.1  # tuning: of the shortest relaxation time: the first step at rest after a jump
+RELAXING = 0.1  # accuracy: of the shortest relaxation time: the same; and the first step at rest after a jump
 SAME_LEVEL = 1e-6  # rounding: of a level
 
 
@@ -66,18 +66,31 @@ class StepChooser:
         return self._step(span, number, self._first(span) if first else self.chosen.next)
 
     def judge(
-        self, span: Span, step: Step, end: float, rejected: bool, error: float, front: float = 0.0
+        self,
+        span: Span,
+        step: Step,
+        end: float,
+        rejected: bool,
+        error: float,
+        front: float = 0.0,
+        begins: bool = False,
     ) -> Step | MadeStep:
         """Return the shorter step to make instead of one with such an error, or how the step is noted as made.
 
         It ends the stage at `end` [s]; `rejected` says whether a longer one was tried before. The `front` of a contact
-        with adhesion has moved by so many half process zones, of which one is allowed, but where it snaps.
+        with adhesion has moved by so many half process zones, of which one is allowed, but where it snaps. Steps in
+        which it snaps, `begins` or ends are a share of the shortest relaxation time: what is sudden meets the body
+        before it relaxes. Where energies are asked for, so is what each point loses as it closes: then the root of the
+        accuracy is allowed.
         """
         numerics = self.scene.choices.numerics
         order = order_of_time_error(numerics.integrator, step.growth > 0.0)
         ratio = error / (TIME_SHARE * numerics.asked.of_steps)
-        if step.dt > SNAP_SHARE * self._bounds(span).most:
-            ratio = max(ratio, front**order)
+        sudden = min(SNAP_SHARE * self._bounds(span).most, RELAXING * self.scene.material.shortest_time)
+        if step.dt > sudden:
+            relaxes = self.scene.material.branched is not None
+            allowed = math.sqrt(numerics.asked.of_steps) if relaxes and self.scene.energy is not None else 1.0
+            ratio = max(ratio, (front / allowed) ** order, (step.dt / sudden) ** order if begins and relaxes else 0.0)
         wanted = SAFETY * ratio ** (-1.0 / order) if ratio > 0.0 else MOST_GROWTH
         if ratio > REJECTED:
             share = max((REJECTED / ratio) ** (1.0 / order), MOST_SHRINK)

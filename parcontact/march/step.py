@@ -102,7 +102,7 @@ def _accepted(scene: Scene, state: State, step: Step) -> _Made:
         if step.judge is None:
             return _Made(solved, errors, motion, None)
         error = 0.0 if motion.untouched else scene.slab.agree(errors.step)
-        verdict = step.judge(error, motion.front)
+        verdict = step.judge(error, motion.front, motion.begins)
         if not isinstance(verdict, Step):
             return _Made(solved, errors, motion, verdict)
         step = verdict
@@ -166,7 +166,8 @@ def _follow(scene: Scene, state: State, made: _Made, energy: EnergyMemory | None
         solved.measures,
         (x - x_before, y - y_before),
         gained,
-        *made.motion,
+        made.motion.front,
+        made.motion.untouched,
         made.errors.of_friction,
     )
     changes = {name: effect.follow(instant, state.memories[name]) for name, effect in scene.effects.items()}

@@ -36,7 +36,7 @@ def test_a_step_that_is_made_anew_leaves_nothing() -> None:
     for step in itertools.islice(tried.steps(), 12):
         attempts = [step]
 
-        def judge(error: float, front: float) -> Step | MadeStep:
+        def judge(error: float, front: float, begins: bool) -> Step | MadeStep:
             verdict = attempts[-1].judge(error)  # type: ignore[misc]  # noqa: B023  # it is called in this turn only
             if not isinstance(verdict, Step):
                 return verdict

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from marching import marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 from sticking import (
@@ -115,3 +116,29 @@ def test_instant_retraction_of_a_rough_surface() -> None:
     areas = [row.contact_area for row, _ in found[-count - 1 :]]
     assert np.all(np.diff(areas) < 0)
     assert 0 < areas[-1] < 0.1 * areas[0]
+
+
+@pytest.mark.parametrize(("accuracy", "within"), [(0.05, 0.05), (0.005, 0.02)])
+def test_energies_of_a_contact_that_comes_about_follow_the_accuracy(accuracy: float, within: float) -> None:
+    """A ball comes into contact within 100 s, in a second of which it snaps in, and its rubber relaxes in 0.1 s.
+
+    6400 given steps dissipate 27.8 pJ; with a rest, which adds 0.2, an independent program 27.6 on this mesh. With
+    steps that pass over the snap it was 21.1 at any accuracy. `error_energy` covers what is missing, and is less than
+    a seventh of it all.
+    """
+    branches = [{"modulus": 4e6, "relaxation_time": 0.01}, {"modulus": 5e6, "relaxation_time": 0.1}]
+    ball = {
+        "grid": {"points": 64, "size": 3e-4, "boundary": "free"},
+        "surface": {"shape": "sphere", "radius": 1e-3},
+        "material": {"model": "zener", "modulus_inf": 1e6, "branches": branches},
+        "adhesion": {"work": 0.05, "range": 5.4e-7},
+        "history": [{"approach": {"from": -4e-6, "to": 5e-7}, "duration": 100.0}],
+        "numerics": {"accuracy": accuracy},
+        "output": {"energy": True},
+    }
+    _, rows = marched(ball)
+    wanted, error = 27.8e-12, rows[-1].added[-1]
+    assert abs(rows[-1].dissipated - wanted) < within * wanted
+    assert abs(rows[-1].dissipated - wanted) < error < wanted / 7.0
+    begins = next(number for number, row in enumerate(rows) if row.measures.contact_area > 0.0)
+    assert rows[begins].time - rows[begins - 1].time < 0.0011
