@@ -36,7 +36,7 @@ COMPOUNDS: dict[str, dict[str, Any]] = {
 }
 LONG = 4e-3  # m
 POINTS = (320, 512, 512, 1024)  # of the one grid, four boxes of whose longest waves have 16 cells times the decades
-LINE = 16384
+LINE = 65536
 
 
 def case_of(number: int, seed: int, line: bool) -> tuple[dict[str, Any], int, float, float]:
@@ -47,7 +47,12 @@ def case_of(number: int, seed: int, line: bool) -> tuple[dict[str, Any], int, fl
     slope, hurst = float(10 ** chance.uniform(-1.3, -0.3)), round(float(chance.uniform(0.5, 0.9)), 2)
     speed = float(10 ** chance.uniform(-2.5, 1.0))
     surface = {
-        **{"shape": "rough", "hurst": hurst, "long_wavelength": LONG, "short_wavelength": LONG * 16 / points},
+        **{
+            "shape": "rough",
+            "hurst": hurst,
+            "long_wavelength": LONG,
+            "short_wavelength": LONG * (64 if line else 16) / points,
+        },
         **{"rms_slope": round(slope, 3), "seed": int(chance.integers(1000)), "amplitudes": "fixed"},
     }
     load = float(10 ** chance.uniform(-2.0, 0.5))  # over the rms pressure of full contact
@@ -64,7 +69,8 @@ def case_of(number: int, seed: int, line: bool) -> tuple[dict[str, Any], int, fl
 
 
 def solve(job: dict[str, Any], count: int, points: int, samples: int, line: bool, speed: float, load: float) -> Point:
-    along = points if count == 1 else 2 * round(8 * (points / 16) ** (1 / count))
+    waves = 64 if line else 16  # times the cells of a wave
+    along = points if count == 1 else 2 * round(waves / 2 * (points / waves) ** (1 / count))
     shape = [along, 1] if line else along
     bands = {"count": count, "points": shape, "samples": samples}
     return RoadSliding(jobs.load({**job, "bands": bands}), Slab.alone(1, 1)).solve((speed, 0.0), load)

@@ -1,7 +1,8 @@
 """A road and a rubber as a laboratory would deliver them, made up, so that the truth is known: python jobs/road/make.py
 
 Writes beside itself, in measured/: road.npy, 1.8 x 1.8 mm of a larger road in um, tilted, 2 % of its points missing,
-its edges fitting nowhere; compound.csv, Young's moduli at five temperatures with 2 % noise. In truth/: the whole road
+its edges fitting nowhere; spectrum.csv, the spectrum of its finer waves down to 1 um; compound.csv, Young's moduli at
+five temperatures with 2 % noise. In truth/: the whole road
 of 2 x 2 mm, periodic, in m; compound.yaml with the relaxation function and the shift that the table was made from.
 """
 
@@ -14,6 +15,7 @@ HERE = Path(__file__).parent
 LENGTH, POINTS = 2.0e-3, 256  # of the whole road [m]
 SEEN = 232  # points of it along a side that are measured
 LONGEST, SHORTEST, HURST, SLOPE = 2.5e-4, 6.25e-5, 0.8, 0.08
+FINEST = 1.0e-6  # of the spectrum [m]
 MISSING, TILT = 0.02, (0.03, -0.01)
 MODULUS_INF, MODULI = 1.0e6, 1e6 * np.array([300, 350, 220, 80, 24, 7, 2.4, 1.0, 0.5, 0.3, 0.2, 0.15])  # [Pa]
 TIMES = 5e-9 * 10.0 ** np.arange(12)  # [s], at the reference
@@ -41,6 +43,16 @@ def measured(heights: NDArray[np.float64]) -> NDArray[np.float64]:
     part += TILT[0] * x + TILT[1] * y
     part[np.random.default_rng(5).random(part.shape) < MISSING] = np.nan
     return 1e6 * part
+
+
+def spectrum() -> str:
+    """The isotropic spectrum of waves too short for the map, which goes on as that of the map."""
+    ends = 2 * np.pi / np.array([LONGEST, SHORTEST])
+    power = 2.0 - 2.0 * HURST
+    constant = SLOPE**2 * power / (2 * np.pi * (ends[1] ** power - ends[0] ** power))
+    q = np.geomspace(ends[1], 2 * np.pi / FINEST, 20)
+    rows = [f"{k:.8g},{constant * k ** (-2 - 2 * HURST):.8g}" for k in q]
+    return "\n".join(["q[1/m],C2D[m^4]", *rows]) + "\n"
 
 
 def table() -> str:
@@ -71,6 +83,7 @@ def main() -> None:
     np.save(HERE / "truth" / "road.npy", heights)
     np.save(HERE / "measured" / "road.npy", measured(heights))
     (HERE / "measured" / "compound.csv").write_text(table())
+    (HERE / "measured" / "spectrum.csv").write_text(spectrum())
     (HERE / "truth" / "compound.yaml").write_text(compound())
 
 

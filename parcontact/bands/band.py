@@ -34,7 +34,8 @@ Vector = tuple[float, float]
 @dataclass(frozen=True)
 class Rung:
     """Steady state of one band under a mean `pressure` [Pa]: friction of its waves by energy and by slopes [-], area as
-    a share, counted and corrected, approach [m], highest pressure [Pa]; weights of the rungs of the next finer band and
+    a share, counted and corrected, approach [m] (by `Cascade.climb` with that
+    of finer bands), highest pressure [Pa]; weights of the rungs of the next finer band and
     the share of the load above them; power [W/m^2] that each branch loses; rises of temperature by its waves
     (`band_heat`), 0 without `thermal`; relative errors of friction and area by the solver and by the grid; residual,
     and calls of the operator."""

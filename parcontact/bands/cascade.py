@@ -106,21 +106,24 @@ class Cascade:
     def climb(self, samples: Sequence[int]) -> dict[tuple[int, int], list[Rung]]:
         """Solve all rungs of all bands with the laws of finer ones: the upward pass, for each sample on its own."""
         found: dict[tuple[int, int], list[Rung]] = {}
-        laws = dict.fromkeys(samples, HARD)
+        laws, touching = dict.fromkeys(samples, HARD), dict.fromkeys(samples, 0.0)
         for number in reversed(range(self.cut.count)):
             rungs = range(len(self.ladders[number].rungs))
             tasks = [Task(number, sample, rung, laws[sample]) for sample in samples for rung in rungs]
             solved = iter(self.solve_tasks(tasks))
             for sample in samples:
-                found[number, sample] = [next(solved) for _ in rungs]
+                own = [next(solved) for _ in rungs]
+                found[number, sample] = [replace(rung, approach=rung.approach + touching[sample]) for rung in own]
                 if number:
-                    laws[sample] = self._law(number, found[number, sample])
+                    laws[sample], touching[sample] = self._law(number, found[number, sample])
         return found
 
-    def _law(self, number: int, rungs: Sequence[Rung]) -> InterfaceLaw:
-        """Return how a band and all finer ones close; what the solver leaves of a rise is taken off."""
+    def _law(self, number: int, rungs: Sequence[Rung]) -> tuple[InterfaceLaw, float]:
+        """Return how a band and all finer ones close, and their approach [m] where c is 0; what the solver leaves of a
+        rise is taken off."""
         closings = np.maximum.accumulate([rung.approach for rung in rungs])
-        return InterfaceLaw.of_table(self.ladders[number].rungs, closings)
+        law = InterfaceLaw.of_table(self.ladders[number].rungs, closings)
+        return law, float(closings[0] - law.closings[1])
 
     def fall(self, solve: Callable[[int, Array], Sequence[Rung]]) -> Results:
         """Send the load down through the bands: the downward pass. `solve(band, weights)` returns its rungs."""

@@ -18,7 +18,8 @@ from .measured_band import MapBand, band_of_map
 from .wave_spectrum import WaveSpectrum, spectrum_of
 
 WIDTH = 0.75  # accuracy: decades of a band, about; 0.65 to 1 are right to 4 % in friction, 0.45 to 7 %
-WAVES, CELLS = 4, 4.0  # accuracy: longest waves along a box, cells per shortest wave
+WAVES, WAVES_OF_LINE = 4, 16  # accuracy: longest waves along a box
+CELLS = 4.0  # accuracy: per shortest wave
 FEWEST, MOST = 2, 8  # tuning: surfaces of each band, where the scatter chooses them
 SAMPLE_SHARE = 0.3  # accuracy: of the accuracy asked for, which the scatter of surfaces may have
 
@@ -40,6 +41,11 @@ class Cut:
     def box(self) -> float:
         """The longer side of the box of the coarsest band [m]."""
         return self.waves * self.spectrum.longest if self.measured is None else max(self.measured.grid.size)
+
+    @property
+    def line(self) -> bool:
+        """Whether its surfaces are profiles."""
+        return 1 in self.points
 
     @property
     def count(self) -> int:
@@ -76,7 +82,7 @@ def choose(job: Job) -> Cut:
     measured = band_of_map(job, spectrum.longest, CELLS)
     count = asked.count or 0
     count = max(1, count - bool(measured) if count else round(decades / WIDTH))
-    waves, ratio = asked.waves or WAVES, 10.0 ** (decades / count)
+    waves, ratio = asked.waves or (WAVES_OF_LINE if line else WAVES), 10.0 ** (decades / count)
     along = fast_length(CELLS * waves * ratio * EDGE)
     points = asked.points or (along, along)
     least = LEAST_CELLS * waves * ratio * EDGE

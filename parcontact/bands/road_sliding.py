@@ -26,7 +26,10 @@ from .limits import STRAIN
 
 MOST_ROUNDS = 20  # tuning: of temperatures, more than any case has needed
 LEAST_ERROR, RELATIVE = 0.1, 0.02  # accuracy: of the rise of a band [K], and relative
-HARD_SHARE, LEAST_METHOD = 0.25, 0.03  # accuracy: of the difference of hard walls; relative. Found on 17 cases, these
+HARD_SHARE, LEAST_METHOD = (
+    0.25,
+    0.03,
+)  # accuracy: of the difference of hard walls, all of profiles; relative. Found on 17 cases, these
 # covered 102 of 104 differences of friction and area in 26 others (`scripts/band_errors.py`)
 NEARLY_ALL = 0.1  # accuracy: of the area; where less is not in contact, errors go to 0 with it
 SURE = 2.0  # accuracy: standard errors of the scatter of surfaces that count as an error
@@ -36,13 +39,15 @@ TABLE = "bands.csv"
 @dataclass(frozen=True)
 class Outcome:
     """What all bands come to: results with laws from all samples, friction and area of the first sample with laws and
-    behind hard walls, and standard errors of friction and area by the scatter of surfaces; the rungs of each band."""
+    behind hard walls, and standard errors of friction and area by the scatter of surfaces; the rungs of each band, and
+    whether these are of profiles."""
 
     results: Results
     with_laws: tuple[float, float]
     hard: tuple[float, float]
     scatter: tuple[float, float]
     rungs: Sequence[Sequence[Rung]]
+    line: bool = False
 
     @property
     def friction(self) -> float:
@@ -56,7 +61,8 @@ class Outcome:
             return [0.0, 0.0]
         least = LEAST_METHOD * min(1.0, (1.0 - self.results[-1].contact_area_corrected) / NEARLY_ALL)
         ends = zip(self.hard, self.with_laws, strict=True)
-        return [max(HARD_SHARE * abs(hard - law), least * law) for hard, law in ends]
+        share = 1.0 if self.line else HARD_SHARE
+        return [max(share * abs(hard - law), least * law) for hard, law in ends]
 
 
 @dataclass(frozen=True)
@@ -217,7 +223,7 @@ class RoadSliding:
                 ]
                 variances += np.var(each, axis=0, ddof=1) / len(samples)
         scatter = np.sqrt(variances)
-        return Outcome(results, _sums(first), hard, (float(scatter[0]), float(scatter[1])), means)
+        return Outcome(results, _sums(first), hard, (float(scatter[0]), float(scatter[1])), means, self.cut.line)
 
     def _to_point(self, outcome: Outcome, velocity: Vector, pressure: float, seconds: float) -> Point:
         results, finest, coarsest = outcome.results, outcome.results[-1], outcome.rungs[0][0]
@@ -260,7 +266,7 @@ class RoadSliding:
         method, scatter = outcome.method, [SURE * error for error in outcome.scatter]
         parts = [
             Parts(solver / whole, 0.0, 0.0, mesh / whole, method=method[k] / whole + lost, scatter=scatter[k] / whole)
-            for k, (whole, (solver, mesh)) in enumerate(((friction, of_bands), (area, of_area)))
+            for k, (whole, (solver, mesh)) in enumerate(((friction or 1.0, of_bands), (area or 1.0, of_area)))
         ]
         own = self._interface_share(outcome, friction)
         with_interface = replace(parts[0], method=parts[0].method + own * parts[1].method)

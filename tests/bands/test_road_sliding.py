@@ -230,3 +230,17 @@ def test_a_curve_that_was_killed_goes_on(tmp_path: Path, monkeypatch: pytest.Mon
     assert len(tables.read(Path("out/job/bands_theory.csv"))["friction"]) == 4
     assert main(["report", "out/job"]) == 0
     assert "bands.csv" in Path("out/job/report.html").read_text()
+
+
+@pytest.mark.parametrize("pressure", [2e4, 1e5])
+def test_elastic_contact_in_two_bands(pressure: float) -> None:
+    """Area and mean gap of one grid with the same coarse waves, 6 and 27 % in contact: to 4 %, the chance of finer
+    waves, and to 1 %."""
+    body = {"material": {"model": "elastic", "shear_modulus": 1e6}, "numerics": {"tolerance": 1e-2}}
+    surface = {"surface": {**ROUGH, "short_wavelength": LONG / 16}}
+    one = sliding({**body, **surface, "bands": {"count": 1, "points": 256, "samples": 2}}).solve((1.0, 0.0), pressure)
+    two = sliding({**body, **surface, "bands": {"count": 2, "points": 64, "samples": 2}}).solve((1.0, 0.0), pressure)
+    assert two.measures.contact_area == pytest.approx(one.measures.contact_area, rel=0.04)
+    assert two.measures.mean_gap == pytest.approx(one.measures.mean_gap, rel=0.01)
+    assert two.friction == one.friction == 0.0
+    assert two.errors.friction is None
