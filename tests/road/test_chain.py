@@ -47,11 +47,13 @@ def test_friction_of_the_fitted_rubber_and_of_the_treated_road(
 
 
 def test_more_branches_err_less(compare: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The error of the fit falls with the error that is asked for, to 2 % with twelve branches."""
+    """Of twelve decades: at least twelve branches, more the less error is asked for, and 2 % of error by a noise of
+    2 %."""
     monkeypatch.setattr(compare, "STEPS", 2)
     found = [compare.cost(error)[:2] for error in (0.02, 0.1)]
-    assert found[0][0] == 12 > found[1][0]
-    assert found[0][1] < 0.02 < found[1][1]
+    assert found[0][0] > found[1][0] >= 12
+    assert found[0][1] < 0.02
+    assert found[1][1] < 0.1
 
 
 def test_the_job_asks_for_what_the_readme_says(compare: ModuleType) -> None:
