@@ -23,6 +23,7 @@ from .streams import describe_loss, tolerant_streams
 
 STAGGER_SECONDS = 0.5  # for which other ranks let root report an error that all of them have
 WAIT_SECONDS = 5.0  # for which a rank that ends with an error waits for the others to do so too
+AGAIN = 3  # exit code: stopped early, run again
 LEAVE_FILES = {
     "run",
     "steady",
@@ -131,6 +132,7 @@ def _end_all(error: BaseException) -> NoReturn:
     if not ranks.is_root():
         time.sleep(STAGGER_SECONDS)
     several = world is not None and world.size > 1
+    code = AGAIN if isinstance(error, KeyboardInterrupt) else FAILED
     where = f" on rank {world.rank} of {world.size}" if world is not None and several else ""
     said = f": {error}" if str(error) else ""
     reason = _describe_surroundings(error) or f"ended by {type(error).__name__}"
@@ -138,8 +140,8 @@ def _end_all(error: BaseException) -> NoReturn:
         traceback.print_exception(error)
     print(f"parcontact: {reason}{where}{said}", file=sys.stderr, flush=True)
     if world is not None and several:
-        world.Abort(FAILED)
-    sys.exit(FAILED)
+        world.Abort(code)
+    sys.exit(code)
 
 
 def _describe_surroundings(error: BaseException) -> str:

@@ -35,6 +35,8 @@ start=$(date +%s) slurm=${SLURM_JOB_ID:-}
 [ "$slurm${PBS_JOBID:-}" ] || { echo "submit this script: sbatch $0 job.yaml, or JOB=job.yaml qsub -v JOB $0" >&2; exit 2; }
 there=${SLURM_SUBMIT_DIR:-${PBS_O_WORKDIR:-.}}
 cd "$there" || exit 1
+# the jobs of an array would all append to the file of the first of them
+[ "${SLURM_ARRAY_TASK_ID:-}" ] && exec >>"slurm-${SLURM_JOB_NAME:-parcontact}-$SLURM_ARRAY_TASK_ID.out" 2>&1
 bin=${PARCONTACT_BIN:-$there/.venv/bin}
 [ -x "$bin/parcontact" ] || bin=$(dirname "$(type -P parcontact)")
 [ -x "$bin/parcontact" ] || { echo "no parcontact: set PARCONTACT_BIN to the directory that it is in" >&2; exit 2; }

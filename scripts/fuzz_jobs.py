@@ -57,7 +57,7 @@ STEPS = 400  # of a history that is run here
 LATER = 8.0  # times the tolerance that steps may have
 SLACK = 1e-6  # of a load, relative: sums over all points
 DONE, FAILED, REFUSED = 0, 1, 2  # exit codes
-PLACE = re.compile(r"^(.+:\d+:\d+|--set .+|parcontact|.+job\.yaml: cannot be read): \S")
+PLACE = re.compile(r"^(.+:\d+:\d+|--set .+|parcontact|.+job\.yaml: cannot be read): \S|^\.\.\. and \d+ more")
 NOT_FINITE = re.compile(r"(?<![\w.-])-?(nan|inf)(?![\w])(?<!points are nan)", re.IGNORECASE)
 EXTREME = (
     *(0, -0.0, 1, -1, 0.5, 5e-324, 1e-300, 1e-150, 1e-30, 1e30, 1e150, 1e300, 1.7e308, -1e300, 1e18, 2**31,

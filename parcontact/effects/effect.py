@@ -5,15 +5,18 @@ may bring the contact law of the steps, and it follows each step that was made.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from functools import wraps
+from inspect import getattr_static, isfunction
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from numpy.typing import DTypeLike, NDArray
 
 from ..errors import InputError
 from ..history.timeline import Step
+from ..job import added_sections
 from ..job.sections.part import Part
 from ..parallel.slab import Array
 from ..physics.entries import Entry, Memory, Saved
@@ -150,6 +153,35 @@ class Effect(Protocol[Memory]):
 
 Effects = Mapping[str, Effect[Any]]
 Memories = Mapping[str, Any]
+
+
+def guarded(section: str, effect: type[Effect[Any]]) -> type[Effect[Any]]:
+    """Return the class of an effect; where it is not of this package, its methods name it where they fail, and maps of
+    an instant are read-only for it."""
+    if added_sections.is_ours(section):
+        return effect
+
+    def guard(name: str, method: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(method)
+        def call(*given: Any) -> Any:
+            instants = [one for one in given if isinstance(one, Instant)]
+            with added_sections.naming_effect(section), ExitStack() as kept:
+                for one in instants:
+                    for field in (one.pressure, one.displacement, one.touching):
+                        kept.callback(setattr, field.flags, "writeable", field.flags.writeable)
+                        field.flags.writeable = False
+                return method(*given)
+
+        return call
+
+    members: dict[str, Any] = {}
+    for name in (*(name for name in dir(effect) if not name.startswith("_")), "__init__"):
+        raw = getattr_static(effect, name)
+        if isinstance(raw, staticmethod):
+            members[name] = staticmethod(guard(name, raw.__func__))
+        elif isfunction(raw):
+            members[name] = guard(name, raw)
+    return type(effect.__name__, (effect,), members)
 
 
 def columns_of(effects: Effects) -> tuple[str, ...]:

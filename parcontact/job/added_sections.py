@@ -11,11 +11,13 @@ for, for a job without such a section.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
+from ..errors import InputError, RunError
 from .sections.part import Part
 from .text.fault import Fault, refuse
 
@@ -37,6 +39,24 @@ def effects_of(sections: Iterable[str]) -> dict[str, Any]:
         if reason := why_unusable(section):
             refuse(Fault(reason, (section,), at_key=True))
     return {section: _load(section) for section in found}
+
+
+@contextmanager
+def naming_effect(section: str) -> Iterator[None]:
+    """Name the effect of a section where its code fails, whatever it raises, also to end the program. Raises
+    RunError."""
+    try:
+        yield
+    except (InputError, RunError):
+        raise
+    except (Exception, SystemExit) as error:
+        whose = f"the effect {section} ({_registered()[section].value})"
+        raise RunError(f"{whose} has failed: {type(error).__name__}: {error}") from error
+
+
+def is_ours(section: str) -> bool:
+    """Return whether a section is added by an effect of this package."""
+    return section in names()
 
 
 def unusable() -> list[str]:

@@ -23,6 +23,7 @@ from .sections.materials import Dma, Material, Zener, describe_temperature, heat
 from .sections.part import Instead, Origin, Part, Rule
 from .sections.spectral_bands import BAND_RULES, SomeBands
 from .sections.stages import Initial, Stage, Steady
+from .text.fault import Fault
 from .text.overrides import Included
 from .text.python_data import is_array
 from .text.yamltext import dump
@@ -157,8 +158,10 @@ class Job(Part):
     def _told(self, what: str) -> Iterator[str]:
         """Yield the `doubts` or `facts` of the effects whose sections are given."""
         sections = [name for name in type(self).model_fields if name not in Job.model_fields and self.section(name)]
-        for effect in added_sections.effects_of(sections).values():
-            yield from getattr(effect, what, lambda job: ())(self)
+        for section, effect in added_sections.effects_of(sections).items():
+            with added_sections.naming_effect(section):
+                told = list(getattr(effect, what, lambda job: ())(self))
+            yield from told
 
     @property
     def directions(self) -> list[tuple[float, float]]:
@@ -215,10 +218,24 @@ def extended(sections: tuple[str, ...]) -> type[Job]:
         for name, effect in effects.items()
     }
     made = create_model(SEPARATOR.join(("Job", *sections)), __base__=Job, __module__=__name__, **fields)
+    own: Iterator[Any] = (
+        _named_rule(name, rule) for name, effect in effects.items() for rule in getattr(effect, "rules", ())
+    )
     lifted = [check for effect in effects.values() for check in getattr(effect, "lifts", ())]
     kept = (rule for rule in Job.rules if rule.check not in lifted)
-    made.rules = (*kept, *(rule for effect in effects.values() for rule in getattr(effect, "rules", ())))
+    made.rules = (*kept, *own)
     return made
+
+
+def _named_rule(section: str, rule: Rule) -> Rule:
+    """Return a rule that names the effect of its section where it fails."""
+
+    def check(*values: Any) -> Iterator[Fault]:
+        with added_sections.naming_effect(section):
+            found = list(rule.check(*values))
+        yield from found
+
+    return rule if added_sections.is_ours(section) else rule._replace(check=check)
 
 
 def __getattr__(name: str) -> Any:

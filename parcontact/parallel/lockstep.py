@@ -22,7 +22,8 @@ WAIT_SECONDS = 5.0  # tuning: for which a rank that ended with an exception wait
 TELL_SECONDS = 60.0  # tuning: of waiting for the others, after which a rank says so
 SPIN_SECONDS, NAP_SECONDS = 1e-3, 1e-3  # tuning: others mostly come at once; later, they may have the core
 ENDED = "has ended the program"
-ADVICE = "every rank must make the same calls and as many steps: see 'From several ranks' in parcontact manual python"
+ADVICE = "every rank must make the same calls and as many steps: see 'From several ranks' in parcontact manual python. "
+ADVICE += "A rank that works alone (mpi4py.futures) gives comm=MPI.COMM_SELF"
 
 _known: list[MPI.Intracomm] = []
 

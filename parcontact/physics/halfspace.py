@@ -265,7 +265,9 @@ class HalfSpace:
         """
         creep, modulus, tau = _creep(prony), float(prony.moduli[k]), float(prony.relaxation_times[k])
         ratio = -tau / creep.retardation_times
-        shares = creep.compliances * modulus * ratio / (1.0 + ratio)
+        shares = creep.compliances * modulus * ratio
+        apart = ratio != -1.0  # but to rounding, where a branch is far too soft to make anything
+        shares = np.divide(shares, 1.0 + ratio, out=np.zeros_like(shares), where=apart)
         own = CreepSpectrum(modulus * creep.glass, shares, creep.retardation_times, 0.0)
         return self._along_wake(fft, velocity, own, np.float64)
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..effects.adhesion import law_of
-from ..effects.effect import Decision, Effect
+from ..effects.effect import Decision, Effect, guarded
 from ..effects.folded_branches import FoldedBranches, bounded_error, fold_branches, time_scales
 from ..effects.interface import interface_of
 from ..effects.relaxation import feeds_back, relaxation_of, time_factor_of
@@ -47,12 +47,19 @@ class Choices:
     def effects(self) -> list[Decision]:
         """Every effect that there is, on or off, and why."""
         own = [getattr(self, name) for name, part in vars(Choices).items() if isinstance(part, Decided)]
-        return own + [effect.decide(self.job) for effect in added_sections.find_effects().values()]
+        return own + [self._decide(section, effect) for section, effect in added_sections.find_effects().items()]
+
+    def _decide(self, section: str, effect: type[Effect[Any]]) -> Decision:
+        """Return the decision of an effect; one of somebody else is not asked about a job without its section."""
+        if self.job.section(section) is None and not added_sections.is_ours(section):
+            return Decision(section, False, f"there is no {section} section")
+        return guarded(section, effect).decide(self.job)
 
     @cached_property
     def followers(self) -> dict[str, type[Effect[Any]]]:
         """The effects that the job's further sections ask for, by their names in checkpoints."""
-        found = added_sections.effects_of(type(self.job).model_fields).values()
+        known = added_sections.effects_of(type(self.job).model_fields)
+        found = [guarded(section, effect) for section, effect in known.items()]
         return {effect.decide(self.job).name: effect for effect in found if effect.decide(self.job).on}
 
     # -- the body -----------------------------------------------------------------------------------------------------

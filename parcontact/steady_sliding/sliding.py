@@ -243,7 +243,7 @@ class SteadySliding:
             p[...] = start
         contact, operator = solve(self.levels[0], p)
         unit, load = self.setup.units.height / self.setup.units.length, kernels.total(p)
-        lost = operator.loss(p, self.setup.size, _direction(velocity))
+        lost = max(operator.loss(p, self.setup.size, _direction(velocity)), 0.0)  # not of rounding, of an elastic body
         return contact, calls, lost / (self.setup.slab.sum(load)[0] or math.nan) * unit
 
     def _solver(self, level: Level, velocity: Vector) -> tuple[SteadySolver, Convolution]:

@@ -5,7 +5,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import RunParcontact
+from conftest import Main, RunParcontact
+
+from parcontact import __main__
 
 JOBS = Path(__file__).parents[2] / "jobs"
 SLOW = ("mpi4py.MPI", "numba", "numpy", "scipy", "pyfftw", "matplotlib", "h5py", "pydantic", "yaml", "xarray")
@@ -117,3 +119,29 @@ def test_ranks_speak_once(run_parcontact: RunParcontact, words: list[str], code:
     assert (done.stdout + done.stderr).count(once) == 1
     assert "alone" not in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_without_an_mpi_library(tmp_path: Path, outside_mpi: dict[str, str]) -> None:
+    """A sentence says what to install; the fault of mpi4py, as it is where no library is found, is made by a module in
+    its place."""
+    (tmp_path / "mpi4py").mkdir()
+    (tmp_path / "mpi4py" / "__init__.py").write_text("raise RuntimeError('cannot load MPI library')\n")
+    job = JOBS / "westergaard.yaml"
+    command = [sys.executable, "-m", "parcontact", str(job), "--out", "out"]
+    done = subprocess.run(
+        command, cwd=tmp_path, env={**outside_mpi, "PYTHONPATH": str(tmp_path)}, capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("parcontact: no MPI library can be started: cannot load MPI library; install one")
+    assert done.stderr.count("\n") == 1
+
+
+def test_interrupted_before_it_has_begun(main: Main, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C means: run again, with the code that says so."""
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(__main__, "parse_arguments", interrupted)
+    code, _, said = main("job.yaml")
+    assert (code, said) == (3, "parcontact: ended by KeyboardInterrupt\n")

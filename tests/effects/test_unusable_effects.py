@@ -71,3 +71,32 @@ def test_the_rest_works_without_it(main: Main, changed: Callable[[str, str], Non
     assert "interface" in json.loads(shown)["properties"]
     assert "wear" not in json.loads(shown)["properties"]
     assert re.fullmatch(r"warning: wear .*cannot be used: SyntaxError.*; the schema is without it\n", said)
+
+
+FAILURES = {
+    "in a step": ("def follow(self, instant", "ZeroDivisionError: division by zero"),
+    "to end the program": ("def values(self, memory", "SystemExit: 0"),
+    "in its decision": ("def decide(job", "ZeroDivisionError: division by zero"),
+}
+
+
+@pytest.mark.parametrize("name", FAILURES)
+def test_what_fails_in_a_run_names_the_effect(main: Main, changed: Callable[[str, str], None], name: str) -> None:
+    """In one sentence and with the code of a failure, whatever it raises."""
+    start, reason = FAILURES[name]
+    line = next(line for line in shown().splitlines() if start in line)
+    raising = "raise SystemExit(0)" if "SystemExit" in reason else "1 / 0"
+    changed(line, f"{line}\n        {raising}")
+    code, _, said = main("job.yaml", "--quiet", "--out", "out")
+    assert code == 1
+    assert said.count("\n") == 1
+    assert f"the effect wear (tread_wear:Wear) has failed: {reason}" in said
+    assert main("plan", "plain.yaml", "--seconds", "0.01", "--ranks", "1")[0] == 0, "it is not asked for there"
+
+
+def test_maps_are_read_only(main: Main, changed: Callable[[str, str], None]) -> None:
+    line = next(line for line in shown().splitlines() if "def follow(self, instant" in line)
+    changed(line, f"{line}\n        instant.pressure[...] = 0.0")
+    code, _, said = main("job.yaml", "--quiet", "--out", "out")
+    assert code == 1
+    assert "the effect wear (tread_wear:Wear) has failed: ValueError: assignment destination is read-only" in said

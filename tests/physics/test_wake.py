@@ -133,3 +133,13 @@ def test_waits_for_no_endless_wake() -> None:
     half_space, fft = HalfSpace((1.0, 1.0), free=True), FFT(Slab.alone(4, 4))
     with pytest.raises(InputError, match="endless wake"):
         half_space.sliding_operator(fft, (1.0, 0.0), Prony(0.0, np.ones(1), np.ones(1)))
+
+
+def test_a_branch_that_is_far_too_soft_makes_nothing() -> None:
+    """Its retardation time is its relaxation time to the last digit: as an operator it is 0, not infinite."""
+    slab = Slab.alone(4, 4)
+    body = Prony(1.0, np.array([1e-30]), np.array([2.0]))
+    with np.errstate(all="raise"):
+        branch = HalfSpace((1.0, 1.0), free=True).branch_operator(FFT(slab), (1.0, 0.0), body, 0)
+        found = branch.apply(np.ones((4, 4)), slab.empty())
+    assert np.abs(found).max() < 1e-29

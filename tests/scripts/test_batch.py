@@ -94,6 +94,12 @@ def test_next_job_goes_on(batch: Batch, system: str, how: list[str]) -> None:
     assert link.next == ["job.yaml", "--until", "never"]
 
 
+def test_jobs_of_an_array_write_files_of_their_own(batch: Batch, tmp_path: Path) -> None:
+    """All would append to the file of the first of them."""
+    batch("slurm", ["job.yaml"], SLURM_ARRAY_TASK_ID=4, SLURM_JOB_NAME="road", CODE=1)
+    assert (tmp_path / "slurm-road-4.out").is_file()
+
+
 def test_requeued_job_goes_on(batch: Batch) -> None:
     assert batch("slurm", ["job.yaml", "--restart", "never"], SLURM_RESTART_COUNT=1).given == ["job.yaml"]
 
