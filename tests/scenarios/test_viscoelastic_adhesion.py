@@ -69,12 +69,13 @@ def forces(job: Job) -> Any:
 
 @pytest.mark.parametrize(
     ("duration", "ratio", "modulus"),
-    [(1e5 * TIME, RATIO, MODULUS), (1e-6 * TIME, RATIO, RATIO * MODULUS), (TIME, 1 + 1e-6, MODULUS)],
+    [(1e6 * TIME, RATIO, MODULUS), (1e-6 * TIME, RATIO, RATIO * MODULUS), (TIME, 1 + 1e-6, MODULUS)],
     ids=["slow", "fast", "without relaxation"],
 )
 def test_elastic_limits(duration: float, ratio: float, modulus: float) -> None:
     """Pressed from out of contact and pulled off, the force is at each step that of an elastic body; the solver's
-    tolerance, which moves it by 1e-3 of the pull-off."""
+    tolerance, which moves it by 1e-3 of the pull-off. Where the contact snaps in a slow step, the force is off by
+    some ten relaxation times over the step, here 1e-4 of the snap."""
     path = ramp(-4 * LENGTH, 2 * LENGTH, 15, duration), ramp(2 * LENGTH, -4 * LENGTH, 30, duration)
     elastic = {"model": "elastic", "shear_modulus": modulus / 4}
     found, exact = (forces(sphere(32, 5, 1, *path, material=body)) for body in (zener(ratio), elastic))
@@ -111,7 +112,7 @@ def test_instant_retraction_of_a_rough_surface() -> None:
     elastic = pc.Simulation(second, comm=MPI.COMM_SELF)
     exact = [(row, gathered(elastic, "pressure")) for row in elastic.steps()]
     for (row, maps), (other, p) in zip(found[-count - 1 :], exact[-count - 1 :], strict=True):
-        assert_allclose(maps["pressure"], p, atol=1e-4 * np.abs(p).max())
+        assert_allclose(maps["pressure"], p, atol=2e-4 * np.abs(p).max())  # 1e-4 of each of the two runs
         assert row.contact_area == other.contact_area
     areas = [row.contact_area for row, _ in found[-count - 1 :]]
     assert np.all(np.diff(areas) < 0)
