@@ -157,7 +157,7 @@ def run_faults(code: int, said: str) -> Iterator[str]:
         yield f"says nan or inf: {said[-400:]}"
 
 
-PHYSICS = ("double precision reaches only",)  # what a run that fails may say
+PHYSICS = ("double precision reaches only", "the flash temperature")  # what a run that fails may say
 
 
 # -- results ----------------------------------------------------------------------------------------------------------

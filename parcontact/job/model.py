@@ -60,6 +60,7 @@ class Job(Part):
     rules = (
         Rule(("grid", "numerics"), limits.kernel_fits),
         Rule(("grid", "body"), limits.layer_is_resolved),
+        Rule(("grid", "body"), limits.layer_is_in_proportion),
         Rule(("grid", "body", "initial", "steady"), limits.no_wake_in_a_layer),
         Rule(("grid", "steady"), limits.waves_are_independent),
         Rule(("surface",), limits.some_shape),

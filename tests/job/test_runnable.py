@@ -57,3 +57,8 @@ def test_waves_of_a_box(tmp_path: Path) -> None:
     line = grid.model_copy(update={"points": (1, 4)})
     assert has_wave(line, 6e-4, 1e-3)
     assert not has_wave(line, 4e-4, 6e-4)
+
+
+def test_a_layer_is_in_proportion_to_its_box(tmp_path: Path) -> None:
+    (mistake,) = mistakes_of(tmp_path, replaced(SMALL, body="{thickness: 1e-13}"))
+    assert mistake.startswith("job.yaml:1:19: body.thickness must be at least 1e-09 of the box, 1e-12 m, got 1e-13")

@@ -19,6 +19,7 @@ from .cells import has_wave, one_cell
 
 LOADS = {"pressure": PRESSURE, "force": FORCE}
 BY_SPECTRUM = Rough | RoughSpectrum | Flat
+THINNEST = 1e-9  # accuracy: thickness of a layer over the longer side of its box
 MOST_STEPS = 10**8  # tuning: of a history; at a millisecond each they take more than a day
 
 
@@ -31,6 +32,15 @@ def layer_is_resolved(grid: Grid, body: Body | None) -> Iterator[Fault]:
     if body is not None and grid.boundary == "free" and body.thickness < 2 * max(grid.dx, grid.dy):
         least = 2 * max(grid.dx, grid.dy)
         sentence = f"must be at least two cells, {least:.3g} m, when grid.boundary is free, got {body.thickness:g}"
+        yield Fault(sentence, ("body", "thickness"))
+
+
+def layer_is_in_proportion(grid: Grid, body: Body | None) -> Iterator[Fault]:
+    """Check that a layer is not so thin in its box that its compliance is beyond what numbers hold."""
+    if body is not None and body.thickness < THINNEST * max(grid.size):
+        sentence = (
+            f"must be at least {THINNEST:g} of the box, {THINNEST * max(grid.size):.3g} m, got {body.thickness:g}"
+        )
         yield Fault(sentence, ("body", "thickness"))
 
 
