@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, ValidationInfo, model_validator
 
@@ -202,7 +202,7 @@ class Zener(Part):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _with_moduli(cls, data: Any, handler: Callable[[Any], Zener]) -> Zener:
+    def _with_moduli(cls, data: Any, handler: Callable[[Any], Self]) -> Self:
         """Put moduli in place of fractions of `modulus_0`."""
         found = handler(data)
         if (whole := found.modulus_0) is None:
