@@ -35,7 +35,7 @@ def moving(kind: str, steps: int, jump: bool, integrator: Integrator) -> Row:
     return marched(data)[1][-1]
 
 
-@pytest.mark.parametrize(("integrator", "order"), [("exponential", 2.0), ("backward-euler", 1.0)])
+@pytest.mark.parametrize(("integrator", "order"), [("exponential-linear", 2.0), ("backward-euler", 1.0)])
 @pytest.mark.parametrize("kind", ["sphere", "waves"])
 @pytest.mark.parametrize("jump", [False, True])
 def test_order_in_a_moving_contact(kind: str, jump: bool, integrator: Integrator, order: float) -> None:
@@ -46,6 +46,19 @@ def test_order_in_a_moving_contact(kind: str, jump: bool, integrator: Integrator
         coarse, middle, fine = column(rows, name)
         assert np.log2((middle - coarse) / (fine - middle)) == pytest.approx(order, abs=0.2)
         assert fine == pytest.approx(middle, rel=5e-3)
+
+
+@pytest.mark.parametrize("kind", ["sphere", "waves"])
+@pytest.mark.parametrize("jump", [False, True])
+def test_quadratic_steps_in_a_moving_contact(kind: str, jump: bool) -> None:
+    """Order 3 of the dissipation, in the mean over three halvings from twenty steps on: to 0.3, as points come and go.
+    Friction changes by less than 2e-4, where linear steps change it by 1e-3."""
+    rows = [moving(kind, times * 20, jump, "exponential") for times in (1, 2, 4, 8)]
+    changes = np.abs(np.diff(column(rows, "dissipated")))
+    assert np.log2(changes[0] / changes[2]) / 2.0 == pytest.approx(3.0, abs=0.3)
+    assert np.abs(np.diff(column(rows, "friction"))).max() < 2e-4 * rows[-1].measures.friction
+    for row in rows:
+        assert row.stored + row.dissipated == pytest.approx(row.work, rel=1e-13)
 
 
 # V tau/a*: rows of time over the creep time, mu R/a*, its error, d R/a*^2. A load step and the start of sliding, both
@@ -100,8 +113,8 @@ def power(rows: list[Row], area: float) -> NDArray[np.float64]:
 
 
 def test_energy_of_a_rough_contact() -> None:
-    """Balance: 1e-3 of the work is asked for, 1e-12 is reached. Work of the forces on the surface: 5e-3 at one cell per
-    step, and then less with each halving of the step by at least 2^1.5, a little less than the order of the integrator.
+    """Balance: 1e-3 of the work is asked for, 1e-12 is reached. Work of the forces on the surface, by trapezoids: 2e-2
+    at one cell per step, and then less with each halving by at least 2^1.5, a little less than the order of the rule.
     """
     differences = []
     for cells in (1.0, 0.5, 0.25):
@@ -113,7 +126,7 @@ def test_energy_of_a_rough_contact() -> None:
         sliding = rows[start:]
         by_forces = power(sliding, 1e-6)[-1]
         differences.append(abs(sliding[-1].work - sliding[0].work - by_forces) / by_forces)
-    assert differences[0] < 5e-3
+    assert differences[0] < 2e-2
     assert np.all(np.array(differences[:-1]) > 2**1.5 * np.array(differences[1:]))
 
 

@@ -44,7 +44,7 @@ def outcomes(path: Path) -> dict[Settings, Outcome]:
 
 
 def test_orders_and_limits_of_full_contact(tmp_path: Path) -> None:
-    """Exponential steps are of the second order, backward Euler of the first, to the same closed form.
+    """Exponential steps are of the third order, backward Euler of the first, to the same closed form.
 
     Measured: the exponential steps' limit is right to 3e-6, that of backward Euler to 1.2e-3, which has 128 cells at
     most to tell its orders apart.
@@ -53,7 +53,7 @@ def test_orders_and_limits_of_full_contact(tmp_path: Path) -> None:
     path.write_text(WAVE)
     found = outcomes(path)
     limits = {(one.quantity, one.integrator, one.ladder): one for one in verdict.limits(ladders(load(path)), found)}
-    for integrator, order in (("exponential", 2.0), ("backward-euler", 1.0)):
+    for integrator, order in (("exponential", 3.0), ("backward-euler", 1.0)):
         limit = limits["mu_max", integrator, "mesh and time together"].limit
         print(f"{integrator}: mu_max {limit}")
         assert limit.value == pytest.approx(FULL * EXACT, rel=1e-3)
@@ -80,11 +80,12 @@ study: {mesh: [16, 32, 64, 128]}
 """
 
 
-@pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])
+@pytest.mark.parametrize("integrator", ["exponential-linear", "backward-euler"])
 def test_refining_one_of_mesh_and_time_is_wasted(tmp_path: Path, integrator: str) -> None:
     """A step of velocity with 23 % of contact (paper, Fig. 6): together they converge in the first order at least; the
     mesh alone, with the steps of 32 points, leaves friction where it was, and time alone, on 16 points, the area where
-    the mesh has it. Against 128 points with quarter cells, known to 2e-4 or so."""
+    the mesh has it. Against 128 points with quarter cells, known to 2e-4 or so. Quadratic steps of
+    a cell are accurate enough here: their mesh alone is what is left."""
     path = tmp_path / "rough.yaml"
     path.write_text(PARTIAL)
     job = load(path)
