@@ -10,7 +10,7 @@ from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..job.sections import listing
 from ..plotting import plots
-from ..summary import sweep_table
+from ..summary import headline, sweep_table
 from . import log, material, origin, results, road
 from .parts import Chapter, Section, Table, draw_chart, embed_file
 
@@ -54,7 +54,7 @@ def describe_directory(directory: Path) -> Chapter:
     shown = [one.without(sorted(places, key=len, reverse=True)) for one in sections if one]
     here, there_is = Path.cwd(), directory.absolute()
     named = there_is.relative_to(here) if there_is.is_relative_to(here) else Path(there_is.name)
-    return Chapter(title or there_is.name, named, kinds, shown)
+    return Chapter(title or there_is.name, named, kinds, shown, headline.describe(directory))
 
 
 def compare(directories: Sequence[Path]) -> Iterator[Chapter]:

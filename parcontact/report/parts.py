@@ -58,12 +58,13 @@ class Section:
 
 @dataclass(frozen=True)
 class Chapter:
-    """All about one output directory."""
+    """All about one output directory; `headline` says its results in a sentence."""
 
     title: str
     directory: Path
     kind: str
     sections: Sequence[Section]
+    headline: str = ""
 
 
 def draw_chart(chart: charts.Chart) -> Picture:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from ..printed import quantity
 
+SAME_LOAD = 1e-9  # rounding: relative: loads this close are the same
 LEAST_PULL = 1e-9  # accuracy: of the highest pressure, below which a mean pressure is what rounding leaves of 0
 
 Columns = Mapping[str, Sequence[float]]
@@ -50,6 +51,16 @@ def _find(pressure: NDArray[np.float64], approach: NDArray[np.float64], last: in
     row = begin + int(np.argmin(pressure[begin:stop]))
     near = pressure[max(row - 1, start) : min(row + 2, stop)]
     return PullOff(row, float(np.abs(near - pressure[row]).max()), end if lost else None)
+
+
+def choose_row(columns: Columns, detached: bool = False) -> int:
+    """Return the row that shows the contact of a run: the last one, unless the surfaces came off by then. In that case
+    it is the row of the last pull-off, or without one the last row of the largest load. Arguments as for `find`."""
+    pressure, area = (np.asarray(columns[name], float) for name in ("pressure", "contact_area"))
+    if area[-1] > 0.0 and not detached:
+        return len(area) - 1
+    pulls = find(columns, detached)
+    return pulls[-1].row if pulls else int(np.flatnonzero(pressure >= (1.0 - SAME_LOAD) * pressure.max())[-1])
 
 
 def describe(columns: Columns, area: float, detached: bool = False) -> Iterator[str]:

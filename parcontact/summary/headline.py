@@ -1,0 +1,151 @@
+"""The headline of a report: one sentence with the results that a job is about, and their errors."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+from ..job import Job
+from ..job.resolved import RESOLVED, shown_job
+from ..printed import quantity, with_error
+from ..storage import marker, tables
+from . import pull_off, slide, sweep_table
+
+SWEPT = (  # results of a sweep, from the most telling one on: column, words, unit, and the column of its error
+    ("pull_off", "the pull-off force", "N", "pull_off_error"),
+    ("mu_dyn", "the mean friction", "", "mu_dyn_error"),
+    ("friction", "friction", "", slide.ERRORS[0]),
+    (slide.CORRECTED, "the contact area over the nominal area", "", slide.ERRORS[1]),
+)
+
+Columns = Mapping[str, Sequence[float]]
+
+
+def describe(directory: Path) -> str:
+    """Return the headline of an output directory: a sentence for each of its run, friction curve, sweep and study."""
+    parts = {"measures.csv": _run, "steady.csv": _curve, "sweep.csv": _sweep, "study.txt": _study}
+    return " ".join(filter(None, (part(directory) for name, part in parts.items() if (directory / name).is_file())))
+
+
+def _run(directory: Path) -> str:
+    """Return friction, pull-off force, leakage and contact area of a run, as far as its job is about them."""
+    if not (directory / RESOLVED).is_file():
+        return ""
+    job = shown_job(directory / RESOLVED)
+    columns = tables.read(directory / "measures.csv")
+    if not columns["time"]:
+        return ""
+    detached = bool(marker.detached(directory))
+    parts = [*_friction(job, columns), *_pull_off(job, columns, detached), *_leakage(directory, columns)]
+    return _to_sentence([*parts, _area(job, columns, detached)])
+
+
+def _friction(job: Job, columns: Columns) -> Iterator[str]:
+    """Yield friction of the slide where something slides and friction is defined."""
+    found, errors = slide.measure(job.history, columns), slide.absolute_errors(job.history, columns, job.grid.dx)
+    if found is None or math.isnan(found.mu_dyn):
+        return
+    mean, peak = (with_error(getattr(found, name), errors.get(name, math.nan)) for name in ("mu_dyn", "mu_max"))
+    yield f"the mean friction is {mean} and the highest {peak}"
+
+
+def _pull_off(job: Job, columns: Columns, detached: bool) -> Iterator[str]:
+    """Yield the force of the last pull-off and by how much the loads of the steps next to it differ."""
+    lost = [pull for pull in pull_off.find(columns, detached) if pull.lost is not None]
+    if lost:
+        box = job.grid.lx * job.grid.ly
+        force, within = -columns["pressure"][lost[-1].row] * box, lost[-1].beside * box
+        yield f"the pull-off force is {quantity(force, 'N', 4)} +- {quantity(within, 'N', 2)}"
+
+
+def _leakage(directory: Path, columns: Columns) -> Iterator[str]:
+    """Yield the last conductivities, of `leak.csv` with their errors, else of the run itself."""
+    table = directory / "leak.csv"
+    columns = tables.read(table) if table.is_file() else columns
+    known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
+    if known:
+        flows = [_flow(columns, known[-1], axis) for axis in "xy"]
+        yield f"the conductivity of the gap is {' and '.join(flows)}"
+
+
+def _flow(columns: Columns, row: int, axis: str) -> str:
+    flow, error = columns[f"flow_{axis}"][row], _error(columns, f"error_{axis}", row)
+    return (
+        f"{with_error(flow, flow * error)} m³ along {axis}" if flow else f"0 along {axis}, where contact closes the gap"
+    )
+
+
+def _area(job: Job, columns: Columns, detached: bool) -> str:
+    """Return the mean contact area of the slide; without one that of the row which shows the contact best."""
+    if (found := slide.measure(job.history, columns)) is not None:
+        error = slide.absolute_errors(job.history, columns, job.grid.dx).get("contact_area", math.nan)
+        return f"the mean contact area is {_size(job, found.contact_area_corrected, error)}"
+    row = pull_off.choose_row(columns, detached)
+    area, when = columns[slide.CORRECTED][row], ""
+    if len(columns["time"]) > 1:
+        time = f"t = {quantity(columns['time'][row], 's', 4)}" if columns["time"][-1] else ""
+        when = f" at {time or _load(job, columns['pressure'][row])}"
+    return f"the contact area is {_size(job, area, area * _error(columns, slide.ERRORS[1], row))}{when}"
+
+
+def _load(job: Job, pressure: float) -> str:
+    """Return what presses: the force on the box of a free scene, else the mean pressure."""
+    free = job.grid.boundary == "free"
+    return quantity(pressure * job.grid.lx * job.grid.ly, "N", 4) if free else quantity(pressure, "Pa", 4)
+
+
+def _size(job: Job, share: float, error: float) -> str:
+    """Return a contact area and its error, from shares of the box: in m² in a free scene, else in per cent."""
+    if job.grid.boundary != "free":
+        return f"{with_error(100.0 * share, 100.0 * error)} % of the nominal area"
+    box = job.grid.lx * job.grid.ly
+    within = f" +- {quantity(error * box, 'm²', 2)}" if error > 0.0 else ""
+    return f"{quantity(share * box, 'm²', 4)}{within}"
+
+
+def _curve(directory: Path) -> str:
+    """Return the highest friction of a friction curve, and where it is; '' without a point."""
+    columns = tables.read(directory / "steady.csv")
+    if not columns["velocity"]:
+        return ""
+    best = max(range(len(columns["friction"])), key=columns["friction"].__getitem__)
+    friction, speed, pressure = (columns[name][best] for name in ("friction", "velocity", "pressure"))
+    highest = with_error(friction, friction * _error(columns, slide.ERRORS[0], best))
+    place = f"at {quantity(speed, 'm/s')} and {quantity(pressure, 'Pa')}"
+    return _to_sentence([f"the highest friction of the curve is {highest}, {place}"])
+
+
+def _sweep(directory: Path) -> str:
+    """Return the smallest and the largest of the first of the results `SWEPT` that the cases of a sweep have; ''
+    without any."""
+    rows = sweep_table.read(sweep_table.results(directory))
+    for name, words, unit, error in SWEPT:
+        known = sorted((row for row in rows if math.isfinite(row.get(name, math.nan))), key=itemgetter(name))
+        if known and known[-1][name]:
+            ends = [f"{_with_unit(row, name, unit, error)} (case {row['case']:g})" for row in (known[0], known[-1])]
+            return _to_sentence([f"{words} of the cases is from {ends[0]} to {ends[1]}"])
+    return ""
+
+
+def _study(directory: Path) -> str:
+    """Return the first sentence of a study, about its accuracy."""
+    return (directory / "study.txt").read_text(errors="replace").partition("\n")[0]
+
+
+def _with_unit(row: Mapping[str, Any], name: str, unit: str, error: str) -> str:
+    value, within = row[name], row.get(error, math.nan)
+    within = abs(value) * within if error in slide.ERRORS else within
+    if not unit:
+        return with_error(value, within)
+    return quantity(value, unit, 4) + (f" +- {quantity(within, unit, 2)}" if within > 0.0 else "")
+
+
+def _error(columns: Columns, name: str, row: int) -> float:
+    """Return an error of a row, nan where the table has none."""
+    return columns[name][row] if name in columns else math.nan
+
+
+def _to_sentence(parts: Sequence[str]) -> str:
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}."
