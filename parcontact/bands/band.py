@@ -22,7 +22,7 @@ from ..solve.interface_law import InterfaceLaw
 from ..solve.nonsymmetric.splitting import Splitting, step_for
 from ..steady_sliding.losses import branch_powers
 from ..steady_sliding.sliding import SteadyState, judge_state, tolerance_of
-from .band_heat import Warming, warming_of
+from .band_heat import Warming, shares_of_depth, warming_of, waves_along_depth
 from .choice import Cut
 from .ladder import Ladder
 
@@ -34,11 +34,10 @@ Vector = tuple[float, float]
 @dataclass(frozen=True)
 class Rung:
     """Steady state of one band under a mean `pressure` [Pa]: friction of its waves by energy and by slopes [-], area as
-    a share, counted and corrected, approach [m] (by `Cascade.climb` with that
-    of finer bands), highest pressure [Pa]; weights of the rungs of the next finer band and
-    the share of the load above them; power [W/m^2] that each branch loses; rises of temperature by its waves
-    (`band_heat`), 0 without `thermal`; relative errors of friction and area by the solver and by the grid; residual,
-    and calls of the operator."""
+    a share, counted and corrected, approach [m] (by `Cascade.climb` with that of finer bands), highest pressure [Pa];
+    weights of the rungs of the next finer band and the share of the load above them; power [W/m^2] that each branch
+    loses; S_j and g of its heat (`band_heat`), of one 0 without `thermal`; relative errors of friction and area by the
+    solver and by the grid; residual, and calls of the operator."""
 
     pressure: float
     friction: float
@@ -51,6 +50,7 @@ class Rung:
     load_lost: float
     powers: Array
     warming: Array
+    depths: Array
     errors: Array  # friction by solver and by grid, area by solver and by grid
     residual: float
     penetration: float
@@ -76,6 +76,9 @@ class Band:
         slab = Slab.alone(*grid.points)
         surface = (HeightArray(heights=Heights(np.asarray(heights))),)
         own = job.model_copy(update={"grid": grid, "surface": surface, "bands": None})
+        self._depth_waves = waves_along_depth(float(cut.edges[0]), float(cut.edges[-1]))[0]
+        self.warming: Warming | None = None
+        self._warmed_for: tuple[Vector, float] | None = None
         self._take(set_up(own, slab))
         self._heights = self.setup.surface.heights((0.0, 0.0), slab.empty())
 
@@ -84,7 +87,6 @@ class Band:
         self.probe = replace(setup.probe(), interface=None)
         self._known = properties_of(setup, 0.0, True, None)
         self._velocity: Vector = (math.nan, math.nan)
-        self.warming: Warming | None = None
 
     def heat(self, temperature: float) -> None:
         """Take the material at this temperature [deg C] from now on. Raises InputError where it has no shift."""
@@ -99,19 +101,16 @@ class Band:
             self._full = float(np.std(pressure))
             sizes = np.abs(np.concatenate([np.abs(part).ravel() for part in self.operator.symbols]))
             self._stiffest, self._softest = (sizes[sizes > 0.0].min(), sizes.max()) * np.full(2, self.setup.slab.points)
-            if (section := self.setup.job.section("thermal")) is not None:
-                self.warming = warming_of(self.setup, section, seconds, pressure, velocity)
+            section = self.setup.job.section("thermal")
+            if section is not None and self._warmed_for != (velocity, seconds):
+                self.warming = warming_of(self.setup, section, seconds, velocity, self._depth_waves)
+                self._warmed_for = velocity, seconds
             self._velocity = velocity
 
     @property
     def full_contact_rms(self) -> float:
         """The rms pressure [Pa] that its waves have in full contact."""
         return self._full * self.setup.units.pressure
-
-    @property
-    def warming_depth(self) -> float:
-        """The wavenumber [1/m] of the depth where its heat lies."""
-        return math.inf if self.warming is None else self.warming.depth
 
     @cached_property
     def rms_slope(self) -> float:
@@ -147,12 +146,19 @@ class Band:
             weights,
             above,
             branch_powers(setup, contact, velocity).sum(axis=1) / area,
-            np.zeros(3) if self.warming is None else self.warming.of(setup, contact.p),
+            *self._heat_of(contact.p),
             np.array(parts).ravel(),
             contact.certificate.worst,
             contact.certificate.penetration,
             float(contact.steps),
         )
+
+    def _heat_of(self, pressure: Array) -> tuple[Array, Array]:
+        """Return S_j and g of the heat under a map of pressure."""
+        if self.warming is None:
+            return np.zeros(1), np.zeros(1)
+        shares = shares_of_depth(self.setup, pressure, self._velocity, self._depth_waves)
+        return self.warming.of(self.setup, pressure), shares
 
     def _resolvent(self, gamma: float) -> Convolution:
         return self.operator.mapped(lambda symbol: 1.0 / (1.0 + gamma * symbol), self.setup.fft.complex)

@@ -41,8 +41,8 @@ class Task(NamedTuple):
 class BandResult:
     """What one band comes to under a distribution of pressure: its weights and the load [Pa] on it; friction of its
     waves over the whole load [-], by energy and by slopes; area down to it, counted and corrected; share of the load
-    above its ladder; power [W/m^2] per branch; rises of temperature by its waves (`band_heat`) in the mean over the
-    load; absolute errors of friction and of area by solver and grid."""
+    above its ladder; power [W/m^2] per branch; S_j and g of its heat
+    (`band_heat`) in the mean over the load; absolute errors of friction and of area by solver and grid."""
 
     weights: Array
     load: float
@@ -53,6 +53,7 @@ class BandResult:
     load_lost: float
     powers: Array
     warming: Array
+    depths: Array
     errors: Array
 
 
@@ -154,6 +155,7 @@ class Cascade:
             np.sum([w * rung.powers for w, rung in zip(weights, rungs, strict=True)], axis=0),
             np.sum([w * rung.warming for w, rung in zip(loads * ladder.rungs, rungs, strict=True)], axis=0)
             / self.pressure**2,
+            np.sum([w * rung.depths for w, rung in zip(loads / loads.sum(), rungs, strict=True)], axis=0),
             np.array([*((loads * energy) @ errors[:, :2] / self.pressure), *(areas @ errors[:, 2:])]),
         )
 

@@ -19,7 +19,7 @@ from ..solve.certificate import Certificate
 from ..steady_sliding.curve import States, on_one_grid
 from ..steady_sliding.point import Point
 from .band import Rung, Vector
-from .band_heat import flash_of_bands, rises_of
+from .band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
 from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, choose, describe_cut, doubts_of_bands
 from .limits import STRAIN
@@ -146,9 +146,10 @@ class RoadSliding:
         cascade, section = self._cascade, self.job.section("thermal")
         speed, box = math.hypot(*cascade.velocity), self.setup.grid.lx * self.setup.grid.ly
         heats = [result.friction * cascade.pressure * speed for result in results]
-        depths = [cascade.band(k, 0).warming_depth for k in range(self.cut.count)]
-        warmings = [result.warming for result in results]
-        return rises_of((section.conductor, cascade.seconds), depths, warmings, heats, rubbing / box * speed)
+        m, weights = waves_along_depth(float(self.cut.edges[0]), float(self.cut.edges[-1]))
+        whole = uniform(section.conductor, m, cascade.seconds)
+        shares, warmings = [result.depths for result in results], [result.warming for result in results]
+        return rises_of(weights, whole, shares, warmings, heats, rubbing / box * speed)
 
     def _settle(self) -> "Warm":
         """Find the temperatures of bands that make themselves, with one surface of each band, and leave them in the

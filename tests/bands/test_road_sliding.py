@@ -11,7 +11,7 @@ from mpi4py import MPI
 from parcontact import job as jobs
 from parcontact.__main__ import main
 from parcontact.bands.band import Band
-from parcontact.bands.band_heat import uniform_rise
+from parcontact.bands.band_heat import uniform, waves_along_depth
 from parcontact.bands.cascade import Cascade, mean_rungs
 from parcontact.bands.choice import choose
 from parcontact.bands.road_sliding import RoadSliding
@@ -114,8 +114,7 @@ THERMAL = {"conductivity": 0.2, "diffusivity": 1e-7, "distance": 0.02}
 
 @pytest.mark.parametrize("feedback", ["none", "mean"])
 def test_heat_of_one_band_is_that_of_one_grid(feedback: str) -> None:
-    """The flash temperature within 5 %: a band takes its heat to lie where it does in full contact. Friction with
-    feedback within 0.1 %, as 3 % of 1.2 K change it by less."""
+    """The flash temperature within 3 %, to which a fixed point with feedback is found, and friction within 0.1 %."""
     job = {"material": SHIFTED, "thermal": {**THERMAL, "feedback": feedback}, "numerics": {"tolerance": 1e-3}}
     one = {"surface": {**ROUGH, "short_wavelength": 1e-3}, "bands": {"count": 1, "points": 64, "samples": 1}}
     found = sliding({**job, **one})
@@ -125,23 +124,24 @@ def test_heat_of_one_band_is_that_of_one_grid(feedback: str) -> None:
     grid = SteadySliding(set_up(on_grid, Slab.alone(64, 64))).solve((1.0, 0.0), 1e6)
     assert bands.flash is not None
     assert grid.flash is not None
-    assert bands.flash.mean == pytest.approx(grid.flash.mean, rel=0.05)
+    assert bands.flash.mean == pytest.approx(grid.flash.mean, rel=0.03 if bands.rounds > 1 else 2e-3)
     assert bands.friction == pytest.approx(grid.friction, rel=1e-3)
     assert (bands.rounds > 1) == (feedback == "mean")
 
 
 def test_uniform_heat_of_bands() -> None:
-    """On the surface the rise is `2 sqrt(t/pi)/e`; at one depth of both, after a time much shorter than it takes
-    through the depth, heat stays where it is: `g^2` integrates to `15 q/(16 e...)`, here by its own sum over depths."""
+    """On the surface the rise is `2 sqrt(t/pi)/e`; at one depth, after a time much shorter than it takes through the
+    depth, heat stays where it is, here by the sum of its density over depths: to 5 %."""
     body, q, time = Conductor(0.2, 1e-7), 1e4, 0.3
-    assert uniform_rise(body, np.inf, np.inf, time) == pytest.approx(
-        2 * np.sqrt(time / np.pi) / body.effusivity, rel=1e-3
-    )
+    m, weights = waves_along_depth(1e3, 1e6)
+    surface = np.sum(weights * uniform(body, m, time))
+    assert surface == pytest.approx(2 * np.sqrt(time / np.pi) / body.effusivity, rel=1e-3)
     z = (np.arange(4000) + 0.5) * 1e-6
     spread = 4 * q**3 * z**2 * np.exp(-2 * q * z)
     short = 1e-3  # s, in which heat goes 0.01 mm, a tenth of the depth
     stays = short * np.sum(spread**2) * 1e-6 * body.diffusivity / body.conductivity
-    assert uniform_rise(body, q, q, short) == pytest.approx(stays, rel=0.05)
+    share = np.real((1.0 - 0.5j * m / q) ** -3)
+    assert np.sum(weights * share**2 * uniform(body, m, short)) == pytest.approx(stays, rel=0.05)
 
 
 def test_finer_bands_are_warmer() -> None:
