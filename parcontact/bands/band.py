@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -111,10 +110,6 @@ class Band:
     def full_contact_rms(self) -> float:
         """The rms pressure [Pa] that its waves have in full contact."""
         return self._full * self.setup.units.pressure
-
-    @cached_property
-    def rms_slope(self) -> float:
-        return self.setup.roughness.rms_slope if self.setup.roughness else 0.0
 
     def solve(self, pressure: float, law: InterfaceLaw, below: Ladder | None) -> Rung:
         """Return the steady state under a mean pressure [Pa] with the closing of all finer bands [m over Pa], and its

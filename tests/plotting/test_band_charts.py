@@ -1,0 +1,48 @@
+"""Pictures of bands: bars of all bands add up to the friction of the curve; lines of area and temperature."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from parcontact.plotting import band_charts, charts
+
+HEAD = "velocity,pressure,temperature,band,long_wavelength,short_wavelength,friction,contact_area,flash_temperature"
+
+
+def table(directory: Path, heat: str = "5.0") -> None:
+    """Two bands at three speeds and two pressures."""
+    rows = [
+        f"{speed},{pressure},,{band},{1e-2 / 10**band},{1e-3 / 10**band},{0.1 * (band + 1)},{0.5 / (band + 1)},{heat}\n"
+        for pressure in (1e5, 2e5)
+        for speed in (1.0, 0.01, 0.1)
+        for band in (0, 1)
+    ]
+    (directory / "bands.csv").write_text(HEAD + "\n" + "".join(rows))
+
+
+def test_bars_add_up(tmp_path: Path) -> None:
+    """Of the first pressure, sorted by speed: 0.1 at the bottom and 0.2 above, with one width in the logarithm."""
+    table(tmp_path)
+    (bars, area, heat) = band_charts.charts(tmp_path)
+    axes = Figure().add_subplot()
+    charts.draw(bars, axes)
+    boxes = [patch for patch in axes.patches if isinstance(patch, Rectangle)]
+    assert len(boxes) == 6
+    assert [box.get_height() for box in boxes] == pytest.approx([0.1] * 3 + [0.2] * 3)
+    assert [box.get_y() for box in boxes] == pytest.approx([0.0] * 3 + [0.1] * 3)
+    middles = [np.sqrt(box.get_x() * (box.get_x() + box.get_width())) for box in boxes[:3]]
+    assert middles == pytest.approx([0.01, 0.1, 1.0])
+    assert axes.get_ylim()[1] > 0.3
+    assert area.series[0].x.tolist() == pytest.approx([10.0, 100.0])
+    assert area.series[0].y.tolist() == pytest.approx([0.5, 0.25])
+    assert heat.series[0].y.tolist() == [5.0, 5.0]
+
+
+def test_no_heat_no_temperatures(tmp_path: Path) -> None:
+    table(tmp_path, heat="")
+    assert [chart.key for chart in band_charts.charts(tmp_path)] == ["bands", "bands area"]
+    (tmp_path / "bands.csv").unlink()
+    assert band_charts.charts(tmp_path) == []
