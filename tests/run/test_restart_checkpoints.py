@@ -17,7 +17,7 @@ def damage(path: Path) -> None:
 
 
 def newer(path: Path) -> None:
-    path.write_bytes(path.read_bytes().replace(b"format 1", b"format 2", 1))
+    path.write_bytes(path.read_bytes().replace(b"format 2", b"format 3", 1))
 
 
 def truncate(path: Path) -> None:
