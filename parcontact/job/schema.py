@@ -87,6 +87,8 @@ def schema() -> Schema:
     properties["surface"] = {"anyOf": [properties["surface"]["items"], properties["surface"]]}
     properties["sweep"] = _sweep()
     found["anyOf"] = [{"required": ["history"]}, {"required": ["steady"]}]
+    found["required"].remove("grid")
+    found["allOf"].append({"anyOf": [{"required": ["grid"]}, {"required": ["bands"]}]})
     return {"$schema": DRAFT, **found, "title": "A job of parcontact"}
 
 
