@@ -14,6 +14,7 @@ from . import style, units
 from .run import Fields, Run
 
 INSTANTS = 5  # at most so many lines in one panel
+MOST_LETTERS = 16  # of the name of a stage in a legend
 RANGE = 1.3  # that is shown over that of the contact
 
 Curve = tuple[str, Array, Array]  # its name, and pressures [Pa] on a line [m]
@@ -33,9 +34,13 @@ def _choose_instants(run: Run, fields: Fields) -> tuple[list[tuple[int, str]], s
     indices = sorted({fields.shown[int(k)] for k in np.linspace(0, len(fields.shown) - 1, INSTANTS)})
     instants = [(index, int(fields.steps[index]), float(fields.times[index])) for index in indices]
     loads = {run.pressed(step) for _, step, _ in instants}
-    if run.lasts and len(loads) == 1:
-        return [(index, units.text(time, "s")) for index, _, time in instants], f", {loads.pop()}"
-    return [(index, run.instant(step, time)) for index, step, time in instants], ""
+    same_load = run.lasts and len(loads) == 1
+    names = []
+    for index, step, time in instants:
+        stage = style.plain(run.name_stage(step), MOST_LETTERS)
+        when = units.text(time, "s") if same_load else run.instant(step, time)
+        names.append((index, "\n".join(filter(None, (stage, when)))))
+    return names, f", {loads.pop()}" if same_load else ""
 
 
 def _draw_pressures(

@@ -43,32 +43,31 @@ STRIP = 8  # points across: a map as narrow as this is drawn as a line
 BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile and ratio to it, above which points do not set the range of colours
 
 
-def panels(run: Run, at: str = "") -> list[style.Panel]:
-    """Return panels of the last saved instant, or of the one that is asked for; none if nothing was saved.
+def panels(run: Run, at: str = "") -> tuple[list[style.Panel], list[style.Panel]]:
+    """Return panels of pressures on a line, and maps of one instant; none of what was not saved.
 
-    Raises InputError where nothing is saved at the instant that is asked for.
+    The instant is the one that is asked for, else the last, or where the surfaces came off that of the pull-off or of
+    the largest load. Raises InputError where nothing is saved at the instant that is asked for.
     """
     try:
         with h5py.File(run.directory / "fields.h5", "r", locking=False) as file:
-            return list(_panels(run, Fields(file, at)))
+            fields = Fields(file, at, until=run.telling_step)
+            narrow = min(fields.x.size, fields.y.size) <= STRIP
+            pressures = list(lines.panels(run, fields, narrow)) if fields.read("pressure") is not None else []
+            return pressures, [] if narrow or not fields.saved else list(_panels(run, fields))
     except (OSError, KeyError):
         if at:
             told = f"--at {at}: {run.directory} holds no maps; output: {{fields: [...]}} saves them"
             raise InputError(told) from None
-        return []
+        return [], []
 
 
 def _panels(run: Run, fields: Fields) -> Iterator[style.Panel]:
-    found = {name: fields.last(name) for name in LOOKS}
+    found = {name: fields.read(name) for name in LOOKS}
     pressure = found["pressure"]
-    if pressure is not None:
-        yield from lines.panels(run, fields, min(fields.x.size, fields.y.size) <= STRIP)
-    if not fields.saved or min(fields.x.size, fields.y.size) <= STRIP:
-        return
     if found["gap"] is not None:
         del found["displacement"]  # one of both says enough
-    last = fields.shown[-1]
-    instant = run.instant(int(fields.steps[last]), float(fields.times[last]))
+    instant = run.instant(int(fields.steps[fields.chosen]), float(fields.times[fields.chosen]))
     for name, values in found.items():
         if values is not None:
             yield _panel(fields, name, mask(name, values, pressure, run.job), instant, _find_window(pressure))

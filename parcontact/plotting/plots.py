@@ -1,4 +1,4 @@
-"""Pictures of runs, finished or not, and of friction curves: what was measured, and the last saved maps.
+"""Pictures of runs, finished or not, and of friction curves: what was measured, and maps of one instant.
 
 Which panels there are follows from the job: friction if the surface slides, energies if they were asked for, curves
 over the load if all stages are single solves, pressures along a line through a sphere beside Hertz's.
@@ -135,7 +135,7 @@ def choose_evenly(labels: dict[int, str], most: int) -> dict[int, str]:
 def _draw_directory(directory: Path, options: Options) -> Figure:
     has_run, has_curve, has_sweep = ((directory / name).is_file() for name in (MEASURES, steady.TABLE, sweep.TABLE))
     groups: list[Sequence[style.Panel]] = []
-    titles = []
+    titles, fields = list[str](), list[style.Panel]()
     if has_run:
         run = Run(directory)
         found = _wrap(run.job.title or directory.absolute().name)
@@ -147,7 +147,8 @@ def _draw_directory(directory: Path, options: Options) -> Figure:
         titles.append(_wrap(steady.title(directory)))
         groups.append(options.to_panels(steady.charts(directory, options.over)))
     if has_run and options.wants("maps"):
-        groups.append(maps.panels(run, options.at or ""))
+        pressures, fields = maps.panels(run, options.at or "")
+        groups.append(pressures)
     if has_sweep:
         titles.append(_wrap(sweep.title(directory) or directory.absolute().name))
         groups += [options.to_panels([chart]) for chart in options.choose(sweep.charts(directory))]
@@ -156,10 +157,10 @@ def _draw_directory(directory: Path, options: Options) -> Figure:
             raise InputError(f"{directory} is no directory")
         lacking = f"it has no {MEASURES} and no {steady.TABLE}{_suggest(directory)}"
         raise InputError(f"{directory} holds no run and no friction curve: {lacking}")
-    if options.panels and not any(groups):
+    if options.panels and not any((*groups, fields)):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
     title = "\n".join(filter(None, (*titles[:1], theory_settings.describe(directory))))
-    return style.figure_of(title, groups, legend=has_curve and len(groups) == 1)
+    return style.figure_of(title, groups, legend=has_curve and len(groups) == 1, maps=fields)
 
 
 def _suggest(path: Path) -> str:

@@ -13,7 +13,8 @@ from ..history.timeline import Timeline
 from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
-from ..storage import tables
+from ..storage import marker, tables
+from ..summary import pull_off
 from . import units
 from .charts import FRACTION, Axis
 
@@ -65,6 +66,14 @@ class Run:
         return Timeline.of(self.job, times[-1]).follow(dict(zip(steps, times, strict=True)))
 
     @property
+    def telling_step(self) -> int:
+        """The step whose maps show the contact: the last one, or where the surfaces came off that of the pull-off or of
+        the largest load."""
+        columns = {name: values.tolist() for name, values in self._all.items()}
+        row = pull_off.choose_row(columns, bool(marker.detached(self.directory)))
+        return int(self._all["step"][row])
+
+    @property
     def rows_of_stages(self) -> dict[int, list[int]]:
         """The rows of each stage, by its number; the initial state belongs to the first."""
         found: dict[int, list[int]] = {}
@@ -93,28 +102,37 @@ class Run:
         axis, loads = to_load(self._all["pressure"], self.area * self.free)
         return units.text(loads[rows[-1]], axis.unit)
 
+    def name_stage(self, step: int) -> str:
+        """Return the name that the job gives to the stage of a step; '' where it gives none."""
+        stage = self._stage(step)
+        name = self.job.history[stage].name if stage >= 0 else ""
+        return "" if name == f"stage {stage + 1}" else name
+
     def moved(self, step: int) -> tuple[float, float]:
         """Return where the surface is after a step [m]; where it began if the job does not know of that step."""
         return self.timeline[step].position if 1 <= step <= len(self.timeline) else (0.0, 0.0)
 
 
 class Fields:
-    """The saved maps of a run. `shown` are the instants to draw: the one that was asked for, else all.
+    """The saved maps of a run. `shown` are the instants to draw: the one that was asked for, else all; `chosen` is the
+    one of these whose maps are drawn, the last by default.
 
     `at` is a step, as a whole number, or a time [s]: of a step the maps must be saved, of a time they are the nearest.
     """
 
-    def __init__(self, file: h5py.File, at: str = "") -> None:
+    def __init__(self, file: h5py.File, at: str = "", until: int | None = None) -> None:
         self.file = file
         self.steps: NDArray[np.int64] = file["step"][...]
         self.x, self.y = file["x"][...], file["y"][...]
         self.times: Array = file["t"][...]
         self.saved = np.flatnonzero(~np.isnan(self.times)).tolist()
         self.shown = [self._index(at)] if at else self.saved
+        before = [k for k in self.shown if until is None or self.steps[k] <= until]
+        self.chosen = (before or self.shown or [-1])[-1]
 
-    def last(self, name: str) -> Array | None:
-        """Return the newest map of a name among those that are shown, if it was saved."""
-        field = self.file[name][self.shown[-1]] if name in self.file and self.shown else None
+    def read(self, name: str) -> Array | None:
+        """Return the map of a name at the chosen instant, if it was saved."""
+        field = self.file[name][self.chosen] if name in self.file and self.shown else None
         return field if field is not None and np.isfinite(field).all() else None
 
     def _index(self, at: str) -> int:

@@ -85,17 +85,24 @@ def line(number: int) -> dict[str, Any]:
     return {"color": COLORS[number % len(COLORS)], "linestyle": DASHES[number % len(DASHES)]}
 
 
-def figure_of(title: str, groups: Sequence[Sequence[Panel]], legend: bool = False) -> Figure:
-    """Draw groups of panels below each other, each in even rows; with `legend` one for all panels, under the title."""
-    rows = [row for group in groups for row in _split_rows(group)]
-    height = 0.25 + 0.2 * (title.count("\n") + 1) + HEIGHT * len(rows)
+def figure_of(
+    title: str, groups: Sequence[Sequence[Panel]], legend: bool = False, maps: Sequence[Panel] = ()
+) -> Figure:
+    """Draw groups of panels below each other, each in even rows, and `maps` in places of one size, of which the last
+    may stay empty; with `legend` one for all panels, under the title."""
+    parts = [(row, 1, len(row)) for group in groups for row in _split_rows(group)]
+    parts += [(maps, -(-len(maps) // COLUMNS), COLUMNS)] if maps else []
+    heights = [rows for _, rows, _ in parts]
+    height = 0.25 + 0.2 * (title.count("\n") + 1) + HEIGHT * sum(heights)
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     if title and not legend:
         figure.suptitle(plain(title), fontsize=11)
-    for part, panels in zip(figure.subfigures(len(rows) or 1, 1, squeeze=False)[:, 0], rows, strict=False):
-        for panel, axes in zip(panels, part.subplots(1, len(panels), squeeze=False)[0], strict=True):
-            panel(axes)
-    if legend and rows:
+    places = figure.subfigures(len(parts), 1, squeeze=False, height_ratios=heights)[:, 0] if parts else ()
+    for place, (panels, rows, columns) in zip(places, parts, strict=True):
+        grid = place.add_gridspec(rows, columns)
+        for number, panel in enumerate(panels):
+            panel(place.add_subplot(grid[divmod(number, columns)]))
+    if legend and parts:
         _put_legend_above(figure, title)
     return figure
 

@@ -16,7 +16,7 @@ from PIL import Image
 
 from parcontact.job import Job
 from parcontact.plotting import maps, plots
-from parcontact.plotting.run import Run, label_frames
+from parcontact.plotting.run import Fields, Run, label_frames
 from parcontact.report import results
 
 ALL = "output: {fields: [pressure, displacement, gap, height]}\n"
@@ -112,7 +112,7 @@ def test_no_scale_of_nothing(
 ) -> None:
     """A gap where all is closed and pressures where nothing presses have no numbers; a displacement of zero has one."""
     out = ran(tmp_path, text + f"output: {{fields: [pressure, {name if name != 'pressure' else 'gap'}]}}\n")
-    plots.plot([out])
+    plots.plot([out], plots.Options(at=str(1 + text.count("}, {"))))  # the last step
     (axes,) = (axes for title, axes in maps_of(drawn[0]).items() if title.startswith(name))
     with h5py.File(out / "fields.h5") as file:
         list(maps.draw_frames(file, name, {len(file["step"]) - 1: ""}, Run(out).job))
@@ -153,3 +153,53 @@ def test_the_colours_of_pressures_that_pull_and_push_show_both() -> None:
     axes = Figure().subplots()
     maps._draw_map(axes, "pressure", (np.arange(65.0), np.arange(65.0)), (-2.0, 5.0))
     assert mesh(axes).norm(np.zeros(1)) == 0.5
+
+
+HELD = "history: [{name: press, force: 0.1, duration: 1.0e-3, time_step: 2.0e-4}, %s]\n"
+
+
+@pytest.mark.parametrize(
+    ("then", "told"),
+    [
+        ("{name: lift, force: 0, duration: 4.0e-4, time_step: 2.0e-4}", "1 ms, 100 mN"),  # the end of the largest load
+        ("{name: half, force: 0.05, duration: 4.0e-4, time_step: 2.0e-4}", "1.4 ms, 50 mN"),  # contact holds
+    ],
+)
+def test_maps_show_the_contact(tmp_path: Path, drawn: list[Figure], then: str, told: str) -> None:
+    out = ran(tmp_path, SPHERE + ZENER + HELD % then + "output: {fields: [pressure, gap, height]}\n")
+    plots.plot([out])
+    assert {title.split("\n")[1] for title in maps_of(drawn[0])} == {told}
+    (lines,) = (axes for axes in drawn[0].axes if axes.get_title().startswith("pressure on a line"))
+    legend = lines.get_legend()
+    assert legend
+    names = [text.get_text().split("\n") for text in legend.get_texts()][:5]  # then those of Hertz's
+    assert [stage for stage, _ in names] == ["press"] * 3 + 2 * [then[7:].split(",")[0]]
+
+
+def test_maps_of_a_pull_off(tmp_path: Path, drawn: list[Figure]) -> None:
+    """The contact is pulled hardest in row 3, and lost in row 4; maps are there of all steps but that of row 3."""
+    loads = "".join(f"{{pressure: {load}}}, " for load in (1e3, 2e3, 3e3, 4e3, 5e3))
+    out = ran(tmp_path, WAVE + ELASTIC + f"history: [{loads}]\noutput: {{fields: pressure}}\n")
+    run = Run(out)
+    for name, values in {"pressure": [0, 3, 1, -2, 0, 0], "approach": [0, -1, -2, -3, -4, -5]}.items():
+        run._all[name] = np.array(values, dtype=float)
+    run._all["contact_area"] = np.array([0.0, 0.3, 0.2, 0.1, 0.0, 0.0])
+    assert run.telling_step == 3
+    with h5py.File(out / "fields.h5", "r+") as file:
+        file["t"][2] = np.nan
+        assert Fields(file).chosen == 4
+        assert Fields(file, until=run.telling_step).chosen == 1
+        assert Fields(file, "5", until=run.telling_step).chosen == 4  # what is asked for is drawn
+
+
+def test_maps_have_one_size(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Three maps, in two rows: their frames have one size, squares as their boxes, and the last place is empty."""
+    plots.plot([ran(tmp_path, WAVE + ELASTIC + LOADS + "output: {fields: [pressure, gap, height]}\n")])
+    drawn[0].draw_without_rendering()
+    boxes = [axes.get_window_extent() for axes in maps_of(drawn[0]).values()]
+    sizes = np.array([(box.width, box.height) for box in boxes])
+    np.testing.assert_allclose(sizes, sizes[0, 0], rtol=1e-6)  # of rounding in the layout
+    first, second, third = boxes
+    assert first.y0 == pytest.approx(second.y0, abs=0.5)
+    assert third.x0 == pytest.approx(first.x0, abs=0.5)
+    assert third.y1 < first.y0
