@@ -171,7 +171,8 @@ def many_decades(bench: Bench) -> None:
 
 
 def _settling(omega: float, dt: float, steps: int, integrator: viscoelastic.Integrator) -> complex:
-    """Transfer modulus after some steps from a jump: each term b + (1 - b) (decay/z)^steps, b its steady value."""
+    """Transfer modulus after some steps from a jump: each term b + (1 - b) (decay/z)^steps, b its steady value. The
+    first quadratic step is linear: b + (m - b) (decay/z)^(steps - 1) with m = decay/z + phi (1 - 1/z)."""
     spring, moduli, times = TYRE
     total = complex(spring)
     for modulus, time in zip(moduli, times, strict=True):
@@ -179,6 +180,9 @@ def _settling(omega: float, dt: float, steps: int, integrator: viscoelastic.Inte
             complex(viscoelastic.discrete_modulus(omega, dt, 0.0, [modulus], [time], integrator=integrator)) / modulus
         )
         z = dt / time
-        decay = np.exp(-z) if integrator == "exponential" else 1.0 / (1.0 + z)
-        total += modulus * (share + (1.0 - share) * (decay * np.exp(-1j * omega * dt)) ** steps)
+        decay, turn = 1.0 / (1.0 + z) if integrator == "backward-euler" else np.exp(-z), np.exp(-1j * omega * dt)
+        first = share + (1.0 - share) * decay * turn
+        if integrator == "exponential":
+            first = decay * turn - np.expm1(-z) / z * (1.0 - turn)
+        total += modulus * (share + (first - share) * (decay * turn) ** (steps - 1))
     return total
