@@ -91,7 +91,7 @@ class Gaps:
             raise InputError(f"{directory}: no map is saved yet")
 
     def _open(self) -> h5py.File:
-        return h5py.File(self.directory / "fields.h5", "r", locking=False)
+        return hdf5.open_results(self.directory / "fields.h5")
 
     def read(self, index: int) -> Map:
         """Return the gap [m] at a saved instant; raises InputError where it is not whole."""

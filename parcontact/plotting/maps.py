@@ -16,6 +16,7 @@ from ..effects.contact_law import touching_of
 from ..errors import InputError
 from ..job import Job
 from ..parallel.slab import Array
+from ..storage import hdf5
 from . import lines, style, units
 from .run import Fields, Run
 
@@ -50,7 +51,7 @@ def panels(run: Run, at: str = "") -> tuple[list[style.Panel], list[style.Panel]
     the largest load. Raises InputError where nothing is saved at the instant that is asked for.
     """
     try:
-        with h5py.File(run.directory / "fields.h5", "r", locking=False) as file:
+        with hdf5.open_results(run.directory / "fields.h5") as file:
             fields = Fields(file, at, until=run.telling_step)
             narrow = min(fields.x.size, fields.y.size) <= STRIP
             pressures = list(lines.panels(run, fields, narrow)) if fields.read("pressure") is not None else []

@@ -12,7 +12,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -108,7 +107,7 @@ def _write_movie(directory: Path, options: Options) -> Path:
     if target.suffix != ".gif":
         raise InputError(f"--movie writes a GIF: --out must end in .gif, got {target}")
     try:
-        with h5py.File(path, "r", locking=False) as file:
+        with hdf5.open_results(path) as file:
             run = Run(directory)
             labels = label_frames(run, file)
             there = [key for key in maps.LOOKS if key in file]

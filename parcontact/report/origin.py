@@ -6,8 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-import h5py
-
 from ..job import Job
 from ..job.sections.listing import plain
 from ..physics.budget import exceeds
@@ -104,7 +102,7 @@ def section(directory: Path, found: log.Log) -> Section:
     there += sorted(directory.glob("checkpoint/step-*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
     for path in there:
         try:
-            with h5py.File(path, "r", locking=False) as file:
+            with hdf5.open_results(path) as file:
                 rows = [
                     ("said by", str(path.relative_to(directory))),
                     ("program", str(file.attrs["program"])),

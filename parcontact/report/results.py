@@ -156,7 +156,7 @@ def browse_run(run: Run) -> list[Browser]:
 def _browse_file(path: Path, label: Callable[[h5py.File], dict[int, str]], job: Job) -> list[Browser]:
     """Return none where the file is missing or cannot be read: a report tells what there is."""
     try:
-        with h5py.File(path, "r", locking=False) as file, style.drawing(RC):
+        with hdf5.open_results(path) as file, style.drawing(RC):
             labels = choose_evenly(label(file), MOST_MAPS)
             return [_browse_map(file, name, labels, job) for name in maps.LOOKS if maps.where(file, name) and labels]
     except hdf5.FAILURES:

@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..errors import RunError
+from ..errors import InputError, RunError
 from ..parallel import root
 from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
@@ -46,6 +46,21 @@ def write(path: Path, slab: Slab, parts: Iterable[Part]) -> None:
 def read(path: Path, slab: Slab, parts: Iterable[Part]) -> None:
     """Read the rows of every rank into `part.rows`; collective."""
     _move(path, slab, list(parts), False)
+
+
+def open_results(path: Path) -> h5py.File:
+    """Open a file of results to read it. Raises InputError where one of its members is that of another file, which
+    whoever made the file chose, and one of FAILURES where it cannot be read."""
+    file = h5py.File(path, "r", locking=False)
+    for name in file:
+        if isinstance(file.get(name, getlink=True), h5py.ExternalLink) or _has_outside_data(file[name]):
+            file.close()
+            raise InputError(f"{path}: {name} is stored in another file, which is not read: copy it into this one")
+    return file
+
+
+def _has_outside_data(item: Any) -> bool:
+    return isinstance(item, h5py.Dataset) and (item.is_virtual or item.external is not None)
 
 
 def sync(path: Path, slab: Slab) -> None:

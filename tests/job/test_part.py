@@ -122,7 +122,7 @@ MATERIALS = {
     ),
     "material: {model: zener, branches: [{G0: 1, modulus: 5}]}": (
         "3:37: material.branches.0 mixes forms of a branch: give G0, G1, eta1, modulus, "
-        "relaxation_time, got G0, modulus"
+        "relaxation_time or g, tau, got G0, modulus"
     ),
     "material: {model: zener, branches: [{G0: 1, G1: 1, eta1: .nan}]}": (
         "3:58: material.branches.0.eta1 must be a viscosity [Pa s] of zero or more, or .inf, got nan"
@@ -226,7 +226,7 @@ OTHERS = {
         "5:28: numerics.max_iterations must be a positive whole number of iterations, got 0"
     ),
     "numerics: {integrator: backward_euler}": (
-        "5:24: numerics.integrator must be exponential | backward-euler, got 'backward_euler'; did you mean "
+        "5:24: numerics.integrator must be exponential | exponential-linear | backward-euler, got 'backward_euler'; did you mean "
         "backward-euler?"
     ),
     "numerics: {accept_unconverged: 1}": "5:32: numerics.accept_unconverged must be true or false, got 1",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from parcontact.errors import RunError
+from parcontact.errors import InputError, RunError
 from parcontact.parallel.slab import Array, Slab
 from parcontact.storage import checkpoint, hdf5
 from parcontact.storage.hdf5 import Part
@@ -137,3 +137,22 @@ def test_regions_of_maps(comm: MPI.Intracomm, shared_path: Path) -> None:
         found = checkpoint.find_regions(file)
     assert all(stop < start for (_, stop), (start, _) in pairwise(found))
     assert sum(stop - start for start, stop in found) == (2 + 3) * 6 * 9 * 8
+
+
+@pytest.mark.parametrize("kind", ["link", "virtual", "outside"])
+def test_maps_of_another_file_are_refused(tmp_path: Path, kind: str) -> None:
+    """Whoever made the file would choose which files of this machine get into a report that is sent away."""
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["gap"] = np.ones((2, 2))
+    with h5py.File(tmp_path / "fields.h5", "w") as file:
+        if kind == "link":
+            file["gap"] = h5py.ExternalLink("other.h5", "gap")
+        elif kind == "virtual":
+            layout = h5py.VirtualLayout((2, 2), float)
+            layout[...] = h5py.VirtualSource(tmp_path / "other.h5", "gap", (2, 2))
+            file.create_virtual_dataset("gap", layout)
+        else:
+            place = [(str(tmp_path / "raw"), 0, 32)]
+            file.create_dataset("gap", (2, 2), float, external=place)
+    with pytest.raises(InputError, match="gap is stored in another file"):
+        hdf5.open_results(tmp_path / "fields.h5")
