@@ -226,8 +226,8 @@ OTHERS = {
         "5:28: numerics.max_iterations must be a positive whole number of iterations, got 0"
     ),
     "numerics: {integrator: backward_euler}": (
-        "5:24: numerics.integrator must be exponential | exponential-linear | backward-euler, got 'backward_euler'; did you mean "
-        "backward-euler?"
+        "5:24: numerics.integrator must be exponential | exponential-linear | backward-euler, got "
+        "'backward_euler'; did you mean backward-euler?"
     ),
     "numerics: {accept_unconverged: 1}": "5:32: numerics.accept_unconverged must be true or false, got 1",
     "output: {fields: [gap, presure]}": (
