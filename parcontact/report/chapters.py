@@ -40,9 +40,11 @@ def describe_directory(directory: Path) -> Chapter:
         job, warnings = _read_job(resolved)
         title, places = job.title, [*_places(job), *places]
         asked = _describe_job(job, resolved.with_name(JOBS[resolved.name]))
+        of_job = [asked, material.section(job), road.section(job)]
         if there == ["sweep.csv"]:
-            asked = replace(asked, title="What was asked of the first case", sentences=[_describe_swept(directory)])
-        sections += [asked, material.section(job), road.section(job)]
+            of_job = _name_first_case([replace(asked, sentences=[_describe_swept(directory)]), *of_job[1:]])
+            sections += _describe_example(directory, resolved.parent)
+        sections += of_job
         if there[0] in ("measures.csv", "steady.csv"):
             sections += origin.costs(directory / there[0], found, job)
         cited = origin.list_citations(job)
@@ -79,6 +81,19 @@ def _places(job: Job) -> list[str]:
     """Return the directories of this machine that a job names: who reads a report has others."""
     parts = [value for part in (*job.surface, job.material) for _, value in listing.items(part)]
     return [f"{path.parent}/" for path in (job.path, *parts) if isinstance(path, Path) and path.is_absolute()]
+
+
+def _name_first_case(sections: Sequence[Section]) -> list[Section]:
+    """Return sections that say whose they are."""
+    return [replace(one, title=f"{one.title} of the first case") for one in sections]
+
+
+def _describe_example(directory: Path, case: Path) -> list[Section]:
+    """Return the results of the first case of a sweep as an example, where it is a run that is done."""
+    first = sweep_table.read(directory / "sweep.csv")[0]
+    if first["state"] != "done" or not (case / "measures.csv").is_file():
+        return []
+    return [replace(results.describe_run(case), title="The first case as an example")]
 
 
 def _describe_swept(directory: Path) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 from .. import progress
-from ..columns import STEADY, UNITS
+from ..columns import STEADY, SWEEP, UNITS
 from ..job import Job
 from ..plotting import histories, maps, steady, style, sweep, units
 from ..plotting.plots import choose_evenly
@@ -103,9 +103,16 @@ def describe_curve(directory: Path) -> Section:
 def describe_sweep(directory: Path) -> Section:
     rows = sweep_table.read(sweep_table.results(directory))
     used = [name for name in (rows[0] if rows else ()) if any(format_cell(row[name]) not in ("", "–") for row in rows)]
-    table = _shorten(used, [[row[name] for name in used] for row in rows])
+    table = _shorten(list(map(_add_unit, used)), [[row[name] for name in used] for row in rows])
     told = list(filter(None, [theory_settings.describe(directory)]))
     return Section("Sweep", told, [table], [draw_chart(chart) for chart in sweep.charts(directory)])
+
+
+def _add_unit(name: str) -> str:
+    """Return a column of a sweep, or a key of its job, with its unit: `pull_off [N]`, `history.0.velocity [m/s]`."""
+    known = {column.name: column.unit for column in (*SWEEP, *STEADY)} | sweep.UNITS
+    unit = known.get(name) or sweep.UNITS.get(name.split(".")[-1], "")
+    return f"{name} [{unit}]" if unit else name
 
 
 def describe_study(directory: Path) -> Section:

@@ -207,7 +207,8 @@ def test_sweep_and_study(tmp_path: Path) -> None:
     for told in (">failed</td>", ">0.12346</td>", ">exponential</td>", "for 1 %: mesh 64"):
         assert told in found.text
     named = re.findall(r'<td data-head="([^"]*)"', found.text)  # a phone shows rows of wide tables as names and values
-    assert named == [*head, *head, "mesh", "integrator", "mu_max"]
+    units = [name.replace("velocity", "velocity [m/s]") for name in head]
+    assert named == [*units, *units, "mesh", "integrator", "mu_max"]
 
 
 def test_a_sweep_shows_its_first_case_and_what_differs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -219,7 +220,9 @@ def test_a_sweep_shows_its_first_case_and_what_differs(tmp_path: Path, monkeypat
     (tmp_path / "job.yaml").write_text(text)
     assert __main__.main(["job.yaml", "--quiet"]) == 0
     found = Page(page.write([tmp_path / "out" / "job", tmp_path / "out" / "job" / "cases" / "000"]).read_text())
-    assert found.headings.count("What was asked of the first case") == found.headings.count("What was asked") == 1
+    of_first = [f"{name} of the first case" for name in ASKED]
+    assert found.headings[:5] == ["Sweep", "The first case as an example", *of_first]
+    assert found.headings.count("What was asked") == 1  # of the case itself, in the second chapter
     assert "There are 2 cases. They differ in surface.scale (1.0, 2.0)." in found.text
     assert "road.npy" in found.text
     assert str(tmp_path) not in found.text
