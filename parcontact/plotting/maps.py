@@ -41,6 +41,7 @@ LOOKS = {
 }
 TENSION = "RdBu_r"  # colours of pressures that pull at some points
 STRIP = 8  # points across: a map as narrow as this is drawn as a line
+TICKS = 5  # intervals at most; were it left to the room there is, ticks would change after the layout, and be cut off
 BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile and ratio to it, above which points do not set the range of colours
 
 
@@ -144,10 +145,11 @@ def _draw_map(
     mesh = axes.pcolormesh(x, y, empty, cmap=look.colors, norm=norm, rasterized=True)
     axes.set_aspect("equal")
     for axis, along in ((axes.xaxis, "x"), (axes.yaxis, "y")):
-        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
+        axis.set_major_locator(MaxNLocator(TICKS, steps=[1, 2, 5, 10]))
         units.label(axis, along, "m")
     if low <= high:
-        scale = axes.figure.colorbar(mesh, ax=axes, ticks=[low] if low == high else None, **bar).ax.yaxis
+        ticks = [low] if low == high else MaxNLocator(TICKS, steps=[1, 2, 5, 10])
+        scale = axes.figure.colorbar(mesh, ax=axes, ticks=ticks, **bar).ax.yaxis
         units.label(scale, name, look.unit)
     return mesh.set_array
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from drawing import ELASTIC, LOADS, SPHERE, STRIP, WAVE, ZENER, ran
+from drawing import ELASTIC, LOADS, MAPS, SPHERE, STRIP, WAVE, ZENER, ran
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
@@ -203,3 +203,16 @@ def test_maps_have_one_size(tmp_path: Path, drawn: list[Figure]) -> None:
     assert first.y0 == pytest.approx(second.y0, abs=0.5)
     assert third.x0 == pytest.approx(first.x0, abs=0.5)
     assert third.y1 < first.y0
+
+
+def test_ticks_do_not_follow_the_layout(tmp_path: Path) -> None:
+    """A scale of colours whose ticks follow its room has other ones after the layout, and labels beyond the edge."""
+    text = WAVE.replace("1.0e-6", "5.0e-6") + ELASTIC + "history: [{pressure: 1.0e3}]\n" + MAPS
+    _, panels = maps.panels(Run(ran(tmp_path, text)))
+    found = []
+    for size in (2.0, 9.0):
+        figure = Figure(figsize=(size, size))
+        panels[1](figure.subplots())
+        figure.draw_without_rendering()
+        found.append([[text.get_text() for text in axes.get_yticklabels()] for axes in figure.axes])
+    assert found[0] == found[1]
