@@ -3,6 +3,8 @@
 import math
 
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+TIMES = {"years": 365.25 * 86400.0, "days": 86400.0, "h": 3600.0, "min": 60.0}  # [s]
+LONG_TIME = 2.0  # of a unit of time, from which on it is used
 MOST_DIGITS = 6  # of a number with an error
 
 
@@ -10,8 +12,10 @@ def prefixed(unit: str, largest: float) -> tuple[str, float]:
     """Return the unit with the prefix that suits the largest value, and its size in the unit without one.
 
     Squares, m², go up by a million; they keep the larger unit down to a thousandth of it. No unit, degrees and
-    cubes have no prefix, and there are no kiloseconds.
+    cubes have no prefix. Times of two minutes or more are in minutes, hours, days or years.
     """
+    if unit == "s" and abs(largest) >= LONG_TIME * TIMES["min"]:
+        return next((name, size) for name, size in TIMES.items() if abs(largest) >= LONG_TIME * size)
     if unit in ("", "°C", "m³") or not largest:
         return unit, 1.0
     square = unit == "m²"
@@ -25,7 +29,8 @@ def text(value: float, unit: str, digits: int = 3) -> str:
     """Return a number with its unit, for pictures and pages: 11.7 µm."""
     rounded = float(f"{value:.{digits}g}") + 0.0  # no -0
     shown, size = prefixed(unit, rounded)
-    return f"{rounded / size:g} {shown}".rstrip()
+    number = value if shown in TIMES else rounded  # a time is rounded in its own unit
+    return f"{float(f'{number / size:.{digits}g}'):g} {shown}".rstrip()
 
 
 def quantity(value: float, unit: str, digits: int = 3) -> str:

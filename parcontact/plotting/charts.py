@@ -141,6 +141,8 @@ def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
     if log:
         axes.set(**{f"{which}scale": "log"})
         low, high = axis.get_view_interval()
+        if unit == "s" and units.label_log_times(axis, name):
+            return
         few = high < 10.0**FEW_DECADES * low
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=5))
         axis.set_minor_formatter(NullFormatter())

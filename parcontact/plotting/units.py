@@ -1,15 +1,50 @@
 """Units with the prefix that suits the numbers on an axis: 1.04 kPa, not 0.00104167 MPa."""
 
+from collections.abc import Sequence
+from typing import Any
+
 from matplotlib.axis import Axis
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
-from ..printed import prefixed, text
+from ..printed import LONG_TIME, TIMES, prefixed, text
 
-__all__ = ["label", "prefixed", "text"]
+__all__ = ["label", "label_log_times", "prefixed", "text"]
+
+MARKS = {"1 ns": 1e-9, "1 µs": 1e-6, "1 ms": 1e-3, "1 s": 1.0, "1 min": 60.0, "1 h": 3600.0}
+MARKS |= {"1 day": TIMES["days"], "1 year": TIMES["years"]}  # of a logarithmic axis [s]
+FEW_MARKS = 3  # less leave a reader without a scale
 
 
 def label(axis: Axis, name: str, unit: str) -> None:
     """Name an axis of SI values, and show its ticks in the unit that suits the range of the axis."""
     shown, size = prefixed(unit, max(map(abs, axis.get_view_interval())))
+    if shown in TIMES and axis.get_scale() == "linear":
+        axis.set_major_locator(_RoundTimes(size))
     axis.set_label_text(f"{name} [{shown}]" if shown else name)
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / size:.10g}".replace("-", "−")))
+
+
+def label_log_times(axis: Axis, name: str) -> bool:
+    """Name a logarithmic axis of long times, with a tick at a second, a minute, an hour; return whether it is one."""
+    low, high = axis.get_view_interval()
+    marks = {size: mark for mark, size in MARKS.items() if low <= size <= high}
+    if high < LONG_TIME * TIMES["min"] or len(marks) < FEW_MARKS:
+        return False
+    axis.set_major_locator(FixedLocator(list(marks)))
+    axis.set_major_formatter(FixedFormatter(list(marks.values())))
+    axis.set_minor_locator(NullLocator())
+    axis.set_label_text(name)
+    return True
+
+
+class _RoundTimes(MaxNLocator):
+    """Ticks at round numbers of a unit of time of `size` seconds."""
+
+    def __init__(self, size: float) -> None:
+        super().__init__("auto", steps=[1, 2, 5, 10])
+        self._size = size
+
+    def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+        """Return times [s] from about `vmin` to `vmax` [s]."""
+        found: Any = super().tick_values(vmin / self._size, vmax / self._size)
+        return found * self._size

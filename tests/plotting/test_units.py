@@ -1,9 +1,10 @@
 """Units with prefixes, as words and on axes."""
 
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from parcontact.plotting import units
+from parcontact.plotting import charts, units
 
 
 @pytest.mark.parametrize(("largest", "label"), [(3.2e-5, "µm"), (999.9, "m"), (1e3, "km"), (2e-12, "nm"), (0.0, "m")])
@@ -23,6 +24,14 @@ def test_prefixes(largest: float, label: str) -> None:
         (0.05, "J/m²", "50 mJ/m²"),
         (0.3, "", "0.3"),
         (0.0, "s", "0 s"),
+        (119.4, "s", "119 s"),
+        (119.6, "s", "1.99 min"),  # 120 s in three digits
+        (5400.0, "s", "90 min"),
+        (86400.0, "s", "24 h"),
+        (30 * 86400.0, "s", "30 days"),
+        (-3.15576e8, "s", "-10 years"),
+        (3.2e7, "s", "370 days"),
+        (600.0, "N", "600 N"),
     ],
 )
 def test_numbers_with_prefixes(value: float, unit: str, told: str) -> None:
@@ -41,3 +50,42 @@ def test_axes_have_prefixes(high: float, name: str, ticks: list[str]) -> None:
     figure.draw_without_rendering()
     assert axes.get_ylabel() == name
     assert [text.get_text() for text in axes.get_yticklabels()] == ticks
+
+
+@pytest.mark.parametrize(
+    ("end", "unit", "size"),
+    [(60.0, "s", 1.0), (3600.0, "min", 60.0), (2.0e5, "days", 86400.0), (3.2e8, "years", 3.15576e7)],
+)
+def test_axes_of_long_times(end: float, unit: str, size: float) -> None:
+    """Ticks are at whole or round numbers of the unit, not of seconds."""
+    figure = Figure()
+    axes = figure.subplots()
+    axes.plot([0.0, end], [0.0, 1.0])
+    units.label(axes.xaxis, "time", "s")
+    figure.draw_without_rendering()
+    assert axes.get_xlabel() == f"time [{unit}]"
+    shown = [float(tick.get_text().replace("−", "-")) for tick in axes.get_xticklabels()]
+    np.testing.assert_allclose(axes.get_xticks(), np.array(shown) * size, rtol=1e-9, atol=1e-9 * end)
+    assert all(len(tick.get_text()) <= 4 for tick in axes.get_xticklabels())
+
+
+@pytest.mark.parametrize(
+    ("end", "ticks"),
+    [
+        (100.0, []),  # powers of ten
+        (86400.0, ["1 s", "1 min", "1 h", "1 day"]),
+        (3.2e8, ["1 s", "1 min", "1 h", "1 day", "1 year"]),
+    ],
+)
+def test_logarithmic_axes_of_long_times(end: float, ticks: list[str]) -> None:
+    figure = Figure()
+    axes = figure.subplots()
+    axes.plot([1e-2, end], [0.0, 1.0])
+    axes.set_xlim(1e-2, end)
+    charts.set_scale(axes, "x", "time", "s", log=True)
+    figure.draw_without_rendering()
+    long = end > 100.0
+    assert axes.get_xlabel() == "time" + " [s]" * (not long)
+    if long:
+        assert [tick.get_text() for tick in axes.get_xticklabels()] == ticks
+    assert axes.get_xscale() == "log"
