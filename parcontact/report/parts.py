@@ -15,7 +15,7 @@ SIZE = (4.2, 2.9)  # of the picture of a chart [inch]: two beside each other on 
 RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes: a page looks the same on every machine
 
 Picture = tuple[str, str]  # its data: URI, and what it shows
-Browser = tuple[str, Sequence[Picture]]  # a map by its name, of which one picture is shown at a time
+Browser = tuple[str, Sequence[Picture], int]  # a map by its name, its pictures, and which is shown first
 Download = tuple[str, str, int]  # a file inside the page: its name, its data: URI and its bytes
 
 

@@ -16,7 +16,7 @@ from ..columns import STEADY, SWEEP, UNITS
 from ..job import Job
 from ..plotting import histories, maps, steady, style, sweep, units
 from ..plotting.plots import choose_evenly
-from ..plotting.run import Run, find_curve_job, find_free_area, label_frames, to_load
+from ..plotting.run import Fields, Run, find_curve_job, find_free_area, label_frames, to_load
 from ..storage import hdf5, marker, tables
 from ..summary import pull_off, slide, sweep_table, theory_beside, theory_settings
 from .parts import RC, Browser, Section, Table, draw_chart, to_uri
@@ -157,23 +157,28 @@ def _parse_number(text: str) -> object:
 
 def browse_run(run: Run) -> list[Browser]:
     """Return all maps that a run has saved, over time."""
-    return _browse_file(run.directory / "fields.h5", partial(label_frames, run), run.job)
+    return _browse_file(run.directory / "fields.h5", partial(label_frames, run), run.job, run.telling_step)
 
 
-def _browse_file(path: Path, label: Callable[[h5py.File], dict[int, str]], job: Job) -> list[Browser]:
-    """Return none where the file is missing or cannot be read: a report tells what there is."""
+def _browse_file(
+    path: Path, label: Callable[[h5py.File], dict[int, str]], job: Job, step: int | None = None
+) -> list[Browser]:
+    """Return maps, first shown as after a `step`, or the last ones; none where the file is missing or unreadable."""
     try:
         with hdf5.open_results(path) as file, style.drawing(RC):
             labels = choose_evenly(label(file), MOST_MAPS)
-            return [_browse_map(file, name, labels, job) for name in maps.LOOKS if maps.where(file, name) and labels]
+            chosen = Fields(file, until=step).chosen if step is not None else max(labels, default=0)
+            names = [name for name in maps.LOOKS if maps.where(file, name) and labels]
+            return [_browse_map(file, name, labels, job, chosen) for name in names]
     except hdf5.FAILURES:
         return []
 
 
-def _browse_map(file: h5py.File, name: str, labels: dict[int, str], job: Job) -> Browser:
+def _browse_map(file: h5py.File, name: str, labels: dict[int, str], job: Job, chosen: int) -> Browser:
     counted = progress.with_bar(list(labels), f"maps of {name}", "map")
     images = zip(maps.draw_frames(file, name, labels, job, MAP_SIZE, MAP_DPI), counted, strict=True)
-    return name, [(to_uri(to_small_png(image), "image/png"), labels[index]) for image, index in images]
+    first = max(sum(index <= chosen for index in labels) - 1, 0)
+    return name, [(to_uri(to_small_png(image), "image/png"), labels[index]) for image, index in images], first
 
 
 def to_small_png(image: Image.Image) -> bytes:

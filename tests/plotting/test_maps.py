@@ -169,6 +169,8 @@ def test_maps_show_the_contact(tmp_path: Path, drawn: list[Figure], then: str, t
     out = ran(tmp_path, SPHERE + ZENER + HELD % then + "output: {fields: [pressure, gap, height]}\n")
     plots.plot([out])
     assert {title.split("\n")[1] for title in maps_of(drawn[0])} == {told}
+    for _, images, first in results.browse_run(Run(out)):
+        assert images[first][1].startswith(f"{told} (step ")
     (lines,) = (axes for axes in drawn[0].axes if axes.get_title().startswith("pressure on a line"))
     legend = lines.get_legend()
     assert legend
