@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from runs import begun, marched
 
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 from parcontact.summary import slide
 
 Json = dict[str, Any]
@@ -81,7 +81,7 @@ def march_of(seed: int, number: int) -> Json:
     }
 
 
-def run(job: Json, cells: float | None = None, **numerics: Any) -> tuple[dict[str, NDArray[Any]], list[Row], Any]:
+def run(job: Json, cells: float | None = None, **numerics: Any) -> tuple[dict[str, NDArray[Any]], list[StepRow], Any]:
     """The columns of a run, its rows, and its stages."""
     history = [stage if cells is None else {**stage, "cells_per_step": cells} for stage in job["history"]]
     march = begun({**job, "history": history, "numerics": numerics})

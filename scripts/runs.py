@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from parcontact.job import Job
     from parcontact.march.loop import March
-    from parcontact.storage.row import Row
+    from parcontact.storage.row import StepRow
 
 ROOT = Path(__file__).resolve().parents[1]
 Json = dict[str, Any]
@@ -30,11 +30,11 @@ def begun(
     return start.first(read, Slab(MPI.COMM_SELF if comm is None else comm, *read.grid.points))
 
 
-def marched(march: "March", note: Callable[["March"], None] | None = None) -> tuple[list["Row"], list[float]]:
+def marched(march: "March", note: Callable[["March"], None] | None = None) -> tuple[list["StepRow"], list[float]]:
     """All rows of a march, the initial one first, and the CPU time [s] when each was done; `note` sees each state."""
     from parcontact.march.loop import run
 
-    rows, clock = list["Row"](), list[float]()
+    rows, clock = list["StepRow"](), list[float]()
 
     def keep(now: "March") -> None:
         rows.append(now.row)

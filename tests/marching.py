@@ -15,7 +15,7 @@ from parcontact.job import Job, load
 from parcontact.march.loop import March, run
 from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding import start
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 
 # the paper's Hertz material as one Maxwell branch beside the long-term spring: modulus 2.75 MPa at once, a tenth of it
 # in the end, relaxation time 1 ms, creep time 10 ms
@@ -50,13 +50,13 @@ def begun(data: dict[str, Any] | Job, comm: MPI.Intracomm = MPI.COMM_SELF) -> Ma
 
 def marched(
     data: dict[str, Any] | Job, tasks: Sequence[Callable[[March], None]] = (), comm: MPI.Intracomm = MPI.COMM_SELF
-) -> tuple[March, list[Row]]:
+) -> tuple[March, list[StepRow]]:
     """A march at the end of a job, and the row of every instant, the initial one first."""
-    march, rows = begun(data, comm), list[Row]()
+    march, rows = begun(data, comm), list[StepRow]()
     run(march, [lambda state: rows.append(state.row), *tasks])
     return march, rows
 
 
-def column(rows: Sequence[Row], name: str) -> NDArray[np.float64]:
+def column(rows: Sequence[StepRow], name: str) -> NDArray[np.float64]:
     """One number of every row, by the name of its measure or of its own."""
     return np.array([getattr(row, name) if hasattr(row, name) else getattr(row.measures, name) for row in rows])

@@ -9,12 +9,12 @@ from parcontact import job, scene
 from parcontact.march.loop import March
 from parcontact.march.loop import run as run_march
 from parcontact.parallel.slab import Slab
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 
 Fields = dict[str, NDArray[Any]]
 
 
-def run(path: Path, *overrides: str) -> list[tuple[Row, Fields]]:
+def run(path: Path, *overrides: str) -> list[tuple[StepRow, Fields]]:
     """What each step of a job gave: its row and fields. The steps of these jobs are static solves."""
     loaded = job.load(path, overrides)
     ready = March(scene.build(loaded, Slab.alone(*loaded.grid.points)))

@@ -9,7 +9,7 @@ from drawing import ELASTIC, LOADS, MAPS, SLIDE, WAVE, ZENER, ran
 
 from parcontact import progress
 from parcontact.__main__ import main
-from parcontact.plotting.run import Run
+from parcontact.plotting.run import PlottedRun
 from parcontact.report import results
 
 
@@ -54,7 +54,7 @@ def test_steady_states(job: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
 def test_the_maps_of_a_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = ran(tmp_path, WAVE + ELASTIC + LOADS + MAPS)
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
-    assert [len(images) for _, images, _ in results.browse_run(Run(out))] == [2, 2]
+    assert [len(images) for _, images, _ in results.browse_run(PlottedRun(out))] == [2, 2]
     assert "maps of pressure:   0%" in terminal.getvalue()
     assert "0/2" in terminal.getvalue()
 

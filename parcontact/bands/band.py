@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job
-from ..job.sections.height_arrays import Heights
+from ..job.sections.height_arrays import GivenHeights
 from ..march.errors import properties_of
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array, Slab
@@ -23,7 +23,7 @@ from ..steady_sliding.losses import branch_powers
 from ..steady_sliding.sliding import SteadyState, judge_state, tolerance_of
 from .band_heat import Warming, shares_of_depth, warming_of, waves_along_depth
 from .choice import Cut
-from .ladder import Ladder
+from .ladder import PressureLadder
 
 PARTS = 6  # accuracy: of a cell of wavenumbers, along each side, over which the spectrum is summed
 MOST_STEPS = 20000  # tuning: of one contact, more than any has needed
@@ -73,7 +73,7 @@ class Band:
             waves = _make_waves(cut, number, _seed(job, number, sample), fft, side)
             heights = fft.backward(waves, fft.slab.empty())
         slab = Slab.alone(*grid.points)
-        surface = (HeightArray(heights=Heights(np.asarray(heights))),)
+        surface = (HeightArray(heights=GivenHeights(np.asarray(heights))),)
         own = job.model_copy(update={"grid": grid, "surface": surface, "bands": None})
         self._depth_waves = waves_along_depth(float(cut.edges[0]), float(cut.edges[-1]))[0]
         self.warming: Warming | None = None
@@ -111,7 +111,7 @@ class Band:
         """The rms pressure [Pa] that its waves have in full contact."""
         return self._full * self.setup.units.pressure
 
-    def solve(self, pressure: float, law: InterfaceLaw, below: Ladder | None) -> Rung:
+    def solve(self, pressure: float, law: InterfaceLaw, below: PressureLadder | None) -> Rung:
         """Return the steady state under a mean pressure [Pa] with the closing of all finer bands [m over Pa], and its
         distribution over the ladder `below`, that of the next finer band. Raises RunError where it is not found."""
         setup, velocity, units = self.setup, self._velocity, self.setup.units

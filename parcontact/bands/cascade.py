@@ -23,7 +23,7 @@ from ..parallel.slab import Array, Slab
 from ..solve.interface_law import HARD, InterfaceLaw
 from .band import Band, Rung, Vector
 from .choice import Cut
-from .ladder import Ladder
+from .ladder import PressureLadder
 
 NEGLIGIBLE = 1e-12  # accuracy: of the load: a rung that carries less is not solved behind hard walls
 
@@ -72,7 +72,7 @@ class Cascade:
         self._bands: dict[tuple[int, int], Band] = {}
         self._temperatures = [math.nan] * cut.count
         self.velocity: Vector = (1.0, 0.0)
-        self.ladders: list[Ladder] = []
+        self.ladders: list[PressureLadder] = []
         self.pressure = math.nan
 
     def band(self, number: int, sample: int) -> Band:
@@ -102,7 +102,7 @@ class Cascade:
         """Slide at a velocity [m/s] under a mean pressure [Pa] from now on."""
         self.velocity, self.pressure = velocity, pressure
         squares = np.cumsum([0.0, *(self.band(k, 0).full_contact_rms ** 2 for k in range(self.cut.count))])
-        self.ladders = [Ladder.over(pressure, math.sqrt(square)) for square in squares[:-1]]
+        self.ladders = [PressureLadder.over(pressure, math.sqrt(square)) for square in squares[:-1]]
 
     def climb(self, samples: Sequence[int]) -> dict[tuple[int, int], list[Rung]]:
         """Solve all rungs of all bands with the laws of finer ones: the upward pass, for each sample on its own."""
@@ -139,7 +139,7 @@ class Cascade:
                 weights = np.sum([w * rung.weights for w, rung in zip(weights, rungs, strict=True)], axis=0)
         return tuple(found)
 
-    def _sum(self, weights: Array, ladder: Ladder, rungs: Sequence[Rung]) -> BandResult:
+    def _sum(self, weights: Array, ladder: PressureLadder, rungs: Sequence[Rung]) -> BandResult:
         loads = weights * ladder.rungs
         energy = np.array([rung.friction for rung in rungs])
         areas = weights * [rung.contact_area_corrected for rung in rungs]

@@ -24,13 +24,13 @@ BELOW = 4.5  # accuracy: rms pressures below the mean, less than which full cont
 
 
 @dataclass(frozen=True)
-class Ladder:
+class PressureLadder:
     """Rungs: rising pressures [Pa], shape (n,)."""
 
     rungs: Array
 
     @classmethod
-    def over(cls, mean: float, rms: float) -> "Ladder":
+    def over(cls, mean: float, rms: float) -> "PressureLadder":
         """Return the ladder for pressures of this mean and of this rms deviation in full contact [Pa], equally spaced
         in the logarithm; of one rung where nothing deviates."""
         if not rms > 0.0:

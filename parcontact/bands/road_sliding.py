@@ -34,7 +34,7 @@ TABLE = "bands.csv"
 
 
 @dataclass(frozen=True)
-class Outcome:
+class BandOutcome:
     """What all bands come to: results with laws from all samples, friction and area of the first sample with laws and
     behind hard walls, and standard errors of friction and area by the scatter of surfaces; the rungs of each band, and
     whether these are of profiles."""
@@ -191,7 +191,7 @@ class RoadSliding:
 
     # -- samples and errors -------------------------------------------------------------------------------------------
 
-    def _solve(self) -> Outcome:
+    def _solve(self) -> BandOutcome:
         """Solve surfaces until their scatter is below its share of the accuracy asked for."""
         asked, fixed = self.job.numerics.asked, self.cut.samples
         samples = list(range(fixed or FEWEST))
@@ -208,7 +208,7 @@ class RoadSliding:
             samples.append(len(samples))
             rungs.update(self._cascade.climb(samples[-1:]))
 
-    def _outcome(self, rungs: Solved, samples: Sequence[int], hard: tuple[float, float]) -> Outcome:
+    def _outcome(self, rungs: Solved, samples: Sequence[int], hard: tuple[float, float]) -> BandOutcome:
         means = [mean_rungs(rungs, band, samples) for band in range(self.cut.count)]
         results = self._cascade.fall(lambda band, _: means[band])
         first = self._cascade.fall(lambda band, _: rungs[band, 0])
@@ -221,9 +221,9 @@ class RoadSliding:
                 ]
                 variances += np.var(each, axis=0, ddof=1) / len(samples)
         scatter = np.sqrt(variances)
-        return Outcome(results, _sums(first), hard, (float(scatter[0]), float(scatter[1])), means, self.cut.line)
+        return BandOutcome(results, _sums(first), hard, (float(scatter[0]), float(scatter[1])), means, self.cut.line)
 
-    def _to_point(self, outcome: Outcome, velocity: Vector, pressure: float, seconds: float) -> Point:
+    def _to_point(self, outcome: BandOutcome, velocity: Vector, pressure: float, seconds: float) -> Point:
         results, finest, coarsest = outcome.results, outcome.results[-1], outcome.rungs[0][0]
         box, rubbed = self.setup.grid.lx * self.setup.grid.ly, self._rub(results)
         slopes = sum(result.friction_slopes for result in results) + rubbed / pressure
@@ -255,7 +255,7 @@ class RoadSliding:
             tuple(powers.tolist()),
         )
 
-    def _errors(self, outcome: Outcome, friction: float) -> ErrorBudget:
+    def _errors(self, outcome: BandOutcome, friction: float) -> ErrorBudget:
         """Return relative errors: those of grids and of load beyond ladders add up over bands."""
         area = outcome.results[-1].contact_area_corrected
         lost = sum(result.load_lost for result in outcome.results)
@@ -270,7 +270,7 @@ class RoadSliding:
         with_interface = replace(parts[0], method=parts[0].method + own * parts[1].method)
         return ErrorBudget(with_interface if friction > 0.0 else None, parts[1])
 
-    def _interface_share(self, outcome: Outcome, friction: float) -> float:
+    def _interface_share(self, outcome: BandOutcome, friction: float) -> float:
         return 1.0 - outcome.friction / friction if friction > 0.0 else 0.0
 
 

@@ -45,7 +45,7 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
     own = argparse.Namespace(**vars(options))
     stop = on_root(world, lambda: sweep.stop_file(cases))
     own.quiet, own.others_file = options.quiet or groups.count > 1, stop
-    whole = sweep.Sweep(cases, groups, partial(act, own), stop, options.quiet, limit, told, runs)
+    whole = sweep.SweepRun(cases, groups, partial(act, own), stop, options.quiet, limit, told, runs)
     return whole.run(chosen)
 
 

@@ -225,7 +225,7 @@ def plot(options: argparse.Namespace) -> int:
     from ..plotting import plots
 
     names = ("format", "panels", "over", "log", "compare", "movie", "at", "out")
-    wanted = plots.Options(**{name: getattr(options, name) for name in names})
+    wanted = plots.PlotOptions(**{name: getattr(options, name) for name in names})
     for picture in plots.plot(options.directories, wanted):
         print(f"picture: {picture}")
     return DONE

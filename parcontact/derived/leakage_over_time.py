@@ -20,7 +20,7 @@ from ..leakage.fluids import PressureDrop
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..plotting import conductivity, leakage
-from ..plotting.run import Fields, Run
+from ..plotting.run import Fields, PlottedRun
 from ..printed import per_cent, quantity, stated_error
 from ..storage import files, hdf5, tables
 
@@ -28,7 +28,7 @@ NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure,
 MOST_CELLS = 4e6  # tuning: of a map for each rank to take one; of larger ones fewer ranks do. 2048 x 2048 takes 1.4 GB
 
 
-class Instant(NamedTuple):
+class LeakInstant(NamedTuple):
     """One row of leak.csv.
 
     `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` these over K of the surface that just
@@ -54,7 +54,7 @@ class Instant(NamedTuple):
     flow_rate: float = np.nan
 
 
-class Solved(NamedTuple):
+class SolvedLeak(NamedTuple):
     """The flow at an instant, without its maps, the error that the mesh makes along x and along y, and the flow rates
     [m^3/s] of a fluid."""
 
@@ -110,7 +110,7 @@ class Gaps:
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
         return np.asarray(heights.max() - heights, dtype=float)
 
-    def solve(self, index: int) -> tuple[Solved, list[Map]]:
+    def solve(self, index: int) -> tuple[SolvedLeak, list[Map]]:
         """Return the flow at a saved instant, and for both directions where it is."""
         gap, flows, errors, shown = self.read(index), list[Flow](), list[float](), list[Map]()
         rates = list[float]()
@@ -120,7 +120,7 @@ class Gaps:
             flows.append(replace(flow, pressure=np.empty((0, 0))))
             rates.append(self._rate(gap, flow, axis))
             errors.append(mesh_error(gap, flow, self.size, axis, self.periodic))
-        return Solved(Leak(*flows), (errors[0], errors[1]), (rates[0], rates[1])), shown
+        return SolvedLeak(Leak(*flows), (errors[0], errors[1]), (rates[0], rates[1])), shown
 
     def _rate(self, gap: Map, flow: Flow, axis: str) -> float:
         """Return the flow of the fluid along an axis [m^3/s], NaN without one."""
@@ -131,11 +131,11 @@ class Gaps:
         found = solve_flow(self.drop.conducting_gap(gap), self.size, axis, self.periodic) if slipping else flow
         return self.drop.flow_rate(found.conductivity, length, width)
 
-    def row(self, index: int, solved: Solved, bare: Leak | None) -> Instant:
+    def row(self, index: int, solved: SolvedLeak, bare: Leak | None) -> LeakInstant:
         found = solved.leak
         rows = np.flatnonzero(self.columns["step"] == self.fields.steps[index])
-        row = {name: float(self.columns[name][rows[-1]]) if rows.size else np.nan for name in Instant._fields[1:3]}
-        return Instant(
+        row = {name: float(self.columns[name][rows[-1]]) if rows.size else np.nan for name in LeakInstant._fields[1:3]}
+        return LeakInstant(
             float(self.fields.times[index]),
             row["pressure"],
             row["contact_area"],
@@ -171,7 +171,7 @@ def write(directory: Path, at: str, over: str, comm: MPI.Intracomm, drop: Pressu
     table, picture = (directory / f"{name}.{kind}" for kind in ("csv", "png"))
     columns = choose_columns(LEAK, when={"--fluid"} if drop else ())
     files.write(table, to_csv(names_of(columns), (values_of(columns, row) for row in rows)))
-    instant = Run(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
+    instant = PlottedRun(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
     flows = leaks[drawn].leak.along_x, leaks[drawn].leak.along_y
     leakage.draw(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
     yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
@@ -183,10 +183,10 @@ def write(directory: Path, at: str, over: str, comm: MPI.Intracomm, drop: Pressu
     yield f"picture: {picture}"
 
 
-def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, Solved], int, list[Map]]:
+def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, SolvedLeak], int, list[Map]]:
     """Return, on root, the flow at all instants, the one to draw and its maps: the last that has a flow in both
     directions, or else in one; collective."""
-    mine, drawn, maps, problem = dict[int, Solved](), (-1, -1), list[Map](), ""
+    mine, drawn, maps, problem = dict[int, SolvedLeak](), (-1, -1), list[Map](), ""
     working = max(1, int(comm.size * min(1.0, MOST_CELLS / gaps.cells)))
     try:
         for index in gaps.shown[comm.rank :: working] if comm.rank < working else []:
@@ -212,7 +212,7 @@ def _bare_flow(gaps: Gaps) -> tuple[Leak | None, str]:
         return None, " ".join(str(error).split())
 
 
-def _describe(rows: Sequence[Instant], axis: str) -> Iterator[str]:
+def _describe(rows: Sequence[LeakInstant], axis: str) -> Iterator[str]:
     """Say of an axis when contact closes the gap, how far K depends on the mesh, and where it has no meaning."""
     yield _describe_closure(rows, axis)
     errors = [error for row in rows if (error := getattr(row, f"error_{axis}")) == error]
@@ -227,7 +227,7 @@ def _describe(rows: Sequence[Instant], axis: str) -> Iterator[str]:
         yield f"along {axis} the constriction is below 10 nm at {where}: K means little, as no fluid is a continuum"
 
 
-def _describe_fluid(gaps: Gaps, last: Instant, solved: Solved) -> Iterator[str]:
+def _describe_fluid(gaps: Gaps, last: LeakInstant, solved: SolvedLeak) -> Iterator[str]:
     """Say how much of the fluid flows at the last instant, and where it is no continuum."""
     drop = gaps.drop
     assert drop is not None
@@ -246,7 +246,7 @@ def _describe_fluid(gaps: Gaps, last: Instant, solved: Solved) -> Iterator[str]:
 
 def _describe_missing(gaps: Gaps, at: str) -> Iterator[str]:
     """Name the stages at whose end no gap is saved, of a run all of whose instants are shown."""
-    run = Run(gaps.directory)
+    run = PlottedRun(gaps.directory)
     saved = set(gaps.fields.steps[gaps.shown].tolist())
     ends = {index: int(run.columns["step"][rows[-1]]) for index, rows in run.rows_of_stages.items()}
     names = [run.job.history[index].name for index, step in ends.items() if step not in saved]
@@ -254,7 +254,7 @@ def _describe_missing(gaps: Gaps, at: str) -> Iterator[str]:
         yield f"no gap is saved at the end of {', '.join(names)}: output: {{every: 1}} saves those of all steps"
 
 
-def _describe_closure(rows: Sequence[Instant], axis: str) -> str:
+def _describe_closure(rows: Sequence[LeakInstant], axis: str) -> str:
     """Say from which instant on contact closes the gap along an axis."""
     closed = [not getattr(row, f"percolates_{axis}") for row in rows]
     if len(rows) == 1:

@@ -27,7 +27,7 @@ from ..storage.curve_points import Wanted
 from ..summary import theory_beside, theory_settings
 from ..summary.theory_settings import TheorySettings
 from ..theory import full_contact, persson, persson_rings
-from ..theory.persson_history import Leg, Memory, follow
+from ..theory.persson_history import Memory, SlidingLeg, follow
 from ..theory.persson_rings import Rings
 
 ONE_ROUGH = (
@@ -39,7 +39,7 @@ STEADY_FILE, BANDS_FILE = "steady_theory.csv", "bands_theory.csv"
 WavesOf = Literal["continuum", "lattice"]
 
 
-class Instant(NamedTuple):
+class PredictedInstant(NamedTuple):
     """One row of theory.csv: s, m, Pa, and two ratios."""
 
     time: float
@@ -49,7 +49,7 @@ class Instant(NamedTuple):
     contact_area: float
 
 
-def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Instant]:
+def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[PredictedInstant]:
     """Return the rows for a job, the initial state first; `slab` must be that of one rank.
 
     The waves are those of the job's spectrum as an unbounded surface has them (`continuum`), or those of the very
@@ -188,7 +188,7 @@ def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
     ]
 
 
-def write(job: Job, rows: Iterator[Instant], settings: TheorySettings) -> Path:
+def write(job: Job, rows: Iterator[PredictedInstant], settings: TheorySettings) -> Path:
     """Write the rows as theory.csv, and theory.yaml beside it, for the job; returns the table's path."""
     return _write(job.output.directory / theory_settings.TABLE, THEORY, rows, settings)
 
@@ -304,9 +304,9 @@ def _material(job: Job) -> Prony:
     return Prony(factor * series.modulus_inf, factor * series.moduli, series.relaxation_times)
 
 
-def _rows(job: Job, timeline: Timeline, memory: Memory, gamma: float) -> Iterator[Instant]:
+def _rows(job: Job, timeline: Timeline, memory: Memory, gamma: float) -> Iterator[PredictedInstant]:
     pressure = job.initial.pressure or 0.0
-    first = Leg(job.initial.velocity, 0.0, np.zeros(1), np.array([pressure]))
+    first = SlidingLeg(job.initial.velocity, 0.0, np.zeros(1), np.array([pressure]))
     touched = job.initial.state == "steady"
     legs = [first]
     for span in timeline.spans:
@@ -318,12 +318,12 @@ def _rows(job: Job, timeline: Timeline, memory: Memory, gamma: float) -> Iterato
         distances = slid + math.hypot(*leg.velocity) * leg.instants
         slid = float(distances[-1])
         friction = found.friction(leg.pressures)
-        yield from map(Instant, time + leg.instants, distances, leg.pressures, friction, found.contact_area)
+        yield from map(PredictedInstant, time + leg.instants, distances, leg.pressures, friction, found.contact_area)
 
 
-def _leg(job: Job, span: Span) -> Leg:
+def _leg(job: Job, span: Span) -> SlidingLeg:
     """Return a stage: the jump of its load, if it begins with one, and its steps."""
     fractions = np.array([*([0.0] if span.jumps else []), *(span.ends[index] for index in range(1, span.count + 1))])
     area = job.grid.lx * job.grid.ly if span.stage.control == "force" else 1.0
     pressures = np.array([span.stage.load.at(min(fraction, 1.0)) for fraction in fractions]) / area
-    return Leg(span.stage.velocity, span.stage.seconds, fractions * span.stage.seconds, pressures)
+    return SlidingLeg(span.stage.velocity, span.stage.seconds, fractions * span.stage.seconds, pressures)

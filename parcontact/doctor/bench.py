@@ -13,7 +13,7 @@ from ..job import Job
 from ..march.loop import March
 from ..parallel.slab import Array, Slab
 from ..steady_sliding import start
-from ..storage.row import Row
+from ..storage.row import StepRow
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -78,7 +78,7 @@ class Bench:
         self._note(march.row)
         return march
 
-    def march(self, data: Json, *watches: Watch) -> tuple[March, list[Row]]:
+    def march(self, data: Json, *watches: Watch) -> tuple[March, list[StepRow]]:
         """A march at the end of a job, and the row of every instant, the initial one first; collective."""
         march = self.begin(data)
         job, rows = march.scene.job, [march.row]
@@ -97,7 +97,7 @@ class Bench:
         """Return the amplitude of the pressure of a wave that is longer than two cells [Pa]; collective."""
         return float(np.sqrt(2.0) * np.std(self.whole(march, "pressure")))
 
-    def _note(self, row: Row) -> None:
+    def _note(self, row: StepRow) -> None:
         self.residual = float(np.max((self.residual, row.certificate.worst)))  # NaN if one is
         self.iterations = max(self.iterations, row.iterations)
 

@@ -30,7 +30,7 @@ from ..solve.certificate import Certificate
 from ..solve.contact import Contact
 from ..solve.problem import Approach, Control, MeanPressure
 from .adhesive_energies import JUMPS, PUSHED, SURFACES, PathWork
-from .contact_protocol import Detached, End, Motion, PreviousContacts, SolvedContact
+from .contact_protocol import Detached, EdgeMotion, End, PreviousContacts, SolvedContact
 
 JUMP_STRIDE = 1.0 / 8.0  # accuracy: of a jump: the longest part in which it is made
 LEAST_STRIDE = 1.0 / 16.0  # accuracy: of these, and of a step: the shortest part in which a hard one is made
@@ -189,22 +189,22 @@ class AdhesiveLaw:
             reached = share
             backup[...] = gap
 
-    def motion(self, solved: SolvedContact[AdhesiveMemory], before: Measures, now: Measures) -> Motion:
+    def motion(self, solved: SolvedContact[AdhesiveMemory], before: Measures, now: Measures) -> EdgeMotion:
         """Return by how many half process zones the edge of the contact has moved in a step, in the mean.
 
         In cells that is the number of points that came into contact or left it, over the length of the edge, which is
         pi/4 of the sides of cells along it. What is left of the load of an `untouched` contact is the solver's error.
         """
         if not (before.contact_area or now.contact_area or solved.numbers["tensile_area"]):
-            return Motion(0.0, True)
+            return EdgeMotion(0.0, True)
         begins = (before.contact_area == 0.0) != (now.contact_area == 0.0)
         excess = max(each.contact_area - each.contact_area_corrected for each in (before, now))
         sides = excess * self.slab.points / SIDE
         if sides <= 0.0:
-            return Motion(begins=begins)
+            return EdgeMotion(begins=begins)
         moved = solved.numbers["points_changed"] / (0.25 * math.pi * sides) * cell_of(self.grid)
         zone = self.scene.choices.adhesion.process_zone(modulus_of(self.scene.job.material))
-        return Motion(2.0 * moved / zone if zone > 0.0 else 0.0, begins=begins)
+        return EdgeMotion(2.0 * moved / zone if zone > 0.0 else 0.0, begins=begins)
 
     def _path(self, trial: Trial, control: Control, past: PreviousContacts, before: Measures) -> LoadPath:
         """Return the way of what is prescribed since the last step, in the run's units."""

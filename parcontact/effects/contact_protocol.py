@@ -71,7 +71,7 @@ class SolvedContact(Generic[Remembered]):
     remark: str = ""
 
 
-class Motion(NamedTuple):
+class EdgeMotion(NamedTuple):
     """Motion of a contact in a step: half process zones by which its edges moved; whether nothing touches before and
     after the step, nor is under tension; and whether an adhesive contact begins or ends."""
 
@@ -105,7 +105,7 @@ class ContactLaw(Protocol[Memory]):
         """Solve a step of the body from the memory, contacts and measures of the step before, with the pressure in the
         spare map, to a tolerance, None for that of the job. A contact that was not solved has a `failure`."""
 
-    def motion(self, solved: SolvedContact[Memory], before: Measures, now: Measures) -> Motion:
+    def motion(self, solved: SolvedContact[Memory], before: Measures, now: Measures) -> EdgeMotion:
         """Return how the contact has moved in a step, from its measures before and after it."""
 
     def gap(self, memory: Memory) -> Array | None:

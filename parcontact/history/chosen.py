@@ -79,7 +79,7 @@ def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
 
 
 @dataclass(frozen=True)
-class Ladder:
+class StepLadder:
     """Steps that double from `first` to `most` [s], and then are alike, over some `seconds`."""
 
     first: float
@@ -116,7 +116,7 @@ class ChosenEnds:
 
     made: Sequence[float]
     stops: tuple[float, ...]
-    ladder: Ladder
+    ladder: StepLadder
     limits: Bounds
 
     @property
@@ -186,7 +186,7 @@ class ChosenSteps:
         left = 0.0 if reached(now, stops[-1]) else stops[-1] - now
         first = min(self.next if made and self.next else limits.least, limits.most)
         longest = min(limits.most, one_cell(stage, grid)) if stage.speed else limits.most
-        return ChosenEnds(made, stops, Ladder(first, max(first, longest), left), limits)
+        return ChosenEnds(made, stops, StepLadder(first, max(first, longest), left), limits)
 
     def numbers(self) -> dict[str, tuple[list[float] | float, str]]:
         """Return all this, with units, by the names that it has in a checkpoint."""

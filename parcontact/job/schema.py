@@ -124,7 +124,7 @@ class Key:
 
 
 @dataclass(frozen=True)
-class Section:
+class SectionSchema:
     """A part of a job, where it stands in it ('surface', 'material.branches'), and its keys."""
 
     place: str
@@ -132,9 +132,9 @@ class Section:
     keys: tuple[Key, ...]
 
 
-def sections() -> list[Section]:
+def sections() -> list[SectionSchema]:
     """Return every part of a job, in the order of the job, with those of the effects of this package."""
-    found: dict[type[Part], Section] = {Job: Section("", Job, tuple(_keys(Job)))}
+    found: dict[type[Part], SectionSchema] = {Job: SectionSchema("", Job, tuple(_keys(Job)))}
     for name, field in Job.model_fields.items():
         _collect(name, field, found)
     for name, effect in added_sections.effects_of(added_sections.names()).items():
@@ -151,10 +151,10 @@ def _parts_of(annotation: Any) -> Iterator[type[Part]]:
         yield from _parts_of(inner)
 
 
-def _collect(place: str, annotation: Any, found: dict[type[Part], Section]) -> None:
+def _collect(place: str, annotation: Any, found: dict[type[Part], SectionSchema]) -> None:
     for part in _parts_of(annotation):
         if part not in found:
-            found[part] = Section(place, part, tuple(_keys(part)))
+            found[part] = SectionSchema(place, part, tuple(_keys(part)))
             for name, field in part.model_fields.items():
                 _collect(f"{place}.{name}", field, found)
 

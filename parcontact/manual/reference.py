@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from ..job import schema
-from ..job.schema import Key, Section
+from ..job.schema import Key, SectionSchema
 from ..job.sections.part import kind_key
 
 MEANINGS = Path(__file__).parent / "keys.yaml"
@@ -28,7 +28,7 @@ def keys() -> str:
     return "\n".join(line for section in schema.sections() for line in _section(section))
 
 
-def heading(section: Section) -> str:
+def heading(section: SectionSchema) -> str:
     """Return the name of a section: its place in a job, and its kind where there are several."""
     kind = kind_key(section.part)
     named = f"{kind}: {section.part.model_fields[kind].default}" if kind else ""
@@ -38,7 +38,7 @@ def heading(section: Section) -> str:
     return f"{place}{detail}" if section.place else "The sections of a job"
 
 
-def _section(section: Section) -> Iterator[str]:
+def _section(section: SectionSchema) -> Iterator[str]:
     yield f"\n## {heading(section)}\n"
     yield f"{' '.join((section.part.__doc__ or '').split())}\n"
     for word in section.part.one_of:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..effects.contact_protocol import ContactLaw, Detached, Motion, PreviousContacts, SolvedContact
+from ..effects.contact_protocol import ContactLaw, Detached, EdgeMotion, PreviousContacts, SolvedContact
 from ..history.timeline import Step
 from ..parallel.slab import Array
 from ..physics.body import Trial
@@ -74,9 +74,9 @@ class DryLaw:
             raise failure.of_solve(scene, step, failed, contact, tried, problem.heights, moved)
         return contact, f"the contact solve {failed.failure}; solved when retried with {', with '.join(tried)}"
 
-    def motion(self, solved: SolvedContact[None], before: Measures, now: Measures) -> Motion:
+    def motion(self, solved: SolvedContact[None], before: Measures, now: Measures) -> EdgeMotion:
         """Return no motion: edges may move by any way in a step."""
-        return Motion()
+        return EdgeMotion()
 
     def gap(self, memory: None) -> Array | None:
         """Return None: pressures are solved for."""

@@ -27,7 +27,7 @@ NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Estimate:
+class StepErrors:
     """Errors of a step: its budget, None where nothing touches, and the error of its length alone, by which steps
     that are chosen are judged; with the friction of the body, from which a change in the next step is known, infinite
     after a jump. `lasting` is the budget without the error of a rise of friction, which passes: the tolerance of the
@@ -45,7 +45,7 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolvedStep:
     """A step that has been solved: the contact by its law, its measures, and the memory of the body after it."""
 
     step: Step
@@ -85,7 +85,7 @@ class ErrorPart:
         return ErrorMemory(float(saved.get("friction", math.inf)), ErrorSums.restored(saved))
 
 
-def estimate_errors(scene: Scene, friction: float, solved: Solved) -> Estimate:
+def estimate_errors(scene: Scene, friction: float, solved: SolvedStep) -> StepErrors:
     """Return how wrong a step is, with the `friction` of the body in the step before, infinite where that is not known
     or was a jump; collective."""
     step, measures, certificate = solved.step, solved.measures, solved.contact.certificate
@@ -101,7 +101,7 @@ def estimate_errors(scene: Scene, friction: float, solved: Solved) -> Estimate:
         still = StepObservation(
             0.0, integrators.difference, integrators.order, 0.0, 0.0, 0.0, 0.0, seconds=step.dt, curved=curved
         )
-        return Estimate(None, time_error(run, still, points), own, None)
+        return StepErrors(None, time_error(run, still, points), own, None)
     observed = StepObservation(
         complementarity=certificate.complementarity,
         difference=integrators.difference,
@@ -123,7 +123,7 @@ def estimate_errors(scene: Scene, friction: float, solved: Solved) -> Estimate:
     lasting = estimate(run, observed, points, time)
     uneven = min(1.0, measures.max_pressure / measures.pressure - 1.0) if measures.pressure > 0.0 else 1.0
     budget = _with_rise(lasting, error_of_rise(run, observed, points, change, uneven))
-    return Estimate(budget, time, own, lasting)
+    return StepErrors(budget, time, own, lasting)
 
 
 def _with_rise(budget: ErrorBudget, rise: float) -> ErrorBudget:
@@ -140,7 +140,7 @@ def _cells_slid(run: RunProperties, step: Step, cell: tuple[float, float]) -> fl
     return math.hypot(step.velocity[0] / dx, step.velocity[1] / dy) * step.dt
 
 
-def _compare_integrators(scene: Scene, solved: Solved) -> IntegratorDifference:
+def _compare_integrators(scene: Scene, solved: SolvedStep) -> IntegratorDifference:
     """Return what the embedded pair shows of a step; collective."""
     step, trial, contact, measures = solved.step, solved.trial, solved.contact, solved.measures
     branches = scene.material.branched
@@ -158,7 +158,7 @@ def _compare_integrators(scene: Scene, solved: Solved) -> IntegratorDifference:
     return pair.compare(step.dt, trial, solved.body, pressure, contact.u, load, share, step.growth)
 
 
-def _compare_views(scene: Scene, solved: Solved) -> float:
+def _compare_views(scene: Scene, solved: SolvedStep) -> float:
     """Return by how much friction by the slopes of the rigid surface and of the body differ; collective.
 
     Of an elastic body the latter is 0.

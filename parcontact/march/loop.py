@@ -12,7 +12,7 @@ from ..physics.budget import ErrorSums
 from ..physics.entries import Entry
 from ..scene import Scene
 from ..storage.checkpoint import Contents, Facts
-from ..storage.row import Row
+from ..storage.row import StepRow
 from .choosing import StepChooser
 from .dry_law import law_of
 from .errors import ErrorMemory
@@ -31,7 +31,7 @@ class March:
         self.state = self._weighed(first_state(scene) if state is None else state)
 
     @property
-    def row(self) -> Row:
+    def row(self) -> StepRow:
         return self.state.row
 
     @property
@@ -58,7 +58,7 @@ class March:
         while self.row.step < len(timeline) and not self.detached:
             yield next_step(self.scene, self.state, timeline, stop)
 
-    def advance(self, step: Step) -> Row:
+    def advance(self, step: Step) -> StepRow:
         """Make the next state; collective. Raises StepError, and stays where it is, when that cannot be."""
         try:
             self.state = self._weighed(make_step(self.scene, self.state, step), self.row)
@@ -67,7 +67,7 @@ class March:
             self.state = self.state.after(law=memory)
         return self.row
 
-    def _weighed(self, state: State, since: Row | None = None) -> State:
+    def _weighed(self, state: State, since: StepRow | None = None) -> State:
         """Return the state with its errors added to the sums; a first state begins the sums."""
         row = state.row
         if row.errors is None:

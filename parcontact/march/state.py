@@ -23,7 +23,7 @@ from ..physics.units import Units
 from ..scene import Scene
 from ..storage import checkpoint, wisdom
 from ..storage.checkpoint import Contents, Facts
-from ..storage.row import Row
+from ..storage.row import StepRow
 from .dry_law import law_of
 from .errors import ErrorMemory, ErrorPart
 from .tolerance import StepTolerance, TolerancePart, follows
@@ -48,9 +48,9 @@ class State:
         return State({**self.memories, **changes})
 
     @property
-    def row(self) -> Row:
+    def row(self) -> StepRow:
         """What the last step is recorded as."""
-        row: Row = self.memories["row"]
+        row: StepRow = self.memories["row"]
         return row
 
     @property
@@ -125,22 +125,22 @@ class _RowPart:
 
     scene: Scene
 
-    def at_rest(self) -> Row:
+    def at_rest(self) -> StepRow:
         """Return the record of the initial state: at no load the surface just touches the body."""
         setup = self.scene.setup
         highest = setup.heights.highest
-        return Row(
+        return StepRow(
             measures=Measures(approach=0.0 - highest - setup.surface.datum, mean_gap=highest - setup.heights.mean)
         )
 
-    def entries(self, memory: Row, units: Units) -> dict[str, Entry]:
+    def entries(self, memory: StepRow, units: Units) -> dict[str, Entry]:
         measures = {name: Entry(float(value)) for name, value in asdict(memory.measures).items()}
         return {"distance": Entry(memory.distance, 1.0, "m"), **measures}
 
-    def restored(self, memory: Row, saved: Saved) -> Row:
+    def restored(self, memory: StepRow, saved: Saved) -> StepRow:
         kinds: dict[str, type] = {each.name: type(each.default) for each in fields(Measures)}
         measures = Measures(**{name: kind(saved[name]) for name, kind in kinds.items()})
-        return Row(distance=float(saved["distance"]), measures=measures)
+        return StepRow(distance=float(saved["distance"]), measures=measures)
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,7 @@ def first_state(scene: Scene, body: BodyMemory | None = None) -> State:
     return completed(scene, State({name: part.at_rest() for name, part in parts.items() if name not in given} | given))
 
 
-def pressed_state(scene: Scene, state: State, row: Row, pressure: Array, approach: float) -> State:
+def pressed_state(scene: Scene, state: State, row: StepRow, pressure: Array, approach: float) -> State:
     """Return a first state under a pressure, which is copied into its maps, and that had been there before, with the
     friction of a row."""
     newest, others = state.contact.pressures[:2], state.contact.pressures[2:]

@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from ..effects.contact_protocol import Motion, PreviousContacts, PreviousPressure
+from ..effects.contact_protocol import EdgeMotion, PreviousContacts, PreviousPressure
 from ..effects.effect import Changes, Instant, values_of
 from ..history.chosen import MadeStep
 from ..history.timeline import Step
@@ -19,10 +19,10 @@ from ..physics.body import Trial, surface_of
 from ..physics.energy import EnergyMemory, Pressed
 from ..scene import Scene
 from ..solve.problem import Approach, Control, MeanPressure
-from ..storage.row import Row
+from ..storage.row import StepRow
 from . import failure
 from .dry_law import law_of
-from .errors import ErrorMemory, Estimate, Solved, estimate_errors
+from .errors import ErrorMemory, SolvedStep, StepErrors, estimate_errors
 from .failure import DetachedError, StepError
 from .starts import cells_moved
 from .state import State, energies_of
@@ -32,9 +32,9 @@ from .state import State, energies_of
 class _Made:
     """A step that is accepted: how it was solved, its errors, its motion, and how it is noted if it was chosen."""
 
-    solved: Solved
-    errors: Estimate
-    motion: Motion
+    solved: SolvedStep
+    errors: StepErrors
+    motion: EdgeMotion
     verdict: MadeStep | None
 
 
@@ -56,7 +56,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
     followed = {name: each.memory for name, each in changes.items()}
     states_errors = all(each.states_errors for each in changes.values()) and not solved.measures.at_edge
     remarks = (solved.of_law.remark, *(each.remark for each in changes.values()), _describe_passed(step))
-    row = Row(
+    row = StepRow(
         step.number,
         step.time,
         state.row.distance + math.dist(step.position, last.position),
@@ -108,7 +108,7 @@ def _accepted(scene: Scene, state: State, step: Step) -> _Made:
         step = verdict
 
 
-def _solve(scene: Scene, state: State, step: Step) -> Solved:
+def _solve(scene: Scene, state: State, step: Step) -> SolvedStep:
     """Solve a step, measure it and let the body go on; collective. Raises StepError and DetachedError."""
     body, law, before = scene.material, law_of(scene), state.row.measures
     trial = body.begin(state.body, step.dt, scene.motion.at(step.position), step.growth)
@@ -125,7 +125,7 @@ def _solve(scene: Scene, state: State, step: Step) -> Solved:
     if not measures.finite:
         raise failure.not_finite(scene, step, measures)
     memory = body.commit(state.body, trial, contact.u, scene.solver.workspace.pressure)
-    return Solved(step, trial, of_law, measures, memory)
+    return SolvedStep(step, trial, of_law, measures, memory)
 
 
 def _control(scene: Scene, step: Step, trial: Trial) -> Control:
@@ -138,7 +138,7 @@ def _control(scene: Scene, step: Step, trial: Trial) -> Control:
     return MeanPressure(mean / (trial.alpha * scene.units.pressure))
 
 
-def _advance_energy(scene: Scene, state: State, solved: Solved) -> EnergyMemory | None:
+def _advance_energy(scene: Scene, state: State, solved: SolvedStep) -> EnergyMemory | None:
     """Return the energies of the body after a step, None where none are asked for; collective."""
     if scene.energy is None or state.energy is None:
         return None

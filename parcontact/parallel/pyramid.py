@@ -22,7 +22,7 @@ Shape = tuple[int, int]  # points of a cell along x and y: 1 or 2
 FEW = 8  # tuning: times fewer cells than a rank has points: then every rank has all cells
 
 
-def steps_of(slab: Slab, pairs: int = 0) -> list["Step"]:
+def steps_of(slab: Slab, pairs: int = 0) -> list["PyramidStep"]:
     """All steps from a grid to a single cell, the finest first; so many to `pairs` come first. A grid that every rank
     has is that of a rank alone."""
     grids = [slab]
@@ -31,7 +31,7 @@ def steps_of(slab: Slab, pairs: int = 0) -> list["Step"]:
         dealt = [slice(0, ny)] if alone else parts_of(dealt, shape[1])
         shapes.append(shape)
         grids.append(Slab(MPI.COMM_SELF if alone else slab.comm, nx, ny, slab.tally, dealt))
-    return [Step(fine, coarse, shape) for (fine, coarse), shape in zip(pairwise(grids), shapes, strict=True)]
+    return [PyramidStep(fine, coarse, shape) for (fine, coarse), shape in zip(pairwise(grids), shapes, strict=True)]
 
 
 def count_cells(nx: int, ny: int, ranks: int, rank: int, most: int | None = None, pairs: int = 0) -> int:
@@ -67,7 +67,7 @@ def parts_of(dealt: list[slice], tall: int) -> list[slice]:
 
 
 @dataclass(frozen=True)
-class Step:
+class PyramidStep:
     """From a grid of points to the next one of cells of a `shape`. Methods are collective among the ranks of the
     points."""
 

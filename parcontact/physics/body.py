@@ -44,7 +44,7 @@ from .units import Units
 
 
 @dataclass(frozen=True)
-class Heights:
+class MovedHeights:
     """Heights of the rigid surface: the map `base` moved by `offset` cells along x (cyclic)."""
 
     base: Array
@@ -84,7 +84,7 @@ class Trial:
 
     alpha: float
     effective: Array
-    heights: Heights
+    heights: MovedHeights
     advance: Advance
 
 
@@ -114,7 +114,7 @@ class ElasticBody:
     def start_from(self, memory: BodyMemory, displacement: Array, branches: Iterable[Array]) -> None:
         """Do nothing: the displacement follows from the pressure."""
 
-    def begin(self, memory: BodyMemory, dt: float, heights: Heights, growth: float = 0.0) -> Trial:
+    def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
         """Begin a step under the heights themselves; local to this rank.
 
         The displacement is that in a map of the solver, which the solve of the step overwrites.
@@ -220,7 +220,7 @@ class ZenerBody:
                 memory.branches[self.kept.index(k)] = branch
         memory.pending = self._still
 
-    def begin(self, memory: BodyMemory, dt: float, heights: Heights, growth: float = 0.0) -> Trial:
+    def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
         """Begin a step of modulus alpha under the effective heights `h + r/alpha`, in place of one that has begun from
         the same memory; local to this rank.
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from ..parallel.slab import Array, Slab
 from . import loops
-from .body import BodyMemory, Heights, ZenerBody, surface_of
+from .body import BodyMemory, MovedHeights, ZenerBody, surface_of
 from .entries import Entry, MapCount, Saved
 from .prony import Prony, bend
 from .units import Units
@@ -219,7 +219,7 @@ class ElasticPressure:
         in the maps of the one before; local to this rank."""
         assert memory is not None
         v = surface_of(memory)
-        now = self.body.commit(memory, self.body.begin(memory, dt, Heights(v), growth), p, v)
+        now = self.body.commit(memory, self.body.begin(memory, dt, MovedHeights(v), growth), p, v)
         return now.increment, now
 
     def entries(self, memory: BodyMemory | None, units: Units) -> dict[str, Entry]:

@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from ..history.timeline import SAME_PLACE
-from .body import Heights
+from .body import MovedHeights
 from .surface import Surface
 
 Vector = tuple[float, float]
@@ -23,7 +23,7 @@ def are_whole(cells: Vector) -> bool:
 class Motion(Protocol):
     """Heights of the surface at a displacement; collective."""
 
-    def at(self, displacement: tuple[float, float]) -> Heights: ...
+    def at(self, displacement: tuple[float, float]) -> MovedHeights: ...
 
 
 class AnyFraction:
@@ -34,12 +34,12 @@ class AnyFraction:
         self._where = (0.0, 0.0)
         self._map = surface.heights(self._where, surface.slab.empty())
 
-    def at(self, displacement: tuple[float, float]) -> Heights:
+    def at(self, displacement: tuple[float, float]) -> MovedHeights:
         if displacement != self._where:
             self._surface.slab.tally["shift"] += 1
             self._surface.heights(displacement, self._map)
             self._where = displacement
-        return Heights(self._map)
+        return MovedHeights(self._map)
 
 
 class AlongX:
@@ -50,11 +50,11 @@ class AlongX:
         self._surface, self._parts, self._part = surface, parts, 0
         self._map = surface.heights((0.0, 0.0), surface.slab.empty())
 
-    def at(self, displacement: tuple[float, float]) -> Heights:
+    def at(self, displacement: tuple[float, float]) -> MovedHeights:
         cell = self._surface.cell[0]
         whole, part = divmod(round(displacement[0] / cell * self._parts), self._parts)
         if part != self._part:
             self._surface.slab.tally["shift"] += 1
             self._surface.heights((part / self._parts * cell, 0.0), self._map)
             self._part = part
-        return Heights(self._map, whole % self._surface.slab.nx)
+        return MovedHeights(self._map, whole % self._surface.slab.nx)

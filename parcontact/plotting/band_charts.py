@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..parallel.slab import Array
 from . import style, units
-from .charts import Axis, Chart, Series
+from .charts import Axis, Chart, ChartLine
 from .run import read_table
 
 TABLE, THEORY = "bands.csv", "bands_theory.csv"
@@ -54,12 +54,12 @@ def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Cha
         rows = _sorted(columns, columns["band"] == band)
         ends = (columns[f"{end}_wavelength"][rows[0]] for end in ("long", "short"))
         name = " to ".join(units.text(float(end), "m") for end in ends)
-        series.append(Series(name, columns["velocity"][rows], columns["friction"][rows], style.line(int(band))))
+        series.append(ChartLine(name, columns["velocity"][rows], columns["friction"][rows], style.line(int(band))))
     if theory is not None:
         speeds = np.unique(theory["velocity"])
         sums = np.array([theory["friction"][theory["velocity"] == speed].sum() for speed in speeds])
         look = {"color": style.GREY, "linestyle": ":", "linewidth": 2 * THIN}
-        series.append(Series("theory", speeds, sums, look))
+        series.append(ChartLine("theory", speeds, sums, look))
     bands = len(series) - (theory is not None)
     return Chart("bands", Axis("sliding velocity", "m/s"), Axis("friction by band"), series, log_x=True, stacked=bands)
 
@@ -75,7 +75,7 @@ def _over_bands(columns: dict[str, Array], theory: dict[str, Array] | None, name
             rows = rows[np.argsort(table["band"][rows])]
             short = table["short_wavelength"][rows]
             label = units.text(speed, "m/s") if table is columns else "theory" if number == 0 else ""
-            series.append(Series(label, longest / short if area else short, table[name][rows], look))
+            series.append(ChartLine(label, longest / short if area else short, table[name][rows], look))
     y = Axis("contact area /\nnominal area") if area else Axis("temperature rise", "K")
     return Chart("bands area" if area else "bands heat", x, y, series, log_x=True)
 

@@ -28,7 +28,7 @@ FEW_DECADES = 1.5  # of a logarithmic axis, on which more than powers of ten are
 
 
 @dataclass(frozen=True)
-class Series:
+class ChartLine:
     """One line: its name, or '', and numbers in SI, with their errors as shares of them if these are known."""
 
     name: str
@@ -56,7 +56,7 @@ class Chart:
     key: str
     x: Axis
     y: Axis
-    series: Sequence[Series]
+    series: Sequence[ChartLine]
     bottom: bool = True
     spikes: bool = False
     peak: bool = False
@@ -100,7 +100,7 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
         axes.legend(title=chart.legend_title or None, **place)
 
 
-def _draw_bars(axes: Axes, series: Sequence[Series]) -> None:
+def _draw_bars(axes: Axes, series: Sequence[ChartLine]) -> None:
     """Draw bars at common places, the first series at the bottom, as wide as most of what is between two places."""
     x = series[0].x
     half = (float(np.diff(np.log(x)).min()) if x.size > 1 else 1.0) * BAR_SHARE / 2.0
@@ -110,7 +110,7 @@ def _draw_bars(axes: Axes, series: Sequence[Series]) -> None:
         bottom = bottom + one.y
 
 
-def _drop_hidden_points(one: Series, log_x: bool, log_y: bool) -> Series:
+def _drop_hidden_points(one: ChartLine, log_x: bool, log_y: bool) -> ChartLine:
     """Return a line without the points that logarithmic axes cannot show."""
     x, y = np.asarray(one.x, dtype=float), np.asarray(one.y, dtype=float)
     there = np.isfinite(x) & ((x > 0.0) | (not log_x)) & ((y > 0.0) | (not log_y))
@@ -128,7 +128,7 @@ def _mark_zeros(axes: Axes, chart: Chart) -> None:
             axes.plot(zeros, height, transform=axes.get_xaxis_transform(), label=label, **look)
 
 
-def _draw_errors(axes: Axes, one: Series, share: Array) -> None:
+def _draw_errors(axes: Axes, one: ChartLine, share: Array) -> None:
     """Draw bars of the errors that are known; one of more than all of a value goes down to next to nothing."""
     size = np.where(np.isfinite(share), np.abs(share * one.y), 0.0)
     look: dict[str, Any] = {"ecolor": one.look["color"], "elinewidth": 1.0, "capsize": 2.5, "alpha": 0.7}
@@ -154,7 +154,7 @@ def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
         axis.set_label_text(f"{name} [{unit}]" if unit else name)
 
 
-def _set_limits(axes: Axes, chart: Chart, series: Sequence[Series], log_x: bool) -> None:
+def _set_limits(axes: Axes, chart: Chart, series: Sequence[ChartLine], log_x: bool) -> None:
     """Show zero, and room above bars of errors up to the whole of a value; leave out a spike, whose height is told."""
     whole = np.sum([one.y for one in series[: chart.stacked]], axis=0) if chart.stacked else np.zeros(0)
     ys = np.concatenate([whole, *(one.y for one in series)])
@@ -179,7 +179,7 @@ def _highest(values: Array) -> float:
     return float(values[np.isfinite(values)].max(initial=0.0))
 
 
-def _name_peak(axes: Axes, one: Series, unit: str) -> None:
+def _name_peak(axes: Axes, one: ChartLine, unit: str) -> None:
     """Name the highest point of a line in the legend, if it is inside and the line has come down from it."""
     height = np.nan_to_num(np.abs(one.y))
     at = int(np.argmax(height))

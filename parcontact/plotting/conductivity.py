@@ -8,7 +8,7 @@ import numpy as np
 
 from ..parallel.slab import Array
 from . import style
-from .charts import Axis, Chart, Series
+from .charts import Axis, Chart, ChartLine
 
 CONTINUUM = 1e-8  # physics: gap [m] that some thirty molecules of water fill; in a narrower one no viscosity is known
 THIN = "constriction\nunder 10 nm"
@@ -25,11 +25,11 @@ def chart(
 ) -> Chart:
     """Draw conductivities K [m^3], by their names, over an axis, all of shape (n,), with their critical constrictions
     [m]; K is 0 where contact closes, and NaN where it is not known."""
-    lines, thin = list[Series](), list[Series]()
+    lines, thin = list[ChartLine](), list[ChartLine]()
     for number, (name, flow) in enumerate(flows.items()):
         known = np.isfinite(flow)
-        lines.append(Series(name, at[known], flow[known], style.line(number) | {"marker": "."}))
+        lines.append(ChartLine(name, at[known], flow[known], style.line(number) | {"marker": "."}))
         narrow = known & is_thin(constrictions[name])
         if narrow.any():
-            thin.append(Series(THIN * (not thin), at[narrow], flow[narrow], THIN_LOOK))
+            thin.append(ChartLine(THIN * (not thin), at[narrow], flow[narrow], THIN_LOOK))
     return Chart("leakage", over, Axis("conductivity K", "m³"), lines + thin, log_x=log_x, zeros="closed")

@@ -11,8 +11,8 @@ from ..errors import InputError
 from ..parallel.slab import Array
 from ..storage import tables
 from . import conductivity, style, units
-from .charts import Axis, Chart, Series
-from .run import Run
+from .charts import Axis, Chart, ChartLine
+from .run import PlottedRun
 
 EARLY = 0.05  # of the time that is shown: as long as half of the rows lie within it, a linear axis is hardly used
 FEW_ROWS = 8
@@ -40,16 +40,16 @@ class Abscissa:
     marked: bool = False
     loop: bool = False
 
-    def series(self, lines: dict[str, Array]) -> list[Series]:
+    def series(self, lines: dict[str, Array]) -> list[ChartLine]:
         """Return lines by their names; the only one has none."""
         mark = {"marker": "o"} if self.marked else {}
         looks = [style.line(number) | mark for number in range(len(lines))]
         rows = slice(None) if self.rows is None else self.rows
         drawn = zip(lines.items(), looks, strict=True)
-        return [Series(name, self.values, values[rows], look) for (name, values), look in drawn]
+        return [ChartLine(name, self.values, values[rows], look) for (name, values), look in drawn]
 
 
-def charts(run: Run, over: str = "") -> list[Chart]:
+def charts(run: PlottedRun, over: str = "") -> list[Chart]:
     """Return panels of what was measured; none of a single solve. Raises InputError where nothing can be drawn."""
     if not run.curves:
         return []
@@ -66,7 +66,7 @@ def _steps_grow(times: Array) -> bool:
     return later.size > FEW_ROWS and bool(max(np.median(later), later[0]) < EARLY * later[-1])
 
 
-def _add_theory(chart: Chart, run: Run) -> Chart:
+def _add_theory(chart: Chart, run: PlottedRun) -> Chart:
     """Add the lines of theory.csv to friction and contact area, if it is in the directory of the run."""
     column = {"friction": "friction", "area": "contact_area"}.get(chart.key)
     table = run.directory / "theory.csv"
@@ -75,13 +75,13 @@ def _add_theory(chart: Chart, run: Run) -> Chart:
     theory = {name: np.array(values) for name, values in tables.read(table).items()}
     over = "distance" if chart.x.unit == "m" else "time"
     (own,) = chart.series
-    lines = [replace(own, name="simulation"), Series("theory", theory[over], theory[column], style.line(1))]
+    lines = [replace(own, name="simulation"), ChartLine("theory", theory[over], theory[column], style.line(1))]
     if chart.key == "friction" and VISCOUS in run.columns:  # the theory excludes interface friction
-        lines.append(Series("without interface", own.x, run.columns[VISCOUS], style.line(2)))
+        lines.append(ChartLine("without interface", own.x, run.columns[VISCOUS], style.line(2)))
     return replace(chart, series=lines)
 
 
-def _find_charts(run: Run, along: Abscissa) -> Iterator[Chart]:
+def _find_charts(run: PlottedRun, along: Abscissa) -> Iterator[Chart]:
     """Yield the panels that a run has: key, measure, lines by name, and whether there is something to see."""
     columns, free = run.columns, run.free
     signed = run.backwards and not along.marked  # over the speed, no direction is told
@@ -135,7 +135,7 @@ def _find_charts(run: Run, along: Abscissa) -> Iterator[Chart]:
         yield conductivity.chart(along.axis, along.values, flows, narrowest)
 
 
-def describe_solve(run: Run) -> str:
+def describe_solve(run: PlottedRun) -> str:
     """Return what the last solve has found, in words."""
     axis, load = run.load
     fraction = run.columns["contact_area_corrected"][-1]
@@ -147,7 +147,7 @@ def describe_solve(run: Run) -> str:
     return f"{pressed},  contact area {area},\n{name} {length},  highest pressure {highest}"
 
 
-def _choose_abscissa(run: Run, over: str) -> Abscissa:
+def _choose_abscissa(run: PlottedRun, over: str) -> Abscissa:
     """Return what was asked for, else the distance if the surface slides whenever time passes, else time, else load."""
     if not over:
         slides = run.slides and all(stage.speed > 0.0 for stage in run.job.history if stage.seconds)
@@ -168,7 +168,7 @@ def _choose_abscissa(run: Run, over: str) -> Abscissa:
     return Abscissa(axis, values, stages=stages)
 
 
-def _choose_velocity(run: Run) -> Abscissa:
+def _choose_velocity(run: PlottedRun) -> Abscissa:
     """Return the last row of each stage that slides, over its speed."""
     ends = [(run.job.history[number].speed, rows[-1]) for number, rows in run.rows_of_stages.items()]
     sliding = sorted((speed, row) for speed, row in ends if speed > 0.0)

@@ -11,7 +11,7 @@ from ..job import Cylinder, Elastic, Sphere
 from ..parallel.slab import Array
 from ..theory import hertz
 from . import style, units
-from .run import Fields, Run
+from .run import Fields, PlottedRun
 
 INSTANTS = 5  # at most so many lines in one panel
 MOST_LETTERS = 16  # of the name of a stage in a legend
@@ -20,7 +20,7 @@ RANGE = 1.3  # that is shown over that of the contact
 Curve = tuple[str, Array, Array]  # its name, and pressures [Pa] on a line [m]
 
 
-def panels(run: Run, fields: Fields, narrow: bool) -> Iterator[style.Panel]:
+def panels(run: PlottedRun, fields: Fields, narrow: bool) -> Iterator[style.Panel]:
     """Yield the panel of a narrow map, or of the only shape of a surface if that is round."""
     shape = run.job.surface[0]
     if narrow:
@@ -29,7 +29,7 @@ def panels(run: Run, fields: Fields, narrow: bool) -> Iterator[style.Panel]:
         yield _make_profile(run, fields, shape)
 
 
-def _choose_instants(run: Run, fields: Fields) -> tuple[list[tuple[int, str]], str]:
+def _choose_instants(run: PlottedRun, fields: Fields) -> tuple[list[tuple[int, str]], str]:
     """Return some saved instants, evenly, and what tells them apart; and the load of all if it is one, for a title."""
     indices = sorted({fields.shown[int(k)] for k in np.linspace(0, len(fields.shown) - 1, INSTANTS)})
     instants = [(index, int(fields.steps[index]), float(fields.times[index])) for index in indices]
@@ -63,7 +63,7 @@ def _draw_pressures(
     axes.legend(**style.BESIDE)
 
 
-def _make_strip(run: Run, fields: Fields) -> style.Panel:
+def _make_strip(run: PlottedRun, fields: Fields) -> style.Panel:
     """Return a panel of pressures along the long side of a narrow map."""
     lies = fields.x.size > fields.y.size
     chosen, load = _choose_instants(run, fields)
@@ -74,7 +74,7 @@ def _make_strip(run: Run, fields: Fields) -> style.Panel:
     return partial(_draw_pressures, curves=curves, along="x" if lies else "y", title=title)
 
 
-def _make_profile(run: Run, fields: Fields, shape: Sphere | Cylinder) -> style.Panel:
+def _make_profile(run: PlottedRun, fields: Fields, shape: Sphere | Cylinder) -> style.Panel:
     """Return a panel of pressures on a line through the axis, seen from it, beside Hertz's under the last load."""
     across = isinstance(shape, Cylinder) and shape.axis == "x"
     centre = shape.center or (run.job.grid.lx / 2, run.job.grid.ly / 2)
@@ -96,7 +96,7 @@ def _make_profile(run: Run, fields: Fields, shape: Sphere | Cylinder) -> style.P
     return partial(_draw_pressures, curves=curves, along=along, title=title, theory=theory, reach=reach)
 
 
-def _find_moduli(run: Run) -> list[tuple[str, float]]:
+def _find_moduli(run: PlottedRun) -> list[tuple[str, float]]:
     """Return the shear moduli [Pa] of the elastic bodies to compare with."""
     material = run.job.material.fitted
     if isinstance(material, Elastic):

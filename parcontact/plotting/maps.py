@@ -18,7 +18,7 @@ from ..job import Job
 from ..parallel.slab import Array
 from ..storage import hdf5
 from . import lines, style, units
-from .run import Fields, Run
+from .run import Fields, PlottedRun
 
 Window = tuple[slice, slice]
 
@@ -45,7 +45,7 @@ TICKS = 5  # intervals at most; were it left to the room there is, ticks would c
 BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile and ratio to it, above which points do not set the range of colours
 
 
-def panels(run: Run, at: str = "") -> tuple[list[style.Panel], list[style.Panel]]:
+def panels(run: PlottedRun, at: str = "") -> tuple[list[style.Panel], list[style.Panel]]:
     """Return panels of pressures on a line, and maps of one instant; none of what was not saved.
 
     The instant is the one that is asked for, else the last, or where the surfaces came off that of the pull-off or of
@@ -64,7 +64,7 @@ def panels(run: Run, at: str = "") -> tuple[list[style.Panel], list[style.Panel]
         return [], []
 
 
-def _panels(run: Run, fields: Fields) -> Iterator[style.Panel]:
+def _panels(run: PlottedRun, fields: Fields) -> Iterator[style.Panel]:
     found = {name: fields.read(name) for name in LOOKS}
     pressure = found["pressure"]
     if found["gap"] is not None:

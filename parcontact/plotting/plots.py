@@ -21,7 +21,7 @@ from ..storage import files, hdf5
 from ..summary import sweep_table, theory_settings
 from . import charts, histories, maps, steady, style, sweep, units
 from .charts import Chart
-from .run import Run, label_frames
+from .run import PlottedRun, label_frames
 
 PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy", "leakage", "steady", "maps")
 MEASURES = "measures.csv"
@@ -31,7 +31,7 @@ FASTEST, SLOWEST = 20, 2  # frames per second
 
 
 @dataclass(frozen=True)
-class Options:
+class PlotOptions:
     """Options of a picture; '' and () leave the choice to what the directories hold. `out` is a file, `at` a step
     or a time [s], whose maps are drawn."""
 
@@ -63,7 +63,7 @@ class Options:
         return [partial(charts.draw, chart, log=self.log) for chart in found]
 
 
-def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path]:
+def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> list[Path]:
     """Draw what is in each directory, or compare them in one picture; returns the pictures' paths.
 
     Raises InputError where there is nothing to draw.
@@ -81,7 +81,7 @@ def plot(directories: Sequence[Path], options: Options = Options()) -> list[Path
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv alone, beside it; returns the picture's path."""
     with style.drawing():
-        title, panels = _wrap(steady.title(table.parent)), Options().to_panels(steady.charts(table.parent))
+        title, panels = _wrap(steady.title(table.parent)), PlotOptions().to_panels(steady.charts(table.parent))
         return _save(style.figure_of(title, [panels], legend=True), table.with_suffix(""))
 
 
@@ -89,7 +89,7 @@ def _wrap(title: str) -> str:
     return "\n".join(textwrap.wrap(title, style.LINE))
 
 
-def _save(figure: Figure, stem: Path, options: Options = Options()) -> Path:
+def _save(figure: Figure, stem: Path, options: PlotOptions = PlotOptions()) -> Path:
     target = options.out or stem.with_name(f"{stem.name}.{options.format or 'png'}")
     kind = options.format or target.suffix.lstrip(".")
     if kind not in style.MARKED:
@@ -100,7 +100,7 @@ def _save(figure: Figure, stem: Path, options: Options = Options()) -> Path:
         raise InputError(f"cannot write {target}: {hdf5.reason(error)}") from error
 
 
-def _write_movie(directory: Path, options: Options) -> Path:
+def _write_movie(directory: Path, options: PlotOptions) -> Path:
     """Write all saved instants of a map as a GIF, with one range of colours."""
     path, name = directory / "fields.h5", options.movie
     target = options.out or directory / f"{name}.gif"
@@ -108,7 +108,7 @@ def _write_movie(directory: Path, options: Options) -> Path:
         raise InputError(f"--movie writes a GIF: --out must end in .gif, got {target}")
     try:
         with hdf5.open_results(path) as file:
-            run = Run(directory)
+            run = PlottedRun(directory)
             labels = label_frames(run, file)
             there = [key for key in maps.LOOKS if key in file]
             if name not in there or not labels:
@@ -131,12 +131,12 @@ def choose_evenly(labels: dict[int, str], most: int) -> dict[int, str]:
     return {indices[k]: labels[indices[k]] for k in kept}
 
 
-def _draw_directory(directory: Path, options: Options) -> Figure:
+def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
     has_run, has_curve, has_sweep = ((directory / name).is_file() for name in (MEASURES, steady.TABLE, sweep.TABLE))
     groups: list[Sequence[style.Panel]] = []
     titles, fields = list[str](), list[style.Panel]()
     if has_run:
-        run = Run(directory)
+        run = PlottedRun(directory)
         found = _wrap(run.job.title or directory.absolute().name)
         titles.append(found if run.curves else f"{found}\n{histories.describe_solve(run)}")
         groups.append(options.to_panels(options.choose(histories.charts(run, options.over))))
@@ -170,7 +170,7 @@ def _suggest(path: Path) -> str:
     return f"; did you mean {found[0]}?" if found else ""
 
 
-def _draw_comparison(directories: Sequence[Path], options: Options) -> Figure:
+def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figure:
     """Draw the lines of all directories in one picture."""
     for directory in directories:
         if not _find_charts(directory, options):
@@ -178,16 +178,16 @@ def _draw_comparison(directories: Sequence[Path], options: Options) -> Figure:
     return style.figure_of("", [options.to_panels(compare_charts(directories, options))], legend=True)
 
 
-def compare_charts(directories: Sequence[Path], options: Options = Options()) -> list[Chart]:
+def compare_charts(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> list[Chart]:
     """Return charts with the lines of all directories that have any."""
     found = [_find_charts(directory, options) for directory in directories]
     return charts.compare([each for each in zip(_name_directories(directories), found, strict=True) if each[1]])
 
 
-def _find_charts(directory: Path, options: Options) -> list[Chart]:
+def _find_charts(directory: Path, options: PlotOptions) -> list[Chart]:
     found: list[Chart] = []
     if (directory / MEASURES).is_file():
-        found += options.choose(histories.charts(Run(directory), options.over))
+        found += options.choose(histories.charts(PlottedRun(directory), options.over))
     if (directory / steady.TABLE).is_file() and options.wants("steady"):
         found += steady.charts(directory, options.over)
     return found

@@ -25,7 +25,7 @@ MEASURED = (
 NEAREST = 3  # steps with maps that a message names
 
 
-class Run:
+class PlottedRun:
     """A run's job and rows. The rows before the first load of a body at rest are left out: nothing has happened yet."""
 
     def __init__(self, directory: Path) -> None:
@@ -149,7 +149,7 @@ class Fields:
         return int(self.saved[order[0]])
 
 
-def label_frames(run: Run, file: h5py.File) -> dict[int, str]:
+def label_frames(run: PlottedRun, file: h5py.File) -> dict[int, str]:
     """Return when each map of a run was saved, and what pressed then, by its index."""
     fields = Fields(file)
     told = ((k, int(fields.steps[k]), float(fields.times[k])) for k in fields.saved)

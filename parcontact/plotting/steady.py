@@ -11,7 +11,7 @@ import numpy as np
 from ..job.resolved import STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from . import band_charts, style, units
-from .charts import Axis, Chart, Series
+from .charts import Axis, Chart, ChartLine
 from .run import find_free_area, read_table, to_contact_area, to_load
 
 TABLE, THEORY = "steady.csv", "steady_theory.csv"
@@ -76,7 +76,7 @@ def _add_derived(columns: dict[str, Array], area: float) -> None:
         columns["reduced"] = columns["shift_factor"] * columns["velocity"]
 
 
-def _make_lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -> Iterator[Series]:
+def _make_lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -> Iterator[ChartLine]:
     """Yield a line for each value of the column `by`."""
     error = columns.get(f"error_{y}")
     groups = _round(columns[by])
@@ -84,10 +84,10 @@ def _make_lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -
         rows = np.flatnonzero(groups == value)
         rows = rows[np.argsort(columns[x][rows], kind="stable")]
         shown = units.text(value, unit), columns[x][rows], columns[y][rows], style.line(number) | {"marker": "o"}
-        yield Series(*shown, None if error is None else error[rows])
+        yield ChartLine(*shown, None if error is None else error[rows])
 
 
-def _make_theory(columns: dict[str, Array], x: str, y: str, by: str) -> Iterator[Series]:
+def _make_theory(columns: dict[str, Array], x: str, y: str, by: str) -> Iterator[ChartLine]:
     """Yield thin lines of Persson's theory: as many as there are of the simulation, one over a_T v."""
     one = {"one": np.zeros_like(columns[x])} if x == "reduced" else {}
     yield from _make_thin(columns | one, x, y, "one" if one else by, "theory", ":", style.GREY if one else "")
@@ -95,11 +95,11 @@ def _make_theory(columns: dict[str, Array], x: str, y: str, by: str) -> Iterator
 
 def _make_thin(
     columns: dict[str, Array], x: str, y: str, by: str, label: str, dashes: str, color: str = ""
-) -> Iterator[Series]:
+) -> Iterator[ChartLine]:
     """Yield thin lines beside those of the simulation, of the same or of another color; the first has the label."""
     for number, line in enumerate(_make_lines(columns, x, y, by, "")):
         own = {"color": color or style.line(number)["color"], "linestyle": dashes, "linewidth": THIN}
-        yield Series("" if number else label, line.x, line.y, own)
+        yield ChartLine("" if number else label, line.x, line.y, own)
 
 
 def _round(values: Array) -> Array:

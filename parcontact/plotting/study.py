@@ -23,7 +23,7 @@ LEAST = 1e-7  # smaller errors are drawn here
 
 
 @dataclass(frozen=True)
-class Curve:
+class StudyCurve:
     """Errors of one quantity along one ladder; sizes over that of the box."""
 
     quantity: str
@@ -34,7 +34,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Point:
+class StudyPoint:
     """One case: its work, its time [s], its relative error, and whether none is both cheaper and more accurate."""
 
     work: float
@@ -45,7 +45,10 @@ class Point:
 
 
 def plot(
-    directory: Path, curves: Sequence[Curve], points: Mapping[str, Sequence[Point]], doubts: Mapping[str, float]
+    directory: Path,
+    curves: Sequence[StudyCurve],
+    points: Mapping[str, Sequence[StudyPoint]],
+    doubts: Mapping[str, float],
 ) -> list[Path]:
     """Draw `convergence.png`, if anything is refined, and `work_precision.png`; returns their paths.
 
@@ -58,15 +61,15 @@ def plot(
         return [style.save(figure, directory / name) for name, figure in figures.items()]
 
 
-def _convergence(curves: Sequence[Curve], doubts: Mapping[str, float]) -> Figure:
-    own: dict[str, list[Curve]] = {}
+def _convergence(curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Figure:
+    own: dict[str, list[StudyCurve]] = {}
     for curve in curves:
         own.setdefault(curve.quantity, []).append(curve)
     panels = [partial(_draw_ladders, name=name, curves=found, doubt=doubts[name]) for name, found in own.items()]
     return style.figure_of("", [[panel] for panel in panels], legend=True)
 
 
-def _draw_ladders(axes: Axes, name: str, curves: Sequence[Curve], doubt: float) -> None:
+def _draw_ladders(axes: Axes, name: str, curves: Sequence[StudyCurve], doubt: float) -> None:
     """Draw errors of a quantity over how many times as fine a mesh or a step is as the coarsest."""
     for curve in curves:
         x = [max(curve.sizes) / size for size in curve.sizes]
@@ -85,7 +88,7 @@ def _draw_ladders(axes: Axes, name: str, curves: Sequence[Curve], doubt: float) 
     axes.xaxis.set_major_formatter(ScalarFormatter())
 
 
-def _work_precision(points: Mapping[str, Sequence[Point]]) -> Figure:
+def _work_precision(points: Mapping[str, Sequence[StudyPoint]]) -> Figure:
     """Draw a row for each quantity that is known, over both costs; study.csv has the settings of the points."""
     known = {name: [one for one in found if math.isfinite(one.error)] for name, found in points.items()}
     groups = [
@@ -96,7 +99,7 @@ def _work_precision(points: Mapping[str, Sequence[Point]]) -> Figure:
     return style.figure_of("", groups, legend=True)
 
 
-def _draw_points(axes: Axes, name: str, points: Sequence[Point], cost: str) -> None:
+def _draw_points(axes: Axes, name: str, points: Sequence[StudyPoint], cost: str) -> None:
     """Draw errors of a quantity over one cost; over the work with a line through the best points."""
     for integrator, color in INTEGRATORS.items():
         mine = [one for one in points if one.integrator == integrator]
@@ -126,5 +129,5 @@ def _per_cent(errors: Sequence[float]) -> Array:
     return 100 * np.maximum(errors, LEAST)
 
 
-def _places(points: Sequence[Point], cost: str) -> tuple[list[float], Array]:
+def _places(points: Sequence[StudyPoint], cost: str) -> tuple[list[float], Array]:
     return [getattr(one, cost) for one in points], _per_cent([one.error for one in points])

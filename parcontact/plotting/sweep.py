@@ -19,7 +19,7 @@ from ..summary import sweep_table
 from ..summary.slide import CORRECTED
 from ..summary.sweep_table import SAMPLES
 from . import style, units
-from .charts import FRACTION, Axis, Chart, Series
+from .charts import FRACTION, Axis, Chart, ChartLine
 
 TABLE = sweep_table.TABLE
 UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N", "size": "m", "distance": "m"}
@@ -59,7 +59,7 @@ def charts(directory: Path) -> list[Chart]:
     word = key.split(".")[-1]
     x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
     for panel, y, columns in panels:
-        series, lines = list[Series](), list(_split(rows, key))
+        series, lines = list[ChartLine](), list(_split(rows, key))
         for j, (part, own) in enumerate(lines):
             for k, (name, column) in enumerate(columns.items()):
                 look = {"color": style.line(j if len(lines) > 1 else k)["color"]}
@@ -123,21 +123,21 @@ def _named(key: str, value: Any) -> str:
 
 def _make_lines(
     names: tuple[str, str], rows: Rows, column: str, key: str, look: dict[str, Any], number: int
-) -> Iterator[Series]:
+) -> Iterator[ChartLine]:
     """Yield means as a line with its points, all cases as small dots, and the theory, of the column of a number."""
     theirs = "contact_area" if column == CORRECTED else column
     x, y, theory = (_read_column(rows, wanted) for wanted in (key, column, f"theory_{theirs}"))
     if (there := np.isfinite(y)).any():
         at, means = _average(x[there], y[there])
-        yield Series(names[0], at, means, look | {"marker": MARKERS[number], "linestyle": "-"})
+        yield ChartLine(names[0], at, means, look | {"marker": MARKERS[number], "linestyle": "-"})
         if at.size < there.sum():
             dots = {"marker": ".", "linestyle": "none", "alpha": 0.5, "markersize": 3}
-            yield Series("each case", x[there], y[there], look | dots)
+            yield ChartLine("each case", x[there], y[there], look | dots)
     if (there := np.isfinite(theory)).any():
-        yield Series(names[1], *_average(x[there], theory[there]), look | {"linestyle": DASHES[number]})
+        yield ChartLine(names[1], *_average(x[there], theory[there]), look | {"linestyle": DASHES[number]})
 
 
-def _name_once(series: Sequence[Series]) -> Iterator[Series]:
+def _name_once(series: Sequence[ChartLine]) -> Iterator[ChartLine]:
     """Yield lines of which only the first with a name has it: dots and theories are alike but for their colours."""
     known = set[str]()
     for one in series:

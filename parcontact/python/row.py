@@ -18,7 +18,7 @@ class Row(Mapping[str, float]):
         self._numbers = dict(numbers)
 
     @classmethod
-    def of(cls, row: recorded.Row, added: tuple[str, ...] = ()) -> Row:
+    def of(cls, row: recorded.StepRow, added: tuple[str, ...] = ()) -> Row:
         """A recorded row; `added` names the columns of effects."""
         branches = len(row.branch_dissipation)
         return cls(dict(zip(recorded.columns(branches, added), recorded.numbers(row, branches), strict=True)))

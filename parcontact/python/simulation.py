@@ -28,7 +28,7 @@ from ..scene import choices
 from ..scene.sanity import ContactWatch
 from ..steady_sliding import start
 from ..storage import checkpoint, heights, wisdom
-from ..storage.checkpoint import Contents, Facts, Table
+from ..storage.checkpoint import Contents, Facts, TableMark
 from ..storage.fields import UNITS
 from .given_jobs import Given, agree, all_ranks, path_of, read, warn, warn_of
 from .row import Row
@@ -168,7 +168,7 @@ class Simulation:
         last = ",".join(cells(self.row.values()))
         provenance = runner.provenance_of(self.job, slab, self._saved)
         heights.store(self.job.surface, file.parent, slab)
-        march.save(file, Facts(plain, provenance, table=Table(last=last)))
+        march.save(file, Facts(plain, provenance, table=TableMark(last=last)))
 
     @classmethod
     def restore(

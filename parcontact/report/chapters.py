@@ -12,7 +12,7 @@ from ..job.sections import listing
 from ..plotting import plots
 from ..summary import headline, sweep_table
 from . import log, material, origin, results, road
-from .parts import Chapter, Section, Table, draw_chart, embed_file
+from .parts import Chapter, ReportSection, ReportTable, draw_chart, embed_file
 
 KINDS = {  # by the table that each of them has
     "measures.csv": ("run", results.describe_run),
@@ -48,10 +48,10 @@ def describe_directory(directory: Path) -> Chapter:
         if there[0] in ("measures.csv", "steady.csv"):
             sections += origin.costs(directory / there[0], found, job)
         cited = origin.list_citations(job)
-        sections.append(Section("Warnings", found.warnings or warnings or ["There was no warning."]))
+        sections.append(ReportSection("Warnings", found.warnings or warnings or ["There was no warning."]))
     data = [embed_file(directory / name) for name in (*KINDS, *MORE_TABLES) if (directory / name).is_file()]
     said = "The tables, in SI units and with all digits, are inside this file:"
-    sections += [origin.section(directory, found), cited, Section("Data", [said], downloads=data)]
+    sections += [origin.section(directory, found), cited, ReportSection("Data", [said], downloads=data)]
     kinds = " and ".join(KINDS[name][0] for name in there)
     shown = [one.without(sorted(places, key=len, reverse=True)) for one in sections if one]
     here, there_is = Path.cwd(), directory.absolute()
@@ -65,7 +65,9 @@ def compare(directories: Sequence[Path]) -> Iterator[Chapter]:
         found = plots.compare_charts(directories)
         shared = [chart for chart in found if len({one.look["color"] for one in chart.series}) > 1]
         if shared:
-            yield Chapter("Comparison", Path(), "", [Section("Together", pictures=[draw_chart(one) for one in shared])])
+            yield Chapter(
+                "Comparison", Path(), "", [ReportSection("Together", pictures=[draw_chart(one) for one in shared])]
+            )
 
 
 def _read_job(resolved: Path) -> tuple[Job, Sequence[str]]:
@@ -83,12 +85,12 @@ def _places(job: Job) -> list[str]:
     return [f"{path.parent}/" for path in (job.path, *parts) if isinstance(path, Path) and path.is_absolute()]
 
 
-def _name_first_case(sections: Sequence[Section]) -> list[Section]:
+def _name_first_case(sections: Sequence[ReportSection]) -> list[ReportSection]:
     """Return sections that say whose they are."""
     return [replace(one, title=f"{one.title} of the first case") for one in sections]
 
 
-def _describe_example(directory: Path, case: Path) -> list[Section]:
+def _describe_example(directory: Path, case: Path) -> list[ReportSection]:
     """Return the results of the first case of a sweep as an example, where it is a run that is done."""
     first = sweep_table.read(directory / "sweep.csv")[0]
     if first["state"] != "done" or not (case / "measures.csv").is_file():
@@ -105,8 +107,8 @@ def _describe_swept(directory: Path) -> str:
     return f"There are {len(rows)} cases. They differ in {values}."
 
 
-def _describe_job(job: Job, given: Path) -> Section:
+def _describe_job(job: Job, given: Path) -> ReportSection:
     """Return a table of all keys with every default, and the job file as it was given, if it is there."""
     rows = [row for row in listing.rows(job) if not row[0].startswith(ELSEWHERE)]
     texts = [("the job file as it was given", given.read_text(errors="replace"))] if given.is_file() else []
-    return Section("What was asked", tables=[Table(("key", "value", "unit"), rows)], texts=texts)
+    return ReportSection("What was asked", tables=[ReportTable(("key", "value", "unit"), rows)], texts=texts)

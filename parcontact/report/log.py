@@ -16,7 +16,7 @@ PART = re.compile(r"([a-z ]+) (\S+) %")
 
 
 @dataclass(frozen=True)
-class Estimate:
+class LoggedEstimate:
     """An estimated error of a run or of the worst point of a curve: the sentence of the log, total and parts [%]."""
 
     name: str
@@ -37,7 +37,7 @@ class Log:
     last run; lines about the program and machine."""
 
     warnings: list[str]
-    estimates: list[Estimate]
+    estimates: list[LoggedEstimate]
     counts: list[Sequence[str]]
     machine: list[str]
 
@@ -52,14 +52,14 @@ def read(directory: Path) -> Log:
     return Log(list(dict.fromkeys(warnings)), _find_estimates(lines), counts, machine)
 
 
-def _find_estimates(lines: list[str]) -> list[Estimate]:
+def _find_estimates(lines: list[str]) -> list[LoggedEstimate]:
     """Return the last ones of a run, which says them again when it goes on; of a curve the largest."""
-    found: dict[tuple[str, bool], Estimate] = {}
+    found: dict[tuple[str, bool], LoggedEstimate] = {}
     for line in lines:
         if match := ESTIMATE.match(line.removeprefix(WARNING)):
             name, of_curve = "friction" if "friction" in match[1] else "contact area", "points" in match[1]
             parts = {part.strip(): float(share) for part, share in PART.findall(match[3])}
             before = found.get((name, of_curve))
             if before is None or not of_curve or float(match[2]) > before.total:
-                found[name, of_curve] = Estimate(name, of_curve, match.string, float(match[2]), parts)
+                found[name, of_curve] = LoggedEstimate(name, of_curve, match.string, float(match[2]), parts)
     return list(found.values())

@@ -12,14 +12,14 @@ from ..job import Dma, Job, Zener
 from ..physics.prony import complex_modulus
 from ..plotting import style, units
 from ..scene.measured_range import excited_band, excited_bands
-from .parts import Section, Table, draw_panel
+from .parts import ReportSection, ReportTable, draw_panel
 
 DECADES = 1.5  # that a picture shows beyond the relaxation times
 POINTS = 400  # of a line
 CAPTION = "moduli and loss tangent over frequency, at the temperature of the job"
 
 
-def section(job: Job) -> Section:
+def section(job: Job) -> ReportSection:
     """Return the section about the material of a job at its temperature."""
     series = relaxation_of(job.material)
     instant = series.modulus_inf + float(np.sum(series.moduli))
@@ -32,15 +32,15 @@ def section(job: Job) -> Section:
     ]
     if job.included:
         rows.append(("included from", str(job.included)))
-    tables = [Table(("property", "value"), rows)]
+    tables = [ReportTable(("property", "value"), rows)]
     if not series.moduli.size:
-        return Section("Rubber", tables=tables)
+        return ReportSection("Rubber", tables=tables)
     branches = zip(series.relaxation_times, series.moduli, strict=True)
     listed = [(units.text(float(tau), "s"), units.text(float(modulus), "Pa")) for tau, modulus in branches]
-    tables.append(Table(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
+    tables.append(ReportTable(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
     if (excited := _list_bands(job)).rows:
         tables.append(excited)
-    return Section("Rubber", tables=tables, pictures=[draw_panel(partial(_draw_moduli, job=job), CAPTION)])
+    return ReportSection("Rubber", tables=tables, pictures=[draw_panel(partial(_draw_moduli, job=job), CAPTION)])
 
 
 def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:
@@ -62,14 +62,14 @@ def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:
         yield "measured from", f"{found.temperatures[0]:g} to {found.temperatures[1]:g} °C"
 
 
-def _list_bands(job: Job) -> Table:
+def _list_bands(job: Job) -> ReportTable:
     """Return which frequencies the waves of the surface excite at each temperature, if they move."""
     found = excited_bands(job, (job.steady.temperatures if job.steady else None) or ())
     degrees = ("–" if one.temperature is None else f"{one.temperature:g} °C" for one in found)
     ranges = ((f"{one.factor:.3g}", _write_band(one.band), _write_band(one.reduced)) for one in found)
     rows = [(degree, *others) for degree, others in zip(degrees, ranges, strict=True)]
     told = "frequencies with which the waves of the surface pass, at all velocities of the job"
-    return Table(("temperature", "a_T", "excited by the job", "as at the reference"), rows, told)
+    return ReportTable(("temperature", "a_T", "excited by the job", "as at the reference"), rows, told)
 
 
 def _write_band(band: tuple[float, float]) -> str:

@@ -13,13 +13,13 @@ from ..storage import hdf5, provenance
 from ..storage.tables import read as read_table
 from ..summary.slide import ERRORS
 from . import log
-from .parts import Section, Table
+from .parts import ReportSection, ReportTable
 
 FRICTION = ERRORS[0]
 NAMES = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
 
 
-def costs(table: Path, found: log.Log, job: Job) -> Iterator[Section]:
+def costs(table: Path, found: log.Log, job: Job) -> Iterator[ReportSection]:
     """Yield the errors of a run or a curve of a job, given by its table, then wall time, operator calls and counts."""
     columns = read_table(table)
     yield describe_errors(columns, found.estimates, job, table.name == "steady.csv")
@@ -29,18 +29,18 @@ def costs(table: Path, found: log.Log, job: Job) -> Iterator[Section]:
         ("wall time of all of them", f"{math.fsum(columns['seconds']):.4g} s"),
         ("operator calls", f"{math.fsum(calls):.6g}"),
     ]
-    tables = [Table(("cost", "value"), rows)]
+    tables = [ReportTable(("cost", "value"), rows)]
     if found.counts:
-        tables.append(Table(("counted on one rank in the last run", "number"), found.counts))
-    yield Section("Cost", tables=tables)
+        tables.append(ReportTable(("counted on one rank in the last run", "number"), found.counts))
+    yield ReportSection("Cost", tables=tables)
 
 
 def describe_errors(
     columns: Mapping[str, Sequence[float]],
-    estimates: Sequence[log.Estimate],
+    estimates: Sequence[log.LoggedEstimate],
     job: Job,
     of_curve: bool,
-) -> Section:
+) -> ReportSection:
     """Return nothing for a table without errors, else those of the points of a friction curve, or of the means over a
     run and of its steps. The log has the parts: of a curve those of the worst point, if that misses the accuracy."""
     known = {what: [float(one) for one in columns.get(name, ()) if one == one] for name, what in NAMES.items()}
@@ -48,7 +48,7 @@ def describe_errors(
         known[NAMES[FRICTION]] = _in_motion(columns) if job.directions else []
     known = {what: values for what, values in known.items() if values}
     if not known:
-        return Section("Error budget")
+        return ReportSection("Error budget")
     found = {one.name: one for one in estimates if one.of_curve == of_curve}
     said, accuracies = [], dict(zip(NAMES.values(), job.numerics.asked.both, strict=True))
     for name, values in known.items() if of_curve else ((name, [one.total / 100]) for name, one in found.items()):
@@ -60,7 +60,7 @@ def describe_errors(
         (what, _percent(max(values)), _percent(min(values) if of_curve else values[-1]))
         for what, values in known.items()
     ]
-    tables = [Table(("estimated error of", "largest", second), rows)]
+    tables = [ReportTable(("estimated error of", "largest", second), rows)]
     if found:
         names = list(dict.fromkeys(part for one in found.values() for part in one.parts))
         parts = [
@@ -68,8 +68,8 @@ def describe_errors(
             for name, one in found.items()
         ]
         head = ("estimated error of", "in all", *names)
-        tables.insert(0, Table(head, parts, f"parts, {where}"))
-    return Section("Error budget", said, tables)
+        tables.insert(0, ReportTable(head, parts, f"parts, {where}"))
+    return ReportSection("Error budget", said, tables)
 
 
 def _in_motion(columns: Mapping[str, Sequence[float]]) -> list[float]:
@@ -81,7 +81,9 @@ def _in_motion(columns: Mapping[str, Sequence[float]]) -> list[float]:
     return [float(error) for error, motion in kept if motion and error == error]
 
 
-def _judge(name: str, errors: Sequence[float], worst: log.Estimate | None, accuracy: float, of_curve: bool) -> str:
+def _judge(
+    name: str, errors: Sequence[float], worst: log.LoggedEstimate | None, accuracy: float, of_curve: bool
+) -> str:
     """Say whether relative errors are as small as asked for, and what makes most of the worst."""
     asked = f"The accuracy of {100 * accuracy:g} % that was asked for {name} (numerics.accuracy)"
     missed = sum(exceeds(error, accuracy) for error in errors)
@@ -96,7 +98,7 @@ def _percent(share: float) -> str:
     return f"{100 * share:.3g} %"
 
 
-def section(directory: Path, found: log.Log) -> Section:
+def section(directory: Path, found: log.Log) -> ReportSection:
     """Return what the newest file in a directory that knows it says about its origin."""
     there = [directory / name for name in ("fields.h5", "steady.h5") if (directory / name).is_file()]
     there += sorted(directory.glob("checkpoint/step-*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
@@ -122,11 +124,11 @@ def section(directory: Path, found: log.Log) -> Section:
                 ]
         except (*hdf5.FAILURES, KeyError, ValueError):
             continue
-        chain = Table(("run", "program", "ranks", "started", "from step"), runs, "runs that made the results")
-        return Section("Provenance", found.machine, [Table(("of", "value"), rows), chain])
-    return Section("Provenance", found.machine or [f"This report was made by {provenance.PROGRAM}."])
+        chain = ReportTable(("run", "program", "ranks", "started", "from step"), runs, "runs that made the results")
+        return ReportSection("Provenance", found.machine, [ReportTable(("of", "value"), rows), chain])
+    return ReportSection("Provenance", found.machine or [f"This report was made by {provenance.PROGRAM}."])
 
 
-def list_citations(job: Job | None) -> Section:
+def list_citations(job: Job | None) -> ReportSection:
     """Return what a paper that uses the results of a job should cite."""
-    return Section("What to cite", [provenance.PROGRAM, *(provenance.cite_lines(plain(job)) if job else ())])
+    return ReportSection("What to cite", [provenance.PROGRAM, *(provenance.cite_lines(plain(job)) if job else ())])

@@ -20,7 +20,7 @@ Download = tuple[str, str, int]  # a file inside the page: its name, its data: U
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """Rows of cells under the names of columns, both as texts."""
 
     head: Sequence[str]
@@ -29,12 +29,12 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Section:
+class ReportSection:
     """One heading of a report and all that is under it, in this order; `texts` are shown as they are."""
 
     title: str
     sentences: Sequence[str] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[ReportTable] = ()
     pictures: Sequence[Picture] = ()
     browsers: Sequence[Browser] = ()
     texts: Sequence[tuple[str, str]] = ()
@@ -44,7 +44,7 @@ class Section:
         """Whether there is anything to show."""
         return any((self.sentences, self.tables, self.pictures, self.browsers, self.texts, self.downloads))
 
-    def without(self, places: Sequence[str]) -> "Section":
+    def without(self, places: Sequence[str]) -> "ReportSection":
         """Return the section without these directories in its sentences and tables: files are named alone."""
 
         def shorten(text: str) -> str:
@@ -63,7 +63,7 @@ class Chapter:
     title: str
     directory: Path
     kind: str
-    sections: Sequence[Section]
+    sections: Sequence[ReportSection]
     headline: str = ""
 
 

@@ -16,10 +16,10 @@ from ..columns import STEADY, SWEEP, UNITS
 from ..job import Job
 from ..plotting import histories, maps, steady, style, sweep, units
 from ..plotting.plots import choose_evenly
-from ..plotting.run import Fields, Run, find_curve_job, find_free_area, label_frames, to_load
+from ..plotting.run import Fields, PlottedRun, find_curve_job, find_free_area, label_frames, to_load
 from ..storage import hdf5, marker, tables
 from ..summary import pull_off, slide, sweep_table, theory_beside, theory_settings
-from .parts import RC, Browser, Section, Table, draw_chart, to_uri
+from .parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement", "work_precision.png": "error over cost"}
 INTERFACE = ("friction_viscous", "friction_interface")
@@ -37,16 +37,16 @@ COLORS = 256  # of a picture: less than half of the bytes that true colours need
 MAP_SIZE = (4.2, 3.5)  # [inch]
 
 
-def describe_run(directory: Path) -> Section:
+def describe_run(directory: Path) -> ReportSection:
     """Return histories, the largest and last values, and the maps over time."""
-    run, columns = Run(directory), tables.read(directory / "measures.csv")
+    run, columns = PlottedRun(directory), tables.read(directory / "measures.csv")
     known = {name: [value for value in columns.get(name, ()) if value == value] for name in SHOWN}
     rows = [
         (_to_words(name), *map(format_cell, (values[-1], min(values), max(values))), UNITS.get(name, ""))
         for name, values in known.items()
         if values and (run.job.directions or not name.startswith("friction"))
     ]
-    numbers = Table(("measure", "in the end", "smallest", "largest", "unit"), rows)
+    numbers = ReportTable(("measure", "in the end", "smallest", "largest", "unit"), rows)
     told = [
         *slide.describe(run.job.history, run.job.initial, run.job.grid.dx, columns),
         *pull_off.describe(columns, run.job.grid.lx * run.job.grid.ly, bool(marker.detached(directory))),
@@ -54,10 +54,10 @@ def describe_run(directory: Path) -> Section:
     ]
     pictures = [draw_chart(chart) for chart in histories.charts(run)] + _leakage(directory)
     shown = [numbers, *_leakage_of_stages(run), *_theory(directory, run)]
-    return Section("Results of the run", list(filter(None, told)), shown, pictures, browse_run(run))
+    return ReportSection("Results of the run", list(filter(None, told)), shown, pictures, browse_run(run))
 
 
-def _theory(directory: Path, run: Run) -> list[Table]:
+def _theory(directory: Path, run: PlottedRun) -> list[ReportTable]:
     """Return the results of Persson's theory beside those of the run, where there is a theory."""
     rows = [
         (one.name, *map(format_cell, (one.run or math.nan, one.theory)), f"{one.theory / one.run - 1:+.0%}")
@@ -65,17 +65,19 @@ def _theory(directory: Path, run: Run) -> list[Table]:
         if one.run
     ]
     head = ("result", "run", "Persson's theory", "difference of the theory")
-    return [Table(head, rows, "beside Persson's theory; the area of the run as corrected for its edges")] * bool(rows)
+    return [ReportTable(head, rows, "beside Persson's theory; the area of the run as corrected for its edges")] * bool(
+        rows
+    )
 
 
-def _leakage_of_stages(run: Run) -> list[Table]:
+def _leakage_of_stages(run: PlottedRun) -> list[ReportTable]:
     """Return the conductivities at the end of each stage, where the run has calculated them: the last row that has."""
     if "flow_x" not in run.columns:
         return []
     known = [[row for row in rows if run.columns["flow_x"][row] >= 0.0] for rows in run.rows_of_stages.values()]
     rows = [[format_cell(float(run.columns[name][found[-1]])) for name in LEAKAGE] for found in known if found]
     head = [f"{_to_words(name)} [{UNITS[name]}]" for name in LEAKAGE]
-    return [Table(head, rows, "leakage at the end of each stage")] * bool(rows)
+    return [ReportTable(head, rows, "leakage at the end of each stage")] * bool(rows)
 
 
 def _leakage(directory: Path) -> list[tuple[str, str]]:
@@ -86,7 +88,7 @@ def _leakage(directory: Path) -> list[tuple[str, str]]:
     return [(to_uri(picture.read_bytes(), "image/png"), "where fluid flows through the gap, and how much")]
 
 
-def describe_curve(directory: Path) -> Section:
+def describe_curve(directory: Path) -> ReportSection:
     """Return the points of a friction curve, and their maps."""
     columns = tables.read(directory / "steady.csv")
     names = [name for name in POINTS if name in columns]
@@ -97,15 +99,15 @@ def describe_curve(directory: Path) -> Section:
     states = partial(_label_states, find_free_area(directory))
     job = find_curve_job(directory)
     browsers = _browse_file(directory / "steady.h5", states, job) if job else []
-    return Section("Friction curve", (), [table], pictures, browsers)
+    return ReportSection("Friction curve", (), [table], pictures, browsers)
 
 
-def describe_sweep(directory: Path) -> Section:
+def describe_sweep(directory: Path) -> ReportSection:
     rows = sweep_table.read(sweep_table.results(directory))
     used = [name for name in (rows[0] if rows else ()) if any(format_cell(row[name]) not in ("", "–") for row in rows)]
     table = _shorten(list(map(_add_unit, used)), [[row[name] for name in used] for row in rows])
     told = list(filter(None, [theory_settings.describe(directory)]))
-    return Section("Sweep", told, [table], [draw_chart(chart) for chart in sweep.charts(directory)])
+    return ReportSection("Sweep", told, [table], [draw_chart(chart) for chart in sweep.charts(directory)])
 
 
 def _add_unit(name: str) -> str:
@@ -115,7 +117,7 @@ def _add_unit(name: str) -> str:
     return f"{name} [{unit}]" if unit else name
 
 
-def describe_study(directory: Path) -> Section:
+def describe_study(directory: Path) -> ReportSection:
     """Return settings, their errors and costs."""
     with (directory / "study.csv").open(newline="") as file:
         names, *rows = list(csv.reader(file)) or [[]]
@@ -128,17 +130,17 @@ def describe_study(directory: Path) -> Section:
         for name, caption in STUDY_PICTURES.items()
         if (directory / name).is_file()
     ]
-    return Section("What accuracy costs", sentences, [table], pictures)
+    return ReportSection("What accuracy costs", sentences, [table], pictures)
 
 
 def _to_words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _shorten(head: Sequence[str], rows: Sequence[Sequence[object]]) -> Table:
+def _shorten(head: Sequence[str], rows: Sequence[Sequence[object]]) -> ReportTable:
     """Return a table that can be read: its first rows, if there are too many."""
     more = f"the first {MOST_ROWS} of {len(rows)} rows; all are in the data" if len(rows) > MOST_ROWS else ""
-    return Table(head, [[format_cell(value) for value in row] for row in rows[:MOST_ROWS]], more)
+    return ReportTable(head, [[format_cell(value) for value in row] for row in rows[:MOST_ROWS]], more)
 
 
 def format_cell(value: object) -> str:
@@ -155,7 +157,7 @@ def _parse_number(text: str) -> object:
         return text
 
 
-def browse_run(run: Run) -> list[Browser]:
+def browse_run(run: PlottedRun) -> list[Browser]:
     """Return all maps that a run has saved, over time."""
     return _browse_file(run.directory / "fields.h5", partial(label_frames, run), run.job, run.telling_step)
 

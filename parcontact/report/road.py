@@ -11,25 +11,25 @@ from ..parallel.slab import Slab
 from ..physics import surface_statistics as statistics
 from ..plotting import surface, units
 from ..scene import rigid_surface
-from .parts import Section, Table, draw_panel
+from .parts import ReportSection, ReportTable, draw_panel
 
 MOST_POINTS = 2**22  # of a surface that is made anew for a report
 
 
-def section(job: Job) -> Section:
+def section(job: Job) -> ReportSection:
     """Describe the surface of a job, made anew; where its files are gone or it is too large, as the job says."""
-    shapes = Table(("shape",), [(listing.line(part),) for part in job.surface], "shapes, whose heights add up")
+    shapes = ReportTable(("shape",), [(listing.line(part),) for part in job.surface], "shapes, whose heights add up")
     if job.grid.nx * job.grid.ny > MOST_POINTS:
-        return Section("Surface", ["The surface has too many points to be made anew for a report."], [shapes])
+        return ReportSection("Surface", ["The surface has too many points to be made anew for a report."], [shapes])
     slab = Slab.alone(*job.grid.points)
     try:
         made, told = rigid_surface.make_surface(job, FFT(slab))
     except InputError as error:
-        return Section("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
+        return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
     heights, sentences = made.heights((0.0, 0.0), slab.empty()), [*told.notes, *told.doubts]
     found = statistics.describe(heights, job.grid.size)
     if not found.rms_height:
-        return Section("Surface", [*sentences, "The surface is flat."], [shapes])
+        return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
     rows = [
         ("rms height", units.text(found.rms_height, "m", 4)),
         ("rms slope", f"{found.rms_slope:.4g}"),
@@ -37,7 +37,7 @@ def section(job: Job) -> Section:
         ("Nayak's parameter", f"{found.nayak:.4g}"),
         ("Hurst exponent", f"{found.hurst:.3g}" if found.hurst == found.hurst else NOT_SELF_AFFINE),
     ]
-    tables = [shapes, Table(("on the grid of the job", "value"), rows)]
+    tables = [shapes, ReportTable(("on the grid of the job", "value"), rows)]
     sketch = surface.Sketch(heights, job.grid.size, found)
     pictures = [draw_panel(partial(panel, sketch=sketch), caption) for caption, panel in surface.PANELS.items()]
-    return Section("Surface", sentences, tables, pictures)
+    return ReportSection("Surface", sentences, tables, pictures)

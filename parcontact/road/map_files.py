@@ -41,7 +41,7 @@ class Map:
 
 
 @dataclass(frozen=True)
-class Contents:
+class MapContents:
     """Numbers of a file, shape (ny, nx) or (nx,), and what it says: their unit [m], the size of the map along x and y,
     or of the line, and its unit [m]."""
 
@@ -77,7 +77,7 @@ def read(part: Topography) -> Map:
     return found
 
 
-def _in_metres(part: Topography, found: Contents) -> Map:
+def _in_metres(part: Topography, found: MapContents) -> Map:
     """Return the map in m, with missing points as NaN."""
     path, given = part.path, UNITS.get(part.unit_of_heights or "")
     if found.unit is not None and given not in (None, found.unit):
@@ -104,11 +104,11 @@ def _in_metres(part: Topography, found: Contents) -> Map:
     return Map(np.ascontiguousarray(heights), (lx, ly))
 
 
-def _array(part: Topography) -> Contents:
-    return Contents(datafiles.open_numbers(part.path))
+def _array(part: Topography) -> MapContents:
+    return MapContents(datafiles.open_numbers(part.path))
 
 
-def _text(part: Topography) -> Contents:
+def _text(part: Topography) -> MapContents:
     """Read a matrix of heights, rows of x, y, z, an ESRI grid, or a line (rows of x, z or z); text with another header
     is read as one of an instrument."""
     with part.path.open(encoding="latin-1") as file:
@@ -127,9 +127,9 @@ def _text(part: Topography) -> Contents:
     table = np.loadtxt(part.path, delimiter=mark, skiprows=first, ndmin=2, usecols=range(columns), encoding="latin-1")
     if "cellsize" in said:  # of ESRI, whose first row is the northernmost
         missing, (cell,) = said.get("nodata_value") or [np.nan], said["cellsize"]
-        return Contents(np.where(table == missing, np.nan, table)[::-1], None, (cell * columns, cell * len(table)))
+        return MapContents(np.where(table == missing, np.nan, table)[::-1], None, (cell * columns, cell * len(table)))
     if columns > 3 or columns == 1:
-        return Contents(table.squeeze())
+        return MapContents(table.squeeze())
     words = re.findall(r"[\[(]\s*([mnuµμ]?m)\s*[\])]", head[-1] if head else "")
     units = [UNITS[word] for word in words] if len(words) == columns else [None, None]
     return _positions(part.path, table, units[0], units[-1])
@@ -143,7 +143,7 @@ def _numbers(line: str) -> list[float]:
         return []
 
 
-def _positions(path: Path, table: Array, unit_xy: float | None, unit: float | None) -> Contents:
+def _positions(path: Path, table: Array, unit_xy: float | None, unit: float | None) -> MapContents:
     """Return a map from rows of x, y, z, or a line from rows of x, z, in any order; points that are not there are
     missing."""
     if (wrong := np.flatnonzero(~np.isfinite(table[:, :-1]).all(axis=1))).size:
@@ -158,7 +158,7 @@ def _positions(path: Path, table: Array, unit_xy: float | None, unit: float | No
         )
     heights = np.full(counts[::-1].astype(int), np.nan)
     heights[tuple(index.T[::-1].astype(int))] = table[:, -1]
-    return Contents(heights, unit, tuple(counts * steps), unit_xy)
+    return MapContents(heights, unit, tuple(counts * steps), unit_xy)
 
 
 def _place(table: Array, row: int) -> str:
@@ -178,7 +178,7 @@ def _steps(path: Path, name: str, values: Array) -> tuple[float, float]:
     return float(distinct[0]), step
 
 
-def _simple_field(part: Topography) -> Contents:
+def _simple_field(part: Topography) -> MapContents:
     """Read a Gwyddion simple field: a head of `key = value`, one to four zero bytes, and rows of single precision."""
     data = part.path.read_bytes()
     head = data.partition(b"\0")[0]
@@ -188,10 +188,10 @@ def _simple_field(part: Topography) -> Contents:
     nx, ny = int(said["XRes"]), int(said["YRes"])
     units = [_scale(part.path, said[key]) if said.get(key) else None for key in ("ZUnits", "XYUnits")]
     values = np.frombuffer(data, "<f4", nx * ny, 4 * (len(head) // 4 + 1)).reshape(ny, nx)
-    return Contents(values, units[0], (float(said.get("XReal", 1.0)), float(said.get("YReal", 1.0))), units[1])
+    return MapContents(values, units[0], (float(said.get("XReal", 1.0)), float(said.get("YReal", 1.0))), units[1])
 
 
-def _instrument(part: Topography) -> Contents:
+def _instrument(part: Topography) -> MapContents:
     path = part.path
     try:
         import SurfaceTopography
@@ -222,9 +222,9 @@ def _instrument(part: Topography) -> Contents:
     if not topography.is_uniform:
         x, z = topography.positions_and_heights()
         places = np.linspace(x[0], x[-1], len(x))
-        return Contents(np.interp(places, x, z), unit, (places[1] * len(x) - x[0] * len(x),), unit)
+        return MapContents(np.interp(places, x, z), unit, (places[1] * len(x) - x[0] * len(x),), unit)
     heights = np.ma.filled(np.ma.masked_invalid(topography.heights()), np.nan).T
-    return Contents(heights, unit, None if size is None else tuple(topography.physical_sizes), unit)
+    return MapContents(heights, unit, None if size is None else tuple(topography.physical_sizes), unit)
 
 
 def _scale(path: Path, unit: Any) -> float:

@@ -40,7 +40,7 @@ FORMS = "the columns q[1/m] C1D[m^3] or q[1/m] C2D[m^4] (or mm, um, nm)"
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredSpectrum:
     """An isotropic spectrum: Phi [m^4], shape (n,), at rising wavenumbers `q` [rad/m]; beyond them as q^-`fall`, or
     nothing where that is 0."""
 
@@ -57,7 +57,7 @@ class Measured:
         return np.where(inside, np.exp(log), 0.0)
 
 
-def of(part: RoughSpectrum) -> tuple[Measured, tuple[float, float]]:
+def of(part: RoughSpectrum) -> tuple[MeasuredSpectrum, tuple[float, float]]:
     """The spectrum of a job's surface, and its longest and shortest wavelengths [m]. Raises InputError."""
     q, values, power = _read(part.spectrum)
     if part.normalisation == "surface_topography":
@@ -74,10 +74,10 @@ def of(part: RoughSpectrum) -> tuple[Measured, tuple[float, float]]:
             f"{part.spectrum}: short_wavelength is {wanted[1]:.6g} m, the data end at {shortest:.6g} m; give hurst to "
             "continue them by a power law"
         )
-    return Measured(q, 4 * np.pi**2 * values, fall), wanted
+    return MeasuredSpectrum(q, 4 * np.pi**2 * values, fall), wanted
 
 
-def of_line(part: Topography, line: Map) -> tuple[Measured, tuple[float, float]]:
+def of_line(part: Topography, line: Map) -> tuple[MeasuredSpectrum, tuple[float, float]]:
     """Return the spectrum of an isotropic surface whose profiles have the C1D of a line scan, with its longest and
     shortest wavelengths [m]: levelled, through Hann's window, in means over BINS bins a decade. Raises InputError."""
     heights, length = line.heights, line.size[0]
@@ -97,7 +97,10 @@ def of_line(part: Topography, line: Map) -> tuple[Measured, tuple[float, float]]
         for values in (2 * np.pi / length * waves, length / np.pi * power[waves])
     )
     kept, c2 = _over_directions(part.path, q, c1, None)
-    return Measured(kept, 4 * np.pi**2 * c2, 0.0), (2 * np.pi / kept[0], part.short_wavelength or 2 * np.pi / kept[-1])
+    return MeasuredSpectrum(kept, 4 * np.pi**2 * c2, 0.0), (
+        2 * np.pi / kept[0],
+        part.short_wavelength or 2 * np.pi / kept[-1],
+    )
 
 
 def _read(path: Path) -> tuple[Array, Array, int]:

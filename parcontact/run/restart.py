@@ -26,7 +26,7 @@ SAME_STEP = 1e-9  # accuracy: relative: steps of two histories this close are th
 
 
 @dataclass(frozen=True)
-class Origin:
+class RestartPoint:
     """A sound checkpoint to go on from; `own` if it lies in the run's own output directory."""
 
     contents: Contents
@@ -35,7 +35,7 @@ class Origin:
 
 def choose(
     job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str
-) -> tuple[Origin | None, list[str]]:
+) -> tuple[RestartPoint | None, list[str]]:
     """Return where to begin, and warnings about checkpoints that were skipped; collective.
 
     `plain` is the job as plain data, on root; `restart` is `auto`, `never` or the path of a checkpoint. Raises
@@ -51,7 +51,7 @@ def choose(
         found = sound(path, job, plain, slab)
         if isinstance(found, Contents):
             own = on_root(slab.comm, partial(_is_own, found, directory))
-            return Origin(found, own), [f"passed over: {text}" for text in problems]
+            return RestartPoint(found, own), [f"passed over: {text}" for text in problems]
         problems.append(found)
     if problems:
         raise InputError("\n".join(problems) + ("" if given else f"; {ADVICE}"))
@@ -59,7 +59,7 @@ def choose(
     return None, []
 
 
-def claim(plain: Mapping[str, Any], origin: Origin | None) -> Claim:
+def claim(plain: Mapping[str, Any], origin: RestartPoint | None) -> Claim:
     """Return what a run says of itself in the marker: its id stays as long as it goes on in its own directory."""
     new = Claim(marker.kept(plain))
     return replace(new, id=origin.contents.run or new.id, saved=True) if origin and origin.own else new

@@ -24,7 +24,7 @@ from ..storage.marker import Claim
 from ..storage.provenance import Link, Provenance, cite_lines, extended
 from ..storage.recorder import Recorder, Recording
 from . import restart, watch
-from .restart import Origin
+from .restart import RestartPoint
 from .run import DONE, Options, Run
 from .watch import Watch
 
@@ -80,7 +80,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
 
 def _find_origin(
     job: Job, plain: dict[str, Any], directory: Directory, options: Options
-) -> tuple[Origin | None, list[str], str]:
+) -> tuple[RestartPoint | None, list[str], str]:
     """Find where to begin: a checkpoint or None, what to warn of, and why there is nothing to do, or ''; collective."""
     slab, until = directory.slab, options.until
     timeline = Timeline.of(job, until or 0.0)
@@ -116,7 +116,7 @@ def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[st
 
 
 def _open_files(
-    march: March, directory: Directory, claim: Claim, facts: Facts, origin: Origin | None, options: Options
+    march: March, directory: Directory, claim: Claim, facts: Facts, origin: RestartPoint | None, options: Options
 ) -> Recorder:
     """Make the output directory ready, and the files in it; collective."""
     job, slab, added = march.scene.job, march.scene.slab, columns_of(march.scene.effects)

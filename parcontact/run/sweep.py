@@ -34,7 +34,7 @@ Act = Callable[[Job, Slab, Shows], int]
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SweepRun:
     """A sweep of `cases`, with each of which `act` is done; making one and its methods are collective.
 
     Several groups of ranks take the cases by turns, each group one at a time. `act` has a job, the slab of the group,

@@ -129,7 +129,7 @@ def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, told: Told) -> Sp
 
     heights: list[Array] = []
 
-    def make() -> tuple[list[str], list[str], tuple[spectrum.Measured, tuple[float, float]] | None]:
+    def make() -> tuple[list[str], list[str], tuple[spectrum.MeasuredSpectrum, tuple[float, float]] | None]:
         found = map_files.read(part)
         if found.is_line:
             told.notes.append(map_sentences.describe_line(part, found))
@@ -186,7 +186,7 @@ def _transform(heights: Array, fft: FFT) -> Spectrum:
     return spectrum
 
 
-class Heights(NamedTuple):
+class HeightRange(NamedTuple):
     """Heights [m] of a surface: from the lowest to the highest point, Sz of the standards on roughness, 0 if that is
     rounding; the highest point and the mean, over the surface's datum."""
 
@@ -195,10 +195,10 @@ class Heights(NamedTuple):
     mean: float
 
 
-def heights_of(surface: Surface) -> Heights:
+def heights_of(surface: Surface) -> HeightRange:
     """Return the heights that a surface reaches; collective."""
     heights = surface.heights((0.0, 0.0), surface.slab.empty())
     extremes = [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]
     total, top, bottom = surface.slab.reduce([float(heights.sum(dtype=np.float64))], extremes)
     span = top + bottom if top + bottom > FLAT * max(abs(top), abs(bottom), abs(surface.datum)) else 0.0
-    return Heights(span, top, total / surface.slab.points)
+    return HeightRange(span, top, total / surface.slab.points)

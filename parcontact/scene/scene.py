@@ -40,7 +40,7 @@ from ..solve.problem import Operators
 from ..solve.tiles import LARGER_CELLS, SolverOnTiles
 from ..solve.workspace import Workspace
 from .choices import Choices, choices
-from .rigid_surface import Heights, Told, heights_of, make_surface, shortest_measured
+from .rigid_surface import HeightRange, Told, heights_of, make_surface, shortest_measured
 
 
 @dataclass
@@ -59,7 +59,7 @@ class Setup:
     surface: Surface
     roughness: Moments | None
     shortest: float | None
-    heights: Heights
+    heights: HeightRange
     units: Units
     told: Told
 

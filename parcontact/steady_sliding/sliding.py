@@ -38,7 +38,7 @@ Vector = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Level:
+class SteadyLevel:
     """One grid: the rows of each rank, its transform, and the heights."""
 
     slab: Slab
@@ -55,7 +55,7 @@ class SteadyState:
     by_energy: float
 
 
-Make = Callable[[Level, Vector], tuple[SteadySolver | Proximal, Convolution]]
+Make = Callable[[SteadyLevel, Vector], tuple[SteadySolver | Proximal, Convolution]]
 
 
 class SteadySliding:
@@ -71,8 +71,8 @@ class SteadySliding:
         self.probe = setup.probe()
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty())
         finest, *coarser = nested.levels_of(setup.slab, heights)
-        self.levels = [Level(setup.slab, setup.fft, finest.heights)]
-        self.levels += [Level(level.slab, FFT(level.slab), level.heights) for level in coarser]
+        self.levels = [SteadyLevel(setup.slab, setup.fft, finest.heights)]
+        self.levels += [SteadyLevel(level.slab, FFT(level.slab), level.heights) for level in coarser]
         self._known = properties_of(setup, 0.0, True, None)
         self.contact: SteadyContact | None = None
         self._rise: Array | None = None
@@ -223,7 +223,7 @@ class SteadySliding:
         """
         tally, calls = self.setup.slab.tally, 0.0
 
-        def solve(level: Level, p: Array) -> tuple[SteadyContact, Convolution]:
+        def solve(level: SteadyLevel, p: Array) -> tuple[SteadyContact, Convolution]:
             nonlocal calls, make
             before = tally["operator"]
             solver, operator = make(level, velocity)
@@ -246,12 +246,12 @@ class SteadySliding:
         lost = max(operator.loss(p, self.setup.size, _direction(velocity)), 0.0)  # not of rounding, of an elastic body
         return contact, calls, lost / (self.setup.slab.sum(load)[0] or math.nan) * unit
 
-    def _solver(self, level: Level, velocity: Vector) -> tuple[SteadySolver, Convolution]:
+    def _solver(self, level: SteadyLevel, velocity: Vector) -> tuple[SteadySolver, Convolution]:
         operator, inverse = self._operators(level, velocity)
         limit = GIVE_UP if soft_stripes(self.setup, velocity) is not None else math.inf
         return self._solver_for(level, velocity, operator, inverse, LEAST_CUT, limit), operator
 
-    def _proximal(self, level: Level, velocity: Vector) -> tuple[Proximal, Convolution]:
+    def _proximal(self, level: SteadyLevel, velocity: Vector) -> tuple[Proximal, Convolution]:
         operator, inverse = self._operators(level, velocity)
         kind = self.setup.fft.complex
         nearer, nearer_inverse = operator.mapped(proximal.nearer, kind), inverse.mapped(proximal.nearer_inverse, kind)
@@ -261,7 +261,7 @@ class SteadySliding:
 
     def _solver_for(
         self,
-        level: Level,
+        level: SteadyLevel,
         velocity: Vector,
         operator: Convolution,
         preconditioner: Convolution,
@@ -276,7 +276,7 @@ class SteadySliding:
         what = slab, operator, preconditioner, height, tolerance, most
         return SteadySolver(*what, along=along, pairs=pairs, least_cut=least_cut)
 
-    def _operators(self, level: Level, velocity: Vector) -> tuple[Convolution, Convolution]:
+    def _operators(self, level: SteadyLevel, velocity: Vector) -> tuple[Convolution, Convolution]:
         """Make the operator at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""
         body, moved = self.setup.half_space, (level.fft, self.setup.in_units(velocity), self.setup.prony)
         return body.sliding_operator(*moved), body.sliding_inverse(*moved)

@@ -35,7 +35,7 @@ SUMS = "checksums"
 
 
 @dataclass(frozen=True)
-class Table:
+class TableMark:
     """The state of measures.csv: how many rows it has, and the last one."""
 
     rows: int = 0
@@ -51,7 +51,7 @@ class Contents:
     time: float
     job: dict[str, Any]
     run: str
-    table: Table
+    table: TableMark
     chain: tuple[Link, ...]
     shape: tuple[int, int]
     units: dict[str, float]
@@ -74,7 +74,7 @@ class Facts:
     job: Mapping[str, Any]
     provenance: Provenance
     run: str = ""
-    table: Table = Table()
+    table: TableMark = TableMark()
     step: int = 0
     time: float = 0.0
 
@@ -108,7 +108,7 @@ def write(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry]) ->
     try:
         size = sum(rows.itemsize for rows in maps.values()) * slab.nx * slab.ny
         hdf5.lay_out(part, slab, build, size, SEAL)
-        hdf5.write(part, slab, [hdf5.Part(name, (), rows) for name, rows in maps.items()])
+        hdf5.write(part, slab, [hdf5.Slice(name, (), rows) for name, rows in maps.items()])
         everyone = slab.from_all({name: row_sums(rows) for name, rows in maps.items()})
         hdf5.on_root(slab, finish, f"cannot write {part}")
         hdf5.sync(part, slab)
@@ -211,7 +211,7 @@ def _contents(path: Path, file: h5py.File) -> Contents:
         float(file.attrs["time"]),
         json.loads(file.attrs["plain job"]),
         str(file.attrs.get("run", "")),
-        Table(table.get("rows", 0), table.get("last", "")),
+        TableMark(table.get("rows", 0), table.get("last", "")),
         read_chain(file),
         shape,
         {name: float(item.attrs["unit"]) for name, item in found.items()},
@@ -228,7 +228,7 @@ def verify(contents: Contents, slab: Slab) -> str:
         for name, dtype in contents.maps.items():
             if rows.dtype != dtype or rows.shape != slab.shape:
                 rows = np.empty(slab.shape, dtype)
-            hdf5.read(contents.path, slab, [hdf5.Part(name, (), rows)])
+            hdf5.read(contents.path, slab, [hdf5.Slice(name, (), rows)])
             bad = np.flatnonzero(row_sums(rows) != contents.sums[name][slab.rows])
             if count := int(slab.sum(float(bad.size))[0]):
                 return f"{contents.path} is damaged: {count} of {slab.ny} rows of {name} do not match their checksums"
@@ -240,7 +240,7 @@ def verify(contents: Contents, slab: Slab) -> str:
 def read(contents: Contents, slab: Slab, entries: Mapping[str, Entry]) -> None:
     """Read the maps of a checkpoint into those of `entries`, in their units; collective. Numbers are in `contents`."""
     maps = _maps(entries)
-    hdf5.read(contents.path, slab, [hdf5.Part(name, (), rows) for name, rows in maps.items()])
+    hdf5.read(contents.path, slab, [hdf5.Slice(name, (), rows) for name, rows in maps.items()])
     for name, rows in maps.items():
         if contents.units[name] != entries[name].unit:
             rows *= contents.units[name] / entries[name].unit

@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from ..streams import printable
 from . import files
-from .row import Row
+from .row import StepRow
 
 HEAD = "    step        time [s]    load [Pa] corr.area  friction   iter  residual"
 STAMP = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d[.,]\d+ ")
@@ -21,7 +21,7 @@ EVERY_SECONDS = 0.5  # tuning: a bar is redrawn, and lines are shortened to a ba
 LEFT_SECONDS = 30.0  # tuning: between two lines with the time left, where there is no terminal for a bar
 
 
-def line(row: Row) -> str:
+def line(row: StepRow) -> str:
     """Return the line of a step, under `HEAD`."""
     m = row.measures
     return (
@@ -78,7 +78,7 @@ class Console:
         if shown:
             self._write(f"{WARNING}{printable(text)}", sys.stderr)
 
-    def step(self, row: Row) -> None:
+    def step(self, row: StepRow) -> None:
         """Say the line of a step, and how far the run is."""
         text = line(row)
         self.log(text)

@@ -120,8 +120,8 @@ class FieldsFile:
             for name in self.names:
                 rows.fill(np.nan)
                 if name in found.names:
-                    hdf5.read(self.path, self.slab, [hdf5.Part(name, (found.steps.index(step),), rows)])
-                hdf5.write(new, self.slab, [hdf5.Part(name, (self.steps[step],), rows)])
+                    hdf5.read(self.path, self.slab, [hdf5.Slice(name, (found.steps.index(step),), rows)])
+                hdf5.write(new, self.slab, [hdf5.Slice(name, (self.steps[step],), rows)])
         times = [found.times[found.steps.index(step)] for step in kept]
         hdf5.mark(new, self.slab, [self.steps[step] for step in kept], {"t": times})
         hdf5.sync(new, self.slab)

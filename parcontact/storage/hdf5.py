@@ -30,7 +30,7 @@ DOUBLE = 8  # bytes of a number in a map
 RESERVE = 1 << 20  # tuning: bytes: more than HDF5 writes of what is not a map; it does not survive a disk that is full
 
 
-class Part(NamedTuple):
+class Slice(NamedTuple):
     """This rank's rows of one map in a dataset `name`, below the leading indices `at`."""
 
     name: str
@@ -38,12 +38,12 @@ class Part(NamedTuple):
     rows: Array
 
 
-def write(path: Path, slab: Slab, parts: Iterable[Part]) -> None:
+def write(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
     """Write the rows of every rank; collective."""
     _move(path, slab, list(parts), True)
 
 
-def read(path: Path, slab: Slab, parts: Iterable[Part]) -> None:
+def read(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
     """Read the rows of every rank into `part.rows`; collective."""
     _move(path, slab, list(parts), False)
 
@@ -109,7 +109,7 @@ def reason(error: BaseException) -> str:
     return text.splitlines()[0] if text else type(error).__name__
 
 
-def _move(path: Path, slab: Slab, parts: Sequence[Part], writes: bool) -> None:
+def _move(path: Path, slab: Slab, parts: Sequence[Slice], writes: bool) -> None:
     """Write or read the rows at their places; collective. One rank that cannot take part is an error of all before."""
     what, problem, places = f"cannot {'write' if writes else 'read'} {path}", "", list[int]()
     try:
@@ -128,7 +128,7 @@ def _move(path: Path, slab: Slab, parts: Sequence[Part], writes: bool) -> None:
     raise_first(slab, problem)
 
 
-def _place(dataset: h5py.Dataset, part: Part, slab: Slab) -> int:
+def _place(dataset: h5py.Dataset, part: Slice, slab: Slab) -> int:
     """Return where in the file the rows of this rank begin; raises ValueError if they are of another kind."""
     if (dataset.dtype, dataset.shape[-2:], slab.shape) != (part.rows.dtype, (slab.ny, slab.nx), part.rows.shape):
         kinds = f"{dataset.dtype} {dataset.shape}, not of {part.rows.dtype} {part.rows.shape} and its like"
@@ -139,7 +139,7 @@ def _place(dataset: h5py.Dataset, part: Part, slab: Slab) -> int:
     return int(dataset.id.get_offset()) + index * dataset.dtype.itemsize
 
 
-def _by_turns(path: Path, slab: Slab, parts: Sequence[Part], places: Sequence[int], writes: bool) -> str:
+def _by_turns(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[int], writes: bool) -> str:
     """Let one rank act after the other, those without rows only wait; returns what failed on this rank, or ''."""
     problem = ""
     for rank in range(slab.comm.size):
@@ -156,7 +156,7 @@ def _by_turns(path: Path, slab: Slab, parts: Sequence[Part], places: Sequence[in
     return problem
 
 
-def _together(path: Path, slab: Slab, parts: Sequence[Part], places: Sequence[int], writes: bool) -> str:
+def _together(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[int], writes: bool) -> str:
     """Let all ranks act at once, by MPI-IO, also after a failure, which is returned."""
     problem = ""
     try:
@@ -221,7 +221,7 @@ def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
 
 def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], marks: Mapping[str, float]) -> None:
     """Put maps of one instant or point into their place, and then its coordinates, the `marks`; collective."""
-    write(path, slab, [Part(name, (index,), np.ascontiguousarray(rows, np.float64)) for name, rows in maps.items()])
+    write(path, slab, [Slice(name, (index,), np.ascontiguousarray(rows, np.float64)) for name, rows in maps.items()])
     mark(path, slab, index, marks)
 
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from ..errors import InputError, RunError
 from ..parallel.slab import Array
 from . import fields, hdf5
-from .checkpoint import Contents, Table
+from .checkpoint import Contents, TableMark
 from .console import Console
 from .directory import Directory
 from .fields import FieldsFile
 from .provenance import Provenance
-from .row import MeasuresFile, Row, cut_back_table
+from .row import MeasuresFile, StepRow, cut_back_table
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class Recorder:
         table, log = self.path / "measures.csv", self.path / "run.log"
         columns = recording.branches, recording.added
 
-        def cut_back() -> tuple[Table, list[str]]:
-            return cut_back_table(table, saved.step, saved.table, *columns) if saved is not None else (Table(), [])
+        def cut_back() -> tuple[TableMark, list[str]]:
+            return cut_back_table(table, saved.step, saved.table, *columns) if saved is not None else (TableMark(), [])
 
         def begin_log() -> None:
             self.console = Console(log, quiet, recording.total)
@@ -80,11 +80,11 @@ class Recorder:
         return file
 
     @property
-    def table(self) -> Table:
+    def table(self) -> TableMark:
         """The state of measures.csv, on root."""
-        return self._measures.table if self._measures else Table()
+        return self._measures.table if self._measures else TableMark()
 
-    def write(self, row: Row, field: Callable[[str], Array], total: int = 0) -> None:
+    def write(self, row: StepRow, field: Callable[[str], Array], total: int = 0) -> None:
         """Record an instant; `field(name)` gives this rank's rows of a map. `total` is how many steps an open-ended run
         will have, as far as is known by now; when the row's step is the last one, its number.
 
@@ -122,12 +122,12 @@ class Recorder:
         if wanted and wanted != [last for last in file.steps if last >= step]:
             file.make_place(wanted)
 
-    def catch_up(self, row: Row, field: Callable[[str], Array]) -> None:
+    def catch_up(self, row: StepRow, field: Callable[[str], Array]) -> None:
         """Save the maps of the step after which a run goes on, if they are due and could not be saved then."""
         if self._fields and self._fields.is_due(row.step):
             self._save_fields(row, field)
 
-    def _save_fields(self, row: Row, field: Callable[[str], Array]) -> None:
+    def _save_fields(self, row: StepRow, field: Callable[[str], Array]) -> None:
         if self._fields and row.step in self._fields.steps:
             with self._noting_problems():
                 self._fields.save(row.step, row.time, {name: field(name) for name in self._fields.names})

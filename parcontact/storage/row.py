@@ -13,12 +13,12 @@ from ..physics.budget import ErrorBudget
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate
 from . import files
-from .checkpoint import Table
+from .checkpoint import TableMark
 from .tables import MEND, GrowingTable, lines_of
 
 
 @dataclass(frozen=True)
-class Row:
+class StepRow:
     """One instant of a run, as it goes into measures.csv; SI units, energies in J since the start.
 
     `errors` is the budget of the instant, None where nothing touches. `added` is what effects have for columns of their
@@ -63,7 +63,7 @@ def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
     return names
 
 
-def numbers(row: Row, branches: int) -> list[float]:
+def numbers(row: StepRow, branches: int) -> list[float]:
     """Return the numbers of a row, in the order of `columns`; NaN for what was not asked for."""
     return [*values_of(_always(branches), row), *row.added]
 
@@ -76,33 +76,33 @@ def _always(branches: int) -> list[Column]:
 class MeasuresFile(GrowingTable):
     """The growing file of a run; `table` is what it holds."""
 
-    def __init__(self, path: Path, table: Table, branches: int = 0, added: Sequence[str] = ()) -> None:
+    def __init__(self, path: Path, table: TableMark, branches: int = 0, added: Sequence[str] = ()) -> None:
         """Continue the file, which holds this `table`, or begin it."""
         super().__init__(path, columns(branches, added))
         self.table, self._branches = table, branches
 
-    def write(self, row: Row) -> None:
+    def write(self, row: StepRow) -> None:
         """Append a row; on an error the file is as it was before, but `table` has the row, which the next run adds."""
         line = cells(numbers(row, self._branches))
-        self.table = Table(self.table.rows + 1, ",".join(line))
+        self.table = TableMark(self.table.rows + 1, ",".join(line))
         self.append(line)
 
 
 def cut_back_table(
-    path: Path, step: int, then: Table, branches: int = 0, added: Sequence[str] = ()
-) -> tuple[Table, list[str]]:
+    path: Path, step: int, then: TableMark, branches: int = 0, added: Sequence[str] = ()
+) -> tuple[TableMark, list[str]]:
     """Remove the rows after `step`, and one that is incomplete; the columns become those of the present job.
 
     `then` is what the file held when the checkpoint was written: a last row for which the disk had no room is added.
     Returns what the file holds now, and what is lost. Raises InputError, and changes nothing, for a damaged file.
     """
     if not path.exists():
-        return Table(), [f"{path} is missing: the rows up to step {step} are lost"]
+        return TableMark(), [f"{path} is missing: the rows up to step {step} are lost"]
     found, wanted = lines_of(path), columns(branches, added)
     names = next(found, [])
     if "step" not in names:
         raise InputError(f"{path}, line 1, does not name the columns, step among them; move it away or mend it")
-    last, kept, problems = -1, Table(), list[str]()
+    last, kept, problems = -1, TableMark(), list[str]()
     with files.replaced(path) as new:
         new.write(f"{','.join(wanted)}\n".encode())
         for number, line in enumerate(found, 2):
@@ -111,7 +111,7 @@ def cut_back_table(
                 raise InputError(f"{path}, line {number}: the step {row['step']!r} is not a whole number; {MEND}")
             if int(row["step"]) > step:
                 break
-            last, kept = int(row["step"]), Table(kept.rows + 1, ",".join(row.get(name, "") for name in wanted))
+            last, kept = int(row["step"]), TableMark(kept.rows + 1, ",".join(row.get(name, "") for name in wanted))
             new.write(f"{kept.last}\n".encode())
         if last < step and kept.rows + 1 == then.rows and names == wanted:
             kept = then

@@ -21,7 +21,7 @@ from ..parallel.slab import Slab
 from ..parallel.tally import Tally
 from ..steady_sliding import start
 from ..storage import files
-from ..storage.row import Row
+from ..storage.row import StepRow
 from .ladders import Settings
 
 FIRST_STEPS = 2
@@ -60,7 +60,7 @@ def warm_up(job: Job, slab: Slab) -> None:
 def run(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome | None:
     """March through a job, writing nothing; None if `stopped` says so after a step; collective."""
     marching = start.first(job, slab)
-    rows: list[Row] = []
+    rows: list[StepRow] = []
 
     def note(state: March) -> bool:
         rows.append(state.row)
@@ -74,7 +74,7 @@ def run(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome | None:
     return Outcome(*settled(job, rows), len(rows) - 1, counted["operator"], transform_work(counted), seconds)
 
 
-def settled(job: Job, rows: Sequence[Row]) -> tuple[float, float, float, float]:
+def settled(job: Job, rows: Sequence[StepRow]) -> tuple[float, float, float, float]:
     """mu_max, mu_end, area and corrected area of a run, from its rows."""
     end = rows[-1].time
     lasting = [stage for stage in job.history if stage.seconds > 0.0]

@@ -112,10 +112,10 @@ class _Study:
 
     def _curves(
         self, outcomes: dict[Settings, Outcome], errors: dict[Settings, dict[str, float]]
-    ) -> list[study_plots.Curve]:
+    ) -> list[study_plots.StudyCurve]:
         """Return the errors along each ladder."""
         return [
-            study_plots.Curve(quantity, integrator, name, sizes, [errors[case][quantity] for case in cases])
+            study_plots.StudyCurve(quantity, integrator, name, sizes, [errors[case][quantity] for case in cases])
             for integrator in self.refined.integrators
             for name, (sizes, cases) in verdict.sequences(self.refined, outcomes, integrator).items()
             for quantity in verdict.NEEDED
@@ -125,12 +125,12 @@ class _Study:
 
 def _points(
     outcomes: dict[Settings, Outcome], errors: dict[Settings, dict[str, float]], quantity: str
-) -> list[study_plots.Point]:
+) -> list[study_plots.StudyPoint]:
     """Error and cost of every case, and whether it is on the front."""
     error = {case: errors[case][quantity] for case in outcomes}
     best = verdict.front(outcomes, error)
     return [
-        study_plots.Point(found.transform_work, found.cpu_seconds, error[case], case.integrator, case in best)
+        study_plots.StudyPoint(found.transform_work, found.cpu_seconds, error[case], case.integrator, case in best)
         for case, found in outcomes.items()
     ]
 

@@ -17,7 +17,7 @@ Outcomes = Mapping[Settings, Outcome]
 
 
 @dataclass(frozen=True)
-class Found:
+class StudyFinding:
     """The limit of one quantity along one ladder of one integrator."""
 
     quantity: str
@@ -65,7 +65,7 @@ def judged(ladders: Ladders) -> list[str]:
     return [name for name in QUANTITIES if ladders.slides or name not in FRICTION]
 
 
-def limits(ladders: Ladders, outcomes: Outcomes) -> list[Found]:
+def limits(ladders: Ladders, outcomes: Outcomes) -> list[StudyFinding]:
     """The limit of every quantity along every ladder."""
     found = []
     for integrator in ladders.integrators:
@@ -73,7 +73,7 @@ def limits(ladders: Ladders, outcomes: Outcomes) -> list[Found]:
             for quantity in judged(ladders):
                 values = [float(getattr(outcomes[case], quantity)) for case in cases]
                 finer = [getattr(outcomes[case], quantity) for case in _finer(outcomes, cases[-1])]
-                found.append(Found(quantity, integrator, name, _cover(extrapolate(sizes, values), finer)))
+                found.append(StudyFinding(quantity, integrator, name, _cover(extrapolate(sizes, values), finer)))
     return found
 
 

@@ -28,7 +28,7 @@ from .persson_rings import Rings
 CHUNK = 1_000_000  # tuning: transfer moduli held at a time, of 16 bytes; some ten arrays of that size are needed
 
 
-class Leg(NamedTuple):
+class SlidingLeg(NamedTuple):
     """A stretch at constant velocity (vx, vy) m/s: its duration, instants since its start (s), and p0 there (Pa)."""
 
     velocity: tuple[float, float]
@@ -37,7 +37,7 @@ class Leg(NamedTuple):
     pressures: Array
 
 
-class Outcome(NamedTuple):
+class TheoryOutcome(NamedTuple):
     """At each instant: <p grad h> in Pa, shape (instants, 2), and A/A0."""
 
     traction: Array
@@ -85,17 +85,17 @@ class Memory:
         return np.asarray(phase / (1 + phase))
 
 
-def follow(memory: Memory, legs: Iterable[Leg], gamma: float = persson.GAMMA) -> Iterator[Outcome]:
+def follow(memory: Memory, legs: Iterable[SlidingLeg], gamma: float = persson.GAMMA) -> Iterator[TheoryOutcome]:
     """Follow the instants of each leg, one after the other, with the `memory`."""
     for leg in legs:
         count = max(1, CHUNK // max(1, len(memory.shares)))
         starts = range(0, max(1, leg.instants.size), count)
         parts = [_observe(memory, leg, slice(start, start + count), gamma) for start in starts]
-        yield Outcome(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+        yield TheoryOutcome(*(np.concatenate(part) for part in zip(*parts, strict=True)))
         memory.slide(leg.velocity, leg.duration)
 
 
-def _observe(memory: Memory, leg: Leg, chosen: slice, gamma: float) -> Outcome:
+def _observe(memory: Memory, leg: SlidingLeg, chosen: slice, gamma: float) -> TheoryOutcome:
     modulus, pressures = memory.moduli(leg.velocity, leg.instants[chosen]), leg.pressures[chosen]
     traction = persson.traction(pressures, memory.rings, modulus, gamma)
-    return Outcome(traction, persson.contact_area(pressures, memory.rings, modulus))
+    return TheoryOutcome(traction, persson.contact_area(pressures, memory.rings, modulus))

@@ -47,7 +47,9 @@ def job(**changes: Any) -> Job:
     return Job.model_validate({"grid": grid, "surface": [WAVE], "material": SLS, "history": HISTORY, **changes})
 
 
-def predicted(job: Job, waves: prediction.WavesOf = "lattice", gamma: float = 0.45) -> list[prediction.Instant]:
+def predicted(
+    job: Job, waves: prediction.WavesOf = "lattice", gamma: float = 0.45
+) -> list[prediction.PredictedInstant]:
     return list(prediction.predict(job, Slab.alone(*job.grid.points), gamma, waves))
 
 
@@ -153,7 +155,7 @@ def test_the_verb(run_parcontact: RunParcontact, tmp_path: Path) -> None:
     assert first == "Persson's theory, gamma 1, for the spectrum of the surface: here/theory.csv"
     assert re.fullmatch(r"Persson's theory predicts mu_max \S+, mu_dyn \S+, contact area \S+", second)
     table = rows(tmp_path / "here" / "theory.csv")
-    assert tuple(table[0]) == prediction.Instant._fields
+    assert tuple(table[0]) == prediction.PredictedInstant._fields
     assert float(table[-1]["distance"]) == pytest.approx(4.32e-4)
     assert {path.name for path in (tmp_path / "here").iterdir()} == {"theory.csv", "theory.yaml"}
     assert yaml.safe_load((tmp_path / "here" / "theory.yaml").read_text()) == {

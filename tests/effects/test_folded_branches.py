@@ -29,7 +29,7 @@ from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
-from parcontact.physics.body import Heights, ZenerBody
+from parcontact.physics.body import MovedHeights, ZenerBody
 from parcontact.physics.prony import Prony, creep, normal_form
 
 Json = dict[str, Any]
@@ -129,7 +129,7 @@ def stresses(moments: list[tuple[float, float]], without: tuple[int, ...] = ()) 
     body = ZenerBody(POINT, DECADES, "exponential", memoryless=without)
     memory, found = body.at_rest(), []
     for dt, u in moments:
-        trial = body.begin(memory, dt, Heights(np.full((1, 1), u)))
+        trial = body.begin(memory, dt, MovedHeights(np.full((1, 1), u)))
         displacement = trial.effective.copy()
         memory = body.commit(memory, trial, displacement, np.empty((1, 1)))
         found.append(float(displacement[0, 0]) * trial.alpha)
@@ -161,7 +161,7 @@ def test_rest_after_a_jump_without_the_memory_of_a_branch() -> None:
         body = ZenerBody(POINT, prony, "exponential", memoryless=without)
         memory = body.at_rest()
         for step, u in moments:
-            trial = body.begin(memory, step, Heights(np.full((1, 1), u)))
+            trial = body.begin(memory, step, MovedHeights(np.full((1, 1), u)))
             displacement = trial.effective.copy()
             memory = body.commit(memory, trial, displacement, np.empty((1, 1)))
         found.append(float(displacement[0, 0]))

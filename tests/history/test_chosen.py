@@ -12,7 +12,7 @@ from marching import SLS, begun, column, marched
 from mpi4py import MPI
 from restarting import Bench
 
-from parcontact.history.chosen import ChosenEnds, ChosenSteps, Ladder, bounds
+from parcontact.history.chosen import ChosenEnds, ChosenSteps, StepLadder, bounds
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 
@@ -52,7 +52,7 @@ def test_it_is_what_a_stage_does_that_says_nothing() -> None:
 )
 def test_ladder(first: float, most: float, seconds: float) -> None:
     """Steps double up to the longest and end where they should; none is longer than twice the one before."""
-    ladder = Ladder(first, most, seconds)
+    ladder = StepLadder(first, most, seconds)
     ends = [ladder.end(n) for n in range(ladder.count + 1)]
     steps = np.diff(ends)
     assert ends[-1] == seconds

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact.__main__ import main
-from parcontact.job.sections.height_arrays import Heights
+from parcontact.job.sections.height_arrays import GivenHeights
 
 WORLD = MPI.COMM_WORLD
 NX, NY = 16, 12
@@ -61,7 +61,7 @@ def test_heights_with_names_of_axes() -> None:
     xarray = pytest.importorskip("xarray")
     heights = np.arange(12.0).reshape(3, 4)
     named = xarray.DataArray(heights, dims=("y", "x"))
-    assert Heights(named) == Heights(named.transpose("x", "y")) == Heights(heights)
+    assert GivenHeights(named) == GivenHeights(named.transpose("x", "y")) == GivenHeights(heights)
 
 
 def test_heights_with_coordinates() -> None:

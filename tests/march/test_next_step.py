@@ -12,7 +12,7 @@ from restarting import ELASTIC, ROUGH, SLIDE, ZENER, Bench, cut, rows, same
 
 from parcontact.history.timeline import Timeline
 from parcontact.march.loop import March, run
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 
 GRID: dict[str, Any] = {"points": 32, "size": 1e-3}
 DWELL = {"name": "dwell", "pressure": 1e4, "duration": 0.1, "time_step": {"first": 1e-4, "growth": 1.2}}
@@ -22,9 +22,9 @@ def job(*history: dict[str, Any], material: Any = ZENER, **changes: Any) -> dict
     return {"grid": GRID, "surface": ROUGH, "material": material, "history": [*history], **changes}
 
 
-def all_steps(data: dict[str, Any]) -> tuple[March, list[Row]]:
+def all_steps(data: dict[str, Any]) -> tuple[March, list[StepRow]]:
     """Without passing any over."""
-    march, found = begun(data), list[Row]()
+    march, found = begun(data), list[StepRow]()
     run(march, [lambda now: found.append(now.row)], Timeline.of(march.scene.job))
     return march, found
 

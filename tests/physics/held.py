@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from parcontact.parallel.slab import Array
-from parcontact.physics.body import BodyMemory, Heights, Trial, ZenerBody, surface_of
+from parcontact.physics.body import BodyMemory, MovedHeights, Trial, ZenerBody, surface_of
 from parcontact.physics.entries import Entry, Saved
 from parcontact.physics.units import Units
 
@@ -26,7 +26,7 @@ class HeldBody:
         self.body.settle(self.memory)
         return self.memory.branches
 
-    def begin(self, dt: float, heights: Heights, growth: float = 0.0) -> Trial:
+    def begin(self, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
         return self.body.begin(self.memory, dt, heights, growth)
 
     def commit(self, trial: Trial, displacement: Array) -> None:

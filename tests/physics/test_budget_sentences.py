@@ -11,7 +11,7 @@ from parcontact.job import Job
 from parcontact.physics.budget import ErrorBudget, ErrorSums, Parts, advice
 from parcontact.report import log
 from parcontact.steady_sliding.table import describe_missed
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 
 
 def test_an_error_that_is_printed_like_its_limit_is_within_it() -> None:
@@ -43,8 +43,8 @@ def test_friction_of_which_most_may_be_error_is_unknown(mesh: float, stated: flo
     in facts and in sentences, from which reports read it; the area and the parts stay as they are."""
     parts = Parts(solver=0.01, time=0.0, folded=0.0, mesh=mesh)
     budget = ErrorBudget(parts, parts)
-    assert Row(0, 0.0, 0.0, errors=budget).error_friction == pytest.approx(stated)
-    assert Row(0, 0.0, 0.0, errors=budget).error_area == pytest.approx(0.01 + mesh)
+    assert StepRow(0, 0.0, 0.0, errors=budget).error_friction == pytest.approx(stated)
+    assert StepRow(0, 0.0, 0.0, errors=budget).error_area == pytest.approx(0.01 + mesh)
     sums = ErrorSums().plus(budget, 0.1, 1.0)
     assert sums.facts(0.01)["friction"]["total"] == pytest.approx(stated)
     friction, area, *further = sums.lines((0.01, 0.01))

@@ -6,7 +6,7 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact.parallel.slab import Slab
-from parcontact.physics.body import Heights, ZenerBody
+from parcontact.physics.body import MovedHeights, ZenerBody
 from parcontact.physics.embedded import SAMPLED_ROWS, EmbeddedPair
 from parcontact.physics.prony import Prony
 
@@ -24,7 +24,7 @@ def march(comm: MPI.Intracomm, name: str, nx: int, ny: int, dt: float) -> tuple[
     heights, first, second, p = (dice.normal(size=(ny, nx))[slab.rows] for _ in range(4))
     pair = EmbeddedPair(slab, body.body, DX)
     for u, step in ((first, 2e-3), (second, dt)):
-        trial = body.begin(step, Heights(heights, 2))
+        trial = body.begin(step, MovedHeights(heights, 2))
         displacement = u + trial.effective - np.roll(heights, 2, axis=1)  # so that u is the new displacement
         body.commit(trial, displacement)
     pressure = np.maximum(p, 0.0)
@@ -80,7 +80,7 @@ def test_difference_of_quadratic_and_linear_steps(comm: MPI.Intracomm, growth: f
     ends, held = [], [HeldBody(ZenerBody(slab, PRONY, "exponential")) for _ in range(2)]
     for body, last in zip(held, (growth, 0.0), strict=True):
         for u, step, grown in ((first, dt / growth, 0.0), (second, dt, last)):
-            trial = body.begin(step, Heights(u), grown)
+            trial = body.begin(step, MovedHeights(u), grown)
             displacement = trial.effective.copy()
             body.commit(trial, displacement)
         ends.append((displacement * trial.alpha, trial, displacement))
@@ -118,13 +118,13 @@ def test_a_contact_that_the_sample_misses(comm: MPI.Intracomm, row: int) -> None
     pressure = slab.zeros()
     if row in range(*slab.rows.indices(200)):
         pressure[row - slab.rows.start] = 1.0
-    trial = body.begin(1e-2, Heights(slab.zeros()))
+    trial = body.begin(1e-2, MovedHeights(slab.zeros()))
     displacement = slab.zeros()
     displacement[...] = 1.0
     body.commit(trial, displacement)
     line = Slab.alone(8, 1)
     alone = HeldBody(ZenerBody(line, PRONY, "exponential"))
-    one = alone.begin(1e-2, Heights(np.zeros((1, 8))))
+    one = alone.begin(1e-2, MovedHeights(np.zeros((1, 8))))
     alone.commit(one, np.ones((1, 8)))
     expected = EmbeddedPair(line, alone.body, DX).compare(
         1e-2, one, alone.memory, np.ones((1, 8)), np.ones((1, 8)), 8.0, 1.0
@@ -142,7 +142,7 @@ def test_nothing_pressed_and_jumps() -> None:
     slab = Slab.alone(4, 4)
     body = HeldBody(ZenerBody(slab, PRONY, "exponential"))
     pair = EmbeddedPair(slab, body.body, DX)
-    trial = body.begin(0.0, Heights(slab.zeros()))
+    trial = body.begin(0.0, MovedHeights(slab.zeros()))
     body.commit(trial, np.ones((4, 4)))
     assert pair.compare(0.0, trial, body.memory, np.ones((4, 4)), np.ones((4, 4)), 16.0, 1.0).difference == 0.0
     assert pair.compare(1.0, trial, body.memory, np.zeros((4, 4)), np.ones((4, 4)), 0.0, 0.0).difference == 0.0
@@ -157,7 +157,7 @@ def test_second_order_of_a_step() -> None:
         body = HeldBody(ZenerBody(slab, PRONY, "exponential"))
         pair, dt = EmbeddedPair(slab, body.body, DX), 1e-3 / count
         for step in range(1, count + 1):
-            trial = body.begin(dt, Heights(slab.zeros()), float(step > 1))
+            trial = body.begin(dt, MovedHeights(slab.zeros()), float(step > 1))
             body.commit(trial, np.sin(3e3 * step * dt) + trial.effective)
         of_step = dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0
         found.append(pair.compare(*of_step).difference)
@@ -177,7 +177,7 @@ def test_order_in_the_length_of_a_step(times: list[float], dt: float, order: flo
     those beyond the ends. A jump, and a body of no branch, have none: two is what is told."""
     slab, prony = Slab.alone(4, 1), Prony(1.0, np.full(len(times), 1e-3), np.array(times))
     body = HeldBody(ZenerBody(slab, prony, "exponential"))
-    trial = body.begin(dt, Heights(slab.zeros()))
+    trial = body.begin(dt, MovedHeights(slab.zeros()))
     body.commit(trial, np.ones((1, 4)))
     look = EmbeddedPair(slab, body.body, DX).compare(dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0)
     assert look.order == pytest.approx(order, rel=1e-5)

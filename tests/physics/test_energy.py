@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from rubbers import complex_modulus
 
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.body import Heights, ZenerBody
+from parcontact.physics.body import MovedHeights, ZenerBody
 from parcontact.physics.energy import (
     AppliedInverse,
     ElasticEnergy,
@@ -72,7 +72,7 @@ class Driven:
         self.p, self.alpha, self.dt = slab.zeros(), 1.0, 0.0
 
     def to(self, u: Array, dt: float) -> EnergyMemory:
-        heights, growth = Heights(u.reshape(1, 4)), dt / self.dt if self.dt else 0.0
+        heights, growth = MovedHeights(u.reshape(1, 4)), dt / self.dt if self.dt else 0.0
         trial = self.zener.begin(dt, heights, growth)
         p, alpha = trial.effective.copy(), trial.alpha
         self.zener.commit(trial, p)
@@ -191,7 +191,7 @@ def test_sums_go_over_all_ranks(comm: MPI.Intracomm) -> None:
     balance = elastic.advance(elastic.at_rest(), 0.0, Pressed(p, 0.5), Pressed(p, 0.5), u, zener.memory)
     assert balance.work == balance.stored == 0.5 * 0.5 * 6.0 * 12
     energy = ZenerEnergy(slab, zener.body, AppliedInverse(Identity(), slab.empty))
-    trial = zener.begin(0.0, Heights(u))
+    trial = zener.begin(0.0, MovedHeights(u))
     zener.commit(trial, trial.effective.copy())
     pressed = Pressed(u, trial.alpha)
     balance = energy.advance(energy.at_rest(), 0.0, pressed, pressed, u, zener.memory)

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from rubbers import relaxation
 
 from parcontact.parallel.slab import Slab
-from parcontact.physics.body import ElasticBody, Heights, ZenerBody
+from parcontact.physics.body import ElasticBody, MovedHeights, ZenerBody
 from parcontact.physics.prony import Integrator, Prony, creep, normal_form, zener_to_prony
 from parcontact.physics.units import Units
 
@@ -30,7 +30,7 @@ def body(prony: Prony, integrator: Integrator = "exponential") -> HeldBody:
 def push(body: HeldBody, u: float, dt: float, growth: float = 0.0) -> float:
     """Prescribe the displacement of a point in a step, which is `growth` times as long as the one before; returns its
     total pressure."""
-    heights = Heights(np.full((1, 1), u))
+    heights = MovedHeights(np.full((1, 1), u))
     trial = body.begin(dt, heights, growth)
     displacement = trial.effective.copy()
     body.commit(trial, displacement)
@@ -39,7 +39,7 @@ def push(body: HeldBody, u: float, dt: float, growth: float = 0.0) -> float:
 
 def load(body: HeldBody, p: float, dt: float, growth: float = 0.0) -> float:
     """Prescribe the total pressure of a point; returns its displacement."""
-    heights = Heights(np.zeros((1, 1)))
+    heights = MovedHeights(np.zeros((1, 1)))
     trial = body.begin(dt, heights, growth)
     body.commit(trial, np.full((1, 1), p / trial.alpha))
     return float(body.u[0, 0])
@@ -56,7 +56,7 @@ def branch(body: HeldBody, k: int) -> float:
 def test_coefficients_of_eq_8() -> None:
     """alpha, beta and gamma of Eq. (8), printed to 1e-9 of their size."""
     made = body(TWO, "backward-euler")
-    alpha = made.begin(DT, Heights(np.zeros((1, 1)))).alpha
+    alpha = made.begin(DT, MovedHeights(np.zeros((1, 1)))).alpha
     decay, gain, _ = made.body.coefficients(DT)
     g0, g1, eta1 = (np.array(values) for values in BRANCHES)
     both = g0 + g1
@@ -208,8 +208,8 @@ def test_moved_heights_are_moved_heights(integrator: Integrator) -> None:
     base, prony = rng.normal(size=slab.shape), normal_form(*TWO)
     first, second = (HeldBody(ZenerBody(slab, prony, integrator)) for _ in range(2))
     for offset, dt in ((0, 0.0), (1, 1e-3), (5, 1e-3), (7, 2e-3), (-1, 1e-4)):
-        here = Heights(np.roll(base, offset, axis=1))
-        trial, same = first.begin(dt, here), second.begin(dt, Heights(base, offset))
+        here = MovedHeights(np.roll(base, offset, axis=1))
+        trial, same = first.begin(dt, here), second.begin(dt, MovedHeights(base, offset))
         assert trial.alpha == same.alpha
         assert_allclose(same.effective, trial.effective, rtol=0, atol=1e-15)
         displacement = trial.effective + rng.uniform(size=slab.shape)
@@ -222,8 +222,8 @@ def test_elastic_heights() -> None:
     slab = Slab.alone(5, 2)
     base, made = np.arange(10.0).reshape(2, 5), ElasticBody(slab, 3.0)
     memory = made.at_rest()
-    assert made.begin(memory, 0.0, Heights(base)).effective is base
-    trial = made.begin(memory, 1.0, Heights(base, 2))
+    assert made.begin(memory, 0.0, MovedHeights(base)).effective is base
+    trial = made.begin(memory, 1.0, MovedHeights(base, 2))
     assert trial.alpha == 3.0
     np.testing.assert_array_equal(trial.effective, np.roll(base, 2, axis=1))
 
@@ -234,7 +234,7 @@ def test_beginning_again_with_another_step(integrator: Integrator) -> None:
     first, second = body(TWO, integrator), body(TWO, integrator)
     for made in (first, second):
         push(made, 1.0, 1e-3)
-    heights = Heights(np.full((1, 1), 2.0))
+    heights = MovedHeights(np.full((1, 1), 2.0))
     second.begin(5e-3, heights)
     second.begin(0.0, heights)
     assert_allclose(push(second, 2.0, 1e-3), push(first, 2.0, 1e-3), rtol=1e-15)
@@ -261,7 +261,7 @@ def test_a_step_that_is_dropped_leaves_the_memory() -> None:
     made, other = body(TWO), body(TWO)
     for each in (made, other):
         push(each, 1.0, 1e-3)
-    dropped = made.begin(2e-3, Heights(np.full((1, 1), 5.0)))
+    dropped = made.begin(2e-3, MovedHeights(np.full((1, 1), 5.0)))
     made.body.commit(made.memory, dropped, np.full((1, 1), 7.0), np.empty((1, 1)))
     assert made.u == other.u
     assert push(made, 2.0, 1e-4) == push(other, 2.0, 1e-4)

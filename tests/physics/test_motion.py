@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.body import Heights
+from parcontact.physics.body import MovedHeights
 from parcontact.physics.motion import PARTS, AlongX, AnyFraction
 from parcontact.physics.shapes import Round
 from parcontact.physics.surface import Surface
@@ -29,7 +29,7 @@ def surface_on(comm: MPI.Intracomm) -> Surface:
     )
 
 
-def whole(heights: Heights, slab: Slab) -> Array:
+def whole(heights: MovedHeights, slab: Slab) -> Array:
     return gathered(np.roll(heights.base, heights.offset, axis=1), slab)
 
 

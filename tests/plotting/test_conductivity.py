@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from parcontact.derived.leakage_over_time import Instant
+from parcontact.derived.leakage_over_time import LeakInstant
 from parcontact.plotting import charts, conductivity, leakage
 
 
@@ -30,8 +30,8 @@ def test_closed_instants_and_narrow_constrictions() -> None:
     assert shown["limits"][1] >= 3.0
 
 
-def row(time: float, pressure: float, flow: float) -> Instant:
-    return Instant(time, pressure, 0.1, flow, flow, 1, 1, 1e-7, np.nan, np.nan, 1e-7, 1e-7, 0.1, 0.1)
+def row(time: float, pressure: float, flow: float) -> LeakInstant:
+    return LeakInstant(time, pressure, 0.1, flow, flow, 1, 1, 1e-7, np.nan, np.nan, 1e-7, 1e-7, 0.1, 0.1)
 
 
 RAMP = [row(float(time), 1e5 * (1.0 + time), 1e-20) for time in range(3)]
@@ -47,7 +47,7 @@ HOLDS = [row(1.0, 1e5, 4e-20), row(2.0, 1e5 * (1.0 + 1e-12), 3e-20), row(3.0, 2e
         (HOLDS, "pressure", "pressure", [1e5, 2e5]),  # the last instant of each
     ],
 )
-def test_what_k_is_drawn_over(rows: list[Instant], over: str, name: str, expected: list[float]) -> None:
+def test_what_k_is_drawn_over(rows: list[LeakInstant], over: str, name: str, expected: list[float]) -> None:
     chart = leakage.chart_of(rows, over)
     assert chart.x.name == name
     assert chart.series[0].x == pytest.approx(expected, rel=1e-9)

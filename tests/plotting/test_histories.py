@@ -132,7 +132,7 @@ def test_load_over_approach_is_a_loop(tmp_path: Path, drawn: list[Figure]) -> No
         f"{{approach: {{from: {a}, to: {b}}}, duration: 1.0e-3, time_step: 2.5e-4}}" for a, b in ((0, 2e-6), (2e-6, 0))
     ]
     out = ran(tmp_path, SPHERE + ZENER + f"history: [{', '.join(ramps)}]\n")
-    plots.plot([out], plots.Options(over="approach"))
+    plots.plot([out], plots.PlotOptions(over="approach"))
     assert "approach [µm]" not in panels(drawn[0])
     (axes,) = (axes for axes in drawn[0].axes if axes.get_ylabel().startswith("force"))
     x = np.array(axes.get_lines()[0].get_xdata())
@@ -161,5 +161,5 @@ def test_a_contact_that_sticks_is_drawn_with_its_tension(tmp_path: Path, drawn: 
 def test_a_load_is_not_drawn_over_itself(tmp_path: Path, drawn: list[Figure]) -> None:
     out = ran(tmp_path, SPHERE + ELASTIC + "history: [{force: {from: 0, to: 0.1}, duration: 1.0, time_step: 0.25}]\n")
     for over, there in (("time", 1), ("load", 0)):
-        plots.plot([out], plots.Options(over=over))
+        plots.plot([out], plots.PlotOptions(over=over))
         assert [axes.get_ylabel()[:5] for axes in drawn[-1].axes].count("force") == there

@@ -16,7 +16,7 @@ from PIL import Image
 
 from parcontact.job import Job
 from parcontact.plotting import maps, plots
-from parcontact.plotting.run import Fields, Run, label_frames
+from parcontact.plotting.run import Fields, PlottedRun, label_frames
 from parcontact.report import results
 
 ALL = "output: {fields: [pressure, displacement, gap, height]}\n"
@@ -51,7 +51,7 @@ def test_one_look(tmp_path: Path, drawn: list[Figure]) -> None:
     plots.plot([out])
     found = {title.split()[0]: axes for title, axes in maps_of(drawn[0]).items()}
     assert set(found) == {"pressure", "gap", "height"}
-    run = Run(out)
+    run = PlottedRun(out)
     assert [label for _, label in results.browse_run(run)[0][1]] == ["1 kPa (step 1)", "2 kPa (step 2)"]
     with h5py.File(out / "fields.h5") as file:
         for name, axes in found.items():
@@ -83,7 +83,7 @@ def test_when_and_under_what_load(tmp_path: Path, drawn: list[Figure], text: str
         f"gap (contact black)\n{told}",
         f"height (up is into the body)\n{told}",
     }
-    run = Run(out)
+    run = PlottedRun(out)
     with h5py.File(out / "fields.h5") as file:
         last, label = list(label_frames(run, file).items())[-1]
         assert label == f"{told} (step {file['step'][last]})"
@@ -112,10 +112,10 @@ def test_no_scale_of_nothing(
 ) -> None:
     """A gap where all is closed and pressures where nothing presses have no numbers; a displacement of zero has one."""
     out = ran(tmp_path, text + f"output: {{fields: [pressure, {name if name != 'pressure' else 'gap'}]}}\n")
-    plots.plot([out], plots.Options(at=str(1 + text.count("}, {"))))  # the last step
+    plots.plot([out], plots.PlotOptions(at=str(1 + text.count("}, {"))))  # the last step
     (axes,) = (axes for title, axes in maps_of(drawn[0]).items() if title.startswith(name))
     with h5py.File(out / "fields.h5") as file:
-        list(maps.draw_frames(file, name, {len(file["step"]) - 1: ""}, Run(out).job))
+        list(maps.draw_frames(file, name, {len(file["step"]) - 1: ""}, PlottedRun(out).job))
         for found in (mesh(axes), mesh(drawn[-1].axes[0])):
             assert (found.colorbar is None) == (ticks is None)
             if found.colorbar is not None:
@@ -169,7 +169,7 @@ def test_maps_show_the_contact(tmp_path: Path, drawn: list[Figure], then: str, t
     out = ran(tmp_path, SPHERE + ZENER + HELD % then + "output: {fields: [pressure, gap, height]}\n")
     plots.plot([out])
     assert {title.split("\n")[1] for title in maps_of(drawn[0])} == {told}
-    for _, images, first in results.browse_run(Run(out)):
+    for _, images, first in results.browse_run(PlottedRun(out)):
         assert images[first][1].startswith(f"{told} (step ")
     (lines,) = (axes for axes in drawn[0].axes if axes.get_title().startswith("pressure on a line"))
     legend = lines.get_legend()
@@ -182,7 +182,7 @@ def test_maps_of_a_pull_off(tmp_path: Path, drawn: list[Figure]) -> None:
     """The contact is pulled hardest in row 3, and lost in row 4; maps are there of all steps but that of row 3."""
     loads = "".join(f"{{pressure: {load}}}, " for load in (1e3, 2e3, 3e3, 4e3, 5e3))
     out = ran(tmp_path, WAVE + ELASTIC + f"history: [{loads}]\noutput: {{fields: pressure}}\n")
-    run = Run(out)
+    run = PlottedRun(out)
     for name, values in {"pressure": [0, 3, 1, -2, 0, 0], "approach": [0, -1, -2, -3, -4, -5]}.items():
         run._all[name] = np.array(values, dtype=float)
     run._all["contact_area"] = np.array([0.0, 0.3, 0.2, 0.1, 0.0, 0.0])
@@ -210,7 +210,7 @@ def test_maps_have_one_size(tmp_path: Path, drawn: list[Figure]) -> None:
 def test_ticks_do_not_follow_the_layout(tmp_path: Path) -> None:
     """A scale of colours whose ticks follow its room has other ones after the layout, and labels beyond the edge."""
     text = WAVE.replace("1.0e-6", "5.0e-6") + ELASTIC + "history: [{pressure: 1.0e3}]\n" + MAPS
-    _, panels = maps.panels(Run(ran(tmp_path, text)))
+    _, panels = maps.panels(PlottedRun(ran(tmp_path, text)))
     found = []
     for size in (2.0, 9.0):
         figure = Figure(figsize=(size, size))

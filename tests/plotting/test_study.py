@@ -14,10 +14,10 @@ from parcontact.plotting import study
 QUANTITIES = ("mu_max", "mu_end", "area_corrected")
 
 
-def points(fall: float) -> list[study.Point]:
+def points(fall: float) -> list[study.StudyPoint]:
     """Nine settings of each integrator, each eight times as dear as the one before, with `fall` of its error."""
     return [
-        study.Point(8.0**k, 1e-2 * 8.0**k, fall**k * worse, integrator, best)
+        study.StudyPoint(8.0**k, 1e-2 * 8.0**k, fall**k * worse, integrator, best)
         for k in range(9)
         for integrator, worse, best in (("exponential", 0.3, True), ("backward-euler", 0.6, False))
     ]
@@ -39,7 +39,7 @@ def test_what_accuracy_costs(tmp_path: Path, drawn: list[Figure], fall: float) -
 @pytest.mark.parametrize("unknown", [math.nan, math.inf])
 def test_quantities_without_an_error_are_left_out(tmp_path: Path, drawn: list[Figure], unknown: float) -> None:
     """As friction of a body that does not slide, and what only one case is known of."""
-    nothing = [study.Point(1.0, 1.0, unknown, "exponential", False)]
+    nothing = [study.StudyPoint(1.0, 1.0, unknown, "exponential", False)]
     assert study.plot(tmp_path, [], {"mu_max": nothing}, {})[0].stat().st_size > 0
     study.plot(tmp_path, [], {"mu_max": nothing, "area_corrected": points(0.5)}, {})
     assert [axes.get_ylabel() for axes in drawn[1].axes] == ["contact area, corrected:\nerror [%]", ""]
@@ -57,7 +57,7 @@ def test_cases_that_are_alike(tmp_path: Path, drawn: list[Figure]) -> None:
 def test_how_errors_fall(tmp_path: Path, drawn: list[Figure]) -> None:
     """One panel below the other, with one key above them; what is not known of the reference is grey."""
     curves = [
-        study.Curve(name, integrator, ladder, [1.0, 0.5, 0.25], [0.1, 0.02, 1e-5])
+        study.StudyCurve(name, integrator, ladder, [1.0, 0.5, 0.25], [0.1, 0.02, 1e-5])
         for name in QUANTITIES
         for integrator in study.INTEGRATORS
         for ladder in ("mesh and time together", "mesh alone", "time alone")

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from parcontact import job
 from parcontact.plotting import sweep
-from parcontact.plotting.plots import Options, plot
+from parcontact.plotting.plots import PlotOptions, plot
 
 SIZES = (1e-3, 2e-3, 3e-3)
 RESULTS = ("mu_max", "mu_dyn", "contact_area_corrected")
@@ -103,7 +103,7 @@ def test_nothing_to_draw(tmp_path: Path, rows: list[tuple[Any, ...]]) -> None:
 
 @pytest.mark.rendered
 def test_the_picture(tmp_path: Path) -> None:
-    (picture,) = plot([saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 4.0))], Options())
+    (picture,) = plot([saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 4.0))], PlotOptions())
     assert picture == tmp_path / "picture.png"
     assert picture.stat().st_size > 10_000
 
@@ -111,18 +111,18 @@ def test_the_picture(tmp_path: Path) -> None:
 def test_the_title_is_that_of_the_job(tmp_path: Path, drawn: list[Figure]) -> None:
     """As the first case has it; without a case that of the directory."""
     saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 4.0))
-    plot([tmp_path], Options())
+    plot([tmp_path], PlotOptions())
     (tmp_path / "cases" / "000").mkdir(parents=True)
     (tmp_path / "job.yaml").write_text(f"title: A road at several speeds\n{WAVE}{ELASTIC}{LOADS}")
     (tmp_path / "cases" / "000" / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
-    plot([tmp_path], Options())
+    plot([tmp_path], PlotOptions())
     assert [figure.get_suptitle() for figure in drawn] == [tmp_path.name, "A road at several speeds"]
 
 
 def test_dots_of_cases_have_a_key(tmp_path: Path, drawn: list[Figure]) -> None:
     """Once: those of every line look alike. None where each case is a point of the line."""
-    plot([saved(tmp_path, case(1.0, 1, 3.0), case(1.0, 2, 5.0), case(2.0, 1, 7.0))], Options())
-    plot([saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 7.0))], Options())
+    plot([saved(tmp_path, case(1.0, 1, 3.0), case(1.0, 2, 5.0), case(2.0, 1, 7.0))], PlotOptions())
+    plot([saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 7.0))], PlotOptions())
     legends = [figure.axes[0].get_legend() for figure in drawn]
     names = [[text.get_text() for text in legend.get_texts()] for legend in legends if legend is not None]
     assert names == [["highest", "each case", "theory, highest", "dynamic"], ["highest", "theory, highest", "dynamic"]]
@@ -134,7 +134,7 @@ def test_many_lines_have_their_key_beside_them(tmp_path: Path, drawn: list[Figur
     colour means the same value in both panels."""
     head = (*HEAD, "theory_mu_max", "theory_mu_dyn", "theory_contact_area")
     rows = [case(v, seed, v * seed + 1e3 * size, size) for v in (1.0, 2.0) for seed in (1, 2) for size in SIZES]
-    plot([saved(tmp_path, *((*row, 0.4, 0.3) for row in rows), head=head)], Options())
+    plot([saved(tmp_path, *((*row, 0.4, 0.3) for row in rows), head=head)], PlotOptions())
     (figure,) = drawn
     keys = [legend.get_window_extent() for axes in figure.axes if (legend := axes.get_legend())]
     assert keys[1].y1 < keys[0].y0

@@ -13,7 +13,7 @@ from parcontact.job import Job
 from parcontact.march.loop import March, run
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import ZenerBody
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 
 Json = dict[str, Any]
 EPS = float(np.finfo(float).eps)
@@ -54,7 +54,7 @@ class Periods:
     """A task of a march that keeps of each period's end the displacement [m], the branches [Pa m] and the row."""
 
     states: list[Array] = field(default_factory=list)
-    rows: list[Row] = field(default_factory=list)
+    rows: list[StepRow] = field(default_factory=list)
 
     def __call__(self, march: March) -> None:
         if march.row.step > 1 and (march.row.step - 1) % PERIOD == 0:

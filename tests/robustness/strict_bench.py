@@ -10,7 +10,7 @@ import numpy as np
 from parcontact.doctor.bench import Bench, Watch
 from parcontact.history.timeline import Step
 from parcontact.march.loop import March
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 
 LOAD = 1e-13  # how well the mean pressure is met
 BALANCE = {"double": 1e-11, "mixed": 1e-9}  # work = stored + dissipated, over the largest of all times
@@ -19,7 +19,7 @@ BALANCE = {"double": 1e-11, "mixed": 1e-9}  # work = stored + dissipated, over t
 class StrictBench(Bench):
     """Checks traction, penetration, load, numbers and energies, without the program's own sums."""
 
-    def march(self, data: dict[str, Any], *watches: Watch) -> tuple[March, list[Row]]:
+    def march(self, data: dict[str, Any], *watches: Watch) -> tuple[March, list[StepRow]]:
         march, rows = super().march(data, self._look, *watches)
         if march.scene.job.output.energy and march.scene.job.numerics.integrator == "exponential":
             self._balance(rows)  # that of the other integrator closes to first order only
@@ -50,7 +50,7 @@ class StrictBench(Bench):
             self.expect("load", load / built.slab.points * area, step.load, LOAD, scale)
             self.expect("measured load", measures.pressure * area, step.load, LOAD, scale)
 
-    def _balance(self, rows: Sequence[Row]) -> None:
+    def _balance(self, rows: Sequence[StepRow]) -> None:
         largest = max(max(abs(row.work), row.stored, row.dissipated) for row in rows)
         for row in rows:
             self.expect("energy", row.stored + row.dissipated, row.work, BALANCE[self.precision], scale=largest)

@@ -16,7 +16,7 @@ from parcontact.march.loop import March
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics import loops
 from parcontact.solve import kernels
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 
 from . import twins
 from .scenes import Sketch
@@ -55,7 +55,7 @@ def noise(height: float, shape: tuple[int, int] = (12, 20)) -> NDArray[np.float6
     return np.round((raw - raw.mean()) / unit) * unit
 
 
-def pressures(data: Json) -> tuple[list[Array], list[Row]]:
+def pressures(data: Json) -> tuple[list[Array], list[StepRow]]:
     """Maps and rows of every step."""
     maps: list[Array] = []
 

@@ -12,7 +12,7 @@ from parcontact.history.timeline import Step, Timeline
 from parcontact.march.failure import StepError
 from parcontact.march.loop import March, run
 from parcontact.parallel.slab import Array
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 
 EPS = float(np.finfo(float).eps)
 ROUNDINGS = 64  # that a number may be off by, of the largest it is a difference of
@@ -47,7 +47,7 @@ class Witness:
     failure: str = ""
     beyond: bool = False
     iterations: int = 0
-    last: Row = field(default_factory=Row)
+    last: StepRow = field(default_factory=StepRow)
     scales: Scales = field(default_factory=Scales)
 
     @property
@@ -68,7 +68,7 @@ class Witness:
             self.failure, self.beyond = str(error), isinstance(error, StepError) and error.beyond_precision
         return self
 
-    def _note(self, timeline: clock.Timeline, row: Row) -> None:
+    def _note(self, timeline: clock.Timeline, row: StepRow) -> None:
         if row.step:
             step = timeline[row.step]
             self.iterations = max(self.iterations, row.iterations)

@@ -40,7 +40,7 @@ def cases_in_groups(directory: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[t
 
 def go(cases: tuple[Case, ...], act: Callable[[Job, Slab], int]) -> int:
     groups, stop = Groups(MPI.COMM_SELF), sweep.stop_file(cases)
-    return sweep.Sweep(cases, groups, lambda job, slab, _: act(job, slab), stop, quiet=True).run(cases)
+    return sweep.SweepRun(cases, groups, lambda job, slab, _: act(job, slab), stop, quiet=True).run(cases)
 
 
 def seeds_done(cases: tuple[Case, ...], codes: dict[int, int]) -> tuple[int, list[int]]:
@@ -145,7 +145,7 @@ def test_no_case_begins_when_the_time_is_used_up(cases: tuple[Case, ...], capsys
 
     for seconds, code in ((1.0, 3), (60.0, 0)):
         limit, alone = watch.limit(watch.age() + seconds, {}), Groups(MPI.COMM_SELF)
-        assert sweep.Sweep(cases[:2], alone, act, sweep.stop_file(cases), limit=limit).run(cases[:2]) == code
+        assert sweep.SweepRun(cases[:2], alone, act, sweep.stop_file(cases), limit=limit).run(cases[:2]) == code
         assert len(begun) == (0 if code else 2)
     said = capsys.readouterr().out.splitlines()[0]
     assert said == "stopped before case 0: the wall time is nearly used up; run again to go on"
@@ -170,7 +170,7 @@ def test_groups_of_ranks_take_cases_by_turns(
             raise RunError("it fell over")
         return 0
 
-    assert sweep.Sweep(cases, groups, act, sweep.stop_file(cases)).run(cases) == 1
+    assert sweep.SweepRun(cases, groups, act, sweep.stop_file(cases)).run(cases) == 1
     assert groups.from_all(begun) == [list(range(6))[number :: groups.count] for number in range(groups.count)]
     said = capsys.readouterr()
     told = "".join(world.allgather(said.err)).splitlines()
@@ -185,7 +185,7 @@ def test_groups_of_ranks_take_cases_by_turns(
     if world.rank == 0:
         stop.path.touch()
     world.Barrier()
-    assert sweep.Sweep(cases, groups, act, stop).run(cases) == 3
+    assert sweep.SweepRun(cases, groups, act, stop).run(cases) == 3
     assert begun == list(range(6))[groups.number :: groups.count]
     assert stop.path.exists()
 

@@ -48,7 +48,7 @@ def test_groups_that_find_cases_taken(
     def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
         raise InUseError("taken")
 
-    assert sweep.Sweep(cases[:4], groups, act, sweep.stop_file(cases)).run(cases[:4]) == 0
+    assert sweep.SweepRun(cases[:4], groups, act, sweep.stop_file(cases)).run(cases[:4]) == 0
     err = "".join(world.allgather(capsys.readouterr().err)).splitlines()
     assert sorted(err) == [f"parcontact: case {n} is being run by another program: taken" for n in range(4)]
 

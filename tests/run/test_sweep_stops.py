@@ -68,14 +68,14 @@ def test_a_stop_file_ends_all_that_run(tmp_path: Path, monkeypatch: pytest.Monke
         return 3
 
     for chosen, stop in zip((cases, cases, cases[2:3]), stops, strict=True):
-        assert sweep.Sweep(cases, Groups(MPI.COMM_SELF), act, stop).run(chosen) == 3
+        assert sweep.SweepRun(cases, Groups(MPI.COMM_SELF), act, stop).run(chosen) == 3
     assert begun == ["000"]
     later = sweep.stop_file(cases)
-    assert sweep.Sweep(cases, Groups(MPI.COMM_SELF), lambda *_: 0, later).run(cases[1:3]) == 0
+    assert sweep.SweepRun(cases, Groups(MPI.COMM_SELF), lambda *_: 0, later).run(cases[1:3]) == 0
     asked = [later.asks]
     os.utime(later.path, ns=(1, 1))
     assert [*asked, later.asks] == [False, True]
-    assert sweep.Sweep(cases, Groups(MPI.COMM_SELF), lambda *_: 0, later).run(cases) == 3
+    assert sweep.SweepRun(cases, Groups(MPI.COMM_SELF), lambda *_: 0, later).run(cases) == 3
 
 
 @pytest.mark.mpi
@@ -96,7 +96,7 @@ def test_a_signal_that_no_case_sees_ends_the_sweep(
         job.output.directory.mkdir(parents=True, exist_ok=True)
         return 0
 
-    assert sweep.Sweep(cases, groups, act, stop).run(cases) == 3
+    assert sweep.SweepRun(cases, groups, act, stop).run(cases) == 3
     assert groups.from_all(begun) == [[number] for number in range(groups.count)]
     if groups.root:
         assert [row["state"] for row in table()] == ["-"] * 6
@@ -117,6 +117,6 @@ def test_what_stops_one_group_stops_all(shared_path: Path, monkeypatch: pytest.M
         asked.append(other.asks)
         return 3 if groups.number == groups.count - 1 else 0
 
-    assert sweep.Sweep(cases, groups, act, stop).run(cases) == 3
+    assert sweep.SweepRun(cases, groups, act, stop).run(cases) == 3
     assert groups.from_all(begun) == [[number] for number in range(groups.count)]
     assert (any(asked), stop.path.exists(), stop.own.exists()) == (False, False, False)

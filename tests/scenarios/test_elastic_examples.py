@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from static_jobs import run
 
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 from parcontact.theory import hertz, westergaard
 
 SPHERE = (0.15, 1e-2, 2.75e6)  # force [N], radius [m], shear modulus [Pa] of jobs/hertz.yaml
@@ -138,7 +138,7 @@ def test_johnson_area_corrected() -> None:
     assert abs(corrected) < 2e-3
 
 
-def check_westergaard(row: Row, pressures: NDArray[Any], edge: float, wrong: float) -> None:
+def check_westergaard(row: StepRow, pressures: NDArray[Any], edge: float, wrong: float) -> None:
     """Each of the two edges of the contact to `edge` cells, and the pressures to `wrong` of the highest."""
     mean = row.measures.pressure
     cells = X.size * (row.measures.contact_area - float(westergaard.contact_fraction(mean, *WAVE)))

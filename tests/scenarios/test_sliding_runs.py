@@ -11,10 +11,10 @@ from sliding import FAST, PRESS, WAVELENGTH, Json, rough, slide, wave
 
 from parcontact.march.loop import March
 from parcontact.physics.prony import Integrator
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 
 
-def moving(kind: str, steps: int, jump: bool, integrator: Integrator) -> Row:
+def moving(kind: str, steps: int, jump: bool, integrator: Integrator) -> StepRow:
     """A sphere, or crossed waves, in partial contact for 4 ms, with half the load from the middle on if `jump`."""
     halves = [(2e-3, 1.0), (2e-3, 0.5 if jump else 1.0)]
     step = {"time_step": 4e-3 / steps, "velocity": 0.04}
@@ -105,7 +105,7 @@ def test_sphere_that_starts_to_slide(speed: float) -> None:
         assert row.stored + row.dissipated == pytest.approx(row.work, rel=1e-12)
 
 
-def power(rows: list[Row], area: float) -> NDArray[np.float64]:
+def power(rows: list[StepRow], area: float) -> NDArray[np.float64]:
     """The work of the forces on the surface since the first row: the integral of W dd - F ds, by trapezoids."""
     mean = [0.5 * (column(rows, name)[1:] + column(rows, name)[:-1]) for name in ("pressure", "force_x")]
     steps = [np.diff(column(rows, name)) for name in ("approach", "distance")]
@@ -170,7 +170,7 @@ def test_along_y_as_along_x(tmp_path: Path) -> None:
     terms = [(m, n, rng.uniform(0, 2 * np.pi)) for m in range(-3, 4) for n in range(4) if (m, n) != (0, 0)]
     heights = sum(1e-7 * np.cos(2 * np.pi * (m * x + n * y) + phase) / np.hypot(m, n) for m, n, phase in terms)
 
-    def slid(heights: NDArray[np.float64], size: list[float], velocity: list[float]) -> tuple[March, list[Row]]:
+    def slid(heights: NDArray[np.float64], size: list[float], velocity: list[float]) -> tuple[March, list[StepRow]]:
         path = tmp_path / f"{velocity[0]}.npy"
         np.save(path, heights)
         ny, nx = heights.shape

@@ -12,7 +12,7 @@ from rubbers import relaxation
 from sliding import CELL, FAST, HEIGHT, MEAN, WAVELENGTH, K, wave
 
 from parcontact.physics.prony import Integrator
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 from parcontact.theory import full_contact
 
 INTEGRATORS: tuple[Integrator, ...] = ("exponential", "exponential-linear", "backward-euler")
@@ -29,7 +29,7 @@ STEADY = [
 ]
 
 
-def traction(rows: list[Row]) -> NDArray[np.float64]:
+def traction(rows: list[StepRow]) -> NDArray[np.float64]:
     """Tangential force over normal force, along x."""
     return column(rows, "force_x") / (column(rows, "pressure") * WAVELENGTH**2)
 

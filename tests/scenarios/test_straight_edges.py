@@ -5,12 +5,12 @@ import pytest
 from marching import marched
 
 from parcontact.job import Job
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 
 FINER = 16
 
 
-def pressed(radius: float, cells: int) -> Row:
+def pressed(radius: float, cells: int) -> StepRow:
     job = Job.model_validate(
         {
             "grid": {"points": [4, cells], "size": [4e-3 / cells, 1e-3]},

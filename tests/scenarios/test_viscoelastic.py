@@ -10,7 +10,7 @@ from marching import PRONY, SLS, column, example, marched
 from numpy.testing import assert_allclose
 
 from parcontact.march.loop import March
-from parcontact.storage.row import Row
+from parcontact.storage.row import StepRow
 from parcontact.theory import lee_radok
 
 Json = dict[str, Any]
@@ -109,7 +109,7 @@ def test_no_load_on_a_body_at_rest() -> None:
     assert_allclose(force(march, np.array(rows[-1].measures.pressure)), FORCE, rtol=1e-12)
 
 
-def near(rows: list[Row], t: float, name: str) -> float:
+def near(rows: list[StepRow], t: float, name: str) -> float:
     """A number at an instant, between steps linearly."""
     return float(np.interp(t, column(rows, "time"), column(rows, name)))
 

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from parcontact.errors import InputError, RunError
 from parcontact.parallel.slab import Array, Slab
 from parcontact.storage import checkpoint, hdf5
-from parcontact.storage.hdf5 import Part
+from parcontact.storage.hdf5 import Slice
 
 pytestmark = pytest.mark.mpi
 
@@ -49,7 +49,7 @@ def test_both_ways_are_interchangeable(
         make(path, slab)
         a, b = field(slab, 1), field(slab, 2)
         monkeypatch.setattr(hdf5, "MPI_IO", writes)
-        hdf5.write(path, slab, [Part("a", (), a), Part("group/b", (), b), Part("stack", (2,), a)])
+        hdf5.write(path, slab, [Slice("a", (), a), Slice("group/b", (), b), Slice("stack", (2,), a)])
         monkeypatch.setattr(hdf5, "MPI_IO", reads)
         for reader in communicators:
             if reader.size > writer.size:
@@ -57,7 +57,7 @@ def test_both_ways_are_interchangeable(
             other = Slab(reader, 5, ny)
             found = [np.full(other.shape, np.nan) for _ in range(3)]
             names: tuple[tuple[str, tuple[int, ...]], ...] = (("a", ()), ("group/b", ()), ("stack", (2,)))
-            hdf5.read(path, other, [Part(*n, rows) for n, rows in zip(names, found, strict=True)])
+            hdf5.read(path, other, [Slice(*n, rows) for n, rows in zip(names, found, strict=True)])
             for rows, seed in zip(found, (1, 2, 1), strict=True):
                 assert np.array_equal(rows, field(other, seed))
 
@@ -67,7 +67,7 @@ def test_same_bytes(comm: MPI.Intracomm, shared_path: Path, monkeypatch: pytest.
     for name, together in (("together.h5", True), ("in turn.h5", False)):
         monkeypatch.setattr(hdf5, "MPI_IO", together)
         make(shared_path / name, slab)
-        hdf5.write(shared_path / name, slab, [Part("a", (), field(slab)), Part("stack", (1,), field(slab))])
+        hdf5.write(shared_path / name, slab, [Slice("a", (), field(slab)), Slice("stack", (1,), field(slab))])
     comm.Barrier()
     assert (shared_path / "together.h5").read_bytes() == (shared_path / "in turn.h5").read_bytes()
 
@@ -79,7 +79,7 @@ def test_writing_leaves_all_else_alone(comm: MPI.Intracomm, shared_path: Path) -
     comm.Barrier()
     before = path.read_bytes()
     comm.Barrier()
-    hdf5.write(path, slab, [Part("a", (), field(slab))])
+    hdf5.write(path, slab, [Slice("a", (), field(slab))])
     comm.Barrier()
     after = path.read_bytes()
     with h5py.File(path) as file:
@@ -96,10 +96,10 @@ def test_one_error_for_all(
     monkeypatch.setattr(hdf5, "MPI_IO", together)
     slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
     with pytest.raises(RunError, match=r"cannot open .*absent\.h5: No such file"):
-        hdf5.write(shared_path / "absent.h5", slab, [Part("a", (), field(slab))])
+        hdf5.write(shared_path / "absent.h5", slab, [Slice("a", (), field(slab))])
     make(path, slab)
     with pytest.raises(RunError, match=r"cannot write .*file\.h5"):
-        hdf5.write(path, slab, [Part("a", (), field(slab)), Part("absent", (), field(slab))])
+        hdf5.write(path, slab, [Slice("a", (), field(slab)), Slice("absent", (), field(slab))])
     with pytest.raises(RunError, match=r"cannot make .*: No such file"):
         make(shared_path / "absent" / "file.h5", slab)
 
@@ -112,17 +112,17 @@ def test_error_of_one_rank(comm: MPI.Intracomm, shared_path: Path) -> None:
     if comm.rank == comm.size - 1:
         rows = np.zeros((slab.shape[0] + 50, 6))
     with pytest.raises(RunError, match="cannot write"):
-        hdf5.write(path, slab, [Part("a", (), rows), Part("group/b", (), field(slab))])
+        hdf5.write(path, slab, [Slice("a", (), rows), Slice("group/b", (), field(slab))])
 
 
 def test_change_keeps_maps(comm: MPI.Intracomm, shared_path: Path) -> None:
     slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
     make(path, slab)
-    hdf5.write(path, slab, [Part("a", (), field(slab))])
+    hdf5.write(path, slab, [Slice("a", (), field(slab))])
     hdf5.change(path, slab, lambda file: file.attrs.modify("text", np.bytes_("y")))
     hdf5.on_root(slab, lambda: hdf5.put(path, {"t": np.array([1.0, 2.0, np.nan])}), "put")
     rows = np.empty(slab.shape)
-    hdf5.read(path, slab, [Part("a", (), rows)])
+    hdf5.read(path, slab, [Slice("a", (), rows)])
     assert np.array_equal(rows, field(slab))
     with h5py.File(path) as file:
         assert file.attrs["text"] == b"y"

@@ -10,7 +10,7 @@ from rubbers import TWELVE_DECADES, ZENER
 
 from parcontact.theory import full_contact
 from parcontact.theory.full_contact import Waves
-from parcontact.theory.persson_history import CHUNK, Leg, Memory, Outcome, follow
+from parcontact.theory.persson_history import CHUNK, Memory, SlidingLeg, TheoryOutcome, follow
 from parcontact.theory.persson_rings import Rings, rings_of_spectrum, rings_of_surface
 
 from .test_persson import K_LONG, K_SHORT, PRESSURE, spectrum
@@ -19,8 +19,8 @@ WAVES = Waves(np.array([0.5e-6, 0.2e-6 + 0.1e-6j]), np.array([25132.741, 30000.0
 OBLIQUE = (0.03, -0.02)
 
 
-def at(velocity: tuple[float, float], instants: np.ndarray, pressure: float = 2e5) -> Leg:
-    return Leg(velocity, float(instants[-1]), instants, np.full(instants.shape, pressure))
+def at(velocity: tuple[float, float], instants: np.ndarray, pressure: float = 2e5) -> SlidingLeg:
+    return SlidingLeg(velocity, float(instants[-1]), instants, np.full(instants.shape, pressure))
 
 
 @pytest.fixture
@@ -77,7 +77,7 @@ def test_full_contact_with_other_loads(memory: Memory) -> None:
     pressures = np.linspace(1e6, 3e6, 7)
     exact = full_contact.traction(*memory.rings.waves, memory.moduli(OBLIQUE, instants))
     for gamma in (0.0, 0.45, 1.0):
-        (found,) = follow(Memory(memory.rings, ZENER), [Leg(OBLIQUE, 5e-3, instants, pressures)], gamma)
+        (found,) = follow(Memory(memory.rings, ZENER), [SlidingLeg(OBLIQUE, 5e-3, instants, pressures)], gamma)
         assert_allclose(found.traction, exact, rtol=1e-12, atol=1e-12 * np.abs(exact).max())
         assert_allclose(found.friction(pressures), np.hypot(*exact.T) / pressures, rtol=1e-12)
         assert np.all(found.contact_area == 1.0)
@@ -151,7 +151,7 @@ def test_peak_after_a_velocity_step(small_road: Rings, row: tuple[float, ...]) -
     assert_allclose(1e6 * distances[friction.argmax()], where, atol=0.1)
 
 
-def tyre(road: Rings, velocity: float, distances: np.ndarray) -> tuple[Outcome, Outcome]:
+def tyre(road: Rings, velocity: float, distances: np.ndarray) -> tuple[TheoryOutcome, TheoryOutcome]:
     """1 ms at rest under load, then sliding."""
     rest = at((0.0, 0.0), np.array([1e-6, 1e-5, 1e-4, 5e-4, 1e-3]), PRESSURE)
     resting, sliding = follow(Memory(road, TWELVE_DECADES), [rest, at((velocity, 0.0), distances / velocity, PRESSURE)])

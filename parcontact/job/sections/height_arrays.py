@@ -22,7 +22,7 @@ SAME_CELL = 1e-3  # accuracy: relative: coordinates this close are rounded
 EXPECTED = "must be a numpy array of heights [m], real and finite, of shape (ny, nx)"
 
 
-class Heights:
+class GivenHeights:
     """A map of heights [m], read only. Where a job is sent to other ranks, `values` stay behind: root deals them.
 
     `cell` is the distance [m] of its points along x and y, nan where they have no coordinates.
@@ -59,7 +59,7 @@ class Heights:
         return f"surface-{self.checksum}.npy"
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Heights) and (self.shape, self.checksum) == (other.shape, other.checksum)
+        return isinstance(other, GivenHeights) and (self.shape, self.checksum) == (other.shape, other.checksum)
 
     def __hash__(self) -> int:
         return hash((self.shape, self.checksum))
@@ -87,13 +87,13 @@ def _distance(given: Any, axis: str) -> float:
     return mean
 
 
-def _heights(given: Any) -> Heights:
-    if isinstance(given, Heights):
+def _heights(given: Any) -> GivenHeights:
+    if isinstance(given, GivenHeights):
         return given
     if not hasattr(given, "__array__"):
         refuse(Fault(f"{EXPECTED}, got {quote(given)}; a job file names a file instead, {{shape: file, path: ...}}"))
     try:
-        return Heights(given)
+        return GivenHeights(given)
     except (TypeError, ValueError) as error:
         refuse(Fault(f"{EXPECTED}, got {error}"))
 
@@ -102,7 +102,7 @@ class HeightArray(Part):
     """Heights given in Python, as a numpy array. A job that is stored names a file of them, which lies beside it."""
 
     shape: Literal["array"] = "array"
-    heights: Annotated[Heights, PlainValidator(_heights), WithJsonSchema({"allOf": [False]})] = Field(
+    heights: Annotated[GivenHeights, PlainValidator(_heights), WithJsonSchema({"allOf": [False]})] = Field(
         description="a numpy array of heights [m] of shape (ny, nx)"
     )
 

@@ -51,7 +51,7 @@ class GapSolution:
 
 
 @dataclass
-class Iterate:
+class GapIterate:
     """A gap in numbers: its mean and its lowest value, the uniform part m of the pressure, the approach; under which
     load or mean gap; on which body.
 
@@ -76,7 +76,7 @@ class Iterate:
     step: float = 1.0
 
 
-def certify(slab: Slab, it: Iterate, working: Array, g: Array, q: Array, sigma: Array, z: Array) -> Certificate:
+def certify(slab: Slab, it: GapIterate, working: Array, g: Array, q: Array, sigma: Array, z: Array) -> Certificate:
     """Return how wrong the gap is: by z, weighted by the pressure, over a length; and the load; collective.
 
     The length is by how much the body is deformed in the contact, at most the range, and at least a tenth of it. Wrong

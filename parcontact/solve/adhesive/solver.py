@@ -45,7 +45,7 @@ from ..certificate import Certificate
 from ..preconditioner.cell_sums import CellSums
 from ..problem import Approach, Control, MeanPressure
 from . import kernels
-from .iterate import GapOperators, GapSolution, Iterate, certify
+from .iterate import GapIterate, GapOperators, GapSolution, certify
 from .law import Law
 
 # tuning
@@ -116,7 +116,7 @@ class GapSolver:
 
     # -- the steps of a solve ------------------------------------------------------------------------------------------
 
-    def _begin(self, law: Law, heights: Array, control: Control, gap: Array, operators: GapOperators) -> Iterate:
+    def _begin(self, law: Law, heights: Array, control: Control, gap: Array, operators: GapOperators) -> GapIterate:
         """Give the start its mean where that is given, find its pressure, and forget the last direction."""
         self._t.fill(0.0)
         sums = self.slab.sum(maps.total(heights), maps.total(gap))
@@ -133,15 +133,15 @@ class GapSolver:
         operators.inverse.apply(self._q, self._q)
         kernels.attract(law, gap, self._sigma)
         d = control.value if isinstance(control, Approach) else 0.0
-        return Iterate(law, heights, mean_h, control, operators, given, mean_g, d=d)
+        return GapIterate(law, heights, mean_h, control, operators, given, mean_g, d=d)
 
-    def _uniform(self, it: Iterate, mean_gap: float) -> float:
+    def _uniform(self, it: GapIterate, mean_gap: float) -> float:
         """The uniform part m of the pressure, where it is not a multiplier."""
         if isinstance(it.control, MeanPressure):
             return it.control.value
         return (mean_gap + it.mean_height + it.control.value) / it.operators.mean
 
-    def _find_residual(self, it: Iterate, g: Array) -> tuple[float, bool]:
+    def _find_residual(self, it: GapIterate, g: Array) -> tuple[float, bool]:
         """Let the pressure follow the last step, and find the working set and c on it, in the map of the way; the size
         of the set, and whether the surface has come off; collective."""
         q, sigma, before = self._q, self._sigma, it.m
@@ -165,7 +165,7 @@ class GapSolver:
         held = attracted / self.slab.points  # with all points open it only falls from here on
         return members, held < HELD * -it.m or (held < -it.m and it.lowest > FAR * it.law.range)
 
-    def _find_pressure(self, it: Iterate) -> None:
+    def _find_pressure(self, it: GapIterate) -> None:
         """Put the pressure into its map. Where nothing touches under an approach it is minus the attraction: far apart
         that is less than what is wrong with K (g + h)."""
         if isinstance(it.control, Approach) and it.lowest > 0.0:
@@ -173,7 +173,7 @@ class GapSolver:
         else:
             self._q += it.m
 
-    def _least_uniform(self, it: Iterate) -> float:
+    def _least_uniform(self, it: GapIterate) -> float:
         """The least uniform pressure that holds full contact; collective."""
         lowest = float((-self._q).max(initial=-np.inf))
         return self.slab.reduce((), [lowest])[0] - it.law.strength
@@ -195,7 +195,7 @@ class GapSolver:
             return f"did not converge in max_iterations = {iteration}: the residual is {asked}"
         return None
 
-    def _precondition(self, it: Iterate, g: Array, z: Array, near: float) -> tuple[Certificate, bool]:
+    def _precondition(self, it: GapIterate, g: Array, z: Array, near: float) -> tuple[Certificate, bool]:
         """Put `z = M c` into a map, with c in that of the way, or `z = A c` where gaps seem to be `near`; returns the
         certificate that z makes, and whether it is that of A c; collective."""
         if self._cells is not None:
@@ -206,7 +206,7 @@ class GapSolver:
         it.operators.operator.apply(self._way, z)
         return certify(self.slab, it, self._working, g, self._q, self._sigma, z), True
 
-    def _turn(self, it: Iterate, members: float, scale: float, z: Array) -> float:
+    def _turn(self, it: GapIterate, members: float, scale: float, z: Array) -> float:
         """Make the new direction from z; returns `<c, z>`; collective.
 
         `scale` is that of the last one, 0 for one to be forgotten.
@@ -222,7 +222,7 @@ class GapSolver:
         maps.turn(working, z, beta, mean, self._t)
         return c_z
 
-    def _descend(self, it: Iterate, g: Array, out: Array) -> bool:
+    def _descend(self, it: GapIterate, g: Array, out: Array) -> bool:
         """Make a step along the direction to the gap `out` and its attraction; returns whether any lowers E;
         collective."""
         share = self._share(it, g)
@@ -241,7 +241,7 @@ class GapSolver:
         it.share = 0.0
         return False
 
-    def _share(self, it: Iterate, g: Array) -> float:
+    def _share(self, it: GapIterate, g: Array) -> float:
         """Find a way along the direction; returns which share of it to go; collective."""
         for _ in range(MAX_TRIES):
             total, cut = self.slab.sum(*kernels.lead(g, self._t, it.step, self._way))
@@ -254,7 +254,7 @@ class GapSolver:
         it.step *= wanted if wanted > 0.0 else 1.0
         return 1.0 if cut > 0.0 and wanted >= WHOLE else min(wanted, most)
 
-    def _newton(self, it: Iterate, g: Array) -> tuple[float, float]:
+    def _newton(self, it: GapIterate, g: Array) -> tuple[float, float]:
         """The share of the way that is the step of Newton, or the majorized one, and the most that gaps allow;
         collective."""
         it.operators.inverse.apply(self._way, self._image)

@@ -22,7 +22,7 @@ class CellLevel:
     second map but for sums. `known` are the points of which interpolation knows the values; maps of the rows of this
     rank. Collective."""
 
-    step: pyramid.Step
+    step: pyramid.PyramidStep
 
     @property
     def coarse(self) -> Slab:
