@@ -142,8 +142,8 @@ def go(job: dict[str, Any], counts: Counter[str], checks: bool = True) -> tuple[
         counts["steps that took more than 100 iterations"] += row.iterations > 100
         if len(wrong) > 2:
             break
-    if march.detached and march.state.sticking is not None:
-        made.append((march.state.sticking.detached[0], 0.0, 0.0))
+    if march.detached:
+        made.append((march.state.law.end.time, 0.0, 0.0))
     return march, np.array(made).reshape(-1, 3), wrong
 
 
@@ -153,7 +153,7 @@ def trial(counts: Counter[str], seed: int, finer: int, number: int) -> Iterator[
     about = f"({job['grid']['boundary']} {job['surface']['shape']} {job['material']['model']} {job['adhesion']['law']})"
     try:
         march, made, wrong = go(job, counts)
-        counts["snaps"] += march.state.sticking.snaps if march.state.sticking is not None else 0
+        counts["snaps"] += march.state.memories["adhesion"].snaps
         counts["touched"] += bool(made[:, 1].max(initial=0.0) > 0.0)
         counts["came off"] += bool(march.detached)
         wrong += in_finer_steps(job, made, counts, finer) if finer else []

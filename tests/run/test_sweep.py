@@ -101,13 +101,13 @@ def test_a_finished_case_whose_table_lacks_rows_is_damaged(
 
 
 def test_errors_are_those_that_the_end_of_a_run_tells(cases: tuple[Case, ...]) -> None:
-    """To the three digits of its sentences."""
+    """To 1 %: in tables a row that is wrong by more than half counts as 1 or more, in the sum of a run as it is."""
     assert main(["job.yaml", "--case", "0", "--quiet"]) == 0
     log = (cases[0].job.output.directory / "run.log").read_text()
     for name, what in (("error_friction", "friction"), ("error_area", "the corrected contact area")):
         told = re.search(f"estimated error of {what}: ([0-9.]+) %", log)
         assert told is not None
-        assert 100.0 * float(table()[0][name]) == pytest.approx(float(told[1]), rel=6e-3)
+        assert 100.0 * float(table()[0][name]) == pytest.approx(float(told[1]), rel=1e-2)
 
 
 def test_a_sweep_ends_with_its_largest_errors(cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,6 +25,7 @@ class Small(NamedTuple):
 
 
 SMALL = {
+    "band_errors": Small(["--cases", "1"], r"(?m)^2 bands, friction: .*within 5 % in \d of 1"),
     "bench": Small(
         ["--points", "64", "--rounds", "1", "--json", "bench.json", "--picture", "bench.png"],
         r"(?s)double: operator calls +\d\d .*tolerance 0.005: operator calls per step +[4-9](\.| ).*"
@@ -42,6 +43,7 @@ SMALL = {
     "fuzz_jobs": Small(["--jobs", "40"], r"(?m)^40 made: 0 with faults; "),
     "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_disturbed.py
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^\d\d pages in pages"),
+    "march_errors": Small(["--marches", "1"], r"(?m)^exponential +0.01 +[0-9.]+ "),
     "mutants": Small(["--count", "1", "--seed", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
     "paper_figures": Small(["7", "--to", "pictures"], r"(?m)^picture: pictures/fig07.png"),
     "random_adhesion": Small(["--scenes", "3"], r"(?m)^3 made: 0 with faults; .*[1-9]\d+ steps"),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
@@ -45,12 +46,15 @@ def test_conditions_with_a_law(mean: float) -> None:
     contact = splitting.solve(HEIGHTS, mean, LAW, 60.0)
     assert contact.converged
     p = contact.p
-    fine = np.interp(np.log(np.maximum(p, 0.1)), np.log([0.1, 1.0, 10.0]), [0.0, 0.3, 0.5])
-    slope = 0.3 / np.log(10.0)  # dc/d(log p) of the first interval: below the first rung c goes on with it
+    cubic = PchipInterpolator(np.log([0.1, 1.0, 10.0]), [0.0, 0.3, 0.5], extrapolate=False)
+    fine = np.where(p > 10.0, 0.5, cubic(np.log(np.clip(p, 0.1, 10.0))))
+    slope = float(cubic(np.log(0.1), 1))  # dc/d(log p) at the first rung: below it c goes on with it
     closing = np.where(p < 0.1, (p / 0.1 - 1.0) * slope, fine) + slope
     known = np.interp(p, LAW.pressures, LAW.closings)
-    # between points of the law, six to an interval of one decade, a straight line: (log(10)/6)^2/8 of its slope
-    assert np.abs(known - closing).max() < 0.3 / np.log(10.0) * (np.log(10.0) / 6) ** 2 / 8 * 1.3
+    # straight lines in p between points a sixth of a decade apart: an eighth of its square times c_ll - c_l, l = log p
+    logs = np.linspace(np.log(0.1), np.log(10.0), 400)
+    bend = np.abs(cubic(logs, 2) - cubic(logs, 1)).max()
+    assert np.abs(known - closing).max() < bend * (np.log(10.0) / 6) ** 2 / 8 * 1.3
     u = operator.apply(p, np.empty_like(p))
     gap = u + known - HEIGHTS - contact.d
     scale = np.ptp(HEIGHTS)
