@@ -1,5 +1,7 @@
 """Which law a contact obeys, from its job: what pressures are admissible, and where surfaces touch in saved maps."""
 
+import math
+
 from ..job import Job
 from ..parallel.slab import Array
 from ..solve.adhesive.law import Law
@@ -7,10 +9,10 @@ from ..solve.bounded import Bounded
 from ..solve.constraint import Constraint, Mask, NonNegative
 
 
-def constraint_of(job: Job, unit: float = 1.0) -> Constraint:
-    """Return which pressures a job admits without adhesion, in a unit of pressure [Pa]."""
+def constraint_of(job: Job, unit: float = 1.0, most: float = math.inf) -> Constraint:
+    """Return which pressures a job admits without adhesion, in a unit of pressure [Pa]; none is above `most` units."""
     hardness = job.material.hardness
-    return NonNegative() if hardness is None else Bounded(hardness / unit)
+    return NonNegative() if hardness is None or hardness / unit >= most else Bounded(hardness / unit)
 
 
 def touching_of(job: Job, pressure: Array, gap: Array) -> Mask:

@@ -17,7 +17,7 @@ from ..physics.units import Units
 from ..scene import Scene, solver_on, solver_on_tiles
 from ..solve.contact import Contact
 from ..solve.fallback import cold_start, retry
-from ..solve.problem import Control, Problem
+from ..solve.problem import Control, MeanPressure, Problem
 from . import failure
 from .starts import cells_moved, make_start
 
@@ -46,7 +46,8 @@ class DryLaw:
     ) -> SolvedContact[None]:
         """Solve a step; `effects.contact_protocol.ContactLaw.solve`. Raises StepError."""
         scene, contact, remark = self.scene, None, ""
-        problem = Problem(*scene.operators, trial.effective, scene.constraint(trial.alpha), control)
+        most = control.value * scene.slab.points if isinstance(control, MeanPressure) else math.inf
+        problem = Problem(*scene.operators, trial.effective, scene.constraint(trial.alpha, most), control)
         make_start(scene, past.pressures, step, trial.alpha, past.spare)
         if past.last.alpha == 0.0:  # nothing has been solved before
             on = partial(solver_on, scene.setup)

@@ -161,9 +161,10 @@ class Scene:
         """Return the gap [m] of this rank's rows to a surface at a position; the others in the run's units."""
         return (displacement - self.heights(position) - approach) * self.units.height
 
-    def constraint(self, alpha: float) -> Constraint:
-        """Return which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure."""
-        return contact_law.constraint_of(self.job, alpha * self.units.pressure)
+    def constraint(self, alpha: float, most: float = math.inf) -> Constraint:
+        """Return which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure. None is
+        above `most`, such as the whole load on one point."""
+        return contact_law.constraint_of(self.job, alpha * self.units.pressure, most)
 
 
 def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:

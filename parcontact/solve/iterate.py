@@ -41,13 +41,14 @@ class Iterate:
         """The same iterate, for the d at which `<p, g> = 0` over free points, but for the rounding of d.
 
         If none is free it is the middle of `between`, or, with all pressures at one bound, the d for all points.
+        Without any pressure it stays.
         """
         if self.between is not None:
             d = 0.5 * sum(self.between)
         elif self.free_load > 0.0:
             d = self.d + self.free_gaps / self.free_load
         else:
-            d = self.d + self.gaps / self.load
+            d = self.d + (self.gaps / self.load if self.load > 0.0 else 0.0)
         rest = self.free_gaps - (d - self.d) * self.free_load
         return replace(self, d=d, gaps=self.gaps - (d - self.d) * self.load, free_gaps=rest)
 

@@ -85,3 +85,13 @@ def test_a_slide_of_a_viscoelastic_body(comm: Any) -> None:
 def test_what_cannot_be(changes: dict[str, Any], said: str) -> None:
     with pytest.raises(pc.JobError, match=said):
         pc.Simulation(scene(material={**ZENER, "hardness": 900.0}, **changes))
+
+
+def test_a_hardness_above_the_whole_load_on_one_point_is_none() -> None:
+    """No pressure can reach it, however high it is: every number is that of the job without. One of 2e18 Pa took
+    pressures below its 1e-12th part for none, and the solve stalled."""
+    surface = {"shape": "rough", "hurst": 0.8, "long_wavelength": 1e-3, "short_wavelength": 2e-4, "rms_slope": 0.1}
+    job = {"grid": {"points": 16, "size": 1e-3}, "surface": surface, "history": [{"pressure": 1e4}]}
+    body = {"model": "elastic", "shear_modulus": 1e9}
+    found = [marched({**job, "material": {**body, **more}})[1][-1] for more in ({}, {"hardness": 2e18})]
+    assert found[0].measures == found[1].measures

@@ -76,7 +76,9 @@ class InFluid:
 @pytest.fixture
 def with_fluid(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
     """All that a law of one's own needs."""
-    return lambda: monkeypatch.setattr(contact_law, "constraint_of", lambda job, unit=1.0: InFluid(FLUID / unit))
+    return lambda: monkeypatch.setattr(
+        contact_law, "constraint_of", lambda job, unit=1.0, most=0.0: InFluid(FLUID / unit)
+    )
 
 
 def job(load: float, points: int = 32, **changes: Any) -> dict[str, Any]:
