@@ -240,10 +240,12 @@ def test_adhesion() -> None:
 
 
 def test_yielding_counterbody() -> None:
-    """A bound that nothing reaches costs sums over ranks alone: see `solve/test_bounded` for one that is reached."""
-    off, on = job(history=[PRESS]), job(history=[PRESS], material={**ELASTIC, "hardness": 1e9})
+    """A bound that nothing reaches costs sums over ranks alone, and one above the whole load on a point, here 1.9 MPa,
+    costs nothing: see `solve/test_bounded` for one that is reached."""
+    off, on = job(history=[PRESS]), job(history=[PRESS], material={**ELASTIC, "hardness": 9e5})
     assert [row(planned, "yielding counterbody").on for planned in (off, on)] == [False, True]
     assert set(extra(on, off)) == {"allreduce"}
+    assert not extra(job(history=[PRESS], material={**ELASTIC, "hardness": 2e6}), off)
 
 
 def test_displacement_control() -> None:
