@@ -39,7 +39,7 @@ class Task(NamedTuple):
 
 @dataclass(frozen=True)
 class BandResult:
-    """What one band comes to under a distribution of pressure: its weights and the load [Pa] on it; friction of its
+    """Result of one band under a distribution of pressure: its weights and the load [Pa] on it; friction of its
     waves over the whole load [-], by energy and by slopes; area down to it, counted and corrected; share of the load
     above its ladder; power [W/m^2] per branch; S_j and g of its heat
     (`band_heat`) in the mean over the load; absolute errors of friction and of area by solver and grid."""

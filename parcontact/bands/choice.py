@@ -1,4 +1,4 @@
-"""What a job in bands leaves open: how many bands there are, their boxes and points, and how many surfaces of each."""
+"""Choice of what a job in bands leaves open: the number of bands, their boxes, points and numbers of surfaces."""
 
 import math
 from collections.abc import Sequence
@@ -44,7 +44,7 @@ class Cut:
 
     @property
     def line(self) -> bool:
-        """Whether its surfaces are profiles."""
+        """True if its surfaces are profiles."""
         return 1 in self.points
 
     @property

@@ -35,7 +35,7 @@ TABLE = "bands.csv"
 
 @dataclass(frozen=True)
 class BandOutcome:
-    """What all bands come to: results with laws from all samples, friction and area of the first sample with laws and
+    """Results of all bands: results with laws from all samples, friction and area of the first sample with laws and
     behind hard walls, and standard errors of friction and area by the scatter of surfaces; the rungs of each band, and
     whether these are of profiles."""
 
@@ -64,7 +64,7 @@ class BandOutcome:
 
 @dataclass(frozen=True)
 class Warm:
-    """How temperatures of bands were found: in how many `rounds`, and friction without them."""
+    """Search for the temperatures of bands: the number of `rounds`, and friction without them."""
 
     rounds: int = 1
     friction_cold: float = math.nan

@@ -1,4 +1,4 @@
-"""What a job in bands will do, and what it costs, by a trial of its finest band."""
+"""Plan of a job in bands: its steps and costs, by a trial of its finest band."""
 
 import time
 from collections.abc import Iterator

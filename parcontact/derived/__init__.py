@@ -1,1 +1,1 @@
-"""What is calculated for a job, or from what its run has left: Persson's theory, and leakage over time."""
+"""Calculations for a job, or from the files of its run: Persson's theory, and leakage over time."""

@@ -1,4 +1,4 @@
-"""What `parcontact surface` says and draws of the rigid surface of a job."""
+"""Sentences and picture of the rigid surface of a job, for `parcontact surface`."""
 
 from collections.abc import Iterator
 from pathlib import Path

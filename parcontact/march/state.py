@@ -49,7 +49,7 @@ class State:
 
     @property
     def row(self) -> StepRow:
-        """What the last step is recorded as."""
+        """The record of the last step."""
         row: StepRow = self.memories["row"]
         return row
 
@@ -61,7 +61,7 @@ class State:
 
     @property
     def law(self) -> Any:
-        """What the contact law remembers."""
+        """The memory of the contact law."""
         return self.memories["law"]
 
     @property
@@ -93,7 +93,7 @@ class State:
 
     @property
     def tolerance(self) -> StepTolerance:
-        """What is known of the tolerance that solves may have."""
+        """The memory of the tolerance that solves may have."""
         return self.memories.get("tolerance") or StepTolerance()
 
 
