@@ -18,11 +18,11 @@ from campaign import numbers, parser
 from numpy.typing import NDArray
 
 from parcontact import job as jobs
+from parcontact.accuracy.budget import Parts
 from parcontact.bands.band import Band
 from parcontact.bands.choice import choose
 from parcontact.bands.road_sliding import RoadSliding
 from parcontact.parallel.slab import Slab
-from parcontact.physics.budget import Parts
 from parcontact.steady_sliding.point import Point
 
 COMPOUNDS: dict[str, dict[str, Any]] = {

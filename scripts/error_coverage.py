@@ -41,12 +41,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from parcontact import scene
+from parcontact.accuracy.budget import NAMES, Parts, weight_of
 from parcontact.errors import InputError, RunError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.march.loop import March
 from parcontact.parallel.slab import Slab
-from parcontact.physics.budget import NAMES, Parts, weight_of
 from parcontact.steady_sliding import curve
 from parcontact.steady_sliding.sliding import SteadySliding
 

@@ -19,6 +19,7 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"parallel", "job"},
     {"history", "road", "leakage"},
     {"physics"},
+    {"accuracy"},
     {"theory", "solve"},
     {"effects"},
     {"storage"},

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..accuracy.budget import ErrorBudget, Parts
 from ..columns import BANDS, names_of
 from ..effects.relaxation import feeds_back, temperature_of
 from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.slab import Array, Slab
-from ..physics.budget import ErrorBudget, Parts
 from ..physics.measures import Measures
 from ..scene import Setup, choices
 from ..solve.certificate import Certificate

@@ -1,8 +1,8 @@
 """Time steps that follow the error of a step.
 
-The error E of a step of length dt is estimated from that step alone (`physics.time_error`). It is to be `allowed` E0, a
-share of `numerics.accuracy`. As E goes with dt^p (p = 3 for steps in which the displacement is quadratic, 1.7 where it
-is linear, 1 for backward Euler), the next is
+The error E of a step of length dt is estimated from that step alone (`accuracy.time_error`). It is to be `allowed` E0,
+a share of `numerics.accuracy`. As E goes with dt^p (p = 3 for steps in which the displacement is quadratic, 1.7 where
+it is linear, 1 for backward Euler), the next is
 
     dt <- dt clip(SAFETY (E0/E)^(1/p), 1, MOST_GROWTH),
 
@@ -21,10 +21,10 @@ import math
 from dataclasses import dataclass
 from functools import partial
 
+from ..accuracy.time_error import order_of_time_error
 from ..history.chosen import Bounds, ChosenEnds, ChosenSteps, MadeStep, reached
 from ..history.timeline import Span, Step
 from ..job.checks.cells import one_cell
-from ..physics.time_error import order_of_time_error
 from ..scene import Scene
 
 TIME_SHARE = 0.8  # accuracy: of numerics.accuracy, for the error of a step

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from ..accuracy.budget import ErrorBudget, ErrorSums, estimate
+from ..accuracy.embedded import EmbeddedPair, IntegratorDifference
+from ..accuracy.time_error import RunProperties, StepObservation, error_of_rise, time_error
 from ..effects.contact_protocol import SolvedContact
 from ..history.timeline import Step
 from ..job import Cylinder, Flat, Rough, Wave
 from ..physics.body import BodyMemory, Trial, surface_of
-from ..physics.budget import ErrorBudget, ErrorSums, estimate
-from ..physics.embedded import EmbeddedPair, IntegratorDifference
 from ..physics.entries import Entry, Saved
 from ..physics.measures import Measures
 from ..physics.prony import Prony
 from ..physics.slopes import friction_by_energy
-from ..physics.time_error import RunProperties, StepObservation, error_of_rise, time_error
 from ..physics.units import Units
 from ..scene import Scene, Setup
 from ..solve.contact import Contact

@@ -3,12 +3,12 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
+from ..accuracy.budget import ErrorSums
 from ..effects.adhesive_law import nothing_holds
 from ..effects.contact_protocol import Detached
 from ..errors import InputError
 from ..history.timeline import Step, Timeline
 from ..parallel.slab import Array
-from ..physics.budget import ErrorSums
 from ..physics.entries import Entry
 from ..scene import Scene
 from ..storage.checkpoint import Contents, Facts

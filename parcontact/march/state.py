@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..accuracy.budget import ErrorSums
 from ..effects.contact_protocol import PreviousContacts, PreviousPressure
 from ..effects.effect import Memories, values_of
 from ..errors import InputError
 from ..history.chosen import ChosenSteps
 from ..parallel.slab import Array
 from ..physics.body import BodyMemory
-from ..physics.budget import ErrorSums
 from ..physics.energy import EnergyMemory
 from ..physics.entries import Entry, MapCount, RunPart, Saved, part_of, prefixed
 from ..physics.measures import Measures

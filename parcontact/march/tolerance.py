@@ -16,10 +16,10 @@ first step, which may be far above the one with which the surface passed before:
 import math
 from dataclasses import dataclass
 
+from ..accuracy.budget import ErrorBudget, Parts
 from ..history.chosen import reached
 from ..history.timeline import Step
 from ..job.sections.calculation import Accuracy
-from ..physics.budget import ErrorBudget, Parts
 from ..physics.entries import Entry, Saved
 from ..physics.units import Units
 from ..scene import Scene

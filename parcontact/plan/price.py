@@ -2,7 +2,7 @@
 
 The mesh may make MESH_SHARE of an accuracy, time steps TIME_SHARE of it, or CHOSEN_SHARE where stages choose them. What
 the mesh makes of friction falls with the power SPOTS_ORDER of the cell, and of the contact area with the first; what
-time steps make with the order of the integrator (`physics.time_error`). Nothing more is tried.
+time steps make with the order of the integrator (`accuracy.time_error`). Nothing more is tried.
 """
 
 import math
@@ -12,14 +12,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from ..accuracy.mesh_error import SPOTS_ORDER
+from ..accuracy.time_error import order_of_time_error
 from ..history.chosen import ChosenEnds
 from ..history.timeline import Span, Timeline
 from ..job import Job, OnOneMesh, Rough
 from ..job.checks.cells import cells_per_wave, fast_length, one_cell
 from ..job.sections.listing import plain
 from ..mesh import points_for
-from ..physics.mesh_error import SPOTS_ORDER
-from ..physics.time_error import order_of_time_error
 from ..printed import per_cent
 from .costs import Costs
 from .report import duration_text, ranks_text, unit_of

@@ -14,12 +14,12 @@ from itertools import islice
 from typing import TypeVar
 
 from .. import scene
+from ..accuracy.budget import ErrorBudget, weight_of
 from ..errors import InputError, RunError
 from ..history.timeline import Step
 from ..job import Job
 from ..march.loop import March
 from ..parallel.slab import Slab
-from ..physics.budget import ErrorBudget, weight_of
 from ..steady_sliding import start
 from ..steady_sliding.curve import request
 from ..steady_sliding.point import Point

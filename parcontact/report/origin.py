@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
+from ..accuracy.budget import exceeds
 from ..job import Job
 from ..job.sections.listing import plain
-from ..physics.budget import exceeds
 from ..storage import hdf5, provenance
 from ..storage.tables import read as read_table
 from ..summary.slide import ERRORS

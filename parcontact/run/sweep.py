@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TextIO
 
+from ..accuracy.budget import exceeds
 from ..errors import InputError, InUseError, RunError
 from ..job import Case, Job
 from ..job.reading import CASES
@@ -15,7 +16,6 @@ from ..job.sections.listing import plain_job
 from ..parallel.groups import Groups
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..physics.budget import exceeds
 from ..printed import per_cent
 from ..storage import marker, stopfile
 from ..storage.directory import refuse_files, refuse_other_jobs

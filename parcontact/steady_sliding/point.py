@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from ..physics.budget import ErrorBudget
+from ..accuracy.budget import ErrorBudget
 from ..physics.flash import Flash
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate

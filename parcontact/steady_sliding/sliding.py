@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..accuracy.budget import ErrorBudget, estimate_steady
+from ..accuracy.time_error import RunProperties, StepObservation
 from ..effects.relaxation import temperature_of
 from ..errors import InputError, RunError
 from ..march.errors import properties_of
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
-from ..physics.budget import ErrorBudget, estimate_steady
 from ..physics.convolution import Convolution
 from ..physics.flash import Flash
 from ..physics.loops import slope_under
 from ..physics.measures import Measures
-from ..physics.time_error import RunProperties, StepObservation
 from ..scene import Setup, choices, sanity
 from ..solve import kernels, nested
 from ..solve.local_load import LEAST_CUT

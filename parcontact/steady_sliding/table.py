@@ -5,11 +5,11 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from .. import progress
+from ..accuracy.budget import advice, describe, exceeds
 from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
 from ..job import Job
 from ..job.checks.advice import describe_sample
 from ..job.sections.materials import describe_temperature
-from ..physics.budget import advice, describe, exceeds
 from ..scene import Setup
 from ..storage import curve_points, files, tables
 from ..storage.console import Console, always

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+from ..accuracy.budget import ErrorBudget
 from ..columns import MEASURES, Column, cells, choose_columns, names_of, values_of
 from ..errors import InputError
-from ..physics.budget import ErrorBudget
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate
 from . import files

@@ -12,10 +12,10 @@ from mpi4py import MPI
 from sliding import rough, slide
 
 import parcontact as pc
+from parcontact.accuracy.budget import ErrorBudget, Parts
 from parcontact.history.timeline import Step
 from parcontact.march.loop import March
 from parcontact.march.tolerance import CLOSE, FIRST, MOST, SHARES, StepTolerance, tolerance_before
-from parcontact.physics.budget import ErrorBudget, Parts
 from parcontact.solve.certificate import Certificate
 from parcontact.solve.contact import Contact
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from held import HeldBody
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 from rubbers import complex_modulus
@@ -18,8 +19,6 @@ from parcontact.physics.energy import (
     dissipation_weights,
 )
 from parcontact.physics.prony import Integrator, Prony
-
-from .held import HeldBody
 
 BODY = Prony(0.3, np.array([0.5, 2.0, 1.0]), np.array([0.05, 0.4, 1e2]))
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(40)

@@ -4,6 +4,7 @@ from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
+from held import HeldBody
 from numpy.testing import assert_allclose
 from rubbers import relaxation
 
@@ -11,8 +12,6 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics.body import ElasticBody, MovedHeights, ZenerBody
 from parcontact.physics.prony import Integrator, Prony, creep, normal_form, zener_to_prony
 from parcontact.physics.units import Units
-
-from .held import HeldBody
 
 POINT = Slab.alone(1, 1)
 MICRON = 1e-6

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from marching import marched
 
+from parcontact.accuracy.budget import ErrorSums
+from parcontact.accuracy.mesh_error import SPOTS_ORDER
+from parcontact.accuracy.time_error import CURVED_ORDER, TIME_ORDER
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.job.checks.cells import cells_per_wave
 from parcontact.job.sections.listing import plain
 from parcontact.mesh import load_cases
 from parcontact.parallel.slab import Slab
-from parcontact.physics.budget import ErrorSums
-from parcontact.physics.mesh_error import SPOTS_ORDER
-from parcontact.physics.time_error import CURVED_ORDER, TIME_ORDER
 from parcontact.plan import price
 from parcontact.plan.costs import Costs, costs_of
 from parcontact.plan.planning import only_steady_states

@@ -7,12 +7,12 @@ import pytest
 from counting import ELASTIC, ITERATIONS, NX, NY, PRESS, RUBBER, SLIDE, STAND, Json, job, whole
 
 from parcontact import scene
+from parcontact.accuracy.embedded import EmbeddedPair
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 from parcontact.physics.body import ElasticBody, ZenerBody
-from parcontact.physics.embedded import EmbeddedPair
 from parcontact.physics.motion import AlongX
 from parcontact.physics.probe import Probe
 from parcontact.physics.slopes import friction_by_energy

@@ -8,8 +8,8 @@ import pytest
 from marching import marched
 
 import parcontact as pc
+from parcontact.accuracy.budget import ErrorSums
 from parcontact.job import Job
-from parcontact.physics.budget import ErrorSums
 from parcontact.python.curves import Curve
 
 Json = dict[str, Any]

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from parcontact.accuracy.budget import ErrorBudget, ErrorSums, Parts, advice
 from parcontact.job import Job
-from parcontact.physics.budget import ErrorBudget, ErrorSums, Parts, advice
 from parcontact.report import log
 from parcontact.steady_sliding.table import describe_missed
 from parcontact.storage.row import StepRow

@@ -8,10 +8,10 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import j1, spherical_jn
 
-from parcontact.physics.budget import estimate, estimate_steady
-from parcontact.physics.edge_loss import lost_in_short_waves
+from parcontact.accuracy.budget import estimate, estimate_steady
+from parcontact.accuracy.edge_loss import lost_in_short_waves
+from parcontact.accuracy.time_error import RunProperties, StepObservation, radius_of
 from parcontact.physics.prony import Prony
-from parcontact.physics.time_error import RunProperties, StepObservation, radius_of
 
 ONE = Prony(1e6, np.array([1e6]), np.array([1e-3]))
 SLOW, FAST = 1e-6, 1e9  # cells in a second

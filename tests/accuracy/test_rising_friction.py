@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from parcontact.accuracy.time_error import RunProperties, StepObservation, error_of_rise, radius_of
 from parcontact.physics.prony import Prony
-from parcontact.physics.time_error import RunProperties, StepObservation, error_of_rise, radius_of
 
 STEPS, TAU = 10.0, 1e-3  # relaxation times in a step
 LATE = 1.0 / math.tanh(0.5 * STEPS) - 2.0 / STEPS  # L of the module

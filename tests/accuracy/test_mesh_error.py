@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from parcontact.physics.budget import ErrorSums, estimate
-from parcontact.physics.mesh_error import friction_by_mesh
-from parcontact.physics.time_error import RunProperties, StepObservation, count_spots, spot_radius
+from parcontact.accuracy.budget import ErrorSums, estimate
+from parcontact.accuracy.mesh_error import friction_by_mesh
+from parcontact.accuracy.time_error import RunProperties, StepObservation, count_spots, spot_radius
 
 KNOWN = RunProperties(8.0, False, 1e-4, True)
 SEEN = StepObservation(1e-3, 4e-4, 2.0, 0.02, 0.02, 0.1, 0.095)

@@ -21,9 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..parallel.slab import Array, Slab
-from . import loops
-from .body import BodyMemory, Trial, ZenerBody, surface_of
-from .prony import Advance, coefficients
+from ..physics import loops
+from ..physics.body import BodyMemory, Trial, ZenerBody, surface_of
+from ..physics.prony import Advance, coefficients
 
 SAMPLED_ROWS = 8  # accuracy: at least, if a map has as many: the difference is then within 5 % of that on all rows
 LEAST_VARIANCE = 1e-6  # accuracy: of heights, over their mean square: less is rounding

@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
+from held import HeldBody
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
+from parcontact.accuracy.embedded import SAMPLED_ROWS, EmbeddedPair
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import MovedHeights, ZenerBody
-from parcontact.physics.embedded import SAMPLED_ROWS, EmbeddedPair
 from parcontact.physics.prony import Prony
-
-from .held import HeldBody
 
 PRONY = Prony(0.5, np.array([2.0, 1.0, 4.0]), np.array([1e-3, 1e-1, 3.0]))
 DX = 0.25

@@ -22,7 +22,7 @@ import math
 
 import numpy as np
 
-from .prony import Prony, complex_modulus
+from ..physics.prony import Prony, complex_modulus
 
 STRIP, CIRCLE = 2.0 / math.pi, 3.0 / math.pi  # physics: q0 times the half width, and times the radius
 NODES = 16  # accuracy: of the integral, within 2 % of it for one branch

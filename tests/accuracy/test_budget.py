@@ -6,10 +6,10 @@ from dataclasses import astuple, replace
 import numpy as np
 import pytest
 
-from parcontact.physics.budget import ErrorBudget, ErrorSums, estimate, estimate_steady
+from parcontact.accuracy.budget import ErrorBudget, ErrorSums, estimate, estimate_steady
+from parcontact.accuracy.time_error import RunProperties, StepObservation, count_spots, spot_radius, time_error
 from parcontact.physics.measures import SIDE
 from parcontact.physics.prony import Prony
-from parcontact.physics.time_error import RunProperties, StepObservation, count_spots, spot_radius, time_error
 
 KNOWN = RunProperties(8.0, False, 1e-4, True)
 SEEN = StepObservation(1e-3, 4e-4, 2.0, 0.02, 0.02, 0.1, 0.095)

@@ -39,8 +39,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..physics.entries import Entry, Saved
 from ..printed import per_cent
-from .entries import Entry, Saved
 from .mesh_error import SPOTS_POWER, area_by_mesh, friction_by_mesh, lost_at_edges
 from .time_error import RunProperties, StepObservation, count_spots, share_of_area, time_error
 

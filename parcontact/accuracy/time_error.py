@@ -45,8 +45,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .measures import excess_of
-from .prony import Prony, complex_modulus
+from ..physics.measures import excess_of
+from ..physics.prony import Prony, complex_modulus
 
 Vector = tuple[float, float]
 
