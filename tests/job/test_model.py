@@ -19,6 +19,7 @@ from parcontact.job import (
 )
 from parcontact.job.checks.cells import cells_per_wave
 from parcontact.job.resolved import shown_job
+from parcontact.job.sections import listing
 
 from .texts import SMALL, job_of, replaced
 
@@ -158,6 +159,18 @@ def test_ramps(tmp_path: Path, control: str) -> None:
     assert (stage_read.time_step, stage_read.velocity) == (0.5, (0.0, -1.0))
 
 
+def test_the_duration_of_an_approach_follows_from_its_velocity(tmp_path: Path) -> None:
+    """Both ways, beside a sliding velocity, in steps that are chosen or given; |to - from| / velocity to rounding."""
+    down = "{approach: {from: -1e-6, to: 2e-6, velocity: 1.5e-6}, velocity: 3.0}"
+    up = "{approach: {from: 2e-6, to: -1e-6, velocity: 3e-5}, time_step: 0.01}"
+    press, pull = job_of(tmp_path, replaced(SMALL.split("history")[0], history=f"[{down}, {up}]")).history
+    assert (press.seconds, pull.seconds) == pytest.approx((2.0, 0.1), rel=1e-15)
+    assert (press.load.start, press.load.end, press.speed) == (-1e-6, 2e-6, 3.0)
+    assert press.chooses
+    assert pull.time_step == 0.01
+    assert "approach -1e-06 to 2e-06 m at 1.5e-06 m/s, velocity" in listing.line(press)
+
+
 def test_complete_unloading_is_a_stage(tmp_path: Path) -> None:
     text = replaced(SMALL.split("history")[0], history="[{pressure: 1e5}, {pressure: 0}, {approach: -1e-6}]")
     assert [stage.load.end for stage in job_of(tmp_path, text).history] == [1e5, 0.0, -1e-6]
@@ -210,7 +223,8 @@ ROUND_TRIPS = {
     "everything": replaced(
         SMALL.split("history")[0],
         material="{model: zener, branches: [{G0: 1e6, G1: 0, eta1: .inf}]}",
-        history="[{force: {from: 0, to: 1e-2}, velocity: [1e-7, 2], distance: 1, time_step: 1e-5}, {approach: -1e-9}]",
+        history="[{force: {from: 0, to: 1e-2}, velocity: [1e-7, 2], distance: 1, time_step: 1e-5}, {approach: -1e-9}, "
+        "{approach: {from: -1e-9, to: 3e-9, velocity: 7e-10}}]",
         initial="{state: steady, pressure: 3, velocity: 0.123456789012345678}",
         output="{fields: [gap], every: 3, directory: /somewhere/else}",
         numerics="{integrator: backward-euler, precision: mixed, accept_unconverged: true}",

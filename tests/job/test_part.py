@@ -169,6 +169,27 @@ HISTORIES = {
     "history: [{pressure: {from: 1, to: 2}}]": (
         "4:22: history.0.pressure changes from one value to another, which needs a duration [s] or a distance [m]"
     ),
+    "history: [{approach: {from: 0, to: 1e-6}}]": (
+        "4:22: history.0.approach changes from one value to another, which needs a duration [s] or a distance [m], or "
+        "a velocity [m/s] in its braces"
+    ),
+    "history: [{approach: {from: 0, to: 1e-6, velocity: 2e-6}, duration: 1}]": (
+        "4:52: history.0.approach.velocity and a duration are both given: the duration follows from it (0.5 s); leave "
+        "it out, or the duration of the stage"
+    ),
+    "history: [{approach: {from: 0, to: 1e-6, velocity: 2e-6}, velocity: 1, distance: 1}]": (
+        "4:52: history.0.approach.velocity and a distance are both given: the duration follows from it (0.5 s); leave "
+        "it out, or the distance of the stage"
+    ),
+    "history: [{approach: {from: 1e-6, to: 0, velocity: -1}}]": (
+        "4:52: history.0.approach.velocity must be a positive velocity along the normal [m/s], got -1"
+    ),
+    "history: [{approach: {from: 1e-6, to: 1e-6, velocity: 1}}]": (
+        "4:55: history.0.approach.velocity needs two ends that differ: an approach that does not change has no velocity"
+    ),
+    "history: [{pressure: {from: 0, to: 1, velocity: 1}, duration: 1}]": (
+        "4:39: history.0.pressure.velocity is not a known key; there are from, to"
+    ),
     "history: [{pressure: 1, velocity: 1, duration: 1, time_step: auto, cells_per_step: 1}]": (
         "4:11: history.0 takes at most one of time_step | cells_per_step, got time_step and cells_per_step"
     ),

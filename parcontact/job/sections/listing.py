@@ -23,7 +23,8 @@ def plain(value: Any) -> Any:
         chosen = value.chosen if isinstance(value, Numerics) else ()
         return {key: plain(inner) for key, inner in items(value) if key not in chosen}
     if isinstance(value, Ramp):
-        return value.start if value.constant else {"from": value.start, "to": value.end}
+        velocity = {"velocity": value.velocity} if value.velocity else {}
+        return value.start if value.constant else {"from": value.start, "to": value.end, **velocity}
     if isinstance(value, tuple):
         return [plain(inner) for inner in value]
     return str(value) if isinstance(value, Path) else value
@@ -70,7 +71,9 @@ def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
 
 
 def _unit_of(value: Any, part: Part, key: str) -> str:
-    """Return the unit of a number; '' for words, as time_step: auto, and for mappings."""
+    """Return the unit of a number, and the velocity of a ramp; '' for words, as time_step: auto, and for mappings."""
+    if isinstance(value, Ramp) and value.velocity:
+        return f"{unit(part, key)} at {text(value.velocity)} m/s"
     return "" if isinstance(value, str | Part) else unit(part, key)
 
 

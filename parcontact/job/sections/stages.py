@@ -36,24 +36,33 @@ Velocity = Annotated[Vector, BeforeValidator(_no_ramp), Field(description=VELOCI
 
 @dataclass(frozen=True)
 class Ramp:
-    """A load that goes linearly from `start` to `end` within a stage."""
+    """A load that goes linearly from `start` to `end` within a stage.
+
+    An approach may say at which `velocity` [m/s] it changes, along the normal: the duration of the stage follows.
+    """
 
     start: float
     end: float
+    velocity: float | None = None
 
     @property
     def constant(self) -> bool:
         return self.start == self.end
+
+    @property
+    def seconds(self) -> float:
+        """The duration that follows from the normal velocity [s]; 0 where none is given."""
+        return abs(self.end - self.start) / self.velocity if self.velocity else 0.0
 
     def at(self, fraction: float) -> float:
         """Return the load at a fraction (0 to 1) of the stage; exact at both ends."""
         return (1 - fraction) * self.start + fraction * self.end
 
 
-def _ramp(number: Any, description: str) -> PlainValidator:
-    """Return a validator that makes a `Ramp` of one number, or of {from, to}."""
+def _ramp(number: Any, description: str, **more: Any) -> PlainValidator:
+    """Return a validator that makes a `Ramp` of one number, or of {from, to} and the keys that are in `more`."""
     end: Any = (number, Field(description=description))
-    keys = create_model("Ends", __base__=Part, **{"from": end, "to": end})
+    keys = create_model("Ends", __base__=Part, **{"from": end, "to": end}, **more)
 
     def read(value: Any, info: ValidationInfo) -> Ramp:
         if isinstance(value, Ramp):
@@ -62,9 +71,15 @@ def _ramp(number: Any, description: str) -> PlainValidator:
             ends = f"{{from: {quote(value[0])}, to: {quote(value[1])}}}"
             refuse(Fault(f"must be {description}, got a list; give {ends} for a ramp, or a stage for each"))
         given = value if isinstance(value, dict) else {"from": value, "to": value}
-        return Ramp(*(number for _, number in keys.model_validate(given, context=info.context)))
+        ramp = Ramp(*(number for _, number in keys.model_validate(given, context=info.context)))
+        if ramp.velocity and ramp.constant:
+            refuse(Fault("needs two ends that differ: an approach that does not change has no velocity", ("velocity",)))
+        return ramp
 
     return PlainValidator(read, json_schema_input_type=number | keys)
+
+
+NORMAL: Any = (Positive | None, Field(default=None, description="a positive velocity along the normal [m/s]"))
 
 
 class GeometricStep(Part):
@@ -98,9 +113,10 @@ def _stepping(
     velocity: tuple[float, float],
     time_step: float | GeometricStep | Auto | None,
     cells_per_step: float | None,
+    approach: Ramp | None,
 ) -> Iterator[Fault]:
     """Check that steps have time to be made in, and ways a velocity."""
-    lasts = duration is not None or distance is not None
+    lasts = duration is not None or distance is not None or (approach is not None and approach.velocity is not None)
     if not lasts and (time_step or cells_per_step):
         key = "time_step" if time_step else "cells_per_step"
         yield Fault("needs a duration [s] or a distance [m]: without them a stage is one solve", (key,))
@@ -110,9 +126,19 @@ def _stepping(
 
 
 def _lasting_ramp(duration: float | None, distance: float | None, *loads: Ramp | None) -> Iterator[Fault]:
+    """Check that each ramp has one duration: from a key of the stage, or from the velocity of the approach."""
+    lasts = {"duration": duration, "distance": distance}
+    given = [key for key, value in lasts.items() if value is not None]
     for name, ramp in zip(CONTROLS, loads, strict=True):
-        if ramp is not None and not ramp.constant and duration is None and distance is None:
-            yield Fault("changes from one value to another, which needs a duration [s] or a distance [m]", (name,))
+        if ramp is None:
+            continue
+        if ramp.velocity and given:
+            told = f"the duration follows from it ({ramp.seconds:.4g} s); leave it out, or the {given[0]} of the stage"
+            yield Fault(f"and a {given[0]} are both given: {told}", (name, "velocity"))
+        if not ramp.constant and not ramp.velocity and not given:
+            normal = ", or a velocity [m/s] in its braces" if name == "approach" else ""
+            needs = f"needs a duration [s] or a distance [m]{normal}"
+            yield Fault(f"changes from one value to another, which {needs}", (name,))
 
 
 WHICH_LOAD = "give a pressure [Pa], a force [N] or an approach [m]"
@@ -124,7 +150,7 @@ class Stage(Part):
     name: str = Field(default="stage", description="text (put numbers in quotes)")
     pressure: Annotated[Ramp | None, _ramp(Real, PRESSURE)] = Field(default=None, description=PRESSURE + SIGNED)
     force: Annotated[Ramp | None, _ramp(Real, FORCE)] = Field(default=None, description=FORCE + SIGNED)
-    approach: Annotated[Ramp | None, _ramp(Real, APPROACH)] = Field(default=None, description=APPROACH)
+    approach: Annotated[Ramp | None, _ramp(Real, APPROACH, velocity=NORMAL)] = Field(default=None, description=APPROACH)
     velocity: Velocity = (0.0, 0.0)
     duration: Positive | None = Field(default=None, description="a positive time [s]")
     distance: Positive | None = Field(default=None, description="a positive length [m]")
@@ -139,14 +165,16 @@ class Stage(Part):
     one_of = (CONTROLS,)
     at_most_one = (("duration", "distance"), ("time_step", "cells_per_step"))
     rules = (
-        Rule(("duration", "distance", "velocity", "time_step", "cells_per_step"), _stepping),
+        Rule(("duration", "distance", "velocity", "time_step", "cells_per_step", "approach"), _stepping),
         Rule(("duration", "distance", *CONTROLS), _lasting_ramp),
     )
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
         """Let a stage that lasts and does not say in which steps choose them itself."""
-        lasts, given = data.keys() & {"duration", "distance"}, data.keys() & {"time_step", "cells_per_step"}
+        approach, given = data.get("approach"), data.keys() & {"time_step", "cells_per_step"}
+        moves = approach.get("velocity") if isinstance(approach, dict) else getattr(approach, "velocity", None)
+        lasts = moves or data.keys() & {"duration", "distance"}
         return {**data, "time_step": AUTO} if lasts and not given else data
 
     @property
@@ -175,7 +203,7 @@ class Stage(Part):
         """The duration of the stage [s]; 0 for an instantaneous one."""
         if self.distance is not None:
             return self.distance / self.speed
-        return self.duration or 0.0
+        return self.duration or self.load.seconds
 
 
 def _steady_start(state: str, velocity: tuple[float, float], pressure: float | None) -> Iterator[Fault]:
