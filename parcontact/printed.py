@@ -1,4 +1,7 @@
-"""Numbers as an engineer writes them: prefixes of units, shares in per cent, as many digits as the error allows."""
+"""Numbers as an engineer writes them: prefixes of units, shares in per cent, as many digits as the error allows.
+
+What is read has ± and µ everywhere; `streams` replaces them on terminals that cannot show them.
+"""
 
 import math
 
@@ -25,17 +28,12 @@ def prefixed(unit: str, largest: float) -> tuple[str, float]:
     return PREFIXES[power] + unit, 10.0 ** (2 * power if square else power)
 
 
-def text(value: float, unit: str, digits: int = 3) -> str:
-    """Return a number with its unit, for pictures and pages: 11.7 µm."""
+def quantity(value: float, unit: str, digits: int = 3) -> str:
+    """Return a number with its unit: 11.7 µm."""
     rounded = float(f"{value:.{digits}g}") + 0.0  # no -0
     shown, size = prefixed(unit, rounded)
     number = value if shown in TIMES else rounded  # a time is rounded in its own unit
     return f"{float(f'{number / size:.{digits}g}'):g} {shown}".rstrip()
-
-
-def quantity(value: float, unit: str, digits: int = 3) -> str:
-    """Return a number with its unit, for terminals that know few letters: 11.7 um."""
-    return text(value, unit, digits).replace("µ", "u")
 
 
 def per_cent(share: float, digits: int = 2) -> str:
@@ -50,7 +48,7 @@ def stated_error(error: float, digits: int = 2) -> str:
 
 
 def with_error(value: float, error: float) -> str:
-    """Return a number and its error: two digits of the error, and the number as far as these: 0.01483 +- 0.00036.
+    """Return a number and its error: two digits of the error, and the number as far as these: 0.01483 ± 0.00036.
 
     Four digits where no error is known; at most MOST_DIGITS where it is small.
     """
@@ -61,8 +59,8 @@ def with_error(value: float, error: float) -> str:
     shown = max(last, first + 1 - MOST_DIGITS)
     if -4 <= first < MOST_DIGITS:
         within = f"{error:.{max(-last, 0)}f}" if shown == last else f"{error:.1e}"
-        return f"{value:.{max(-shown, 0)}f} +- {within}"
-    return f"{value:.{first - shown}e} +- {error:.1e}"
+        return f"{value:.{max(-shown, 0)}f} ± {within}"
+    return f"{value:.{first - shown}e} ± {error:.1e}"
 
 
 def _exponent(value: float) -> int:

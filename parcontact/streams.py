@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
+PLAIN = str.maketrans({"±": "+-", "µ": "u", "²": "^2", "³": "^3", "°": "deg ", "−": "-", "–": "-", "×": "x"})
 CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
@@ -35,7 +36,7 @@ class TolerantStream(io.TextIOBase):
             try:
                 self._stream.write(shown)
             except UnicodeEncodeError:
-                self._stream.write(shown.encode("ascii", "backslashreplace").decode())
+                self._stream.write(shown.translate(PLAIN).encode("ascii", "backslashreplace").decode())
             except (OSError, ValueError) as error:
                 self._give_up(error)
         return len(text)

@@ -258,7 +258,7 @@ class ErrorSums:
             if parts is not None
         ]
         if self.friction is not None and self.friction.of_friction >= 1.0:
-            lines.append(f"friction is 0 +- {self.friction_within:.2g}: it is smaller than its estimated error")
+            lines.append(f"friction is 0 ± {self.friction_within:.2g}: it is smaller than its estimated error")
         return lines
 
 

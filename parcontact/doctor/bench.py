@@ -45,8 +45,8 @@ class Finding:
 
     def __str__(self) -> str:
         if self.expected == 0.0:
-            return f"{self.what} = {self.found:.2g} (0 +- {self.allowed:.1g})"
-        return f"{self.what} = {self.found:.6g} ({self.expected:.6g} +- {self.allowed:.1g})"
+            return f"{self.what} = {self.found:.2g} (0 ± {self.allowed:.1g})"
+        return f"{self.what} = {self.found:.6g} ({self.expected:.6g} ± {self.allowed:.1g})"
 
 
 class Bench:

@@ -13,7 +13,7 @@ Json = dict[str, Any]
 PRONY = (0.275e6, [2.475e6], [1e-3])
 GLASSY, LONG_TERM, RELAXATION, CREEP = 2.75e6, 0.275e6, 1e-3, 1e-2
 
-# one wave: 0.25 mm long and 0.5 um high, in full contact under 0.2 MPa
+# one wave: 0.25 mm long and 0.5 µm high, in full contact under 0.2 MPa
 WAVELENGTH, HEIGHT, MEAN = 0.25e-3, 0.5e-6, 0.2e6
 K = 2 * np.pi / WAVELENGTH
 FAST = 1.0 / (K * RELAXATION)  # m/s, at which the wave passes in one relaxation time per radian

@@ -53,7 +53,7 @@ def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Cha
     for band in np.unique(columns["band"]):
         rows = _sorted(columns, columns["band"] == band)
         ends = (columns[f"{end}_wavelength"][rows[0]] for end in ("long", "short"))
-        name = " to ".join(units.text(float(end), "m") for end in ends)
+        name = " to ".join(units.quantity(float(end), "m") for end in ends)
         series.append(ChartLine(name, columns["velocity"][rows], columns["friction"][rows], style.line(int(band))))
     if theory is not None:
         speeds = np.unique(theory["velocity"])
@@ -74,7 +74,7 @@ def _over_bands(columns: dict[str, Array], theory: dict[str, Array] | None, name
             rows = np.flatnonzero(np.isclose(table["velocity"], speed, rtol=1e-6))
             rows = rows[np.argsort(table["band"][rows])]
             short = table["short_wavelength"][rows]
-            label = units.text(speed, "m/s") if table is columns else "theory" if number == 0 else ""
+            label = units.quantity(speed, "m/s") if table is columns else "theory" if number == 0 else ""
             series.append(ChartLine(label, longest / short if area else short, table[name][rows], look))
     y = Axis("contact area /\nnominal area") if area else Axis("temperature rise", "K")
     return Chart("bands area" if area else "bands heat", x, y, series, log_x=True)

@@ -170,7 +170,7 @@ def _set_limits(axes: Axes, chart: Chart, series: Sequence[ChartLine], log_x: bo
         rest = _highest(ys[late])
         if 0.0 < SPIKE_HEIGHT * rest < highest:
             axes.set_ylim(top=1.25 * rest)
-            told = f"↑ {units.text(highest, chart.y.unit)}"
+            told = f"↑ {units.quantity(highest, chart.y.unit)}"
             axes.text(0.12, 0.97, told, transform=axes.transAxes, va="top", color=style.RED, fontsize=9)
 
 
@@ -184,7 +184,7 @@ def _name_peak(axes: Axes, one: ChartLine, unit: str) -> None:
     height = np.nan_to_num(np.abs(one.y))
     at = int(np.argmax(height))
     if 0 < at < height.size - 1 and height[at] > 1.02 * height[-1]:
-        told = f"{one.y[at]:.3g} at {units.text(one.x[at], unit)}"
+        told = f"{one.y[at]:.3g} at {units.quantity(one.x[at], unit)}"
         axes.plot(one.x[at], one.y[at], "o", color=style.RED, label=told, scalex=False, scaley=False)
 
 

@@ -139,11 +139,11 @@ def describe_solve(run: PlottedRun) -> str:
     """Return what the last solve has found, in words."""
     axis, load = run.load
     fraction = run.columns["contact_area_corrected"][-1]
-    area = units.text(fraction * run.area, "m²", 4) if run.free else f"{fraction:.4g} of the nominal"
+    area = units.quantity(fraction * run.area, "m²", 4) if run.free else f"{fraction:.4g} of the nominal"
     name, column = ("approach", "approach") if run.free else ("mean gap", "mean_gap")
-    length = units.text(run.columns[column][-1], "m", 4)
-    highest = units.text(run.columns["max_pressure"][-1], "Pa", 4)
-    pressed = f"{axis.name} {units.text(load[-1], axis.unit, 4)}"
+    length = units.quantity(run.columns[column][-1], "m", 4)
+    highest = units.quantity(run.columns["max_pressure"][-1], "Pa", 4)
+    pressed = f"{axis.name} {units.quantity(load[-1], axis.unit, 4)}"
     return f"{pressed},  contact area {area},\n{name} {length},  highest pressure {highest}"
 
 

@@ -38,7 +38,7 @@ def _choose_instants(run: PlottedRun, fields: Fields) -> tuple[list[tuple[int, s
     names = []
     for index, step, time in instants:
         stage = style.plain(run.name_stage(step), MOST_LETTERS)
-        when = units.text(time, "s") if same_load else run.instant(step, time)
+        when = units.quantity(time, "s") if same_load else run.instant(step, time)
         names.append((index, "\n".join(filter(None, (stage, when)))))
     return names, f", {loads.pop()}" if same_load else ""
 

@@ -219,4 +219,5 @@ def _name_cases(directories: Sequence[Path]) -> list[str]:
 
 def _name_value(key: str, value: Any) -> str:
     """Return a key of a sweep and its value, as `velocity 100 mm/s`."""
-    return f"{key} {units.text(value, sweep.UNITS.get(key, ''), 4)}" if isinstance(value, float) else f"{key} {value}"
+    shown = units.quantity(value, sweep.UNITS.get(key, ""), 4) if isinstance(value, float) else value
+    return f"{key} {shown}"

@@ -65,7 +65,7 @@ def title(directory: Path) -> str:
     job = shown_job(directory / STEADY_RESOLVED) if (directory / STEADY_RESOLVED).is_file() else None
     axis, loads = to_load(read_table(directory / TABLE, ("pressure",))["pressure"], find_free_area(directory))
     name = (job.title if job else "") or "steady sliding"
-    return f"{name}: {units.text(loads[0], axis.unit)}" if _count(loads) == 1 else name
+    return f"{name}: {units.quantity(loads[0], axis.unit)}" if _count(loads) == 1 else name
 
 
 def _add_derived(columns: dict[str, Array], area: float) -> None:
@@ -83,7 +83,7 @@ def _make_lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -
     for number, value in enumerate(np.unique(groups)):
         rows = np.flatnonzero(groups == value)
         rows = rows[np.argsort(columns[x][rows], kind="stable")]
-        shown = units.text(value, unit), columns[x][rows], columns[y][rows], style.line(number) | {"marker": "o"}
+        shown = units.quantity(value, unit), columns[x][rows], columns[y][rows], style.line(number) | {"marker": "o"}
         yield ChartLine(*shown, None if error is None else error[rows])
 
 

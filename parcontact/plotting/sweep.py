@@ -117,7 +117,7 @@ def _split(rows: Rows, key: str) -> Iterator[tuple[str, Rows]]:
 def _named(key: str, value: Any) -> str:
     """Return a value with its unit, after the name of its key unless that is a pressure or a temperature."""
     word = key.split(".")[-1]
-    text = units.text(value, UNITS.get(word, "")) if isinstance(value, float) else str(value)
+    text = units.quantity(value, UNITS.get(word, "")) if isinstance(value, float) else str(value)
     return text if word in sweep_table.PLACES else f"{word.replace('_', ' ')} {text}"
 
 

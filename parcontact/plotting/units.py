@@ -6,9 +6,9 @@ from typing import Any
 from matplotlib.axis import Axis
 from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
-from ..printed import LONG_TIME, TIMES, prefixed, text
+from ..printed import LONG_TIME, TIMES, prefixed, quantity
 
-__all__ = ["label", "label_log_times", "prefixed", "text"]
+__all__ = ["label", "label_log_times", "prefixed", "quantity"]
 
 MARKS = {"1 ns": 1e-9, "1 µs": 1e-6, "1 ms": 1e-3, "1 s": 1.0, "1 min": 60.0, "1 h": 3600.0}
 MARKS |= {"1 day": TIMES["days"], "1 year": TIMES["years"]}  # of a logarithmic axis [s]

@@ -24,8 +24,8 @@ def section(job: Job) -> ReportSection:
     series = relaxation_of(job.material)
     instant = series.modulus_inf + float(np.sum(series.moduli))
     rows = [
-        ("shear modulus in the long run", units.text(series.modulus_inf, "Pa", 4)),
-        ("shear modulus at once", units.text(instant, "Pa", 4)),
+        ("shear modulus in the long run", units.quantity(series.modulus_inf, "Pa", 4)),
+        ("shear modulus at once", units.quantity(instant, "Pa", 4)),
         ("Poisson's ratio", f"{job.material.poisson:g}"),
         ("relaxing branches", str(series.moduli.size)),
         *_describe_temperature(job),
@@ -36,7 +36,7 @@ def section(job: Job) -> ReportSection:
     if not series.moduli.size:
         return ReportSection("Rubber", tables=tables)
     branches = zip(series.relaxation_times, series.moduli, strict=True)
-    listed = [(units.text(float(tau), "s"), units.text(float(modulus), "Pa")) for tau, modulus in branches]
+    listed = [(units.quantity(float(tau), "s"), units.quantity(float(modulus), "Pa")) for tau, modulus in branches]
     tables.append(ReportTable(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
     if (excited := _list_bands(job)).rows:
         tables.append(excited)
@@ -73,7 +73,7 @@ def _list_bands(job: Job) -> ReportTable:
 
 
 def _write_band(band: tuple[float, float]) -> str:
-    return f"{units.text(band[0], 'Hz')} to {units.text(band[1], 'Hz')}"
+    return f"{units.quantity(band[0], 'Hz')} to {units.quantity(band[1], 'Hz')}"
 
 
 def _draw_moduli(axes: Axes, job: Job) -> None:

@@ -197,4 +197,4 @@ def _label_states(area: float, file: h5py.File) -> dict[int, str]:
     axis, loads = to_load(file["load"][...], area)
     warm = [f", {t:g} °C" for t in file["temperature"][...]] if "temperature" in file else [""] * speeds.size
     known = np.flatnonzero(~np.isnan(speeds)).tolist()
-    return {k: f"{units.text(speeds[k], 'm/s')}, {units.text(loads[k], axis.unit)}{warm[k]}" for k in known}
+    return {k: f"{units.quantity(speeds[k], 'm/s')}, {units.quantity(loads[k], axis.unit)}{warm[k]}" for k in known}

@@ -31,7 +31,7 @@ def section(job: Job) -> ReportSection:
     if not found.rms_height:
         return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
     rows = [
-        ("rms height", units.text(found.rms_height, "m", 4)),
+        ("rms height", units.quantity(found.rms_height, "m", 4)),
         ("rms slope", f"{found.rms_slope:.4g}"),
         ("rms curvature", f"{found.rms_curvature:.4g} 1/m"),
         ("Nayak's parameter", f"{found.nayak:.4g}"),

@@ -56,7 +56,7 @@ def _pull_off(job: Job, columns: Columns, detached: bool) -> Iterator[str]:
     if lost:
         box = job.grid.lx * job.grid.ly
         force, within = -columns["pressure"][lost[-1].row] * box, lost[-1].beside * box
-        yield f"the pull-off force is {quantity(force, 'N', 4)} +- {quantity(within, 'N', 2)}"
+        yield f"the pull-off force is {quantity(force, 'N', 4)} ± {quantity(within, 'N', 2)}"
 
 
 def _leakage(directory: Path, columns: Columns) -> Iterator[str]:
@@ -100,7 +100,7 @@ def _size(job: Job, share: float, error: float) -> str:
     if job.grid.boundary != "free":
         return f"{with_error(100.0 * share, 100.0 * error)} % of the nominal area"
     box = job.grid.lx * job.grid.ly
-    within = f" +- {quantity(error * box, 'm²', 2)}" if error > 0.0 else ""
+    within = f" ± {quantity(error * box, 'm²', 2)}" if error > 0.0 else ""
     return f"{quantity(share * box, 'm²', 4)}{within}"
 
 
@@ -138,7 +138,7 @@ def _with_unit(row: Mapping[str, Any], name: str, unit: str, error: str) -> str:
     within = abs(value) * within if error in slide.ERRORS else within
     if not unit:
         return with_error(value, within)
-    return quantity(value, unit, 4) + (f" +- {quantity(within, unit, 2)}" if within > 0.0 else "")
+    return quantity(value, unit, 4) + (f" ± {quantity(within, unit, 2)}" if within > 0.0 else "")
 
 
 def _error(columns: Columns, name: str, row: int) -> float:

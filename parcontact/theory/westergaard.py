@@ -1,6 +1,6 @@
 """A rigid wavy surface (one sinusoid) pressed on an elastic or viscoelastic half-space (Westergaard).
 
-The surface h(x) = Delta cos(2 pi x/lambda) has its crests at x = 0, +-lambda, ...; p is the mean pressure. With
+The surface h(x) = Delta cos(2 pi x/lambda) has its crests at x = 0, ±lambda, ...; p is the mean pressure. With
 p* = pi E* Delta/lambda, at which contact becomes complete, s = min(p/p*, 1), psi = pi x/lambda and E* = 2 G/(1 - nu):
 
     contact fraction  f = (2/pi) asin sqrt(s)

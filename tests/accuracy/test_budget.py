@@ -182,7 +182,7 @@ def test_friction_that_is_noise_is_0_within_its_error(friction: float) -> None:
     summary = ErrorSums()
     summary = summary.plus(ErrorBudget(budget, budget), friction, 1.0, slid=1e-3)
     assert summary.friction_within == pytest.approx(budget.total * friction)
-    assert summary.lines((0.01, 0.01))[-1].startswith(f"friction is 0 +- {budget.total * friction:.2g}: ")
+    assert summary.lines((0.01, 0.01))[-1].startswith(f"friction is 0 ± {budget.total * friction:.2g}: ")
 
 
 def test_the_two_views_bound_the_mesh() -> None:

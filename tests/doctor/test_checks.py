@@ -28,7 +28,7 @@ def test_a_case_that_goes_wrong_is_seen() -> None:
 
     check = Check("name", "expected", wrong)
     result = run_check(check, Bench(MPI.COMM_SELF))
-    assert result.wrong == ["area = 0.5 (0.6 +- 0.06)", "force = nan (1 +- 0.1)"]
+    assert result.wrong == ["area = 0.5 (0.6 ± 0.06)", "force = nan (1 ± 0.1)"]
     assert "WRONG" in markdown([(check, result)])
     failed = run_check(Check("name", "expected", stalled), Bench(MPI.COMM_SELF))
     assert failed.wrong == ["the contact solve stalled"]
@@ -38,7 +38,7 @@ def test_a_case_that_goes_wrong_is_seen() -> None:
 
 
 @pytest.mark.parametrize(
-    ("allowed", "code", "said"), [(0.2, 0, "all is well"), (0.1, 1, "a case: area = 0.5 (0.6 +- 0.06)")]
+    ("allowed", "code", "said"), [(0.2, 0, "all is well"), (0.1, 1, "a case: area = 0.5 (0.6 ± 0.06)")]
 )
 def test_verb(
     allowed: float,

@@ -22,7 +22,7 @@ def curve(
     pressures: tuple[float, ...] = (1e3,),
     degrees: tuple[float, ...] = (20.0,),
 ) -> Path:
-    """A directory with three speeds at each pressure and temperature, whose areas are 0.2, corrected 0.15 +- 10 %."""
+    """A directory with three speeds at each pressure and temperature, whose areas are 0.2, corrected 0.15 ± 10 %."""
     rows = [
         f"{v},{p},0.1,0.2,0.15,{error},0.1,{t},1.0\n"
         for t in degrees

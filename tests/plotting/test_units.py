@@ -35,7 +35,7 @@ def test_prefixes(largest: float, label: str) -> None:
     ],
 )
 def test_numbers_with_prefixes(value: float, unit: str, told: str) -> None:
-    assert units.text(value, unit) == told
+    assert units.quantity(value, unit) == told
 
 
 @pytest.mark.parametrize(

@@ -154,10 +154,10 @@ def test_the_verb_surface(road: Path, main: "Main", run_parcontact: "RunParconta
 
 
 def test_waves_that_are_taken_out_are_reported(road: Path) -> None:
-    """By 50 um of a road with waves down to 40 um: a ring of its spectrum is missing, and the report says so."""
+    """By 50 µm of a road with waves down to 40 µm: a ring of its spectrum is missing, and the report says so."""
     (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=", short_wavelength: 50.0e-6"))
     setup = scene.set_up(jobs.load(road / "job.yaml"), Slab.alone(POINTS, POINTS))
-    assert setup.told.notes[-1] == "road: waves shorter than 50 um were taken out (ideal low-pass)"
+    assert setup.told.notes[-1] == "road: waves shorter than 50 µm were taken out (ideal low-pass)"
     found = heights_of(road, MPI.COMM_SELF, more=", short_wavelength: 50.0e-6")
     q = 2 * np.pi * np.fft.fftfreq(POINTS, LENGTH / POINTS)
     power = np.abs(np.fft.fft2(found)) ** 2
@@ -171,7 +171,7 @@ def test_waves_that_are_taken_out_are_reported(road: Path) -> None:
     [
         ("size: [1.5, 1.5]", "the map is 1.5 x 1.5 m; are lengths in m?"),
         ("pixel: 0.01", "the map is 1.92 x 1.92 m; are lengths in m?"),
-        ("pixel: [1.3e-5, 3.0e-5]", "points of the map are 13 um apart along x and 30 um along y"),
+        ("pixel: [1.3e-5, 3.0e-5]", "points of the map are 13 µm apart along x and 30 µm along y"),
         ("unit: nm, size: [1.0e-2, 1.0e-2]", "the map is 10 mm x 10 mm, and its heights differ by 3"),
         ("pixel: [1.3e-5, 1.4e-5]", ""),
     ],
@@ -276,9 +276,9 @@ def test_a_map_without_a_job(road: Path, main: "Main", monkeypatch: pytest.Monke
     monkeypatch.chdir(road)
     code, out, err = main(*words, "--job", "start/job.yaml")
     assert code == 0, err
-    for line in (r"size +1 mm x 1 mm", r"points +192 x 192", r"pixel +5.208 um x 5.208 um"):
+    for line in (r"size +1 mm x 1 mm", r"points +192 x 192", r"pixel +5.208 µm x 5.208 µm"):
         assert re.search(f"^{line}$", out, re.MULTILINE)
-    for line in (r"missing +(2(.\d)?|1.9) %", r"rms slope +0.0", r"spectrum +waves of 1 mm to 10.42 um"):
+    for line in (r"missing +(2(.\d)?|1.9) %", r"rms slope +0.0", r"spectrum +waves of 1 mm to 10.42 µm"):
         assert re.search(f"^{line}", out, re.MULTILINE)
     assert matplotlib.image.imread(road / "road-surface.png").ndim == 3
     found = mesh.load(road / "start/job.yaml")

@@ -254,7 +254,7 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
         assert all(0.0 < float(row["mu_dyn"]) <= float(row["mu_max"]) for row in rows)
     case = here / "cases" / "001"
     for text in ((case / "run.log").read_text(), info.describe(case)[0]):
-        found = re.search(r"last three quarters of this slide of 500 um, is (\S+) \+- (\S+)\n", text)
+        found = re.search(r"last three quarters of this slide of 500 µm, is (\S+) ± (\S+)\n", text)
         assert found
         assert float(found[1]) == pytest.approx(float(rows[1]["mu_dyn"]), abs=0.1 * float(found[2]))
 

@@ -137,7 +137,7 @@ def test_friction_of_an_elastic_slide_is_0_within_its_error(velocity: Any) -> No
             assert row.errors.friction.mesh >= 1.0
     mean = np.mean([row.measures.friction for row in rows if row.errors])
     assert summary.friction_within == pytest.approx(mean, rel=0.02)  # and what spots and waves add
-    assert any(line.startswith("friction is 0 +- ") for line in summary.lines((0.01, 0.01)))
+    assert any(line.startswith("friction is 0 ± ") for line in summary.lines((0.01, 0.01)))
 
 
 def test_friction_across_the_slide_has_an_error() -> None:

@@ -24,7 +24,7 @@ OFF = [(-0.5, -3e-6, 0.0), (-0.1, -5e-6, 0.0)]
 def test_by_approach() -> None:
     rows = table(*NEAR, *PULL, *OFF)
     assert find(rows) == [PullOff(4, 5.0, 6)]
-    where = "pull-off: 1.5 N (3 Pa), at t = 4 s, approach -1 um; the steps beside it differ by 2.5 N"
+    where = "pull-off: 1.5 N (3 Pa), at t = 4 s, approach -1 µm; the steps beside it differ by 2.5 N"
     assert list(describe(rows, 0.5)) == [f"{where}, and contact was lost by t = 6 s"]
 
 
@@ -69,7 +69,7 @@ def test_a_pull_that_was_held_is_no_pull_off() -> None:
 
 def test_a_contact_that_holds_has_none() -> None:
     (held,) = describe(table(*NEAR, *PULL), 0.5)
-    assert held == "largest pull so far: 1.5 N (3 Pa), at t = 4 s, approach -1 um; contact holds"
+    assert held == "largest pull so far: 1.5 N (3 Pa), at t = 4 s, approach -1 µm; contact holds"
 
 
 def test_a_run_that_ended_with_its_contact_has_one() -> None:

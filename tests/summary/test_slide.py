@@ -85,8 +85,8 @@ def test_sentences_about_a_slide() -> None:
     table = rows((0, 0, 9), (1, 0, 8), (1.1, 0.2, 3), (1.5, 1, 4), (2.0, 2, 2), (3.0, 4, 2))
     table["error_friction"] = [float("nan"), 0.5, 0.02, 0.03, float("nan"), 0.01]  # 0.12, 0, 0.02 at 1, 2, 4 m
     assert said([REST, CLIMB, SETTLE], table) == [
-        "mu_max, the highest friction of the slide, is 4.00 +- 0.12, 1 m after its start",
-        "mu_dyn, the mean friction over the last three quarters of this slide of 4 m, is 2.333 +- 0.027",
+        "mu_max, the highest friction of the slide, is 4.00 ± 0.12, 1 m after its start",
+        "mu_dyn, the mean friction over the last three quarters of this slide of 4 m, is 2.333 ± 0.027",
         "the mean contact area over the same distance is 0.2333 as counted in points",
         "largest estimated errors of single steps of the slide: friction 3 %",
     ]
@@ -146,7 +146,7 @@ def test_mu_max_on_a_ripple() -> None:
     assert ripple(x[::8], friction[::8], 2, 1.0) == 0.0
     table = rows(*zip(x / 2.0, x, friction, strict=True))
     told = said([{**CLIMB, "duration": 2.0}], table, 1.0)[0]
-    assert "is 6.0 +- 1.0 (1 of it a ripple with the period of a cell), " in told
+    assert "is 6.0 ± 1.0 (1 of it a ripple with the period of a cell), " in told
 
 
 def test_a_steady_start_that_does_not_last() -> None:

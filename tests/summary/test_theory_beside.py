@@ -39,8 +39,8 @@ def test_errors_of_the_run_stand_beside_its_results(tmp_path: Path) -> None:
     rows = "1,1,0.4,0.75,0.5,0.1,0.04", "4,4,0.4,0.75,0.5,0.1,0.04"
     write(tmp_path / "measures.csv", head, "0,0,0,1,1,,", *rows)
     assert list(theory_beside.describe(tmp_path, [SLIDE], 1.0)) == [
-        "Persson's theory predicts mu_max 0.2 (run: 0.400 +- 0.040), mu_dyn 0.2 (run: 0.400 +- 0.040), "
-        "contact area 0.25 (run: 0.500 +- 0.020)"
+        "Persson's theory predicts mu_max 0.2 (run: 0.400 ± 0.040), mu_dyn 0.2 (run: 0.400 ± 0.040), "
+        "contact area 0.25 (run: 0.500 ± 0.020)"
     ]
 
 
