@@ -23,6 +23,7 @@ from ..parallel.slab import Array, Slab
 from ..solve.interface_law import HARD, InterfaceLaw
 from .band import Band, Rung, Vector
 from .choice import Cut
+from .contact_store import ContactStore
 from .ladder import PressureLadder
 
 NEGLIGIBLE = 1e-12  # accuracy: of the load: a rung that carries less is not solved behind hard walls
@@ -64,11 +65,11 @@ Solved = Mapping[tuple[int, int], Sequence[Rung]]  # rungs by band and sample
 class Cascade:
     """Bands of a job on the ranks of `slab`, whose points do not matter; methods are collective.
 
-    `solve_tasks` may be replaced to keep what is solved.
+    Contacts that its `store` has are not solved again.
     """
 
     def __init__(self, job: Job, cut: Cut, slab: Slab) -> None:
-        self.job, self.cut, self.slab = job, cut, slab
+        self.job, self.cut, self.slab, self.store = job, cut, slab, ContactStore(slab)
         self._bands: dict[tuple[int, int], Band] = {}
         self._temperatures = [math.nan] * cut.count
         self.velocity: Vector = (1.0, 0.0)
@@ -176,6 +177,13 @@ class Cascade:
 
     def solve_tasks(self, tasks: Sequence[Task]) -> list[Rung]:
         """Return the solved contacts in the order of the tasks. Raises RunError on all ranks if one is not found."""
+        laws = [(task.law.pressures.tobytes(), task.law.closings.tobytes()) for task in tasks]
+        here = self.velocity, self.pressure, self._temperatures
+        states = [(here, task[:3], law) for task, law in zip(tasks, laws, strict=True)]
+        return self.store.find(states, lambda lacking: self._share([tasks[number] for number in lacking]))
+
+    def _share(self, tasks: Sequence[Task]) -> list[Rung]:
+        """Solve the contacts of some tasks, each on one rank."""
         rank, size = self.slab.comm.rank, self.slab.comm.size
         own: list[Rung | None] = []
         problem = ""

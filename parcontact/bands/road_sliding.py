@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -94,6 +95,14 @@ class RoadSliding:
     def notes(self) -> list[str]:
         """Return what was chosen, and where linear theory fails."""
         return describe_cut(self.cut, self.job)
+
+    def keep_in(self, directory: Path) -> None:
+        """Keep contacts in a file of this directory until their point is written; raises RunError."""
+        self._cascade.store.keep_in(directory, self.job)
+
+    def forget(self) -> None:
+        """Remove the contacts of the last point."""
+        self._cascade.store.clear()
 
     def heat(self, temperature: float) -> None:
         """Solve at this temperature [deg C] from now on; raises InputError where the material has no shift."""

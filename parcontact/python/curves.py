@@ -113,6 +113,7 @@ def steady(
         except RunError as error:
             failures.append(str(error))
             warn(str(error), RuntimeWarning)
+        sliding.forget()
         points.append(point)
         doubts += contacts.judge_point(point.measures, str(at)) if point else []
     solved = [point for point in points if point]

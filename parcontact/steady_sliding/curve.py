@@ -84,7 +84,8 @@ class States(Protocol):
     """Steady states of a job at one velocity and pressure after the other, as a curve asks for them; collective.
 
     `setup` says what they are of. `table` is the name of a further table with its columns, None without one; `rows`
-    are its lines for the last state at a velocity [m/s].
+    are its lines for the last state at a velocity [m/s]. It may `keep_in` a directory what it has solved of a state,
+    and `forget` that once the state is written.
     """
 
     setup: Setup
@@ -93,6 +94,10 @@ class States(Protocol):
     def doubts(self, temperatures: Sequence[float]) -> list[str]: ...
 
     def notes(self) -> list[str]: ...
+
+    def keep_in(self, directory: Path) -> None: ...
+
+    def forget(self) -> None: ...
 
     def heat(self, temperature: float) -> None: ...
 
@@ -141,6 +146,7 @@ def run(
                 table.say(text)
             table.warn(doubts, shows)
         maps = _maps(job, slab, wanted, directory)
+        sliding.keep_in(directory.path)
         try:
             with Signals().noted() as signals:
                 return _Curve(sliding, wanted, table, maps, directory, signals, shows, others_file).go()
@@ -242,6 +248,7 @@ class _Curve:
         except RunError as error:
             self.failures += 1
             self._say(f"parcontact: {error}")
+            self.sliding.forget()
             return
         rows = self.sliding.rows(velocity) if self.wanted.waves or self.sliding.table else []
         if self.maps:
@@ -253,3 +260,4 @@ class _Curve:
                 table.warn(self.watch.judge_point(point.measures, str(wanted)), self.shows)
 
         hdf5.on_root(self.slab, write, f"cannot write {self.directory.path / 'steady.csv'}")
+        self.sliding.forget()

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -172,6 +173,12 @@ class SteadySliding:
 
     def notes(self) -> list[str]:
         return []
+
+    def keep_in(self, directory: Path) -> None:
+        """Keep nothing: a point is one solve."""
+
+    def forget(self) -> None:
+        """Forget nothing."""
 
     def rows(self, velocity: Vector) -> list[list[float]]:
         """Return the lines of steady_waves.csv for the last state. Collective."""

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact.__main__ import main
-from parcontact.bands.band import Band
+from parcontact.bands.band import Band, Rung
 from parcontact.bands.band_heat import uniform, waves_along_depth
 from parcontact.bands.cascade import Cascade, mean_rungs
 from parcontact.bands.choice import choose
@@ -230,6 +231,46 @@ def test_a_curve_that_was_killed_goes_on(tmp_path: Path, monkeypatch: pytest.Mon
     assert len(tables.read(Path("out/job/bands_theory.csv"))["friction"]) == 4
     assert main(["report", "out/job"]) == 0
     assert "bands.csv" in Path("out/job/report.html").read_text()
+
+
+class Killed(BaseException):
+    """The end of a process, which nothing catches."""
+
+
+def test_a_point_that_was_killed_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Killed twice within a point with heat, whose temperatures take rounds: all numbers to the last digit, and no
+    contact is solved twice but those of the band that was being solved."""
+    monkeypatch.chdir(tmp_path)
+    job = {**JOB, "material": SHIFTED, "thermal": {**THERMAL, "feedback": "mean"}, "numerics": {"tolerance": 0.2}}
+    job |= {"surface": {**ROUGH, "short_wavelength": 1e-3}, "bands": {"count": 2, "points": 20, "samples": 1}}
+    Path("job.yaml").write_text(yaml.safe_dump(job))
+    calls, killed_at, solve = [0], [0], Band.solve
+
+    def counted(self: Band, *given: Any) -> Rung:
+        calls[0] += 1
+        if calls[0] == killed_at[0]:
+            raise Killed
+        return solve(self, *given)
+
+    monkeypatch.setattr(Band, "solve", counted)
+    command = ["steady", "job.yaml", "--velocities", "0.1", "--quiet"]
+    assert main([*command, "--out", "whole"]) == 0
+    whole, calls[0] = calls[0], 0
+    for killed_at[0] in (whole // 2, whole - 5):
+        with pytest.raises(Killed):
+            main(command)
+        kept = len(Path("out/job/bands.part").read_text().splitlines())
+        lost = killed_at[0] - kept
+        with Path("out/job/bands.part").open("a") as file:
+            file.write('["a line that was not fini')
+    killed_at[0] = 0
+    assert main(command) == 0
+    assert 0 < lost <= 2 * 14  # of both runs
+    assert calls[0] == whole + lost
+    assert not Path("out/job/bands.part").exists()
+    assert Path("out/job/bands.csv").read_text() == Path("whole/bands.csv").read_text()
+    one, other = (tables.read(Path(name) / "steady.csv") for name in ("whole", "out/job"))
+    assert [one[name] for name in one if name != "seconds"] == [other[name] for name in other if name != "seconds"]
 
 
 @pytest.mark.parametrize("pressure", [2e4, 1e5])

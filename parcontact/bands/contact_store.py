@@ -1,0 +1,94 @@
+"""Contacts of the point that is being solved, in a file too: a run that was killed goes on within that point.
+
+What a contact depends on has a digest. A line of the file is a digest and a rung, whose numbers are read back to the
+last bit, so that passes of `cascade` which are done again find the same states without a solve. So do passes that come
+to the same contact twice. A line that was not finished is left out.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..errors import RunError
+from ..job import Job
+from ..job.sections import listing
+from ..parallel.slab import Slab
+from ..storage import hdf5
+from .band import Rung
+
+APART = ("title", "steady", "output")  # sections on which no contact depends
+NAME = "bands.part"  # removed with all unfinished files where a curve begins afresh
+
+
+class ContactStore:
+    """Contacts of a job that are known, on root; methods are collective."""
+
+    def __init__(self, slab: Slab) -> None:
+        self._slab, self._job, self._path = slab, "", Path()
+        self._known: dict[str, Rung] = {}
+
+    def keep_in(self, directory: Path, job: Job) -> None:
+        """Keep contacts in a file of this directory, and take those that it has. Raises RunError for one that cannot be
+        written."""
+        self._path = directory / NAME
+        self._on_root(lambda: self._read(job))
+
+    def find(self, states: Sequence[Any], solve: Callable[[Sequence[int]], Sequence[Rung]]) -> list[Rung]:
+        """Return contacts by what they depend on beside the job, plain data; `solve` is asked for those that are not
+        known, by their numbers. Raises RunError where the file cannot be written."""
+        digests = [hashlib.sha256(repr((self._job, state)).encode()).hexdigest() for state in states]
+        known = self._slab.agree([self._known.get(digest) for digest in digests])
+        lacking = [number for number, rung in enumerate(known) if rung is None]
+        solved = dict(zip(lacking, solve(lacking) if lacking else (), strict=True))
+        found = {digests[number]: rung for number, rung in solved.items()}
+        if self._slab.root:
+            self._known |= found
+        if self._path.name and found:
+            self._on_root(lambda: self._append(found))
+        return [rung or solved[number] for number, rung in enumerate(known)]
+
+    def clear(self) -> None:
+        """Forget all contacts, as their point has been written."""
+        self._known = {}
+        if self._path.name:
+            self._on_root(lambda: self._path.unlink(missing_ok=True))
+
+    def _read(self, job: Job) -> None:
+        of_job = {name: part for name, part in listing.plain_job(job).items() if name not in APART}
+        self._job = repr((__version__, of_job))
+        if not self._path.exists():
+            return
+        with self._path.open("r+b") as file:
+            whole = 0
+            for line in file:
+                try:
+                    digest, numbers = json.loads(line)
+                    self._known[digest] = _rung(numbers)
+                except (ValueError, TypeError, KeyError):
+                    break
+                whole += len(line)
+            file.truncate(whole)
+
+    def _append(self, found: dict[str, Rung]) -> None:
+        lines = [json.dumps([digest, _plain(rung)]) for digest, rung in found.items()]
+        with self._path.open("a") as file:
+            file.write("".join(f"{line}\n" for line in lines))
+
+    def _on_root(self, act: Callable[[], None]) -> None:
+        hdf5.on_root(self._slab, act, f"cannot keep the contacts of a point in {self._path}", RunError)
+
+
+def _plain(rung: Rung) -> dict[str, Any]:
+    return {name: np.asarray(value).tolist() for name, value in asdict(rung).items()}
+
+
+def _rung(numbers: dict[str, Any]) -> Rung:
+    values = [numbers[each.name] for each in fields(Rung)]
+    known: list[Any] = [np.array(value) if isinstance(value, list) else value for value in values]
+    return Rung(*known)
