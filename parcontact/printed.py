@@ -36,6 +36,20 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
     return f"{float(f'{number / size:.{digits}g}'):g} {shown}".rstrip()
 
 
+def span(low: float, high: float, unit: str, digits: int = 3) -> str:
+    """Return two numbers in one unit, in as many digits as tell them apart: 1.05 and 1.10 MPa."""
+    largest = max(abs(low), abs(high))
+    shown, size = prefixed(unit, largest)
+    if low == high or abs(low) < 0.01 * largest:
+        return f"{quantity(low, unit, digits)} and {quantity(high, unit, digits)}"
+    apart = min(largest / 10 ** (digits - 1), abs(high - low)) / size
+    places = max(0, -math.floor(math.log10(apart) + 1e-9))
+    ends = [f"{end / size:.{places}f}" for end in (low, high)]
+    while all("." in end and end[-1] in "0." for end in ends):
+        ends = [end[:-1] for end in ends]
+    return f"{ends[0]} and {ends[1]} {shown}".rstrip()
+
+
 def per_cent(share: float, digits: int = 2) -> str:
     """Return a share in per cent: 0.033 %, 2.2 %, 130 %."""
     percent = 100.0 * share

@@ -23,6 +23,7 @@ from ..plotting import conductivity, leakage
 from ..plotting.run import Fields, PlottedRun
 from ..printed import per_cent, quantity, stated_error
 from ..storage import files, hdf5, tables
+from ..summary import leak_stop
 
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
 MOST_CELLS = 4e6  # tuning: of a map for each rank to take one; of larger ones fewer ranks do. 2048 x 2048 takes 1.4 GB
@@ -255,19 +256,12 @@ def _describe_missing(gaps: Gaps, at: str) -> Iterator[str]:
 
 
 def _describe_closure(rows: Sequence[LeakInstant], axis: str) -> str:
-    """Say from which instant on contact closes the gap along an axis."""
-    closed = [not getattr(row, f"percolates_{axis}") for row in rows]
-    if len(rows) == 1:
-        return f"along {axis} contact {'closes the gap' if closed[0] else 'leaves the gap open'}"
-    if not any(closed):
-        return f"along {axis} contact leaves the gap open at all instants"
-    index = closed.index(True)
-    first = rows[index]
-    known = first.pressure == first.pressure  # its row of measures.csv is there
-    load = f"under {quantity(first.pressure, 'Pa')}"
-    if index and rows[index - 1].pressure < first.pressure:
-        load = f"between {quantity(rows[index - 1].pressure, 'Pa')} and {quantity(first.pressure, 'Pa')}"
-    under = f"{load}, with {per_cent(first.contact_area)} of the area in contact"
-    where = f", {under}" if known else ""
-    found = f"closes the gap at {sum(closed)} of {len(rows)} instants, first at t = {quantity(first.time, 's')}"
-    return f"along {axis} contact {found}{where}"
+    """Say where leakage along an axis stops, and at how many instants contact closes the gap."""
+    names = (f"flow_{axis}", "pressure", "time")
+    stop = leak_stop.describe_axis({name: [getattr(row, name) for row in rows] for name in names}, axis)
+    closed = [row for row in rows if not getattr(row, f"percolates_{axis}")]
+    found = [f"along {axis} leakage {stop}"] if stop else []
+    if closed and len(rows) > 1:
+        under = f", at the first with {per_cent(closed[0].contact_area)} of the area in contact" if stop else ""
+        found.append(f"along {axis} contact closes the gap at {len(closed)} of {len(rows)} instants{under}")
+    return "; ".join(found) or f"along {axis} contact leaves the gap open"

@@ -18,7 +18,7 @@ from ..plotting import histories, maps, steady, style, sweep, units
 from ..plotting.plots import choose_evenly
 from ..plotting.run import Fields, PlottedRun, find_curve_job, find_free_area, label_frames, to_load
 from ..storage import hdf5, marker, tables
-from ..summary import pull_off, slide, sweep_table, theory_beside, theory_settings
+from ..summary import leak_stop, pull_off, slide, sweep_table, theory_beside, theory_settings
 from .parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement", "work_precision.png": "error over cost"}
@@ -50,6 +50,7 @@ def describe_run(directory: Path) -> ReportSection:
     told = [
         *slide.describe(run.job.history, run.job.initial, run.job.grid.dx, columns),
         *pull_off.describe(columns, run.job.grid.lx * run.job.grid.ly, bool(marker.detached(directory))),
+        *leak_stop.describe(directory),
         theory_settings.describe(directory),
     ]
     pictures = [draw_chart(chart) for chart in histories.charts(run)] + _leakage(directory)

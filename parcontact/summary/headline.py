@@ -10,7 +10,7 @@ from ..job import Job
 from ..job.resolved import RESOLVED, shown_job
 from ..printed import quantity, with_error
 from ..storage import marker, tables
-from . import pull_off, slide, sweep_table
+from . import leak_stop, pull_off, slide, sweep_table
 
 SWEPT = (  # results of a sweep, from the most telling one on: column, words, unit, and the column of its error
     ("pull_off", "the pull-off force", "N", "pull_off_error"),
@@ -63,10 +63,12 @@ def _leakage(directory: Path, columns: Columns) -> Iterator[str]:
     """Yield the last conductivities, of `leak.csv` with their errors, else of the run itself."""
     table = directory / "leak.csv"
     columns = tables.read(table) if table.is_file() else columns
+    stops = [text for text in leak_stop.describe(directory) if " between " in text]
     known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
     if known:
         flows = [_flow(columns, known[-1], axis) for axis in "xy"]
         yield f"the conductivity of the gap is {' and '.join(flows)}"
+        yield from stops
 
 
 def _flow(columns: Columns, row: int, axis: str) -> str:

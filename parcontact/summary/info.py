@@ -21,7 +21,7 @@ from ..storage import checkpoint, curve_points, fields, hdf5, marker, tables
 from ..storage.console import meshes_of, warnings_of
 from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
-from . import pull_off, slide, sweep_table, theory_beside, theory_settings
+from . import leak_stop, pull_off, slide, sweep_table, theory_beside, theory_settings
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
 SHOWN = 20  # tuning: numbers of one name, or failed cases, at most
@@ -167,6 +167,7 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     if job is not None:
         yield from (f"  {text}" for text in slide.describe(job.history, job.initial, job.grid.dx, columns))
         yield from (f"  {text}" for text in pull_off.describe(columns, job.grid.lx * job.grid.ly, bool(came_off)))
+    yield from (f"  {text}" for text in leak_stop.describe(table.parent))
 
 
 def _slides(job: Job | None) -> bool:
@@ -223,9 +224,7 @@ def _saved_maps(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
 
 
 def _leakage(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    columns = tables.read(path)
-    closed = " and ".join(f"at {columns[f'percolates_{axis}'].count(0.0)} along {axis}" for axis in "xy")
-    yield f"  leakage: {len(columns['time'])} instants in leak.csv; contact closes the gap {closed}"
+    yield f"  leakage: {len(tables.read(path)['time'])} instants in leak.csv"
 
 
 def _sweep(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
