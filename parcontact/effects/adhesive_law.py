@@ -36,6 +36,7 @@ JUMP_STRIDE = 1.0 / 8.0  # accuracy: of a jump: the longest part in which it is 
 LEAST_STRIDE = 1.0 / 16.0  # accuracy: of these, and of a step: the shortest part in which a hard one is made
 PART_TOLERANCE = 0.05  # tuning: of the parts of a step but for the last
 OPEN = 10.0  # physics: ranges of attraction between surfaces that are detached
+LEAST_LOAD = 1e-9  # accuracy: of all tension, and of the largest attraction on a point: a smaller load is none
 LEAST_TENSION = 1e-2  # physics: of the largest attraction: less is not counted as an area under tension
 NEVER = -1.0  # a time [s] in a checkpoint
 UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
@@ -149,7 +150,9 @@ class AdhesiveLaw:
             numbers[PUSHED] = walk.work * trial.alpha
             numbers[JUMPS] = float(walk.detached or path.closes_gap_first)
         touching = law.touches(now.pasts[0].gap)
-        return SolvedContact(contact, now, touching, numbers, numbers["adhesive_force"], end, snapped, remark)
+        pull = numbers["adhesive_force"]
+        least_load = self._least_load(law, trial.alpha, control, contact.p, pull)
+        return SolvedContact(contact, now, touching, numbers, pull, least_load, end, snapped, remark)
 
     def _walk(
         self, law: Law, memory: AdhesiveMemory, step: Step, trial: Trial, path: LoadPath, pressure: Array
@@ -195,7 +198,9 @@ class AdhesiveLaw:
         In cells that is the number of points that came into contact or left it, over the length of the edge, which is
         pi/4 of the sides of cells along it. What is left of the load of an `untouched` contact is the solver's error.
         """
-        if not (before.contact_area or now.contact_area or solved.numbers["tensile_area"]):
+        least = LEAST_LOAD * self.scene.choices.adhesion.strength
+        apart = not (before.contact_area or now.contact_area or solved.numbers["tensile_area"])
+        if apart or (not solved.loaded and max(before.max_pressure, -before.pressure) <= least):
             return EdgeMotion(0.0, True)
         begins = (before.contact_area == 0.0) != (now.contact_area == 0.0)
         excess = max(each.contact_area - each.contact_area_corrected for each in (before, now))
@@ -269,6 +274,17 @@ class AdhesiveLaw:
         count, pull = self.slab.sum(*kernels.tension(p, LEAST_TENSION * law.strength))
         unit = alpha * self.scene.units.pressure * self.grid.lx * self.grid.ly / self.slab.points
         return {"tensile_area": count / self.slab.points, "adhesive_force": pull * unit}
+
+    def _least_load(self, law: Law, alpha: float, control: Control, p: Array, pull: float) -> float:
+        """Return the load up to which it is the solver's error [N]: a share of all tension and of what one point may
+        pull, or any load where no point presses or pulls more than its error; collective."""
+        largest = self.slab.reduce((), [float(np.abs(p).max(initial=0.0))])[0]
+        least = LEAST_LOAD * law.strength
+        unloaded = isinstance(control, MeanPressure) and abs(control.value) * self.slab.points <= least
+        if largest <= (LEAST_TENSION * law.strength if unloaded else least):
+            return math.inf
+        point = self.grid.lx * self.grid.ly / self.slab.points
+        return LEAST_LOAD * max(pull, law.strength * alpha * self.scene.units.pressure * point)
 
     # -- as a part of the run ------------------------------------------------------------------------------------------
 

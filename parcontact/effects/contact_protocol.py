@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Generic, Literal, NamedTuple, Protocol, TypeVar
@@ -55,7 +56,8 @@ class PreviousContacts:
 class SolvedContact(Generic[Remembered]):
     """The contact of a step: what the law remembers after it, and a map that is not 0 where the surfaces touch.
 
-    `numbers` are those of the law, by name; all tension adds up to the force `pull` [N]. The contact is in
+    `numbers` are those of the law, by name; all tension adds up to the force `pull` [N]. Loads up to `least_load` [N]
+    are the solver's error, any load where neither pressure nor tension is more than that. The contact is in
     `equilibrium`; or it is `detached`, as nothing holds the load; or it was `opened` for that reason, where the run
     goes on with the surfaces far apart, and then stays `open`. `snapped` says that it passed over states without
     equilibrium. `remark` is a sentence for run.log, or ''.
@@ -66,9 +68,15 @@ class SolvedContact(Generic[Remembered]):
     touching: Mask
     numbers: Mapping[str, float] = field(default_factory=dict)
     pull: float = 0.0
+    least_load: float = 0.0
     end: End = "equilibrium"
     snapped: bool = False
     remark: str = ""
+
+    @property
+    def loaded(self) -> bool:
+        """Return whether there is pressure or tension."""
+        return self.least_load < math.inf
 
 
 class EdgeMotion(NamedTuple):

@@ -58,6 +58,11 @@ class SolvedStep:
     def contact(self) -> Contact:
         return self.of_law.contact
 
+    @property
+    def touches(self) -> bool:
+        """Return whether the surfaces touch, and there is pressure or tension."""
+        return self.of_law.loaded and self.measures.contact_area > 0.0
+
 
 @dataclass(frozen=True)
 class ErrorMemory:
@@ -97,7 +102,7 @@ def estimate_errors(scene: Scene, friction: float, solved: SolvedStep) -> StepEr
     integrators, apart = _compare_integrators(scene, solved), _compare_views(scene, solved)
     own = measures.friction - measures.friction_interface
     change, own = own - friction, math.inf if step.jump else own
-    if measures.contact_area == 0.0:
+    if not solved.touches:
         still = StepObservation(
             0.0, integrators.difference, integrators.order, 0.0, 0.0, 0.0, 0.0, seconds=step.dt, curved=curved
         )
@@ -147,7 +152,7 @@ def _compare_integrators(scene: Scene, solved: SolvedStep) -> IntegratorDifferen
     if branches is None:
         return NO_DIFFERENCE
     pair = EmbeddedPair(scene.slab, branches, scene.choices.grid.dx / scene.units.length)
-    if measures.contact_area == 0.0:
+    if not solved.touches:
         return pair.compare_without_load(step.dt, trial, solved.body, step.growth) if step.judge else NO_DIFFERENCE
     load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)
     pressure = contact.p

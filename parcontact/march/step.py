@@ -121,7 +121,7 @@ def _solve(scene: Scene, state: State, step: Step) -> SolvedStep:
         moved = math.hypot(*cells_moved(scene, step, state.contact.last.position))
         raise failure.of_solve(scene, step, contact, contact, [], trial.effective, moved)
     maps = contact.p, trial.alpha, contact.u, trial.effective, contact.d, of_law.touching
-    measures = scene.probe.measure(*maps, step.position, step.velocity, of_law.pull)
+    measures = scene.probe.measure(*maps, step.position, step.velocity, of_law.least_load)
     if not measures.finite:
         raise failure.not_finite(scene, step, measures)
     memory = body.commit(state.body, trial, contact.u, scene.solver.workspace.pressure)

@@ -21,8 +21,6 @@ from .measures import Measures, excess_of
 from .surface import Surface
 from .units import Units
 
-LEAST_LOAD = 1e-9  # accuracy: of the forces that pull, below which a load is what rounding leaves of 0
-
 
 @dataclass(frozen=True)
 class Probe:
@@ -49,14 +47,14 @@ class Probe:
         touching: NDArray[Any],
         displacement: Vector,
         velocity: Vector = (0.0, 0.0),
-        pull: float = 0.0,
+        least_load: float = 0.0,
     ) -> Measures:
         """Measure the pressure `alpha p`, with `u - h - d` the gap, the surface moved by `displacement` [m] and moving
         with `velocity` [m/s]; collective.
 
-        `touching` is a map that is not 0 where the surfaces touch. All tension adds up to the force `pull` [N].
-        Friction is 0 where no load presses: none, tension, or what rounding leaves of two forces that balance. Where
-        nothing touches all pressure is tension, and a load above 0 is an error of the solve.
+        `touching` is a map that is not 0 where the surfaces touch. Friction is 0 where no load presses: none, tension,
+        or one up to `least_load` [N], as rounding leaves it of two forces that balance. Where nothing touches all
+        pressure is tension, and a load above 0 is an error of the solve.
         """
         units, points = self.units, self.slab.points
         cyclic = self.surface.periodic
@@ -66,11 +64,11 @@ class Probe:
         unit_pressure = alpha * units.pressure
         area = self.surface.size[0] * self.surface.size[1]
         force_x, force_y = 0.0, 0.0
-        if load > 0.0 or pull > 0.0:
+        if load > 0.0 or least_load > 0.0:
             unit_force = area / points * unit_pressure * units.height
             force_x, force_y = (unit_force * force for force in self.surface.forces(p, displacement))
         normal = load / points * unit_pressure * area
-        presses = normal > LEAST_LOAD * pull and count > 0
+        presses = normal > least_load and count > 0
         corrected = (count - self._excess * sides) / points
         own = (0.0, 0.0) if self.interface is None else self.interface.force(corrected * area, velocity)
         force_x, force_y = force_x + own[0], force_y + own[1]

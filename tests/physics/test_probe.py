@@ -145,7 +145,7 @@ def test_no_friction_where_pull_and_push_balance(comm: MPI.Intracomm, more: floa
     (tension,) = slab.sum(-float(np.minimum(p, 0.0).sum()))
     pull = tension * ALPHA * UNITS.pressure * LX * LY / (slab.nx * slab.ny)
     probe = Probe(slab, surface, UNITS, InterfaceFriction(2e5))
-    found = probe.measure(p, ALPHA, h, h, 0.0, np.ones_like(p), *instant, pull=pull)
+    found = probe.measure(p, ALPHA, h, h, 0.0, np.ones_like(p), *instant, least_load=1e-9 * pull)
     assert found.force_x != 0.0
     assert_allclose(found.force_interface, 2e5 * LX * LY, rtol=1e-15)
     assert [each != 0.0 for each in (found.friction, found.friction_x, *shares(found, instant[1]))] == [defined] * 4
