@@ -2,7 +2,7 @@
 
     .venv/bin/python scripts/mutants.py [--count 40] [--seed 0] [--list] [part ...]
 
-A part is a file of the program that has tests of its own (tests/ROOM/test_NAME*.py). In each a place is drawn at random
+A part is a file of the program that has tests of its own (see `tests_of`). In each a place is drawn at random
 in a function: an operator, a comparison, a sign, a number or a limit is changed to a wrong one. No line of the source
 is named here, so that the code may be written anew. Some changes alter nothing that matters (a limit that is never met,
 a guard against what cannot happen): of all, at least `SEEN` must be seen. Works on a copy of the last commit in a
@@ -13,6 +13,7 @@ import argparse
 import ast
 import os
 import random
+import re
 import subprocess
 import sys
 import tempfile
@@ -26,9 +27,9 @@ ROOMS = ("physics", "parallel", "solve", "march", "scene", "storage", "plan", "e
 LONGEST = 600.0  # seconds for the tests of one change
 SEEN = 0.8  # share of the changes that must be seen
 FEWEST = 8  # places to break in a part
-SLIDING = "scenarios/test_sliding_waves.py"
+SLIDING = "scenarios/test_sliding_runs.py"
 OTHERS = {  # further tests that answer for a part
-    "march/step.py": f"march/test_sticking.py scenarios/test_viscoelastic.py {SLIDING} scenarios/test_sliding_runs.py",
+    "march/step.py": f"march/test_sticking.py scenarios/test_viscoelastic.py {SLIDING}",
     "march/errors.py": SLIDING,
     "physics/body.py": "scenarios/test_viscoelastic.py",
 }
@@ -40,8 +41,13 @@ Change = tuple[str, Callable[[], None]]  # what is done, and doing it to the tre
 
 
 def tests_of(part: str) -> tuple[str, ...]:
-    """The tests that answer for a file of the program: `tests/ROOM/test_NAME*.py`, and some others."""
-    own = sorted((TESTS / part).parent.glob(f"test_{Path(part).stem}*.py"))
+    """Return the tests of a file of the program: `tests/ROOM/test_NAME*.py`, else those of its room that import it."""
+    path = Path(part)
+    own = sorted((TESTS / path).parent.glob(f"test_{path.stem}*.py"))
+    if not own:
+        room = r"\.".join(path.parent.parts)
+        name = re.compile(rf"from parcontact\.{room}(\.{path.stem} import| import .*\b{path.stem}\b)")
+        own = sorted(test for test in (TESTS / path.parts[0]).rglob("test_*.py") if name.search(test.read_text()))
     own += [TESTS / name for name in OTHERS.get(part, "").split()]
     return tuple(str(path.relative_to(ROOT)) for path in own)
 

@@ -32,7 +32,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from robustness import histories
 from robustness.scenes import Sketch, sketch
-from robustness.trial import trial
+from robustness.witness import trial
 
 from parcontact.errors import RunError
 from parcontact.job import Numerics

@@ -1,6 +1,7 @@
 """Steps that choose themselves: they follow the error asked for, end with their stages, and do not depend on how a run
 was cut into pieces or on how many ranks made it."""
 
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -8,13 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 from csv_rows import Rows, measures
+from job.texts import job_of, with_stage
 from marching import SLS, begun, column, marched
 from mpi4py import MPI
 from restarting import Bench
 
+from parcontact import scene
+from parcontact.errors import InputError, JobError
 from parcontact.history.chosen import ChosenEnds, ChosenSteps, StepLadder, bounds
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
+from parcontact.scene import sanity
 
 POINTS = 32
 CELL = 1e-3 / POINTS
@@ -195,7 +200,6 @@ def test_times_of_rows_long_after_the_start() -> None:
 
 # -- runs -------------------------------------------------------------------------------------------------------------
 
-
 def run(where: Path, comm: MPI.Intracomm, name: str, until: float | None = None, **sections: Any) -> Rows:
     """The rows of a run without their seconds, on root."""
     output = {"fields": ["pressure"], "every": 7}
@@ -270,3 +274,48 @@ def test_errors_do_not_depend_on_the_direction() -> None:
     assert estimates[0] == pytest.approx(estimates[1], rel=1e-6)
     assert estimates[0] > 0.0
     assert estimates[2] == 0.0
+
+
+# -- histories of more steps than anybody makes: they cost nothing until they are made --------------------------------
+
+COUNT = 10**8
+
+
+@pytest.mark.parametrize("way", ["", "velocity: 1, ", "velocity: [0.3, 0.2], "])
+def test_a_timeline_of_so_many_steps(tmp_path: Path, way: str) -> None:
+    """Its length, any of its steps, what a plan asks of it: in less than 10 s of CPU time;
+    a list of all steps takes minutes."""
+    text = with_stage(f"{{pressure: 1e5, {way}duration: {COUNT}.0, time_step: 1.0}}")
+    job = job_of(tmp_path, text)
+    began = time.process_time()
+    timeline = Timeline.of(job)
+    assert timeline.count == COUNT + 1
+    assert timeline[timeline.count].time == float(COUNT)
+    assert timeline[timeline.count // 2].time == pytest.approx(COUNT / 2, rel=2e-8)
+    assert timeline[timeline.count].dt == 1.0
+    assert scene.choices(job).effects
+    assert time.process_time() - began < 10.0
+
+
+def test_the_first_step_between_cells_of_so_many(tmp_path: Path) -> None:
+    """A drift of 1e-12 cells a step counts where it has come to 1e-6 cells, and not before."""
+    cell = 1e-3 / 64
+    stage = f"{{pressure: 1e5, velocity: {cell * (1 + 1e-12)!r}, duration: {COUNT}.0, time_step: 1.0}}"
+    timeline = Timeline.of(job_of(tmp_path, with_stage(stage)))
+    step = timeline.first_between_cells()
+    assert step is not None
+
+    def off(number: int) -> float:
+        cells = timeline[number].position[0] / cell
+        return abs(cells - round(cells))
+
+    assert off(step.number) >= 1e-6 > off(step.number - 1)
+
+
+def test_more_steps_are_refused(tmp_path: Path) -> None:
+    """In a job, and where a run is to go on so far."""
+    with pytest.raises(JobError, match=r"leads to 2e\+08 steps; a history has at most 1e\+08"):
+        job_of(tmp_path, with_stage("{pressure: 1e5, duration: 2e8, time_step: 1.0}"))
+    job = job_of(tmp_path, with_stage("{pressure: 1e5, velocity: 1, duration: 1e-3, time_step: 1e-6}"))
+    with pytest.raises(InputError, match=r"the history would have 1e\+09 steps; it has at most 1e\+08"):
+        sanity.refuse_impossible(job, Timeline.of(job, 1e3))

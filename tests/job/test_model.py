@@ -2,9 +2,11 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import InputError
 from parcontact.job import (
     Elastic,
@@ -14,14 +16,16 @@ from parcontact.job import (
     Ramp,
     Stage,
     ZenerBranch,
+    added_sections,
     describe,
+    load,
     log_range,
 )
-from parcontact.job.checks.cells import cells_per_wave
+from parcontact.job.checks.cells import cells_per_wave, has_wave
 from parcontact.job.resolved import shown_job
 from parcontact.job.sections import listing
 
-from .texts import SMALL, job_of, replaced
+from .texts import SMALL, job_of, mistakes_of, replaced
 
 CONTRACT = """
 title: Rubber pressed on a road, then sliding      # free text
@@ -293,3 +297,137 @@ def test_a_resolved_job_that_is_none(tmp_path: Path) -> None:
     path.write_text("[1, 2")
     with pytest.raises(InputError, match=r"job\.resolved\.yaml cannot be read"):
         shown_job(path)
+
+
+# -- sections of effects, as a job's own keys -------------------------------------------------------------------------
+
+@pytest.mark.parametrize("section", added_sections.names())
+def test_an_empty_section_of_an_effect_is_an_absent_one(tmp_path: Path, section: str) -> None:
+    assert job_of(tmp_path, SMALL + f"{section}:\n") == job_of(tmp_path, SMALL)
+    with pytest.raises(InputError, match=f"zzzzzz is not a known key; there are .*\\b{section}\\b"):
+        job_of(tmp_path, SMALL + "zzzzzz: 1\n")
+
+
+# -- a job as lines to read, and as a file to run again ---------------------------------------------------------------
+
+def test_words_have_no_unit() -> None:
+    """A stage that chooses its steps says auto, and not auto s."""
+    line = listing.line(Stage.model_validate({"pressure": 1.0e5, "duration": 1.0}))
+    assert line.endswith("duration 1 s, time_step auto")
+    line = listing.line(Stage.model_validate({"pressure": 1.0e5, "duration": 1.0, "time_step": 0.5}))
+    assert line.endswith("time_step 0.5 s")
+
+
+def test_a_resolved_job_keeps_what_is_given(tmp_path: Path) -> None:
+    """Values chosen by the accuracy are a comment, and chosen again; equal values that are given make another job."""
+    chosen, given = (job_of(tmp_path, SMALL, *words) for words in ((), ("numerics.tolerance=5e-3",)))
+    assert chosen.resolved().endswith("# chosen by numerics.accuracy: tolerance 0.005, branch_error 0.001\n")
+    assert chosen != given
+    for job, names in ((chosen, {"tolerance", "branch_error"}), (given, {"branch_error"})):
+        again = job_of(tmp_path, job.resolved(), name="job.resolved.yaml")
+        assert set(again.numerics.chosen) == names
+        assert again.numerics.tolerance == 5e-3
+
+
+# -- jobs that no run could begin are mistakes, found when they are read ----------------------------------------------
+
+FLUID = "{model: zener, modulus_inf: 0, branches: [{modulus: 1e6, relaxation_time: 1}]}"
+LINE = "{points: [64, 1], size: [1e-3, 1e-5]}"
+CURVE = "{velocities: [1], pressures: [1e4]}"
+ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: %s, short_wavelength: %s, rms_slope: 0.1}"
+
+
+@pytest.mark.parametrize(
+    ("key", "sections"),
+    [
+        ("steady", {"steady": CURVE}),
+        ("steady", {"steady": CURVE, "grid": "{points: 64, size: 1e-3, boundary: free}"}),
+        ("steady", {"steady": CURVE, "grid": LINE, "body": "{thickness: 1e-4}"}),
+        ("steady", {"steady": CURVE.replace("{", "{direction: [0, 1], "), "grid": LINE}),
+        ("initial", {"initial": "{state: steady, velocity: 1, pressure: 1}"}),
+        ("initial", {"initial": "{state: steady, pressure: 1}", "grid": LINE}),
+    ],
+)
+def test_a_body_that_flows_has_no_steady_state(key: str, sections: dict[str, str], tmp_path: Path) -> None:
+    (mistake,) = mistakes_of(tmp_path, replaced(SMALL, **{"material": FLUID, **sections}))
+    assert f": {key} needs a material with a long-term modulus" in mistake
+
+
+def test_but_for_a_line_along_which_it_slides(tmp_path: Path) -> None:
+    assert job_of(tmp_path, replaced(SMALL, material=FLUID, grid=LINE, steady=CURVE)).steady is not None
+
+
+def test_energies_count_from_a_body_at_rest(tmp_path: Path) -> None:
+    asked = replaced(SMALL, initial="{state: steady, pressure: 1}", output="{energy: true}")
+    (mistake,) = mistakes_of(tmp_path, asked)
+    assert mistake.startswith("job.yaml:2:18: output.energy needs initial: {state: virgin}")
+
+
+def test_a_rough_surface_needs_a_wave(tmp_path: Path) -> None:
+    """On a box of 1 mm there is none from 0.44 to 0.4 mm: (2, 1) has 0.447 mm, (2, 2) 0.354 mm."""
+    (mistake,) = mistakes_of(tmp_path, replaced(SMALL, surface=ROUGH % ("4.4e-4", "4.0e-4")))
+    assert mistake.startswith("job.yaml:1:54: surface.long_wavelength leaves no wave down to short_wavelength")
+    assert job_of(tmp_path, replaced(SMALL, surface=ROUGH % ("4.5e-4", "4.0e-4"))).surface
+
+
+def test_waves_of_a_box(tmp_path: Path) -> None:
+    """The limits as in the spectrum: a wave of the longest length is one, of the shortest none; not even as one of a
+    number of points that ends at two cells along y, where a wave has no phase."""
+    grid = job_of(tmp_path, replaced(SMALL, grid="{points: [8, 4], size: [1e-3, 1e-3]}")).grid
+    assert has_wave(grid, 2.5e-4, 1e-3)
+    assert has_wave(grid, 9e-4, 1e-3)
+    assert not has_wave(grid, 1e-3, 1.1e-3)
+    line = grid.model_copy(update={"points": (1, 4)})
+    assert has_wave(line, 6e-4, 1e-3)
+    assert not has_wave(line, 4e-4, 6e-4)
+
+
+def test_a_layer_is_in_proportion_to_its_box(tmp_path: Path) -> None:
+    (mistake,) = mistakes_of(tmp_path, replaced(SMALL, body="{thickness: 1e-13}"))
+    assert mistake.startswith("job.yaml:1:19: body.thickness must be at least 1e-09 of the box, 1e-12 m, got 1e-13")
+
+
+# -- prony series as fractions of the modulus at a sudden strain, as finite-element programs write them ---------------
+
+FRACTIONS = [{"g": 0.5, "tau": 1e-3}, {"g": 0.25, "tau": 1.0}]
+
+
+def job_with(**material: Any) -> Any:
+    data = {"grid": {"points": 4, "size": 1e-3}, "surface": {"shape": "flat"}, "history": [{"pressure": 1e5}]}
+    return load({**data, "material": {"model": "zener", **material}})
+
+
+@pytest.mark.parametrize("time", [0.0, 1e-3, 0.5, 1e3])
+def test_relaxation_is_that_of_the_series(time: float) -> None:
+    """G(t) = G_0 (1 - sum g (1 - exp(-t/tau))), to rounding."""
+    body = relaxation_of(job_with(modulus_0=4e6, branches=FRACTIONS).material)
+    found = body.modulus_inf + float(sum(body.moduli * [math.exp(-time / tau) for tau in body.relaxation_times]))
+    exact = 4e6 * (1.0 - sum(term["g"] * -math.expm1(-time / term["tau"]) for term in FRACTIONS))
+    assert found == pytest.approx(exact, rel=1e-14)
+
+
+def test_fractions_that_add_up_to_1_are_a_liquid() -> None:
+    thirds = [{"g": share, "tau": 10.0**k} for k, share in enumerate((0.1, 0.2, 0.3, 0.4))]
+    assert job_with(modulus_0=1e6, branches=thirds).material.modulus_inf == 0.0
+
+
+@pytest.mark.parametrize(
+    ("material", "said"),
+    [
+        ({"branches": FRACTIONS}, "material.modulus_0 is missing"),
+        (
+            {"modulus_0": 1e6, "modulus_inf": 1e5, "branches": FRACTIONS},
+            "material.modulus_inf does not go with modulus_0",
+        ),
+        ({"modulus_0": 1e6, "branches": [*FRACTIONS, {"g": 0.26, "tau": 1.0}]}, "fractions g that add up to 1.01"),
+        (
+            {"modulus_0": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1.0}]},
+            "needs branches of the form g, tau",
+        ),
+        ({"modulus_0": 1e6, "branches": [{"g": 0.5, "tau": 1.0, "modulus": 1e6}]}, "mixes forms of a branch"),
+        ({"modulus_0": 1e6, "branches": [{"g": 1.5, "tau": 1.0}]}, "a fraction of modulus_0 .* from 0 to 1, got 1.5"),
+    ],
+)
+def test_mistakes(material: dict[str, Any], said: str) -> None:
+    with pytest.raises(JobError, match=said):
+        job_with(**material)

@@ -1,12 +1,18 @@
 """Flow through gaps: closed forms of waves, mazes and checkerboards, closure, and what rotations and scales do."""
 
+import heapq
+import math
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from parcontact.errors import InputError
+from parcontact.leakage.elimination import Balance
 from parcontact.leakage.flow import Map, leak, mesh_error, solve_flow
+from parcontact.leakage.fluids import FLUIDS, Fluid, PressureDrop
+from parcontact.leakage.paths import connected_from_end_to_end, critical_constriction
 
 
 def wave(points: int, depth: float) -> Map:
@@ -149,3 +155,130 @@ def test_what_is_no_map_of_gaps(gap: Any, size: Any, told: str) -> None:
 def test_what_a_leak_shows() -> None:
     """A notebook prints its numbers, not its maps."""
     assert len(repr(leak(np.ones((64, 64)).tolist(), [1.0, 1.0]))) < 300
+
+
+# -- flow of liquids and gases through an even gap, against closed forms, and the sentences on them -------------------
+
+SIZE, GAP = (2e-3, 1e-3), 1e-6  # [m]
+EVEN = np.full((4, 8), GAP)
+
+
+def rate(drop: PressureDrop) -> float:
+    flow = solve_flow(drop.conducting_gap(EVEN), SIZE)
+    return drop.flow_rate(flow.conductivity, *SIZE)
+
+
+def test_a_liquid() -> None:
+    """Plane Poiseuille flow, h^3/(12 eta) (p1 - p2) W/L, to rounding."""
+    found = rate(PressureDrop(Fluid("oil", 0.1), 3e5, 1e5))
+    assert found == pytest.approx(GAP**3 / (12 * 0.1) * 2e5 * SIZE[1] / SIZE[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["air", "nitrogen", "helium"])
+def test_a_gas_that_expands_and_slips(name: str) -> None:
+    """As many molecules pass each place: with the slip length lambda(p) the integral of `h^3 p (1 + 6 lambda/h) dp/eta`
+    from p2 to p1, here by 2000 trapezoids (exact, as it is linear in p: 1e-9)."""
+    fluid, high, low = FLUIDS[name], 3e5, 1e4
+    p = np.linspace(low, high, 2001)
+    slip = 1.0 + 6.0 * np.array([fluid.mean_free_path(each) for each in p]) / GAP
+    density = GAP**3 * p * slip
+    passing = float(0.5 * (density[1:] + density[:-1]) @ np.diff(p))
+    exact = passing / (12.0 * fluid.viscosity) / low * SIZE[1] / SIZE[0]
+    assert rate(PressureDrop(fluid, high, low)) == pytest.approx(exact, rel=1e-9)
+
+
+@pytest.mark.parametrize(("name", "path"), [("air", 66e-9), ("nitrogen", 65e-9), ("helium", 192e-9)])
+def test_mean_free_paths(name: str, path: float) -> None:
+    """Those of tables at 20 C and 1 bar, which differ by some per cent (air 66 to 68 nm, helium 190 to 198 nm)."""
+    assert FLUIDS[name].mean_free_path(1e5) == pytest.approx(path, rel=0.03)
+
+
+def test_masses() -> None:
+    """Dry air at 20 C and 1 bar has 1.189 kg/m^3; 1e-9 m^3/s of it are 1.189e-3 mg/s, and 3.6 ml/h."""
+    drop = PressureDrop(FLUIDS["air"], 2e5, 1e5)
+    assert FLUIDS["air"].density_at(1e5) == pytest.approx(1.189, rel=1e-3)
+    assert drop.describe_rate(1e-9) == "1e-09 m^3/s (3.6 ml/h, 0.00119 mg/s)"
+    assert math.isnan(Fluid("oil", 0.1).density_at(1e5))
+
+
+# -- connected cells and critical constrictions against a search that grows from the first row ------------------------
+
+def widest_path(gap: NDArray[np.float64], periodic: bool) -> float:
+    """The smallest gap on the widest path, by Dijkstra's algorithm."""
+    rows, columns = gap.shape
+    best = np.zeros_like(gap)
+    queue = [(-float(g), 0, j) for j, g in enumerate(gap[0]) if g > 0.0]
+    heapq.heapify(queue)
+    while queue:
+        width, i, j = heapq.heappop(queue)
+        if best[i, j] >= -width:
+            continue
+        best[i, j] = -width
+        for a, b in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
+            if periodic:
+                b %= columns
+            if 0 <= a < rows and 0 <= b < columns:
+                heapq.heappush(queue, (max(width, -float(gap[a, b])), a, b))
+    return float(best[-1].max())
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_the_constriction_is_that_of_the_widest_path(periodic: bool) -> None:
+    generator, closed = np.random.default_rng(5), 0
+    for share in np.linspace(0.2, 0.6, 40):
+        gap = np.where(generator.uniform(size=(9, 11)) < share, 0.0, generator.uniform(size=(9, 11)))
+        found, position = critical_constriction(gap, periodic)
+        assert found == widest_path(gap, periodic)
+        closed += position is None
+        assert position is None or gap[position] == found
+    assert 0 < closed < 40  # both happen
+
+
+def test_what_leads_nowhere_is_left_out() -> None:
+    gap = np.zeros((4, 5), dtype=bool)
+    gap[:, 1] = gap[0, 3] = gap[2, 2] = True
+    gap[3, 4] = True
+    kept = connected_from_end_to_end(gap, periodic_sides=False)
+    gap[0, 3] = gap[3, 4] = False
+    assert (kept == gap).all()
+
+
+# -- elimination of half of the cells against a dense solution, for odd and even, narrow and wide maps ----------------
+
+def dense(cubes: Map, aspect: float, periodic: bool, given: Map) -> Map:
+    """The pressures by a full matrix, made face by face."""
+    (ny, nx), number = cubes.shape, np.arange(cubes.size).reshape(cubes.shape)
+    matrix = np.zeros((cubes.size, cubes.size))
+
+    def connect(a: int, b: int, c: float) -> None:
+        matrix[a, a] += c
+        matrix[b, b] += c
+        matrix[a, b] -= c
+        matrix[b, a] -= c
+
+    for i in range(ny):
+        for j in range(nx):
+            for k, m, ratio in ((i + 1, j, aspect), (i, j + 1, 1.0 / aspect)):
+                if k < ny and (m < nx or periodic):
+                    a, b = cubes[i, j], cubes[k, m % nx]
+                    connect(number[i, j], number[k, m % nx], ratio * 2 * a * b / (a + b) if a * b else 0.0)
+    for row in (0, -1):
+        matrix[number[row], number[row]] += 2.0 * aspect * cubes[row]
+    wet = cubes.ravel() > 0.0
+    found = np.zeros(cubes.size)
+    found[wet] = np.linalg.solve(matrix[np.ix_(wet, wet)], given.ravel()[wet])
+    return found.reshape(cubes.shape)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+@pytest.mark.parametrize("shape", [(6, 8), (7, 7), (5, 1), (5, 2), (1, 6), (4, 3)])
+def test_pressures_are_those_of_the_full_matrix(shape: tuple[int, int], periodic: bool) -> None:
+    """To rounding, with what is given to any cell. Cells between columns without walls reach both ends."""
+    random = np.random.default_rng(1)
+    cubes = random.uniform(0.1, 1.0, shape)
+    if shape[1] > 3:
+        cubes[1:-1, 2] = 0.0
+    given = np.where(cubes > 0.0, random.normal(size=shape), 0.0)
+    with np.errstate(divide="ignore"):
+        found = Balance(1.0 / cubes, 0.7, periodic).solve(given)
+    np.testing.assert_allclose(found, dense(cubes, 0.7, periodic, given), rtol=0, atol=1e-13)

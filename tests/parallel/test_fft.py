@@ -17,12 +17,14 @@ from mpi4py import MPI
 from numpy.typing import DTypeLike, NDArray
 
 from parcontact.parallel import fft as transforms
-from parcontact.parallel import transpose
+from parcontact.parallel import regrid, transpose
+from parcontact.parallel.cosines import Cosines
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.fftw import export_wisdom, import_wisdom
 from parcontact.parallel.slab import Slab
 
 pytestmark = pytest.mark.mpi
+
 
 TOLERANCES: dict[DTypeLike, float] = {np.float64: 1e-12, np.float32: 1e-6}
 SIZES = [(64, 48), (63, 45), (31, 37), (48, 61), (1, 24), (24, 1), (1, 1), (2, 2), (5, 3), (2, 3), (97, 2)]  # nx, ny
@@ -275,3 +277,124 @@ def test_foreign_wisdom(comm: MPI.Intracomm) -> None:
     assert not import_wisdom(b"(fftw-9.9 fftw_wisdom)\x1e\x1e")
     assert import_wisdom(export_wisdom())
     check(Slab(comm, 16, 16), (16, 16), np.float64)
+
+
+# -- cosine series against SciPy's, on any grid and any number of ranks -----------------------------------------------
+
+def symbols_of(cosines: Cosines, symbol: NDArray[Any]) -> list[NDArray[np.complexfloating]]:
+    """A symbol on half waves, shape (ny, nx), as `convolve` takes it; there is no wave nx."""
+    (own, _), (other, _) = cosines.modes
+    parts = (symbol[:, own[0]] + 1j * symbol[:, other[0] % cosines.mx]) / (cosines.mx * cosines.my)
+    return [np.ascontiguousarray(parts[:, columns].astype(cosines.fft.complex)) for columns in cosines.column_blocks]
+
+
+def check_cosines(slab: Slab, dtype: DTypeLike) -> None:
+    """The product with a symbol is SciPy's."""
+    cosines = Cosines(FFT(slab, dtype=dtype))
+    whole = random_map(slab.nx, slab.ny)
+    symbol = np.random.default_rng(3).uniform(0.5, 1.5, whole.shape)
+    expected = scipy.fft.idctn(symbol * scipy.fft.dctn(whole))
+    out = cosines.convolve(whole[slab.rows].astype(dtype), symbols_of(cosines, symbol), slab.empty())
+    close(out, expected[slab.rows], dtype, np.abs(whole).max())
+
+
+@pytest.mark.parametrize("dtype", TOLERANCES)
+@pytest.mark.parametrize(("nx", "ny"), SIZES)
+def test_product_with_a_symbol(communicators: list[MPI.Intracomm], nx: int, ny: int, dtype: DTypeLike) -> None:
+    for comm in communicators:
+        check_cosines(Slab(comm, nx, ny), dtype)
+
+
+@pytest.mark.parametrize("nx", [64, 33])
+def test_many_blocks_cosines(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, nx: int) -> None:
+    """In blocks of eight rows, which are sent in four legs."""
+    monkeypatch.setattr(transforms, "BLOCK_BYTES", 1)
+    monkeypatch.setattr(transpose, "LEG_BYTES", 1)
+    check_cosines(Slab(comm, nx, 75), np.float64)
+
+
+@pytest.mark.parametrize("dtype", TOLERANCES)
+def test_what_it_costs(comm: MPI.Intracomm, dtype: DTypeLike) -> None:
+    """Two transforms of the map's own size, with their messages; in memory, a block of columns beside them."""
+    slab = Slab(comm, 20, 14)
+    fft = FFT(slab, dtype=dtype)
+    before = slab.tally.copy()
+    cosines = Cosines(fft)
+    assert slab.tally.since(before)["map bytes"] == Cosines.footprint(14, np.dtype(dtype).itemsize)
+    before = slab.tally.copy()
+    fft.backward(fft.forward(slab.zeros()), slab.empty())
+    plain, before = slab.tally.since(before), slab.tally.copy()
+    cosines.convolve(slab.zeros(), symbols_of(cosines, np.ones((14, 20))), slab.empty())
+    assert slab.tally.since(before) == plain
+
+
+# -- maps between grids, on any number of ranks; against numpy on the whole map ---------------------------------------
+
+GRIDS = {"cells": st.integers(1, 9), "fx": st.integers(1, 3), "fy": st.integers(1, 3)}
+
+
+def pair(cells: int, fx: int, fy: int) -> tuple[Slab, Slab]:
+    """A fine and a coarse grid: fewer coarse rows than ranks, and rows cut apart by ranks, are among them."""
+    coarse = Slab(MPI.COMM_WORLD, 4, cells)
+    return coarse.resized(4 * fx, cells * fy), coarse
+
+
+def field(slab: Slab, seed: int = 0, dtype: type = np.float64) -> tuple[NDArray, NDArray]:
+    """A whole map, and this rank's rows of it."""
+    whole: NDArray = np.random.default_rng(seed).normal(size=(slab.ny, slab.nx)).astype(dtype)
+    own = slab.empty(dtype)
+    own[...] = whole[slab.rows]
+    return whole, own
+
+
+@settings(max_examples=30)
+@given(**GRIDS)
+def test_restricts_to_means(cells: int, fx: int, fy: int) -> None:
+    """To rounding."""
+    fine, coarse = pair(cells, fx, fy)
+    whole, own = field(fine)
+    means = whole.reshape(cells, fy, 4, fx).mean(axis=(1, 3))
+    np.testing.assert_allclose(regrid.restrict(fine, coarse, own), means[coarse.rows], rtol=0, atol=1e-15)
+
+
+@settings(max_examples=30)
+@given(**GRIDS, single=st.booleans())
+def test_prolongs_by_copies(cells: int, fx: int, fy: int, single: bool) -> None:
+    """Copies, so equal."""
+    fine, coarse = pair(cells, fx, fy)
+    whole, own = field(coarse, dtype=np.float32 if single else np.float64)
+    found = regrid.prolong(coarse, fine, own, fine.empty(own.dtype))
+    np.testing.assert_array_equal(found, np.kron(whole, np.ones((fy, fx)))[fine.rows])
+
+
+@settings(max_examples=30)
+@given(**GRIDS)
+def test_prolongation_is_the_transpose(cells: int, fx: int, fy: int) -> None:
+    """`<prolong c, f> = fx fy <c, restrict f>` and `restrict prolong c = c`, to rounding."""
+    fine, coarse = pair(cells, fx, fy)
+    (_, f), (_, c) = field(fine, 1), field(coarse, 2)
+    up, down = regrid.prolong(coarse, fine, c, fine.empty()), regrid.restrict(fine, coarse, f)
+    left, right = fine.sum(float((up * f).sum()), float((c * down).sum()))
+    assert left == pytest.approx(fx * fy * right, rel=1e-12, abs=1e-12)
+    np.testing.assert_allclose(regrid.restrict(fine, coarse, up), c, rtol=1e-15)
+
+
+@settings(max_examples=30)
+@given(ny=st.integers(1, 9), seed=st.integers(0, 99))
+def test_fetches_what_each_rank_wants(ny: int, seed: int) -> None:
+    """Any rows, none too, also more than one rank has; copies, so equal."""
+    slab = Slab(MPI.COMM_WORLD, 3, ny)
+    bounds = np.sort(np.random.default_rng(seed).integers(0, ny + 1, (slab.comm.size, 2)))
+    wanted = [slice(int(start), int(stop)) for start, stop in bounds]
+    whole, own = field(slab)
+    np.testing.assert_array_equal(regrid.fetch(slab, own, wanted), whole[wanted[slab.comm.rank]])
+
+
+def test_counts_what_is_sent() -> None:
+    """Each rank takes the rows of the next one; its own cost nothing."""
+    size = MPI.COMM_WORLD.size
+    slab = Slab(MPI.COMM_WORLD, 2, size)
+    regrid.fetch(slab, slab.zeros(), slab.dealt)
+    assert slab.tally["bytes sent"] == 0
+    regrid.fetch(slab, slab.zeros(), slab.dealt[1:] + slab.dealt[:1])
+    assert slab.tally["bytes sent"] == (16 if size > 1 else 0)

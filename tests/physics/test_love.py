@@ -1,16 +1,31 @@
 """Love's influence coefficients against quadrature, a series far away, and themselves."""
 
 import math
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mpi4py import MPI
 from numpy.testing import assert_allclose
-from scipy.integrate import dblquad
+from rubbers import complex_modulus
+from scipy.integrate import dblquad, quad
 
+from parcontact.errors import InputError
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.parallel.tally import Tally
+from parcontact.physics import tile_operator as module
+from parcontact.physics import wake
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.physics.layer import Base, Layer
 from parcontact.physics.love import love
+from parcontact.physics.love import love as elastic
+from parcontact.physics.prony import Prony, creep_spectrum
+from parcontact.physics.tiles import SIDE, Tiles
+
+from .maps import gathered, random_map
 
 
 @pytest.mark.parametrize("aspect", [1.0, 0.1, 30.0])
@@ -66,3 +81,309 @@ def test_cells_add_up() -> None:
         x, y = np.array(quarters).T
         whole = love(np.array(float(i)), np.array(j * aspect), 1.0, aspect)
         assert_allclose(love(x, y, 0.5, aspect / 2).sum(), whole, rtol=2e-14)
+
+
+# -- operators of steady sliding against integrals along the wake, and against the body's own relaxation --------------
+
+BODY = Prony(0.3, np.array([2.0, 0.7]), np.array([0.05, 2.0]))
+CREEP = creep_spectrum(*BODY)
+CELL = (0.1, 0.07)
+
+
+def along_the_wake(x: float, y: float, velocity: tuple[float, float]) -> float:
+    """`J_g A(x) + sum J_i int exp(-t/l_i)/l_i A(x + v t) dt` with Love's A, by adaptive quadrature in units of l_i."""
+
+    def love(t: float) -> float:
+        return float(elastic(np.array(x + velocity[0] * t), np.array(y + velocity[1] * t), *CELL))
+
+    total = CREEP.glass * love(0.0)
+    for compliance, time in zip(CREEP.compliances, CREEP.retardation_times, strict=True):
+        nearest = -(x * velocity[0] + y * velocity[1]) / float(np.dot(velocity, velocity)) / time
+        points = sorted({0.0, *(p for p in (nearest - 0.05, nearest, nearest + 0.05) if 0.0 < p < 40.0), 40.0})
+        for start, stop in pairwise(points):
+            part = quad(lambda s, time=time: np.exp(-s) * love(s * time), start, stop, epsabs=1e-12, limit=400)
+            total += compliance * part[0]
+    return total
+
+
+@pytest.mark.parametrize("velocity", [(0.02, 0.0), (1.0, 0.0), (-0.3, 0.4), (0.0, 50.0)])
+def test_coefficients_are_integrals_along_the_wake(velocity: tuple[float, float]) -> None:
+    """To 1e-5, what six Gauss nodes per panel leave at the edge of the loaded cell; on it, before it, in its wake."""
+    places = np.array([(0.0, 0.0), (0.05, 0.035), (0.3, 0.0), (-0.3, 0.14), (-2.0, -1.0), (1.0, 3.0)])
+    found = wake.wake(places[None, :, 0], places[None, :, 1], *CELL, velocity, CREEP)[0]
+    expected = [along_the_wake(float(x), float(y), velocity) for x, y in places]
+    assert_allclose(found, expected, rtol=1e-5)
+
+
+@pytest.mark.parametrize("velocity", [(0.002, 0.0), (0.02, 0.0), (-1.0, 0.0), (50.0, 0.0)])
+def test_rows_along_the_velocity(velocity: tuple[float, float]) -> None:
+    """What is found for whole rows, from cell to cell, is what is found for each cell: to 1e-5 as above."""
+    x, y = CELL[0] * np.array([0.0, 1.0, 2.0, 3.0, -3.0, -2.0, -1.0]), CELL[1] * np.array([0.0, 1.0, -2.0])
+    found = wake.wake(x[None, :], y[:, None], *CELL, velocity, CREEP)
+    expected = [[along_the_wake(float(a), float(b), velocity) for a in x] for b in y]
+    assert_allclose(found, expected, rtol=1e-5)
+
+
+def test_far_coefficients_are_those_of_point_loads() -> None:
+    """Love's displacement far away is that of a point load, `dx dy/(4 pi r)`, to the fourth power of cell over distance
+    when two terms of its expansion are taken: here along the whole wake, to 1e-6."""
+    velocity = (0.4, 0.1)
+    x, y = 4.0, 3.0
+
+    def point(t: float) -> float:
+        return CELL[0] * CELL[1] / (4 * np.pi * np.hypot(x + velocity[0] * t, y + velocity[1] * t))
+
+    expected = CREEP.glass * point(0.0)
+    for compliance, time in zip(CREEP.compliances, CREEP.retardation_times, strict=True):
+        expected += compliance * quad(lambda s, time=time: np.exp(-s) * point(s * time), 0.0, 40.0)[0]
+    found = wake.wake(np.array([[x]]), np.array([[y]]), *CELL, velocity, CREEP)
+    assert_allclose(found, expected, rtol=(max(CELL) / 5.0) ** 2)
+
+
+@pytest.mark.parametrize(("speed", "compliance"), [(1e-9, CREEP.glass + CREEP.compliances.sum()), (1e9, CREEP.glass)])
+def test_slow_and_fast_bodies_are_elastic(speed: float, compliance: float) -> None:
+    """Relaxed, to the share of a cell that is crept along (rounding, where this is left out); glassy, to the distance
+    over a creep length."""
+    x, y = np.array([[0.0, 0.2, -1.0]]), np.array([[0.0, 0.1, 2.0]])
+    found = wake.wake(x, y, *CELL, (speed, 0.0), CREEP)
+    assert_allclose(found, compliance * elastic(x, y, *CELL), rtol=1e-6)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("velocity", [(0.7, 0.0), (0.3, -0.4)])
+def test_periodic_is_the_symbol(comm: MPI.Intracomm, velocity: tuple[float, float]) -> None:
+    """Against numpy's complex transform of the whole map with `1/(2 |q| G*(-q v))`, to rounding; the Nyquist wave,
+    which has two signs, takes the mean of both. The inverse undoes it but for the mean."""
+    nx, ny, size = 12, 9, (1.5, 0.8)
+    slab = Slab(comm, nx, ny)
+    fft = FFT(slab)
+    half_space = HalfSpace(size)
+    forward = half_space.sliding_operator(fft, velocity, BODY)
+    inverse = half_space.sliding_inverse(fft, velocity, BODY)
+    p = random_map(nx, ny)
+    own = slab.empty()
+    own[...] = p[slab.rows]
+    qx = 2 * np.pi / size[0] * np.fft.fftfreq(nx, 1 / nx)[None, :]
+    qy = 2 * np.pi / size[1] * np.fft.fftfreq(ny, 1 / ny)[:, None]
+    modulus = complex_modulus(-(qx * velocity[0] + qy * velocity[1]), *BODY)
+    other = complex_modulus(-(-qx * velocity[0] + qy * velocity[1]), *BODY)
+    modulus[:, nx // 2] = 0.5 * (modulus + other)[:, nx // 2]
+    q = np.hypot(qx, qy)
+    symbol = np.divide(0.5, q * modulus, out=np.zeros((ny, nx), complex), where=q > 0)
+    expected = np.fft.ifft2(symbol * np.fft.fft2(p)).real
+    u = forward.apply(own, slab.empty())
+    assert_allclose(gathered(u, slab), expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+    back = gathered(inverse.apply(u, slab.empty()), slab)
+    assert_allclose(back - back.mean(), p - p.mean(), rtol=0, atol=1e-12)
+
+
+@pytest.mark.mpi
+def test_free_is_the_sum_of_coefficients(comm: MPI.Intracomm) -> None:
+    """Against the double sum over all pairs of cells, to rounding; what is upstream stays so, nothing wraps around."""
+    nx, ny, size, velocity = 7, 5, (0.7, 0.35), (0.5, 0.2)
+    slab = Slab(comm, nx, ny)
+    p = random_map(nx, ny)
+    own = slab.empty()
+    own[...] = p[slab.rows]
+    operator = HalfSpace(size, free=True).sliding_operator(FFT(slab), velocity, BODY)
+    u = gathered(operator.apply(own, slab.empty()), slab)
+    x, y = (0.1 * np.arange(nx))[None, :], (0.07 * np.arange(ny))[:, None]
+    expected = np.zeros((ny, nx))
+    for j in range(ny):
+        for i in range(nx):
+            expected += p[j, i] * wake.wake(x - x[0, i], y - y[j, 0], *CELL, velocity, CREEP)
+    assert_allclose(u, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+def test_waits_for_no_endless_wake() -> None:
+    half_space, fft = HalfSpace((1.0, 1.0), free=True), FFT(Slab.alone(4, 4))
+    with pytest.raises(InputError, match="endless wake"):
+        half_space.sliding_operator(fft, (1.0, 0.0), Prony(0.0, np.ones(1), np.ones(1)))
+
+
+def test_a_branch_that_is_far_too_soft_makes_nothing() -> None:
+    """Its retardation time is its relaxation time to the last digit: as an operator it is 0, not infinite."""
+    slab = Slab.alone(4, 4)
+    body = Prony(1.0, np.array([1e-30]), np.array([2.0]))
+    with np.errstate(all="raise"):
+        branch = HalfSpace((1.0, 1.0), free=True).branch_operator(FFT(slab), (1.0, 0.0), body, 0)
+        found = branch.apply(np.ones((4, 4)), slab.empty())
+    assert np.abs(found).max() < 1e-29
+
+
+# -- the layer: closed forms and limits of its compliance, and one operator by two ways -------------------------------
+
+BASES: list[Base] = ["bonded", "smooth"]
+
+
+def test_incompressible_bonded_layer() -> None:
+    """S(x) = (sinh 2x - 2x)/(cosh 2x + 1 + 2x^2); for small x it is 2/3 x^3 to x^2 of itself."""
+    x = np.array([0.5, 2.0])
+    exact = (np.sinh(2 * x) - 2 * x) / (np.cosh(2 * x) + 1 + 2 * x**2)
+    np.testing.assert_allclose(Layer(1.0).compliance_ratio(x), exact, rtol=1e-13)
+    np.testing.assert_allclose(exact, [0.05757363, 0.64145003], atol=5e-9)
+    small = np.array([1e-8, 1e-4])
+    np.testing.assert_allclose(Layer(1.0).compliance_ratio(small), 2 / 3 * small**3, rtol=2e-8)
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.49])
+def test_long_waves_on_a_compressible_bonded_layer(poisson: float) -> None:
+    """The layer is strained in one direction then, as under a uniform pressure; what is left is of order (q d)^2."""
+    layer = Layer(2.0, "bonded", poisson)
+    q = np.array([1e-6])
+    assert (1 - poisson) / q * layer.compliance_ratio(q) == pytest.approx(layer.mean_compliance, rel=1e-9)
+
+
+def test_long_waves_on_a_smooth_base() -> None:
+    """A wave strains the layer in a plane: `(1 - nu) d/2`."""
+    assert Layer(2.0, "smooth").compliance_ratio(np.array([1e-6])) / 1e-6 == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.5])
+def test_a_thick_layer_is_a_half_space(base: Base, poisson: float) -> None:
+    ratio = Layer(1.0, base, poisson).compliance_ratio(np.array([20.0, 1e3]))
+    np.testing.assert_allclose(ratio, 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.5])
+def test_a_smooth_base_holds_less_than_a_bonded_one(poisson: float) -> None:
+    x = np.geomspace(1e-3, 10.0, 200)
+    bonded, smooth = (Layer(1.0, base, poisson).compliance_ratio(x) for base in BASES)
+    assert (bonded < smooth).all()
+    assert (np.diff(smooth) >= 0.0).all()  # it has no hump: below the half space at all wavelengths
+    assert np.abs(np.diff(np.log(bonded))).max() < 3.2 * np.log(x[1] / x[0])  # no jump where the series ends
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("poisson", [0.2, 0.5])
+def test_isolated_and_periodic_layers_agree_in_a_wide_box(base: Base, poisson: float) -> None:
+    """The neighbours are 16 thicknesses away, where a pressure moves an incompressible layer by 6e-4, others less.
+
+    Means differ on a smooth base: it lets an isolated layer spread, but not one that repeats for ever.
+    """
+    slab = Slab.alone(128, 128)
+    fft, x = FFT(slab), (np.arange(128) - 63.5) / 8.0
+    pressure = np.exp(-(x**2 + x[:, None] ** 2))
+    layer = Layer(1.0, base, poisson)
+    moved = [
+        HalfSpace((16.0, 16.0), poisson, "love", free, layer).operator(fft).apply(pressure.copy(), slab.empty()).copy()
+        for free in (True, False)
+    ]
+    difference = moved[0] - moved[1]
+    difference -= difference.mean() * (base == "smooth")
+    assert np.abs(difference).max() < 1e-3 * np.abs(moved[1]).max()
+
+
+def test_isolated_layer_against_the_integral_over_waves() -> None:
+    """A point far from a small cell: `(1 - nu)/(2 pi) int S(q d) J0(q r) dq` by another quadrature, in the far field of
+    which a sign changes: an incompressible layer bulges beside a force."""
+    from scipy.integrate import quad
+    from scipy.special import j0
+
+    layer, cell = Layer(1.0), 1e-3
+    for r in (0.5, 1.0, 2.0):
+        beyond = quad(
+            lambda q, r=r: (float(layer.compliance_ratio(np.array(q))) - 1.0) * j0(q * r), 0.0, 40.0, limit=400
+        )[0]
+        exact = 0.5 / (2 * np.pi) * (1.0 / r + beyond)
+        x, y = np.array([[r]]), np.zeros((1, 1))
+        found = layer.coefficients(x, y, cell, cell, cell**2 * 0.5 / (2 * np.pi) / np.hypot(x, y)) / cell**2
+        assert found[0, 0] == pytest.approx(exact, abs=2e-6)  # the mean over the cell
+        assert (exact < 0.0) == (r >= 1.0)
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("poisson", [0.3, 0.5])
+def test_the_preconditioner_is_the_inverse_of_short_waves(base: Base, poisson: float) -> None:
+    """Waves longer than that of the softest one count as stiff as that; no other one does."""
+    fft, layer = FFT(Slab.alone(32, 32)), Layer(0.05, base, poisson)
+    body = HalfSpace((1.0, 1.0), poisson, layer=layer)
+    softest, stiffness = layer.softest_wave
+    product = body.symbol(fft) * body.inverse_symbol(fft)
+    q = 2 * np.pi * np.hypot(*fft.modes)
+    np.testing.assert_allclose(product[q >= softest], 1.0, rtol=1e-13)
+    assert (body.inverse_symbol(fft)[(q < softest) & (q > 0.0)] == stiffness).all()
+    assert (softest * 0.05 > 1.0) == (base == "bonded" and poisson == 0.5)
+    assert product[q > 0.0].max() < 1.0 + 1e-5  # the softest wave is looked for among 2000
+
+
+@pytest.mark.parametrize("poisson", [0.4, 0.49, 0.5])
+def test_long_waves_are_stiffer_than_the_softest_one(poisson: float) -> None:
+    """`softest + 1/(c0 + c2 q^2)` is the stiffness of waves longer than the thickness; of an incompressible layer c2 is
+    d^3/3. What is left is (q d)^4 of the compliance."""
+    layer = Layer(2.0, "bonded", poisson)
+    waves, (_, softest) = layer.long_waves((100.0, 50.0)), layer.softest_wave
+    assert waves is not None
+    q = np.array([0.01, 0.02]) / layer.thickness
+    compliance = (1 - poisson) / q * layer.compliance_ratio(q)
+    added = 1.0 / compliance - softest
+    np.testing.assert_allclose(added, 1.0 / (waves.c0 + waves.c2 * q**2), rtol=1e-3)
+    assert waves.c0 == pytest.approx(0.0) or poisson < 0.5
+    assert waves.c2 == pytest.approx(8 / 3) or poisson < 0.5
+
+
+def test_where_no_wave_is_stiffer_than_the_softest() -> None:
+    """Smooth bases, compressible layers, and layers that are thick for their box."""
+    for layer, size in ((Layer(1.0, "smooth"), 100.0), (Layer(1.0, "bonded", 0.2), 100.0), (Layer(1.0), 2.0)):
+        assert layer.long_waves((size, size)) is None
+
+
+# -- operators on tiles do what those of the whole box do -------------------------------------------------------------
+
+ERROR = 2e-7  # of the largest displacement: (1/FINENESS)^ORDER/5 of two interpolations, and erfc(REACH)
+
+
+def stacked(tiles: Tiles, field: np.ndarray) -> np.ndarray:
+    """The tiles of a map, which is 0 beyond its end."""
+    whole = np.zeros((tiles.numbers.shape[0] * SIDE, tiles.numbers.shape[1] * SIDE))
+    whole[: field.shape[0], : field.shape[1]] = field
+    corners = zip(tiles.rows * SIDE, tiles.columns * SIDE, strict=True)
+    return np.concatenate([whole[j : j + SIDE, i : i + SIDE] for j, i in corners])
+
+
+@pytest.mark.parametrize(
+    ("points", "size", "nodes"),
+    [((200, 330), (1.0, 1.65), 256), ((330, 200), (1.0, 1.0), 256), ((384, 512), (0.75, 1.0), 64)],
+    ids=["ends cut off", "long cells", "distant nodes"],
+)
+def test_displacement_is_that_of_the_whole_box(
+    points: tuple[int, int], size: tuple[float, float], nodes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Under a random pressure on scattered tiles, near each other and far apart, on these and at all points; it is
+    symmetric, too."""
+    monkeypatch.setattr(module, "NODES", nodes)
+    nx, ny = points
+    tiles = Tiles(points, np.array([0, 0, 1, 3, (ny - 1) // SIDE]), np.array([0, 1, 4, 2, (nx - 1) // SIDE]))
+    marked = stacked(tiles, np.ones((ny, nx)))
+    rng, body = np.random.default_rng(1), HalfSpace(size, free=True)
+    p, q = (rng.random(tiles.shape) * marked for _ in range(2))
+    whole = np.zeros((tiles.numbers.shape[0] * SIDE, tiles.numbers.shape[1] * SIDE))
+    for number, (row, column) in enumerate(zip(tiles.rows * SIDE, tiles.columns * SIDE, strict=True)):
+        whole[row : row + SIDE, column : column + SIDE] = p[number * SIDE : (number + 1) * SIDE]
+    pressure = np.ascontiguousarray(whole[:ny, :nx])
+    expected = body.operator(FFT(Slab.alone(nx, ny), measured=False)).apply(pressure, np.empty((ny, nx)))
+    operator, _ = body.on_tiles(tiles, tally := Tally())
+    u, v = operator.apply(p, np.empty_like(p)), operator.apply(q, np.empty_like(q))
+    assert_allclose(u * marked, stacked(tiles, expected), rtol=0.0, atol=ERROR * expected.max())
+    parts, held = list[np.ndarray](), tally["map bytes"]
+    operator.displace(p, [slice(0, 7), slice(7, 7), slice(7, 70), slice(70, ny)], lambda _, rows: parts.append(rows))
+    assert tally["map bytes"] - held == expected.nbytes  # of all parts, which are kept here
+    assert_allclose(np.concatenate(parts), expected, rtol=0.0, atol=ERROR * expected.max())
+    assert np.vdot(q, u) == pytest.approx(np.vdot(p, v), rel=1e-12)
+
+
+def test_inverse_on_tiles_beside_each_other() -> None:
+    """It is that of a periodic box of eight tiles, for a pressure within one of the tiles: to rounding on the tiles
+    around it, and nothing beyond."""
+    count = 8 * SIDE
+    tiles = Tiles((count, count), np.array([3, 3, 4, 6]), np.array([3, 4, 4, 3]))
+    whole = np.zeros((count, count))
+    whole[3 * SIDE : 4 * SIDE, 3 * SIDE : 4 * SIDE] = np.random.default_rng(1).random((SIDE, SIDE))
+    transform, tally = FFT(Slab.alone(count, count), measured=False), Tally()
+    zero_mean = HalfSpace((1.0, 1.0)).inverse(transform).apply(whole, np.empty_like(whole))
+    expected = stacked(tiles, zero_mean - 2.0 * 2.0 * np.pi * whole.mean())  # that of the mean is 0 on tiles
+    _, inverse = HalfSpace((1.0, 1.0), free=True).on_tiles(tiles, tally)
+    found = inverse.apply(stacked(tiles, whole), np.empty(tiles.shape))
+    assert_allclose(found[: 3 * SIDE], expected[: 3 * SIDE], rtol=0.0, atol=1e-13 * expected.max())
+    assert_allclose(found[3 * SIDE :], 0.0, atol=1e-13 * expected.max())

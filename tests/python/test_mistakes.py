@@ -13,7 +13,9 @@ from mpi4py import MPI
 
 import parcontact as pc
 
-JOB: dict[str, Any] = {
+from .test_simulation import JOB
+
+BALL: dict[str, Any] = {
     "grid": {"points": 8, "size": 1e-3},
     "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [1, 0]},
     "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
@@ -24,7 +26,7 @@ JOB: dict[str, Any] = {
 }
 
 
-def simulation(job: Any = JOB, set: Any = None) -> pc.Simulation:
+def simulation(job: Any = BALL, set: Any = None) -> pc.Simulation:
     return pc.Simulation(job, set, MPI.COMM_SELF)
 
 
@@ -32,13 +34,13 @@ def simulation(job: Any = JOB, set: Any = None) -> pc.Simulation:
     ("call", "said"),
     [
         (lambda: simulation(None), "the job must be the path of a file or a mapping, got None"),
-        (lambda: simulation(JOB, {5: 1}), "set has a key that is no word, 5"),
-        (lambda: simulation(JOB, 5), "set must be a mapping of keys and values, got 5"),
-        (lambda: pc.steady(JOB, "abc"), "velocities must be a number, a list of numbers or a range .* got 'abc'"),
-        (lambda: pc.steady(JOB, [None]), r"velocities must be a number.* got \[None\]"),  # type: ignore[list-item]
-        (lambda: pc.steady(JOB, 1j), "velocities must be a number.* got 1j"),  # type: ignore[arg-type]
-        (lambda: pc.steady(JOB, 1.0, temperatures="20"), "temperatures must be a number, a list of numbers, got '20'"),
-        (lambda: pc.steady(JOB, 1.0, set=5), "set must be a mapping"),  # type: ignore[arg-type]
+        (lambda: simulation(BALL, {5: 1}), "set has a key that is no word, 5"),
+        (lambda: simulation(BALL, 5), "set must be a mapping of keys and values, got 5"),
+        (lambda: pc.steady(BALL, "abc"), "velocities must be a number, a list of numbers or a range .* got 'abc'"),
+        (lambda: pc.steady(BALL, [None]), r"velocities must be a number.* got \[None\]"),  # type: ignore[list-item]
+        (lambda: pc.steady(BALL, 1j), "velocities must be a number.* got 1j"),  # type: ignore[arg-type]
+        (lambda: pc.steady(BALL, 1.0, temperatures="20"), "temperatures must be a number, a list of numbers, got '20'"),
+        (lambda: pc.steady(BALL, 1.0, set=5), "set must be a mapping"),  # type: ignore[arg-type]
     ],
 )
 def test_mistakes_of_jobs(call: Callable[[], Any], said: str) -> None:
@@ -52,7 +54,7 @@ def test_mistakes_of_jobs(call: Callable[[], Any], said: str) -> None:
         (lambda: simulation().save(None), "a path must be a text or a pathlib.Path, got None"),  # type: ignore[arg-type]
         (lambda: pc.Simulation.restore(5), "a path must be a text"),  # type: ignore[arg-type]
         (lambda: pc.open(None), "a path must be a text"),  # type: ignore[arg-type]
-        (lambda: pc.Simulation(JOB, comm=5), "comm must be a communicator of mpi4py, got 5"),  # type: ignore[arg-type]
+        (lambda: pc.Simulation(BALL, comm=5), "comm must be a communicator of mpi4py, got 5"),  # type: ignore[arg-type]
     ],
 )
 def test_other_mistakes(call: Callable[[], Any], said: str) -> None:
@@ -62,7 +64,7 @@ def test_other_mistakes(call: Callable[[], Any], said: str) -> None:
 
 def test_run_again_and_in_a_thread(tmp_path: Path) -> None:
     """A run that was stopped goes on when it is called again; one that has finished says the same again."""
-    stopped = simulation(JOB, {"output.directory": str(tmp_path / "out")})
+    stopped = simulation(BALL, {"output.directory": str(tmp_path / "out")})
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "stop").touch()
     with ThreadPoolExecutor(1) as threads:
@@ -72,13 +74,13 @@ def test_run_again_and_in_a_thread(tmp_path: Path) -> None:
     assert [*ends, stopped.finished] == [False, True]
     assert rows[0].step > 0
     assert rows[0].friction == rows[1].friction
-    steps = simulation(JOB, {"output.directory": str(tmp_path / "other")})
+    steps = simulation(BALL, {"output.directory": str(tmp_path / "other")})
     next(steps.steps())
     with pytest.raises(pc.InputError, match="must come before the first of steps"):
         steps.run()
 
 
-SWEPT = {**JOB, "sweep": [{"surface.amplitude": [1e-6, 2e-6]}]}
+SWEPT = {**BALL, "sweep": [{"surface.amplitude": [1e-6, 2e-6]}]}
 
 
 def test_advice_in_the_words_of_python(tmp_path: Path) -> None:
@@ -86,18 +88,18 @@ def test_advice_in_the_words_of_python(tmp_path: Path) -> None:
     ours = {"output.directory": str(tmp_path / "ours")}
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine").touch()
-    simulation(JOB, ours).run()
+    simulation(BALL, ours).run()
     advice: dict[str, Callable[[], Any]] = {
         'give restart="never" to start afresh, or output.directory for another': lambda: simulation(
-            JOB, {**ours, "surface.amplitude": 3e-6}
+            BALL, {**ours, "surface.amplitude": 3e-6}
         ).run(),
-        "restart=PATH goes on from an earlier": lambda: simulation(JOB, {**ours, "history.0.pressure": 3e4}).run(),
+        "restart=PATH goes on from an earlier": lambda: simulation(BALL, {**ours, "history.0.pressure": 3e4}).run(),
         "it holds mine; give another output.directory, or restart=": lambda: simulation(
-            JOB, {"output.directory": str(tmp_path / "full")}
+            BALL, {"output.directory": str(tmp_path / "full")}
         ).run(),
         'leave it out (set={"sweep": None})': lambda: simulation(SWEPT),
         'leave the sweep out (set={"sweep": None})': lambda: simulation(SWEPT, {"surface.amplitude": 3e-6}),
-        "no velocities: give velocities [m/s], or": lambda: pc.steady(JOB, comm=MPI.COMM_SELF),
+        "no velocities: give velocities [m/s], or": lambda: pc.steady(BALL, comm=MPI.COMM_SELF),
     }
     for words, call in advice.items():
         with pytest.raises(pc.InputError, match=re.escape(words)) as said:
@@ -110,9 +112,9 @@ def test_more_points_than_any_machine_holds() -> None:
     """Refused when they are asked for, not when the first map is made."""
     grid = {"points": 2_000_000, "size": 1.0}
     calls: list[Callable[[], Any]] = [
-        lambda: simulation({**JOB, "grid": grid}),
-        lambda: pc.steady({**JOB, "grid": grid}, 1.0, comm=MPI.COMM_SELF),
-        lambda: pc.surface(JOB["surface"], grid),
+        lambda: simulation({**BALL, "grid": grid}),
+        lambda: pc.steady({**BALL, "grid": grid}, 1.0, comm=MPI.COMM_SELF),
+        lambda: pc.surface(BALL["surface"], grid),
     ]
     for call in calls:
         with pytest.raises(pc.InputError, match=r"2000000 x 2000000 points need .* use fewer points"):
@@ -131,9 +133,9 @@ def test_a_simulation_is_saved_not_pickled(act: Callable[[Any], Any]) -> None:
 @pytest.mark.mpi
 def test_a_saved_state_has_the_sums_of_the_budget(comm: MPI.Intracomm, shared_path: Any) -> None:
     """The budget at the end is that of the whole slide, to the last digit, as without a stop; also of a saved one."""
-    whole = pc.Simulation(JOB, comm=comm)
+    whole = pc.Simulation(BALL, comm=comm)
     whole.run()
-    run = pc.Simulation(JOB, comm=comm)
+    run = pc.Simulation(BALL, comm=comm)
     for row in run.steps():
         if row.step == 5:
             break
@@ -144,3 +146,31 @@ def test_a_saved_state_has_the_sums_of_the_budget(comm: MPI.Intracomm, shared_pa
     sums = whole._march.state.errors.sums
     assert run._march.state.errors.sums.tolist() == sums.tolist()
     assert sums[1, 0] == pytest.approx(5e-4, rel=1e-9)  # the way [m], added step by step
+
+
+# -- warnings are those of Python: of the line of the script, whether a run writes files or not -----------------------
+
+def test_warnings_are_those_of_python() -> None:
+    """A slope beyond linear theory: the surface is steep, as the command line says."""
+    steep = {**JOB, "surface": {"shape": "wave", "amplitude": 1e-4, "waves": [2, 1]}}
+    with pytest.warns(UserWarning, match="slope") as said:
+        next(pc.Simulation(steep, comm=MPI.COMM_SELF).steps())
+    with pytest.warns(UserWarning, match="slope") as also:
+        pc.steady({**steep, "numerics": {"accuracy": 0.1}}, 0.1, 1e6, comm=MPI.COMM_SELF)
+    assert {warning.filename for warning in [*said, *also]} == {__file__}
+
+
+def test_warnings_of_a_run_with_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """They are those of a run in memory, of its surface and of its contact, and are in run.log; none is printed."""
+    odd = {**JOB, "grid": {**JOB["grid"], "boundary": "free"}, "surface": {"shape": "sphere", "radius": 0.1}}
+    told = []
+    for files in ({}, {"output.directory": str(tmp_path / "here")}):
+        with pytest.warns(UserWarning, match="the box") as said:
+            pc.Simulation(odd, files, MPI.COMM_SELF).run()
+        told.append([str(warning.message) for warning in said])
+        assert {warning.filename for warning in said} == {__file__}
+    assert told[0] == told[1]
+    assert "reaches the edge of the box" in told[0][-1]
+    log = (tmp_path / "here" / "run.log").read_text()
+    assert all(f"warning: {text}" in log for text in told[0])
+    assert "warning" not in capsys.readouterr().err

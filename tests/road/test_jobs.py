@@ -2,24 +2,29 @@
 
 import math
 import re
+import shutil
+import subprocess
+import sys
+from importlib import util
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import ModuleType
 
 import matplotlib.image
 import numpy as np
 import pytest
+from conftest import Main, RunParcontact
 from mpi4py import MPI
 
+import parcontact as pc
 from parcontact import job as jobs
 from parcontact import mesh, scene
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
+from parcontact.plotting import compound as files
+from parcontact.rubber import compound
 from parcontact.scene import sanity
 
 from . import truth
-
-if TYPE_CHECKING:
-    from conftest import Main, RunParcontact
 
 LENGTH, POINTS, SLOPE = 1e-3, 192, 0.05
 JOB = """
@@ -152,7 +157,6 @@ def test_the_verb_surface(road: Path, main: "Main", run_parcontact: "RunParconta
 
 # -- what is taken out of a map, and what is doubted ------------------------------------------------------------------
 
-
 def test_waves_that_are_taken_out_are_reported(road: Path) -> None:
     """By 50 µm of a road with waves down to 40 µm: a ring of its spectrum is missing, and the report says so."""
     (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=", short_wavelength: 50.0e-6"))
@@ -210,7 +214,6 @@ def test_bands_have_no_direction() -> None:
 
 
 # -- the grid of the map, and a map without a job ---------------------------------------------------------------------
-
 
 def grid_of(road: Path, grid: str, surface: str = "") -> jobs.Grid:
     surface = surface or "{shape: topography, path: road.npy, unit: um, size: [1.0e-3, 2.0e-3]}"
@@ -340,3 +343,80 @@ def test_points_that_stick_out(shared_path: Path, comm: MPI.Intracomm, communica
         found = [float(text) for text in re.findall(r"([0-9.]+) with(?:out)?\b", doubts[0])]
         assert found == pytest.approx([expected, SLOPE], rel=0.02)
         assert "by the spectrum of the heights with the points that stick out" in doubts[1]
+
+
+# -- a box as large as a point of the map, or smaller, is refused instead of being flat -------------------------------
+
+APART = 1e-5  # m, from one point of the map to the next
+
+
+@pytest.fixture
+def fine_map(tmp_path: Path) -> dict[str, object]:
+    np.save(tmp_path / "road.npy", np.random.default_rng(1).standard_normal((16, 16)))
+    size = [16 * APART, 16 * APART]
+    return {"shape": "topography", "path": str(tmp_path / "road.npy"), "unit": "um", "size": size}
+
+
+@pytest.mark.parametrize("periodic", ["smooth", "window", "mirror"])
+@pytest.mark.parametrize("size", [0.01 * APART, 0.9 * APART, [10 * APART, 1.4 * APART]])
+def test_a_box_of_one_point(fine_map: dict[str, object], size: object, periodic: str) -> None:
+    with pytest.raises(pc.InputError, match=r"the box is .* m along \w, and points of the map are 1e-05 m apart"):
+        pc.surface({**fine_map, "periodic": periodic}, {"points": 8, "size": size})
+
+
+def test_a_profile_is_one_point_wide(fine_map: dict[str, object]) -> None:
+    heights = pc.surface(fine_map, {"points": [8, 1], "size": [8 * APART, APART]})
+    assert heights.shape == (1, 8)
+    assert np.ptp(heights) > 0.0
+
+
+# -- jobs/road: from measured files to friction, against a truth that its script knows --------------------------------
+
+ROAD = Path(__file__).resolve().parents[2] / "jobs" / "road"
+
+
+@pytest.fixture(scope="module")
+def compare(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
+    """The script that compares, in a directory with the measured files and the material that is fitted to them."""
+    there = tmp_path_factory.mktemp("chain") / "road"
+    there.mkdir()
+    for name in ("make.py", "compare.py", "road.yaml"):
+        shutil.copy(ROAD / name, there)
+    subprocess.run([sys.executable, there / "make.py"], check=True, timeout=120)
+    made = compound.fitted(there / "measured" / "compound.csv", 0.5, 20.0, "wlf", 0.02)
+    list(files.write(made, there / "materials" / "compound.yaml", None))
+    spec = util.spec_from_file_location("compare", there / "compare.py")
+    assert spec
+    assert spec.loader
+    script = util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    return script
+
+
+def test_friction_of_the_fitted_rubber_and_of_the_treated_road(
+    compare: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """3 % and 5 %, which are asked of the chain; 1 % and 3 % are found."""
+    monkeypatch.setattr(compare, "VELOCITIES", np.array([0.01, 0.3]))
+    truth = compare.friction(material=compare.TRUE_RUBBER, **compare.TRUE_ROAD)
+    assert compare.friction(**compare.TRUE_ROAD) == pytest.approx(truth, rel=0.03)
+    assert compare.friction(material=compare.TRUE_RUBBER) == pytest.approx(truth, rel=0.05)
+    assert truth.min() > 0.02
+
+
+def test_more_branches_err_less(compare: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of twelve decades: at least twelve branches, more the less error is asked for, and 2 % of error by a noise of
+    2 %."""
+    monkeypatch.setattr(compare, "STEPS", 2)
+    found = [compare.cost(error)[:2] for error in (0.02, 0.1)]
+    assert found[0][0] > found[1][0] >= 12
+    assert found[0][1] < 0.02
+    assert found[1][1] < 0.1
+
+
+def test_the_job_asks_for_what_the_readme_says(compare: ModuleType) -> None:
+    job = jobs.load(compare.HERE / "road.yaml")
+    assert job.warnings == ()
+    assert job.steady is not None
+    assert job.steady.temperatures == (0.0, 20.0, 40.0)
+    assert isinstance(job.surface[0], jobs.Topography)

@@ -1,30 +1,33 @@
 """Surfaces with a measured spectrum: that of the surface made is the one in the table."""
 
 import re
+import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import pytest
 import SurfaceTopography
+from conftest import Main
+from judging import job_of
 from mpi4py import MPI
 from scipy.special import gamma
 
+import parcontact as pc
 from parcontact import job as jobs
+from parcontact import scene
 from parcontact.derived import prediction
 from parcontact.errors import InputError
+from parcontact.march.errors import properties_of
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics import surface_statistics as statistics
 from parcontact.road import map_files, spectrum
 from parcontact.road.map_files import UNITS
-from parcontact.scene import rigid_surface
+from parcontact.scene import rigid_surface, sanity
 from parcontact.theory import persson_rings
 
 from . import truth
-
-if TYPE_CHECKING:
-    from conftest import Main
 
 L, N = 1.0e-3, 128
 ROLL, POWER = 2e4, 3.6  # of C2 = A (1 + (q/ROLL)^2)^(-POWER/2), whose profiles are known in closed form
@@ -271,3 +274,116 @@ def test_a_table_that_is_not_there(tmp_path: Path) -> None:
     (tmp_path / "job.yaml").write_text(JOB.format(more=""))
     with pytest.raises(InputError, match="must be an existing file"):
         jobs.load(tmp_path / "job.yaml")
+
+
+# -- cells per shortest wave of measured surfaces, from their spectra, in what is said of them and in their -----------
+
+SLIDE = {"pressure": 1e5, "velocity": 0.3, "distance": 1e-4, "cells_per_step": 1}
+
+
+def frame_of(surface: dict[str, Any], points: int, boundary: str = "periodic") -> scene.Setup:
+    job = job_of(surface, [SLIDE], grid={"points": points, "size": 1e-3, "boundary": boundary})
+    return scene.set_up(job, Slab.alone(points, points))
+
+
+def rough(hurst: float, short: float) -> dict[str, Any]:
+    waves = {"long_wavelength": 2.5e-4, "short_wavelength": short, "rms_slope": 0.1, "seed": 1}
+    return {"shape": "rough", "hurst": hurst, **waves}
+
+
+def saved(path: Path, surface: dict[str, Any], points: int) -> dict[str, Any]:
+    """A topography in a file, of the heights of another surface on so many points."""
+    made = frame_of(surface, points)
+    np.save(path, made.surface.heights((0.0, 0.0), made.slab.empty()) * made.units.height)
+    return {"shape": "topography", "path": str(path), "unit": "m", "size": [1e-3, 1e-3]}
+
+
+def cells(setup: scene.Setup) -> float:
+    found = properties_of(setup, 0.0, True, None).cells_per_wave
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.8, 1.0])
+@pytest.mark.parametrize("kind", ["topography", "file"])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_a_map_has_the_cells_per_wave_of_its_rough_surface(
+    tmp_path: Path, hurst: float, kind: str, boundary: str
+) -> None:
+    """To 5 %: 16 waves side by side are told apart by 6 %; the mesh part of the budget, which goes with the
+    power 2.5 of it, to 12 %."""
+    wanted = rough(hurst, 1e-3 / 16)
+    part = saved(tmp_path / "road.npy", wanted, 128)
+    if kind == "file":
+        part = {"shape": "file", "path": part["path"]}
+    expected = cells(frame_of(wanted, 128))
+    assert expected == pytest.approx(8.0)
+    assert cells(frame_of(part, 128, boundary)) == pytest.approx(expected, rel=0.05)
+
+
+def test_a_map_on_a_coarse_grid_is_told(tmp_path: Path) -> None:
+    """As a rough surface is; on its own fine grid nothing is said."""
+    part = saved(tmp_path / "road.npy", rough(0.8, 1e-3 / 16), 144)
+    assert sanity.check_heights(frame_of(part, 144)) == []
+    (text,) = sanity.check_heights(frame_of(part, 64))
+    assert text.startswith("surface: only 4.")
+    assert "cells per shortest wave along x" in text
+    assert "needs 8: use 12" in text
+
+
+def test_friction_of_a_map_whose_waves_the_grid_lacks(tmp_path: Path) -> None:
+    """On 1.8 cells per shortest wave steady friction is 28 % less than on 7, and its estimate covers that; it is not
+    more than four times as much."""
+    part = saved(tmp_path / "road.npy", {**rough(0.8, 1e-3 / 40), "rms_slope": 0.3}, 288)
+    friction, error = {}, {}
+    for points in (72, 288):
+        data = {"grid": {"points": points, "size": 1e-3}, "surface": part, "material": {"include": "synthetic_tyre"}}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # coarse grids are told
+            found = pc.steady({**data, "history": [{"pressure": 1e5}]}, velocities=[0.1], pressures=[1e5])
+        friction[points], error[points] = found.friction[0], found.error_friction[0]
+    wrong = 1.0 - friction[72] / friction[288]
+    assert wrong > 0.2
+    assert wrong <= error[72] < 4.0 * wrong
+
+
+# -- statistics against the closed forms of waves and of self-affine surfaces -----------------------------------------
+
+LENGTH = 1e-3
+
+
+def test_a_wave() -> None:
+    """A sin(qx): rms A/sqrt 2, slope q A/sqrt 2, curvature half of q^2 A/sqrt 2, spectra that hold its whole power."""
+    x = np.arange(64) * LENGTH / 64
+    q, amplitude = 2 * np.pi * 5 / LENGTH, 2e-6
+    found = statistics.describe(np.tile(amplitude * np.sin(q * x), (32, 1)), (LENGTH, LENGTH / 2))
+    rms = amplitude / np.sqrt(2.0)
+    assert found.rms_height == pytest.approx(rms, rel=1e-12)
+    assert found.rms_slope == pytest.approx(q * rms, rel=1e-12)
+    assert found.rms_curvature == pytest.approx(0.5 * q**2 * rms, rel=1e-12)
+    assert np.sum(found.psd_x) * 2 * np.pi / LENGTH == pytest.approx(rms**2, rel=1e-12)
+    assert found.qx[np.argmax(found.psd_x)] == pytest.approx(q, rel=1e-12)
+
+
+def test_a_self_affine_road() -> None:
+    """The exponent that it was made with, to 0.05; the square height is the integral of either spectrum."""
+    heights = truth.rough(256, LENGTH, LENGTH, LENGTH / 100, 0.1, hurst=0.8)
+    found = statistics.describe(heights, (LENGTH, LENGTH))
+    assert found.hurst == pytest.approx(0.8, abs=0.05)
+    assert found.rms_slope == pytest.approx(0.1, rel=1e-12)
+    one = np.sum(found.psd_y) * 2 * np.pi / LENGTH
+    assert one == pytest.approx(np.mean((heights - heights.mean(axis=0)) ** 2), rel=1e-6)
+
+
+@pytest.mark.parametrize("hurst", [-0.4, 1.6])
+def test_a_steeper_or_flatter_spectrum_is_not_self_affine(hurst: float) -> None:
+    """Exponents of a power law that no self-affine surface has, 0 to 1, are not told."""
+    q = np.geomspace(1.0, 1e2, 24)
+    assert np.isnan(statistics._hurst(q, q ** (-2.0 * (1.0 + hurst))))
+    assert statistics._hurst(q, q ** (-2.0 * (1.0 + 0.7))) == pytest.approx(0.7, rel=1e-9)
+
+
+def test_white_noise_has_no_hurst_exponent() -> None:
+    found = statistics.describe(np.random.default_rng(3).standard_normal((64, 64)), (1.0, 1.0))
+    assert np.isnan(found.hurst)
+    assert found.nayak > 1.5  # of an isotropic random surface at least 1.5

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from .stories import Json, decades
+from .scenes import Json, decades
 
 SIDES = (1, 2, 3, 5, 8, 8, 12, 12, 13, 16, 16, 16, 20)  # points
 FIELDS = ("pressure", "displacement", "gap", "height")
@@ -122,7 +122,6 @@ def _reconciled(dice: Random, job: Json) -> Json:
 
 # -- surfaces ---------------------------------------------------------------------------------------------------------
 
-
 def _surface(dice: Random, scale: Scale, directory: Path) -> Json | list[Json]:
     makers = [_rough, _rough, _sphere, _cylinder, _wave, _wave, _file, _topography, _spectrum, lambda *_: _FLAT]
     shapes = [dice.choice(makers)(dice, scale, directory) for _ in range(dice.choice([1, 1, 1, 2, 3]))]
@@ -212,7 +211,6 @@ def _topography(dice: Random, scale: Scale, directory: Path) -> Json:
 
 # -- bodies -----------------------------------------------------------------------------------------------------------
 
-
 def _material(dice: Random, scale: Scale, directory: Path) -> Json:
     kind = dice.choices(["elastic", "zener", "tyre", "dma"], [3, 12, 1, 2])[0]
     if kind == "tyre":
@@ -293,7 +291,6 @@ def _interface(dice: Random, scale: Scale) -> Json:
 
 # -- loads and motion -------------------------------------------------------------------------------------------------
 
-
 def _velocity(dice: Random, scale: Scale) -> Any:
     speed = scale.speed * decades(dice, -2, 2)
     return dice.choice([speed, -speed, [speed, 0.0], [0.0, speed], [0.6 * speed, -0.8 * speed]])
@@ -357,7 +354,6 @@ def _steady(dice: Random, scale: Scale) -> Json:
 
 
 # -- calculation ------------------------------------------------------------------------------------------------------
-
 
 def _numerics(dice: Random, scale: Scale) -> Json:
     made: Json = {"accuracy": dice.choice([0.3, 0.2, 0.1, {"friction": 0.3, "area": 0.1}])}

@@ -1,5 +1,6 @@
 """What happens to a run from outside: signals, a full disk, a second run; the next run always finishes the history."""
 
+import io
 import os
 import shutil
 import signal
@@ -9,13 +10,23 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import h5py
 import pytest
+import short_job
+import yaml
 from conftest import WORLD, outside
 from csv_rows import measures
 
+from parcontact import __main__
+from parcontact.errors import RunError
+from parcontact.storage import console, hdf5
+from parcontact.storage.tables import GrowingTable
+from parcontact.streams import printable
+
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="starts runs of its own")
+
 
 JOB = """
 grid: {points: [32, 24], size: [1.0e-3, 0.75e-3]}
@@ -26,7 +37,6 @@ output: {fields: [pressure], every: 7}
 checkpoint: {every: 5}
 """  # 160 steps and a jump
 SECONDS = 200.0  # in which a run that was hit must have ended
-BAD_INPUT, AGAIN = 2, 3
 
 
 class Runs:
@@ -115,7 +125,7 @@ def same(out: Path, whole: Path) -> None:
 
 
 def test_asked_to_stop(runs: Runs, whole: Path, tmp_path: Path) -> None:
-    """By a signal to one rank (to mpirun: `test_disturbed.py`), or by a file: it saves and says run again; in the end
+    """By a signal to one rank (to mpirun: below), or by a file: it saves and says run again; in the end
     nothing has changed."""
     out = tmp_path / "out"
     asked: list[Callable[[subprocess.Popen[str]], None]] = [
@@ -253,3 +263,238 @@ def test_read_only_file(runs: Runs, tmp_path: Path, place: str) -> None:
     assert len(errors.splitlines()) == 1
     assert place in errors
     assert "permitted" in errors or "Permission denied" in errors
+
+
+# -- what must not end a run, and what must: its console, signals, full disks; what it says of itself -----------------
+
+GUMMI: dict[str, Any] = {
+    **short_job.JOB,
+    "title": "Gummi µ",
+    "grid": {"points": [32, 24], "size": [1e-3, 7.5e-4]},
+    "history": [{"pressure": 1e4, "velocity": 0.1, "distance": 1.5625e-4, "cells_per_step": 1}],
+    "output": {"fields": ["pressure"]},
+}
+STEPS = 6  # a jump and 5 cells
+LONG = ("--set", "history.0.distance=0.3125")  # 10 000 cells
+DONE, FAILED, BAD_INPUT, AGAIN = 0, 1, 2, 3
+BIN = Path(sys.executable).parent
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A directory with job.yaml, in which we are."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump(GUMMI, allow_unicode=True))
+    return tmp_path
+
+
+def rows(out: Path) -> int:
+    """Steps in the table, with the initial state."""
+    try:
+        return (out / "measures.csv").read_bytes().count(b"\n") - 1
+    except FileNotFoundError:
+        return 0
+
+
+class Broken(io.TextIOWrapper):
+    """A stream whose reader has gone."""
+
+    def write(self, text: str) -> int:
+        raise BrokenPipeError(32, "Broken pipe")
+
+
+def closed() -> io.StringIO:
+    stream = io.StringIO()
+    stream.close()
+    return stream
+
+
+STREAMS: dict[str, Callable[[], Any]] = {
+    "full": lambda: Path("/dev/full").open("w"),  # noqa: SIM115  # closed by the test
+    "broken": lambda: Broken(io.BytesIO()),
+    "none": lambda: None,
+    "closed": closed,
+    "ascii": lambda: io.TextIOWrapper(io.BytesIO(), encoding="ascii"),
+}
+
+
+@pytest.mark.parametrize("kind", STREAMS)
+def test_console_is_not_the_run(here: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    """Neither the lines of the steps nor warnings end a run, whoever reads them."""
+    stream = STREAMS[kind]()
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "stdout", stream)
+        patch.setattr(sys, "stderr", stream)
+        code = __main__.main(["job.yaml", "--out", "out"])
+    if kind == "full":
+        stream.close()  # what it held has gone nowhere
+    if kind == "ascii":
+        stream.flush()
+        assert b"Gummi u" in stream.buffer.getvalue()
+    assert (code, rows(here / "out")) == (DONE, STEPS + 1)
+    assert "Gummi µ" in (here / "out" / "run.log").read_text(encoding="utf-8")
+
+
+def test_reader_that_leaves(here: Path, outside_mpi: dict[str, str]) -> None:
+    """`parcontact job.yaml | head -n 1` ends with the code of the run, and says nothing of it."""
+    command = f"{sys.executable} -m parcontact job.yaml --out out | head -n 1; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], env=outside_mpi, capture_output=True, text=True, timeout=SECONDS)
+    assert (done.returncode, done.stderr) == (DONE, "")
+    assert rows(here / "out") == STEPS + 1
+
+
+def test_escapes_in_a_title(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What would command a terminal is spelt out, in the log too."""
+    assert __main__.main(["job.yaml", "--out", "out", "--set", 'title="\\e[31mred\\a\\u202e"']) == DONE
+    said = capsys.readouterr()
+    log = (here / "out" / "run.log").read_text(encoding="utf-8")
+    for text in (said.out, said.err, log):
+        assert not set(text) & set("\x1b\x07\u202e")
+    assert "\\x1b[31mred\\x07\\u202e: 32 x 24 points" in said.out
+    assert printable("plain µ\ttext\n") == "plain µ\ttext\n"
+
+
+def start(words: Sequence[str], environment: dict[str, str], ranks: int = 1) -> subprocess.Popen[str]:
+    launch = [str(BIN / "mpirun"), "-n", str(ranks)] if ranks > 1 else []
+    command = [*launch, sys.executable, "-m", "parcontact", *words, "--quiet"]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, env=environment, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
+
+
+def wait_for(process: subprocess.Popen[str], there: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + SECONDS
+    while not there() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(2e-3)
+    assert process.poll() is None, process.communicate()
+
+
+def newest(out: Path) -> int:
+    return max((int(path.stem[5:]) for path in out.glob("checkpoint/step-*.h5")), default=-1)
+
+
+def test_hang_up(here: Path, outside_mpi: dict[str, str]) -> None:
+    """SIGHUP, of a terminal that is closed, saves and ends with 3."""
+    process = start(["job.yaml", "--out", "out", *LONG], outside_mpi)
+    wait_for(process, lambda: rows(here / "out") > 3)
+    process.send_signal(signal.SIGHUP)
+    assert process.communicate(timeout=SECONDS)[1] == ""
+    assert process.returncode == AGAIN
+    assert newest(here / "out") == rows(here / "out") - 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_mpirun_that_is_told_to_end(here: Path, outside_mpi: dict[str, str], number: signal.Signals) -> None:
+    """Its ranks save the last step that they have made, and it ends with 3 as they do."""
+    process = start(["job.yaml", "--out", "out", *LONG], outside_mpi, ranks=2)
+    wait_for(process, lambda: rows(here / "out") > 3)
+    process.send_signal(number)
+    process.communicate(timeout=SECONDS)
+    assert process.returncode == AGAIN
+    assert newest(here / "out") == rows(here / "out") - 1
+
+
+def test_mpirun_that_is_killed(here: Path, outside_mpi: dict[str, str]) -> None:
+    """No rank goes on without it: soon another run may use the directory."""
+    process = start(["job.yaml", "--out", "out", *LONG], outside_mpi, ranks=2)
+    wait_for(process, lambda: rows(here / "out") > 3)
+    process.kill()
+    process.communicate(timeout=SECONDS)
+    assert __main__.main(["job.yaml", "--out", "out", "--quiet", "--until", "1e-9"]) == DONE
+
+
+def test_signal_during_the_start(here: Path, outside_mpi: dict[str, str]) -> None:
+    """There is nothing to save yet: it ends the process at once, which says so."""
+    (here / "out").mkdir()
+    for name in ("theory.csv", "theory.yaml"):
+        (here / "out" / name).touch()
+    process = start(["job.yaml", "--out", "out", *LONG, "--set", "grid.points=[2048, 1536]"], outside_mpi)
+    wait_for(process, lambda: (here / "out" / ".lock").exists())
+    process.send_signal(signal.SIGTERM)
+    assert process.communicate(timeout=SECONDS)[1] == "parcontact: ended by SIGTERM, with nothing to save\n"
+    assert process.returncode == -signal.SIGTERM
+    assert not (here / "out" / "measures.csv").exists()
+
+
+def test_full_disk_while_rows_are_written(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The real reason is told, the state is saved, and the same command makes up for the row that had no room."""
+    append = GrowingTable.append
+
+    def full(self: GrowingTable, cells: Sequence[str]) -> None:
+        if cells[0] == "3":
+            raise OSError(28, "No space left on device")
+        append(self, cells)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(GrowingTable, "append", full)
+        assert __main__.main(["job.yaml", "--out", "out", "--quiet"]) == FAILED
+    said = capsys.readouterr().err
+    assert "cannot write out/measures.csv: No space left on device; the newest checkpoint is " in said
+    assert __main__.main(["job.yaml", "--out", "out", "--quiet"]) == DONE
+    assert rows(here / "out") == STEPS + 1
+    lines = (here / "out" / "measures.csv").read_text().splitlines()
+    assert [line.split(",")[0] for line in lines[1:]] == [str(step) for step in range(STEPS + 1)]
+
+
+def test_full_disk_while_maps_are_written(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The map that had no room is saved by the run that goes on."""
+    write, maps = hdf5.write, []
+
+    def full(path: Path, slab: Any, parts: Any) -> None:
+        if path.name == "fields.h5":
+            maps.append(path)
+            if len(maps) == 3:
+                raise RunError(f"cannot write {path}: No space left on device")
+        write(path, slab, parts)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(hdf5, "write", full)
+        assert __main__.main(["job.yaml", "--out", "out", "--quiet"]) == FAILED
+    assert "No space left on device; the newest checkpoint is out/checkpoint/step-3.h5" in capsys.readouterr().err
+    assert __main__.main(["job.yaml", "--out", "out", "--quiet"]) == DONE
+    assert __main__.main(["job.yaml", "--out", "whole", "--quiet"]) == DONE
+    one, other = ((here / out / "fields.h5").read_bytes()[-STEPS * 32 * 24 * 8 :] for out in ("out", "whole"))
+    assert one == other
+
+
+def test_log_and_time_left(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """run.log begins with what one asks for; where there is no terminal, a line tells the time left. The
+    first step takes longer than others, so that no time follows from it."""
+    monkeypatch.setattr(console, "LEFT_SECONDS", 0.0)
+    monkeypatch.setenv("SLURM_JOB_ID", "4711")
+    monkeypatch.setattr(sys, "argv", ["/usr/bin/parcontact", "job.yaml", "--out", "out"])
+    assert __main__.main(["job.yaml", "--out", "out"]) == DONE
+    said = capsys.readouterr().out
+    assert said.count(" left\n") == STEPS - 2
+    assert f"# step 2 of {STEPS}, about 0:00:0" in said
+    head = "\n".join((here / "out" / "run.log").read_text(encoding="utf-8").splitlines()[:5])
+    for part in ("parcontact 0.", f"process {os.getpid()}", "parcontact job.yaml --out out", "1 rank, ", "MPI"):
+        assert part in head
+    for part in ("batch job: SLURM_JOB_ID = 4711", "cores", "GB of memory", "load "):
+        assert part in head
+
+
+def test_info_of_directories(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """What ran, how far it came, what came out; of several, one below the other."""
+    curve = ("--velocities", "0.01:0.1:2", "--pressures", "1e4")
+    assert __main__.main(["job.yaml", "--out", "out", "--until", "0.0007", "--quiet"]) == DONE
+    assert __main__.main(["steady", "job.yaml", "--out", "out", *curve, "--quiet"]) == DONE
+    capsys.readouterr()
+    assert __main__.main(["info", "out"]) == DONE
+    said = capsys.readouterr().out
+    assert "run: not finished after step 4, t = 937.5 µs, 5 rows" in said
+    for part in ("last row: pressure 10 kPa, friction ", "friction curve: 2 points from 0.01 to 0.1 m/s", "checkpoint"):
+        assert part in said
+    assert "fields: pressure at 4 of 6 instants" in said
+    assert __main__.main(["job.yaml", "--out", "out", "--quiet"]) == DONE
+    assert __main__.main(["info", "out", "out/fields.h5"]) == DONE
+    said = capsys.readouterr().out
+    assert f"run: finished after step {STEPS}" in said
+    assert "out/fields.h5: pressure on 32 x 24 points" in said
+    assert __main__.main(["info", "out", "job.yaml"]) == BAD_INPUT
+    (here / "out" / "measures.csv").write_text("step,time\n1\n")
+    assert __main__.main(["info", "out"]) == BAD_INPUT
+    assert "measures.csv, line 2, has 1 values instead of 2" in capsys.readouterr().out

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from mpi4py import MPI
 
 from . import scenes
-from .trial import trial, witness
-from .witness import distance
+from .witness import distance, trial, witness
 
 FEW = 80  # scenes of Hypothesis; each is marched twice
 SEEDS = range(6)  # of scenes on many ranks

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .scenes import Sketch
-from .stories import Json, Map, decades
+from .scenes import Json, Map, Sketch, decades
 
 
 @dataclass(frozen=True)

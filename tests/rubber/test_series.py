@@ -1,5 +1,6 @@
 """Fits against a rubber whose truth is known: series, shifts, and the material file."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,12 @@ from numpy.testing import assert_allclose
 
 from parcontact import job as jobs
 from parcontact.errors import InputError
+from parcontact.job.checks.meaning import modulus_after
 from parcontact.rubber import compound, series, superposition, tables
-from parcontact.rubber.shift import WLF, Arrhenius, Factors
+from parcontact.rubber.shift import WLF, Arrhenius, Density, Factors, given, log_vertical
 
 from . import measured
+from .bodies import Array, branches, noisy, write
 
 LAW = WLF(measured.C1, measured.C2, measured.REFERENCE)
 
@@ -203,3 +206,194 @@ def test_mistakes_in_a_job(tmp_path: Path, material: str, sentence: str) -> None
     (line,) = failure.value.mistakes
     assert sentence in line
     assert ":4:" in line
+
+
+# -- the vertical shift: moduli of rubber go with density times temperature, or constants of the shift come -----------
+
+# twelve decades of a rubber in shear at 20 C, with the WLF constants of that temperature
+RUBBER = branches(
+    2e6, 1e6 * np.array([12.0, 18.0, 20.0, 15.0, 9.0, 5.0, 3.0, 1.5, 0.8, 0.4]), 10.0 ** np.arange(-7.0, 3.0)
+)
+C1, C2, REFERENCE, MIDDLE = 8.0, 110.0, 20.0, 10.0
+TEMPERATURES = np.arange(-30.0, 51.0, 10.0)
+FREQUENCIES = np.geomspace(0.1, 100.0, 13)
+
+
+def density_factor(temperature: float, reference: float = REFERENCE) -> float:
+    """rho T over that at a reference, of natural rubber: rho = 0.93 - 5.5e-4 (T - 20 C)."""
+    rho, there = (0.93 - 5.5e-4 * (t - 20.0) for t in (temperature, reference))
+    return rho * (temperature + 273.15) / (there * (reference + 273.15))
+
+
+def own_factor(temperature: float) -> float:
+    """b_T of a crystallising compound that was made up: it stiffens in the cold."""
+    return float(10.0 ** (0.15 * np.tanh((20.0 - temperature) / 15.0)))
+
+
+def sweeps(path: Path, vertical: str) -> Path:
+    """Young's moduli with a noise of 0.5 and 1 %, by a law of b_T."""
+    rows: list[Array] = []
+    for number, temperature in enumerate(TEMPERATURES):
+        above = temperature - REFERENCE
+        omega = 2 * np.pi * FREQUENCIES * 10.0 ** (-C1 * above / (C2 + above))
+        laws = {"density": density_factor(temperature), "none": 1.0, "own": own_factor(temperature)}
+        moduli = 3e-6 * laws[vertical] * RUBBER.modulus(omega)
+        storage, loss = noisy(moduli.real, 0.005, number), noisy(moduli.imag, 0.01, 50 + number)
+        rows.append(np.array([np.full(13, temperature), FREQUENCIES, storage, loss]))
+    return write(path, "T[C] f[Hz] E'[MPa] E''[MPa]", *np.hstack(rows))
+
+
+RIGHT = C1 * C2 / (C2 + MIDDLE - REFERENCE), C2 + MIDDLE - REFERENCE  # the constants at another reference
+
+
+def test_moduli_that_go_with_density_and_temperature(tmp_path: Path) -> None:
+    """C1 and C2 at the middle temperature, 8.8 and 100 K, to 3 %; without b_T they were 11 and 5 % off. b_T to 2 %,
+    although the expansion is that of any rubber. All is told."""
+    made = compound.fitted(sweeps(tmp_path / "table.txt", "density"), 0.5, None, "wlf", 0.02)
+    assert isinstance(made.shift, WLF)
+    assert made.shift.reference == MIDDLE
+    assert_allclose([made.shift.C1, made.shift.C2], RIGHT, rtol=0.03)
+    assert isinstance(made.shift.vertical, Density)
+    for temperature in TEMPERATURES:
+        b = 10.0 ** log_vertical(made.shift, float(temperature))
+        assert b == pytest.approx(density_factor(float(temperature), MIDDLE), rel=0.02)
+    assert made.doubts() == []
+    assert "# Horizontal shift, fitted: WLF with C1 = 8." in made.text()
+    assert "# Vertical shift: density times temperature, with an expansion of 0.0006 1/K; a_T = " in made.text()
+    assert "and b_T = 0.879 at -30 C, a_T = " in made.text()
+    without = compound.fitted(tmp_path / "table.txt", 0.5, None, "wlf", 0.02, vertical="none")
+    assert isinstance(without.shift, WLF)
+    assert abs(without.shift.C1 / RIGHT[0] - 1.0) > 0.08
+
+
+def test_relaxations_at_several_temperatures(tmp_path: Path) -> None:
+    """G(t) with a noise of 0.3 %: C1 and C2 to 4 %; without b_T C1 is a tenth and more off."""
+    t, rows = np.geomspace(0.1, 300.0, 30), []
+    for number, temperature in enumerate(TEMPERATURES):
+        above = temperature - REFERENCE
+        moduli = density_factor(temperature) * RUBBER.relaxation(t * 10.0 ** (C1 * above / (C2 + above)))
+        rows.append(np.array([np.full(30, temperature), t, noisy(moduli, 0.003, number)]))
+    path = write(tmp_path / "table.txt", "T[C] t[s] G(t)[Pa]", *np.hstack(rows))
+    made = compound.fitted(path, 0.5, None, "wlf", 0.02)
+    assert isinstance(made.shift, WLF)
+    assert_allclose([made.shift.C1, made.shift.C2], RIGHT, rtol=0.04)
+    without = compound.fitted(path, 0.5, None, "wlf", 0.02, vertical="none").shift
+    assert isinstance(without, WLF)
+    assert abs(without.C1 / RIGHT[0] - 1.0) > 0.1
+
+
+def test_moduli_that_do_not_change(tmp_path: Path) -> None:
+    """A table that has been reduced already: no b_T is found, and the constants are right to 3 %."""
+    made = compound.fitted(sweeps(tmp_path / "table.txt", "none"), 0.5, None, "wlf", 0.02)
+    assert isinstance(made.shift, WLF)
+    assert made.shift.vertical is None
+    assert_allclose([made.shift.C1, made.shift.C2], RIGHT, rtol=0.03)
+    assert "# Vertical shift: none, b_T = 1; a_T = " in made.text()
+
+
+@pytest.mark.parametrize("law", ["wlf", "free"])
+def test_moduli_with_a_law_of_their_own(tmp_path: Path, law: str) -> None:
+    """Free factors are found to 5 %, and a_T to 0.1 decades of 8; without them the constants are wrong, and told so."""
+    path = sweeps(tmp_path / "table.txt", "own")
+    (text,) = compound.fitted(path, 0.5, None, "wlf", 0.02).doubts()[-1:]
+    assert re.match(r"free vertical factors b_T would join the sweeps with a misfit of \S+ %, not 4\.\d %, and", text)
+    made = compound.fitted(path, 0.5, None, law, 0.02, vertical="free")
+    assert made.shift is not None
+    assert isinstance(made.shift.vertical, Factors)
+    for temperature in map(float, TEMPERATURES):
+        right = own_factor(temperature) / own_factor(MIDDLE)
+        assert 10.0 ** log_vertical(made.shift, temperature) == pytest.approx(right, rel=0.05)
+        above = temperature - MIDDLE
+        assert made.shift.log_factor(temperature) == pytest.approx(-RIGHT[0] * above / (RIGHT[1] + above), abs=0.1)
+
+
+def test_a_job_at_another_temperature(tmp_path: Path) -> None:
+    """Moduli of the file are b_T times those at the reference, also those that checks use; a table in a job gives the
+    same body."""
+    from parcontact.effects.relaxation import relaxation_of
+
+    made = compound.fitted(sweeps(tmp_path / "table.txt", "density"), 0.5, 20.0, "wlf", 0.05)
+    (tmp_path / "rubber.yaml").write_text(made.text())
+    warm = load(tmp_path, "{include: rubber, temperature: 50}").material
+    b = (1.0 - 6e-4 * 30.0) * 323.15 / 293.15
+    for material in (
+        warm,
+        load(tmp_path, "{model: dma, path: table.txt, error: 0.05, reference: 20, temperature: 50}").material,
+    ):
+        series = relaxation_of(material)
+        assert series.modulus_inf == pytest.approx(b * made.series.modulus_inf, rel=1e-6)
+        assert_allclose(series.moduli, b * made.series.moduli, rtol=1e-6)
+        assert material.fitted.long_modulus == pytest.approx(series.modulus_inf, rel=1e-12)
+        assert material.fitted.instant_modulus == pytest.approx(series.modulus_inf + series.moduli.sum(), rel=1e-12)
+        assert modulus_after(material.fitted, 1e30) == pytest.approx(4.0 * series.modulus_inf, rel=1e-9)
+    (fact,) = load(tmp_path, "{include: rubber, temperature: 50}").facts
+    assert fact.endswith(f", b_T = {b:.4g}, reference 20 C)")
+
+
+SHIFTED = (
+    "{{model: zener, modulus_inf: 1e6, temperature: {}, "
+    "shift: {{law: wlf, C1: 8, C2: 100, reference: 20, vertical: {}}}}}"
+)
+FACTORS = "{law: factors, temperatures: [0, 40], logs: [-0.1, 0.1]}"
+
+
+def test_laws_in_a_job(tmp_path: Path) -> None:
+    """By their definitions, and refused where they end."""
+    half_way = load(tmp_path, SHIFTED.format(30, FACTORS)).material.fitted
+    assert half_way.long_modulus == pytest.approx(1e6 * 10.0**0.05, rel=1e-12)
+    density = load(tmp_path, SHIFTED.format(30, "{law: density, expansion: 5e-4}")).material.fitted
+    assert density.long_modulus == pytest.approx(1e6 * (1 - 5e-3) * 303.15 / 293.15, rel=1e-12)
+    for material, sentence in (
+        (SHIFTED.format(50, FACTORS), "material.temperature is beyond the shift: 50 C is outside the shift factors"),
+        (SHIFTED.format(30, "{law: factors, temperatures: [0, null], logs: [0, 1]}"), "got nothing"),
+        (SHIFTED.format(5, "{law: factors, temperatures: [0, 10], logs: [0, 1]}"), "vertical.temperatures must reach"),
+        (
+            SHIFTED.format(30, "{law: density, expansion: -1}"),
+            "vertical.expansion must be a loss of density per kelvin",
+        ),
+        (SHIFTED.format(30, "{law: wlf}"), "must be density | factors, got 'wlf'"),
+    ):
+        with pytest.raises(jobs.JobError) as failure:
+            load(tmp_path, material)
+        (line,) = failure.value.mistakes
+        assert sentence in line
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "T,log_aT,log_bT\nC,-,-\n-40,3,-0.1\n20,0,0\n60,-1.7,0.05\n",
+        "T[C];log_aT;log_bT\n-40;3;-0.1\n20;0;0\n60;-1.7;0.05\n",
+        "T [°C]\tlog_aT\tlog_bT\n60\t-1.7\t0.05\n20\t0\t0\n-40\t3\t-0.1\n",
+        "T[C] log_aT log_bT\n-40 3 -0.1\n20 0 0\n60 -1.7 0.05\n",
+    ],
+)
+def test_tables_of_both_shifts(tmp_path: Path, text: str) -> None:
+    """Commas, semicolons, tabs or blanks; the column b_T is used, and that of a_T as ever."""
+    path = tmp_path / "shifts.csv"
+    path.write_text(text, encoding="latin-1")
+    temperatures, vertical = (-40.0, 20.0, 60.0), (-0.1, 0.0, 0.05)
+    expected = Factors(temperatures, (3.0, 0.0, -1.7), 20.0, Factors(temperatures, vertical, 20.0))
+    assert given(str(path), None) == expected
+
+
+def test_a_table_of_both_shifts_in_a_fit(tmp_path: Path) -> None:
+    """Known factors join the sweeps, and the file has both; nothing else is fitted."""
+    a = [-C1 * (t - REFERENCE) / (C2 + t - REFERENCE) for t in TEMPERATURES]
+    b = [np.log10(density_factor(t)) for t in TEMPERATURES]
+    shifts = write(tmp_path / "shifts.txt", "T[C] log_aT log_bT", TEMPERATURES, np.array(a), np.array(b))
+    law = given(str(shifts), None)
+    path = sweeps(tmp_path / "table.txt", "density")
+    made = compound.fitted(path, 0.5, None, law, 0.02)
+    assert made.shift == law
+    assert made.series.best < 0.01
+    assert "# Horizontal shift, given: 9 factors, log10: " in made.text()
+    (tmp_path / "rubber.yaml").write_text(made.text())
+    cold = load(tmp_path, "{include: rubber, temperature: -30}").material.fitted
+    assert cold.long_modulus == pytest.approx(density_factor(-30.0) * made.series.modulus_inf, rel=1e-4)
+
+
+def test_a_law_that_ends() -> None:
+    with pytest.raises(InputError, match="beyond the density law"):
+        Density(1e-2, 20.0).log_factor(130.0)
+    assert Density(0.0, 20.0).log_factor(20.0) == 0.0

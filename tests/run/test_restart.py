@@ -1,14 +1,23 @@
 """A run that was cut into pieces is the run that was not, to the last bit, on any number of ranks."""
 
+import json
+import math
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
+from conftest import Main
 from mpi4py import MPI
-from restarting import FASTER, SCENES, SLIDE, Bench, cut, rows, same
+from restarting import ELASTIC, FASTER, PRESS, ROUGH, SCENES, SLIDE, TOUCH, Bench, cut, maps, part_way, rows, same
 
+from parcontact.__main__ import main
+from parcontact.errors import InputError
+from parcontact.job import Job
+from parcontact.run.run import chosen_by_accuracy
 from parcontact.storage import checkpoint, tables
 from parcontact.storage.provenance import read_budget
 from parcontact.summary import info
@@ -106,3 +115,254 @@ def test_other_ranks(
         contents = checkpoint.inspect(out / f"checkpoint/step-{len(rows(out)) - 1}.h5")
         assert [link.ranks for link in contents.chain] == [first, second]
     comm.Barrier()
+
+
+# -- from which checkpoint a run goes on, and which are kept ----------------------------------------------------------
+
+def damage(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[-9] ^= 4
+    path.write_bytes(data)
+
+
+def newer(path: Path) -> None:
+    path.write_bytes(path.read_bytes().replace(b"format 2", b"format 3", 1))
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:5000])
+
+
+def of_another_job(path: Path) -> None:
+    shutil.copy(path.parents[2] / "other" / "checkpoint" / path.name, path)
+
+
+FAULTS = [
+    (damage, "is damaged"),
+    (newer, "written by a newer parcontact"),
+    (truncate, "is damaged: it has 5000 bytes instead of"),
+    (of_another_job, "belongs to another job: surface.0.seed was 4, is 3"),
+]
+
+
+@pytest.mark.parametrize(("fault", "message"), FAULTS)
+def test_falls_back(
+    bench: Bench, capfd: pytest.CaptureFixture[str], fault: Callable[[Path], None], message: str
+) -> None:
+    """A checkpoint that will not do is passed over with one message; without a good one nothing is done."""
+    data = bench.job("viscoelastic")
+    bench.run(bench.job("viscoelastic", surface={"seed": 4}), bench.where / "other")
+    out, whole = part_way(bench, data), bench.where / "whole"
+    bad = [out / "checkpoint" / f"step-{step}.h5" for step in (5, 6)]
+    for path in bad:
+        fault(path)
+    capfd.readouterr()
+    assert bench.run(data, out) == 0
+    warnings = [line for line in capfd.readouterr().err.splitlines() if "passed over" in line]
+    assert len(warnings) == 2
+    assert all(message in line and str(path) in line for line, path in zip(warnings, reversed(bad), strict=True))
+    same(whole, out, len(rows(whole)) - 1)
+    for path in (out / "checkpoint").glob("step-*.h5"):
+        fault(path)
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    with pytest.raises(InputError) as raised:
+        bench.run(data, out)
+    assert message in str(raised.value)
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_restart_never(bench: Bench) -> None:
+    data = bench.job("viscoelastic")
+    out = part_way(bench, data)
+    (out / "checkpoint" / "step-99.h5").write_bytes(b"")
+    assert bench.run(data, out, restart="never") == 0
+    same(bench.where / "whole", out, len(rows(out)) - 1)
+    assert not (out / "checkpoint" / "step-99.h5").exists()
+
+
+def test_restart_from_a_path(bench: Bench) -> None:
+    """From an earlier checkpoint of the same directory, whose later ones are put aside; or from another directory."""
+    data, whole = bench.job("viscoelastic"), bench.where / "whole"
+    out = part_way(bench, data)
+    total = len(rows(whole)) - 1
+    assert bench.run(data, out, restart=str(out / "checkpoint" / "step-3.h5"), until=0.0007) == 0
+    assert [row["step"] for row in rows(out)] == ["0", "1", "2", "3", "4", "5"]
+    aside = sorted(path.name for path in (out / "checkpoint").glob("*.aside"))
+    assert aside == [f"step-{step}.h5.aside" for step in (4, 5, 6)]
+    assert bench.run(data, out) == 0
+    same(whole, out, total)
+    new = bench.where / "new"
+    assert bench.run(data, new, restart=str(whole / "checkpoint" / "step-6.h5")) == 0
+    assert rows(new) == rows(whole)[7:]
+    assert maps(new / f"checkpoint/step-{total}.h5") == maps(whole / f"checkpoint/step-{total}.h5")
+
+
+def test_keeps_the_newest(bench: Bench) -> None:
+    data = bench.job("elastic", checkpoint={"every": 3, "keep": 2})
+    out = bench.where / "out"
+    assert bench.run(data, out) == 0
+    total = len(rows(out)) - 1
+    kept = sorted(int(path.stem[5:]) for path in (out / "checkpoint").iterdir())
+    assert kept == [max(step for step in range(0, total, 3)), total]
+
+
+# -- which settings a run may change when it goes on, and which are refused -------------------------------------------
+
+REFUSED: list[tuple[dict[str, Any], str]] = [
+    ({"grid": {"points": [20, 16]}}, "grid.points was [20, 14], is [20, 16]"),
+    ({"grid": {"size": [2e-3, 7e-4]}}, "grid.size was [0.001, 0.0007], is [0.002, 0.0007]"),
+    ({"surface": {"seed": 4}}, "surface.0.seed was 3, is 4"),
+    ({"surface": {**ROUGH, "rms_slope": None, "rms_height": 1e-6}}, "surface.0.rms_slope was 0.02, is None"),
+    ({"material": {"modulus_inf": 2e6}}, "material.modulus_inf was 1000000.0, is 2000000.0"),
+    ({"material": ELASTIC}, "material.model was zener, is elastic"),
+    ({"body": {"thickness": 1e-3}}, "body.thickness was None, is 0.001"),
+    ({"numerics": {"integrator": "backward-euler"}}, "numerics.integrator was exponential, is backward-euler"),
+    ({"numerics": {"kernel": "love"}}, "numerics.kernel was spectral, is love"),
+    ({"numerics": {"precision": "mixed"}}, "numerics.precision was double, is mixed"),
+    (
+        {"history": [{**PRESS, "pressure": 2e5}, SLIDE, FASTER]},
+        "step 1 of the 6 already made had pressure 100000.0, has pressure 200000.0",
+    ),
+    (
+        {"history": [PRESS, {**SLIDE, "velocity": 0.3}, FASTER]},
+        "step 6 of the 6 already made ended at t = 0.00125 s, ends at 0.00116666",
+    ),
+    ({"history": [PRESS]}, "step 6 of the 6 already made ended at t = 0.00125 s, ends at 0.0015"),
+    ({"history": [TOUCH]}, "6 steps were made, and the job has 1 up to t = 0.00125 s"),
+]
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Bench, Path]:
+    """A run that was stopped after its sixth step, and where it is."""
+    bench = Bench(MPI.COMM_SELF, tmp_path_factory.mktemp("stopped"))
+    return bench, part_way(bench, bench.job("viscoelastic"))
+
+
+@pytest.mark.parametrize(("changes", "message"), REFUSED)
+def test_refused(stopped: tuple[Bench, Path], changes: dict[str, Any], message: str) -> None:
+    """Another problem, or another past: both values are shown, and nothing is written."""
+    bench, out = stopped
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    with pytest.raises(InputError) as raised:
+        bench.run(bench.job("viscoelastic", **changes), out)
+    assert message in str(raised.value)
+    assert "give --restart never to start afresh" in str(raised.value)
+    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
+
+
+def test_other_settings(bench: Bench) -> None:
+    """Tolerance, outputs, checkpoints and what is still to come may change; measures go on with the new columns."""
+    out = part_way(bench, bench.job("viscoelastic"))
+    changes = {
+        "title": "another",
+        "numerics": {"tolerance": 1e-6},
+        "output": {"fields": ["gap"], "every": 4, "branch_dissipation": False},
+        "checkpoint": {"every": 100, "keep": 1},
+        "history": [PRESS, SLIDE, {**SLIDE, "name": "back", "velocity": -0.2}, TOUCH],
+    }
+    changed = bench.job("viscoelastic", **changes)
+    assert bench.run(changed, out) == 0
+    assert bench.run(changed, bench.where / "afresh") == 0
+    found, afresh, old = rows(out), rows(bench.where / "afresh"), rows(bench.where / "whole")
+    assert [row["step"] for row in found] == [row["step"] for row in afresh]
+    assert found[:7] == [{key: row[key] for key in found[0]} for row in old[:7]]
+    assert float(found[-1]["friction"]) == pytest.approx(float(afresh[-1]["friction"]), rel=0.05)
+    with h5py.File(out / "fields.h5") as file:
+        assert file["step"][...].tolist() == [*range(1, 7), 8, 12, len(found) - 1]
+        assert np.isnan(file["gap"][6:]).sum() == 0
+    assert [path.name for path in (out / "checkpoint").iterdir()] == [f"step-{len(found) - 1}.h5"]
+    contents = checkpoint.inspect(out / "checkpoint" / f"step-{len(found) - 1}.h5")
+    assert [(link.from_step, "another" in link.job) for link in contents.chain] == [(0, False), (6, True)]
+
+
+def test_later_energies(bench: Bench) -> None:
+    """Energies count from the start: they cannot begin half-way, but they can end there."""
+    silent = {"energy": False, "branch_dissipation": False}
+    out = part_way(bench, bench.job("viscoelastic", output=silent))
+    with pytest.raises(InputError, match=r"does not have energy/.*: output\.energy was off"):
+        bench.run(bench.job("viscoelastic"), out)
+    other = cut(bench, bench.where / "whole", 6)
+    assert bench.run(bench.job("viscoelastic", output=silent), other) == 0
+
+
+def test_surface_file(bench: Bench) -> None:
+    """A file of heights may move, but not change."""
+    heights = 1e-6 * np.random.default_rng(0).random((14, 20))
+    np.save(bench.where / "heights.npy", heights)
+    surface = {"shape": "file", "path": str(bench.where / "heights.npy")}
+    out = part_way(bench, bench.job("viscoelastic", surface=[surface]))
+    np.save(bench.where / "moved.npy", heights)
+    moved = bench.job("viscoelastic", surface=[{**surface, "path": str(bench.where / "moved.npy")}])
+    np.save(bench.where / "heights.npy", 2 * heights)
+    with pytest.raises(InputError, match=r"surface\.0\.content was .*, is "):
+        bench.run(bench.job("viscoelastic", surface=[surface]), out)
+    assert bench.run(moved, out) == 0
+
+
+# -- which maps a run saves: by `output.every` and nothing else -------------------------------------------------------
+
+JOB = """\
+grid: {{points: 16, size: 1.0e-3}}
+surface: {{shape: wave, amplitude: 1.0e-6, waves: [1, 0]}}
+material: {{model: zener, modulus_inf: 1.0e+6, branches: [{{modulus: 1.0e+6, relaxation_time: 1.0e-3}}]}}
+output: {{fields: [gap], every: 3}}
+history: [{{pressure: 1.0e+4, duration: 1.0e-3{steps}}}]
+"""
+
+
+@pytest.mark.parametrize("steps", ["", ", time_step: 1.0e-4"])
+def test_every_third_step_and_the_last(main: Main, tmp_path: Path, steps: str) -> None:
+    """Also where steps are chosen, whose number is not known before; not the state before the first step."""
+    (tmp_path / "job.yaml").write_text(JOB.format(steps=steps))
+    assert main("job.yaml", "--quiet")[0] == 0
+    last = len((tmp_path / "out" / "job" / "measures.csv").read_text().splitlines()) - 2
+    with h5py.File(tmp_path / "out" / "job" / "fields.h5") as file:
+        assert file["step"][:].tolist() == sorted({*range(3, last + 1, 3), last})
+
+
+# -- what a run advises where it is more wrong than asked for ---------------------------------------------------------
+
+@pytest.mark.parametrize(
+    ("slide", "numerics", "parts"),
+    [
+        ({}, {}, {"solver", "time", "folded"}),
+        ({"cells_per_step": 1}, {}, {"solver", "folded"}),
+        ({}, {"accuracy": 0.03, "tolerance": 1e-4}, {"time", "folded"}),
+        ({}, {"tolerance": 1e-4, "branch_error": 0.0}, {"time"}),
+        ({}, {"tolerance": 5e-3, "branch_error": 1e-3}, {"time"}),  # given, though they are what would be chosen
+    ],
+)
+def test_what_a_smaller_accuracy_would_help(slide: dict[str, Any], numerics: dict[str, Any], parts: set[str]) -> None:
+    """The settings that it has chosen; steps are those of the slide, whatever a press has."""
+    data = {
+        "grid": {"points": 16, "size": 1e-3},
+        "surface": {"shape": "flat"},
+        "material": {"model": "elastic", "shear_modulus": 1e6},
+        "history": [
+            {"pressure": 1e4, "duration": 1e-3, "time_step": 1e-4},
+            {"pressure": 1e4, "velocity": 0.1, "distance": 1e-4, **slide},
+        ],
+        "numerics": numerics,
+    }
+    assert chosen_by_accuracy(Job.model_validate(data)) == parts
+
+
+def test_no_error_is_stated_where_the_box_cuts_a_contact_off(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Steps at the edge have no error, and the end says so; a step inside has one."""
+    data = {
+        "grid": {"points": 32, "size": 1e-3, "boundary": "free"},
+        "surface": {"shape": "sphere", "radius": 1e-2},
+        "material": {"model": "elastic", "shear_modulus": 1e6},
+        "history": [{"force": 0.01}, {"force": 1.0}],
+    }
+    (tmp_path / "job.yaml").write_text(json.dumps(data))
+    monkeypatch.chdir(tmp_path)
+    for force, inside, name in ((1.0, False, "edge"), (0.011, True, "room")):
+        assert main(["job.yaml", "--set", f"history.1.force={force}", "--set", f"output.directory={name}"]) == 0
+        out = capsys.readouterr().out
+        assert ("no error is stated of steps whose contact reaches the edge of the box" in out) != inside
+        errors = tables.read(tmp_path / name / "measures.csv")["error_area"]
+        assert [math.isnan(error) for error in errors] == [True, False, not inside]

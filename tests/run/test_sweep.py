@@ -1,10 +1,17 @@
 """Sweeps as a user runs them: all cases or one, stopped and gone on with, and what they come to."""
 
 import errno
+import fcntl
 import math
+import os
 import re
+import signal
+import threading
+import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 import pytest
 from conftest import RunParcontact
@@ -12,13 +19,15 @@ from mpi4py import MPI
 from sweeping import JOB, table
 
 from parcontact.__main__ import main
-from parcontact.errors import RunError
+from parcontact.errors import InUseError, RunError
 from parcontact.job import Case, Job, load_cases
 from parcontact.parallel.groups import Groups
+from parcontact.parallel.signals import Signals
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
 from parcontact.run import sweep, watch
-from parcontact.storage import files
+from parcontact.storage import directory, files
+from parcontact.storage.stopfile import StopFile
 from parcontact.summary import info, slide, sweep_table
 
 
@@ -292,3 +301,159 @@ material: {model: elastic, shear_modulus: 1.0e6}
 history: [{pressure: 1.0e4}]
 sweep: [{surface.seed: [1, 2, 3, 4], surface.short_wavelength: [2.5e-4, 2.5e-4, 5.0e-4, 2.5e-4]}]
 """
+
+
+# -- several programs on the cases of one sweep: a job array, or the same command given twice -------------------------
+
+def test_a_case_that_another_program_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is passed over, and has not failed; if it is the only one, the command is refused like a single run's."""
+    cases, _ = cases_in_groups(tmp_path, monkeypatch)
+    monkeypatch.setattr(directory, "MAX_SECONDS_TO_RELEASE", 0.1)
+    where = cases[1].job.output.directory
+    where.mkdir(parents=True)
+    with (where / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert main(["job.yaml", "--quiet", "--set", "numerics.accuracy=0.5"]) == 0
+        in_use = f"the output directory {where} is in use by another run (just started)\n"
+        assert capsys.readouterr().err == f"parcontact: case 1 is being run by another program: {in_use}"
+        assert [row["state"] for row in table()] == ["done", "-", *["done"] * 4]
+        assert main(["job.yaml", "--quiet", "--case", "1"]) == 2
+        assert capsys.readouterr().err == f"parcontact: {in_use}"
+    assert main(["job.yaml", "--quiet"]) == 0
+    assert {row["state"] for row in table()} == {"done"}
+
+
+@pytest.mark.mpi
+def test_groups_that_find_cases_taken(
+    shared_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One rank of each group says so, and the others go on with it."""
+    (cases, groups), world = cases_in_groups(shared_path, monkeypatch), MPI.COMM_WORLD
+
+    def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
+        raise InUseError("taken")
+
+    assert sweep.SweepRun(cases[:4], groups, act, sweep.stop_file(cases)).run(cases[:4]) == 0
+    err = "".join(world.allgather(capsys.readouterr().err)).splitlines()
+    assert sorted(err) == [f"parcontact: case {n} is being run by another program: taken" for n in range(4)]
+
+
+def test_tables_are_written_by_one_program_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Jobs of an array end together: the last one to write has read what all others left."""
+    cases, _ = cases_in_groups(tmp_path, monkeypatch)
+    out = Path("out/job")
+    sweep_table.write(out, cases)
+    with (out / ".sweep.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        other = threading.Thread(target=sweep_table.write, args=(out, cases))
+        other.start()
+        other.join(0.2)
+        assert other.is_alive()
+        fcntl.flock(lock, fcntl.LOCK_UN)
+        other.join(20.0)
+        assert not other.is_alive()
+
+
+# -- what stops one case of a sweep stops all of them, and the same command goes on -----------------------------------
+
+def begin(job: Job, begun: list[int], groups: Groups) -> None:
+    """Note a case that begins; all groups of ranks begin their first one together; collective."""
+    begun.append(int(job.output.directory.name))
+    if len(begun) == 1:
+        groups.everyone.Barrier()
+
+
+def wait_for_others(groups: Groups, stop: StopFile) -> None:
+    """Let the first group, where there are two, wait until the other one asks it to stop."""
+    deadline = time.monotonic() + 100.0
+    while groups.number == 0 and groups.count > 1 and not stop.asks and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
+def test_a_stop_file_ends_the_case_that_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It saves, and the same command goes on with it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job.yaml").write_text(JOB)
+    judge = watch.Watch.judge
+
+    def ask(self: watch.Watch, step: int, *others: Any) -> watch.Verdict:
+        if step == 4:
+            Path("out/job/stop").touch()
+        return judge(self, step, *others)
+
+    monkeypatch.setattr(watch, "LOOK_SECONDS", -1.0)
+    monkeypatch.setattr(watch.Watch, "judge", ask)
+    assert main(["job.yaml", "--quiet"]) == 3
+    assert [row["state"] for row in table()] == ["begun", *"-----"]
+    assert Path("out/job/stop").exists()  # and stops no later program
+    monkeypatch.setattr(watch.Watch, "judge", judge)
+    assert main(["job.yaml", "--quiet"]) == 0
+    assert "stopped after step 4 of" in Path("out/job/cases/000/run.log").read_text()
+    assert {row["state"] for row in table()} == {"done"}
+
+
+def test_a_stop_file_ends_all_that_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Programs with all cases or one stop by one file, which none removes; it stops none that begins later."""
+    cases, _ = cases_in_groups(tmp_path, monkeypatch)
+    stops, begun = [sweep.stop_file(cases) for _ in range(3)], list[str]()
+
+    def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
+        begun.append(job.output.directory.name)
+        stops[0].path.mkdir(parents=True)
+        return 3
+
+    for chosen, stop in zip((cases, cases, cases[2:3]), stops, strict=True):
+        assert sweep.SweepRun(cases, Groups(MPI.COMM_SELF), act, stop).run(chosen) == 3
+    assert begun == ["000"]
+    later = sweep.stop_file(cases)
+    assert sweep.SweepRun(cases, Groups(MPI.COMM_SELF), lambda *_: 0, later).run(cases[1:3]) == 0
+    asked = [later.asks]
+    os.utime(later.path, ns=(1, 1))
+    assert [*asked, later.asks] == [False, True]
+    assert sweep.SweepRun(cases, Groups(MPI.COMM_SELF), lambda *_: 0, later).run(cases) == 3
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("noted", [False, True], ids=["before the run of a case notes it", "after its last look"])
+def test_a_signal_that_no_case_sees_ends_the_sweep(
+    shared_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], noted: bool
+) -> None:
+    """To the last rank alone: its case goes on to its end, no further one is begun, and the table has what is done."""
+    cases, groups = cases_in_groups(shared_path, monkeypatch)
+    begun, stop = list[int](), groups.agree(sweep.stop_file(cases))
+
+    def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
+        begin(job, begun, groups)
+        with Signals().noted() if noted else nullcontext():
+            if groups.everyone.rank == groups.everyone.size - 1:
+                os.kill(os.getpid(), signal.SIGTERM)
+        wait_for_others(groups, stop)
+        job.output.directory.mkdir(parents=True, exist_ok=True)
+        return 0
+
+    assert sweep.SweepRun(cases, groups, act, stop).run(cases) == 3
+    assert groups.from_all(begun) == [[number] for number in range(groups.count)]
+    if groups.root:
+        assert [row["state"] for row in table()] == ["-"] * 6
+        assert "run again to go on" in capsys.readouterr().out
+
+
+@pytest.mark.mpi
+def test_what_stops_one_group_stops_all(shared_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A signal to one rank, say, or a stop file for its case: the others begin no further case. Another program, which
+    runs at the same time, is not asked."""
+    cases, groups = cases_in_groups(shared_path, monkeypatch)
+    stop, other = (groups.agree(sweep.stop_file(cases)) for _ in range(2))
+    begun, asked = list[int](), list[bool]()
+
+    def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
+        begin(job, begun, groups)
+        wait_for_others(groups, stop)
+        asked.append(other.asks)
+        return 3 if groups.number == groups.count - 1 else 0
+
+    assert sweep.SweepRun(cases, groups, act, stop).run(cases) == 3
+    assert groups.from_all(begun) == [[number] for number in range(groups.count)]
+    assert (any(asked), stop.path.exists(), stop.own.exists()) == (False, False, False)

@@ -1,12 +1,15 @@
 """Elastic bodies that stick, against closed forms of every length of the attraction."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from closed_forms import adhesion
+from closed_forms import adhesion, viscoelastic_adhesion
+from marching import begun, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
+from numpy.typing import NDArray
 from scipy.integrate import simpson
 from sticking import (
     ELASTIC,
@@ -16,6 +19,8 @@ from sticking import (
     RADIUS,
     UNLOADED,
     WORK,
+    Job,
+    Map,
     cells_per_zone,
     gathered,
     last_row,
@@ -28,6 +33,7 @@ from sticking import (
 )
 
 import parcontact as pc
+from parcontact.python.row import Row
 
 ALPHA, AMPLITUDE, WAVELENGTH = 0.3, 5e-6, 1e-3  # of Johnson's wave
 
@@ -104,7 +110,6 @@ def test_highest_load_with_dugdales_law() -> None:
 
 
 # -- lines -----------------------------------------------------------------------------------------------------------
-
 
 def line(points: int, length: float, surface: dict[str, Any], work: float, *history: dict[str, Any]) -> dict[str, Any]:
     """A surface that is the same all along y; a process zone is four cells long."""
@@ -200,7 +205,6 @@ SCALE = WORK * UNLOADED**2  # of energies [J]
 
 # -- energies --------------------------------------------------------------------------------------------------------
 
-
 def test_a_loop_of_a_reversible_contact_loses_nothing() -> None:
     """There and back without a snap: less than 0.1 % of w a^2."""
     ramps = ramp(0.0, 4 * LENGTH, 40), ramp(4 * LENGTH, 0.0, 40)
@@ -252,3 +256,238 @@ def test_the_gap_is_between_body_and_surface(boundary: str) -> None:
     attraction = WORK / job["adhesion"]["range"] * np.exp(-gap / job["adhesion"]["range"])
     assert_allclose(p[gap > 0], -attraction[gap > 0], atol=1e-4 * attraction.max())
     assert (p + attraction)[gap == 0].min() > 0
+
+
+# -- viscoelastic bodies that stick: rates, and the limits in which they are elastic ----------------------------------
+
+RATIO, TIME = 10.0, 1e-2  # k = E_inf/E_0, relaxation time [s]
+
+
+def zener(ratio: float = RATIO) -> Job:
+    branch = {"modulus": MODULUS / 4 * (ratio - 1), "relaxation_time": TIME}
+    return {"model": "zener", "modulus_inf": MODULUS / 4, "branches": [branch]}
+
+
+def relaxed(approach: float) -> Job:
+    """A stage of a thousand relaxation times, in steps that grow."""
+    return {"approach": approach, "duration": 1000 * TIME, "time_step": {"first": TIME / 2, "growth": 3}}
+
+
+@pytest.mark.parametrize(("rate", "fall", "exact"), [(0.03, 20, 1.365), (0.3, 20, 2.481), (3, 8, 7.38)])
+def test_pull_off_over_rate(rate: float, fall: float, exact: float) -> None:
+    """V tau over the unit of length is `rate`; an independent axisymmetric program's numbers, to 1 % on cells of 0.4
+    process zones."""
+    start, duration = 17.875 * LENGTH, fall * TIME / rate
+    job = sphere(48, 8, 1, relaxed(start), ramp(start, start - fall * LENGTH, 160, duration), material=zener())
+    assert_allclose(pull_off(job), -exact * FORCE, rtol=0.01)
+
+
+@pytest.mark.parametrize(("radius", "exact"), [(2, 8.61), (3, 11.21), (4, 11.84)])
+def test_instant_retraction(radius: int, exact: float) -> None:
+    """Relaxed with a contact of two to four radii of the unloaded one, then pulled off within 1e-6 relaxation times:
+    the program of the other test, 1 % on cells of at most half a process zone."""
+    start = (radius * UNLOADED) ** 2 / 1e-3 - np.sqrt(2 * np.pi * WORK * radius * UNLOADED / MODULUS)
+    fall = (radius**2 + 4) * LENGTH
+    job = sphere(
+        16 * max(radius, 3), 3 * radius, 1, relaxed(start), ramp(start, start - fall, 80, 1e-6 * TIME), material=zener()
+    )
+    assert cells_per_zone(job) > 2.0
+    assert_allclose(pull_off(job), -exact * FORCE, rtol=0.01)
+
+
+# -- elastic limits --------------------------------------------------------------------------------------------------
+
+def forces(job: Job) -> Any:
+    return np.array([row.pressure * nominal_area(job) for row in steps(job)])
+
+
+@pytest.mark.parametrize(
+    ("duration", "ratio", "modulus"),
+    [(1e6 * TIME, RATIO, MODULUS), (1e-6 * TIME, RATIO, RATIO * MODULUS), (TIME, 1 + 1e-6, MODULUS)],
+    ids=["slow", "fast", "without relaxation"],
+)
+def test_elastic_limits(duration: float, ratio: float, modulus: float) -> None:
+    """Pressed from out of contact and pulled off, the force is at each step that of an elastic body; the solver's
+    tolerance, which moves it by 1e-3 of the pull-off. Where the contact snaps in a slow step, the force is off by
+    some ten relaxation times over the step, here 1e-4 of the snap."""
+    path = ramp(-4 * LENGTH, 2 * LENGTH, 15, duration), ramp(2 * LENGTH, -4 * LENGTH, 30, duration)
+    elastic = {"model": "elastic", "shear_modulus": modulus / 4}
+    found, exact = (forces(sphere(32, 5, 1, *path, material=body)) for body in (zener(ratio), elastic))
+    assert_allclose(found, exact, atol=2e-3 * FORCE)
+    assert exact.min() < -FORCE
+
+
+def rough(material: Job, surface: Any, *history: Job) -> Job:
+    size = 1e-4
+    return {
+        "grid": {"points": 48, "size": size},
+        "surface": surface,
+        "material": material,
+        "adhesion": {"work": WORK, "range": float(np.sqrt(2 * size / 48 * WORK / MODULUS))},
+        "history": list(history),
+        "numerics": {"tolerance": 1e-5},
+    }
+
+
+@pytest.mark.filterwarnings("ignore:surface")  # of cells per wave, of the second one
+def test_instant_retraction_of_a_rough_surface() -> None:
+    """From a relaxed state (p_i, g_i) the body is at once an elastic one of E_inf under the heights `u_i/k - g_i`: in
+    g' = k g - (k - 1) g_i the theorem of instant retraction. Pressures of two runs, to the tolerance of the solves."""
+    surface = {"shape": "rough", "hurst": 0.8, "rms_slope": 0.1, "seed": 2}
+    surface |= {"long_wavelength": 2.5e-5, "short_wavelength": 1.7e-5}
+    start, fall, count = -1e-7, 6e-8, 8
+    retraction = ramp(start, start - fall, count, 1e-7 * TIME)
+    run = pc.Simulation(rough(zener(), surface, relaxed(start), retraction), comm=MPI.COMM_SELF)
+    found = [(row, {name: gathered(run, name) for name in ("pressure", "displacement", "gap")}) for row in run.steps()]
+    _, rest = found[-count - 1]
+    heights = rest["displacement"] / RATIO - rest["gap"]
+    stiff = {"model": "elastic", "shear_modulus": RATIO * MODULUS / 4}
+    second = rough(stiff, {"shape": "array", "heights": heights}, {"approach": 0.0}, ramp(0.0, -fall, count))
+    elastic = pc.Simulation(second, comm=MPI.COMM_SELF)
+    exact = [(row, gathered(elastic, "pressure")) for row in elastic.steps()]
+    for (row, maps), (other, p) in zip(found[-count - 1 :], exact[-count - 1 :], strict=True):
+        assert_allclose(maps["pressure"], p, atol=2e-4 * np.abs(p).max())  # 1e-4 of each of the two runs
+        assert row.contact_area == other.contact_area
+    areas = [row.contact_area for row, _ in found[-count - 1 :]]
+    assert np.all(np.diff(areas) < 0)
+    assert 0 < areas[-1] < 0.1 * areas[0]
+
+
+@pytest.mark.parametrize(("accuracy", "within"), [(0.05, 0.05), (0.005, 0.02)])
+def test_energies_of_a_contact_that_comes_about_follow_the_accuracy(accuracy: float, within: float) -> None:
+    """A ball comes into contact within 100 s, in a second of which it snaps in, and its rubber relaxes in 0.1 s.
+
+    6400 given steps dissipate 27.8 pJ; with a rest, which adds 0.2, an independent program 27.6 on this mesh. With
+    steps that pass over the snap it was 21.1 at any accuracy. `error_energy` covers what is missing, and is less than
+    a seventh of it all.
+    """
+    branches = [{"modulus": 4e6, "relaxation_time": 0.01}, {"modulus": 5e6, "relaxation_time": 0.1}]
+    ball = {
+        "grid": {"points": 64, "size": 3e-4, "boundary": "free"},
+        "surface": {"shape": "sphere", "radius": 1e-3},
+        "material": {"model": "zener", "modulus_inf": 1e6, "branches": branches},
+        "adhesion": {"work": 0.05, "range": 5.4e-7},
+        "history": [{"approach": {"from": -4e-6, "to": 5e-7}, "duration": 100.0}],
+        "numerics": {"accuracy": accuracy},
+        "output": {"energy": True},
+    }
+    _, rows = marched(ball)
+    wanted, error = 27.8e-12, rows[-1].added[-1]
+    assert abs(rows[-1].dissipated - wanted) < within * wanted
+    assert abs(rows[-1].dissipated - wanted) < error < wanted / 7.0
+    begins = next(number for number, row in enumerate(rows) if row.measures.contact_area > 0.0)
+    assert rows[begins].time - rows[begins - 1].time < 0.0011
+
+
+# -- what adhesion costs: operator calls of steps with it, over those of the same steps without -----------------------
+
+SIZE, POINTS, SLOPE = 1e-4, 128, 0.1
+RUBBER: Job = {
+    "model": "zener",
+    "modulus_inf": MODULUS / 4,
+    "branches": [{"modulus": 9e6, "relaxation_time": 1.0}],
+}
+
+
+def counted(job: Job) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Operator calls of each step but the first two, and how far edges of contact moved in it: the points that come
+    into contact or leave it over the points in contact."""
+    march, calls, contacts = begun(job), [], []
+    for step in march.steps():
+        march.advance(step)
+        calls.append(march.row.operator_calls)
+        contacts.append(march.field("gap") == 0.0)
+    moved = [np.sum(one != other) / max(other.sum(), 1) for one, other in pairwise(contacts)]
+    return np.array(calls[2:]), np.array(moved[1:])
+
+
+@pytest.mark.parametrize(("body", "strength"), [(ELASTIC, 0.01), (ELASTIC, 0.05), (RUBBER, 0.01)])
+def test_a_resolved_step_with_adhesion(body: Job, strength: float) -> None:
+    """Pressed and let go, with a work of adhesion over E* slope^2 and the shortest wave: at most three times the calls
+    of the same steps without, to the same tolerance, where edges of contact move little."""
+    cell = SIZE / POINTS
+    waves = {"hurst": 0.8, "long_wavelength": SIZE / 4, "short_wavelength": 8 * cell, "rms_slope": SLOPE, "seed": 1}
+    job: Job = {
+        "grid": {"points": POINTS, "size": SIZE},
+        "surface": {"shape": "rough", **waves},
+        "material": body,
+        "history": [{"pressure": 1.0}],
+        "numerics": {"tolerance": 5e-3},
+    }
+    height = float(begun(job).field("height").std())
+    low, high = -2.5 * height, -height
+    count = 4 * int(np.ceil((high - low) / (SLOPE * cell)))
+    job["history"] = [ramp(low, high, count), ramp(high, low, count)]
+    sticks = {"work": strength * MODULUS * SLOPE**2 * 8 * cell, "range": "auto"}
+    (calls, moved), (without, _) = counted({**job, "adhesion": sticks}), counted(job)
+    resolved = moved < 0.2
+    assert resolved.sum() >= 5
+    assert 0.5 < calls[resolved].sum() / without[resolved].sum() < 3.0
+
+
+# -- edges of contact that open and close steadily on a relaxing body, against the theory of the steady crack ---------
+
+CREEP = RATIO * TIME  # [s]
+SHEAR = MODULUS / 2  # of the relaxed layer [Pa]
+BRANCH = SHEAR * (RATIO - 1)
+CELL, BOX, DEPTH = 1e-6, 9, 10.0  # [m]; length of the box, half of which is the punch, in T; depth beside it, in ranges
+THEORIES = viscoelastic_adhesion.opening_crack, viscoelastic_adhesion.closing_crack
+
+
+def strengths(velocity: float) -> Map:
+    """G/w by theory of an edge that opens and of one that closes, at V over (c0/CREEP)."""
+    return np.array([theory(velocity / CREEP, SHEAR, [BRANCH], [TIME]) for theory in THEORIES])
+
+
+def layer(cells: int, thickness: int, *history: Job) -> Job:
+    """A layer of so many process zones, each of which has so many cells."""
+    zone, points = cells * CELL, BOX * thickness * cells
+    reach = float(np.sqrt(zone * WORK / MODULUS))
+    branch = {"modulus": BRANCH, "relaxation_time": TIME}
+    return {
+        "grid": {"points": [points, 1], "size": [points * CELL, CELL]},
+        "surface": {"shape": "array", "heights": np.where(np.arange(points) < points // 2, 0.0, -DEPTH * reach)[None]},
+        "body": {"thickness": thickness * zone, "base": "smooth"},
+        "material": {"model": "zener", "modulus_inf": SHEAR, "branches": [branch], "poisson": 0.0},
+        "adhesion": {"work": WORK, "range": reach, "law": "dugdale"},
+        "history": list(history),
+        "numerics": {"tolerance": 1e-4},
+    }
+
+
+def speed(rows: list[Row], points: int) -> float:
+    """Cells per CREEP by which each of two edges moves, from the instants at which points change sides."""
+    areas, instants = np.unique([row.contact_area for row in rows], return_index=True)
+    assert len(areas) > 5
+    return abs(float(np.polyfit([rows[instant].time / CREEP for instant in instants], areas * points / 2, 1)[0]))
+
+
+def excess(velocity: float, way: float, count: int, cells: int, thickness: int) -> Map:
+    """G over that of theory at the velocity which is seen, opening and closing, less 1. The lifts that are held, each
+    for a `way` in c0 and so many steps, are those of theory at `velocity`."""
+    given, held = strengths(velocity), way / velocity * CREEP
+    opening, closing = (-np.sqrt(2 * thickness * cells * CELL * given * WORK / MODULUS)).tolist()
+    history = (
+        ramp(0.0, opening, 100, 3 * CREEP * (1 + 1 / velocity)),
+        ramp(opening, opening, count, held),
+        ramp(opening, closing, 100, 10 * CREEP),
+        ramp(closing, closing, count, held),
+    )
+    job = layer(cells, thickness, {"approach": 0.0}, *history)
+    *_, last = rows = list(steps(job))
+    assert 0 < last.contact_area < 0.5
+    steady = rows[-100 - 3 * count // 2 : -100 - count], rows[-count // 2 :]
+    seen = (speed(part, job["grid"]["points"][0]) / (np.pi / 4 * cells) for part in steady)
+    return given / [strengths(each)[side] for side, each in enumerate(seen)] - 1
+
+
+@pytest.mark.filterwarnings("ignore:surface")  # of cells per wave: it is a step
+@pytest.mark.parametrize(("velocity", "way", "count"), [(0.1, 6, 600), (10, 20, 400)])
+def test_steady_crack(velocity: float, way: float, count: int) -> None:
+    """G/w is 1.1981 and 4.5272 for edges that open with `velocity`, 0.8175 and 0.2001 for those that close. The error
+    is of second order in the cells, here a quarter and an eighth of l, and of first order in l/T: both extrapolated,
+    0.2 % are left, to which the instants add some 0.2 %. Alone, the meshes are up to 3 % and 1.3 % off."""
+    coarse, fine, thick = (excess(velocity, way, count, *each) for each in ((4, 80), (8, 80), (4, 160)))
+    print(coarse, fine, thick)
+    assert np.all(np.abs(fine) < np.abs(coarse))
+    assert_allclose(coarse + (fine - coarse) * 4 / 3 + (thick - coarse) * 2, 0, atol=5e-3)

@@ -7,6 +7,8 @@ measured is given where it is far better.
 
 import itertools
 import math
+import warnings
+from pathlib import Path
 from typing import Any
 
 import jgh
@@ -17,6 +19,11 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from static_jobs import run
 
+import parcontact as pc
+from parcontact.errors import RunError
+from parcontact.job import Job
+from parcontact.solve import nested
+from parcontact.solve.fallback import cold_start
 from parcontact.storage.row import StepRow
 from parcontact.theory import hertz, westergaard
 
@@ -192,3 +199,165 @@ def test_rough() -> None:
         assert row.certificate.worst <= 1e-3
         assert fields["pressure"].min() >= 0.0
         assert_allclose(fields["gap"].mean(), row.measures.mean_gap, rtol=1e-9)
+
+
+# -- elastic jobs whichever way the load is given, and from other starts ----------------------------------------------
+
+BUMPS = """
+grid: {points: [48, 40], size: [1.0e-3, 8.0e-4]}
+surface: {shape: rough, hurst: 0.8, long_wavelength: 5.0e-4, short_wavelength: 1.0e-4, rms_height: 1.0e-6, seed: 4}
+material: {model: elastic, poisson: 0.5, shear_modulus: 1.0e6}
+history: [{pressure: 5.0e3}]
+numerics: {tolerance: 1.0e-10}
+"""
+
+
+@pytest.fixture
+def bumps(tmp_path: Path) -> Path:
+    """A small rough periodic job in a file."""
+    path = tmp_path / "bumps.yaml"
+    path.write_text(BUMPS)
+    return path
+
+
+# -- the same contact, given in other ways -----------------------------------------------------------------------------
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_pressure_force_and_approach_agree(bumps: Path, boundary: str) -> None:
+    """Tolerance 1e-10 on gaps: pressures to 1e-8 of the highest."""
+    body = f"grid.boundary={boundary}"
+    [(pressed, expected)] = run(bumps, body)
+    force = 5e3 * 1e-3 * 8e-4
+    [(forced, by_force)] = run(bumps, body, f"history=[{{force: {force!r}}}]")
+    [(moved, by_approach)] = run(bumps, body, f"history=[{{approach: {pressed.measures.approach!r}}}]")
+    highest = pressed.measures.max_pressure
+    assert_allclose(by_force["pressure"], expected["pressure"], atol=1e-8 * highest)
+    assert_allclose(by_approach["pressure"], expected["pressure"], atol=1e-8 * highest)
+    assert_allclose(forced.measures.pressure, 5e3, rtol=1e-13)
+    assert_allclose(moved.measures.pressure, 5e3, rtol=1e-7)
+
+
+def test_periodic_approach_beyond_full_contact_is_refused(bumps: Path) -> None:
+    """With the approach that would be just full contact; below it all is well."""
+    closed = 0.0  # a surface of mean height 0 is closed when its mean is where the body's was
+    run(bumps, f"history=[{{approach: {closed - 1e-9}}}]")
+    with pytest.raises(RunError, match=r"approach of 1e-07 m is beyond full contact.*prescribe a pressure") as refusal:
+        run(bumps, "history=[{approach: 1.0e-7}]")
+    assert "step 1" in str(refusal.value)
+
+
+# -- invariance --------------------------------------------------------------------------------------------------------
+
+def test_poisson_ratio(bumps: Path) -> None:
+    """Only (1 - nu)/G enters."""
+    [(_, expected)] = run(bumps)
+    [(row, found)] = run(bumps, "material.poisson=0.2", "material.shear_modulus=1.6e6")
+    assert_allclose(found["pressure"], expected["pressure"], atol=1e-8 * row.measures.max_pressure)
+
+
+def test_coming_from_another_load_changes_nothing(bumps: Path) -> None:
+    """An elastic body has no memory: to the tolerance of the solves."""
+    direct, detour = run(bumps)[-1], run(bumps, "history=[{pressure: 5.0e4}, {pressure: 1.0}, {pressure: 5.0e3}]")[-1]
+    assert_allclose(detour[1]["pressure"], direct[1]["pressure"], atol=1e-8 * direct[0].measures.max_pressure)
+
+
+# -- starts ------------------------------------------------------------------------------------------------------------
+
+def test_only_the_first_solve_of_a_large_job_starts_on_coarser_grids(
+    bumps: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the limit lowered: its pressure is the same to the tolerance, at fewer calls; later steps start as ever."""
+    words = ("grid.points=64", "surface.short_wavelength=1.25e-4", "history=[{pressure: 5.0e3}, {pressure: 6.0e3}]")
+    (small, fields), (small_after, _) = run(bumps, *words)
+    monkeypatch.setattr(cold_start, "WORTHWHILE", 64 * 64)
+    grids, descend = list[int](), nested.descend
+
+    def counted(levels: list[nested.Level], *given: Any) -> None:
+        grids.append(len(levels))
+        descend(levels, *given)
+
+    monkeypatch.setattr(nested, "descend", counted)
+    (large, expected), (large_after, _) = run(bumps, *words)
+    assert grids == [2]
+    assert_allclose(fields["pressure"], expected["pressure"], rtol=0, atol=1e-7 * expected["pressure"].max())
+    assert large.operator_calls < small.operator_calls
+    assert abs(large_after.operator_calls - small_after.operator_calls) <= 3  # an iteration
+
+
+# -- the corrected area of cylinders, whose edges of contact follow the grid, and its estimated error -----------------
+
+FINER = 16
+
+
+def pressed(radius: float, cells: int) -> StepRow:
+    job = Job.model_validate(
+        {
+            "grid": {"points": [4, cells], "size": [4e-3 / cells, 1e-3]},
+            "surface": {"shape": "cylinder", "radius": radius, "axis": "x"},
+            "material": {"model": "elastic", "shear_modulus": 1e6},
+            "history": [{"pressure": 1e4}],
+            "numerics": {"tolerance": 1e-6},
+        }
+    )
+    return marched(job)[1][-1]
+
+
+@pytest.mark.parametrize("radius", np.geomspace(1e-3, 5e-2, 8))
+def test_estimate_covers_the_error(radius: float) -> None:
+    """At least half of it, in contacts of 5 to 30 of 48 cells. The error, of half a cell at each of two edges at most,
+    is taken against 16 times finer cells, of which it is known to a sixteenth."""
+    row, fine = pressed(radius, 48), pressed(radius, 48 * FINER)
+    exact = fine.measures.contact_area_corrected
+    error = abs(row.measures.contact_area_corrected / exact - 1.0)
+    assert row.errors is not None
+    assert row.errors.area.total > 0.5 * error
+    assert row.errors.area.total < 4.0 / (48 * exact)  # half a cell at each edge is 1 of these, and the estimate 3
+
+
+# -- cells four times as long across the sliding as along it: friction and the area of a finer mesh of ----------------
+
+BODY = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 4e6, "relaxation_time": 2e-5}]}
+ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "short_wavelength": 1e-3 / 12, "rms_slope": 0.1}
+
+
+def steady(points: tuple[int, int], along: tuple[int, int] = (1, 0)) -> tuple[float, float, float]:
+    job: dict[str, Any] = {
+        "grid": {"points": list(points), "size": 1e-3},
+        "surface": {**ROUGH, "seed": 4},
+        "material": BODY,
+        "numerics": {"tolerance": 1e-3, "accuracy": 0.5},
+        "steady": {"velocities": [1.0], "pressures": [1.5e5], "direction": list(along)},
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        found = pc.steady(job)
+    return found.friction[0], found.contact_area_corrected[0], found.error_friction[0]
+
+
+def test_friction_comes_from_the_cells_along_the_sliding() -> None:
+    """With 16 and 4 cells per shortest wave, against 16 and 16: friction within 1 %, the corrected area within 2 %.
+    With 4 along and 16 across friction is more wrong; either is within twice its estimate, as 95 % are."""
+    (fine, area, _), (long, of_long, stated), (wide, _, of_wide) = (
+        steady(points) for points in ((192, 192), (192, 48), (48, 192))
+    )
+    assert long == pytest.approx(fine, rel=0.01)
+    assert of_long == pytest.approx(area, rel=0.02)
+    assert abs(long / fine - 1.0) < abs(wide / fine - 1.0) < 2.0 * of_wide
+    assert abs(long / fine - 1.0) < 2.0 * stated
+    assert stated < 0.2 * of_wide
+
+
+def calls_of_a_slide(points: tuple[int, int], velocity: tuple[float, float]) -> float:
+    """Operator calls per step of a slide by half a shortest wave, in steps of a cell."""
+    slide = {"pressure": 1.5e5, "velocity": list(velocity), "distance": 1e-3 / 24, "cells_per_step": 1}
+    job = {"grid": {"points": list(points), "size": 1e-3}, "surface": {**ROUGH, "seed": 4}, "material": BODY}
+    rows = marched({**job, "history": [{"pressure": 1.5e5}, slide], "numerics": {"tolerance": 5e-3}})[1]
+    calls = [row.operator_calls for row in rows[2:]]
+    return sum(calls) / len(calls)
+
+
+@pytest.mark.parametrize(("points", "velocity"), [((192, 48), (1.0, 0.0)), ((48, 192), (0.0, 1.0))])
+def test_a_slide_takes_as_many_calls_as_on_squares(points: tuple[int, int], velocity: tuple[float, float]) -> None:
+    """Within 15 %, of squares with the same cells along the sliding; 40 % more without pairs along it."""
+    squares, long = calls_of_a_slide((192, 192), velocity), calls_of_a_slide(points, velocity)
+    assert long <= 1.15 * squares

@@ -1,15 +1,34 @@
 """What each precision promises: loads, certificates, and results beside those of double precision."""
 
 import math
+import random
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
+from conftest import Main
+from judging import HERE, Json, job_of, rough_heights
+from judging import run as warnings_of
 from marching import begun, column, marched
 from mpi4py import MPI
 from numpy.typing import NDArray
+from short_job import JOB
 
+from parcontact import scene
+from parcontact.history.timeline import Timeline
+from parcontact.job import Job, load_cases
+from parcontact.march.failure import StepError
 from parcontact.march.loop import March, run
+from parcontact.parallel.slab import Slab
+from parcontact.physics.measures import Measures
+from parcontact.physics.probe import Probe
+from parcontact.scene import sanity
+from parcontact.solve.certificate import Certificate
 
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "rms_slope": 0.02, "seed": 1}
 RUBBER = {"model": "elastic", "shear_modulus": 1e6}
@@ -105,3 +124,136 @@ def test_displacements_have_the_digits_of_the_operator(tolerance: float, kept: t
     scene = begun({**data, "history": [{"pressure": 1e4}], "numerics": numerics}).scene
     assert scene.solver.workspace.displacement.dtype == kept
     assert scene.solver.workspace.pressure.dtype == np.float64
+
+
+# -- results that are not finite never pass for results, and a certificate that is not a number is none ---------------
+
+NAN, INF = math.nan, math.inf
+
+
+@pytest.mark.parametrize("wrong", [NAN, INF])
+@pytest.mark.parametrize("place", range(3))
+def test_no_certificate(wrong: float, place: int) -> None:
+    parts = [0.0, 0.0, 0.0]
+    parts[place] = wrong
+    assert not Certificate(*parts).worst <= 1.0
+
+
+@pytest.mark.parametrize("wrong", [NAN, INF, 1e308])
+def test_heights_that_are_not_finite(wrong: float) -> None:
+    """Whatever the solver makes of them: no row, and the state is as it was."""
+    march = begun(JOB)
+    first, second = islice(Timeline.of(march.scene.job), 2)
+    march.advance(first)
+    before, pressure = march.row, march.field("pressure")
+    motion: Any = march.scene.motion
+    heights = motion.at(second.position)
+    heights.parts[0][...] = wrong
+    motion.at = lambda position: heights
+    with np.errstate(all="ignore"), pytest.raises(StepError):
+        march.advance(second)
+    assert march.row is before
+    assert np.array_equal(march.field("pressure"), pressure)
+
+
+@pytest.fixture
+def overflowing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measures one of which overflows, of solves that are as they should be."""
+    measures = Probe.measure
+
+    def overflow(self: Probe, *words: Any) -> Measures:
+        return replace(measures(self, *words), force_y=INF)
+
+    monkeypatch.setattr(Probe, "measure", overflow)
+
+
+CURVE = ("steady", "--velocities", "0.1,1", "--pressures", "1e4")
+
+
+@pytest.mark.usefixtures("overflowing")
+@pytest.mark.parametrize(
+    ("words", "said", "times"),
+    [
+        (("run",), "step 1 at t = 0 s (stage 'press'): force_y would not be finite", 1),
+        (CURVE, "its results would not be finite", 2),  # of each point
+    ],
+)
+def test_no_run_and_no_point_of_a_curve_is_one(
+    main: Main, tmp_path: Path, words: tuple[str, ...], said: str, times: int
+) -> None:
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
+    code, shown, errors = main(words[0], "job.yaml", *words[1:], "--quiet")
+    assert (code, (shown + errors).count(said)) == (1, times)
+
+
+# -- of no sound scene anything is told -------------------------------------------------------------------------------
+
+OURS = sorted(
+    path for path in HERE.rglob("*.yaml") if path.parent.name != "road" and path.stem != "rubber"
+)  # that one: tests/road/test_jobs.py
+
+
+@pytest.mark.parametrize("path", OURS, ids=lambda path: path.stem)
+def test_no_job_of_ours_is_told(path: Path) -> None:
+    """Of a sweep, the last case: that over the size of the box begins with boxes that are told to be too small."""
+    job = load_cases(path)[-1].job
+    assert job.warnings == ()
+    if sanity.is_quickly_made(job):
+        assert sanity.check_heights(scene.set_up(job, Slab.alone(*job.grid.points))) == []
+
+
+def sound(dice: random.Random, directory: Path) -> Job:
+    """A scene of rubber that a tribologist would set up: roughness, waves, a sphere, a measured road."""
+    make: Callable[[random.Random, Path], Job] = dice.choice([_road, _road, _sphere, _measured])
+    return make(dice, directory)
+
+
+def _material(dice: random.Random) -> tuple[Json, float]:
+    modulus = 10.0 ** dice.uniform(5, 8)
+    if dice.random() < 0.4:
+        return {"model": "elastic", "shear_modulus": modulus, "poisson": dice.choice([0.3, 0.45, 0.5])}, modulus
+    branches = [{"modulus": modulus / 4, "relaxation_time": 10.0**n} for n in range(-6, 1)]
+    return {"model": "zener", "modulus_inf": modulus / 4, "branches": branches}, 2 * modulus
+
+
+def _road(dice: random.Random, directory: Path) -> Job:
+    length, points = 10.0 ** dice.uniform(-5, 0), dice.choice([64, 96])
+    material, modulus = _material(dice)
+    slope = dice.uniform(0.01, 0.3)
+    short = length / points * dice.uniform(8.5, 14.0)
+    rough = {"shape": "rough", "hurst": dice.uniform(0.5, 1.0), "long_wavelength": length / 4}
+    rough |= {"short_wavelength": min(short, length / 4), "rms_slope": slope, "seed": dice.randint(0, 99)}
+    pressure = modulus * slope * dice.uniform(0.05, 0.5)
+    history: list[Json] = [{"pressure": pressure}]
+    if dice.random() < 0.5:
+        slide = {"velocity": dice.uniform(0.1, 10.0), "distance": 2 * length / points, "cells_per_step": 1}
+        history.append({"pressure": pressure, **slide})
+    return job_of(rough, history, grid={"points": points, "size": length}, material=material)
+
+
+def _sphere(dice: random.Random, directory: Path) -> Job:
+    radius = 10.0 ** dice.uniform(-4, 0)
+    material, _ = _material(dice)
+    contact = radius * dice.uniform(0.01, 0.2)
+    grid = {"points": 64, "size": contact * dice.uniform(3.0, 5.0), "boundary": "free"}
+    return job_of(
+        {"shape": "sphere", "radius": radius}, [{"approach": contact**2 / radius}], grid=grid, material=material
+    )
+
+
+def _measured(dice: random.Random, directory: Path) -> Job:
+    path = directory / f"{dice.getrandbits(32)}.npy"
+    np.save(path, rough_heights(64, dice.uniform(8.5, 16.0), dice.randint(0, 99)) + dice.uniform(-1e-3, 1e-3))
+    material, modulus = _material(dice)
+    history = [{"pressure": 0.1 * modulus * dice.uniform(0.05, 0.5)}]
+    return job_of({"shape": "file", "path": str(path)}, history, material=material)
+
+
+def test_no_sound_scene_is_told(tmp_path: Path) -> None:
+    """50 random ones, each with its heights and its steps."""
+    dice = random.Random(12)
+    for number in range(50):
+        job = sound(dice, tmp_path)
+        assert job.warnings == (), (number, job.resolved())
+        assert sanity.check_heights(scene.set_up(job, Slab.alone(*job.grid.points))) == [], job.resolved()
+        assert warnings_of(job) == [], (number, job.resolved())

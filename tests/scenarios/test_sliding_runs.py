@@ -1,17 +1,28 @@
 """A surface that slides on a viscoelastic body: order in time, energies, directions."""
 
+import tracemalloc
+import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from marching import SLS, column, marched
+from closed_forms import step_responses
+from conftest import Main, RunParcontact
+from marching import JOBS, PRONY, SLS, column, example, marched
+from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
-from sliding import FAST, PRESS, WAVELENGTH, Json, rough, slide, wave
+from rubbers import relaxation
+from sliding import CELL, FAST, HEIGHT, MEAN, PRESS, TYRE, WAVELENGTH, Json, K, rough, slide, wave
 
+import parcontact as pc
 from parcontact.march.loop import March
+from parcontact.parallel.fft import BLOCK_BYTES
 from parcontact.physics.prony import Integrator
+from parcontact.storage import tables
 from parcontact.storage.row import StepRow
+from parcontact.theory import full_contact
 
 
 def moving(kind: str, steps: int, jump: bool, integrator: Integrator) -> StepRow:
@@ -194,3 +205,312 @@ def test_along_y_as_along_x(tmp_path: Path) -> None:
         assert_allclose(found, wanted, rtol=0, atol=1e-7 * np.abs(wanted).max())
     calls = [np.mean(column(each[5:], "operator_calls")) for each in (rows, same)]
     assert calls[1] < 1.1 * calls[0]
+
+
+# -- a wave that slides in full contact: friction against its closed form, and its order in time ----------------------
+
+INTEGRATORS: tuple[Integrator, ...] = ("exponential", "exponential-linear", "backward-euler")
+
+# velocity and the friction of steady sliding at one cell per step, of exponential and of backward Euler steps
+STEADY = [
+    (0.001, 4.902519e-05, 4.888371e-05),
+    (0.004, 0.0001943267, 0.000192302),
+    (0.01, 0.0004615856, 0.0004507858),
+    (FAST, 0.0009763055, 0.0009302677),
+    (0.1, 0.0006707329, 0.0006487824),
+    (0.4, 0.0001923269, 0.0001904834),
+    (1.0, 7.756915e-05, 7.726771e-05),
+]
+
+
+def traction(rows: list[StepRow]) -> NDArray[np.float64]:
+    """Tangential force over normal force, along x."""
+    return column(rows, "force_x") / (column(rows, "pressure") * WAVELENGTH**2)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize(("velocity", "exponential", "euler"), STEADY)
+def test_steady_friction(integrator: Integrator, velocity: float, exponential: float, euler: float) -> None:
+    """After 25 relaxation times the friction that these steps must give: computed to 1e-9, and printed to 7 digits but
+    for the quadratic steps."""
+    cells = max(60, np.ceil(25e-3 * velocity / CELL))
+    data = wave([{"velocity": velocity, "distance": cells * CELL, "cells_per_step": 1}], integrator=integrator)
+    data["grid"]["size"][1] = 1e-4 * WAVELENGTH  # a very long and narrow box is all right
+    _, rows = marched(data)
+    found = rows[-1].measures.friction
+    if integrator != "exponential":
+        assert found == pytest.approx(exponential if integrator == "exponential-linear" else euler, rel=3e-7)
+    waves = (MEAN, HEIGHT, np.array([K]), np.array([0.0]), velocity, 0.0)
+    exact = step_responses.discrete_friction_coefficient(*waves, CELL / velocity, *PRONY, integrator=integrator)
+    assert found == pytest.approx(float(exact), rel=1e-9)
+    assert rows[-1].measures.force_x < 0.0
+    assert rows[-1].operator_calls <= 4
+
+
+def test_error_of_a_step_in_full_contact() -> None:
+    """The estimate is one to three times the error of the loss of these steps, here at z = dt/tau of 0.1."""
+    stage = {"velocity": FAST, "distance": 60 * CELL, "cells_per_step": 1, "pressure": 1e2 * MEAN}
+    _, rows = marched(wave([stage], tolerance=1e-10))
+    errors, waves = rows[-1].errors, (MEAN, HEIGHT, np.array([K]), np.array([0.0]), FAST, 0.0)
+    assert errors is not None
+    assert errors.friction is not None
+    stepped = step_responses.discrete_friction_coefficient(*waves, CELL / FAST, *PRONY)
+    true = abs(float(stepped / full_contact.friction_coefficient(*waves, *PRONY)) - 1.0)
+    assert true < errors.friction.time < 3.0 * true
+
+
+def transient(before: float, after: float, steps: int, integrator: Integrator) -> float:
+    """Largest error, over the largest exact value, in 5 ms after 20 ms at one velocity and then at another."""
+    stages = [{"duration": 20e-3, "time_step": 20e-3 / (4 * steps if before else 1), "velocity": before}]
+    stages += [{"duration": 5e-3, "time_step": 5e-3 / steps, "velocity": after}]
+    _, rows = marched(wave(stages, points=(8, 1), integrator=integrator))
+    late = [row for row in rows if row.time > 20.0001e-3]
+    t = column(late, "time") - 20e-3
+    modulus = step_responses.velocity_step_modulus(t, K * before, np.array([K * after]), *PRONY)
+    exact = full_contact.traction(HEIGHT, np.array([K]), np.array([0.0]), modulus)[:, 0] / MEAN
+    return float(np.abs(traction(late) - exact).max() / np.abs(exact).max())
+
+
+def test_start_after_a_rest() -> None:
+    """Load, 1 ms of rest, sliding: within 1e-6 of the peak at 500 steps in 5 ms, with order 3."""
+    errors = []
+    for steps in (125, 250, 500):
+        sliding = {"duration": 5e-3, "time_step": 5e-3 / steps, "velocity": FAST}
+        stages = [{"duration": 1e-3, "time_step": 1e-3}, sliding]
+        _, rows = marched(wave(stages, points=(8, 1)))
+        late = rows[2:]
+        t = column(late, "time") - 1e-3
+        modulus = step_responses.load_rest_slide_modulus(t, 1e-3, np.array([K * FAST]), *PRONY)
+        exact = full_contact.traction(HEIGHT, np.array([K]), np.array([0.0]), modulus)[:, 0] / MEAN
+        errors.append(float(np.abs(traction(late) - exact).max() / np.abs(exact).max()))
+    assert errors[-1] < 1e-6
+    assert_allclose(np.log2(errors[:-1]) - np.log2(errors[1:]), 3.0, rtol=0.05)
+    printed = [0, -1.20719, -2.35062, -5.32082, -8.62804, -10.6389, -9.73556]
+    at = np.array([0, 0.1, 0.2, 0.5, 1, 2, 5]) * 1e-3
+    assert_allclose(np.interp(at, t, traction(late)), 1e-4 * np.array(printed), rtol=0, atol=5e-6 * 1e-4 * 11)
+
+
+@pytest.mark.parametrize(
+    ("integrator", "order"), [("exponential", 3.0), ("exponential-linear", 2.0), ("backward-euler", 1.0)]
+)
+def test_order_of_a_velocity_step(integrator: Integrator, order: float) -> None:
+    errors = [transient(0.004, FAST, steps, integrator) for steps in (100, 200, 400)]
+    assert_allclose(np.log2(errors[:-1]) - np.log2(errors[1:]), order, rtol=0.05)
+
+
+@pytest.mark.parametrize("waves", [(1, 1), (2, 1), (1, -2)])
+def test_oblique_waves(waves: tuple[int, int]) -> None:
+    """Sliding along x: mu = |q| kx h0^2 G''(kx v)/P0 of these steps; and a force across. To 1e-9."""
+    velocity = 0.4 * FAST
+    cell = WAVELENGTH / 32
+    stage = {"velocity": velocity, "distance": 50 * cell, "cells_per_step": 1}
+    _, rows = marched(wave([{"duration": 20e-3, "time_step": 20e-3}, stage], waves, (32, 32)))
+    kx, ky = K * waves[0], K * waves[1]
+    data = rows[-1].measures
+    dt = cell / velocity
+    moment = (MEAN, HEIGHT, np.array([kx]), np.array([ky]), velocity, 0.0, dt, *PRONY)
+    mu = float(step_responses.discrete_friction_coefficient(*moment))
+    settled = np.exp(-50 * dt / 1e-3)
+    load = MEAN * WAVELENGTH**2
+    assert_allclose([-data.force_x / load, -data.force_y / load], [mu, mu * ky / kx], rtol=1e-9 + 3 * settled)
+    assert_allclose(data.friction, mu * np.hypot(kx, ky) / kx, rtol=1e-9 + 3 * settled)
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0), (0.0, 1.0), (0.6, -0.8)])
+def test_only_motion_along_a_wave_dissipates(direction: tuple[float, float]) -> None:
+    """A wave along y (or x) that slides along x (or y) relaxes as at rest: amplitude 2 k h0 G(t), no friction."""
+    velocity = (FAST * np.array(direction)).tolist()
+    stage = {"velocity": velocity, "duration": 2e-3, "time_step": 2e-4}
+    for waves, along in (((1, 0), direction[0]), ((0, 1), direction[1])):
+        march, rows = marched(wave([stage], waves, (16, 16)))
+        amplitude = np.ptp(march.field("pressure")) / 2
+        if along == 0.0:
+            assert amplitude == pytest.approx(float(2 * K * HEIGHT * relaxation(2e-3, *PRONY)), rel=1e-12)
+            assert_allclose(column(rows, "friction"), 0.0, atol=1e-15)
+        else:
+            assert rows[-1].measures.friction > 1e-4
+
+
+def test_a_reversal_changes_the_sign_of_friction_x() -> None:
+    """`-force_x` over the normal force to rounding, past 0 after the reversal, where `friction` has a cusp."""
+    there, back = ({"velocity": speed, "distance": 16 * CELL, "cells_per_step": 1} for speed in (FAST, -FAST))
+    _, rows = marched(wave([there, back]))
+    signed, magnitude = (column(rows, name) for name in ("friction_x", "friction"))
+    assert_allclose(signed[1:], -traction(rows[1:]), rtol=1e-14)
+    assert np.array_equal(np.abs(signed), magnitude)
+    assert np.all(signed[2:17] > 0.0)
+    assert signed[-1] < 0.0
+
+
+@pytest.mark.parametrize(("cells", "boundary"), [(3.0, "periodic"), (2.25, "periodic"), (2.25, "free")])
+def test_height_is_where_the_surface_is(tmp_path: Path, cells: float, boundary: str) -> None:
+    """`h0(x - s)` with its mean, to 1e-12 of it, which the gap is counted from; 10 roundings of each length."""
+    x = np.arange(64) * CELL
+    np.save(tmp_path / "wave.npy", 3.0 * HEIGHT + HEIGHT * np.cos(K * x)[None, :])
+    data = wave([{"velocity": FAST, "distance": cells * CELL, "cells_per_step": cells}], tolerance=1e-6)
+    data["grid"]["boundary"] = boundary
+    data["surface"] = {"shape": "file", "path": str(tmp_path / "wave.npy")}
+    march, _ = marched(data)
+    height, gap, displacement = (march.field(name) for name in ("height", "gap", "displacement"))
+    assert_allclose(height[0], 3.0 * HEIGHT + HEIGHT * np.cos(K * (x - cells * CELL)), rtol=1e-12)
+    approach = march.row.measures.approach
+    assert_allclose(gap, displacement - height - approach, rtol=0.0, atol=4e-15 * (3 * HEIGHT + abs(approach)))
+
+
+# -- the examples of jobs/ that slide, as they promise ----------------------------------------------------------------
+
+def test_example_of_full_contact() -> None:
+    """What jobs/full_contact.yaml promises, to its four digits and the 1e-4 of its steps."""
+    _, rows = marched(example("full_contact"))
+    t, friction = column(rows, "time"), column(rows, "friction")
+    ends = [20e-3, 30e-3, 40e-3]
+    assert_allclose(np.interp(ends, t, friction), [1.945e-4, 9.771e-4, 9.771e-4], rtol=5e-4)
+    peaks = [(20e-3, 30e-3, 1.178e-3, 1.47e-3), (30.6e-3, 40e-3, 1.108e-3, 2.36e-3 - 0.6e-3)]
+    for start, end, highest, when in peaks:
+        there = (t > start) & (t < end)
+        assert friction[there].max() == pytest.approx(highest, rel=5e-4)
+        assert t[there][friction[there].argmax()] - start == pytest.approx(when, abs=5e-5)
+    force = column(rows, "force_x")
+    assert np.all(np.abs(np.diff(force[t > 1e-3])) < 0.05 * np.abs(force).max())  # it does not jump
+    assert friction[-1] == pytest.approx(9.771e-4 * np.exp(-5.0), rel=5e-3)
+
+
+def test_example_of_a_sphere() -> None:
+    """What jobs/sphere_sliding.yaml promises for V* = 1, within 3 % with 8 cells per a* and steps twice as long."""
+    _, rows = marched(example("sphere_sliding", "grid.points=176", "history.0.time_step=2.5e-4"))
+    t, friction = column(rows, "time") / 1e-2, column(rows, "friction") * 1e-2 / 0.46765e-3
+    promised = np.array([0.0948, 0.3435, 0.4740, 0.5394, 0.5746, 0.5953])
+    assert_allclose(np.interp([0.2, 0.6, 1.0, 1.4, 1.8, 2.2], t, friction), promised, rtol=3e-2)
+
+
+@pytest.mark.rendered
+def test_example_of_a_velocity_step(run_parcontact: "RunParcontact", main: "Main", tmp_path: Path) -> None:
+    """As a user would, at an eighth of the waves and points: friction peaks and settles, the area falls; a picture."""
+    job = JOBS / "velocity_step.yaml"
+    smaller = ["--set", "grid.points=128", "--set", "surface.0.short_wavelength=1.25e-4", "--quiet"]
+    ran = run_parcontact([job, "--out", tmp_path / "out", *smaller], ranks=2)
+    assert ran.returncode == 0, ran.stderr
+    table = tables.read(tmp_path / "out/measures.csv")
+    distance, friction, area = (np.array(table[name]) for name in ("distance", "friction", "contact_area"))
+    slow, late = distance < 2.01e-5, distance > 2e-4
+    peak = int(friction.argmax())
+    assert 2e-5 < distance[peak] < 5e-5
+    assert friction[peak] > 1.4 * friction[late].max()
+    assert friction[peak] > 1.4 * friction[slow].max()
+    assert area[late].max() < 0.3 * area[slow].min()
+    assert main("plot", tmp_path / "out")[0] == 0
+    assert (tmp_path / "out/picture.png").stat().st_size > 10_000
+
+
+# -- what a sliding step costs: operator calls, memory, and the same on any number of ranks ---------------------------
+
+def calls_per_step(points: int, history: list[Json], tolerance: float = 5e-3) -> tuple[float, float]:
+    """Operator applications per step after the tenth, and the last friction."""
+    _, rows = marched(rough(points, history, numerics={"tolerance": tolerance}))
+    return float(np.mean(column(rows[11:], "operator_calls"))), rows[-1].measures.friction
+
+
+@pytest.mark.parametrize(
+    ("most", "change"),
+    [
+        (11, {}),
+        (11, {"velocity": [0.0, 0.3]}),
+        (13, {"cells_per_step": 0.25}),
+        (15, {"velocity": [0.2, 0.2]}),
+    ],
+)
+def test_warm_starts_save_work(most: float, change: Json) -> None:
+    """A start that moves with the surface and is extrapolated: 9, 9, 10 and 13 operator applications are measured."""
+    cells = 8 if "cells_per_step" in change else 30
+    calls, _ = calls_per_step(512, [slide(512, cells, **change)])
+    assert calls < most
+
+
+def test_tolerance_of_friction() -> None:
+    """At the default tolerance, 5e-3, friction is good to 1e-3."""
+    stages = [slide(256, 30)]
+    assert calls_per_step(256, stages)[1] == pytest.approx(calls_per_step(256, stages, 1e-7)[1], rel=1e-3)
+
+
+@pytest.mark.mpi(3)
+@pytest.mark.parametrize("velocity", [0.3, [0.0, 0.3]])
+def test_memory(comm: MPI.Intracomm, velocity: Any) -> None:
+    """At most one map of a rank's rows per branch and 14 more, counted and traced, beside the blocks of transforms
+    and the larger cells of the preconditioner: two maps of 4 bytes on 1/4 + 1/16 + ... of the points, of which several
+    ranks have the largest cells all, less than half a map in all."""
+    data = rough(1024, [slide(1024, 2, velocity=velocity)], numerics={"tolerance": 0.1})
+    data["material"] = {**TYRE, "branches": TYRE["branches"][:2]}  # type: ignore[index]
+    blocks = 4 * BLOCK_BYTES
+    marched({**data, "grid": {**data["grid"], "points": 128}, "numerics": {"accept_unconverged": True}}, comm=comm)
+    tracemalloc.start()
+    try:
+        march, rows = marched(data, comm=comm)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    maps = 8 * march.scene.slab.shape[0] * 1024
+    assert len(rows) == 4
+    assert march.scene.slab.tally["map bytes"] <= 16 * maps + blocks
+    assert peak <= 16.5 * maps + blocks
+
+
+@pytest.mark.mpi(3)
+@pytest.mark.parametrize(
+    ("velocity", "tolerance", "agreement"), [(0.3, 1e-11, 1e-8), ([0.2, -0.1], 1e-11, 1e-8), ([0.2, -0.1], 1e-4, 1e-3)]
+)
+def test_any_number_of_ranks(comm: MPI.Intracomm, tolerance: float, agreement: float, velocity: Any) -> None:
+    """After 80 steps of a rough contact: as one rank, to 1e-8 of solves at 1e-11 and 1e-3 of solves at 1e-4."""
+    steps = {"velocity": velocity, "duration": 80 * 1e-3 / 32 / 0.3, "time_step": 1e-3 / 32 / 0.3}
+    data = rough(32, [steps], numerics={"tolerance": tolerance}, output={"energy": True})
+    data["surface"]["short_wavelength"] = 1.25e-4
+    names = ("pressure", "force_x", "force_y", "friction", "contact_area", "approach", "max_pressure", "dissipated")
+    alone, rows = marched(data)
+    assert len(rows) == 82
+    march, same = marched(data, comm=comm)
+    for name in names:
+        found, expected = column(same, name), column(rows, name)
+        points = 3 / 32**2 if name == "contact_area" and tolerance > 1e-6 else 0.0
+        assert_allclose(found, expected, rtol=0, atol=agreement * np.abs(expected).max() + points, err_msg=name)
+    for name in ("pressure", "displacement"):
+        whole, field = np.concatenate(march.scene.slab.from_all(march.field(name))), alone.field(name)
+        share = agreement if tolerance < 1e-6 else 0.03
+        assert_allclose(whole, field, rtol=0, atol=share * np.abs(field).max(), err_msg=name)
+
+
+# -- errors of friction where a body relaxes before the surface has slid by a cell: edges of contact are not ----------
+
+ROUGH = {"shape": "rough", "hurst": 0.9, "rms_slope": 0.05, "long_wavelength": 2.5e-4, "short_wavelength": 1.25e-4}
+SPHERE = {"shape": "sphere", "radius": 5e-3}
+ZENER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]}
+SYNTHETIC = {"include": "synthetic_tyre"}
+
+
+def friction(points: int, surface: Any, body: Any, speed: float, boundary: str = "periodic") -> tuple[float, float]:
+    """Return friction of steady sliding under 10 kPa, and its stated error."""
+    grid = {"points": points, "size": 1e-3, "boundary": boundary}
+    job = {"grid": grid, "surface": surface, "material": body, "numerics": {"accuracy": 0.003}}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # coarse meshes are told
+        curve = pc.steady(job, velocities=[speed], pressures=[1e4])
+    return curve.friction[0], curve.error_friction[0]
+
+
+@pytest.mark.parametrize(
+    ("surface", "body", "speed", "boundary"),
+    [
+        ({**ROUGH, "seed": 5}, ZENER, 1e-4, "periodic"),  # 1 % of a cell in a relaxation time
+        ({**ROUGH, "seed": 5}, ZENER, 1e-3, "periodic"),
+        ({**ROUGH, "seed": 6}, SYNTHETIC, 1e-8, "periodic"),
+        (SPHERE, ZENER, 1e-3, "periodic"),
+        (SPHERE, ZENER, 1e-3, "free"),
+    ],
+)
+def test_stated_errors_cover_what_edges_lose(surface: Any, body: Any, speed: float, boundary: str) -> None:
+    """The true error is that against meshes of 192 and 384 points in a periodic box, from both of which the first order
+    of the cell is taken off. It is 0.4 to 8 % here."""
+    coarse, fine = (friction(points, surface, body, speed)[0] for points in (192, 384))
+    exact = 2.0 * fine - coarse
+    for points in (64, 96):
+        found, error = friction(points, surface, body, speed, boundary)
+        true = abs(found / exact - 1.0)
+        assert true < error < 5.0 * true

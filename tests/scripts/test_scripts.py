@@ -3,16 +3,21 @@
 Claims about time are not judged here: a busy machine would break them.
 """
 
+import ast
+import random
 import re
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 from typing import NamedTuple
 
+import numpy as np
 import pytest
+from marching import ROOT, load_script
 
-ROOT = Path(__file__).resolve().parents[2]
-FILES = sorted((ROOT / "scripts").glob("*.py"))
+ROOT_scripts = Path(__file__).resolve().parents[2]
+FILES = sorted((ROOT_scripts / "scripts").glob("*.py"))
 SCRIPTS = [path for path in FILES if "__main__" in path.read_text()]  # the others serve them
 
 
@@ -41,7 +46,7 @@ SMALL = {
         ["--scenes", "2", "--from", "13"], r"(?s)first half: 2 \| both .*2 scenes, .*written: ", (0, 1)
     ),
     "fuzz_jobs": Small(["--jobs", "40"], r"(?m)^40 made: 0 with faults; "),
-    "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_disturbed.py
+    "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_faults.py
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^\d\d pages in pages"),
     "march_errors": Small(["--marches", "1"], r"(?m)^exponential +0.01 +[0-9.]+ "),
     "mutants": Small(["--count", "1", "--seed", "1", "parallel/slab.py"], r"(?m)^1 of 1 seen"),
@@ -60,3 +65,61 @@ def test_a_small_run(script: Path, tmp_path: Path, outside_mpi: dict[str, str]) 
     assert "Traceback" not in done.stderr
     assert done.returncode in small.codes, done.stderr
     assert re.search(small.printed, done.stdout), done.stdout
+
+
+# -- what scripts/bench.py counts and concludes; what it times is judged by nobody but its reader ---------------------
+
+@pytest.fixture(scope="module")
+def peers() -> ModuleType:
+    return load_script("bench.peers")
+
+
+@pytest.mark.parametrize(
+    ("begins", "needs"),
+    [(-2.0, 1e-3), (-4.0, 1e-3)],  # the first tolerance is too loose, or tighter than it need be
+)
+def test_the_loosest_tolerance_is_found(peers: ModuleType, begins: float, needs: float) -> None:
+    """A program whose error is its tolerance, and which takes a second for each digit."""
+    code = "def attempt(tolerance):\n    return -float(np.log10(tolerance)), tolerance"
+    given = {"heights": np.zeros((2, 2)), "load": 1.0, "wanted": needs * (1.0 + 1e-12)}
+    found = peers.search(Path(sys.executable), peers.Task("it", code, begins), given)
+    assert found.reached
+    assert found.seconds == pytest.approx(3.0)
+    assert found.error == pytest.approx(1e-3)
+
+
+def test_a_program_that_is_too_slow(peers: ModuleType) -> None:
+    """What its last try took at least counts, or a longer one before."""
+    first = [{"began": 0.0}, {"seconds": 100.0, "error": 1e-5}, {"began": 120.0}]
+    assert peers.judge(first, 1e-7).seconds == peers.LIMIT - 120.0
+    assert not peers.judge(first, 1e-7).reached
+    assert peers.judge([*first[:2], {"began": 400.0}], 1e-7).seconds == 100.0
+
+
+def test_a_slide_goes_on_for_as_many_rounds_as_are_asked_for() -> None:
+    """Also past the length of the box, whose surface comes round again."""
+    slide = load_script("bench.work").Slide(64)
+    for _ in range(66):
+        slide.step()
+    assert slide.march.row.distance == pytest.approx(65e-3 / 64, rel=1e-12)  # the first step is the jump of the load
+
+
+# -- scripts/mutants.py finds files with tests of their own, and something to break in each of them -------------------
+
+MUTANTS = load_script("mutants")
+PARTS = MUTANTS.parts()
+
+
+def test_enough_is_broken() -> None:
+    """Most of what computes has tests of its own name, and the scenarios that are named are there."""
+    assert len(PARTS) >= 20
+    assert set(MUTANTS.OTHERS) <= set(PARTS)
+    assert all((ROOT / name).exists() for part in PARTS for name in MUTANTS.tests_of(part))
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_part_can_be_broken(part: str) -> None:
+    text = (ROOT / "parcontact" / part).read_text()
+    what, changed = MUTANTS.draw(part, random.Random(0))
+    assert what
+    assert ast.dump(ast.parse(changed)) != ast.dump(ast.parse(text))

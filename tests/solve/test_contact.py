@@ -5,22 +5,32 @@ what is exact in real numbers is asked for to some hundred roundings.
 """
 
 import dataclasses
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mpi4py import MPI
 from numpy.testing import assert_allclose
+from numpy.typing import NDArray
 
-from parcontact.solve import certificate
-from parcontact.solve.problem import Approach, MeanPressure
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.solve import certificate, contact
+from parcontact.solve.constraint import CELL, Constraint, NonNegative
+from parcontact.solve.contact import ContactSolver
+from parcontact.solve.fallback import cold_start
+from parcontact.solve.local_load import MOST_GIVEN_BACK, LocalLoad
+from parcontact.solve.problem import Approach, MeanPressure, Operators
+from parcontact.solve.workspace import Workspace
 
 from . import polonsky_keer
-from .bodies import BODIES, MODULUS, ROUNDING, TIGHT, keep, rough, solve, solver, white
+from .bodies import BODIES, MODULUS, ROUNDING, TIGHT, Bench, Map, keep, rough, solve, solver, white
 
 # -- against others ----------------------------------------------------------------------------------------------------
-
 
 @pytest.mark.parametrize("load", [0.02, 0.1, 0.5])
 def test_agrees_with_polonsky_and_keer(load: float) -> None:
@@ -73,7 +83,6 @@ def test_single_cell_on_a_free_body() -> None:
 
 
 # -- the certificate ---------------------------------------------------------------------------------------------------
-
 
 @pytest.mark.parametrize("control", ["load", "approach"])
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-8])
@@ -135,7 +144,6 @@ def test_any_surface(seed: int, shape: tuple[int, int], load: float, body: tuple
 
 # -- controls ----------------------------------------------------------------------------------------------------------
 
-
 @pytest.mark.parametrize(("boundary", "kernel"), BODIES)
 @pytest.mark.parametrize("mean", [0.01, 0.4, 2.0])
 def test_load_and_approach_give_the_same_contact(boundary: str, kernel: str, mean: float) -> None:
@@ -175,3 +183,347 @@ def test_periodic_approach_beyond_full_contact_fails() -> None:
 def test_what_a_contact_reports_is_documented() -> None:
     for field in dataclasses.fields(certificate.Certificate):
         assert f"{field.name}: " in str(certificate.Certificate.__doc__)
+
+
+# -- what a contact costs: starts, messages and operator calls of an iteration, single precision ----------------------
+
+def test_warm_start_from_the_solution() -> None:
+    """Nothing is left to do but to see that it is one."""
+    h = rough(64)
+    solving = solver(h)
+    p = np.zeros_like(h)
+    first = keep(solving.solve(h, MeanPressure(0.4), p))
+    operators = solving.slab.tally["operator"]
+    again = keep(solving.solve(h, MeanPressure(0.4), p))
+    assert again.iterations == 0
+    assert solving.slab.tally["operator"] == operators + 1
+    assert_allclose(again.p, first.p, rtol=1e-14)
+
+
+def test_cost_of_an_iteration(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At most three operators and five messages, however many numbers they carry; one message more where so much is
+    cut off that it is taken back near by, which is so in the first iterations only."""
+    h, taken = rough(64), list[float]()
+    solving = solver(h)
+    before, restore = solving.slab.tally.copy(), LocalLoad.restore
+
+    def note(local: LocalLoad, constraint: Constraint, p: Map, load: float, total: float, near_by: bool) -> None:
+        taken.extend([load] * near_by)
+        restore(local, constraint, p, load, total, near_by)
+
+    monkeypatch.setattr(LocalLoad, "restore", note)
+    found = solving.solve(h, MeanPressure(0.4), np.zeros_like(h))
+    spent = solving.slab.tally.since(before)
+    assert spent["operator"] <= 1 + 3 * found.iterations
+    assert spent["allreduce"] <= 3 + 5 * found.iterations + len(taken)
+    assert 0 < len(taken) <= 6 < found.iterations
+    assert "map bytes" not in spent
+
+
+def test_preconditioner_in_single_precision() -> None:
+    """It need not be exact: as many iterations, the same pressures in double precision."""
+    h = rough(128)
+    double = solve(h, 0.4, tolerance=1e-9)
+    solving = solver(h, tolerance=1e-9)
+    narrow = FFT(Slab.alone(128, 128), dtype=np.float32)
+    solving.preconditioner = HalfSpace((1.0, 1.0)).inverse(narrow)
+    mixed = keep(solving.solve(h, MeanPressure(0.4), np.zeros_like(h)))
+    assert abs(mixed.iterations - double.iterations) <= 2
+    assert_allclose(mixed.p, double.p, atol=1e-7 * double.p.max())
+
+
+@pytest.mark.parametrize("load", [0.02, 0.4, 4.0])
+def test_calls_in_a_box_with_nothing_around(load: float) -> None:
+    """At 1, 20 and 90 % of contact at most 25 calls give pressures to 1e-5 (of their L2 norm), from nested grids as
+    programs start. With residuals that jump at the edges, as of a box that repeats, they
+    are 25 to 50."""
+    h = rough(256)
+    free: dict[str, Any] = {"boundary": "free", "kernel": "love"}
+    exact = solve(h, load, tolerance=1e-9, **free)
+
+    def on(slab: Slab, tolerance: float) -> tuple[ContactSolver, Operators]:
+        coarse = solver(np.zeros((slab.ny, slab.nx)), tolerance=tolerance, **free)
+        coarse.solver.height = float(np.ptp(h))
+        return coarse.solver, coarse.operators
+
+    solving, p = solver(h, tolerance=1e-5, **free), np.zeros_like(h)
+    before = solving.slab.tally["operator"]
+    cold_start.prepare(solving.solver, solving.problem(h, MeanPressure(load)), p, on)
+    found = keep(solving.solve(h, MeanPressure(load), p))
+    assert np.linalg.norm(found.p - exact.p) <= 1e-5 * np.linalg.norm(exact.p)
+    assert solving.slab.tally["operator"] - before <= 25
+
+
+# -- the safeguard -----------------------------------------------------------------------------------------------------
+
+class Dense:
+    """An operator given by its matrix."""
+
+    def __init__(self, matrix: list[list[float]]) -> None:
+        self.matrix = np.array(matrix)
+
+    def apply(self, field: NDArray[Any], out: NDArray[Any]) -> NDArray[Any]:
+        out[...] = (self.matrix @ field.ravel()).reshape(field.shape)
+        return out
+
+
+# Found by trial among small matrices B B' + 1 of whole numbers: no half space of ours needed the safeguard.
+LOADED = [[23, -4, -23, -4, 12], [-4, 20, 2, 23, -13], [-23, 2, 29, 0, -6], [-4, 23, 0, 30, -17]]
+LOADED += [[12, -13, -6, -17, 22]]
+MOVED = [[28, -10, -8, -11, 4], [-10, 16, 9, -10, 9], [-8, 9, 11, -3, 3], [-11, -10, -3, 27, -16], [4, 9, 3, -16, 12]]
+CYCLES = [
+    (LOADED, [-5.0, -5.0, 3.0, 1.0, 3.0], MeanPressure(20.0)),
+    (MOVED, [-1.0, 3.0, -2.0, -1.0, 4.0], Approach(-2.0)),
+]
+
+
+@pytest.mark.parametrize(("matrix", "heights", "control"), CYCLES)
+def test_without_halving_steps_it_may_cycle(
+    matrix: list[list[float]], heights: list[float], control: MeanPressure | Approach, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Unpreconditioned, on positive definite matrices with eigenvalues from 1 to some 60."""
+    h = np.array([heights])
+
+    def attempt() -> contact.Contact:
+        solving = ContactSolver(Workspace(Slab.alone(5, 1), 1e-8), 10.0, 1e-8, 500)
+        body = Bench(solving, Dense(matrix), Dense(np.eye(5).tolist()))
+        return body.solve(h, control, np.zeros_like(h))
+
+    guarded = attempt()
+    assert guarded.converged
+    gap = np.array(matrix) @ guarded.p[0] - h[0] - guarded.d
+    assert gap.min() > -1e-7
+    monkeypatch.setattr(contact, "MAX_HALVINGS", 0)
+    assert "stalled" in attempt().failure
+
+
+@pytest.mark.parametrize("control", [MeanPressure(0.4), Approach(0.5)])
+def test_every_iteration_lowers_the_energy(control: MeanPressure | Approach) -> None:
+    """From a start that is nowhere near; but for rounding."""
+    h, start = rough(48), white((48, 48), 3) ** 2
+    energies = []
+    for limit in range(1, 15):
+        solving = solver(h, boundary="free", max_iterations=limit, tolerance=1e-10)
+        found = solving.solve(h, control, start.copy())
+        d = found.d if isinstance(control, Approach) else 0.0
+        energies.append(float(np.sum(found.p * (0.5 * found.u - h - d))))
+    assert np.all(np.diff(energies) <= 1e-13 * np.abs(energies[0]))
+
+
+@pytest.mark.parametrize(("aspect", "load"), [(2e3, 0.1), (1e-3, 50.0)])
+def test_where_steps_are_halved_the_energy_never_rises(aspect: float, load: float) -> None:
+    """On cells far longer than wide, where the preconditioner is far from the inverse: over all iterations of a solve
+    of noise on a box of length 1 and width `aspect`; but for rounding."""
+    h = white((6, 18), 3)
+    energies, halved = [], False
+    for limit in range(1, 60):
+        body = solver(h, size=(1.0, aspect), tolerance=1e-8, max_iterations=limit)
+        found = body.solve(h, MeanPressure(load), np.zeros_like(h))
+        energies.append(float(np.sum(found.p * (0.5 * found.u - h))))
+        halved = body.slab.tally["operator"] > 1 + 3 * found.iterations  # each try of a step costs one more
+        if found.converged:
+            break
+    assert np.all(np.diff(energies) <= 1e-12 * np.abs(energies).max())
+    assert found.converged
+    assert halved
+
+
+# -- what cannot be solved ---------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("control", [MeanPressure(0.4), MeanPressure(0.0), Approach(0.1)])
+def test_heights_that_are_not_finite(value: float, control: MeanPressure | Approach) -> None:
+    h = rough(48)
+    solving = solver(h)
+    h[3, 4] = value
+    if value == -np.inf and control == MeanPressure(0.0):
+        return  # a hole without a bottom, and the highest point touches
+    assert solving.solve(h, control, np.zeros_like(h)).failure == "met numbers that are not finite"
+
+
+@pytest.mark.parametrize("control", [MeanPressure(np.nan), MeanPressure(np.inf), Approach(np.nan), Approach(np.inf)])
+def test_loads_that_are_not_finite(control: MeanPressure | Approach) -> None:
+    h = rough(48)
+    assert solver(h).solve(h, control, np.zeros_like(h)).failure == "met numbers that are not finite"
+
+
+def test_iterations_run_out() -> None:
+    h = rough(64)
+    found = solver(h, max_iterations=3).solve(h, MeanPressure(0.4), np.zeros_like(h))
+    assert not found.converged
+    assert found.iterations == 3
+    assert found.failure.startswith("did not converge in max_iterations = 3: the residual is ")
+    assert found.failure.endswith(" where 1e-06 was asked for")
+
+
+@pytest.mark.parametrize("control", [MeanPressure(0.4), Approach(-0.02)])
+def test_stall(control: MeanPressure | Approach) -> None:
+    """More than rounding allows is refused long before the iterations run out; the last iterate is still a good one."""
+    h = rough(48)
+    found = solver(h, tolerance=1e-300, max_iterations=10_000).solve(h, control, np.zeros_like(h))
+    assert not found.converged
+    assert found.failure.startswith("stalled: no residual below ")
+    assert found.iterations < 300
+    assert found.certificate.worst < 1e-12
+
+
+# -- the same contact, moved or mirrored, by the contact solver: two solves to 1e-11 agree to 1e-9 of the largest -----
+
+@pytest.mark.parametrize(("boundary", "kernel"), BODIES)
+def test_mirror_images_and_transposition(boundary: str, kernel: str) -> None:
+    h = white((24, 36))
+    options: dict[str, Any] = {"boundary": boundary, "kernel": kernel, "tolerance": TIGHT}
+    found = solve(h, 2.0, size=(1.5, 1.0), **options)
+    limit = 1e-9 * found.p.max()
+    assert_allclose(solve(h[:, ::-1].copy(), 2.0, size=(1.5, 1.0), **options).p[:, ::-1], found.p, atol=limit)
+    assert_allclose(solve(h[::-1].copy(), 2.0, size=(1.5, 1.0), **options).p[::-1], found.p, atol=limit)
+    assert_allclose(solve(h.T.copy(), 2.0, size=(1.0, 1.5), **options).p.T, found.p, atol=limit)
+
+
+def test_whole_cell_shifts() -> None:
+    h = white((24, 36))
+    found = solve(h, 2.0, tolerance=TIGHT)
+    moved = solve(np.roll(h, (5, 7), axis=(0, 1)), 2.0, tolerance=TIGHT)
+    assert_allclose(moved.p, np.roll(found.p, (5, 7), axis=(0, 1)), atol=1e-9 * found.p.max())
+
+
+# -- iterations do not grow out of hand at any load, and the last gap closes without coming and going -----------------
+
+LIMIT = 60  # iterations to 1e-6
+ALMOST = 0.9999  # of all points: there the loads end
+
+
+@pytest.mark.parametrize("cells", [16, 2, None])
+def test_cold_starts_at_all_loads(cells: int | None) -> None:
+    """From one point to 99.99 % of contact, which grows with the load; roughness down to so many cells, or a sphere."""
+    square = (np.arange(128) / 128 - 0.5) ** 2
+    heights = -np.add.outer(square, square) if cells is None else rough(128, cells=cells)
+    body, load, areas = solver(heights), 1e-3 / heights.size / heights.shape[0], [0.0]
+    while areas[-1] < ALMOST:
+        found = body.solve(heights, MeanPressure(load * MODULUS), np.zeros_like(heights))
+        assert found.converged, (load, found.failure)
+        assert found.iterations < LIMIT
+        areas.append(np.count_nonzero(found.p) / heights.size)
+        load *= 10.0 if areas[-1] < 0.5 else 10.0**0.25
+    assert areas[1] == 1 / heights.size
+    assert all(before <= after for before, after in pairwise(areas))
+
+
+@pytest.mark.parametrize("two_ways", [False, True], ids=["Westergaard", "Johnson"])
+@pytest.mark.parametrize("share", [0.99, 1.0, 1.01])
+def test_last_gap(two_ways: bool, share: float) -> None:
+    """Points open after each iteration to 1e-9, at shares of the load of full contact: they settle from one side."""
+    x = np.cos(2 * np.pi * (np.arange(128) + 0.3) / 128)
+    heights = x[:, None] * x[None, :] if two_ways else np.tile(x, (128, 1))
+    full = np.pi * MODULUS * (np.sqrt(2.0) if two_ways else 1.0)
+    count: list[int] = []
+    for limit in range(1, 20):
+        body = solver(heights, tolerance=1e-9, max_iterations=limit)
+        found = body.solve(heights, MeanPressure(share * full), np.zeros_like(heights))
+        count.append(heights.size - int(np.count_nonzero(found.p)))
+        if found.converged:
+            break
+    assert found.converged
+    assert reversals(count) == 0
+    assert (count[-1] == 0) == (share >= 1.0)
+
+
+def reversals(count: list[int]) -> int:
+    """Return how often a count that has fallen rises, or the other way round."""
+    steps = [after - before for before, after in pairwise(count) if after != before]
+    return sum(first * second < 0 for first, second in pairwise(steps))
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_last_gap_between_points(side: float) -> None:
+    """On 37 x 31 points with the deepest point between them, at 1e-1 to 1e-16 from full contact: no pressure pulls,
+    and above it is p + K h to 1e-9; the nearer, the fewer iterations."""
+    x, y = (np.cos(2 * np.pi * (np.arange(points) + 0.3) / points) for points in (37, 31))
+    heights = x[None, :] * y[:, None]
+    body = solver(heights, tolerance=1e-10)
+    waves = body.preconditioner.apply(heights - heights.mean(), np.empty_like(heights))
+    counts = []
+    for exponent in range(-1, -17, -1):
+        mean = -waves.min() * (1.0 + side * 10.0**exponent)
+        found = body.solve(heights, MeanPressure(mean), np.zeros_like(heights))
+        assert found.converged
+        assert found.p.min() >= 0.0
+        counts.append(found.iterations)
+        if side > 0.0:
+            assert_allclose(found.p, mean + waves, rtol=0, atol=1e-9 * float(waves.max()))
+    assert max(counts) < 20
+    assert all(before >= after for before, after in pairwise(counts))
+
+
+# -- cutting off at 0 and taking back near by, against the same with blocks of numpy, on any ranks --------------------
+
+CUT_ROUNDING, TOTAL = 1e-13, 3.0
+ANY_RANKS = pytest.mark.parametrize("shape", [(1, 1), (7, 40), (33, 16), (50, 37), (64, 64)])
+
+
+def cut_off(values: Map, near_by: bool = True, pairs: int = 0) -> tuple[slice, Map, float, float]:
+    """The rows that this rank has, their pressure after the cut, made to have the sum TOTAL, and the load and the cut
+    that are returned."""
+    slab = Slab(MPI.COMM_WORLD, values.shape[1], values.shape[0])
+    p, t = values[slab.rows] + 2.0, np.full(values[slab.rows].shape, 4.0)
+    local = LocalLoad(slab, pairs)
+    load, cut = local.advance(NonNegative(), p, t, 0.5, p)
+    if load > 0.0:
+        local.restore(NonNegative(), p, load, TOTAL, near_by)
+    return slab.rows, p, load, cut
+
+
+def expected(values: Map, rows: int, columns: int) -> Map:
+    """Cell by cell, of so many rows and columns."""
+    out = np.maximum(values, 0.0)
+    for j in range(0, values.shape[0], rows):
+        for i in range(0, values.shape[1], columns):
+            cell = np.s_[j : j + rows, i : i + columns]
+            load = out[cell].sum()
+            share = min((load - values[cell].sum()) / load, MOST_GIVEN_BACK) if load > 0.0 else 0.0
+            out[cell] *= 1.0 - share
+    return out
+
+
+def pressures(shape: tuple[int, int], sunk: float) -> Map:
+    """Random numbers from -sunk to 1 - sunk."""
+    return np.random.default_rng(1).random(shape) - sunk
+
+
+@pytest.mark.mpi
+@ANY_RANKS
+@pytest.mark.parametrize("sunk", [0.1, 0.45, 0.9])
+@pytest.mark.parametrize(
+    ("near_by", "pairs", "cell"),
+    [
+        (True, 0, (CELL, CELL)),
+        (True, 1, (8, CELL)),
+        (True, 4, (4, CELL)),
+        (True, -2, (CELL, 4)),
+        (False, 0, (CELL, CELL)),
+    ],
+)
+def test_each_cell_gives_back_what_was_added_in_it(
+    shape: tuple[int, int], sunk: float, near_by: bool, pairs: int, cell: tuple[int, int]
+) -> None:
+    """Cells have fewer rows where pairs along x make square cells, fewer columns where pairs along y do, but four at
+    least."""
+    values = pressures(shape, sunk) + 2.0 - 2.0  # with the rounding of what is advanced
+    rows, p, load, cut = cut_off(values, near_by, pairs)
+    whole = np.maximum(values, 0.0)
+    assert_allclose(load, whole.sum(), rtol=CUT_ROUNDING)
+    assert_allclose(cut, (whole - values).sum(), rtol=CUT_ROUNDING, atol=CUT_ROUNDING)
+    if load > 0.0:
+        kept = expected(values, *cell) if near_by else whole
+        assert_allclose(p, (TOTAL / kept.sum() * kept)[rows], rtol=CUT_ROUNDING)
+
+
+def test_nothing_and_not_a_number() -> None:
+    """Pressures that are all negative leave 0; what is not a number stays so."""
+    assert cut_off(np.full((20, 20), -1.0))[2] == 0.0
+    values = pressures((20, 20), 0.4)
+    values[3, 3] = np.nan
+    _, p, load, cut = cut_off(values)
+    assert np.isnan(load)
+    assert np.isnan(cut)
+    assert np.isnan(p[3, 3])

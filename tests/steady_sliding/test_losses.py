@@ -16,7 +16,7 @@ from parcontact.physics.prony import Prony
 from parcontact.solve.nonsymmetric import proximal
 from parcontact.steady_sliding.sliding import SteadySliding
 
-from .test_lines import LINE, cylinder_on
+from .test_sliding import LINE, cylinder_on
 
 RATIO, MODULUS, TIME = 1000.0, 1.0e6, 1.0e-3  # G0/G_inf, G_inf [Pa], relaxation time [s]
 PEAK = 2.5e-4 / (2 * np.pi * TIME * np.sqrt(RATIO))  # at which the loss tangent of waves of 0.25 mm is largest [m/s]

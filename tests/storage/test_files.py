@@ -1,11 +1,25 @@
 """Files that are whole or not there, what is put aside, and tables that grow."""
 
+import math
+import os
 import resource
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from parcontact.storage import files
+from parcontact.columns import MEASURES, choose_columns
+from parcontact.errors import InputError, InUseError
+from parcontact.job import load
+from parcontact.parallel.slab import Slab
+from parcontact.physics.measures import Measures
+from parcontact.scene import choices
+from parcontact.storage import directory, files, marker, tables, wisdom
+from parcontact.storage.checkpoint import TableMark
+from parcontact.storage.curve_points import asked, lacking, of_table
+from parcontact.storage.directory import Directory
+from parcontact.storage.marker import Claim
+from parcontact.storage.row import MeasuresFile, StepRow, cut_back_table
 from parcontact.storage.tables import GrowingTable
 
 
@@ -63,3 +77,253 @@ def test_a_line_without_room_leaves_the_table_as_it_was(tmp_path: Path) -> None:
     again.append(["2", "0.25"])
     again.close()
     assert path.read_text() == "step,time\n0,0.0\n1,0.125\n2,0.25\n"
+
+
+# -- output directories: one run at a time, known by its marker -------------------------------------------------------
+
+PLAIN: dict[str, Any] = {"grid": {"points": [8, 8]}, "surface": [{"shape": "flat"}], "material": {"model": "elastic"}}
+
+
+def directory_at(path: Path, verb: str = "run") -> Directory:
+    return Directory(path, Slab.alone(8, 8), verb)
+
+
+def make(here: Directory, job: Path, data: dict[str, Any] = PLAIN) -> None:
+    with here.claimed():
+        here.refuse_foreign(job, data, False)
+        here.make(job, "resolved", Claim(data))
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> Path:
+    path = tmp_path / "job.yaml"
+    path.write_text("given")
+    return path
+
+
+def test_second_run_is_refused(tmp_path: Path, job: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It writes nothing, and may have the directory as soon as the first has ended."""
+    monkeypatch.setattr(directory, "MAX_SECONDS_TO_RELEASE", 0.1)
+    first, second = directory_at(tmp_path / "out"), directory_at(tmp_path / "out")
+    with first.claimed():
+        with pytest.raises(InUseError, match=rf"in use by another run \(process {os.getpid()} on "), second.claimed():
+            raise AssertionError
+        first.make(job, "resolved", Claim(PLAIN))
+    make(second, job)
+    assert second.claim is not None
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        marker.MARKER,
+        "checkpoint",
+        "job.resolved.yaml",
+        "job.yaml",
+    ]
+
+
+def test_nothing_is_left_of_a_job_that_was_refused(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), directory_at(tmp_path / "deep" / "out").claimed():
+        raise ZeroDivisionError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_files_and_other_jobs_are_refused(tmp_path: Path, job: Path) -> None:
+    """Those of others, and other scenes under another verb; the lock, `stop` and theory may be there before."""
+    out = tmp_path / "out"
+    out.mkdir()
+    for name in ("theory.csv", ".hidden", "notes.txt"):
+        (out / name).write_text("mine")
+    with pytest.raises(InputError, match=r"not empty and not of this program: it holds notes\.txt; give --out"):
+        make(directory_at(out), job)
+    (out / "notes.txt").unlink()
+    make(directory_at(out), job)
+    make(directory_at(out, "steady"), job)
+    keep = r"grid.points was \[8, 8\], is \[9, 9\]; give --set grid.points=\[8,8\] to keep its mesh, or give --out"
+    with pytest.raises(InputError, match=keep):
+        make(directory_at(out, "study"), job, {**PLAIN, "grid": {"points": [9, 9]}})
+    (out / marker.MARKER).write_text("{")
+    with pytest.raises(InputError, match="is damaged, so that the owner of"):
+        make(directory_at(out), job)
+
+
+def test_the_directory_of_a_sweep_is_told(tmp_path: Path, job: Path) -> None:
+    """A sweep has no marker of its own, its cases have."""
+    for case in ("000", "001"):
+        make(directory_at(tmp_path / "out" / "cases" / case), job)
+    with pytest.raises(InputError, match=r"out is that of a sweep, with 2 of its cases; give --out for .* with --case"):
+        make(directory_at(tmp_path / "out"), job)
+
+
+def test_differences_of_jobs() -> None:
+    """Keys of sections and of lists of parts, with both values; lists of numbers are one value."""
+    then = {
+        "grid": {"points": [8, 8]},
+        "surface": [{"shape": "wave", "seed": 1}],
+        "numerics": {"kernel": "love", "x": 1},
+    }
+    now = {
+        "grid": {"points": [8, 9]},
+        "surface": [{"shape": "wave", "seed": 2}],
+        "numerics": {"kernel": "love", "x": 2},
+    }
+    assert list(marker.differences(then, now, ("grid", "surface", "numerics.kernel", "initial"))) == [
+        "grid.points was [8, 8], is [8, 9]",
+        "surface.0.seed was 1, is 2",
+    ]
+
+
+def test_many_differences_are_counted() -> None:
+    """Another rubber with many branches differs in many keys."""
+    branches = marker.differences({"k": dict.fromkeys("abcdef", 1)}, {"k": dict.fromkeys("abcdef", 2)}, ("k",))
+    assert marker.told(branches) == "k.a was 1, is 2; k.b was 1, is 2; k.c was 1, is 2; k.d was 1, is 2; and 2 more"
+
+
+# -- fFTW's wisdom is kept for runs with the same transforms, where nobody else can have put it -----------------------
+
+NOBODY = 65534  # a user other than the one who runs the tests
+JOB = """\
+grid: {points: [16, 4], size: [1.0e-3, 2.5e-4]}
+surface: {shape: wave, amplitude: 1.0e-6, waves: [1, 0]}
+material: {model: elastic, shear_modulus: 1.0e6}
+history: [{pressure: 1.0e4}]
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="gives a directory to somebody else")
+def test_plans_in_a_directory_of_others_are_not_read(cache: Path, tmp_path: Path) -> None:
+    (tmp_path / "job.yaml").write_text(JOB)
+    job, slab = load(tmp_path / "job.yaml"), Slab.alone(16, 4)
+    wisdom.keep(choices(job).transforms, slab)
+    (kept,) = (cache / "parcontact" / "plans").iterdir()
+    assert wisdom._place(choices(job).transforms, slab) == kept
+    os.chown(kept.parent, NOBODY, NOBODY)
+    assert wisdom._place(choices(job).transforms, slab) is None
+    wisdom.keep(choices(job).transforms, slab)
+    assert [path.name for path in kept.parent.iterdir()] == [kept.name]
+
+
+def test_plans_are_those_of_a_precision(cache: Path, tmp_path: Path) -> None:
+    """An operator in single precision has transforms of its own."""
+    (tmp_path / "job.yaml").write_text(JOB)
+    slab, mixed = Slab.alone(16, 4), "numerics.precision=mixed"
+    jobs = [load(tmp_path / "job.yaml", [mixed, f"numerics.tolerance={size}"]) for size in ("1e-3", "1e-4")]
+    assert len({wisdom._place(choices(job).transforms, slab) for job in jobs} - {None}) == 2
+
+
+def test_wisdom_of_a_checkpoint(cache: Path) -> None:
+    """It is used for as many ranks; what is none is left alone, as is what was kept before."""
+    slab = Slab.alone(16, 4)
+    saved = wisdom.gather(slab)
+    assert wisdom._adopt(saved.tobytes(), slab)
+    assert not wisdom._adopt(b"none", slab)
+    wisdom.keep(["a"], slab)
+    (kept,) = (cache / "parcontact" / "plans").iterdir()
+    before = kept.stat().st_mtime_ns
+    wisdom.keep(["a"], slab)
+    wisdom.recall(["a"], slab, None)
+    assert kept.stat().st_mtime_ns == before
+
+
+# -- which points of a friction curve are asked for, and which its table lacks ----------------------------------------
+
+NONE = math.nan  # the temperature of the material
+COLUMNS = {"velocity": [0.1, 1.0], "pressure": [1e5, 1e5], "friction": [0.2, 0.3]}
+
+
+def test_every_speed_under_every_pressure_at_every_temperature() -> None:
+    """In the order in which they are solved."""
+    speeds, pressures = (0.1, 1.0), (1e5, 2e5)
+    assert asked(speeds, pressures, (20.0, -5.0)) == [
+        (v, p, t) for t in (20.0, -5.0) for p in pressures for v in speeds
+    ]
+    assert lacking(asked(speeds, pressures), [(v, p, NONE) for p in pressures for v in speeds]) == []
+
+
+def test_a_point_that_is_asked_for_again_is_one() -> None:
+    assert asked((0.1, 1.0, 0.1), (1e5, 1e5)) == asked((0.1, 1.0), (1e5,))
+    assert asked((0.1, 0.1), (1e5,), (20.0, 20.0)) == [(0.1, 1e5, 20.0)]
+
+
+def test_what_a_table_lacks() -> None:
+    """Speeds and pressures to rounding; a temperature that was not asked for is no other one."""
+    there = of_table(COLUMNS)
+    assert lacking(asked((1.0, 0.5, 0.1), (1e5,)), there) == [1]
+    assert lacking([(0.1 * (1 + 5e-7), 1e5, NONE), (0.1 * (1 + 2e-6), 1e5, NONE), (0.1, 1.1e5, NONE)], there) == [1, 2]
+    assert lacking(asked((0.1,), (1e5,), (20.0,)), there) == [0]
+    heated = of_table({**COLUMNS, "temperature": [20.0, -5.0]})
+    assert lacking(asked((0.1, 1.0), (1e5,), (20.0, -5.0)), heated) == [1, 2]
+    assert lacking(asked((0.1,), (1e5,)), heated) == [0]
+
+
+# -- measures.csv: exact numbers, cut back without repeating or losing a row ------------------------------------------
+
+def row(step: int, lost: tuple[float, ...] = ()) -> StepRow:
+    return StepRow(step, 0.1 * step, measures=Measures(pressure=1 / 3), dissipated=sum(lost), branch_dissipation=lost)
+
+
+def written(path: Path, count: int, branches: int = 0) -> None:
+    file = MeasuresFile(path, TableMark(), branches)
+    for step in range(count):
+        file.write(row(step, (0.1,) * branches))
+    file.close()
+
+
+def test_numbers_read_back(tmp_path: Path) -> None:
+    path = tmp_path / "measures.csv"
+    written(path, 3)
+    found = tables.read(path)
+    assert list(found) == [column.name for column in choose_columns(MEASURES)]
+    assert found["step"] == [0, 1, 2]
+    assert found["time"] == [0.0, 0.1, 0.2]
+    assert found["pressure"] == [1 / 3] * 3
+    assert all(math.isnan(value) for value in found["work"])
+
+
+@pytest.mark.parametrize(
+    ("forces", "signed"), [((-3.0, 0.0), 0.5), ((3.0, 0.0), -0.5), ((0.0, 2.0), 0.0), ((-3.0, 4.0), 0.3), ((0, 0), 0.0)]
+)
+def test_signed_friction(tmp_path: Path, forces: tuple[float, float], signed: float) -> None:
+    """Over a normal force F the column is -force_x/F, exactly where the force is along x; friction is |force|/F."""
+    friction = 0.5 if any(forces) else 0.0
+    found = Measures(1.0, *forces, friction)
+    assert found.friction_x == pytest.approx(signed, rel=2e-16, abs=0.0)
+    assert math.copysign(1.0, found.friction_x) == (-1.0 if signed < 0.0 else 1.0)
+    file = MeasuresFile(tmp_path / "measures.csv", TableMark(), 1)
+    file.write(StepRow(1, measures=found, branch_dissipation=(0.1,)))
+    file.close()
+    table = tables.read(tmp_path / "measures.csv")
+    assert list(table).index("friction_x") == list(table).index("dissipated_0") + 1
+    assert table["friction_x"] == [found.friction_x]
+
+
+def test_cut_back(tmp_path: Path) -> None:
+    path = tmp_path / "measures.csv"
+    written(path, 6)
+    whole = path.read_text()
+    with path.open("a") as file:
+        file.write("6,0.6,0.")  # a row that was cut off
+    assert cut_back_table(path, 3, TableMark(), 0)[1] == []
+    assert path.read_text() == "".join(whole.splitlines(keepends=True)[:5])
+    file_again = MeasuresFile(path, TableMark())
+    for step in (4, 5):
+        file_again.write(row(step))
+    file_again.close()
+    assert path.read_text() == whole
+
+
+def test_what_is_lost_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "measures.csv"
+    assert "is missing" in cut_back_table(path, 3, TableMark(), 0)[1][0]
+    written(path, 3)
+    assert "ends with step 2: the rows up to step 5 are lost" in cut_back_table(path, 5, TableMark(), 0)[1][0]
+
+
+def test_other_columns(tmp_path: Path) -> None:
+    """The dissipation of branches may be asked for later, or no longer."""
+    path = tmp_path / "measures.csv"
+    written(path, 3)
+    assert cut_back_table(path, 2, TableMark(), 2)[1] == []
+    assert list(tables.read(path)) == [column.name for column in choose_columns(MEASURES, 2)]
+    assert math.isnan(tables.read(path)["dissipated_1"][2])
+    assert cut_back_table(path, 2, TableMark(), 0)[1] == []
+    assert list(tables.read(path)) == [column.name for column in choose_columns(MEASURES)]
+    written(tmp_path / "split.csv", 2, branches=2)
+    assert tables.read(tmp_path / "split.csv")["dissipated_1"] == [0.1, 0.1]

@@ -1,16 +1,23 @@
 """The first sentence of a report, from tables whose results are known."""
 
 import csv
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from drawing import ELASTIC, SLIDE, SPHERE, WAVE, ZENER, ran
 
+from parcontact import job
+from parcontact.errors import InputError
+from parcontact.job import Stage
 from parcontact.report import page
-from parcontact.summary import headline
+from parcontact.summary import citations, headline, info, theory_beside
+from parcontact.summary.pull_off import Columns, PullOff, describe, find
 
 ROW = ("time", "distance", "pressure", "friction", "contact_area", "contact_area_corrected", "approach", "max_pressure")
 
@@ -74,3 +81,181 @@ def test_curves_sweeps_and_studies(tmp_path: Path) -> None:
     swept = "The mean friction of the cases is from 0.1 (case 1) to 0.200 ± 0.020 (case 0)."
     assert headline.describe(tmp_path) == f"{swept} for 1 %: mesh 64"
     assert not headline.describe(tmp_path / "nowhere")
+
+
+# -- `parcontact info`: what it says of friction ----------------------------------------------------------------------
+
+@pytest.mark.parametrize(("history", "told"), [(SLIDE, True), ("history: [{pressure: 1.0e3}]\n", False)])
+def test_friction_is_told_where_something_slides(tmp_path: Path, history: str, told: bool) -> None:
+    said, sound = info.describe(ran(tmp_path, WAVE + ZENER + history))
+    assert sound
+    assert "last row: pressure 1 kPa, " in said
+    assert (", friction " in said) == told
+
+
+# -- the references of a run follow from its job ----------------------------------------------------------------------
+
+JOB: dict[str, Any] = {
+    "grid": {"points": 64, "size": 1e-3},
+    "surface": {"shape": "wave", "amplitude": 1e-7, "waves": [1, 1]},
+    "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
+    "history": [{"pressure": 1e3, "duration": 1e-3}],
+}
+
+
+def test_what_to_cite(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds no run"):
+        citations.describe(tmp_path)
+    data = {**JOB, "grid": {**JOB["grid"], "boundary": "free"}, "surface": {"shape": "sphere", "radius": 1e-2}}
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump({**data, "material": {"model": "elastic", "shear_modulus": 1e6}}))
+    (tmp_path / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
+    elastic = citations.describe(tmp_path)
+    assert "Love" in elastic
+    assert "Bugnicourt" not in elastic
+    assert "Persson" not in elastic
+    (tmp_path / "theory.csv").touch()
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
+    (tmp_path / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
+    rubber = citations.describe(tmp_path)
+    assert "Love" not in rubber
+    assert "Bugnicourt" in rubber
+    assert "Persson" in rubber
+    assert "Taylor" in rubber
+
+
+@pytest.mark.parametrize(("name", "credited"), [("road.npy", False), ("road.txt", False), ("road.nc", True)])
+def test_surface_topography_is_credited_for_what_it_reads(tmp_path: Path, name: str, credited: bool) -> None:
+    (tmp_path / name).touch()
+    part = {"shape": "topography", "path": name, "unit": "um", "pixel": 1e-6}
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump({**JOB, "surface": part}))
+    (tmp_path / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
+    assert ("SurfaceTopography" in citations.describe(tmp_path)) == credited
+
+
+# -- results of Persson's theory and of a run, from tables whose means are known --------------------------------------
+
+LONG_SLIDE = Stage.model_validate({"pressure": 1.0, "velocity": 1.0, "duration": 4.0, "time_step": 1.0})
+HEAD = "time,distance,friction,contact_area"
+
+
+def write_table(path: Path, head: str, *rows: str) -> None:
+    path.write_text("\n".join([head, *rows, ""]))
+
+
+def test_both_are_measured_alike_and_the_area_is_the_corrected_one(tmp_path: Path) -> None:
+    """Constant friction after a peak: the mean over the last three quarters, 1 m to 4 m, is that constant exactly."""
+    write_table(tmp_path / "theory.csv", HEAD, "0,0,0,0.5", "1,1,0.2,0.25", "4,4,0.2,0.25")
+    assert list(theory_beside.describe(tmp_path, [LONG_SLIDE], 1.0)) == [
+        "Persson's theory predicts mu_max 0.2, mu_dyn 0.2, contact area 0.25"
+    ]
+    write_table(
+        tmp_path / "measures.csv", f"{HEAD},contact_area_corrected", "0,0,0,1,1", "1,1,0.4,0.75,0.5", "4,4,0.4,0.75,0.5"
+    )
+    assert theory_beside.compare(tmp_path, [LONG_SLIDE], 1.0) == [
+        ("mu_max", pytest.approx(0.2), pytest.approx(0.4), math.nan),
+        ("mu_dyn", pytest.approx(0.2), pytest.approx(0.4), math.nan),
+        ("contact area", pytest.approx(0.25), pytest.approx(0.5), math.nan),
+    ]
+
+
+def test_errors_of_the_run_stand_beside_its_results(tmp_path: Path) -> None:
+    """10 % of the constant friction, and 4 % of the constant area."""
+    write_table(tmp_path / "theory.csv", HEAD, "0,0,0,0.5", "1,1,0.2,0.25", "4,4,0.2,0.25")
+    head = f"{HEAD},contact_area_corrected,error_friction,error_area"
+    rows = "1,1,0.4,0.75,0.5,0.1,0.04", "4,4,0.4,0.75,0.5,0.1,0.04"
+    write_table(tmp_path / "measures.csv", head, "0,0,0,1,1,,", *rows)
+    assert list(theory_beside.describe(tmp_path, [LONG_SLIDE], 1.0)) == [
+        "Persson's theory predicts mu_max 0.2 (run: 0.400 ± 0.040), mu_dyn 0.2 (run: 0.400 ± 0.040), "
+        "contact area 0.25 (run: 0.500 ± 0.020)"
+    ]
+
+
+def test_nothing_slides_or_nothing_was_predicted(tmp_path: Path) -> None:
+    assert theory_beside.compare(tmp_path, [LONG_SLIDE], 1.0) == []
+    rest = Stage.model_validate({"pressure": 1.0, "duration": 1.0})
+    write_table(tmp_path / "theory.csv", HEAD, "0,0,0,0", "1,0,0,0.3")
+    assert theory_beside.compare(tmp_path, [rest], 1.0) == [("contact area", 0.3, None, math.nan)]
+
+
+# -- pull-offs from made-up rows: of pulls by approach and by load, of several, of a contact that holds ---------------
+
+def table(*rows: tuple[float, float, float]) -> Columns:
+    """Pressure, approach and area, a row a second."""
+    pressure, approach, area = (list(column) for column in zip(*rows, strict=True))
+    highest = [abs(each) + 1.0 for each in pressure]
+    found = {"pressure": pressure, "approach": approach, "contact_area": area, "max_pressure": highest}
+    return {"time": [float(row) for row in range(len(rows))], **found}
+
+
+NEAR = [
+    (0.0, -5e-6, 0.0),
+    (-9.0, -1e-6, 0.0),
+    (-1.0, 0.0, 0.1),
+    (2.0, 1e-6, 0.3),
+]  # they pull hardest before they touch
+PULL = [(-3.0, -1e-6, 0.2), (-2.5, -2e-6, 0.1)]
+OFF = [(-0.5, -3e-6, 0.0), (-0.1, -5e-6, 0.0)]
+
+
+def test_by_approach() -> None:
+    rows = table(*NEAR, *PULL, *OFF)
+    assert find(rows) == [PullOff(4, 5.0, 6)]
+    where = "pull-off: 1.5 N (3 Pa), at t = 4 s, approach -1 µm; the steps beside it differ by 2.5 N"
+    assert list(describe(rows, 0.5)) == [f"{where}, and contact was lost by t = 6 s"]
+
+
+def test_surfaces_that_pull_hardest_when_they_have_come_off() -> None:
+    """A stiff sphere pulls so: its lowest load is behind the end of contact, but not on the way back."""
+    rows = table(*NEAR, *PULL, (-4.0, -3e-6, 0.0), (-2.0, -4e-6, 0.0), (-6.0, -3e-6, 0.0))
+    assert find(rows) == [PullOff(6, 2.0, 6)]
+
+
+def test_a_contact_under_tension_throughout() -> None:
+    """Its load is highest at the end of the pull, where little still holds."""
+    under_tension = [(-1.0, -1e-6, 0.1), (-2.0, 0.0, 0.3), *PULL, (-0.5, -3e-6, 0.05)]
+    assert find(table(*under_tension, *OFF)) == [PullOff(2, 1.0, 5)]
+    assert find(table(*under_tension)) == [PullOff(2, 1.0, None)]
+
+
+def test_under_a_load() -> None:
+    """What is beside the last load that held is the one before: open surfaces carry none."""
+    rows = table(*NEAR, *PULL, (0.0, -5e-6, 0.0), (0.0, -5e-6, 0.0))
+    assert find(rows) == [PullOff(4, 5.0, 6)]
+    assert find(table(*NEAR[:-1], (-2.0, 0.0, 0.1), (-2.5, 0.0, 0.1), (0.0, -5e-6, 0.0))) == [PullOff(4, 0.5, 5)]
+
+
+def test_flat_surfaces_are_pulled_at_no_approach() -> None:
+    (text,) = describe(table((0.0, 0.0, 1.0), (-2.0, -0.0, 1.0)), 1.0)
+    assert "approach 0 m" in text
+
+
+def test_two_pulls() -> None:
+    rows = table(*NEAR, *PULL, *OFF, *NEAR, (-2.0, 0.0, 0.1), *OFF)
+    first, second = find(rows)
+    assert (first, second) == (PullOff(4, 5.0, 6), PullOff(12, 4.0, 13))
+    assert [text.split(":")[0] for text in describe(rows, 1.0)] == ["pull-off 1", "pull-off 2"]
+
+
+def test_a_pull_that_was_held_is_no_pull_off() -> None:
+    """Rubber holds a fast pull, and comes off slowly under less."""
+    again = [(-8.0, -1e-6, 0.2), (1.0, 0.0, 0.2), *PULL]
+    assert find(table(*NEAR, *again, *OFF)) == [PullOff(6, 4.0, 8)]
+    assert find(table(*NEAR, *again)) == [PullOff(4, 10.0, None)]
+
+
+def test_a_contact_that_holds_has_none() -> None:
+    (held,) = describe(table(*NEAR, *PULL), 0.5)
+    assert held == "largest pull so far: 1.5 N (3 Pa), at t = 4 s, approach -1 µm; contact holds"
+
+
+def test_a_run_that_ended_with_its_contact_has_one() -> None:
+    """The load after the last row was held by nothing."""
+    assert find(table(*NEAR, *PULL), detached=True) == [PullOff(4, 5.0, 6)]
+    (told,) = describe(table(*NEAR, *PULL), 1.0, detached=True)
+    assert told.endswith("the steps beside it differ by 5 N, and nothing held the next load")
+
+
+def test_nothing_is_said_without_a_pull() -> None:
+    assert find(table((0.0, 0.0, 0.0), (2.0, 1e-6, 0.1), (0.0, 0.0, 0.0))) == []
+    assert find(table(*NEAR[:2])) == []
+    assert find(table((0.0, 0.0, 0.0), (-1e-12, 0.0, 0.1), (-2e-12, 0.0, 0.1))) == []  # rounding of no load

@@ -4,17 +4,21 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from mpi4py import MPI
+from numpy.testing import assert_allclose, assert_array_equal
+from numpy.typing import NDArray
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
+from parcontact.solve.adhesive import kernels, law
+from parcontact.solve.adhesive.free_inverse import FreeInverse
 from parcontact.solve.adhesive.iterate import GapOperators, GapSolution
 from parcontact.solve.adhesive.law import Law
 from parcontact.solve.adhesive.solver import GapSolver
 from parcontact.solve.adhesive.sticking import StickingSolver
 from parcontact.solve.certificate import Certificate
-from parcontact.solve.problem import Approach, MeanPressure
+from parcontact.solve.problem import Approach, Control, MeanPressure, Operator
 from parcontact.solve.workspace import Workspace
 
 NX, NY = 24, 20
@@ -129,3 +133,224 @@ def test_passes_that_begin_again_have_the_same_start_and_no_maps_of_their_own() 
     assert_allclose(second[0], first[0], rtol=0.0, atol=0.0)
     assert_allclose(second[1], h + 0.1, rtol=0.0, atol=0.0)
     assert gaps.held[0] - before < 1.5 * gap.nbytes
+
+
+# -- compiled loops of contacts that stick against the same in numpy; sums of some hundred numbers, so rounding only --
+
+
+S, RHO = 2.0, 0.3
+LAWS = [law.Law(law.EXPONENTIAL, S, RHO), law.Law(law.DUGDALE, S, RHO, 0.4), law.Law(law.DUGDALE, S, RHO, 2 * RHO)]
+SHAPES = [(5, 7), (1, 1), (0, 4)]
+
+
+def maps(shape: tuple[int, int]) -> tuple[np.ndarray, ...]:
+    """A gap that is closed at some points, and four other maps."""
+    gap, *others = np.random.default_rng(3).normal(size=(5, *shape))
+    return np.maximum(gap, 0.0), *others
+
+
+def attraction(one: law.Law, gap: np.ndarray) -> np.ndarray:
+    if one.kind == law.EXPONENTIAL:
+        return S * np.exp(-gap / RHO)
+    return np.interp(gap, RHO + 0.5 * one.ramp * np.array([-1.0, 1.0]), [S, 0.0])
+
+
+def gamma(one: law.Law, gap: np.ndarray) -> np.ndarray:
+    """Return the energy at a gap. With a ramp that of Dugdale's law is the mean over it of `S (rho - g)` without: a
+    quadrature of a kinked line, exact on either side of the kink."""
+    if one.kind == law.EXPONENTIAL:
+        return S * RHO * np.exp(-gap / RHO)
+    low, high = (np.clip(RHO + 0.5 * sign * one.ramp - gap, 0.0, None) for sign in (-1.0, 1.0))
+    return S * 0.5 * (high**2 - low**2) / one.ramp
+
+
+def test_decay() -> None:
+    """The exponential function of the C library, to what rounding x does to it; 0 beyond 1e-304."""
+    found = [law.decay(x) for x in np.linspace(0.0, 699.0, 2001)]
+    assert_allclose(found, np.exp(-np.linspace(0.0, 699.0, 2001)), rtol=700 * np.finfo(float).eps)
+    assert [law.decay(x) for x in (0.0, 700.0, 1e300, np.inf)] == [1.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("one", LAWS)
+def test_energy_and_slope_of_the_attraction(one: law.Law) -> None:
+    """`d gamma/dg = -sigma` by central differences (second order, 1e-4 of the range), `gamma(0) = s rho`, and sigma's
+    slope is the softening; between the corners of the laws."""
+    step = 1e-4 * RHO
+
+    def energy(gap: float) -> float:
+        return law.energy(one, gap, law.attraction(one, gap))
+
+    assert_allclose(energy(0.0), S * RHO, rtol=1e-15)
+    for gap in (0.1 * RHO, 0.7 * RHO, 1.2 * RHO, 2.1 * RHO):
+        low, high = gap - step, gap + step
+        here = law.attraction(one, gap)
+        assert_allclose((energy(low) - energy(high)) / (2 * step), here, rtol=1e-7)
+        slope = (law.attraction(one, low) - law.attraction(one, high)) / (2 * step)
+        assert_allclose(slope, law.softening(one, here), rtol=1e-7)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("one", LAWS)
+def test_residual(one: law.Law, shape: tuple[int, int]) -> None:
+    gap, q, c, image, _ = maps(shape)
+    working, sigma, pressed = np.zeros(shape, bool), np.empty(shape), q.copy()
+    kernels.attract(one, gap, sigma)
+    assert_allclose(sigma, attraction(one, gap), rtol=1e-14)
+    count, total = kernels.press(gap, pressed, sigma, 0.3, image)
+    assert_allclose(pressed, q + 0.3 * image, rtol=1e-14, atol=1e-14)
+    assert count == (gap > 0.0).sum()
+    assert_allclose(total, (pressed + sigma)[gap > 0.0].sum(), rtol=1e-12)
+    count, total, attracted, least = kernels.residual(gap, q, sigma, -1.9, working, c)
+    pushed = q - 1.9 + sigma
+    inside = (gap > 0.0) | (pushed < 0.0)
+    assert_array_equal(working, inside)
+    assert_allclose(c, np.where(inside, pushed, 0.0), rtol=1e-14, atol=1e-14)
+    assert count == inside.sum()
+    assert_allclose((total, attracted), (pushed[inside].sum(), sigma.sum()), rtol=1e-12)
+    assert least == (-gap).max(initial=-np.inf)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-4])
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("one", LAWS)
+def test_change_of_energy(one: law.Law, shape: tuple[int, int], size: float) -> None:
+    """Along a way that closes gaps; along a short one of the exponential law to 1e-7 of what surfaces gain."""
+    gap, q, image, t, _ = maps(shape)
+    way, new, sigma, sigma_new = (np.empty(shape) for _ in range(4))
+    total, cut = kernels.lead(gap, t, 0.4 * size, way)
+    assert_allclose(way, np.maximum(gap - 0.4 * size * t, 0.0) - gap, atol=1e-15)
+    assert_allclose((total, cut), ((gap + way).sum(), (way + 0.4 * size * t).sum()), rtol=1e-12, atol=1e-12)
+    kernels.attract(one, gap, sigma)
+    rise, magnitude = kernels.move(one, gap, q, 0.2, sigma, 0.5, way, image, new, sigma_new)
+    assert_allclose(new, gap + 0.5 * way, rtol=1e-14, atol=1e-15)
+    assert_allclose(sigma_new, attraction(one, new), rtol=1e-14)
+    surface = gamma(one, gap) - gamma(one, new)
+    exact = (0.5 * way * (q + 0.2 + 0.25 * image) + surface).sum()
+    assert_allclose(rise, exact, rtol=1e-12, atol=1e-13 + 1e-7 * np.abs(surface).sum() * (size < 1.0))
+    assert magnitude >= abs(rise) * (1.0 - 1e-12)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_counts(shape: tuple[int, int]) -> None:
+    _, p, other, *_ = maps(shape)
+    other = np.maximum(other, 0.0)
+    count, pull = kernels.tension(p, 0.5)
+    assert count == (p < -0.5).sum()
+    assert_allclose(pull, np.maximum(-p, 0.0).sum(), rtol=1e-13)
+    assert_allclose(kernels.weigh(p, other), (np.abs(p).sum(), (np.abs(p) * other).sum()), rtol=1e-13)
+    assert_allclose(kernels.weigh_off(p, other, 0.2), np.abs(p * (other - 0.2)).sum(), rtol=1e-13)
+
+
+# -- contacts that stick on a free body: the state that the energy falls to, beside that of a matrix ------------------
+
+TIGHT = 1e-6
+Map = NDArray[np.float64]
+
+
+def sticking(comm: MPI.Intracomm, points: int) -> tuple[Slab, Operator, StickingSolver]:
+    """A free box of length 1, its operator and a solver."""
+    slab = Slab(comm, points, points)
+    half_space = HalfSpace((1.0, 1.0), kernel="love", free=True)
+    gaps = GapSolver(slab, GapOperators(*half_space.gap_operators(FFT(slab))), 500)
+    free = half_space.operator(FFT(slab, (2 * points, 2 * points)))
+    return slab, free, StickingSolver(gaps, Workspace(slab, TIGHT), TIGHT, free)
+
+
+def stiffness(points: int) -> Map:
+    """The inverse of the operator, as a matrix."""
+    slab, free, _ = sticking(MPI.COMM_SELF, points)
+    columns = [free.apply(unit.reshape(slab.shape), slab.zeros()).ravel() for unit in np.eye(points**2)]
+    return np.linalg.inv(np.array(columns))
+
+
+def fallen(law: Law, heights: Map, control: Control, gap: Map) -> Map:
+    """The gap to which the energy falls from another one, in steps that are too short to pass over an equilibrium.
+    Under a load the body is free to move evenly, which the pressures of an even displacement do not resist."""
+    k, h, g = stiffness(len(heights)), heights.ravel(), gap.ravel()
+    even = k.sum(axis=1)
+    if isinstance(control, Approach):
+        given = even * control.value
+    else:
+        k, given = k - np.outer(even, even) / even.sum(), even / even.mean() * control.value
+    step = 1.0 / np.linalg.eigvalsh(k)[-1]
+    for _ in range(100_000):
+        pushed = k @ (g + h) + given + law.strength * np.exp(-g / law.range)
+        last, g = g, np.maximum(g - step * pushed, 0.0)
+        if abs(g - last).max() < 1e-13:
+            break
+    return g.reshape(heights.shape)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("means", [True, False])
+@pytest.mark.parametrize("points", [4, 24])
+def test_inverse_of_a_free_body(comm: MPI.Intracomm, points: int, means: bool) -> None:
+    """It gives back the pressure that was applied, also but for what moves all points alike, where its load is 0. The
+    tolerance is that of the energy's root, which bounds pressures by the root of the largest compliance over the
+    smallest: below 10 on these grids."""
+    slab, free, solver = sticking(comm, points)
+    p, pressures = slab.zeros(), np.random.default_rng(1).normal(size=(points, points))
+    p[...] = (pressures if means else pressures - pressures.mean())[slab.rows]
+    u = free.apply(p, slab.zeros())
+    u += 0.0 if means else 3.0
+    maps = slab.zeros(), slab.zeros(), slab.zeros(), slab.zeros()
+    back = FreeInverse(slab, free, solver.gaps.operators, 1e-9, maps, means).apply(u, u)
+    assert_allclose(back, p, rtol=0.0, atol=1e-8 * points)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("points", "law", "control"),
+    [
+        (4, Law(0, 16.7, 1.16), Approach(-3.0)),
+        (7, Law(0, 32.2, 1.3), Approach(-3.0)),
+        (4, Law(0, 5.4, 0.57), MeanPressure(0.7)),
+        (6, Law(0, 13.4, 0.81), MeanPressure(-2.1)),
+    ],
+    ids=str,
+)
+def test_a_state_that_is_stable_on_the_free_body_alone(
+    comm: MPI.Intracomm, points: int, law: Law, control: Control
+) -> None:
+    """A wave that fills its box, near a snap. The body that repeats itself is softer, as neighbours are across the
+    edge, and passes go round. The gap is that of the matrix, to 30 tolerances: so near to a snap little moves much."""
+    heights = np.tile(np.cos(2.0 * np.pi * np.arange(points) / points), (points, 1))
+    start = heights.max() - heights
+    if isinstance(control, Approach):
+        start = np.maximum(-heights - control.value, 0.0)
+    expected = fallen(law, heights, control, start)
+    slab, free, solver = sticking(comm, points)
+    gap, lag, p = slab.zeros(), slab.zeros(), slab.zeros()
+    gap[...] = start[slab.rows]
+    contact, detached = solver.solve(law, heights[slab.rows], control, gap, lag, p)
+    assert not contact.failure
+    assert not detached
+    assert contact.certificate.worst <= TIGHT
+    assert_array_equal(gap == 0.0, expected[slab.rows] == 0.0)
+    assert 0.0 < np.mean(expected == 0.0) < 1.0
+    assert_allclose(gap, expected[slab.rows], rtol=0.0, atol=30.0 * TIGHT * law.range)
+    given = contact.d if isinstance(control, Approach) else slab.sum(float(p.sum()))[0] / slab.points
+    assert_allclose(given, control.value, rtol=1e-12)
+    assert_allclose(free.apply(p, slab.zeros()), gap + heights[slab.rows] + contact.d, rtol=0.0, atol=10.0 * TIGHT)
+    repeated = solver.gaps.operators.operator.apply(p, slab.zeros())
+    assert_allclose(lag, free.apply(p, slab.zeros()) - repeated, rtol=0.0, atol=TIGHT)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("pull", [2.697, 2.784])
+def test_a_load_that_the_free_body_alone_holds(comm: MPI.Intracomm, pull: float) -> None:
+    """The first pass holds it, as what is lagged is that of a contact without load; later ones come off. The gap is
+    that of the matrix, to 30 tolerances."""
+    points, law = 4, Law(0, 8.7, 0.79)
+    heights = np.tile(np.cos(2.0 * np.pi * np.arange(points) / points), (points, 1))
+    expected = heights.max() - heights
+    slab, _, solver = sticking(comm, points)
+    gap, lag, p = slab.zeros(), slab.zeros(), slab.zeros()
+    gap[...] = expected[slab.rows]
+    for load in (0.0, -pull):
+        expected = fallen(law, heights, MeanPressure(load), expected)
+        contact, detached = solver.solve(law, heights[slab.rows], MeanPressure(load), gap, lag, p)
+        assert not contact.failure
+        assert not detached
+        assert_allclose(gap, expected[slab.rows], rtol=0.0, atol=30.0 * TIGHT * law.range)
+    assert expected.min() == 0.0

@@ -6,9 +6,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
 from parcontact.parallel.slab import Array, Slab
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.physics.layer import Layer, LongWaves
+from parcontact.solve.preconditioner.cell_sums import CellSums
 from parcontact.solve.preconditioner.extension import FADING, FLOOR, ExtendedPreconditioner, Grids, grids_for, pairs_for
+from parcontact.solve.preconditioner.levels import levels_of
+from parcontact.solve.preconditioner.long_waves import DECAY, LongWavePreconditioner
 
 Map = NDArray[np.float64]
 SINGLE = 1e-5  # relative, of sums in single precision: some hundred roundings of 6e-8
@@ -143,3 +150,164 @@ def test_largest_cells_of_a_high_floor_count_for_nothing(last: float, equal: boo
         given_to_k.append(inverse.given)
     apart = np.abs(given_to_k[0] - given_to_k[1]).max()
     assert (apart <= SINGLE * np.abs(r).max()) == equal
+
+
+# -- long waves on a thin layer: one V-cycle against a direct solve, its symmetry, any ranks, its memory --------------
+
+SIZE = (1.0, 1.5)
+
+
+class Nothing:
+    """A preconditioner that gives nothing, so that what long waves add is seen alone."""
+
+    def apply(self, field: Array, out: Array) -> Array:
+        out.fill(0.0)
+        return out
+
+
+def waves(thickness: float) -> LongWaves:
+    return LongWaves(0.0, thickness**3 / 3, thickness, SIZE)
+
+
+def added(comm: MPI.Intracomm, r: Map, contact: NDArray[np.bool_], thickness: float) -> Map:
+    """What is added on this rank's rows, 0 outside contact."""
+    slab = Slab(comm, r.shape[1], r.shape[0])
+    made = LongWavePreconditioner(slab, waves(thickness), ExtendedPreconditioner(slab))
+    z = slab.empty()
+    z[...] = r[slab.rows]
+    made.apply(Nothing(), contact[slab.rows].copy(), z)
+    return np.where(contact[slab.rows], z, 0.0)
+
+
+def solved(r: Map, contact: NDArray[np.bool_], thickness: float) -> Map:
+    """The solution of its equation by finite differences, with `1/L^2` for the longest wave."""
+    (ny, nx), (lx, ly) = r.shape, SIZE
+    number = np.arange(nx * ny).reshape(ny, nx)
+    matrix = sparse.diags(np.where(contact, 0.0, 1.0 / (DECAY * thickness) ** 2).ravel() + 1.0 / max(SIZE) ** 2)
+    for axis, step in ((0, ly / ny), (1, lx / nx)):
+        for shift in (1, -1):
+            there = (np.ones(r.size), (number.ravel(), np.roll(number, shift, axis).ravel()))
+            matrix = matrix + (sparse.identity(r.size) - sparse.csr_matrix(there)) / step**2
+    z = spsolve(matrix.tocsc(), r.ravel()).reshape(r.shape) * 3 / thickness**3
+    return np.where(contact, z, 0.0)
+
+
+def patches(ny: int, nx: int, seed: int = 1) -> tuple[NDArray[np.bool_], Map]:
+    """Contact in a few patches, and a smooth residual in them."""
+    random = np.random.default_rng(seed)
+    spectrum = np.fft.rfft2(random.normal(size=(ny, nx)))
+    q = np.hypot(*np.meshgrid(np.fft.rfftfreq(nx) * nx, np.fft.fftfreq(ny) * ny))
+    smooth = np.fft.irfft2(spectrum * np.exp(-((q / 3) ** 2)), (ny, nx))
+    contact = smooth > np.quantile(smooth, 0.6)
+    return contact, np.where(contact, random.normal() + smooth / smooth.std(), 0.0)
+
+
+@pytest.mark.parametrize("thickness", [0.03, 0.15])  # cells are smoothed from the finest grid on, and from twice that
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_is_near_the_solution(thickness: float, seed: int) -> None:
+    """Its energy `<r, z>` is that of the solution within a factor 2, as preconditioners of this kind are."""
+    contact, r = patches(48, 64, seed)
+    ratio = np.sum(r * added(MPI.COMM_SELF, r, contact, thickness)) / np.sum(r * solved(r, contact, thickness))
+    assert 0.5 < ratio < 2.0
+
+
+@pytest.mark.parametrize("shape", [(48, 64), (33, 18), (50, 7)])
+def test_is_symmetric_and_positive(shape: tuple[int, int]) -> None:
+    """`<r, M s> = <M r, s>`, to single precision."""
+    contact, _ = patches(*shape)
+    random = np.random.default_rng(2)
+    r, s = (np.where(contact, random.normal(size=shape), 0.0) for _ in range(2))
+    m_r, m_s = (added(MPI.COMM_SELF, one, contact, 0.1) for one in (r, s))
+    assert abs(np.sum(r * m_s) - np.sum(m_r * s)) < SINGLE * np.sum(np.abs(m_r * s))
+    assert np.sum(r * m_r) > 0.0
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("shape", "thickness"), [((48, 64), 0.03), ((48, 64), 0.15), ((33, 18), 0.3), ((2, 40), 0.1)])
+def test_ranks_agree(comm: MPI.Intracomm, shape: tuple[int, int], thickness: float) -> None:
+    contact, r = patches(*shape)
+    alone = added(MPI.COMM_SELF, r, contact, thickness)
+    mine = added(comm, r, contact, thickness)
+    np.testing.assert_allclose(mine, alone[Slab(comm, *shape[::-1]).rows], rtol=0, atol=SINGLE * np.abs(alone).max())
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("thickness", [0.03, 0.4])
+@pytest.mark.parametrize("shape", [(64, 64), (33, 18)])
+def test_holds_what_it_says_long_waves(comm: MPI.Intracomm, shape: tuple[int, int], thickness: float) -> None:
+    """To the byte, on every rank."""
+    slab = Slab(comm, shape[1], shape[0])
+    extended = ExtendedPreconditioner(slab)
+    before = slab.tally["map bytes"]
+    _held = LongWavePreconditioner(slab, waves(thickness), extended)
+    told = LongWavePreconditioner.footprint(shape[1], shape[0], comm.size, comm.rank, waves(thickness))
+    assert slab.tally["map bytes"] - before == told
+
+
+# -- sums over cells of all lengths against products of matrices, on any ranks, and against the operator, -------------
+
+def weighted(c: Map, weights: list[float], pairs: int) -> Map:
+    """`sum w_l I_l I_l' c`, from the finest grid on."""
+    if len(weights) == 1:
+        return weights[0] * c
+    down = np.eye(len(c)) if pairs > 0 else interpolating(len(c))
+    along = np.eye(c.shape[1]) if pairs < 0 else interpolating(c.shape[1])
+    coarse = weighted(down.T @ c @ along, weights[1:], fewer(pairs))
+    return np.asarray(weights[0] * c + down @ coarse @ along.T)
+
+
+@pytest.mark.mpi
+@settings(max_examples=30)
+@given(ny=st.integers(1, 34), nx=st.sampled_from([7, 14, 200]), pairs=st.integers(-2, 2), seed=st.integers(0, 99))
+def test_sums_over_cells_of_all_lengths(ny: int, nx: int, pairs: int, seed: int) -> None:
+    """`M c` is that of products of matrices, to single precision."""
+    random = np.random.default_rng([ny, nx, seed])
+    count = len(levels_of(Slab.alone(nx, ny), pairs))
+    weights, c = random.random(count + 1).tolist(), random.normal(size=(ny, nx))
+    slab = Slab(MPI.COMM_WORLD, nx, ny)
+    out = slab.empty()
+    CellSums(slab, pairs, weights).apply(c[slab.rows].copy(), out)
+    expected = weighted(c, weights, pairs)
+    np.testing.assert_allclose(out, expected[slab.rows], rtol=0, atol=SINGLE * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("ny", [64, 16, 256])
+@pytest.mark.parametrize("layer", [None, Layer(0.1, "smooth", 0.3), Layer(0.5, "bonded", 0.3)])
+def test_makes_of_waves_about_what_the_operator_makes(ny: int, layer: Layer | None) -> None:
+    """Waves along x, y and between, from two points to the whole box, come out 0.5 to 2.5 times as large, on square
+    cells and on cells of 4 : 1: the interpolation takes a wave of four points for half of what it is."""
+    slab, body = Slab.alone(64, ny), HalfSpace((1.0, 1.0), poisson=0.3, layer=layer)
+    sums = CellSums.on(slab, body.size, body.compliance)
+    assert sums is not None
+    half = min(64, ny) // 2
+    x, y, out = np.arange(64) / 64, np.arange(ny)[:, None] / ny, slab.zeros()
+    for along_x, along_y in [(1, 0), (0, 1), (3, 2), (6, 6), (half, 0), (0, ny // 2), (half, ny // 2), (32, 0)]:
+        wave = slab.zeros()
+        wave[...] = np.cos(2 * np.pi * (along_x * x + along_y * y))
+        sums.apply(wave, out)
+        made = float((wave * out).sum() / (wave * wave).sum())
+        should = float(body.compliance(np.array(2 * np.pi * np.hypot(along_x, along_y))))
+        assert 0.5 < made / should < 2.5
+
+
+@pytest.mark.parametrize(
+    ("nx", "ny", "layer"),
+    [(64, 1, None), (1, 64, None), (16, 640, None), (640, 16, None), (64, 64, Layer(0.05, "bonded", 0.5))],
+)
+def test_none_where_they_are_no_good(nx: int, ny: int, layer: Layer | None) -> None:
+    """On lines, on cells that are too long for pairs, and where long waves are stiff; nothing is held."""
+    slab, body = Slab.alone(nx, ny), HalfSpace((1.0, 1.0), layer=layer)
+    assert CellSums.on(slab, body.size, body.compliance) is None
+    assert CellSums.footprint(nx, ny, 1, 0, body.size, body.compliance) == 0
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("nx", "ny"), [(24, 20), (41, 9), (8, 2), (9, 41)])
+def test_footprint(nx: int, ny: int) -> None:
+    """The bytes that it names are held, on any ranks."""
+    slab, body = Slab(MPI.COMM_WORLD, nx, ny), HalfSpace((1.0, 1.0))
+    before = slab.tally["map bytes"]
+    made = CellSums.on(slab, body.size, body.compliance)
+    assert made is not None
+    said = CellSums.footprint(nx, ny, slab.comm.size, slab.comm.rank, body.size, body.compliance)
+    assert slab.tally["map bytes"] - before == said
