@@ -19,6 +19,7 @@ from ..solve import kernels
 from ..solve.constraint import NonNegative
 from ..solve.interface_law import InterfaceLaw
 from ..solve.nonsymmetric.splitting import Splitting, step_for
+from ..solve.problem import MeanPressure
 from ..steady_sliding.losses import branch_powers
 from ..steady_sliding.sliding import SteadyState, judge_state, tolerance_of
 from .band_heat import Warming, shares_of_depth, warming_of, waves_along_depth
@@ -119,9 +120,9 @@ class Band:
         gamma = step_for(self._stiffest, self._softest, mean / self._full)
         what = setup.height / units.height, tolerance_of(setup.choices.numerics.tolerance), MOST_STEPS
         solver = Splitting(setup.slab, self.operator, self._resolvent, *what)
-        contact = solver.solve(self._heights, mean, law.in_units(units.pressure, units.height), gamma)
+        contact = solver.solve(self._heights, MeanPressure(mean), law.in_units(units.pressure, units.height), gamma)
         if contact.failure:
-            raise RunError(f"a band of {max(setup.grid.size):.3g} m at {pressure:.3g} Pa: {contact.failure}")
+            raise RunError(f"a band of {max(setup.grid.size):.3g} m under {pressure:.3g} Pa {contact.failure}")
         seen = contact.u, self._heights, contact.d, NonNegative().touches(contact.p)
         measures = self.probe.measure(contact.p, 1.0, *seen, (0.0, 0.0), velocity)
         lost = self.operator.loss(contact.p, setup.size, _unit(velocity)) / kernels.total(contact.p)

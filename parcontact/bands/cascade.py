@@ -117,10 +117,10 @@ class Cascade:
                 own = [next(solved) for _ in rungs]
                 found[number, sample] = [replace(rung, approach=rung.approach + touching[sample]) for rung in own]
                 if number:
-                    laws[sample], touching[sample] = self._law(number, found[number, sample])
+                    laws[sample], touching[sample] = self.closing_of(number, found[number, sample])
         return found
 
-    def _law(self, number: int, rungs: Sequence[Rung]) -> tuple[InterfaceLaw, float]:
+    def closing_of(self, number: int, rungs: Sequence[Rung]) -> tuple[InterfaceLaw, float]:
         """Return how a band and all finer ones close, and their approach [m] where c is 0; what the solver leaves of a
         rise is taken off."""
         closings = np.maximum.accumulate([rung.approach for rung in rungs])

@@ -20,6 +20,7 @@ from parcontact.solve.nonsymmetric.splitting import Splitting
 from parcontact.solve.nonsymmetric.steady import SteadySolver
 from parcontact.solve.nonsymmetric.stripes import FLOOR, Plain, Stripes
 from parcontact.solve.preconditioner.extension import ExtendedPreconditioner
+from parcontact.solve.problem import MeanPressure
 
 from ..bodies import solve
 
@@ -346,7 +347,7 @@ def test_conditions_with_a_law(mean: float) -> None:
     """p >= 0, w >= 0 and p w = 0 with w = A p + c(p) - h - d, under the mean: to the tolerance of the solve, 1e-9,
     relative to the height; c by its table here."""
     splitting, operator = made(1e-9)
-    contact = splitting.solve(HEIGHTS, mean, LAW, 60.0)
+    contact = splitting.solve(HEIGHTS, MeanPressure(mean), LAW, 60.0)
     assert contact.converged
     p = contact.p
     cubic = PchipInterpolator(np.log([0.1, 1.0, 10.0]), [0.0, 0.3, 0.5], extrapolate=False)
@@ -371,7 +372,7 @@ def test_conditions_with_a_law(mean: float) -> None:
 def test_hard_walls_are_those_of_the_conjugate_gradients(mean: float) -> None:
     """Without a law it is the contact of `solve.contact`: both to 1e-9, pressures to 1e-6 of the highest."""
     splitting, _ = made(1e-9)
-    contact = splitting.solve(HEIGHTS, mean, HARD, 60.0)
+    contact = splitting.solve(HEIGHTS, MeanPressure(mean), HARD, 60.0)
     other = solve(HEIGHTS, mean, tolerance=1e-9)
     assert np.abs(contact.p - other.p).max() < 1e-6 * contact.p.max()
     assert contact.d == pytest.approx(other.d, abs=1e-8)
@@ -380,7 +381,7 @@ def test_hard_walls_are_those_of_the_conjugate_gradients(mean: float) -> None:
 def test_law_alone() -> None:
     """On flat ground the pressure is uniform, and the approach is the closing: `c(p) - d = 0`."""
     splitting, _ = made(1e-9)
-    contact = splitting.solve(np.zeros((N, N)), 2.0, LAW, 60.0)
+    contact = splitting.solve(np.zeros((N, N)), MeanPressure(2.0), LAW, 60.0)
     assert np.ptp(contact.p) < 1e-12
     assert contact.d == pytest.approx(float(LAW.closing(np.array(2.0))), rel=1e-9)
 
