@@ -21,6 +21,7 @@ TWELVE_DECADES = Prony(
 
 # -- their functions as they are defined, term by term: nothing of the program ---------------------------------------
 
+
 def relaxation(t: ArrayLike, modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Array:
     """G(t) = G_inf + sum G_k exp(-t/tau_k) [Pa] at times of any shape [s]."""
     t, terms = np.asarray(t, float), zip(np.ravel(moduli), np.ravel(relaxation_times), strict=True)

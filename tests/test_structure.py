@@ -108,9 +108,9 @@ MADE_BY = {  # which modules make objects of a kind
     **{kind: {"scene.scene"} for kind in ("ElasticPressure", "AppliedInverse", "Probe", "Setup", "Scene")},
     "ZenerBody": {"scene.scene", "physics.energy"},  # a second one follows A^-1 u
     "ContactSolver": {"scene.scene"},
-    "HalfSpace": {"scene.scene", "plan.memory"},
+    "HalfSpace": {"scene.scene"},
     "SteadySolver": {"steady_sliding.sliding"},
-    "SteadySliding": {"steady_sliding.start", "steady_sliding.curve", "plan.sample"},
+    "SteadySliding": {"steady_sliding.start", "steady_sliding.curve", "plan.sample", "plan.memory"},
     "March": {"steady_sliding.start", "study.outcome"},
 }
 

@@ -17,7 +17,7 @@ from ..parallel.slab import Array
 from ..physics import loops
 from ..physics.adhesion import cell_of, modulus_of
 from ..physics.body import Trial
-from ..physics.entries import Entry, MapCount, Saved
+from ..physics.entries import Entry, Saved
 from ..physics.measures import SIDE, Measures
 from ..physics.motion import cells_between
 from ..physics.units import Units
@@ -360,8 +360,3 @@ def _mark(job: Any) -> float:
 def nothing_holds(control: str, load: float) -> str:
     """Return the sentence on surfaces that detach under a prescribed load."""
     return f"nothing holds the surfaces under a {control} of {load:g}{UNITS[control]} any more"
-
-
-def count_maps(free: bool) -> MapCount:
-    """Count the maps of a memory, in a `free` box or a periodic one."""
-    return MapCount(held=4 + free, saved=2 + free)

@@ -103,7 +103,8 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
-        """Return the types of the maps that it holds and that a checkpoint has; what else it holds is not planned."""
+        """Return the types of the maps that a checkpoint has of it and that it holds. `parcontact plan` counts these;
+        of the effects of this package it counts what they allocate."""
         return ()
 
     def __init__(self, scene: Any) -> None: ...

@@ -163,7 +163,7 @@ class ThermalColumns(Effect[ThermalMemory]):
 
     @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
-        """Return the types of the map of temperatures, and of those that hold its spectra."""
+        """Return the types of the map of temperatures, and of those that hold its spectra in a checkpoint."""
         count, rubs = 2 + exponentials_of(job).kept, job.section("interface") is not None
         return [np.float64] * (count + rubs + math.ceil(count / spectra.per_map(job.grid.nx)))
 

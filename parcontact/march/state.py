@@ -17,7 +17,7 @@ from ..history.chosen import ChosenSteps
 from ..parallel.slab import Array
 from ..physics.body import BodyMemory
 from ..physics.energy import EnergyMemory
-from ..physics.entries import Entry, MapCount, RunPart, Saved, part_of, prefixed
+from ..physics.entries import Entry, RunPart, Saved, part_of, prefixed
 from ..physics.measures import Measures
 from ..physics.units import Units
 from ..scene import Scene
@@ -199,12 +199,6 @@ class _ChosenStepsPart:
 
     def restored(self, memory: ChosenSteps, saved: Saved) -> ChosenSteps:
         return ChosenSteps.of(self.scene.job, saved)
-
-
-def count_maps(lasts: bool, keeps_further: bool) -> MapCount:
-    """Count the maps of pressures and the spare one; there is an earlier pressure if stages last."""
-    earlier = lasts + FURTHER * keeps_further
-    return MapCount(held=2 + earlier, saved=1 + earlier)
 
 
 # -- first states -----------------------------------------------------------------------------------------------------

@@ -30,17 +30,14 @@ class Cosines:
         count = fft.shape[1]
         self.column_blocks = [slice(k, min(k + NARROWEST, count)) for k in range(0, count, NARROWEST)]
         self._block = allocate((self.my, NARROWEST), fft.complex, self.slab.tally)
+        if self.slab.only_counts:
+            return
         self._block.fill(0.0)
         self._forward, self._backward = (fft.plan(self._block, self._block, 0, backward) for backward in (False, True))
         self._turn_x, self._turn_y = (
             np.exp(-0.5j * np.pi * np.arange(n) / length).astype(fft.complex)
             for n, length in ((self.mx // 2 + 1, self.mx), (self.my, self.my))
         )
-
-    @staticmethod
-    def footprint(my: int, itemsize: int) -> int:
-        """Bytes that it holds beside the transform, for numbers of so many bytes."""
-        return 2 * itemsize * my * NARROWEST
 
     @property
     def modes(self) -> tuple[Waves, Waves]:

@@ -20,7 +20,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..compiled import loop
 from .fftw import pyfftw
-from .slab import Array, Slab, allocate, deal, dealt_to, reused
+from .slab import Array, Slab, allocate, deal, dealt_to, reused, without_memory
 from .transpose import Leg, count_legs, legs_of, wire_points
 
 Spectrum = NDArray[np.complexfloating]
@@ -33,21 +33,6 @@ LEAST_BYTES = 4 << 20  # tuning: of a spectrum worth blocks of columns; a usual 
 def transform_name(lengths: tuple[int, int], dtype: DTypeLike) -> str:
     """The name under which transforms of this size are counted."""
     return f"fft {lengths[0]}x{lengths[1]} {np.dtype(dtype).name}"
-
-
-def footprint(
-    points: tuple[int, int], lengths: tuple[int, int], dtype: DTypeLike, ranks: int, rank: int, shared: bool = False
-) -> tuple[int, int, int]:
-    """Bytes of one rank in an `FFT` of these lengths for maps of `points = (nx, ny)`: of its spectrum, which may be
-    shared, of all else that it holds, and what it sends in one transform."""
-    itemsize, waves = 2 * np.dtype(dtype).itemsize, lengths[0] // 2 + 1
-    rows, columns = (part.stop - part.start for part in (dealt_to(count, ranks, rank) for count in (points[1], waves)))
-    height = _block_height(rows, waves * itemsize, lengths[1], ranks)
-    blocks = height * lengths[0] * itemsize // 2 + (height * _pitch(waves, itemsize) * itemsize if ranks > 1 else 0)
-    legs = legs_of(rows, height, count_legs(lengths[1] * waves * itemsize, ranks))
-    waiting = wire_points(legs, waves - columns) * itemsize
-    between = 0 if ranks > 1 or shared else lengths[1] * (_pitch(waves, itemsize) - waves) * itemsize
-    return lengths[1] * columns * itemsize, blocks + waiting + between, rows * (waves - columns) * itemsize
 
 
 def _pitch(waves: int, itemsize: int) -> int:
@@ -97,13 +82,14 @@ class FFT:
             raise ValueError(f"transform lengths {self.mx, self.my} are shorter than the map {slab.nx, slab.ny}")
         self.dtype = np.dtype(dtype)
         self.complex = np.dtype(np.complex128 if self.dtype == np.float64 else np.complex64)
-        dealt = deal(self.mx // 2 + 1, slab.comm.size)
-        self.columns = dealt[slab.comm.rank]
+        self.columns = dealt_to(self.mx // 2 + 1, slab.comm.size, slab.comm.rank)
         self.shape = (self.my, self.columns.stop - self.columns.start)
         self.spectrum = self._make_spectrum(sharing)
         self._name = transform_name((self.mx, self.my), dtype)
-        self._make_blocks(dealt)
-        self._make_transforms()
+        self._wire = self._make_blocks()
+        if not slab.only_counts:
+            self._make_legs()
+            self._make_transforms()
 
     @cached_property
     def modes(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -240,30 +226,38 @@ class FFT:
         shape = (rows, _pitch(columns, self.complex.itemsize) if self.slab.comm.size == 1 else columns)
         if sharing is None:
             return allocate(shape, self.complex, self.slab.tally)[:, :columns]
+        if self.slab.only_counts:
+            return without_memory(shape, self.complex)[:, :columns]
         return reused(sharing.spectrum, shape, self.complex)[:, :columns]
 
-    def _make_blocks(self, dealt: list[slice]) -> None:
-        """Blocks of rows, leg by leg of the exchange, and of columns."""
-        slab, ranks, row_bytes = self.slab, self.slab.comm.size, (self.mx // 2 + 1) * self.complex.itemsize
-        heights = [_block_height(part.stop - part.start, row_bytes, self.my, ranks) for part in slab.dealt]
-        count = count_legs(self.my * row_bytes, ranks)
-        legs = [
-            legs_of(part.stop - part.start, height, count) for part, height in zip(slab.dealt, heights, strict=True)
-        ]
-        own, height, waves = legs[slab.comm.rank], heights[slab.comm.rank], self.mx // 2 + 1
+    def _legs_of(self, part: slice) -> tuple[int, list[slice]]:
+        """The height of the blocks of a rank that has these rows, and its rows in each leg of the exchange."""
+        ranks, row_bytes = self.slab.comm.size, (self.mx // 2 + 1) * self.complex.itemsize
+        rows = part.stop - part.start
+        height = _block_height(rows, row_bytes, self.my, ranks)
+        return height, legs_of(rows, height, count_legs(self.my * row_bytes, ranks))
+
+    def _make_blocks(self) -> Spectrum:
+        """Make blocks of rows and of columns; return what is sent in one leg of the exchange."""
+        slab, waves, (height, legs) = self.slab, self.mx // 2 + 1, self._legs_of(self.slab.rows)
         self.row_block = allocate((height, self.mx), self.dtype, slab.tally)
-        block = (height if ranks > 1 else 0, _pitch(waves, self.complex.itemsize))
+        block = (height if slab.comm.size > 1 else 0, _pitch(waves, self.complex.itemsize))
         self._wave_block = allocate(block, self.complex, slab.tally)[:, :waves]
-        wire = allocate((wire_points(own, waves - self.shape[1]),), self.complex, slab.tally)
+        self.column_blocks = _column_blocks(self.shape[1], self.my * self.complex.itemsize)
+        return allocate((wire_points(legs, waves - self.shape[1]),), self.complex, slab.tally)
+
+    def _make_legs(self) -> None:
+        """The legs of the exchange, each with this rank's blocks of rows."""
+        slab, ranks, everyone = self.slab, self.slab.comm.size, [self._legs_of(part) for part in self.slab.dealt]
+        dealt, (height, own) = deal(self.mx // 2 + 1, ranks), everyone[slab.comm.rank]
         self._legs: list[tuple[Leg | None, list[slice]]] = []
         for number, leg in enumerate(own):
             blocks = [slice(j, min(j + height, leg.stop)) for j in range(leg.start, leg.stop, max(height, 1))]
             rows = [
                 slice(part.start + theirs[number].start, part.start + theirs[number].stop)
-                for part, theirs in zip(slab.dealt, legs, strict=True)
+                for part, (_, theirs) in zip(slab.dealt, everyone, strict=True)
             ]
-            self._legs.append((Leg(slab, dealt, rows, self.spectrum, wire) if ranks > 1 else None, blocks))
-        self.column_blocks = _column_blocks(self.shape[1], self.my * self.complex.itemsize)
+            self._legs.append((Leg(slab, dealt, rows, self.spectrum, self._wire) if ranks > 1 else None, blocks))
 
     def _make_transforms(self) -> None:
         heights = {rows.stop - rows.start for _, blocks in self._legs for rows in blocks}

@@ -5,10 +5,10 @@ A cell that is cut by the end of the grid has what there is of it. Each cell is 
 the grid before, until there are so few cells that every rank has all of them, which needs no more messages.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import count, islice, pairwise
+from itertools import count, pairwise
 from typing import Any
 
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .mpi import MPI
 from .regrid import fetch
 from .rows import RowsBeside
-from .slab import Slab, dealt_to
+from .slab import Slab
 
 Shape = tuple[int, int]  # points of a cell along x and y: 1 or 2
 FEW = 8  # tuning: times fewer cells than a rank has points: then every rank has all cells
@@ -25,25 +25,12 @@ FEW = 8  # tuning: times fewer cells than a rank has points: then every rank has
 def steps_of(slab: Slab, pairs: int = 0) -> list["PyramidStep"]:
     """All steps from a grid to a single cell, the finest first; so many to `pairs` come first. A grid that every rank
     has is that of a rank alone."""
-    grids = [slab]
-    dealt, shapes = slab.dealt, []
-    for nx, ny, shape, alone in _larger(slab.nx, slab.ny, len(dealt), pairs):
-        dealt = [slice(0, ny)] if alone else parts_of(dealt, shape[1])
+    grids, shapes = [slab], []
+    for nx, ny, shape, alone in _larger(slab.nx, slab.ny, slab.comm.size, pairs):
         shapes.append(shape)
-        grids.append(Slab(MPI.COMM_SELF if alone else slab.comm, nx, ny, slab.tally, dealt))
+        comm, rows_of = (MPI.COMM_SELF, None) if alone else (slab.comm, ending_in(grids[-1], shape[1]))
+        grids.append(Slab(comm, nx, ny, slab.tally, rows_of))
     return [PyramidStep(fine, coarse, shape) for (fine, coarse), shape in zip(pairwise(grids), shapes, strict=True)]
-
-
-def count_cells(nx: int, ny: int, ranks: int, rank: int, most: int | None = None, pairs: int = 0) -> int:
-    """Cells of the next grids, `most` of them or all, that a rank has; the first of so many `pairs`."""
-    total, part, last = 0, dealt_to(ny, ranks, rank), rank == ranks - 1
-    for width, height, (_, tall), alone in islice(_larger(nx, ny, ranks, pairs), most):
-        if alone:
-            part = slice(0, height)
-        elif tall == 2:
-            part = slice(part.start // 2, (part.stop + last) // 2)  # as in `parts_of`
-        total += width * (part.stop - part.start)
-    return total
 
 
 def _larger(nx: int, ny: int, ranks: int, pairs: int) -> Iterator[tuple[int, int, Shape, bool]]:
@@ -58,12 +45,17 @@ def _larger(nx: int, ny: int, ranks: int, pairs: int) -> Iterator[tuple[int, int
         yield nx, ny, (wide, tall), alone
 
 
-def parts_of(dealt: list[slice], tall: int) -> list[slice]:
-    """The rows of cells of so many rows that end in each part of the rows of a finer grid."""
+def ending_in(fine: Slab, tall: int) -> Callable[[int], slice]:
+    """The rows of cells of so many rows that end in the rows of a rank of a finer grid, over ranks."""
     if tall == 1:
-        return dealt
-    ends = [part.stop // 2 for part in dealt[:-1]]
-    return [slice(start, stop) for start, stop in pairwise([0, *ends, (dealt[-1].stop + 1) // 2])]
+        return fine.rows_of
+    last = fine.comm.size - 1
+
+    def rows_of(rank: int) -> slice:
+        part = fine.rows_of(rank)
+        return slice(part.start // 2, (part.stop + (rank == last)) // 2)
+
+    return rows_of
 
 
 @dataclass(frozen=True)
@@ -84,13 +76,14 @@ class PyramidStep:
     @cached_property
     def own(self) -> slice:
         """Where the cells that end in points of this rank are in its map of cells."""
-        part = self._ending[self.fine.comm.rank]
+        part = ending_in(self.fine, self.shape[1])(self.fine.comm.rank)
         return slice(part.start - self.coarse.rows.start, part.stop - self.coarse.rows.start)
 
     def complete(self, cells: NDArray[Any]) -> None:
         """Where every rank has all cells, tell each those of the others."""
         if self.coarse.comm.size < self.fine.comm.size:
-            made = Slab(self.fine.comm, self.coarse.nx, self.coarse.ny, self.fine.tally, self._ending)
+            ends = ending_in(self.fine, self.shape[1])
+            made = Slab(self.fine.comm, self.coarse.nx, self.coarse.ny, self.fine.tally, ends)
             cells[...] = fetch(made, cells[self.own], [slice(0, made.ny)] * made.comm.size)
 
     def points_beside(self, points: NDArray[Any], *offsets: int) -> NDArray[Any]:
@@ -113,7 +106,7 @@ class PyramidStep:
     @cached_property
     def _ending(self) -> list[slice]:
         """The rows of cells that end in points of each rank."""
-        return parts_of(self.fine.dealt, self.shape[1])
+        return list(map(ending_in(self.fine, self.shape[1]), range(self.fine.comm.size)))
 
     def _beside(self, what: str, slab: Slab, parts: list[slice], cycle: int, offsets: tuple[int, ...]) -> "RowsBeside":
         """Beside the part of each rank that has points; kept for the next time."""

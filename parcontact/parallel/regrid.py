@@ -33,6 +33,8 @@ def factors(fine: Slab, coarse: Slab) -> tuple[int, int]:
 
 def restrict(fine: Slab, coarse: Slab, field: Array) -> Array:
     """The means over the cells of the coarse grid."""
+    if fine.only_counts:
+        return coarse.empty(field.dtype)
     fy, fx = factors(fine, coarse)
     rows, out = _rows_of_cells(fine, coarse, field), coarse.empty(field.dtype)
     if fy == fx == 2:

@@ -4,7 +4,8 @@ A map has `ny` rows of `nx` points. Rows are dealt out evenly and in order; x is
 do not divide `ny`, and ranks without rows, are normal.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property, partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from .fftw import pyfftw
 from .mpi import MPI
-from .tally import Tally
+from .tally import Ledger, Tally
 
 T = TypeVar("T")
 Array = NDArray[np.floating]
@@ -28,18 +29,37 @@ def dealt_to(count: int, ranks: int, rank: int) -> slice:
     return slice(count * rank // ranks, count * (rank + 1) // ranks)
 
 
+class PlannedRank:
+    """One of several ranks of a calculation that is only planned, in place of their communicator: it is alone."""
+
+    def __init__(self, size: int, rank: int) -> None:
+        self.size, self.rank = size, rank
+
+    def Allgather(self, own: NDArray[Any], everyone: NDArray[Any]) -> None:
+        everyone[...] = own
+
+    def bcast(self, value: T) -> T:
+        return value
+
+
 class Slab:
     """This rank's rows of `ny x nx` maps, and the collective operations on them.
 
-    Every method whose docstring says "collective" must be called by all ranks of `comm`.
+    Every method whose docstring says "collective" must be called by all ranks of `comm`. `rows_of(rank)` are the rows
+    of a rank, by default as `deal` has them.
     """
 
     def __init__(
-        self, comm: MPI.Intracomm, nx: int, ny: int, tally: Tally | None = None, dealt: list[slice] | None = None
+        self,
+        comm: MPI.Intracomm,
+        nx: int,
+        ny: int,
+        tally: Tally | None = None,
+        rows_of: Callable[[int], slice] | None = None,
     ) -> None:
         self.comm, self.nx, self.ny = comm, nx, ny
-        self.dealt = deal(ny, comm.size) if dealt is None else dealt
-        self.rows = self.dealt[comm.rank]
+        self.rows_of = rows_of or partial(dealt_to, ny, comm.size)
+        self.rows = self.rows_of(comm.rank)
         self.shape = (self.rows.stop - self.rows.start, nx)
         self.tally = Tally() if tally is None else tally
 
@@ -51,6 +71,23 @@ class Slab:
     def resized(self, nx: int, ny: int) -> "Slab":
         """The slab of a map of another size on the same ranks."""
         return Slab(self.comm, nx, ny, self.tally)
+
+    @staticmethod
+    def planned(nx: int, ny: int, ranks: int, rank: int) -> "Slab":
+        """The slab of one of several ranks of a calculation that is only planned: nothing is allocated on it, and there
+        is nobody to exchange anything with."""
+        comm: Any = PlannedRank(ranks, rank)
+        return Slab(comm, nx, ny, Ledger())
+
+    @cached_property
+    def dealt(self) -> list[slice]:
+        """The rows of every rank."""
+        return [self.rows_of(rank) for rank in range(self.comm.size)]
+
+    @property
+    def only_counts(self) -> bool:
+        """True on a slab that is `planned`."""
+        return self.tally.only_counts
 
     @property
     def root(self) -> bool:
@@ -65,9 +102,17 @@ class Slab:
         return allocate(self.shape, dtype, self.tally)
 
     def zeros(self, dtype: DTypeLike = np.float64) -> Array:
-        field = self.empty(dtype)
-        field.fill(0.0)
-        return field
+        return self._zeros(self.shape, dtype)
+
+    def zero_maps(self, count: int) -> Array:
+        """Maps of zeros in one piece, shape (count, rows, nx)."""
+        return self._zeros((count, *self.shape), np.float64)
+
+    def _zeros(self, shape: tuple[int, ...], dtype: DTypeLike) -> Array:
+        fields = allocate(shape, dtype, self.tally)
+        if not self.only_counts:
+            fields.fill(0.0)
+        return fields
 
     def sum(self, *values: float) -> list[float]:
         """Collective. Sums over all ranks of several numbers, in one message."""
@@ -126,10 +171,16 @@ class Slab:
 
 
 def allocate(shape: tuple[int, ...], dtype: DTypeLike, tally: Tally) -> NDArray[Any]:
-    """An uninitialised array aligned for SIMD transforms, its bytes counted."""
-    array = pyfftw.empty_aligned(shape, dtype=dtype, n=64)
+    """An uninitialised array aligned for SIMD transforms, its bytes counted; one without memory where a tally only
+    counts."""
+    array = without_memory(shape, dtype) if tally.only_counts else pyfftw.empty_aligned(shape, dtype=dtype, n=64)
     tally.hold(array)
     return array
+
+
+def without_memory(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    """An array that takes no memory: all its items are in the same place."""
+    return np.ndarray(shape, dtype, np.zeros(1, dtype), strides=(0,) * len(shape))
 
 
 def reused(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:

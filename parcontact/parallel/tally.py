@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+PURPOSE = "map bytes: "  # before the purpose of arrays in the names of a ledger's counts
+
 
 class Tally(Counter[str]):
     """Named counts of one rank, e.g. `tally["operator"]`; a name never counted reads 0.
@@ -15,7 +17,12 @@ class Tally(Counter[str]):
     `operator` (applications of a pressure -> displacement operator or its inverse), `allreduce`, `bytes sent` (to other
     ranks in transforms and moves of rows), `map bytes` (held in maps and transform buffers), `map bytes at most` (the
     most of them at once), `shift` (sub-cell shifts of a surface).
+
+    Where it `only_counts`, arrays take no memory (`Ledger`). The `purpose` of arrays is noted by a ledger alone.
     """
+
+    only_counts = False
+    purpose = ""
 
     def hold(self, array: NDArray[Any]) -> None:
         """Count the bytes of an array, until it is gone."""
@@ -26,6 +33,28 @@ class Tally(Counter[str]):
             owner = owner.base
         weakref.finalize(owner, self.subtract, {"map bytes": array.nbytes}).atexit = False
 
+    @property
+    def by_purpose(self) -> dict[str, int]:
+        """Return the bytes of all arrays of a ledger by their purposes."""
+        return {name.removeprefix(PURPOSE): held for name, held in self.items() if name.startswith(PURPOSE) and held}
+
     def since(self, earlier: Counter[str]) -> dict[str, int]:
         """Return the counts since `earlier = tally.copy()`."""
         return {name: count - earlier[name] for name, count in self.items() if count != earlier[name]}
+
+
+class Ledger(Tally):
+    """Counts of a calculation that is planned and never made.
+
+    Its arrays have their shapes and types, but take no memory and have no values: nothing is calculated with them.
+    Their bytes are counted under their purposes, too.
+    """
+
+    only_counts = True
+
+    def hold(self, array: NDArray[Any]) -> None:
+        """Count the bytes of an array, until it is gone, also under its purpose."""
+        super().hold(array)
+        name = f"{PURPOSE}{self.purpose}"
+        self[name] += array.nbytes
+        weakref.finalize(array.base, self.subtract, {name: array.nbytes}).atexit = False

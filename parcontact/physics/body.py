@@ -36,9 +36,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..parallel.slab import Array, Slab, allocate
+from ..parallel.slab import Array, Slab
 from . import loops
-from .entries import Entry, MapCount, Saved
+from .entries import Entry, Saved
 from .prony import Advance, Prony, coefficients, elapsed
 from .units import Units
 
@@ -98,14 +98,10 @@ class ElasticBody:
     branched: "ZenerBody | None" = None
     shortest_time = math.inf
 
-    def __init__(self, slab: Slab, modulus: float) -> None:
+    def __init__(self, slab: Slab, modulus: float, moves: bool = True) -> None:
+        """Make a body under heights that move by an offset, or never do."""
         self.slab, self.modulus = slab, modulus
-        self._moved: Array | None = None
-
-    @staticmethod
-    def count_maps(moved: bool) -> MapCount:
-        """Count the maps of a body whose heights are `moved` by an offset, or not."""
-        return MapCount(1 if moved else 0)
+        self._moved = slab.empty() if moves else None
 
     def at_rest(self) -> BodyMemory:
         """Return the memory of a body into which nothing has been pressed."""
@@ -122,8 +118,7 @@ class ElasticBody:
         memory.displacement = None
         if heights.offset == 0:
             return Trial(self.modulus, heights.base, heights, NO_BRANCHES)
-        if self._moved is None:
-            self._moved = self.slab.empty()
+        assert self._moved is not None
         loops.roll(heights.base, heights.offset, self._moved)
         return Trial(self.modulus, self._moved, heights, NO_BRANCHES)
 
@@ -184,11 +179,6 @@ class ZenerBody:
         self._still = Advance(np.ones(len(self.kept)), none, none)
         self._coefficients: _Coefficients | None = None
 
-    @staticmethod
-    def count_maps(kept: int) -> MapCount:
-        """Count the maps of a body with so many branch maps; the others are the displacement and two increments."""
-        return MapCount(held=kept + 3, saved=kept + 2)
-
     @property
     def branched(self) -> "ZenerBody":
         return self
@@ -208,8 +198,7 @@ class ZenerBody:
 
     def at_rest(self) -> BodyMemory:
         """Return the memory of a body into which nothing has been pressed, in new maps."""
-        branches = allocate((len(self.kept), *self.slab.shape), np.float64, self.slab.tally)
-        branches.fill(0.0)
+        branches = self.slab.zero_maps(len(self.kept))
         return BodyMemory(self.slab.zeros(), branches, self.slab.zeros(), self.slab.zeros(), self._still)
 
     def start_from(self, memory: BodyMemory, displacement: Array, branches: Iterable[Array]) -> None:
@@ -254,6 +243,8 @@ class ZenerBody:
 
     def settle(self, memory: BodyMemory) -> None:
         """Advance the branch maps now, for somebody who reads them; the run goes on to the same digits."""
+        if self.slab.only_counts:
+            return
         u = surface_of(memory)
         maps = memory.increment, memory.before
         loops.begin(memory.branches, *memory.pending, *maps, self._still.decay, 0.0, 0.0, u, u, 0)

@@ -10,7 +10,7 @@ from numpy.typing import DTypeLike, NDArray
 from ..parallel.cosines import Cosines
 from ..parallel.fft import FFT
 from ..parallel.fftw import pyfftw
-from ..parallel.slab import Array, deal
+from ..parallel.slab import Array, allocate, deal
 
 Symbols = list[NDArray[Any]]  # one for each block of columns
 Make = Callable[[], Symbols]
@@ -48,11 +48,6 @@ class Convolution:
         assert self._make is not None
         symbols, self._make = self._make(), None
         return symbols
-
-    @staticmethod
-    def footprint(spectrum: int, my: int, even: bool = True, is_complex: bool = False) -> int:
-        """Bytes of a real symbol, or a complex one, beside a transform whose spectrum has so many in `my` rows."""
-        return spectrum // my * (my // 2 + 1 if even else my) // (1 if is_complex else 2)
 
     def mapped(self, function: Callable[[NDArray[np.inexact]], NDArray[np.inexact]], dtype: DTypeLike) -> "Convolution":
         """The operator whose symbol is a function of this one's."""
@@ -103,11 +98,6 @@ class MirroredConvolution:
         """They are made when it is first applied."""
         return _in_blocks(self.fft, self._part, self.fft.fft.complex, self.fft.my)
 
-    @staticmethod
-    def footprint(spectrum: int, my: int, itemsize: int) -> int:
-        """Bytes that it holds beside a transform whose spectrum has so many in `my` rows, for maps of that item."""
-        return spectrum + Cosines.footprint(my, itemsize)
-
     def apply(self, field: Array, out: Array) -> Array:
         """Collective."""
         self.fft.slab.tally["operator"] += 1
@@ -119,9 +109,9 @@ def _in_blocks(
 ) -> Symbols:
     """The first `count` rows of a symbol, times the scale of the transforms, for each block of columns."""
     widths = [columns.stop - columns.start for columns in fft.column_blocks]
-    symbols: Symbols = [np.empty((count, width), dtype) for width in widths]
-    for symbol in symbols:
-        fft.slab.tally.hold(symbol)
+    symbols: Symbols = [allocate((count, width), dtype, fft.slab.tally) for width in widths]
+    if fft.slab.only_counts:
+        return symbols
     for rows in deal(count, PARTS):
         values = part(rows)
         for columns, symbol in zip(fft.column_blocks, symbols, strict=True):
@@ -156,6 +146,8 @@ def tabulate(
     in y is calculated for each distance once. One made `inside` the memory of the transform is lost at its next call.
     """
     transform = table_transform(fft, inside)
+    if fft.slab.only_counts:
+        return transform.spectrum
     dx, dy = size[0] / fft.slab.nx, size[1] / fft.slab.ny
     x, y = _distances(fft.mx), _distances(fft.my)[transform.slab.rows]
     if not even:

@@ -25,7 +25,7 @@ import numpy as np
 from ..parallel.slab import Array, Slab
 from . import loops
 from .body import BodyMemory, MovedHeights, ZenerBody, surface_of
-from .entries import Entry, MapCount, Saved
+from .entries import Entry, Saved
 from .prony import Prony, bend
 from .units import Units
 
@@ -203,11 +203,6 @@ class ElasticPressure:
     def __init__(self, slab: Slab, prony: Prony, integrator: str) -> None:
         self.body = ZenerBody(slab, prony, integrator)
         self.bodies: tuple[ZenerBody, ...] = (self.body,)
-
-    @staticmethod
-    def count_maps(branches: int) -> MapCount:
-        """Count the maps of a body with so many branches, each of which has one; in double precision."""
-        return ZenerBody.count_maps(branches)
 
     def at_rest(self) -> BodyMemory:
         return self.body.at_rest()

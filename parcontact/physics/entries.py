@@ -6,7 +6,7 @@ place (`RunPart`); `march.state.parts_of` lists all parts.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +15,6 @@ from .units import Units
 
 Saved = Mapping[str, NDArray[Any]]
 Memory = TypeVar("Memory")
-
-
-class MapCount(NamedTuple):
-    """Numbers of maps that a part of a run holds, and that its entries have: what a plan adds up."""
-
-    held: int
-    saved: int = 0
 
 
 @dataclass(frozen=True)

@@ -199,16 +199,20 @@ class HalfSpace:
         """
         if self.free:
             table = tabulate(fft, self.size, self._coefficient, self.layer is None).real
+            symbol = table.__getitem__
             owns_mean = fft.columns.start == 0 < fft.columns.stop
             least = mean = fft.slab.sum(float(table[0, 0]) if owns_mean else 0.0)[0]
         else:
-            table, mean = self.symbol(fft), 0.0 if self.layer is None else self.layer.mean_compliance
+            symbol, mean = partial(self.symbol, fft), 0.0 if self.layer is None else self.layer.mean_compliance
             least = mean or self.largest_compliance
-        zero = np.hypot(*wavenumbers(fft, self.size)) == 0.0
-        smallest = LEAST_SYMBOL * (1.0 - self.poisson) / np.where(zero, np.inf, np.hypot(*wavenumbers(fft, self.size)))
-        table = np.where(zero, least, np.maximum(table, smallest))
-        operator = Convolution(fft, lambda rows: table[rows], fft.dtype)
-        inverse = Convolution(fft, lambda rows: np.where(zero[rows], 0.0, 1.0 / table[rows]), fft.dtype)
+
+        def positive(rows: slice, inverted: bool) -> Array:
+            q = np.hypot(*wavenumbers(fft, self.size, rows))
+            smallest = LEAST_SYMBOL * (1.0 - self.poisson) / np.where(q == 0.0, np.inf, q)
+            values = np.where(q == 0.0, least, np.maximum(symbol(rows), smallest))
+            return np.where(q == 0.0, 0.0, 1.0 / values) if inverted else values
+
+        operator, inverse = (Convolution(fft, partial(positive, inverted=way), fft.dtype) for way in (False, True))
         return operator, inverse, mean, least, self.size, self.compliance
 
     # -- under a surface that slides steadily -------------------------------------------------------------------------

@@ -81,7 +81,8 @@ class HeatMemory:
         self._spread = body.diffusivity * qx[0] ** 2, body.diffusivity * qy[:, 0] ** 2
         tally = fft.slab.tally
         self.waves = allocate((known.kept, *fft.shape), fft.complex, tally)
-        self.waves.fill(0.0)
+        if not tally.only_counts:
+            self.waves.fill(0.0)
         self.pressed = allocate(fft.shape, fft.complex, tally)
         self.rubbed = allocate(fft.shape if rubs else (0, fft.shape[1]), fft.complex, tally)
         self.mean = MeanMemory(body)

@@ -66,6 +66,8 @@ class Surface:
 
     def heights(self, shift: tuple[float, float], out: Array) -> Array:
         """Heights of the surface moved by `shift` [m], this rank's rows; collective."""
+        if self.slab.only_counts:
+            return out
         if self.waves is None:
             out.fill(0.0)
         else:

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from ..compiled import pointwise
 from ..parallel.fft import FFT
-from ..parallel.fft import footprint as footprint_of_transform
 from ..parallel.slab import Array, Slab, allocate
 from ..parallel.tally import Tally
 from .convolution import Convolution, padded_lengths, tabulate
@@ -117,17 +116,6 @@ class FreeNodes:
     def displace(self) -> None:
         """From loads to displacements, in their place."""
         self._far.apply(self.map, self.map)
-
-
-def footprint(tiles: Tiles, size: tuple[float, float]) -> int:
-    """Bytes that the operator on tiles of a box of `size` holds."""
-    *_, count = _lengths(tiles, size)
-    step, item = step_of_nodes(tiles), 8
-    nx, ny = (SIDE // step * n + ORDER for n in tiles_along(tiles.points))
-    lengths, nodes = padded_lengths(nx, ny), nx * ny
-    spectrum, blocks, _ = footprint_of_transform((nx, ny), lengths, np.float64, 1, 0)
-    far = spectrum + blocks + Convolution.footprint(spectrum, lengths[1])
-    return TileConvolution.footprint(tiles.count, count // SIDE - 1) + item * nodes + far
 
 
 def free_operator(

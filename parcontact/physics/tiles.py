@@ -64,18 +64,14 @@ class TileConvolution:
         length, count = 2 * SIDE, tiles.count
         self._padded = allocate((count, length, length), np.float64, tally)
         self._waves, self._sums = (allocate((count, length, SIDE + 1), np.complex128, tally) for _ in range(2))
+        self._symbols = _symbols(quadrant, reach, tally)
+        if tally.only_counts:
+            return
         self._padded.fill(0.0)
         make = partial(pyfftw.FFTW, axes=(1, 2), flags=("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT"))
         self._forward = make(self._padded, self._waves)
         self._backward = make(self._sums, self._padded, direction="FFTW_BACKWARD")
         self._backward_of_one = make(self._sums[:1], self._padded[:1], direction="FFTW_BACKWARD")
-        self._symbols = _symbols(quadrant, reach, tally)
-
-    @staticmethod
-    def footprint(count: int, reach: int) -> int:
-        """Bytes that it holds for so many tiles."""
-        waves = 16 * 2 * SIDE * (SIDE + 1)
-        return count * (8 * (2 * SIDE) ** 2 + 2 * waves) + (2 * reach + 1) ** 2 * waves
 
     def apply(self, field: Array, out: Array) -> Array:
         """Apply it to a stacked map; both may be the same."""
@@ -121,6 +117,8 @@ def _symbols(quadrant: Array, reach: int, tally: Tally) -> NDArray[np.complex128
     steps = (np.arange(length) + SIDE) % length - SIDE
     places = np.abs(SIDE * np.arange(-reach, reach + 1)[:, None] + steps[None, :])
     symbols = allocate((count, count, length, SIDE + 1), np.complex128, tally)
+    if tally.only_counts:
+        return symbols
     places[places >= len(quadrant)] = 0  # half a period off: multiplies zeros alone
     for row in range(count):
         kernels = quadrant[places[row][None, :, None], places[:, None, :]]

@@ -1,85 +1,56 @@
 """Bytes that a rank holds in maps, and bytes of a checkpoint: from the job alone, exactly.
 
-Each class says what it holds; here this is added up.
+What a run makes is made on a slab that only counts (`parallel.slab.Slab.planned`).
 """
 
+import math
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike
 
-from ..effects import adhesive_law
 from ..job import Job
 from ..job.checks.size import machines
-from ..march import state
+from ..march.state import parts_of
 from ..march.tolerance import tolerance_before
-from ..parallel.fft import footprint
-from ..parallel.regrid import coarser_points
-from ..parallel.slab import deal, dealt_to
-from ..physics import tile_operator
-from ..physics.body import ElasticBody, ZenerBody
+from ..parallel.slab import Slab
 from ..physics.convolution import Convolution, MirroredConvolution
-from ..physics.energy import ElasticPressure
-from ..physics.entries import MapCount
-from ..physics.halfspace import HalfSpace
-from ..physics.layer import Layer
 from ..physics.lowest import shape_of
-from ..physics.tiles import REACH_OF_INVERSE, SIDE, TileConvolution, Tiles
-from ..scene import choices
+from ..physics.tiles import SIDE, Tiles
+from ..scene import Scene, build_on, choices, outline, solver_on_tiles
 from ..scene.rigid_surface import highest_waves
-from ..solve.adhesive.solver import GapSolver
-from ..solve.contact import ContactSolver
 from ..solve.fallback.cold_start import WORTHWHILE
-from ..solve.nonsymmetric.steady import SteadySolver
-from ..solve.preconditioner.cell_sums import CellSums
-from ..solve.preconditioner.extension import grids_for, pairs_for
-from ..solve.tiles import BLOCKS, LARGER_CELLS, LARGEST_SHARE, LEAST, SHARE
-from ..steady_sliding.sliding import tolerance_of
+from ..solve.tiles import BLOCKS, LARGEST_SHARE, LEAST, SHARE
+from ..steady_sliding.sliding import SteadySliding
 
 FREE_SHARE = 0.7  # tuning: of the memory that is free, which jobs may take
 MEMINFO = Path("/proc/meminfo")
 MOST_POINTS = 2**20  # tuning: of a small case, which gains little from several ranks
 SPARE = 2.0  # tuning: times the maps of steps: what a first contact or steady state on nested grids may hold besides
+SPECTRUM = "surface spectrum"
 
 
-Points = tuple[int, int]
+# names of parts of a run in a plan
+NAMES = {"contact": "pressures", "material": "body", "energy": "memory of energies", "law": "gaps"}
 
 
 def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int]:
-    """Bytes of all maps and transform buffers of a rank in a run of a job, by their purpose; by default no rank has
-    more: the last has the most of all but the surface's waves."""
-    part, chosen, grid = _Part(job, ranks, rank), choices(job), job.grid
-    whole, _ = part.transform(grid.points)
-    kept = chosen.operator_type
-    found = {"transforms": sum(part.transform(grid.points))}
-    if lengths := part.own_lengths:
-        spectrum, blocks = part.transform(lengths, kept)
-        found["padded transforms and operator"] = spectrum + blocks + Convolution.footprint(spectrum, lengths[1])
-    else:
-        found["operator"] = Convolution.footprint(whole, grid.ny) * np.dtype(kept).itemsize // 8
-    if chosen.mixed_precision.on:
-        single, _ = part.transform(grid.points, np.float32)
-        blocks = part.transform(grid.points, np.float32, shared=True)[1]
-        found["single transforms and preconditioner"] = blocks + part.preconditioner(single, 4)
-    else:
-        never = whole if chosen.adhesion is not None and chosen.isolated.on else 0  # of its symbol: it is not applied
-        found["preconditioner"] = part.preconditioner(whole, 8) - never
-    body, tolerance = part.half_space, job.numerics.tolerance
-    grids = grids_for(grid.dx, grid.dy, body.reach)
-    solver = ContactSolver.footprint(*grid.points, tolerance, ranks, part.number, grids, kept, body.long_waves)
-    found["solver"] = solver
-    if chosen.adhesion is not None:
-        found["adhesion"] = 2 * Convolution.footprint(whole, grid.ny) + GapSolver.footprint(part.cells(grid.points))
-        cells = CellSums.footprint(*grid.points, ranks, part.number, body.size, body.compliance)
-        found["adhesion"] += cells
-    if chosen.spectrum.on:
-        found["surface spectrum"] = part.surface_waves
-    for what, count, dtype in _maps(job):
-        if count.held:
-            found[what] = found.get(what, 0) + count.held * np.dtype(dtype).itemsize * part.cells(grid.points)
+    """Return the bytes of all maps and transform buffers of a rank in a run of a job, by their purpose.
+
+    By default it is the last rank, which has the most of all but the waves of the surface: of these the most that a
+    rank has are counted.
+    """
+    slab = _slab(job, ranks, rank)
+    scene = build_on(outline(job, slab))
+    _memories = scene, _completed(scene)
+    found = slab.tally.by_purpose
+    for name, effect in choices(job).followers.items():
+        if name not in scene.effects:
+            found[name] = sum(np.dtype(dtype).itemsize for dtype in effect.maps(job)) * math.prod(slab.shape)
+    if rank is None and choices(job).spectrum.on:
+        found[SPECTRUM] = _most_waves(job, ranks)
     return found
 
 
@@ -96,46 +67,70 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
     """
     if not choices(job).steady_start.on:
         return 0
-    part, points, even = _Part(job, ranks, rank), job.grid.points, not job.initial.velocity[1]
-    spectrum, blocks = part.transform(points)
-    tolerance = min(tolerance_of(job.numerics.tolerance), tolerance_before(choices(job), 0))
-    pairs = pairs_for(job.grid.dx, job.grid.dy)
-    held = SteadySolver.footprint(*points, tolerance, ranks, part.number, sets, pairs)
-    held += 2 * 8 * part.cells(points)  # the heights and the start
-    held += spectrum + blocks + part.surface_waves
-    held += Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
-    if lengths := part.own_lengths:
-        padded, blocks = part.transform(lengths)
-        held += padded + blocks + Convolution.footprint(padded, lengths[1], even, is_complex=True)
-    else:
-        held += Convolution.footprint(spectrum, job.grid.ny, even, is_complex=True)
-    for coarse in coarser_points(*points):
-        held += sum(footprint(coarse, coarse, np.float64, ranks, part.number)[:2]) + 8 * part.cells(coarse)
-    return held
+    slab = _slab(job, ranks, rank)
+    sliding = SteadySliding(outline(job, slab), tolerance_before(choices(job), 0))
+    held = sliding.hold(job.initial.velocity, sets)
+    bytes_held = slab.tally["map bytes"]
+    del held
+    return bytes_held
 
 
 def on_tiles(job: Job) -> int:
     """Bytes that rank 0 holds at most, beside those of `holdings`, while a dilute first contact is solved on tiles; 0
     for a run that does not try that."""
     chosen, (nx, ny) = choices(job), job.grid.points
-    body = _Part(job, 1, 0).half_space
     cold = bool(job.history) and not chosen.steady_start.on and chosen.adhesion is None
     large = nx * ny >= WORTHWHILE and max(nx, ny) > BLOCKS
-    if not (cold and large and body.works_on_tiles(nx, ny)):
+    if not (cold and large):
+        return 0
+    setup = outline(job, Slab.planned(nx, ny, 1, 0))
+    make = solver_on_tiles(setup)
+    if make is None:
         return 0
     count = int(LARGEST_SHARE * nx * ny / SIDE**2)
-    places = np.zeros(count, np.intp)
-    tiles = Tiles((nx, ny), places, places)
-    tolerance = max(SHARE * job.numerics.tolerance, LEAST)
-    held = ContactSolver.footprint(SIDE, count * SIDE, tolerance, 1, 0, LARGER_CELLS)
-    held += tile_operator.footprint(tiles, body.size) + TileConvolution.footprint(count, REACH_OF_INVERSE)
+    places, before = np.zeros(count, np.intp), setup.slab.tally["map bytes"]
+    made = make(Tiles((nx, ny), places, places), max(SHARE * job.numerics.tolerance, LEAST))
+    held = setup.slab.tally["map bytes"] - before
+    del made
     return held + 2 * 8 * SIDE**2 * count  # the heights and the start
 
 
 def saved(job: Job) -> int:
-    """Bytes of the maps in a checkpoint, with the four of the checksum of each row."""
-    nx, ny = job.grid.points
-    return sum(count.saved * (nx * ny * np.dtype(dtype).itemsize + 4 * ny) for _, count, dtype in _maps(job))
+    """Bytes of the maps in a checkpoint, with the four of the checksum of each row. Effects say their maps themselves:
+    some are made for a checkpoint alone."""
+    (nx, ny), scene = job.grid.points, build_on(outline(job, _slab(job, 1, 0)))
+    memories = _completed(scene)
+    parts = {name: part for name, part in parts_of(scene).items() if name not in scene.effects}
+    entries = [entry for name, part in parts.items() for entry in part.entries(memories[name], scene.units).values()]
+    itemsizes = [np.asarray(entry.value).itemsize for entry in entries if entry.is_map]
+    for effect in choices(job).followers.values():
+        itemsizes += [np.dtype(dtype).itemsize for dtype in effect.maps(job)]
+    return sum(nx * ny * itemsize + 4 * ny for itemsize in itemsizes)
+
+
+def _slab(job: Job, ranks: int, rank: int | None) -> Slab:
+    """Return the slab of a rank, without one that of the last one, which only counts."""
+    return Slab.planned(*job.grid.points, ranks, ranks - 1 if rank is None else rank)
+
+
+def _completed(scene: Scene) -> dict[str, Any]:
+    """Return the memories of all parts at rest, and make what the first step makes of the scene."""
+    scene.slab.tally.purpose = "operators"
+    for operator in scene.operators if scene.law is None else scene.operators[:1]:  # a law of its own has its inverse
+        assert isinstance(operator, Convolution | MirroredConvolution)
+        _ = operator.symbols
+    memories = {}
+    for name, part in parts_of(scene).items():
+        scene.slab.tally.purpose = NAMES.get(name, name)
+        memories[name] = part.at_rest()
+    return memories
+
+
+def _most_waves(job: Job, ranks: int) -> int:
+    """Return the bytes of the waves of a surface on the rank that has the most of them."""
+    count = job.grid.nx // 2 + 1
+    rows, columns = shape_of(highest_waves(job), job.grid.points, slice(0, -(-count // min(ranks, count))))
+    return rows * columns * np.dtype(np.complex128).itemsize
 
 
 def free_bytes() -> int:
@@ -159,73 +154,3 @@ def count_side_by_side(jobs: Sequence[Job], ranks: int) -> int:
     here = -(-at_once // machines())
     held = here * SPARE * total(largest, max(1, ranks // at_once))
     return at_once if held <= FREE_SHARE * free_bytes() else 1
-
-
-@dataclass(frozen=True)
-class _Part:
-    """The part of a job's grid that one of several ranks has; without a rank the largest part."""
-
-    job: Job
-    ranks: int
-    rank: int | None
-
-    @property
-    def number(self) -> int:
-        return self.ranks - 1 if self.rank is None else self.rank
-
-    def cells(self, points: Points) -> int:
-        """Points of a map."""
-        rows = dealt_to(points[1], self.ranks, self.number)
-        return (rows.stop - rows.start) * points[0]
-
-    def transform(self, lengths: Points, dtype: DTypeLike = np.float64, shared: bool = False) -> tuple[int, int]:
-        """Bytes of the spectrum of a transform, whose memory may be `shared` with another one, and of its buffers."""
-        return footprint(self.job.grid.points, lengths, dtype, self.ranks, self.number, shared)[:2]
-
-    @property
-    def own_lengths(self) -> Points | None:
-        """Lengths of the operator's own transforms; None if it takes those of the grid."""
-        return self.half_space.own_lengths(self.job.grid.points)
-
-    @property
-    def half_space(self) -> HalfSpace:
-        """The body, in m."""
-        poisson, body, free = self.job.material.poisson, self.job.body, choices(self.job).isolated.on
-        layer = None if body is None else Layer(body.thickness, body.base, poisson)
-        return HalfSpace(self.job.grid.size, poisson, free=free, layer=layer)
-
-    def preconditioner(self, spectrum: int, itemsize: int) -> int:
-        """Bytes of the inverse of the half space beside a transform of maps of such items."""
-        if choices(self.job).isolated.on:
-            return MirroredConvolution.footprint(spectrum, self.job.grid.ny, itemsize)
-        return Convolution.footprint(spectrum, self.job.grid.ny)
-
-    @property
-    def surface_waves(self) -> int:
-        """Bytes of the waves of the surface."""
-        if not choices(self.job).spectrum.on:
-            return 0
-        points, waves = self.job.grid.points, highest_waves(self.job)
-        count = points[0] // 2 + 1
-        most = self.rank is None  # more ranks than columns have none
-        dealt = deal(count, min(self.ranks, count)) if most else [dealt_to(count, self.ranks, self.number)]
-        shapes = [shape_of(waves, points, columns) for columns in dealt]
-        return max(rows * columns for rows, columns in shapes) * 16
-
-
-def _maps(job: Job) -> Iterator[tuple[str, MapCount, DTypeLike]]:
-    """Whole maps, held or in checkpoints: their purpose, count and type."""
-    chosen = choices(job)
-    yield "heights", MapCount(1), np.float64
-    yield "pressures", state.count_maps(chosen.extrapolated_starts.on, chosen.further_starts.on), np.float64
-    if chosen.viscoelasticity.on:
-        yield "branches", ZenerBody.count_maps(len(chosen.folded.kept)), np.float64
-    else:
-        yield "moved heights", ElasticBody.count_maps(chosen.slides_along_x), np.float64
-    if chosen.energy_memory.on:
-        yield "energy memory", ElasticPressure.count_maps(chosen.prony.moduli.size), np.float64
-    if chosen.adhesion is not None:
-        yield "gaps", adhesive_law.count_maps(chosen.isolated.on), np.float64
-    for name, effect in chosen.followers.items():
-        for dtype in effect.maps(job):
-            yield name, MapCount(held=1, saved=1), dtype

@@ -1,7 +1,18 @@
 """From a job to what is calculated with: the choices that follow from it, the rigid surface, the body, the solver."""
 
 from .choices import Choices, choices
-from .scene import Scene, Setup, build, build_on, describe_roughness, describe_scene, set_up, solver_on, solver_on_tiles
+from .scene import (
+    Scene,
+    Setup,
+    build,
+    build_on,
+    describe_roughness,
+    describe_scene,
+    outline,
+    set_up,
+    solver_on,
+    solver_on_tiles,
+)
 
 __all__ = [
     "Choices",
@@ -12,6 +23,7 @@ __all__ = [
     "choices",
     "describe_roughness",
     "describe_scene",
+    "outline",
     "set_up",
     "solver_on",
     "solver_on_tiles",

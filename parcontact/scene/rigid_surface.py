@@ -14,9 +14,9 @@ from ..job import Grid, Job
 from ..job.checks import meaning
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.root import on_root
-from ..parallel.slab import Array, Slab
+from ..parallel.slab import Array, Slab, allocate
 from ..physics import heightfile
-from ..physics.lowest import lowest
+from ..physics.lowest import lowest, shape_of
 from ..physics.roughness import Roughness, shortest_wave
 from ..physics.shapes import Round
 from ..physics.surface import Surface, single_wave
@@ -47,6 +47,14 @@ def make_surface(job: Job, fft: FFT) -> tuple[Surface, Told]:
         surface.waves = lowest(surface.waves, fft, highest_waves(job))
         fft.slab.tally.hold(surface.waves)
     return surface, told
+
+
+def outline_surface(job: Job, fft: FFT) -> Surface:
+    """Return the surface of a job for a calculation that is only planned: its waves have no values."""
+    waves = None
+    if any(isinstance(part, jobs.Spectral) for part in job.surface):
+        waves = allocate(shape_of(highest_waves(job), (fft.mx, fft.my), fft.columns), fft.complex, fft.slab.tally)
+    return Surface(fft.slab, fft, job.grid.size, waves)
 
 
 def _round(part: jobs.Sphere | jobs.Cylinder, grid: Grid) -> Round:

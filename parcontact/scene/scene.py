@@ -18,6 +18,7 @@ from ..effects.effect import Effect, Memories
 from ..effects.folded_branches import FoldedBranches, describe_folded_branches
 from ..history.chosen import describe_steps
 from ..job import Grid, Job
+from ..job.added_sections import is_ours
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.body import Body, ElasticBody, ZenerBody
@@ -40,7 +41,7 @@ from ..solve.problem import Operators
 from ..solve.tiles import LARGER_CELLS, SolverOnTiles
 from ..solve.workspace import Workspace
 from .choices import Choices, choices
-from .rigid_surface import HeightRange, Told, heights_of, make_surface, shortest_measured
+from .rigid_surface import HeightRange, Told, heights_of, make_surface, outline_surface, shortest_measured
 
 
 @dataclass
@@ -180,6 +181,15 @@ def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:
     return Setup(chosen, slab, fft, surface, roughness, shortest, heights, units, told)
 
 
+def outline(job: Job, slab: Slab) -> Setup:
+    """Return the setup of a job on a slab that only counts: its surface has waves, but no heights, and units are 1."""
+    slab.tally.purpose = "transforms"
+    chosen, fft = choices(job), FFT(slab)
+    slab.tally.purpose = "surface spectrum"
+    surface, flat, units = outline_surface(job, fft), HeightRange(0.0, 0.0, 0.0), Units(1.0, 1.0, 1.0)
+    return Setup(chosen, slab, fft, surface, None, None, flat, units, Told([], [], []))
+
+
 def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
     """Make a job's scene on the ranks of `slab`, as `set_up` and `build_on` do."""
     return build_on(set_up(job, slab, until))
@@ -187,13 +197,18 @@ def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
 
 def build_on(setup: Setup) -> Scene:
     """Make the scene of a setup; collective."""
-    chosen, folded = setup.choices, setup.slab.agree(setup.choices.folded)
+    chosen, tally, folded = setup.choices, setup.slab.tally, setup.slab.agree(setup.choices.folded)
     solver, operators = _solver(setup, chosen.numerics.tolerance, chosen.operator_type)
     inverse = AppliedInverse(operators.preconditioner, lambda: solver.workspace.other_displacement)
+    tally.purpose = "heights"
     material, energy = _body_and_energy(setup, folded, inverse)
     scene = Scene(setup, _motion(setup), folded, material, solver, operators, setup.probe(), energy)
-    scene.effects = {name: effect(scene) for name, effect in chosen.followers.items()}
-    scene.law = next((law for effect in scene.effects.values() if (law := effect.law())), None)
+    for name, effect in chosen.followers.items():
+        if setup.slab.only_counts and not is_ours(name):
+            continue  # it may look at heights
+        tally.purpose = name
+        scene.effects[name] = effect(scene)
+        scene.law = scene.law or scene.effects[name].law()
     return scene
 
 
@@ -253,9 +268,11 @@ def _motion(setup: Setup) -> Motion:
 def _solver(setup: Setup, tolerance: float, operator_type: type[np.floating]) -> tuple[ContactSolver, Operators]:
     """Make the contact solver with its workspace, and the operators of the body."""
     height, limit = setup.height / setup.units.height, setup.choices.numerics.max_iterations
+    setup.slab.tally.purpose = "operators"
     operators = _operators(setup, operator_type)
     body, slab = setup.half_space, setup.slab
     grids = grids_for(body.size[0] / slab.nx, body.size[1] / slab.ny, body.reach)
+    setup.slab.tally.purpose = "solver"
     workspace = Workspace(setup.slab, tolerance, operator_type)
     free = setup.choices.isolated.on
     return ContactSolver(workspace, height, tolerance, limit, grids, free, body.long_waves), operators
@@ -277,7 +294,7 @@ def _body_and_energy(
     chosen, slab, integrator = setup.choices, setup.slab, setup.choices.numerics.integrator
     unit = setup.units.pressure * setup.units.height * setup.grid.dx * setup.grid.dy
     if not chosen.viscoelasticity.on:
-        body = ElasticBody(slab, setup.prony.modulus_inf)
+        body = ElasticBody(slab, setup.prony.modulus_inf, chosen.slides_along_x)
         return body, ElasticEnergy(slab, unit) if chosen.energies.on else None
     rubber = ZenerBody(slab, setup.prony, integrator, folded.memoryless, folded.frozen)
     if not chosen.energies.on:

@@ -119,23 +119,6 @@ class ContactSolver:
         self._most_ratio = MAX_STEP_RATIO_FREE if free or long_waves is not None else MAX_STEP_RATIO
         self._local_load = LocalLoad(self.slab)
 
-    @staticmethod
-    def footprint(
-        nx: int,
-        ny: int,
-        tolerance: float,
-        ranks: int,
-        rank: int,
-        grids: Grids = ALL,
-        kept: type[np.floating] = np.float64,
-        long_waves: LongWaves | None = None,
-    ) -> int:
-        """Bytes that it holds on a rank, with its workspace."""
-        cells = ExtendedPreconditioner.footprint(nx, ny, ranks, rank, grids)
-        if long_waves is not None and grids.most != 0 and min(nx, ny) > 1:
-            cells += LongWavePreconditioner.footprint(nx, ny, ranks, rank, long_waves)
-        return Workspace.footprint(nx, ny, tolerance, ranks, rank, kept) + cells
-
     def solve(self, problem: Problem, start: Array, tolerance: float | None = None) -> Contact:
         """Solve from the pressure `start`, which is admissible and in whose place the solution will be; collective.
 

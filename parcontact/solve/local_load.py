@@ -28,12 +28,14 @@ class LocalLoad:
     def __init__(self, slab: Slab, pairs: int = 0) -> None:
         """On a grid where so many `pairs` make square cells (`preconditioner.levels`)."""
         self._slab = slab
+        if slab.only_counts:
+            return
         rows, columns = (max(CELL >> max(count, 0), LEAST) for count in (pairs, -pairs))
         touched = [_rows_of_cells(part, rows) for part in slab.dealt]
         rank, width = slab.comm.rank, -(-slab.nx // columns)
         ends = np.cumsum([0] + [part.stop - part.start for part in touched]).tolist()
         stacked = [slice(start, stop) for start, stop in pairwise(ends)]
-        self._stack = Slab(slab.comm, 2 * width, ends[-1], slab.tally, stacked)
+        self._stack = Slab(slab.comm, 2 * width, ends[-1], slab.tally, stacked.__getitem__)
         numbers = np.concatenate([np.arange(part.start, part.stop) for part in touched])
         self._wanted = [slice(*np.searchsorted(numbers, [part.start, part.stop]).tolist()) for part in touched]
         own = np.arange(touched[rank].start, touched[rank].stop)

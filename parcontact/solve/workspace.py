@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..parallel.slab import Slab, dealt_to
+from ..parallel.slab import Slab
 from .precision import precision_of_directions
 
 
@@ -29,10 +29,3 @@ class Workspace:
 
     def swap_displacements(self) -> None:
         self.displacement, self.other_displacement = self.other_displacement, self.displacement
-
-    @staticmethod
-    def footprint(nx: int, ny: int, tolerance: float, ranks: int, rank: int, kept: type[np.floating]) -> int:
-        """Bytes that it holds on a rank."""
-        rows = dealt_to(ny, ranks, rank)
-        maps = np.float64, kept, kept, precision_of_directions(tolerance), np.bool_
-        return sum(np.dtype(each).itemsize for each in maps) * (rows.stop - rows.start) * nx

@@ -62,8 +62,8 @@ Make = Callable[[SteadyLevel, Vector], tuple[SteadySolver | Proximal, Convolutio
 class SteadySliding:
     """Steady states of one job's surface and body; making and calling it are collective.
 
-    Started from coarser grids, or from the last state where that is very near. `footprint` says what it holds. The
-    tolerance on certificates follows from that of the job, and is `most` at most.
+    Started from coarser grids, or from the last state where that is very near. The tolerance on certificates follows
+    from that of the job, and is `most` at most.
     """
 
     def __init__(self, setup: Setup, most: float = math.inf) -> None:
@@ -80,6 +80,13 @@ class SteadySliding:
         self._speed = self._pressure = 0.0  # the speed times the shift factor: that is what a state depends on
         self.temperature, self._own_temperature = math.nan, temperature_of(setup.job.material)
         self._feedback = Feedback()
+
+    def hold(self, velocity: Vector, sets: bool) -> tuple[Array, SteadySolver, Convolution]:
+        """Make what a solve at a velocity [m/s] holds on the finest grid, if it changes `sets` of points or not."""
+        p, (solver, operator) = self.setup.slab.empty(), self._solver(self.levels[0], velocity)
+        if sets:
+            solver.hold_all()
+        return p, solver, operator
 
     def heat(self, temperature: float) -> None:
         """Solve at this temperature [deg C] from now on; raises InputError where the material has no shift."""

@@ -71,6 +71,7 @@ def scales_of(*history: Json, **changes: Any) -> TimeScales:
 
 # -- from a job to its time scales -------------------------------------------------------------------------------------
 
+
 def test_time_scales_of_a_job() -> None:
     """Only stages that last count; the jump with which a virgin body is loaded is none that reads memory."""
     ramp = {"pressure": {"from": 0.0, "to": 1e5}, "duration": 7e-3, "time_step": {"first": 1e-3, "growth": 2.0}}
@@ -86,6 +87,7 @@ def test_time_scales_of_a_job() -> None:
 
 
 # -- bounds against closed forms and against all branches --------------------------------------------------------------
+
 
 def frozen(prony: Prony, found: FoldedBranches) -> Prony:
     """The material with its frozen branches as springs."""
@@ -224,6 +226,7 @@ def test_any_unit_of_time(unit: float) -> None:
 
 # -- what it saves and costs -------------------------------------------------------------------------------------------
 
+
 def test_folded_branches_have_no_map_and_friction_is_within_the_bound() -> None:
     """Three of four branches: as many maps less, nothing else more; friction differs, but within the bound."""
     (fewer, new), (whole, old) = (marched(sliding(numerics={"branch_error": allowed})) for allowed in (1e-2, 0.0))
@@ -285,6 +288,7 @@ def test_a_steady_start_freezes_nothing() -> None:
 
 
 # -- restarts ----------------------------------------------------------------------------------------------------------
+
 
 class Place(Bench):
     """Runs of jobs, and what they leave."""

@@ -200,6 +200,7 @@ def test_times_of_rows_long_after_the_start() -> None:
 
 # -- runs -------------------------------------------------------------------------------------------------------------
 
+
 def run(where: Path, comm: MPI.Intracomm, name: str, until: float | None = None, **sections: Any) -> Rows:
     """The rows of a run without their seconds, on root."""
     output = {"fields": ["pressure"], "every": 7}

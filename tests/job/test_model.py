@@ -301,6 +301,7 @@ def test_a_resolved_job_that_is_none(tmp_path: Path) -> None:
 
 # -- sections of effects, as a job's own keys -------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("section", added_sections.names())
 def test_an_empty_section_of_an_effect_is_an_absent_one(tmp_path: Path, section: str) -> None:
     assert job_of(tmp_path, SMALL + f"{section}:\n") == job_of(tmp_path, SMALL)
@@ -309,6 +310,7 @@ def test_an_empty_section_of_an_effect_is_an_absent_one(tmp_path: Path, section:
 
 
 # -- a job as lines to read, and as a file to run again ---------------------------------------------------------------
+
 
 def test_words_have_no_unit() -> None:
     """A stage that chooses its steps says auto, and not auto s."""

@@ -203,6 +203,7 @@ def test_masses() -> None:
 
 # -- connected cells and critical constrictions against a search that grows from the first row ------------------------
 
+
 def widest_path(gap: NDArray[np.float64], periodic: bool) -> float:
     """The smallest gap on the widest path, by Dijkstra's algorithm."""
     rows, columns = gap.shape
@@ -244,6 +245,7 @@ def test_what_leads_nowhere_is_left_out() -> None:
 
 
 # -- elimination of half of the cells against a dense solution, for odd and even, narrow and wide maps ----------------
+
 
 def dense(cubes: Map, aspect: float, periodic: bool, given: Map) -> Map:
     """The pressures by a full matrix, made face by face."""

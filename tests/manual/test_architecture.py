@@ -15,7 +15,7 @@ ROOMS = {path.stem for path in HOUSE.iterdir() if not path.name.startswith("__")
 QUOTED = set(re.findall(r"`([^`\n]+)`", texts.page("architecture")))
 NAMES = sorted(name for name in QUOTED if re.fullmatch(r"[\w.]+", name) and name.split(".")[0] in ROOMS and "." in name)
 FILES = sorted(name for name in QUOTED if re.fullmatch(r"[\w/]+(/|\.py|\.yaml|\.md)", name))
-METHODS = ("begin", "commit", "displacement", "entries", "restored", "at_rest", "start_from", "count_maps")
+METHODS = ("begin", "commit", "displacement", "entries", "restored", "at_rest", "start_from")
 
 
 def test_names_are_found() -> None:

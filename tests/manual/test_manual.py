@@ -94,6 +94,7 @@ def test_the_page_on_python_is_text() -> None:
 
 # -- keys ------------------------------------------------------------------------------------------------------------
 
+
 def test_every_key_has_its_meaning() -> None:
     """A key that was added needs a line in parcontact/manual/keys.yaml: [meaning, example]."""
     written = {part: set(known) for part, known in reference.meanings().items()}
@@ -130,6 +131,7 @@ def test_the_page_has_range_unit_and_default() -> None:
 
 # -- columns ---------------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("file", TABLES)
 def test_every_table_is_on_its_page(file: str) -> None:
     """The page has a section for each table, with all of its columns."""
@@ -139,6 +141,7 @@ def test_every_table_is_on_its_page(file: str) -> None:
 
 
 # -- blocks ----------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize(("language", "name", "index"), BLOCKS)
 def test_a_block(language: str, name: str, index: int, elsewhere: Path) -> None:
@@ -201,6 +204,7 @@ def run_code(pieces: list[str]) -> None:
 
 # -- verbs -----------------------------------------------------------------------------------------------------------
 
+
 def test_printing_pages(capsys: pytest.CaptureFixture[str]) -> None:
     assert __main__.main(["manual"]) == 0
     assert "outputs" in capsys.readouterr().out
@@ -211,6 +215,7 @@ def test_printing_pages(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 # -- gallery ---------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize("path", sorted((ROOT / "jobs").glob("*.yaml")), ids=lambda path: path.stem)
 def test_the_picture_of_a_job_is_of_this_job(path: Path) -> None:

@@ -31,6 +31,7 @@ def all_steps(data: dict[str, Any]) -> tuple[March, list[StepRow]]:
 
 # -- when -------------------------------------------------------------------------------------------------------------
 
+
 def test_an_elastic_body_is_solved_once() -> None:
     """Each further instant, at the end of a stage or asked for by its number, takes one look: one application."""
     push = {"name": "push", "pressure": 1e4}
@@ -73,6 +74,7 @@ def test_nothing_is_asked_where_nothing_can_be_passed_over() -> None:
 
 
 # -- runs -------------------------------------------------------------------------------------------------------------
+
 
 def dwelling(bench: Bench, **changes: Any) -> dict[str, Any]:
     history = [{**DWELL, "time_step": {"first": 1e-4, "growth": 2.0}}, {**SLIDE, "pressure": 1e4, "distance": 1e-4}]

@@ -14,7 +14,6 @@ from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job.sections.listing import plain
 from parcontact.march.loop import March, run
-from parcontact.march.state import count_maps
 from parcontact.physics.units import Units
 from parcontact.storage import checkpoint
 from parcontact.storage.checkpoint import Facts
@@ -124,15 +123,6 @@ def test_a_run_in_other_units_goes_on_alike(
         assert np.array_equal(new.field(name), old.field(name)), name
     for name in ("distance", "work", "stored", "dissipated", "branch_dissipation"):
         np.testing.assert_equal(getattr(new.row, name), getattr(old.row, name), name)
-
-
-@pytest.mark.parametrize("data", CASES)
-def test_pressures_of_a_checkpoint_are_counted(data: dict[str, Any]) -> None:
-    """As many maps as are planned for."""
-    march = begun(data)
-    chosen = march.scene.choices
-    counted = count_maps(chosen.extrapolated_starts.on, chosen.further_starts.on).saved
-    assert sum(entry.is_map for name, entry in march.entries().items() if name.startswith("contact/")) == counted
 
 
 @pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])

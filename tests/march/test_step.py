@@ -26,6 +26,7 @@ GRID: dict[str, Any] = {"points": [64, 64], "size": [1e-3, 1e-3]}
 
 # -- tried again ------------------------------------------------------------------------------------------------------
 
+
 @pytest.fixture
 def moody(monkeypatch: pytest.MonkeyPatch) -> None:
     """Solves that fail once or not at all: this is a matter of the contact, and so is the same when repeated."""
@@ -109,6 +110,7 @@ def test_coarse_grids_have_the_same_plans_every_time(boundary: str, precision: s
 
 
 # -- given up ---------------------------------------------------------------------------------------------------------
+
 
 def remembered(march: March) -> dict[str, NDArray[Any]]:
     """What a step must leave alone when it fails."""

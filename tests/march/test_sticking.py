@@ -298,7 +298,6 @@ def test_a_load_of_zero_has_no_friction_and_shortens_no_step(tmp_path: Path) -> 
     assert all(measures.friction == 0.0 for measures in slid)
 
 
-
 def test_a_fluid_flows_where_the_gap_is_open() -> None:
     """Contacts that stick are closed where their gap is 0, whatever the pressure: the flow of a run is that through the
     map of gaps, to the solver's tolerance; it rises when the sphere is pulled off."""

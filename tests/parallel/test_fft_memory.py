@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from parcontact.parallel.fft import FFT, footprint
+from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 
 pytestmark = pytest.mark.mpi(3)
@@ -14,18 +14,21 @@ pytestmark = pytest.mark.mpi(3)
 @pytest.mark.parametrize(
     ("points", "lengths"), [((20, 14), (20, 14)), ((300, 200), (600, 400)), ((2000, 5), (2000, 5)), ((9, 30), (9, 30))]
 )
-def test_footprint(
+def test_planned_memory(
     communicators: list[MPI.Intracomm], points: tuple[int, int], lengths: tuple[int, int], dtype: type
 ) -> None:
-    """What a transform holds is known before it is made; ranks without rows too."""
+    """On a slab that only counts a transform counts what it holds, to the byte; ranks without rows too. What it sends
+    are its rows of the wavenumbers of others."""
     for comm in communicators:
         slab = Slab(comm, *points)
         fft = FFT(slab, lengths, dtype)
-        spectrum, blocks, sent = footprint(points, lengths, dtype, comm.size, comm.rank)
-        assert spectrum == fft.spectrum.nbytes
-        assert spectrum + blocks == slab.tally["map bytes"]
+        planned = Slab.planned(*points, comm.size, comm.rank)
+        plan = FFT(planned, lengths, dtype)
+        assert plan.spectrum.nbytes == fft.spectrum.nbytes
+        assert planned.tally["map bytes"] == slab.tally["map bytes"]
         fft.forward(slab.zeros())
-        assert slab.tally["bytes sent"] == sent
+        others = lengths[0] // 2 + 1 - fft.shape[1]
+        assert slab.tally["bytes sent"] == slab.shape[0] * others * fft.spectrum.itemsize
 
 
 @pytest.mark.parametrize("nx", [8, 14, 16, 300])
@@ -44,8 +47,11 @@ def test_lent_spectrum(communicators: list[MPI.Intracomm], nx: int, ny: int) -> 
         double, alone = FFT(slab), FFT(slab, dtype=np.float32)
         before = slab.tally["map bytes"]
         single = FFT(slab, dtype=np.float32, sharing=double)
-        _, held, _ = footprint((nx, ny), (nx, ny), np.float32, comm.size, comm.rank, shared=True)
-        assert slab.tally["map bytes"] - before == held
+        planned = Slab.planned(nx, ny, comm.size, comm.rank)
+        lender = FFT(planned)
+        held = planned.tally["map bytes"]
+        _borrower = FFT(planned, dtype=np.float32, sharing=lender)
+        assert planned.tally["map bytes"] - held == slab.tally["map bytes"] - before
         assert np.shares_memory(single.spectrum, double.spectrum) or not single.spectrum.size
         field, out = np.random.default_rng(4).normal(size=(ny, nx))[slab.rows], slab.zeros(np.float32)
         for transform in (single, alone, double, single):

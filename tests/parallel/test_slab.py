@@ -112,6 +112,7 @@ def test_maps_are_counted_while_they_are_held() -> None:
 
 # -- rows that move along y, across ranks -----------------------------------------------------------------------------
 
+
 @settings(max_examples=60)
 @given(ny=st.integers(1, 9), count=st.integers(-20, 20), single=st.booleans())
 def test_rolls_like_numpy(ny: int, count: int, single: bool) -> None:

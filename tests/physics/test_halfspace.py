@@ -52,6 +52,7 @@ def matrix(operator: Either) -> Array:
 
 # -- periodic ---------------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("poisson", [0.5, 0.3, 0.0])
 @pytest.mark.parametrize(("wx", "wy"), [(1, 0), (0, 1), (3, 2), (2, -5), (0, 6), (8, 0)])
 def test_cosine(comm: MPI.Intracomm, wx: int, wy: int, poisson: float) -> None:
@@ -124,6 +125,7 @@ def test_inverse(communicators: list[MPI.Intracomm]) -> None:
 
 # -- free -------------------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("poisson", [0.5, 0.3])
 @pytest.mark.parametrize(("nx", "ny"), [(7, 5), (6, 8), (9, 1), (1, 4)])
 def test_direct_sum(communicators: list[MPI.Intracomm], nx: int, ny: int, poisson: float) -> None:
@@ -157,6 +159,7 @@ def test_uniform_pressure_on_a_square(comm: MPI.Intracomm) -> None:
 
 
 # -- all operators ----------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize("name", OPERATORS)
 @pytest.mark.parametrize(("nx", "ny"), [(9, 8), (8, 9), (12, 1)])

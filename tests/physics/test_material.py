@@ -59,6 +59,7 @@ def branch(body: HeldBody, k: int) -> float:
 
 # -- printed numbers, to their twelve digits ---------------------------------------------------------------------------
 
+
 def test_coefficients_of_eq_8() -> None:
     """alpha, beta and gamma of Eq. (8), printed to 1e-9 of their size."""
     made = body(TWO, "backward-euler")
@@ -129,6 +130,7 @@ def test_exponential_steps_are_exact_on_a_ramp() -> None:
 
 # -- jumps -------------------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_a_jump_meets_the_instantaneous_modulus(integrator: Integrator) -> None:
     made = body(TWO, integrator)
@@ -165,6 +167,7 @@ def test_order_of_creep_after_jumps(integrator: Integrator, order: float, again:
 
 
 # -- limits ------------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("z", [1e-300, 1e-15, 1e-13, 1e-6, 1.0, 1e6, 1e12, 1e300])
@@ -203,6 +206,7 @@ def test_branches_without_a_part(integrator: Integrator) -> None:
 
 
 # -- what it does with maps --------------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_moved_heights_are_moved_heights(integrator: Integrator) -> None:
@@ -271,6 +275,7 @@ def test_a_step_that_is_dropped_leaves_the_memory() -> None:
 
 
 # -- discrete moduli of time steps against tables, limits and a march of the body -------------------------------------
+
 
 @pytest.mark.parametrize(
     ("steps", "omega", "loss_euler", "loss", "storage_euler", "storage"),

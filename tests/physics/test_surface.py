@@ -20,6 +20,7 @@ pytestmark = pytest.mark.mpi
 
 # -- waves ------------------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize(("nx", "ny"), [(16, 12), (15, 11), (16, 1)])
 @pytest.mark.parametrize("waves", [(0, 0), (1, 0), (0, 1), (3, 2), (-3, 2), (3, -2), (-4, -5), (0, -3), (-5, 0)])
 def test_single_wave(communicators: list[MPI.Intracomm], nx: int, ny: int, waves: tuple[int, int]) -> None:
@@ -88,6 +89,7 @@ def test_units_of_height(comm: MPI.Intracomm) -> None:
 
 
 # -- shapes -----------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (1.3e-4, -7e-5)])
@@ -162,6 +164,7 @@ def test_flat(comm: MPI.Intracomm) -> None:
 
 
 # -- the tangential force on waves and shapes, against the formulas of their slopes -----------------------------------
+
 
 @pytest.mark.parametrize("waves", [(4, 0), (0, 3), (3, 2), (2, -5), (-4, 1)])
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (3.1e-5, -1.7e-5)])

@@ -44,6 +44,18 @@ JOBS: dict[str, Json] = {
     "free": {"grid": {"boundary": "free"}, "surface": {"shape": "sphere", "radius": 1e-2}},
     "free, energies": {"grid": {"boundary": "free"}, "material": TWO, "history": [SLIDE], "output": {"energy": True}},
     "energies": {"material": TWO, "history": [CELLS], "output": {"energy": True}},
+    "heat": {
+        "material": TWO,
+        "history": [SLIDE],
+        "thermal": {"conductivity": 0.2, "diffusivity": 1e-7},
+        "interface": {"shear_stress": 1e4},
+    },
+    "adhesion": {"history": [SLIDE], "adhesion": {"work": 0.05, "range": 2e-6}},
+    "free, adhesion": {
+        "grid": {"boundary": "free"},
+        "surface": {"shape": "sphere", "radius": 1e-2},
+        "adhesion": {"work": 0.05, "range": 2e-6},
+    },
     "long cells": {"grid": {"size": [1e-3, 1e-5]}, "history": [SLIDE]},
     "waves of two cells": {"grid": {"points": 16}, "surface": {"shape": "wave", "amplitude": 1e-7, "waves": [8, 0]}},
     "mixed": {"history": [SLIDE], "numerics": {"precision": "mixed", "tolerance": 1e-4}},

@@ -9,8 +9,7 @@ from marching import marched
 from mpi4py import MPI
 
 from parcontact import scene
-from parcontact.parallel import pyramid
-from parcontact.parallel.slab import Slab, deal
+from parcontact.parallel.slab import Slab
 from parcontact.physics.tiles import SIDE, Tiles
 from parcontact.plan import memory, report
 from parcontact.plan.costs import Costs
@@ -66,19 +65,6 @@ def test_units_of_memory(points: int, unit: str) -> None:
     assert head.startswith(f"memory per rank [{unit}]")
     assert all(0.0 <= float(number) < 1e6 for row in rows for number in row.split()[-2:])
     assert all("e+" not in row for row in rows)
-
-
-def test_cells_of_larger_grids_are_those_that_are_made() -> None:
-    """Rank by rank, from the rows of that rank alone."""
-    for nx, ny, ranks, pairs in [(32, 24, 1, 0), (32, 24, 5, 2), (33, 70, 7, 1), (512, 301, 16, 0), (8, 5, 9, -3)]:
-        sizes = list(pyramid._larger(nx, ny, ranks, pairs))
-        dealt, made = deal(ny, ranks), []
-        for _, height, (_, tall), alone in sizes:
-            dealt = [slice(0, height)] * ranks if alone else pyramid.parts_of(dealt, tall)
-            made.append(dealt)
-        for rank in range(ranks):
-            cells = [(parts[rank].stop - parts[rank].start) * size[0] for parts, size in zip(made, sizes, strict=True)]
-            assert pyramid.count_cells(nx, ny, ranks, rank, None, pairs) == sum(cells)
 
 
 def test_a_million_ranks_are_counted_at_once() -> None:

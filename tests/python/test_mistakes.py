@@ -150,6 +150,7 @@ def test_a_saved_state_has_the_sums_of_the_budget(comm: MPI.Intracomm, shared_pa
 
 # -- warnings are those of Python: of the line of the script, whether a run writes files or not -----------------------
 
+
 def test_warnings_are_those_of_python() -> None:
     """A slope beyond linear theory: the surface is steep, as the command line says."""
     steep = {**JOB, "surface": {"shape": "wave", "amplitude": 1e-4, "waves": [2, 1]}}

@@ -157,6 +157,7 @@ def test_the_verb_surface(road: Path, main: "Main", run_parcontact: "RunParconta
 
 # -- what is taken out of a map, and what is doubted ------------------------------------------------------------------
 
+
 def test_waves_that_are_taken_out_are_reported(road: Path) -> None:
     """By 50 µm of a road with waves down to 40 µm: a ring of its spectrum is missing, and the report says so."""
     (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=", short_wavelength: 50.0e-6"))
@@ -214,6 +215,7 @@ def test_bands_have_no_direction() -> None:
 
 
 # -- the grid of the map, and a map without a job ---------------------------------------------------------------------
+
 
 def grid_of(road: Path, grid: str, surface: str = "") -> jobs.Grid:
     surface = surface or "{shape: topography, path: road.npy, unit: um, size: [1.0e-3, 2.0e-3]}"

@@ -122,6 +122,7 @@ def _reconciled(dice: Random, job: Json) -> Json:
 
 # -- surfaces ---------------------------------------------------------------------------------------------------------
 
+
 def _surface(dice: Random, scale: Scale, directory: Path) -> Json | list[Json]:
     makers = [_rough, _rough, _sphere, _cylinder, _wave, _wave, _file, _topography, _spectrum, lambda *_: _FLAT]
     shapes = [dice.choice(makers)(dice, scale, directory) for _ in range(dice.choice([1, 1, 1, 2, 3]))]
@@ -211,6 +212,7 @@ def _topography(dice: Random, scale: Scale, directory: Path) -> Json:
 
 # -- bodies -----------------------------------------------------------------------------------------------------------
 
+
 def _material(dice: Random, scale: Scale, directory: Path) -> Json:
     kind = dice.choices(["elastic", "zener", "tyre", "dma"], [3, 12, 1, 2])[0]
     if kind == "tyre":
@@ -291,6 +293,7 @@ def _interface(dice: Random, scale: Scale) -> Json:
 
 # -- loads and motion -------------------------------------------------------------------------------------------------
 
+
 def _velocity(dice: Random, scale: Scale) -> Any:
     speed = scale.speed * decades(dice, -2, 2)
     return dice.choice([speed, -speed, [speed, 0.0], [0.0, speed], [0.6 * speed, -0.8 * speed]])
@@ -354,6 +357,7 @@ def _steady(dice: Random, scale: Scale) -> Json:
 
 
 # -- calculation ------------------------------------------------------------------------------------------------------
+
 
 def _numerics(dice: Random, scale: Scale) -> Json:
     made: Json = {"accuracy": dice.choice([0.3, 0.2, 0.1, {"friction": 0.3, "area": 0.1}])}

@@ -173,6 +173,7 @@ class Sketch:
 
 # -- bodies and surfaces ----------------------------------------------------------------------------------------------
 
+
 def material(dice: Random) -> Json:
     """1 to 15 branches over 20 decades of time and 12 of modulus, or none, around a modulus of any size."""
     scale = decades(dice, -3, 9)

@@ -133,6 +133,7 @@ def test_units_of_powers_of_two_change_no_digit(tmp_path: Path) -> None:
 
 # -- the datum of heights ----------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("precision", ["double", "mixed"])
 @pytest.mark.parametrize("offset", [1.0, -1.0])
 def test_a_constant_of_a_million_times_the_roughness(precision: str, offset: float, tmp_path: Path) -> None:
@@ -179,6 +180,7 @@ def test_a_flat_file_is_flat(constant: float, tmp_path: Path) -> None:
 
 # -- the datum of time -------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("step", [2.5e-12, {"first": 1e-15, "growth": 10.0}])
 def test_a_short_stage_late_in_a_history(step: Any, tmp_path: Path) -> None:
     """After 300 years an instant has no digits for picoseconds, a step must have them all: the body then does what it
@@ -197,6 +199,7 @@ def test_a_short_stage_late_in_a_history(step: Any, tmp_path: Path) -> None:
 
 # -- sums over all points ----------------------------------------------------------------------------------------------
 
+
 @pytest.mark.mpi
 @pytest.mark.parametrize(("nx", "ny"), [(2048, 512), (3, 400_000), (400_000, 3)])
 def test_sums_over_large_maps(communicators: list[MPI.Intracomm], nx: int, ny: int) -> None:
@@ -214,6 +217,7 @@ def test_sums_over_large_maps(communicators: list[MPI.Intracomm], nx: int, ny: i
 
 
 # -- what no digits are left for ---------------------------------------------------------------------------------------
+
 
 def test_a_fluid_under_a_load_for_ages_says_why_it_fails(tmp_path: Path) -> None:
     """The modulus of the step falls to 1e-16 of its first value: the load is then so far beyond full contact that the

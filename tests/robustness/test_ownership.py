@@ -57,6 +57,7 @@ def steps(out: Path) -> list[int]:
 
 # -- the command line where a job is, and what happens while it runs --------------------------------------------------
 
+
 @pytest.fixture
 def main(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Main:
     """The command line in this process and in `tmp_path`, where job.yaml is: exit code, all that it says."""
@@ -92,6 +93,7 @@ def at_step(monkeypatch: pytest.MonkeyPatch) -> Callable[[int, Callable[[], Any]
 
 
 # -- which checkpoint is of this run ----------------------------------------------------------------------------------
+
 
 def other_spelling(out: Path) -> Path:
     return out.parent / "out" / ".." / out.name / "checkpoint" / "step-5.h5"
@@ -140,6 +142,7 @@ def test_checkpoint_of_another_run(main: Main, tmp_path: Path) -> None:
 
 
 # -- results without what they could be made again from ---------------------------------------------------------------
+
 
 def test_finished_run_without_its_checkpoints(main: Main, tmp_path: Path) -> None:
     """The same command replaces nothing; with --restart never it does as it is told."""
@@ -219,6 +222,7 @@ def test_another_job_that_left_no_checkpoint(main: Main, tmp_path: Path) -> None
 
 # -- what others have planted in a directory, or changed in its maps, is neither followed nor lost --------------------
 
+
 def test_planted_picture(main: Main, tmp_path: Path) -> None:
     """`plot` replaces a link instead of what it leads to."""
     main("job.yaml", "--out", "out")
@@ -248,6 +252,7 @@ def test_planted_links_where_a_run_goes_on(main: Main, tmp_path: Path, name: str
 
 
 # -- fields that cannot be read ---------------------------------------------------------------------------------------
+
 
 def test_locked_fields(main: Main, tmp_path: Path) -> None:
     """A file that another program holds is neither lost nor replaced: its name is told."""
@@ -354,6 +359,7 @@ def test_by_python(tmp_path: Path) -> None:
 
 # -- rows of measures.csv that were edited, before a run or a plot ----------------------------------------------------
 
+
 def change(line: int, act: Callable[[str], str]) -> Callable[[str], str]:
     def changed(text: str) -> str:
         lines = text.splitlines()
@@ -422,6 +428,7 @@ def test_missing_rows(main: Main, tmp_path: Path) -> None:
 
 # -- while it runs ----------------------------------------------------------------------------------------------------
 
+
 def test_locked_fields_do_not_disturb_a_run(
     main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path
 ) -> None:
@@ -474,6 +481,7 @@ def test_stop_file_that_cannot_be_removed(
 
 
 # -- no checkpoints ---------------------------------------------------------------------------------------------------
+
 
 def test_keep_none(main: Main, tmp_path: Path) -> None:
     """A short run leaves no checkpoint; one that stops early leaves one, and goes on from it."""

@@ -79,6 +79,7 @@ def test_a_directory_of_somebody_else(cache: Path) -> None:
 
 # -- as another user --------------------------------------------------------------------------------------------------
 
+
 @pytest.fixture
 def common() -> Iterator[Path]:
     """A directory that everybody can enter and write to."""

@@ -189,6 +189,7 @@ def energy_of(march: March, pressure: Array) -> float:
 
 # -- one random scene and its twin, marched and compared --------------------------------------------------------------
 
+
 @dataclass(frozen=True)
 class Trial:
     """What came of a scene: sentences about what must not be, and numbers to count."""

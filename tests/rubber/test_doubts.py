@@ -31,6 +31,7 @@ STORAGE, LOSS = MODULUS.real / 1e6, MODULUS.imag / 1e6  # MPa
 
 # -- temperatures ------------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("step", [1.0, 0.4])
 def test_temperatures_near_to_each_other_are_sets_of_their_own(tmp_path: Path, step: float) -> None:
     """Ten in steps of a degree or less, at each of which the same frequencies were measured."""
@@ -88,6 +89,7 @@ def test_headers_of_instruments(tmp_path: Path, head: str, columns: list[np.ndar
 
 
 # -- misfit and scatter ------------------------------------------------------------------------------------------------
+
 
 def test_scatter_is_what_neighbours_differ_by() -> None:
     """Of 3 %, by 1000 points, to a tenth (its own scatter is 3 %); a smooth curve, of a slope that changes by 1 in a
@@ -162,6 +164,7 @@ def test_tables_that_no_fit_meets(tmp_path: Path, columns: list[np.ndarray], sen
 
 # -- shifts ------------------------------------------------------------------------------------------------------------
 
+
 def test_shift_factors_as_pyvisco_writes_them(tmp_path: Path) -> None:
     path = tmp_path / "factors.csv"
     path.write_text("T,log_aT\nC, -\n40,-1\n20,0\n0,2\n", encoding="utf-8-sig")
@@ -175,6 +178,7 @@ def test_constants_that_no_rubber_has(text: str) -> None:
 
 
 # -- the measured range ------------------------------------------------------------------------------------------------
+
 
 def rubber(velocity: float, **more: Any) -> Job:
     """Waves of 0.25 mm, which pass with v/0.25 mm."""

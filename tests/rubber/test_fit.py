@@ -129,6 +129,7 @@ def test_laws_that_will_not_do(
 
 # -- the loss modulus that follows from a table, which friction depends on: also where it was not measured ------------
 
+
 def miss(series: PronySeries, body: Body, low: float, high: float) -> Array:
     """The relative errors of the loss modulus between two frequencies [Hz], 20 in a decade."""
     omega = 2 * np.pi * np.geomspace(low, high, round(20 * np.log10(high / low)) + 1)

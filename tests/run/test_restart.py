@@ -119,6 +119,7 @@ def test_other_ranks(
 
 # -- from which checkpoint a run goes on, and which are kept ----------------------------------------------------------
 
+
 def damage(path: Path) -> None:
     data = bytearray(path.read_bytes())
     data[-9] ^= 4
@@ -322,6 +323,7 @@ def test_every_third_step_and_the_last(main: Main, tmp_path: Path, steps: str) -
 
 
 # -- what a run advises where it is more wrong than asked for ---------------------------------------------------------
+
 
 @pytest.mark.parametrize(
     ("slide", "numerics", "parts"),

@@ -305,6 +305,7 @@ sweep: [{surface.seed: [1, 2, 3, 4], surface.short_wavelength: [2.5e-4, 2.5e-4, 
 
 # -- several programs on the cases of one sweep: a job array, or the same command given twice -------------------------
 
+
 def test_a_case_that_another_program_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -357,6 +358,7 @@ def test_tables_are_written_by_one_program_at_a_time(tmp_path: Path, monkeypatch
 
 
 # -- what stops one case of a sweep stops all of them, and the same command goes on -----------------------------------
+
 
 def begin(job: Job, begun: list[int], groups: Groups) -> None:
     """Note a case that begins; all groups of ranks begin their first one together; collective."""

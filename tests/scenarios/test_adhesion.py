@@ -111,6 +111,7 @@ def test_highest_load_with_dugdales_law() -> None:
 
 # -- lines -----------------------------------------------------------------------------------------------------------
 
+
 def line(points: int, length: float, surface: dict[str, Any], work: float, *history: dict[str, Any]) -> dict[str, Any]:
     """A surface that is the same all along y; a process zone is four cells long."""
     return {
@@ -205,6 +206,7 @@ SCALE = WORK * UNLOADED**2  # of energies [J]
 
 # -- energies --------------------------------------------------------------------------------------------------------
 
+
 def test_a_loop_of_a_reversible_contact_loses_nothing() -> None:
     """There and back without a snap: less than 0.1 % of w a^2."""
     ramps = ramp(0.0, 4 * LENGTH, 40), ramp(4 * LENGTH, 0.0, 40)
@@ -296,6 +298,7 @@ def test_instant_retraction(radius: int, exact: float) -> None:
 
 
 # -- elastic limits --------------------------------------------------------------------------------------------------
+
 
 def forces(job: Job) -> Any:
     return np.array([row.pressure * nominal_area(job) for row in steps(job)])

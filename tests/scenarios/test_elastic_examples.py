@@ -222,6 +222,7 @@ def bumps(tmp_path: Path) -> Path:
 
 # -- the same contact, given in other ways -----------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
 def test_pressure_force_and_approach_agree(bumps: Path, boundary: str) -> None:
     """Tolerance 1e-10 on gaps: pressures to 1e-8 of the highest."""
@@ -248,6 +249,7 @@ def test_periodic_approach_beyond_full_contact_is_refused(bumps: Path) -> None:
 
 # -- invariance --------------------------------------------------------------------------------------------------------
 
+
 def test_poisson_ratio(bumps: Path) -> None:
     """Only (1 - nu)/G enters."""
     [(_, expected)] = run(bumps)
@@ -262,6 +264,7 @@ def test_coming_from_another_load_changes_nothing(bumps: Path) -> None:
 
 
 # -- starts ------------------------------------------------------------------------------------------------------------
+
 
 def test_only_the_first_solve_of_a_large_job_starts_on_coarser_grids(
     bumps: Path, monkeypatch: pytest.MonkeyPatch

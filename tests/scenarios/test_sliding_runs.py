@@ -359,6 +359,7 @@ def test_height_is_where_the_surface_is(tmp_path: Path, cells: float, boundary: 
 
 # -- the examples of jobs/ that slide, as they promise ----------------------------------------------------------------
 
+
 def test_example_of_full_contact() -> None:
     """What jobs/full_contact.yaml promises, to its four digits and the 1e-4 of its steps."""
     _, rows = marched(example("full_contact"))
@@ -403,6 +404,7 @@ def test_example_of_a_velocity_step(run_parcontact: "RunParcontact", main: "Main
 
 
 # -- what a sliding step costs: operator calls, memory, and the same on any number of ranks ---------------------------
+
 
 def calls_per_step(points: int, history: list[Json], tolerance: float = 5e-3) -> tuple[float, float]:
     """Operator applications per step after the tenth, and the last friction."""

@@ -45,6 +45,7 @@ def force(march: March, pressure: np.ndarray) -> np.ndarray:
 
 # -- a sphere ----------------------------------------------------------------------------------------------------------
 
+
 def test_creep_under_a_load() -> None:
     """Lee and Radok, 40 to 90 cells per radius: radius (from the area), approach and pressure within 0.5 %.
 
@@ -140,6 +141,7 @@ def test_example_of_unloading(between: float, approach: float) -> None:
 
 # -- waves -------------------------------------------------------------------------------------------------------------
 
+
 def test_contact_that_spreads_until_it_is_full() -> None:
     """Westergaard's wave under a load step, which grows as J(t) says: 1.5 cells of 256 and 1 % in time."""
     amplitude, wavelength, pressure, cells = 5e-7, 2.5e-4, 1e4, 256
@@ -182,6 +184,7 @@ def test_flat_surface(integrator: str) -> None:
 
 
 # -- a viscoelastic body with branches far from its time steps, and its energies --------------------------------------
+
 
 def bumps(**changes: Any) -> Json:
     return {
@@ -232,6 +235,7 @@ def test_branches_far_from_the_time_steps(integrator: str) -> None:
 
 
 # -- energy ------------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize(("boundary", "kernel"), [("periodic", "spectral"), ("periodic", "love"), ("free", "love")])
 def test_energies_are_those_of_the_maps(boundary: str, kernel: str) -> None:

@@ -235,6 +235,7 @@ def test_every_rank_says_the_same(comm: MPI.Intracomm, communicators: list[MPI.I
 
 # -- strict -----------------------------------------------------------------------------------------------------------
 
+
 def test_strict_refuses_before_anything_is_written(tmp_path: Path, run_parcontact: RunParcontact) -> None:
     """By the job, and by its heights."""
     text = SMALL.replace("1e6}", "2.75}")

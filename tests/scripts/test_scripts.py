@@ -69,6 +69,7 @@ def test_a_small_run(script: Path, tmp_path: Path, outside_mpi: dict[str, str]) 
 
 # -- what scripts/bench.py counts and concludes; what it times is judged by nobody but its reader ---------------------
 
+
 @pytest.fixture(scope="module")
 def peers() -> ModuleType:
     return load_script("bench.peers")

@@ -32,6 +32,7 @@ from .bodies import BODIES, MODULUS, ROUNDING, TIGHT, Bench, Map, keep, rough, s
 
 # -- against others ----------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("load", [0.02, 0.1, 0.5])
 def test_agrees_with_polonsky_and_keer(load: float) -> None:
     """Pressures to 1e-8 of their mean, the oracle's own error: it ends when an iteration changes them by 1e-10."""
@@ -83,6 +84,7 @@ def test_single_cell_on_a_free_body() -> None:
 
 
 # -- the certificate ---------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize("control", ["load", "approach"])
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-8])
@@ -144,6 +146,7 @@ def test_any_surface(seed: int, shape: tuple[int, int], load: float, body: tuple
 
 # -- controls ----------------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize(("boundary", "kernel"), BODIES)
 @pytest.mark.parametrize("mean", [0.01, 0.4, 2.0])
 def test_load_and_approach_give_the_same_contact(boundary: str, kernel: str, mean: float) -> None:
@@ -186,6 +189,7 @@ def test_what_a_contact_reports_is_documented() -> None:
 
 
 # -- what a contact costs: starts, messages and operator calls of an iteration, single precision ----------------------
+
 
 def test_warm_start_from_the_solution() -> None:
     """Nothing is left to do but to see that it is one."""
@@ -255,6 +259,7 @@ def test_calls_in_a_box_with_nothing_around(load: float) -> None:
 
 
 # -- the safeguard -----------------------------------------------------------------------------------------------------
+
 
 class Dense:
     """An operator given by its matrix."""
@@ -330,6 +335,7 @@ def test_where_steps_are_halved_the_energy_never_rises(aspect: float, load: floa
 
 # -- what cannot be solved ---------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("control", [MeanPressure(0.4), MeanPressure(0.0), Approach(0.1)])
 def test_heights_that_are_not_finite(value: float, control: MeanPressure | Approach) -> None:
@@ -368,6 +374,7 @@ def test_stall(control: MeanPressure | Approach) -> None:
 
 
 # -- the same contact, moved or mirrored, by the contact solver: two solves to 1e-11 agree to 1e-9 of the largest -----
+
 
 @pytest.mark.parametrize(("boundary", "kernel"), BODIES)
 def test_mirror_images_and_transposition(boundary: str, kernel: str) -> None:

@@ -110,7 +110,7 @@ def test_maps_of_ranks_without_rows(comm: MPI.Intracomm) -> None:
     """Rows of tiles come together from all ranks and go back, whoever has them: here the last one has all."""
     nx, ny = 50, 70
     dealt = [slice(0, 0)] * (comm.size - 1) + [slice(0, ny)]
-    slab, tiles = Slab(comm, nx, ny, dealt=dealt), Tiles((nx, ny), np.array([0, 2]), np.array([1, 0]))
+    slab, tiles = Slab(comm, nx, ny, rows_of=dealt.__getitem__), Tiles((nx, ny), np.array([0, 2]), np.array([1, 0]))
     whole = np.random.default_rng(1).random((ny, nx))
     held = slab.tally["map bytes"]
     found: Array | None = module._stacked(slab, tiles, whole[slab.rows])

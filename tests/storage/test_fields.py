@@ -212,6 +212,7 @@ def test_chain_counts_runs_that_are_alike() -> None:
 
 # -- files that all ranks write together: the same bytes whichever way, and one error for all -------------------------
 
+
 def field_hdf5(slab: Slab, seed: int = 0) -> Array:
     """This rank's rows of a map that does not depend on the number of ranks."""
     return np.random.default_rng(seed).standard_normal((slab.ny, slab.nx))[slab.rows]

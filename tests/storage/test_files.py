@@ -255,6 +255,7 @@ def test_what_a_table_lacks() -> None:
 
 # -- measures.csv: exact numbers, cut back without repeating or losing a row ------------------------------------------
 
+
 def row(step: int, lost: tuple[float, ...] = ()) -> StepRow:
     return StepRow(step, 0.1 * step, measures=Measures(pressure=1 / 3), dissipated=sum(lost), branch_dissipation=lost)
 

@@ -397,6 +397,7 @@ def test_the_range_of_adhesion_is_that_of_the_job_on_every_mesh(path: Path, reac
 
 # -- limits of sequences whose limit is known -------------------------------------------------------------------------
 
+
 @given(
     st.floats(0.5, 4.0),
     st.floats(-10.0, 10.0),

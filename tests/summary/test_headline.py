@@ -85,6 +85,7 @@ def test_curves_sweeps_and_studies(tmp_path: Path) -> None:
 
 # -- `parcontact info`: what it says of friction ----------------------------------------------------------------------
 
+
 @pytest.mark.parametrize(("history", "told"), [(SLIDE, True), ("history: [{pressure: 1.0e3}]\n", False)])
 def test_friction_is_told_where_something_slides(tmp_path: Path, history: str, told: bool) -> None:
     said, sound = info.describe(ran(tmp_path, WAVE + ZENER + history))
@@ -178,6 +179,7 @@ def test_nothing_slides_or_nothing_was_predicted(tmp_path: Path) -> None:
 
 
 # -- pull-offs from made-up rows: of pulls by approach and by load, of several, of a contact that holds ---------------
+
 
 def table(*rows: tuple[float, float, float]) -> Columns:
     """Pressure, approach and area, a row a second."""

@@ -101,6 +101,7 @@ def test_maugis_tends_to_jkr() -> None:
 
 # -- a wave ----------------------------------------------------------------------------------------------------------
 
+
 def test_wave() -> None:
     """alpha = 0.3, to the digits printed: pull-off, jump to full contact, and the contact without load."""
     limits = adhesion.wave_limits(0.3)

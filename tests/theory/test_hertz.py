@@ -133,6 +133,7 @@ def test_full_contact() -> None:
 
 # -- the steadily sliding cylinder against tables from another solution of its equations, quadrature and --------------
 
+
 @pytest.mark.parametrize(
     ("velocity", "friction", "half_width", "leading", "trailing"),
     [

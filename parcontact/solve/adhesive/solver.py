@@ -72,11 +72,6 @@ class GapSolver:
         self._working = slab.zeros(np.bool_)
         self._cells = CellSums.on(slab, operators.size, operators.compliance)
 
-    @staticmethod
-    def footprint(cells: int) -> int:
-        """Bytes that it holds on a rank that has so many points, without sums over cells."""
-        return (7 * 8 + 1) * cells
-
     def solve(
         self,
         law: Law,

@@ -39,6 +39,12 @@ class Directions:
         self.kept, self._pairs = kept, list(pairs)
         self._r: Array | None = None
 
+    def hold_all(self) -> None:
+        """Make all maps that a solve can need."""
+        self._residual()
+        for number in range(self.count):
+            self._pair(number)
+
     def _residual(self) -> Array:
         if self._r is None:
             self._r = self.slab.empty()

@@ -23,17 +23,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...parallel.slab import Array, Slab, dealt_to
+from ...parallel.slab import Array, Slab
 from .. import kernels
 from ..certificate import Certificate
 from ..constraint import NonNegative
 from ..iterate import certify, weigh
 from ..local_load import LEAST_CUT
 from ..precision import precision_of_directions
-from ..preconditioner.extension import ExtendedPreconditioner
 from ..problem import Operator
 from .gcr import Directions, gaps_on
-from .projected import DIRECTIONS, Projected, extension_on
+from .projected import Projected
 from .stripes import OnSet, Plain, Stripes
 
 MAX_STEPS_TO_HALVE, STRIPED_STEPS_TO_HALVE = 20, 8  # tuning: projected steps in which the certificate must halve; the
@@ -112,14 +111,9 @@ class SteadySolver:
         self._length = height  # of the last certificate
         self._working: NDArray[Any] = slab.zeros(np.bool_)
 
-    @staticmethod
-    def footprint(nx: int, ny: int, tolerance: float, ranks: int, rank: int, sets: bool = False, pairs: int = 0) -> int:
-        """Bytes that it holds on a rank at most: while projected steps do, or when it has changed `sets`."""
-        rows, kept = dealt_to(ny, ranks, rank), precision_of_directions(tolerance, LOOSE)
-        bytes_of_maps = (1 + 2 * DIRECTIONS + sets) * 8 + 1
-        bytes_of_maps += sets * 2 * (MAX_DIRECTIONS - DIRECTIONS) * np.dtype(kept).itemsize
-        cells = ExtendedPreconditioner.footprint(nx, ny, ranks, rank, extension_on(nx, ny, pairs)[0])
-        return bytes_of_maps * (rows.stop - rows.start) * nx + cells
+    def hold_all(self) -> None:
+        """Make all maps that are needed where the active set changes, as otherwise the first of these solves does."""
+        self._linear.hold_all()
 
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
         """Solve for heights h under the mean pressure, starting from the pressure `start`, in whose place the solution

@@ -15,8 +15,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...parallel.pyramid import count_cells
-from ...parallel.slab import Array, Slab, dealt_to
+from ...parallel.slab import Array, Slab
 from .extension import pairs_for
 from .levels import interpolate, interpolate_back, levels_of
 
@@ -41,14 +40,6 @@ class CellSums:
         nearly square, and where long waves are stiffer than shorter ones, as on incompressible layers."""
         weights = _weights(slab.nx, slab.ny, size, compliance)
         return cls(slab, pairs_for(size[0] / slab.nx, size[1] / slab.ny), weights) if weights else None
-
-    @staticmethod
-    def footprint(nx: int, ny: int, ranks: int, rank: int, size: tuple[float, float], compliance: Compliance) -> int:
-        """Bytes of what `on` returns on a rank."""
-        if not _weights(nx, ny, size, compliance):
-            return 0
-        rows, pairs = dealt_to(ny, ranks, rank), pairs_for(size[0] / nx, size[1] / ny)
-        return (rows.stop - rows.start) * nx + 5 * count_cells(nx, ny, ranks, rank, None, pairs)
 
     def apply(self, c: Array, out: Array) -> None:
         """Put `M c` into another map; collective."""

@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import loop
-from ...parallel.pyramid import count_cells
 from ...parallel.slab import Array, Slab
 from ..problem import Operator
 from .levels import interpolate, interpolate_back, levels_of
@@ -89,11 +88,6 @@ class ExtendedPreconditioner:
             rows, columns = self._floors[-1]
             self._floors[-1] = np.float32(last) * rows, columns
         self._known, self._cells = ([grid.empty(np.float32) for grid in grids] for _ in range(2))
-
-    @staticmethod
-    def footprint(nx: int, ny: int, ranks: int, rank: int, larger: Grids = ALL) -> int:
-        """Bytes that it holds on a rank."""
-        return 2 * 4 * count_cells(nx, ny, ranks, rank, larger.most, larger.pairs)
 
     def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:
         """Put z in the place of the residual r, which is 0 outside the set; only on the set does z mean something.

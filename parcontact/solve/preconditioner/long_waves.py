@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import loop
-from ...parallel import pyramid
-from ...parallel.slab import Array, Slab, dealt_to
+from ...parallel.slab import Array, Slab
 from ...physics.layer import LongWaves
 from ..problem import Operator
 from .extension import ExtendedPreconditioner, lengths
@@ -55,13 +54,6 @@ class LongWavePreconditioner:
         self._cell_lengths = [
             (lengths(slab.ny, level)[grid.rows], lengths(slab.nx, level)) for level, grid in enumerate(grids)
         ]
-
-    @staticmethod
-    def footprint(nx: int, ny: int, ranks: int, rank: int, waves: LongWaves) -> int:
-        """Bytes that it holds on a rank, without the extended preconditioner."""
-        rows = dealt_to(ny, ranks, rank)
-        finest = 0 if _first_grid(nx, ny, waves) else nx * (rows.stop - rows.start)
-        return MAPS * 4 * (finest + pyramid.count_cells(nx, ny, ranks, rank))
 
     def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:
         """Put z in the place of the residual r, which is 0 outside the set; only on the set does z mean something.

@@ -122,8 +122,9 @@ def test_holds_what_it_says(shape: tuple[int, int], larger: Grids) -> None:
     comm = MPI.COMM_WORLD
     slab = Slab(comm, shape[1], shape[0])
     _held = ExtendedPreconditioner(slab, larger=larger)
-    expected = ExtendedPreconditioner.footprint(shape[1], shape[0], comm.size, comm.rank, larger)
-    assert slab.tally["map bytes"] == expected
+    planned = Slab.planned(shape[1], shape[0], comm.size, comm.rank)
+    _counted = ExtendedPreconditioner(planned, larger=larger)
+    assert slab.tally["map bytes"] == planned.tally["map bytes"]
 
 
 def test_pairs_until_cells_are_square() -> None:
@@ -240,11 +241,15 @@ def test_holds_what_it_says_long_waves(comm: MPI.Intracomm, shape: tuple[int, in
     extended = ExtendedPreconditioner(slab)
     before = slab.tally["map bytes"]
     _held = LongWavePreconditioner(slab, waves(thickness), extended)
-    told = LongWavePreconditioner.footprint(shape[1], shape[0], comm.size, comm.rank, waves(thickness))
-    assert slab.tally["map bytes"] - before == told
+    planned = Slab.planned(shape[1], shape[0], comm.size, comm.rank)
+    extended = ExtendedPreconditioner(planned)
+    less = planned.tally["map bytes"]
+    _counted = LongWavePreconditioner(planned, waves(thickness), extended)
+    assert slab.tally["map bytes"] - before == planned.tally["map bytes"] - less
 
 
 # -- sums over cells of all lengths against products of matrices, on any ranks, and against the operator, -------------
+
 
 def weighted(c: Map, weights: list[float], pairs: int) -> Map:
     """`sum w_l I_l I_l' c`, from the finest grid on."""
@@ -298,16 +303,16 @@ def test_none_where_they_are_no_good(nx: int, ny: int, layer: Layer | None) -> N
     """On lines, on cells that are too long for pairs, and where long waves are stiff; nothing is held."""
     slab, body = Slab.alone(nx, ny), HalfSpace((1.0, 1.0), layer=layer)
     assert CellSums.on(slab, body.size, body.compliance) is None
-    assert CellSums.footprint(nx, ny, 1, 0, body.size, body.compliance) == 0
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize(("nx", "ny"), [(24, 20), (41, 9), (8, 2), (9, 41)])
-def test_footprint(nx: int, ny: int) -> None:
-    """The bytes that it names are held, on any ranks."""
+def test_planned_memory(nx: int, ny: int) -> None:
+    """To the byte on a slab that only counts, on any ranks."""
     slab, body = Slab(MPI.COMM_WORLD, nx, ny), HalfSpace((1.0, 1.0))
     before = slab.tally["map bytes"]
     made = CellSums.on(slab, body.size, body.compliance)
     assert made is not None
-    said = CellSums.footprint(nx, ny, slab.comm.size, slab.comm.rank, body.size, body.compliance)
-    assert slab.tally["map bytes"] - before == said
+    planned = Slab.planned(nx, ny, slab.comm.size, slab.comm.rank)
+    _counted = CellSums.on(planned, body.size, body.compliance)
+    assert slab.tally["map bytes"] - before == planned.tally["map bytes"]
