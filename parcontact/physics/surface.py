@@ -28,8 +28,8 @@ class Surface:
     """A sum of waves and shapes on a box of `size = (lx, ly)` [m].
 
     `waves` is this rank's part of the transform of the periodic heights, or of its lowest waves (`lowest`) if there are
-    no others, or None; `periodic` wraps the shapes around the box; `scale` turns m into the unit of heights; with
-    `differences` slopes are central differences over a cell; `datum` [m] is the height from which heights are counted.
+    no others, or None; `periodic` wraps the shapes around the box; `scale` turns m into the unit of heights;
+    `datum` [m] is the height from which heights are counted.
     """
 
     slab: Slab
@@ -38,7 +38,6 @@ class Surface:
     waves: Spectrum | None = None
     shapes: Sequence[Shape] = ()
     periodic: bool = True
-    differences: bool = False
     scale: float = 1.0
     datum: float = 0.0
 
@@ -127,8 +126,8 @@ class Surface:
     def _slope_symbols(self) -> tuple[Array, Array]:
         """Symbols in place of the wavenumber in a slope; 0 at that of Nyquist, whose slope vanishes on the grid."""
         symbols = []
-        for (q, nyquist), step in zip(self._wavenumbers, self.cell, strict=True):
-            symbol = np.sin(q * step) / step if self.differences else q.copy()
+        for q, nyquist in self._wavenumbers:
+            symbol = q.copy()
             symbol[nyquist] = 0.0
             symbols.append(symbol)
         return symbols[0], symbols[1]
@@ -146,18 +145,8 @@ class Surface:
 
     def _slopes(self, shape: Shape, shift: tuple[float, float], rows: Indices, columns: Indices) -> tuple[Array, Array]:
         """Slopes of a shape at some of this rank's points."""
-
-        def near(step_x: float, step_y: float) -> tuple[Array, Array]:
-            x, y = self._distances(shape, (shift[0] - step_x, shift[1] - step_y))
-            return x[0, columns], y[rows, 0]
-
-        if not self.differences:
-            return shape.slope(*near(0.0, 0.0))
-        dx, dy = self.cell
-        return (
-            (shape.height(*near(dx, 0.0)) - shape.height(*near(-dx, 0.0))) / (2 * dx),
-            (shape.height(*near(0.0, dy)) - shape.height(*near(0.0, -dy))) / (2 * dy),
-        )
+        x, y = self._distances(shape, shift)
+        return shape.slope(x[0, columns], y[rows, 0])
 
 
 def single_wave(fft: FFT, amplitude: float, waves: tuple[int, int], phase: float) -> Spectrum:

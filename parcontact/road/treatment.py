@@ -9,26 +9,24 @@ from scipy import fft, ndimage
 from ..parallel.slab import Array
 
 OUTLIER = 16.0  # accuracy: times the median deviation of heights from their neighbours: further off gets a warning
-TAPER = 0.1  # tuning: share of each side over which a window falls to 0
 SWEEPS = 200  # accuracy: of the relaxation that fills holes smoothly
 TERMS = {"none": 0, "mean": 1, "tilt": 3, "curvature": 6}  # of 1, x, y, x^2, x y, y^2
 
 
 @dataclass(frozen=True)
 class Treated:
-    """A map without missing points; how many were `missing`, which were `outliers`, the coefficients of the `trend`
-    that was taken off, and the factor by which a window has `enlarged` the heights inside."""
+    """A map without missing points; how many were `missing`, which were `outliers`, and the coefficients of the `trend`
+    that was taken off."""
 
     heights: Array
     missing: int
     outliers: NDArray[np.bool_]
     trend: tuple[float, ...]
-    enlarged: float
 
 
 def treat(heights: Array, detrend: str, periodic: str, clip: bool = False) -> Treated:
-    """Level, fill, on request clip outliers, and make periodic: `smooth`, `window`, `mirror` (the map becomes twice as
-    long along both directions) or `none`."""
+    """Level, fill, on request clip outliers, and make periodic: `smooth`, `mirror` (the map becomes twice as long along
+    both directions) or `none`."""
     known = np.isfinite(heights)
     level, trend = remove_trend(heights, known, detrend)
     filled = fill(level, known)
@@ -36,14 +34,11 @@ def treat(heights: Array, detrend: str, periodic: str, clip: bool = False) -> Tr
     if clip and odd.any():
         filled, more = remove_trend(np.where(odd, around, filled), np.ones_like(known), detrend)
         trend = trend + more
-    enlarged = 1.0
     if periodic == "smooth":
         filled = make_periodic(filled)
-    elif periodic == "window":
-        filled, enlarged = taper(filled)
     elif periodic == "mirror":
         filled = np.pad(filled, [(0, count if count > 1 else 0) for count in filled.shape], mode="symmetric")
-    return Treated(filled, int((~known).sum()), odd, tuple(map(float, trend)), enlarged)
+    return Treated(filled, int((~known).sum()), odd, tuple(map(float, trend)))
 
 
 def rms_slope(heights: Array, size: tuple[float, float]) -> float:
@@ -96,16 +91,6 @@ def make_periodic(heights: Array) -> Array:
     symbol = 2.0 * np.cos(2 * np.pi * y) + 2.0 * np.cos(2 * np.pi * x) - 4.0
     symbol[0, 0] = np.inf
     return np.asarray(heights + fft.irfft2(fft.rfft2(jumps) / symbol, s=heights.shape))
-
-
-def taper(heights: Array) -> tuple[Array, float]:
-    """Return the map less its mean, taken to 0 at the edges by cosines and enlarged so that its mean square stays; and
-    by which factor."""
-    distances = (np.minimum(np.arange(n), np.arange(n)[::-1]) + 0.5 for n in heights.shape)
-    along_y, along_x = (0.5 - 0.5 * np.cos(np.pi * np.minimum(d / max(TAPER * d.size, 1.0), 1.0)) for d in distances)
-    weight = along_y[:, None] * along_x
-    enlarged = 1.0 / float(np.sqrt(np.mean(weight**2)))
-    return np.asarray((heights - heights.mean()) * weight * enlarged), enlarged
 
 
 def resample(

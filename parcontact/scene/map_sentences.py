@@ -25,11 +25,6 @@ def describe_treatment(prepared: Prepared) -> list[str]:
     if len(done.trend) > 1:
         tilt = [2.0 * slope / length for slope, length in zip(done.trend[1:3], size, strict=True)]
         lines.append(f"road: a tilt of {tilt[0]:.3g} along x and {tilt[1]:.3g} along y was taken off")
-    if done.enlarged > 1.0:
-        lines.append(
-            f"road: the window fades out {per_cent(treatment.TAPER)} of each side. Heights and slopes inside are "
-            f"{per_cent(done.enlarged - 1.0)} larger than measured, so that the rms height of the box stays"
-        )
     if part.short_wavelength:
         lines.append(
             f"road: waves shorter than {quantity(part.short_wavelength, 'm', 4)} were taken out (ideal low-pass)"

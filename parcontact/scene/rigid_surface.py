@@ -40,8 +40,7 @@ def make_surface(job: Job, fft: FFT) -> tuple[Surface, Told]:
     spectral = [part for part in job.surface if isinstance(part, jobs.Spectral)]
     waves = reduce(add, (_waves(part, grid, fft, told) for part in spectral)) if spectral else None
     shapes = [_round(part, grid) for part in job.surface if isinstance(part, jobs.Sphere | jobs.Cylinder)]
-    differences = job.numerics.slope == "finite-difference"
-    surface = Surface(fft.slab, fft, grid.size, waves, shapes, grid.boundary == "periodic", differences)
+    surface = Surface(fft.slab, fft, grid.size, waves, shapes, grid.boundary == "periodic")
     surface.level()
     if surface.waves is not None:
         surface.waves = lowest(surface.waves, fft, highest_waves(job))

@@ -96,7 +96,7 @@ def test_defaults(tmp_path: Path) -> None:
     (stage,) = job.history
     assert (stage.name, stage.seconds, stage.velocity) == ("stage 1", 0.0, (0.0, 0.0))
     assert (job.numerics.integrator, job.numerics.tolerance, job.numerics.max_iterations) == ("exponential", 5e-3, 500)
-    assert (job.numerics.kernel, job.numerics.precision, job.numerics.slope) == ("spectral", "double", "spectral")
+    assert (job.numerics.kernel, job.numerics.precision) == ("spectral", "double")
     assert job.numerics.accept_unconverged is False
     assert (job.output.directory, job.output.fields, job.output.every) == (Path("out/small"), (), 1)
     assert (job.output.energy, job.output.branch_dissipation) == (False, False)

@@ -258,6 +258,9 @@ OTHERS = {
     "output: {fields: [gap, gap]}": "5:24: output.fields.1 names gap a second time",
     "output: {every: 0}": "5:17: output.every must be a positive whole number of steps, got 0",
     "output: {directory: 3}": "5:21: output.directory must be the path of a directory (text), got 3",
+    "numerics: {slope: spectral}": (
+        "5:12: numerics.slope is not a known key; it went; slopes of the surface are those of its waves"
+    ),
     "output: {mesh_check: true}": (
         "5:10: output.mesh_check is not a known key; it went; `parcontact study` measures the error of the mesh, with "
         "a ladder study.mesh"

@@ -17,10 +17,10 @@ Wave = tuple[float, tuple[int, int], float]  # amplitude, waves along x and y, p
 WAVES: list[Wave] = [(A, (3, 0), 0.0), (0.5 * A, (-2, 4), 0.7), (0.3 * A, (1, -5), -2.0), (0.1 * A, (0, 2), 1.0)]
 
 
-def surface_of(slab: Slab, waves: list[Wave], differences: bool = False) -> Surface:
+def surface_of(slab: Slab, waves: list[Wave]) -> Surface:
     fft = FFT(slab)
     transform = np.sum([single_wave(fft, *wave) for wave in waves], axis=0)
-    return Surface(slab, fft, SIZE, transform, differences=differences)
+    return Surface(slab, fft, SIZE, transform)
 
 
 def heights_of(slab: Slab, waves: list[Wave], shift: tuple[float, float] = (0.0, 0.0)) -> Array:

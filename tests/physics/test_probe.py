@@ -27,9 +27,9 @@ UNITS = Units.near(2 * HEIGHT, LX, 1e6)
 PRESSURE = ALPHA * UNITS.pressure  # Pa that the number 1 in a map stands for
 
 
-def wave(comm: MPI.Intracomm, waves: tuple[int, int], differences: bool = False) -> Surface:
+def wave(comm: MPI.Intracomm, waves: tuple[int, int]) -> Surface:
     fft = FFT(Slab(comm, NX, NY))
-    surface = Surface(fft.slab, fft, (LX, LY), single_wave(fft, HEIGHT, waves, 0.0), differences=differences)
+    surface = Surface(fft.slab, fft, (LX, LY), single_wave(fft, HEIGHT, waves, 0.0))
     surface.rescale(UNITS.height)
     return surface
 

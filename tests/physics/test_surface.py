@@ -192,28 +192,11 @@ def test_force_is_the_sum_over_points(communicators: list[MPI.Intracomm], shift:
         assert_allclose(surface_of(slab, WAVES).forces(pressure, shift), expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("shapes", [False, True])
-def test_finite_differences_are_those_of_the_map(comm: MPI.Intracomm, shapes: bool) -> None:
-    """Across the edge of a periodic box too."""
-    slab = Slab(comm, 20, 13)
-    surface = surface_of(slab, WAVES, differences=True)
-    surface.shapes = [Round(R, CENTRE), Round(R, (0.0, 0.0), (1.0, 0.0), exact=True)] if shapes else []
-    shift = (1.23e-4, 4e-5)
-    whole = gathered(surface.heights(shift, slab.empty()), slab)
-    pressure = np.abs(random_map(20, 13))
-    expected = [
-        np.sum(pressure * (np.roll(whole, -1, axis) - np.roll(whole, 1, axis)) / (2 * step))
-        for axis, step in zip((1, 0), surface.cell, strict=True)
-    ]
-    assert_allclose(surface.forces(pressure[slab.rows], shift), expected, rtol=1e-10)
-
-
-@pytest.mark.parametrize("differences", [False, True])
-def test_no_force_on_a_checkerboard(comm: MPI.Intracomm, differences: bool) -> None:
+def test_no_force_on_a_checkerboard(comm: MPI.Intracomm) -> None:
     """The slope of the shortest wave is 0 at all points."""
     slab = Slab(comm, 16, 12)
     for waves in [(8, 6), (8, 0), (0, 6)]:
-        surface = surface_of(slab, [(A, waves, 0.0)], differences=differences)
+        surface = surface_of(slab, [(A, waves, 0.0)])
         pressure = np.abs(random_map(16, 12))[slab.rows]
         for shift in [(0.0, 0.0), (surface.cell[0], 0.0), (0.3 * surface.cell[0], 0.1 * surface.cell[1])]:
             assert_allclose(surface.forces(pressure, shift), [0.0, 0.0], atol=1e-12 * A / surface.cell[1])

@@ -124,7 +124,7 @@ def test_another_part_of_the_map(road: Path) -> None:
         (", size: 1.0e-3", "surface.size must be two positive lengths"),
         (", centre: 1.0e-3", "surface.centre must be two positive lengths"),
         (", detrend: slope", "surface.detrend must be none | mean | tilt | curvature, got 'slope'"),
-        (", periodic: yes", "surface.periodic must be smooth | window | mirror | none"),
+        (", periodic: yes", "surface.periodic must be smooth | mirror | none"),
         (", fill: 1", "surface.fill must be true or false"),
         (", scale: 2", "surface.scale is not a key of shape topography"),
     ],
@@ -359,7 +359,7 @@ def fine_map(tmp_path: Path) -> dict[str, object]:
     return {"shape": "topography", "path": str(tmp_path / "road.npy"), "unit": "um", "size": size}
 
 
-@pytest.mark.parametrize("periodic", ["smooth", "window", "mirror"])
+@pytest.mark.parametrize("periodic", ["smooth", "mirror"])
 @pytest.mark.parametrize("size", [0.01 * APART, 0.9 * APART, [10 * APART, 1.4 * APART]])
 def test_a_box_of_one_point(fine_map: dict[str, object], size: object, periodic: str) -> None:
     with pytest.raises(pc.InputError, match=r"the box is .* m along \w, and points of the map are 1e-05 m apart"):

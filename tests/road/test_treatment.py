@@ -60,13 +60,7 @@ def test_a_periodic_map_is_left_alone() -> None:
     assert_allclose(treatment.make_periodic(periodic), periodic, atol=0.03 * np.ptp(periodic))
 
 
-def test_windows_keep_the_mean_square_and_mirrors_everything() -> None:
-    tapered, _ = treatment.taper(ROAD)
-    assert np.abs(tapered[0]).max() < 0.01 * np.ptp(ROAD)
-    assert np.std(tapered) == pytest.approx(np.std(ROAD), rel=0.1)
-    assert np.diff(tapered[64, 20:108]) == pytest.approx(8.0 / 7.0 * np.diff(ROAD[64, 20:108]), rel=2e-3)
-    assert treatment.treat(ROAD, "none", "window").enlarged == pytest.approx(8.0 / 7.0, rel=2e-3)  # 12.8 cells
-    assert treatment.treat(ROAD, "none", "smooth").enlarged == 1.0
+def test_mirrors_keep_everything() -> None:
     mirrored = treatment.treat(ROAD, "none", "mirror").heights
     assert mirrored.shape == (256, 256)
     assert np.array_equal(mirrored[:128, :128], ROAD)

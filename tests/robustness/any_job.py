@@ -206,7 +206,7 @@ def _topography(dice: Random, scale: Scale, directory: Path) -> Json:
     if dice.random() < 0.5:
         made["detrend"] = dice.choice(["mean", "tilt", "curvature"])
     if dice.random() < 0.5:
-        made["periodic"] = dice.choice(["smooth", "window", "mirror"])
+        made["periodic"] = dice.choice(["smooth", "mirror"])
     return made
 
 
@@ -366,7 +366,6 @@ def _numerics(dice: Random, scale: Scale) -> Json:
         "tolerance": decades(dice, -7, -1),
         "kernel": "love" if scale.free else dice.choice(["spectral", "love"]),
         "precision": dice.choice(["double", "mixed"]),
-        "slope": dice.choice(["spectral", "finite-difference"]),
         "branch_error": dice.choice([0.0, 0.1]),
         "accept_unconverged": True,
     }

@@ -145,10 +145,10 @@ class Numerics(Part):
     )
     kernel: Kernel = "spectral"  # in a free scene: love
     precision: Precision = "double"
-    slope: Literal["spectral", "finite-difference"] = "spectral"
     accept_unconverged: Flag = False
     strict: Flag = False
 
+    foreign = MappingProxyType({"slope": Instead("it went; slopes of the surface are those of its waves")})
     _chosen: dict[str, float] = PrivateAttr(default_factory=dict)
 
     def model_post_init(self, context: Any) -> None:

@@ -159,7 +159,7 @@ class Topography(Part):
     ] = None  # the middle of the map
     detrend: Literal["none", "mean", "tilt", "curvature"] = "tilt"
     fill: Flag = Field(default=True, description="true or false: whether missing points are filled")
-    periodic: Literal["smooth", "window", "mirror", "none"] | None = None  # smooth; none in a free scene
+    periodic: Literal["smooth", "mirror", "none"] | None = None  # smooth; none in a free scene
 
     at_most_one = (("unit", "units"), ("size", "pixel"))
 
