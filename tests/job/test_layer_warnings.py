@@ -25,10 +25,6 @@ def warnings(thickness: float, surface: Any = WAVE, **changes: Any) -> list[str]
     return [text for text in Job.model_validate({**given, "body": body}).warnings if text not in plain]
 
 
-def test_a_layer_of_common_sense_has_no_warning() -> None:
-    assert warnings(1e-3) == warnings(1e-4) == []
-
-
 def test_a_layer_thinner_than_two_cells() -> None:
     """Where contact may have edges: not on waves alone."""
     cell, rough = 1e-3 / 64, {**ROUGH, "rms_height": 1e-7}

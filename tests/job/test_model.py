@@ -19,7 +19,6 @@ from parcontact.job import (
     added_sections,
     describe,
     load,
-    log_range,
 )
 from parcontact.job.checks.cells import cells_per_wave, has_wave
 from parcontact.job.resolved import shown_job
@@ -104,15 +103,6 @@ def test_defaults(tmp_path: Path) -> None:
     assert job.steady is None
 
 
-def test_surface_defaults(tmp_path: Path) -> None:
-    rough = "{shape: rough, hurst: 1, long_wavelength: 1e-4, short_wavelength: 5e-5, rms_height: 1e-6}"
-    job = job_of(tmp_path, replaced(SMALL, surface=f"[{rough}, {{shape: sphere, radius: 1, center: [0, 1e-4]}}]"))
-    first, second = job.surface
-    assert (first.rolloff_wavelength, first.seed, first.amplitudes) == (1e-4, 0, "random")
-    assert (first.rms_slope, first.rms_height, first.psd_constant) == (None, 1e-6, None)
-    assert (second.profile, second.center) == ("paraboloid", (0.0, 1e-4))
-
-
 def test_free_boundary_takes_the_love_kernel(tmp_path: Path) -> None:
     assert job_of(tmp_path, SMALL, "grid.boundary=free").numerics.kernel == "love"
     assert job_of(tmp_path, SMALL, "numerics={kernel: love}").numerics.kernel == "love"
@@ -124,12 +114,6 @@ def test_free_boundary_takes_the_love_kernel(tmp_path: Path) -> None:
 )
 def test_numbers(tmp_path: Path, text: str, number: float) -> None:
     assert job_of(tmp_path, SMALL, f"grid.size={text}").grid.lx == number
-
-
-def test_whole_numbers_may_have_an_exponent(tmp_path: Path) -> None:
-    points = job_of(tmp_path, SMALL, "grid.points=[1e2, 1.0]").grid.points
-    assert points == (100, 1)
-    assert all(type(n) is int for n in points)
 
 
 def test_accuracy_chooses_what_is_not_given(tmp_path: Path) -> None:
@@ -175,20 +159,6 @@ def test_the_duration_of_an_approach_follows_from_its_velocity(tmp_path: Path) -
     assert "approach -1e-06 to 2e-06 m at 1.5e-06 m/s, velocity" in listing.line(press)
 
 
-def test_complete_unloading_is_a_stage(tmp_path: Path) -> None:
-    text = replaced(SMALL.split("history")[0], history="[{pressure: 1e5}, {pressure: 0}, {approach: -1e-6}]")
-    assert [stage.load.end for stage in job_of(tmp_path, text).history] == [1e5, 0.0, -1e-6]
-
-
-def test_zener_moduli() -> None:
-    branch = ZenerBranch(G0=3e6, G1=1e6, eta1=4e3)
-    assert branch.relaxation_time == 1e-3
-    assert (branch.instant_modulus, branch.long_modulus) == (3e6, 0.75e6)
-    assert ZenerBranch(G0=3e6, G1=1e6, eta1=0.0).instant_modulus == 0.75e6
-    assert ZenerBranch(G0=3e6, G1=0.0, eta1=1.0).long_modulus == 0.0
-    assert ZenerBranch(G0=3e6, G1=1e6, eta1=math.inf).long_modulus == 3e6
-
-
 def test_a_maxwell_fluid_is_legal(tmp_path: Path) -> None:
     job = job_of(tmp_path, replaced(SMALL, material="{model: zener, branches: [{G0: 1e6, G1: 0, eta1: .inf}]}"))
     assert job.material.modulus_inf == 0.0
@@ -205,15 +175,6 @@ def test_steady_may_stand_alone(tmp_path: Path) -> None:
     assert (job.steady.velocities[0], job.steady.velocities[-1]) == (1e-3, 10.0)
     assert (job.steady.pressures, job.steady.waves) == ((1e5,), False)
     assert job.steady.unit_direction == pytest.approx((0.6, 0.8), rel=1e-15)
-
-
-def test_log_range_of_one() -> None:
-    assert log_range("2:2:1") == (2.0,)
-
-
-def test_steady_start(tmp_path: Path) -> None:
-    job = job_of(tmp_path, replaced(SMALL, initial="{state: steady, velocity: 0.01, pressure: 1e5}"))
-    assert (job.initial.state, job.initial.velocity, job.initial.pressure) == ("steady", (0.01, 0.0), 1e5)
 
 
 ROUND_TRIPS = {
@@ -249,16 +210,6 @@ def test_resolved_round_trip(tmp_path: Path, text: str) -> None:
     assert again.output.directory == job.output.directory
 
 
-def test_jobs_differ(tmp_path: Path) -> None:
-    assert job_of(tmp_path, SMALL) != job_of(tmp_path, SMALL, "history.0.pressure=2e5")
-
-
-def test_a_job_is_frozen(tmp_path: Path) -> None:
-    job = job_of(tmp_path, SMALL)
-    with pytest.raises(ValueError, match="frozen"):
-        job.title = "other"
-
-
 def test_describe_has_keys_values_and_units(tmp_path: Path) -> None:
     (tmp_path / "road.npy").touch()
     table = " ".join(describe(job_of(tmp_path, CONTRACT)).split())
@@ -268,16 +219,6 @@ def test_describe_has_keys_values_and_units(tmp_path: Path) -> None:
         "time_step (first 1e-07 s, growth 1.2)", "numerics.accept_unconverged no", "cell [9.76563e-07, 9.76563e-07] m",
     ):  # fmt: skip
         assert part in table
-
-
-def test_parts_can_be_made_without_a_file() -> None:
-    assert Stage(pressure=1e5).load == Ramp(1e5, 1e5)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="needs exactly one of pressure"):
-        Stage()
-
-
-def test_job_error_joins_its_mistakes() -> None:
-    assert str(JobError(["a", "b"])) == "a\nb"
 
 
 @pytest.mark.parametrize(

@@ -82,12 +82,6 @@ def test_two_loads_of_a_stage_are_a_ramp_or_two_stages() -> None:
     ]
 
 
-def test_duplicates_deep_inside() -> None:
-    assert mistakes_of(SMALL.replace("pressure: 1e5", "pressure: 1e5, pressure: 1e4")) == [
-        "job.yaml:5:21: history.0.pressure is given twice, first in line 5"
-    ]
-
-
 def test_a_missing_file_and_a_directory(tmp_path: Path) -> None:
     with pytest.raises(JobError, match=r"^nowhere\.yaml: cannot be read: there is no such file$"):
         load("nowhere.yaml")
@@ -295,12 +289,6 @@ def test_keys_of_a_mapping_move_together_and_mappings_multiply(path: Path) -> No
     assert str(cases[4]) == "case 4: grid.points = 32, grid.size = 0.004, history.0.pressure = 200000.0"
 
 
-def test_a_resolved_case_is_that_case(path: Path, tmp_path: Path) -> None:
-    case = cases_of(path, TOGETHER + TIMES)[4]
-    (tmp_path / "again.yaml").write_text(case.job.resolved())
-    assert load(tmp_path / "again.yaml") == case.job
-
-
 def test_a_job_without_a_sweep_is_one_case(path: Path) -> None:
     path.write_text(SMALL)
     (case,) = load_cases(path)
@@ -313,17 +301,6 @@ def test_ranges_and_a_lone_mapping(path: Path) -> None:
     cases = cases_of(path, "  history.0.pressure: 1e4:1e7:7\n")
     assert [case.job.history[0].load.start for case in cases[::2]] == [1e4, 1e5, 1e6, 1e7]
     assert cases[1].job.history[0].load.start == pytest.approx(1e4 * 10**0.5, rel=1e-11)
-
-
-def test_whole_sections_and_materials(path: Path) -> None:
-    sweep = (
-        "  - material.include: [synthetic_tyre]\n    surface: [[{shape: flat}]]\n    numerics: [{tolerance: 1e-6}]\n"
-    )
-    path.write_text(SMALL.replace("material: {model: elastic, shear_modulus: 1e6}\n", "") + f"sweep:\n{sweep}")
-    (case,) = load_cases(path)
-    assert case.job.material.model == "zener"
-    assert case.job.surface[0].shape == "flat"
-    assert case.job.numerics.tolerance == 1e-6
 
 
 def test_overrides_reach_every_case_and_the_sweep_itself(path: Path) -> None:
@@ -393,9 +370,3 @@ def test_a_mistake_of_some_cases_names_the_first_of_them(path: Path) -> None:
 def test_an_override_of_what_is_swept_is_a_mistake(path: Path) -> None:
     (found,) = sweep_mistakes(path, TIMES, "history.0.pressure=1")
     assert found.startswith("--set history.0.pressure=1: history.0.pressure is swept; change the sweep instead")
-
-
-def test_a_misspelt_sweep_is_found(path: Path) -> None:
-    path.write_text(f"{SMALL}sweeps:\n{TIMES}")
-    with pytest.raises(JobError, match=r"sweeps is not a known key; did you mean sweep\?"):
-        load_cases(path)

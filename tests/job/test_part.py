@@ -30,18 +30,15 @@ GRID = {
     "grid: {points: 64, size: [1, 0]}": "1:30: grid.size.1 must be a positive length [m], got 0",
     "grid: {points: 64, size: .inf}": "1:26: grid.size must be a positive length [m], got inf",
     "grid: {points: 64, size: 1 mm}": "1:26: grid.size must be a positive length [m], got '1 mm'; write 1.0e-3",
-    "grid: {points: 64, size: '1e-3'}": "1:26: grid.size must be a positive length [m], got '1e-3'",
     "grid: {points: 64, size: true}": "1:26: grid.size must be a positive length [m], got true",
     "grid: {points: 64, size: [1, 1, 1]}": "1:26: grid.size must be a positive length [m], got [1, 1, 1]",
-    "grid: {points: 64, size: [1]}": "1:26: grid.size must be a positive length [m], got [1]",
-    "grid: {points: 64}": "1:7: grid.size is missing; it must be a positive length [m]",
-    "grid: {points: 64, size: }": "1:25: grid.size is missing; it must be a positive length [m]",
     "grid: {points: 0, size: 1}": "1:16: grid.points must be a positive whole number of points, got 0",
     "grid: {points: 6.5, size: 1}": "1:16: grid.points must be a positive whole number of points, got 6.5",
+    "grid: {points: 64}": "1:7: grid.size is missing; it must be a positive length [m]",
+    "grid: {points: 64, size: }": "1:25: grid.size is missing; it must be a positive length [m]",
     "grid: {points: 64, size: 1, boundary: open}": "1:39: grid.boundary must be periodic | free, got 'open'",
     "grid: {pionts: 1, points: 64, size: 1}": "1:8: grid.pionts is not a known key; did you mean points?",
     "grid: {points: 64, size: 1, zz: 1}": "1:29: grid.zz is not a known key; there are points, size, boundary",
-    "grid: 64": "1:7: grid must be a mapping of keys, got 64",
 }
 
 SURFACES = {
@@ -88,7 +85,6 @@ SURFACES = {
         "2:50: surface.waves.1 must be within -32 and 32 waves for 64 points (Nyquist), got -33"
     ),
     "surface: {shape: file, path: x.csv}": "2:30: surface.path must end in .npy or .h5 or .txt, got 'x.csv'",
-    "surface: {shape: file, path: 3}": "2:30: surface.path must be the path of a .npy, .h5 or .txt file, got 3",
 }
 
 MATERIALS = {
@@ -114,21 +110,12 @@ MATERIALS = {
         "3:11: material has no stiffness at all: modulus_inf and all branches are zero; give one of them a modulus [Pa]"
     ),
     "material: {model: zener, branches: 5}": "3:36: material.branches must be a list of branches, got 5",
-    "material: {model: zener, branches: [5]}": (
-        "3:37: material.branches.0 must be a mapping of G0, G1, eta1, modulus, relaxation_time or g, tau, got 5"
-    ),
     "material: {model: zener, branches: [{g0: 5}]}": (
         "3:37: material.branches.0 must have the keys G0, G1, eta1, modulus, relaxation_time or g, tau, got g0"
     ),
     "material: {model: zener, branches: [{G0: 1, modulus: 5}]}": (
         "3:37: material.branches.0 mixes forms of a branch: give G0, G1, eta1, modulus, "
         "relaxation_time or g, tau, got G0, modulus"
-    ),
-    "material: {model: zener, branches: [{G0: 1, G1: 1, eta1: .nan}]}": (
-        "3:58: material.branches.0.eta1 must be a viscosity [Pa s] of zero or more, or .inf, got nan"
-    ),
-    "material: {model: zener, branches: [{modulus: 1, relaxation_time: 0}]}": (
-        "3:67: material.branches.0.relaxation_time must be a positive time [s], got 0"
     ),
 }
 
@@ -156,7 +143,6 @@ HISTORIES = {
     "history: [{pressure: 0}, {force: 0}]": (
         "4:22: history.0.pressure must not be zero in every stage: nothing would ever touch"
     ),
-    "history: [{pressure: 1, name: 3}]": "4:31: history.0.name must be text (put numbers in quotes), got 3",
     "history: [{pressure: {from: 1}, duration: 1, time_step: 1}]": (
         "4:22: history.0.pressure.to is missing; it must be a pressure [Pa] of zero or more"
     ),
@@ -181,9 +167,6 @@ HISTORIES = {
         "4:52: history.0.approach.velocity and a distance are both given: the duration follows from it (0.5 s); leave "
         "it out, or the distance of the stage"
     ),
-    "history: [{approach: {from: 1e-6, to: 0, velocity: -1}}]": (
-        "4:52: history.0.approach.velocity must be a positive velocity along the normal [m/s], got -1"
-    ),
     "history: [{approach: {from: 1e-6, to: 1e-6, velocity: 1}}]": (
         "4:55: history.0.approach.velocity needs two ends that differ: an approach that does not change has no velocity"
     ),
@@ -192,9 +175,6 @@ HISTORIES = {
     ),
     "history: [{pressure: 1, velocity: 1, duration: 1, time_step: auto, cells_per_step: 1}]": (
         "4:11: history.0 takes at most one of time_step | cells_per_step, got time_step and cells_per_step"
-    ),
-    "history: [{pressure: 1, duration: 1, time_step: {first: auto, growth: 2}}]": (
-        "4:57: history.0.time_step.first must be a positive time step [s], got 'auto'"
     ),
     "history: [{pressure: 1, time_step: auto}]": (
         "4:36: history.0.time_step needs a duration [s] or a distance [m]: without them a stage is one solve"
@@ -214,20 +194,8 @@ HISTORIES = {
     "history: [{pressure: 1, duration: 1, cells_per_step: 1}]": (
         "4:54: history.0.cells_per_step needs a velocity [m/s] that is not zero"
     ),
-    "history: [{pressure: 1, duration: 0, time_step: 1}]": (
-        "4:35: history.0.duration must be a positive time [s], got 0"
-    ),
-    "history: [{pressure: 1, duration: 1, time_step: fine}]": (
-        "4:49: history.0.time_step must be a positive time step [s], {first, growth}, or auto, got 'fine'"
-    ),
-    "history: [{pressure: 1, duration: 1, time_step: {first: 1, growth: 0.9}}]": (
-        "4:68: history.0.time_step.growth must be a factor [-] of one or more, got 0.9"
-    ),
     "history: [{pressure: 1, duration: 1, time_step: {first: 1}}]": (
         "4:49: history.0.time_step.growth is missing; it must be a factor [-] of one or more"
-    ),
-    "history: [{pressure: 1, velocity: [1, b]}]": (
-        "4:39: history.0.velocity.1 must be a velocity [m/s]: a number along x, or [vx, vy], got 'b'"
     ),
 }
 
@@ -250,7 +218,6 @@ OTHERS = {
         "5:24: numerics.integrator must be exponential | exponential-linear | backward-euler, got "
         "'backward_euler'; did you mean backward-euler?"
     ),
-    "numerics: {accept_unconverged: 1}": "5:32: numerics.accept_unconverged must be true or false, got 1",
     "output: {fields: [gap, presure]}": (
         "5:24: output.fields.1 must be pressure | displacement | gap | height | temperature, got 'presure'; "
         "did you mean pressure?"
@@ -278,9 +245,6 @@ OTHERS = {
     ),
     "steady: {velocities: [1, -2]}": (
         "5:26: steady.velocities.1 must be positive speeds [m/s]: a list, or first:last:count, got -2"
-    ),
-    "steady: {velocities: []}": (
-        "5:22: steady.velocities must be positive speeds [m/s]: a list, or first:last:count, got []"
     ),
     "steady: {velocities: 1, direction: [0, 0]}": (
         "5:36: steady.direction must not be zero in both components, got [0, 0]"

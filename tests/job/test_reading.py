@@ -99,12 +99,6 @@ def test_missing_sections() -> None:
 ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 2e-4, short_wavelength: 1e-4, rms_slope: 0.1}"
 
 
-@pytest.mark.parametrize("group", [("rms_slope",), ("rms_height",), ("psd_constant",)])
-def test_each_scale_of_roughness(group: tuple[str]) -> None:
-    text = SMALL.replace("{shape: wave, amplitude: 1e-6, waves: [1, 0]}", ROUGH.replace("rms_slope", group[0]))
-    assert getattr(job_of(text).surface[0], group[0]) == 0.1
-
-
 def test_roughness() -> None:
     text = SMALL.replace("{shape: wave, amplitude: 1e-6, waves: [1, 0]}", ROUGH)
     wave = "surface.short_wavelength"
@@ -131,11 +125,6 @@ def test_roughness() -> None:
         expected = sentence if sentence.startswith("job") else f"--set {override}: {sentence}"
         assert expected.replace("--set grid.size=1e-5", "job.yaml:2:78") in found
     assert job_of(text, "surface.short_wavelength=3.125e-5").surface[0].short_wavelength == 3.125e-5
-
-
-def test_nyquist_ignores_a_direction_with_one_point() -> None:
-    text = SMALL.replace("{shape: wave, amplitude: 1e-6, waves: [1, 0]}", ROUGH)
-    assert job_of(text, "grid.points=[64, 1]").grid.ny == 1
 
 
 def test_checks_between_sections_run_beside_other_mistakes() -> None:

@@ -13,26 +13,12 @@ from .texts import SMALL, mistakes_of, with_material, with_stage, with_surface
 ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 2e-4, short_wavelength: 1e-4, rms_slope: 0.1, seed: %s}"
 
 
-@pytest.mark.parametrize("value", ["false", "3", "0.5", "{a: 1}"])
-def test_a_scalar_where_a_list_of_fields_is_due(tmp_path: Path, value: str) -> None:
-    (mistake,) = mistakes_of(tmp_path, f"{SMALL}output: {{fields: {value}}}\n")
-    assert mistake.startswith("job.yaml:6:18: output.fields must be pressure")
-
-
 @pytest.mark.parametrize("value", ["false", "3", "text", "{a: 1}"])
 def test_a_scalar_where_a_list_of_stages_or_branches_is_due(tmp_path: Path, value: str) -> None:
     (mistake,) = mistakes_of(tmp_path, SMALL.partition("history")[0] + f"history: {value}\n")
     assert mistake.startswith("job.yaml:4:10: history must be a list of stages, got ")
     (mistake,) = mistakes_of(tmp_path, with_material(f"{{model: zener, modulus_inf: 1, branches: {value}}}"))
     assert mistake.startswith("job.yaml:3:52: material.branches must be a list of branches, got ")
-
-
-def test_two_wrong_names_of_fields_are_two_mistakes(tmp_path: Path) -> None:
-    found = mistakes_of(tmp_path, f"{SMALL}output: {{fields: [presure, dispalcement, gap, gap]}}\n")
-    assert len(found) == 3
-    assert "got 'presure'; did you mean pressure?" in found[0]
-    assert "got 'dispalcement'; did you mean displacement?" in found[1]
-    assert found[2].endswith("output.fields.3 names gap a second time")
 
 
 @pytest.mark.parametrize(
@@ -128,11 +114,6 @@ def test_only_regular_files_of_bounded_size_are_read(tmp_path: Path) -> None:
 def test_names_of_jobs_that_no_file_can_have(name: str) -> None:
     with pytest.raises(JobError, match="cannot be read: "):
         load(name)
-
-
-def test_a_long_override_is_shortened(tmp_path: Path) -> None:
-    (mistake,) = mistakes_of(tmp_path, SMALL, f"grid.points={'9' * 100_000}")
-    assert len(mistake) < 400
 
 
 @pytest.mark.parametrize(
