@@ -118,7 +118,10 @@ def _plot(add: Add) -> None:
     add("--over", choices=("time", "distance", "velocity", "load", "approach"), default="", help=text)
     add("--log", metavar="x,y", type=values.names, default=(), help="logarithmic axes: x, y, x,y or none")
     add("--compare", action="store_true", help="several directories in one picture, comparison.png")
-    text = "a movie of this map over its saved instants instead (GIF): pressure, displacement, gap or height"
+    text = (
+        "a movie of this map over its saved instants instead: pressure, displacement, gap or height; a GIF, and an MP4"
+    )
+    text += " where ffmpeg is"
     add("--movie", metavar="FIELD", default="", help=text)
     text = "draw the maps saved after this step (a whole number), or nearest to this time [s]; default: the last ones"
     add("--at", metavar="TIME|STEP", type=values.instant, help=text)

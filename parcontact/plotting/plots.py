@@ -12,22 +12,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from ..errors import InputError
 from ..job.reading import CASES
-from ..storage import files, hdf5
+from ..storage import hdf5
 from ..summary import sweep_table, theory_settings
-from . import charts, histories, maps, steady, style, sweep, units
+from . import charts, histories, maps, movie, steady, style, sweep, units
 from .charts import Chart
-from .run import PlottedRun, label_frames
+from .run import PlottedRun
 
 PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy", "leakage", "steady", "maps")
 MEASURES = "measures.csv"
-FRAMES = 200  # of a movie at most: instants in between are left out
-SECONDS = 8.0  # for which a movie plays, unless its frames are too few
-FASTEST, SLOWEST = 20, 2  # frames per second
 
 
 @dataclass(frozen=True)
@@ -72,7 +68,7 @@ def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> l
         raise InputError("--out names one picture: give one directory, or --compare several in one")
     with style.drawing():
         if options.movie:
-            return [_write_movie(directory, options) for directory in directories]
+            return [path for one in directories for path in movie.write(one, options.movie, options.out)]
         if options.compare:
             return [_save(_draw_comparison(directories, options), Path("comparison"), options)]
         return [_save(_draw_directory(directory, options), directory / "picture", options) for directory in directories]
@@ -98,37 +94,6 @@ def _save(figure: Figure, stem: Path, options: PlotOptions = PlotOptions()) -> P
         return style.save(figure, target, kind)
     except OSError as error:
         raise InputError(f"cannot write {target}: {hdf5.reason(error)}") from error
-
-
-def _write_movie(directory: Path, options: PlotOptions) -> Path:
-    """Write all saved instants of a map as a GIF, with one range of colours."""
-    path, name = directory / "fields.h5", options.movie
-    target = options.out or directory / f"{name}.gif"
-    if target.suffix != ".gif":
-        raise InputError(f"--movie writes a GIF: --out must end in .gif, got {target}")
-    try:
-        with hdf5.open_results(path) as file:
-            run = PlottedRun(directory)
-            labels = label_frames(run, file)
-            there = [key for key in maps.LOOKS if key in file]
-            if name not in there or not labels:
-                raise InputError(f"{path} holds no map of {name}; it holds {', '.join(there) or 'none'}")
-            chosen = choose_evenly(labels, FRAMES)
-            duration = int(1000 / np.clip(round(len(chosen) / SECONDS), SLOWEST, FASTEST))  # of a frame [ms]
-            with files.replaced(target, files.is_marked) as movie:
-                first, *others = maps.draw_frames(file, name, chosen, run.job)
-                look: dict[str, Any] = {"append_images": others, "duration": duration, "loop": 0}
-                first.save(movie, "GIF", save_all=True, comment=files.MARK.encode(), **look)
-    except hdf5.FAILURES as error:
-        raise InputError(f"no movie from {path}: {hdf5.reason(error)}") from error
-    return target
-
-
-def choose_evenly(labels: dict[int, str], most: int) -> dict[int, str]:
-    """Return at most so many instants, evenly, the first and the last among them."""
-    indices = list(labels)
-    kept = np.linspace(0, len(indices) - 1, min(len(indices), most)).astype(int)
-    return {indices[k]: labels[indices[k]] for k in kept}
 
 
 def _draw_directory(directory: Path, options: PlotOptions) -> Figure:

@@ -149,6 +149,13 @@ class Fields:
         return int(self.saved[order[0]])
 
 
+def choose_evenly(labels: dict[int, str], most: int) -> dict[int, str]:
+    """Return at most so many instants, evenly, the first and the last among them."""
+    indices = list(labels)
+    kept = np.linspace(0, len(indices) - 1, min(len(indices), most)).astype(int)
+    return {indices[k]: labels[indices[k]] for k in kept}
+
+
 def label_frames(run: PlottedRun, file: h5py.File) -> dict[int, str]:
     """Return when each map of a run was saved, and what pressed then, by its index."""
     fields = Fields(file)

@@ -15,8 +15,7 @@ from .. import progress
 from ..columns import STEADY, SWEEP, UNITS
 from ..job import Job
 from ..plotting import histories, maps, steady, style, sweep, units
-from ..plotting.plots import choose_evenly
-from ..plotting.run import Fields, PlottedRun, find_curve_job, find_free_area, label_frames, to_load
+from ..plotting.run import Fields, PlottedRun, choose_evenly, find_curve_job, find_free_area, label_frames, to_load
 from ..storage import hdf5, marker, tables
 from ..summary import leak_stop, pull_off, slide, sweep_table, theory_beside, theory_settings
 from .parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri

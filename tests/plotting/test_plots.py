@@ -217,7 +217,7 @@ def test_movie(tmp_path: Path, kind: str) -> None:
         (["--out", "picture.docx"], "pictures are png, pdf, svg"),
         (["--out", "nowhere/picture.png"], "cannot write nowhere/picture.png"),
         (["--movie", "height"], "no map of height; it holds pressure, gap"),
-        (["--movie", "gap", "--out", "gap.mp4"], "must end in .gif"),
+        (["--movie", "gap", "--out", "gap.avi"], "must end in .gif or .mp4, got gap.avi"),
         (["--over", "distance"], "nothing to draw over distance"),
         (["--over", "velocity"], "the surface slides in no stage"),
         (["there", "--out", "one.png"], "--compare"),
