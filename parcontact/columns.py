@@ -424,7 +424,7 @@ SWEEP: Table = tuple(
         ),
         Column(
             *("pull_off_error", "N"),
-            "by how much the loads of the steps before and after it differ from it",
+            "error of it by the steps and the solves",
             when="adhesion",
         ),
         Column("pull_off_approach", "m", "approach at it", when="adhesion"),

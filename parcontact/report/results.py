@@ -46,9 +46,10 @@ def describe_run(directory: Path) -> ReportSection:
         if values and (run.job.directions or not name.startswith("friction"))
     ]
     numbers = ReportTable(("measure", "in the end", "smallest", "largest", "unit"), rows)
+    box = run.job.grid.lx * run.job.grid.ly
     told = [
         *slide.describe(run.job.history, run.job.initial, run.job.grid.dx, columns),
-        *pull_off.describe(columns, run.job.grid.lx * run.job.grid.ly, bool(marker.detached(directory))),
+        *pull_off.describe(columns, box, run.job.numerics.tolerance, bool(marker.detached(directory))),
         *leak_stop.describe(directory),
         theory_settings.describe(directory),
     ]

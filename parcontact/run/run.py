@@ -201,11 +201,12 @@ class Run:
         slides = any(stage.speed for stage in self.job.history)
         self._log_counts()
         if self.slab.root and (slides or adhesion is not None) and not self.stop:
-            grid = self.job.grid
+            grid, tolerance = self.job.grid, self.job.numerics.tolerance
+            box = grid.lx * grid.ly
             with suppress(OSError, InputError):  # a table that cannot be read now ends no run
                 rows = tables.read(self.directory.path / "measures.csv")
                 told = slide.describe(self.job.history, self.job.initial, grid.dx, rows)
-                for text in (*told, *pull_off.describe(rows, grid.lx * grid.ly, bool(self.march.detached))):
+                for text in (*told, *pull_off.describe(rows, box, tolerance, bool(self.march.detached))):
                     console.say(text)
         for line in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
             console.say(line)

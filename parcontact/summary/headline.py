@@ -51,11 +51,11 @@ def _friction(job: Job, columns: Columns) -> Iterator[str]:
 
 
 def _pull_off(job: Job, columns: Columns, detached: bool) -> Iterator[str]:
-    """Yield the force of the last pull-off and by how much the loads of the steps next to it differ."""
+    """Yield the force of the last pull-off and its error by steps and solves."""
     lost = [pull for pull in pull_off.find(columns, detached) if pull.lost is not None]
     if lost:
         box = job.grid.lx * job.grid.ly
-        force, within = -columns["pressure"][lost[-1].row] * box, lost[-1].beside * box
+        force, within = -lost[-1].pressure * box, lost[-1].error(job.numerics.tolerance) * box
         yield f"the pull-off force is {quantity(force, 'N', 4)} ± {quantity(within, 'N', 2)}"
 
 

@@ -165,8 +165,9 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield f"  last row: {', '.join(last)}"
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.3g} s"
     if job is not None:
+        box = job.grid.lx * job.grid.ly
         yield from (f"  {text}" for text in slide.describe(job.history, job.initial, job.grid.dx, columns))
-        yield from (f"  {text}" for text in pull_off.describe(columns, job.grid.lx * job.grid.ly, bool(came_off)))
+        yield from (f"  {text}" for text in pull_off.describe(columns, box, job.numerics.tolerance, bool(came_off)))
     yield from (f"  {text}" for text in leak_stop.describe(table.parent))
 
 

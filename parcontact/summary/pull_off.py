@@ -1,4 +1,15 @@
-"""Pull-offs: the loads at which surfaces that stick came off, from the rows of a run."""
+"""Pull-offs: the loads at which surfaces that stick came off, from the rows of a run.
+
+The largest tension lies between steps. With loads that are a and b higher at the times s before and t after the row of
+the lowest load, the vertex of the parabola through the three lies lower than that row by
+
+    e = (b s/t - a t/s)^2/(4 (s + t) (a/s + b/t)).
+
+It is the load of the pull-off, with the error e, and SOLVER times the tolerance of the solves. Chosen steps of spheres
+that were pulled off at seven rates, at accuracies from 0.1 to 0.005, were within that of 1500 equal steps in all cases.
+The lowest load that was held is the pull-off where no further row has one, where the contact snaps, and of a contact
+that holds: the load of the step before says then what is left open.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -9,38 +20,48 @@ from numpy.typing import NDArray
 from ..printed import quantity
 
 SAME_LOAD = 1e-9  # rounding: relative: loads this close are the same
+SOLVER = 0.25  # accuracy: of the tolerance of the solves, relative error of the load
+SNAP = 0.5  # accuracy: of the largest tension: where more is lost in a step, no parabola is near the loads
 LEAST_PULL = 1e-9  # accuracy: of the highest pressure, below which a mean pressure is what rounding leaves of 0
 
 Columns = Mapping[str, Sequence[float]]
+Values = NDArray[np.float64]
 
 
 class PullOff(NamedTuple):
-    """The row of the lowest load of a pull, by how much the loads of the rows beside it differ from that [Pa], and the
-    first row without contact: the one after the last where the run ended with it, None where contact holds."""
+    """The row of the lowest load of a pull, the lowest load and what the steps leave open of it, as mean pressures
+    [Pa], and the first row without contact: the one after the last where the run ended with it, None where contact
+    holds."""
 
     row: int
-    beside: float
+    pressure: float
+    between: float
     lost: int | None
+
+    def error(self, tolerance: float) -> float:
+        """Return the error of the load [Pa] by the steps and by the `tolerance` of the solves."""
+        return self.between - SOLVER * tolerance * self.pressure
 
 
 def find(columns: Columns, detached: bool = False) -> list[PullOff]:
-    """Return the pull-offs of a run in their order, from its columns `pressure`, `max_pressure`, `approach` and
-    `contact_area`; it may have ended as its surfaces `detached`.
+    """Return the pull-offs of a run in their order, from its columns `time`, `pressure`, `max_pressure`, `approach`
+    and `contact_area`; it may have ended as its surfaces `detached`.
 
     A pull begins where the surfaces of a contact are nearest, or when they last came nearer before it was lost: an
     earlier pull that it has held is no pull-off. It ends where the surfaces part no more: those that have come off may
     pull each other harder than before, and what they do when they come near again is not of the pull.
     """
-    pressure, approach, area = (np.asarray(columns[name], float) for name in ("pressure", "approach", "contact_area"))
+    names = "time", "pressure", "approach", "contact_area"
+    time, pressure, approach, area = (np.asarray(columns[name], float) for name in names)
     touching = np.concatenate([[False], area > 0.0, [False]])
     changes = np.flatnonzero(touching[1:] != touching[:-1]).tolist()
     last = len(area) if detached else len(area) - 1  # row at which a contact was lost at the latest
-    pulls = [_find(pressure, approach, last, *ends) for ends in zip(changes[::2], changes[1::2], strict=True)]
+    pulls = [_find(time, pressure, approach, last, *ends) for ends in zip(changes[::2], changes[1::2], strict=True)]
     least = -LEAST_PULL * np.asarray(columns["max_pressure"], float)
-    return [pull for pull in pulls if pressure[pull.row] < least[pull.row]]
+    return [pull for pull in pulls if pull.pressure < least[pull.row]]
 
 
-def _find(pressure: NDArray[np.float64], approach: NDArray[np.float64], last: int, start: int, end: int) -> PullOff:
+def _find(time: Values, pressure: Values, approach: Values, last: int, start: int, end: int) -> PullOff:
     """Return the lowest load of a contact from the row `start` to before the row `end`, lost if that is not after the
     `last` one."""
     begin, stop, lost = start + int(np.argmax(approach[start:end])), end, end <= last
@@ -49,8 +70,22 @@ def _find(pressure: NDArray[np.float64], approach: NDArray[np.float64], last: in
     while stop < len(approach) and approach[stop] < approach[stop - 1] and pressure[stop]:  # 0 where nothing held
         stop += 1
     row = begin + int(np.argmin(pressure[begin:stop]))
-    near = pressure[max(row - 1, start) : min(row + 2, stop)]
-    return PullOff(row, float(np.abs(near - pressure[row]).max()), end if lost else None)
+    held = end if lost else None
+    if lost and start < row < stop - 1 and pressure[row + 1] < (1.0 - SNAP) * pressure[row]:
+        below = _below(np.diff(time[row - 1 : row + 2]), pressure[row - 1 : row + 2])
+        return PullOff(row, float(pressure[row]) - below, below, held)
+    near = pressure[row - 1] if row > start else pressure[row + 1] if row + 1 < stop else pressure[row]
+    return PullOff(row, float(pressure[row]), float(near - pressure[row]), held)
+
+
+def _below(steps: Values, loads: Values) -> float:
+    """Return by how much the parabola through three loads, of which the second is the lowest, is lower than it."""
+    (before, after), (left, right) = steps, (loads[0] - loads[1], loads[2] - loads[1])
+    if min(before, after) <= 0.0 or left + right == 0.0:
+        return 0.0
+    falls, rises = left / before, right / after
+    slope = (rises * before - falls * after) / (before + after)
+    return slope**2 * (before + after) / (4.0 * (falls + rises))
 
 
 def choose_row(columns: Columns, detached: bool = False) -> int:
@@ -63,15 +98,17 @@ def choose_row(columns: Columns, detached: bool = False) -> int:
     return pulls[-1].row if pulls else int(np.flatnonzero(pressure >= (1.0 - SAME_LOAD) * pressure.max())[-1])
 
 
-def describe(columns: Columns, area: float, detached: bool = False) -> Iterator[str]:
-    """Yield a sentence for each pull-off, and for the largest pull of a contact that holds; `area` is the box [m^2]."""
+def describe(columns: Columns, area: float, tolerance: float, detached: bool = False) -> Iterator[str]:
+    """Yield a sentence for each pull-off, and for the largest pull of a contact that holds; `area` is the box [m^2],
+    solves have the `tolerance`."""
     pulls = find(columns, detached)
     many = sum(pull.lost is not None for pull in pulls) > 1
-    for number, (row, beside, lost) in enumerate(pulls, 1):
-        pressure, time, approach = (columns[name][row] for name in ("pressure", "time", "approach"))
+    for number, pull in enumerate(pulls, 1):
+        row, pressure, _, lost = pull
+        time, approach = (columns[name][row] for name in ("time", "approach"))
         load = f"{quantity(-pressure * area, 'N', 4)} ({quantity(-pressure, 'Pa', 4)})"
         where = f"at t = {quantity(time, 's', 4)}, approach {quantity(approach, 'm', 4)}"
-        within = f"the steps beside it differ by {quantity(beside * area, 'N', 2)}"
+        within = f"its error by steps and solves is {quantity(pull.error(tolerance) * area, 'N', 2)}"
         if lost is None:
             yield f"largest pull so far: {load}, {where}; contact holds"
             continue

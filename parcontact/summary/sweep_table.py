@@ -154,14 +154,13 @@ def _last(values: Sequence[float]) -> float:
 
 
 def _pull_off(case: Case, columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Return the last pull-off of a case [N], by how much the loads of the steps beside it differ [N], and its approach
-    [m]; nothing where contact holds."""
+    """Return the last pull-off of a case and its error [N], and its approach [m]; nothing where contact holds."""
     lost = [each for each in pull_off.find(columns, bool(marker.detached(case.job.output.directory))) if each.lost]
     if not lost:
         return {}
-    pressure, approach = (columns[name][lost[-1].row] for name in ("pressure", "approach"))
-    area = case.job.grid.lx * case.job.grid.ly
-    return dict(zip(SECTIONS["adhesion"], (-pressure * area, lost[-1].beside * area, approach), strict=True))
+    area, pull, approach = case.job.grid.lx * case.job.grid.ly, lost[-1], columns["approach"][lost[-1].row]
+    error = pull.error(case.job.numerics.tolerance)
+    return dict(zip(SECTIONS["adhesion"], (-pull.pressure * area, error * area, approach), strict=True))
 
 
 def _points(case: Case) -> Iterator[dict[str, Any]]:

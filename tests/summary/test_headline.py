@@ -55,12 +55,13 @@ def test_a_press(tmp_path: Path) -> None:
 
 
 def test_a_pull_off_is_told_with_the_area_at_it(tmp_path: Path) -> None:
-    """The last load is 0 and nothing touches. The box has 4 mm²."""
+    """The last load is 0 and nothing touches. The box has 4 mm². The parabola through 2, -3 and -2.5 Pa is lowest at
+    -3 - 2.25^2/11 Pa; the tolerance adds 0.25 of 0.5 %."""
     out = ran(tmp_path, WAVE + ELASTIC + "history: [{pressure: 1.0e3}, {pressure: 2.0e3}]\n")
     loads, areas = [2.0, -3.0, -2.5, 0.0], [0.3, 0.2, 0.1, 0.0]
     rows = zip(range(4), loads, areas, strict=True)
     replace_rows(out, *((float(k), 0, load, 0, area, area, -k * 1e-6, 9) for k, load, area in rows))
-    force = "The pull-off force is 12 µN ± 20 µN"
+    force = "The pull-off force is 13.84 µN ± 1.9 µN"
     assert headline.describe(out) == f"{force}; the contact area is 20.0 ± 1.0 % of the nominal area at t = 1 s."
 
 
@@ -189,6 +190,11 @@ def table(*rows: tuple[float, float, float]) -> Columns:
     return {"time": [float(row) for row in range(len(rows))], **found}
 
 
+def where(columns: Columns, detached: bool = False) -> list[tuple[int, int | None]]:
+    """Rows of pull-offs, and of their ends."""
+    return [(pull.row, pull.lost) for pull in find(columns, detached)]
+
+
 NEAR = [
     (0.0, -5e-6, 0.0),
     (-9.0, -1e-6, 0.0),
@@ -200,61 +206,86 @@ OFF = [(-0.5, -3e-6, 0.0), (-0.1, -5e-6, 0.0)]
 
 
 def test_by_approach() -> None:
+    """Loads of 2, -3 and -2.5 Pa have a parabola of 2.75 t^2 - 2.25 t - 3 Pa, whose vertex is 2.25^2/11 Pa lower."""
     rows = table(*NEAR, *PULL, *OFF)
-    assert find(rows) == [PullOff(4, 5.0, 6)]
-    where = "pull-off: 1.5 N (3 Pa), at t = 4 s, approach -1 µm; the steps beside it differ by 2.5 N"
-    assert list(describe(rows, 0.5)) == [f"{where}, and contact was lost by t = 6 s"]
+    (pull,) = find(rows)
+    below = 2.25**2 / 11.0
+    assert (pull.row, pull.lost) == (4, 6)
+    assert (pull.pressure, pull.between) == pytest.approx((-3.0 - below, below), rel=1e-14)
+    text = "pull-off: 1.73 N (3.46 Pa), at t = 4 s, approach -1 µm; its error by steps and solves is 230 mN"
+    assert list(describe(rows, 0.5, 1e-9)) == [f"{text}, and contact was lost by t = 6 s"]
+
+
+@pytest.mark.parametrize("before", [0.2, 1.0, 3.0])
+@pytest.mark.parametrize("late", [-0.3, 0.0, 0.4])
+def test_the_vertex_of_a_parabola(before: float, late: float) -> None:
+    """Loads on a parabola give its lowest value from steps of any lengths, and 0.25 of the tolerance is their error."""
+    time = np.array([-before - 1.0, -before, 0.0, 1.0, 2.0])
+    pressure = (0.5 * (time - late) ** 2 - 7.0).tolist()
+    row = int(np.argmin(pressure))
+    found = {"time": time.tolist(), "pressure": pressure, "max_pressure": [9.0] * 5, "approach": (-time).tolist()}
+    (pull,) = find({**found, "contact_area": [0.3, 0.2, 0.1, 0.0, 0.0]})
+    assert pull.pressure == pytest.approx(-7.0, rel=1e-14)
+    assert pull.between == pytest.approx(pressure[row] + 7.0, abs=1e-14)
+    assert pull.error(0.02) == pytest.approx(pull.between + 0.25 * 0.02 * 7.0, rel=1e-12)
+
+
+def test_a_contact_that_snaps() -> None:
+    """No parabola is near a load of which more than half is lost at once; the step before says what is left open."""
+    rows = table(*NEAR, (-2.9, -1e-6, 0.2), (-3.0, -1e-6, 0.2), *OFF)
+    assert find(rows) == [PullOff(5, -3.0, pytest.approx(0.1), 6)]
 
 
 def test_surfaces_that_pull_hardest_when_they_have_come_off() -> None:
     """A stiff sphere pulls so: its lowest load is behind the end of contact, but not on the way back."""
     rows = table(*NEAR, *PULL, (-4.0, -3e-6, 0.0), (-2.0, -4e-6, 0.0), (-6.0, -3e-6, 0.0))
-    assert find(rows) == [PullOff(6, 2.0, 6)]
+    assert where(rows) == [(6, 6)]
 
 
 def test_a_contact_under_tension_throughout() -> None:
     """Its load is highest at the end of the pull, where little still holds."""
     under_tension = [(-1.0, -1e-6, 0.1), (-2.0, 0.0, 0.3), *PULL, (-0.5, -3e-6, 0.05)]
-    assert find(table(*under_tension, *OFF)) == [PullOff(2, 1.0, 5)]
-    assert find(table(*under_tension)) == [PullOff(2, 1.0, None)]
+    assert where(table(*under_tension, *OFF)) == [(2, 5)]
+    assert find(table(*under_tension)) == [PullOff(2, -3.0, 1.0, None)]
 
 
 def test_under_a_load() -> None:
-    """What is beside the last load that held is the one before: open surfaces carry none."""
+    """The load before the last one that held says what is left open: open surfaces carry none."""
     rows = table(*NEAR, *PULL, (0.0, -5e-6, 0.0), (0.0, -5e-6, 0.0))
-    assert find(rows) == [PullOff(4, 5.0, 6)]
-    assert find(table(*NEAR[:-1], (-2.0, 0.0, 0.1), (-2.5, 0.0, 0.1), (0.0, -5e-6, 0.0))) == [PullOff(4, 0.5, 5)]
+    assert where(rows) == [(4, 6)]
+    rows = table(*NEAR[:-1], (-2.0, 0.0, 0.1), (-2.5, 0.0, 0.1), (0.0, -5e-6, 0.0))
+    assert find(rows) == [PullOff(4, -2.5, 0.5, 5)]
 
 
 def test_flat_surfaces_are_pulled_at_no_approach() -> None:
-    (text,) = describe(table((0.0, 0.0, 1.0), (-2.0, -0.0, 1.0)), 1.0)
+    (text,) = describe(table((0.0, 0.0, 1.0), (-2.0, -0.0, 1.0)), 1.0, 1e-9)
     assert "approach 0 m" in text
 
 
 def test_two_pulls() -> None:
     rows = table(*NEAR, *PULL, *OFF, *NEAR, (-2.0, 0.0, 0.1), *OFF)
-    first, second = find(rows)
-    assert (first, second) == (PullOff(4, 5.0, 6), PullOff(12, 4.0, 13))
-    assert [text.split(":")[0] for text in describe(rows, 1.0)] == ["pull-off 1", "pull-off 2"]
+    assert where(rows) == [(4, 6), (12, 13)]
+    assert [text.split(":")[0] for text in describe(rows, 1.0, 1e-9)] == ["pull-off 1", "pull-off 2"]
 
 
 def test_a_pull_that_was_held_is_no_pull_off() -> None:
     """Rubber holds a fast pull, and comes off slowly under less."""
     again = [(-8.0, -1e-6, 0.2), (1.0, 0.0, 0.2), *PULL]
-    assert find(table(*NEAR, *again, *OFF)) == [PullOff(6, 4.0, 8)]
-    assert find(table(*NEAR, *again)) == [PullOff(4, 10.0, None)]
+    assert where(table(*NEAR, *again, *OFF)) == [(6, 8)]
+    assert find(table(*NEAR, *again)) == [PullOff(4, -8.0, 10.0, None)]
 
 
 def test_a_contact_that_holds_has_none() -> None:
-    (held,) = describe(table(*NEAR, *PULL), 0.5)
+    (held,) = describe(table(*NEAR, *PULL), 0.5, 1e-9)
     assert held == "largest pull so far: 1.5 N (3 Pa), at t = 4 s, approach -1 µm; contact holds"
 
 
 def test_a_run_that_ended_with_its_contact_has_one() -> None:
     """The load after the last row was held by nothing."""
-    assert find(table(*NEAR, *PULL), detached=True) == [PullOff(4, 5.0, 6)]
-    (told,) = describe(table(*NEAR, *PULL), 1.0, detached=True)
-    assert told.endswith("the steps beside it differ by 5 N, and nothing held the next load")
+    rows = table(*NEAR, (-2.0, -1e-6, 0.2), (-2.25, -1e-6, 0.2))
+    assert find(rows, detached=True) == [PullOff(5, -2.25, 0.25, 6)]
+    (told,) = describe(rows, 1.0, 1e-9, detached=True)
+    assert told.endswith("its error by steps and solves is 250 mN, and nothing held the next load")
 
 
 def test_nothing_is_said_without_a_pull() -> None:
