@@ -300,7 +300,8 @@ def schema(options: argparse.Namespace) -> int:
     from ..job import added_sections
     from ..job import schema as job_schema
 
-    for text in added_sections.unusable():
+    unknown = (f"{added_sections.whose(name)} {reason}" for name, reason in job_schema.without_schema().items())
+    for text in (*added_sections.unusable(), *unknown):
         print(f"warning: {text}; the schema is without it", file=sys.stderr)
     print(json.dumps(job_schema.schema(), indent=1))
     return DONE

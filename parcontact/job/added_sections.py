@@ -50,8 +50,12 @@ def naming_effect(section: str) -> Iterator[None]:
     except (InputError, RunError):
         raise
     except (Exception, SystemExit) as error:
-        whose = f"the effect {section} ({_registered()[section].value})"
-        raise RunError(f"{whose} has failed: {type(error).__name__}: {error}") from error
+        raise RunError(f"{whose(section)} has failed: {type(error).__name__}: {error}") from error
+
+
+def whose(section: str) -> str:
+    """Return the name of the effect of a section, and where its class is."""
+    return f"the effect {section} ({_registered()[section].value})"
 
 
 def is_ours(section: str) -> bool:

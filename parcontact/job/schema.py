@@ -78,9 +78,20 @@ class SchemaOfKeys(GenerateJsonSchema):
         return {**found, **low, "maximum": most}
 
 
+def without_schema() -> dict[str, str]:
+    """Return why sections of effects have no schema, by their names."""
+    reasons = {}
+    for name, effect in added_sections.find_effects().items():
+        try:
+            effect.section.model_json_schema(schema_generator=SchemaOfKeys)
+        except (Exception, SystemExit) as error:  # whatever the code of somebody else does
+            reasons[name] = f"has no JSON schema: {type(error).__name__}: {str(error).splitlines()[0]}"
+    return reasons
+
+
 def schema() -> Schema:
-    """Return the schema of a whole job, with the sections of all effects that are installed."""
-    kind = extended(tuple(added_sections.find_effects()))
+    """Return the schema of a whole job, with the sections of all effects that are installed and have one."""
+    kind = extended(tuple(name for name in added_sections.find_effects() if name not in without_schema()))
     found = kind.model_json_schema(schema_generator=SchemaOfKeys)
     properties = found["properties"]
     properties["material"] = {"anyOf": [_included(found["$defs"]), properties["material"]]}

@@ -22,6 +22,7 @@ from ..steady_sliding import curve
 from ..steady_sliding.heating import describe_hot
 from ..steady_sliding.point import Point
 from ..steady_sliding.table import describe_missed
+from ..storage import wisdom
 from ..storage.curve_points import Wanted
 from .given_jobs import Given, all_ranks, read, warn
 from .wording import python_words
@@ -96,6 +97,7 @@ def steady(
     slab = Slab(all_ranks(comm), *found.grid.points)
     with python_words():
         wanted = curve.request(found, *asked.values())
+    wisdom.recall(curve.transforms_of(found), slab, None)
     sliding = make_states(found, slab)
     for text in sliding.doubts(wanted.temperatures):
         if slab.root:

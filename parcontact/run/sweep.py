@@ -189,8 +189,12 @@ def to_do(chosen: Sequence[Case], afresh: bool) -> list[Job]:
 
 
 def refuse_foreign(cases: Sequence[Case]) -> None:
-    """Raise InputError where the files of others, or of another job, are in the directory of a sweep; root only."""
+    """Raise InputError where the files of others, or of another job, are in the directory of a sweep, or a link in
+    place of the directory of a case; root only."""
     directory, first = _directory(cases), cases[0]
+    for path in (directory / CASES, *(case.job.output.directory for case in cases)):
+        if path.is_symlink():
+            raise InputError(f"{path} is a link, through which no case is written: remove it, or give --out")
     try:
         claims = marker.read(directory)
         entries = [path.name for path in directory.iterdir()] if directory.is_dir() else []

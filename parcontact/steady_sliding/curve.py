@@ -17,7 +17,7 @@ from ..parallel.root import on_root
 from ..parallel.signals import Signals
 from ..parallel.slab import Array, Slab
 from ..scene import Setup, sanity
-from ..storage import curve_points, hdf5, marker, stopfile
+from ..storage import curve_points, hdf5, marker, stopfile, wisdom
 from ..storage.console import always
 from ..storage.curve_points import Wanted
 from ..storage.directory import ADVICE, Directory
@@ -113,6 +113,11 @@ def on_one_grid(job: Job, slab: Slab) -> States:
     return SteadySliding(scene.set_up(job, slab))
 
 
+def transforms_of(job: Job) -> list[Any]:
+    """Return the facts that decide, beside the number of ranks, which transforms a curve has."""
+    return [*scene.choices(job).transforms, "curve"]
+
+
 def run(
     job: Job,
     slab: Slab,
@@ -135,7 +140,10 @@ def run(
         plain = _identity(job, wanted) if slab.root else {}
         directory.refuse_foreign(job.path, plain, restart == "never")
         goes_on = restart != "never" and on_root(slab.comm, lambda: _goes_on(directory, plain))
+        transforms = transforms_of(job)
+        wisdom.recall(transforms, slab, None)
         sliding = make(job, slab)
+        wisdom.keep(transforms, slab)
         doubts = sliding.doubts(wanted.temperatures)
         directory.make(job.path, job.resolved(), marker.Claim(plain))
         if not goes_on:

@@ -73,6 +73,18 @@ def test_the_rest_works_without_it(main: Main, changed: Callable[[str, str], Non
     assert re.fullmatch(r"warning: wear .*cannot be used: SyntaxError.*; the schema is without it\n", said)
 
 
+def test_a_section_without_a_schema(main: Main, changed: Callable[[str, str], None]) -> None:
+    """Its keys are of a class of somebody's own, of which JSON has none: the sentence names the effect."""
+    key = next(line for line in shown().splitlines() if line.strip().startswith("coefficient: "))
+    changed(key, "    model_config = {'arbitrary_types_allowed': True}\n    coefficient: np.ndarray")
+    code, printed, said = main("schema")
+    assert code == 0
+    assert json.loads(printed)["properties"].keys() & {"wear", "interface"} == {"interface"}
+    assert said.startswith("warning: the effect wear (tread_wear:Wear) has no JSON schema: PydanticInvalidFor")
+    assert said.endswith("; the schema is without it\n")
+    assert said.count("\n") == 1
+
+
 FAILURES = {
     "in a step": ("def follow(self, instant", "ZeroDivisionError: division by zero"),
     "to end the program": ("def values(self, memory", "SystemExit: 0"),

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from sweeping import JOB, table
 
 from parcontact.__main__ import main
-from parcontact.errors import InUseError, RunError
+from parcontact.errors import InputError, InUseError, RunError
 from parcontact.job import Case, Job, load_cases
 from parcontact.parallel.groups import Groups
 from parcontact.parallel.signals import Signals
@@ -232,6 +232,19 @@ def test_another_jobs_directory_is_refused(cases: tuple[Case, ...], capsys: pyte
         assert told in capsys.readouterr().err
     assert sorted(Path(".").rglob("*")) == before
     sweep.refuse_foreign(cases)  # the directory of its own job, which may be there already
+
+
+@pytest.mark.parametrize("planted", ["cases", "cases/001"])
+def test_nothing_is_written_through_a_link_in_place_of_a_case(
+    cases: tuple[Case, ...], tmp_path: Path, planted: str
+) -> None:
+    """Where a directory of cases, or of a case, should be."""
+    elsewhere, link = tmp_path / "elsewhere", cases[0].job.output.directory.parent.parent / planted
+    elsewhere.mkdir()
+    link.parent.mkdir(parents=True, exist_ok=True)
+    link.symlink_to(elsewhere)
+    with pytest.raises(InputError, match=rf"{planted} is a link, through which no case is written"):
+        sweep.refuse_foreign(cases)
 
 
 def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_path: Path) -> None:

@@ -514,7 +514,7 @@ def test_the_pull_off_is_within_its_error_at_all_accuracies(duration: float) -> 
         numerics = {"accuracy": accuracy}
         _, rows = marched({**job, "numerics": numerics, "history": [press, rest, {**pull, **steps}]})
         names = "pressure", "max_pressure", "approach", "contact_area"
-        (found,) = find({"time": [row.time for row in rows], **{name: column(rows, name) for name in names}})
+        (found,) = find({"time": [row.time for row in rows]} | {name: column(rows, name).tolist() for name in names})
         return found
 
     exact = pulled(0.002, time_step=duration / 1500)

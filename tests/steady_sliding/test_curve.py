@@ -12,6 +12,7 @@ from mpi4py import MPI
 from parcontact import job as jobs
 from parcontact.errors import InputError
 from parcontact.march.loop import run as run_march
+from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding import start as steadystart
 from parcontact.steady_sliding.curve import request
@@ -125,6 +126,24 @@ def test_curve_from_the_command_line(run_parcontact: Callable, tmp_path: Path) -
         assert power == pytest.approx(-force * speed, rel=1e-9)
     assert len(columns["velocity"]) == 6
     assert (tmp_path / "out/wave/steady.png").stat().st_size > 0
+
+
+def test_a_curve_made_again_has_the_same_transforms(
+    cache: Path, main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """FFTW measures which are the fastest, and others have other last digits. Those of the first run are kept: all of
+    a second one, in which none may be measured, are there, and both tables are the same to the last digit."""
+    (tmp_path / "job.yaml").write_text(ROUGH.replace("points: 128", "points: 48"))
+
+    def curve(out: str) -> list[dict[str, str]]:
+        pyfftw.forget_wisdom()
+        assert main("steady", "job.yaml", "--velocities", "0.1,0.2", "--out", out, "--quiet")[0] == 0
+        return [{**row, "seconds": ""} for row in rows(tmp_path / out / "steady.csv")]
+
+    found, make = curve("one"), pyfftw.FFTW
+    known = lambda *given: make(*given[:-1], (*given[-1], "FFTW_WISDOM_ONLY"))  # noqa: E731
+    monkeypatch.setattr(pyfftw, "FFTW", known)
+    assert curve("other") == found
 
 
 def test_shares_of_wavelengths_add_up(main: Main, tmp_path: Path) -> None:
