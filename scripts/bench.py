@@ -11,16 +11,13 @@
     slide    sliding over a rough surface with twelve branches, by one cell a step; with peers, beside them with eight
     march    the velocity step of the paper's Fig. 8 on two ranks: a step over its transforms, and what it holds
     steady   steady sliding from a cold start, and along a curve of eight velocities per decade
-    folded   what branches without a map save, and what friction is then wrong by
-    effects  what each effect adds to a step at equal iterations; --picture draws it
     flow     leakage through the gap of a contact of 30 %, along x and along y: for --points 2048
-    start    the command line, over an interpreter that only imports numpy
     scale    a transform, a cold solve and a sliding step on two ranks, over one
     sizes    a cold solve and a sliding step on 256 x 256 points and on ever finer grids, over N^2 log2 N
     large    a cold elastic solve at 8 % contact to a pressure error of 1e-5: for --points 8192
 
 Operator calls are those on the finest grid, coarser ones counted by their share of its points. Times of one process are
-CPU times, those of `march`, `scale` and `start` wall times. What is compared takes turns, round by round;
+CPU times, those of `march` and `scale` wall times. What is compared takes turns, round by round;
 shown are the median, and of the ratios of each round the median and the quartiles. The pressure error is the relative
 L2 distance from a solution to 1e-11, for every program alike, that of friction from steps to a tolerance of 5e-5,
 beside peers 1e-7. `--peers DIRECTORY` installs tamaas, aspher and Adhesion there, each in an environment of its own,
@@ -40,26 +37,16 @@ from pathlib import Path
 import runs
 from bench.adhesive import adhesion
 from bench.dilute import dilute, free
-from bench.effects import effects
 from bench.leakage import flow
-from bench.program import start
 from bench.scaling import WORLD, march, scale
-from bench.slides import folded, slide, steady
+from bench.slides import slide, steady
 from bench.solves import large, sizes, solve
 from bench.table import Line
 
 FEWEST = 64  # points along a side
 BUSY = 0.5  # cores at work before the benchmark, above which it warns
-PARTS = {"solve": solve, "slide": slide, "steady": steady, "effects": effects, "start": start}
-PARTS |= {
-    "folded": folded,
-    "sizes": sizes,
-    "large": large,
-    "adhesion": adhesion,
-    "dilute": dilute,
-    "free": free,
-    "flow": flow,
-}
+PARTS = {"solve": solve, "slide": slide, "steady": steady, "sizes": sizes, "large": large, "adhesion": adhesion}
+PARTS |= {"dilute": dilute, "free": free, "flow": flow}
 ON_TWO_RANKS = {"march": march, "scale": scale}
 
 
@@ -93,10 +80,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--points", type=int, default=512, help="along x and y")
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("--json", type=Path, help="write the lines into this file, too")
-    parser.add_argument(
-        "--peers", type=Path, help="compare with tamaas, aspher and Adhesion, installed into this directory"
-    )
-    parser.add_argument("--picture", type=Path, help="draw the effects, like jobs/pictures/ablation.png")
+    parser.add_argument("--peers", type=Path, help="compare with other programs, installed into this directory")
     parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
     asked = parser.parse_args()
     if unknown := set(asked.parts) - set(names):

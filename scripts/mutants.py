@@ -2,11 +2,9 @@
 
     .venv/bin/python scripts/mutants.py [--count 40] [--seed 0] [--list] [part ...]
 
-A part is a file of the program that has tests of its own (see `tests_of`). In each a place is drawn at random
-in a function: an operator, a comparison, a sign, a number or a limit is changed to a wrong one. No line of the source
-is named here, so that the code may be written anew. Some changes alter nothing that matters (a limit that is never met,
-a guard against what cannot happen): of all, at least `SEEN` must be seen. Works on a copy of the last commit in a
-temporary directory. Some ten seconds a change.
+A part is a file of the program that has tests of its own (see `tests_of`). In each an operator, a comparison, a sign,
+a number or a limit in a function, drawn at random, is changed to a wrong one. Some changes alter nothing that matters:
+of all, at least `SEEN` must be seen. Works on a copy of the last commit. Some ten seconds a change.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Parts `slide`, `folded` and `steady`: sliding step by step and directly.
+"""Parts `slide` and `steady`: sliding step by step and directly.
 
 The slide beside peers has eight branches and backward Euler, as tamaas can do it too: relaxation times from 1e-4 to
 1e3, moduli of 2 each over a long-term modulus of 1, in a box of length 1 at a velocity of 1, by one cell a step.
@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from runs import ROOT, Json, begun, marched
+from runs import Json, begun, marched
 
 import parcontact as pc
 from parcontact import scene
@@ -30,7 +30,6 @@ DEFAULT, EXACT = 5e-3, 5e-5  # tolerances of a job that gives none, and of one t
 LARGER = (0.1, 0.05, 0.02, 0.01)
 ERROR = 1e-3  # of friction
 FEWEST = 8  # steps: the first ones are not like the others
-FOLDED = (0.0, 1e-5, 1e-4, 1e-3, 1e-2)  # errors of friction that are allowed
 FIRST, LATER = 12, 48  # steps beside peers
 PRESSURE = 0.165  # beside peers, for 7 to 9 % of contact
 RELAXATION_TIMES = [10.0**k for k in range(-4, 4)]
@@ -111,23 +110,6 @@ def _beside_peers(points: int, directory: Path) -> Iterator[Line]:
     given = {"heights": heights, "slope": slope, "friction": exact[:FIRST], "load": PRESSURE, "wanted": ERROR}
     given |= {"relaxation_times": np.array(RELAXATION_TIMES), "modulus": MODULUS}
     yield from compare_peers(directory, PEERS, given, ours)
-
-
-def folded(points: int, *_: object) -> Iterator[Line]:
-    """The surface of jobs/velocity_step.yaml slides at 3 m/s over 0.5 mm, with more and more branches folded. The error
-    of friction is its largest difference from that with all branches, over its last value, solved to 1e-8."""
-    stage = "history=[{pressure: 1.0e5, velocity: 3.0, distance: 5.0e-4, cells_per_step: 1}]"
-    sets = [f"grid.points={points}", "initial={state: virgin}", "output={}", stage, "numerics.tolerance=1e-8"]
-    for allowed in FOLDED:
-        march = begun(ROOT / "jobs" / "velocity_step.yaml", [*sets, f"numerics.branch_error={allowed!r}"])
-        rows, clock = marched(march)
-        friction = np.array([row.measures.friction for row in rows])
-        if not allowed:
-            whole, seconds = friction, clock[-1] - clock[0]
-        yield Line(f"allowed {allowed:g}: branches with a map", len(march.scene.folded.kept))
-        yield Line(f"allowed {allowed:g}: bound of the error", march.scene.folded.bound)
-        yield Line(f"allowed {allowed:g}: error of friction", float(abs(friction - whole).max() / whole[-1]))
-        yield Line(f"allowed {allowed:g}: time over that of all branches", (clock[-1] - clock[0]) / seconds)
 
 
 def steady(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
