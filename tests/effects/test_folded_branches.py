@@ -19,7 +19,6 @@ from parcontact import scene
 from parcontact.effects.folded_branches import (
     FoldedBranches,
     TimeScales,
-    bounded_error,
     fold_branches,
     frozen_errors,
     memoryless_errors,
@@ -214,16 +213,6 @@ def test_a_longer_job_has_the_same_memoryless_branches() -> None:
     assert sorted((len(found.frozen) for found in chosen), reverse=True) == [len(found.frozen) for found in chosen]
 
 
-@pytest.mark.parametrize("unit", [2.0**600, 2.0**-600])
-def test_any_unit_of_time(unit: float) -> None:
-    """A rubber slower by a factor on which everything happens slower by it has the same errors: to 1e-12, rounding."""
-    other = Prony(TYRE.modulus_inf, TYRE.moduli, TYRE.relaxation_times * unit)
-    slower = FAST_SLIDE._replace(duration=FAST_SLIDE.duration * unit, shortest=FAST_SLIDE.shortest * unit)
-    expected, found = (fold_branches(*both, "exponential", 1e-3) for both in ((TYRE, FAST_SLIDE), (other, slower)))
-    assert found.kept == expected.kept
-    assert found.bound == pytest.approx(expected.bound, rel=1e-12)
-
-
 # -- what it saves and costs -------------------------------------------------------------------------------------------
 
 
@@ -380,10 +369,3 @@ def test_the_log_says_what_is_folded(tmp_path: Path) -> None:
     bound = scene.choices(sliding(numerics={"branch_error": 1e-2})).folded.bound
     assert "branches: 1 of 4 are followed in time; those of 1e-06 s are too fast to remember; those of 3, 10" in log
     assert f"Error of friction at most {100 * bound:.2g} % (numerics.branch_error allows 1 %)" in log
-
-
-@pytest.mark.parametrize(("bound", "told"), [(2e-3, "0.2 %"), (1e-131, "0.0001 %")])
-def test_a_bound_is_no_closer_to_0_than_matters(bound: float, told: str) -> None:
-    found = FoldedBranches((), (0,), (), bound, 1e-2)
-    assert bounded_error(found, slides=True) == f"error of friction at most {told}"
-    assert bounded_error(found, slides=False) == f"error of the modulus at most {told}"

@@ -10,7 +10,6 @@ from mpi4py import MPI
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
-from parcontact.datafiles import open_numbers
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
 from parcontact.physics import heightfile
@@ -170,15 +169,6 @@ def test_only_these_rows_are_held(comm: MPI.Intracomm, shared_path: Path) -> Non
     rows = heightfile.read(path, "", slab)
     assert rows.shape == slab.shape
     assert rows.base is None  # not a view into the whole file
-
-
-def test_a_file_that_ends_early(tmp_path: Path) -> None:
-    """What its header tells is not there: a sentence, not that of the memory map."""
-    np.save(tmp_path / "heights.npy", np.zeros((NY, NX)))
-    whole = (tmp_path / "heights.npy").read_bytes()
-    (tmp_path / "heights.npy").write_bytes(whole[:-1])
-    with pytest.raises(InputError, match="it ends before the last of its values"):
-        open_numbers(tmp_path / "heights.npy")
 
 
 def test_types_that_are_no_numbers(comm: MPI.Intracomm, shared_path: Path) -> None:

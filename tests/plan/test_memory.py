@@ -1,6 +1,5 @@
 """The memory that a plan tells: to the byte what each rank holds and a checkpoint has."""
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -56,24 +55,6 @@ def test_too_large_for_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where there is no memory for any grid, nothing is tried."""
     monkeypatch.setattr(memory, "free_bytes", lambda: 1000)
     assert choose_grid(job(), 1, 10.0) is None
-
-
-@pytest.mark.parametrize(("points", "unit"), [(64, "MB"), (2**15, "GB")])
-def test_units_of_memory(points: int, unit: str) -> None:
-    """A number that a reader can take in: never one of seven digits."""
-    head, *rows, _ = report.maps(job(grid={"points": points}), [1, 64])
-    assert head.startswith(f"memory per rank [{unit}]")
-    assert all(0.0 <= float(number) < 1e6 for row in rows for number in row.split()[-2:])
-    assert all("e+" not in row for row in rows)
-
-
-def test_a_million_ranks_are_counted_at_once() -> None:
-    """No list of all ranks is made: that took 4 s each time, 8 s here, and a plan does so a hundred times."""
-    planned = job(**JOBS["free"])
-    began = time.process_time()
-    held = memory.total(planned, 10**6), memory.total(planned, 10**7)
-    assert time.process_time() - began < 3.0
-    assert held[0] == held[1] > 0
 
 
 @pytest.mark.parametrize("points", [(512, 512), (96, 2048)])

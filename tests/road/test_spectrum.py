@@ -270,12 +270,6 @@ def test_mistakes_of_a_table(tmp_path: Path, text: str, more: str, told: str) ->
         heights_of(load(tmp_path, text, more))
 
 
-def test_a_table_that_is_not_there(tmp_path: Path) -> None:
-    (tmp_path / "job.yaml").write_text(JOB.format(more=""))
-    with pytest.raises(InputError, match="must be an existing file"):
-        jobs.load(tmp_path / "job.yaml")
-
-
 # -- cells per shortest wave of measured surfaces, from their spectra, in what is said of them and in their -----------
 
 SLIDE = {"pressure": 1e5, "velocity": 0.3, "distance": 1e-4, "cells_per_step": 1}

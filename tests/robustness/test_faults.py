@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -211,38 +210,6 @@ def test_vanished_directory(runs: Runs, tmp_path: Path) -> None:
     assert "Traceback" not in errors
 
 
-@contextmanager
-def small_disk(where: Path, kilobytes: int) -> Iterator[Callable[[], None]]:
-    """A file system of a given size; the function that it gives makes it larger."""
-    where.mkdir()
-    if os.geteuid() or subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", where]).returncode:
-        pytest.skip("needs to mount a file system")
-
-    def enlarge() -> None:
-        subprocess.run(["mount", "-o", "remount,size=100m", where], check=True)
-
-    try:
-        yield enlarge
-    finally:
-        subprocess.run(["umount", where], check=True)
-
-
-@pytest.mark.parametrize("kilobytes", [40, 350, 550])
-def test_full_disk(runs: Runs, tmp_path: Path, whole: Path, kilobytes: int) -> None:
-    """No room for the fields, for the first checkpoint, for a later one: one clear message; with room it goes on."""
-    with small_disk(tmp_path / "disk", kilobytes) as enlarge:
-        out = tmp_path / "disk" / "out"
-        code, errors = ended(runs.start(out, ranks=1))
-        assert code in (1, BAD_INPUT), errors
-        assert "No space left on device" in errors.splitlines()[-1]
-        assert "Traceback" not in errors
-        saved = len(list((out / "checkpoint").glob("step-*.h5")))
-        assert ("the newest checkpoint is" in errors) == (saved > 0)
-        enlarge()
-        runs.finish(out, ranks=1)
-        assert steps(out) == steps(whole)
-
-
 @pytest.mark.parametrize("place", ["measures.csv", "fields.h5"])
 def test_read_only_file(runs: Runs, tmp_path: Path, place: str) -> None:
     out = tmp_path / "out"
@@ -370,16 +337,6 @@ def wait_for(process: subprocess.Popen[str], there: Callable[[], bool]) -> None:
 
 def newest(out: Path) -> int:
     return max((int(path.stem[5:]) for path in out.glob("checkpoint/step-*.h5")), default=-1)
-
-
-def test_hang_up(here: Path, outside_mpi: dict[str, str]) -> None:
-    """SIGHUP, of a terminal that is closed, saves and ends with 3."""
-    process = start(["job.yaml", "--out", "out", *LONG], outside_mpi)
-    wait_for(process, lambda: rows(here / "out") > 3)
-    process.send_signal(signal.SIGHUP)
-    assert process.communicate(timeout=SECONDS)[1] == ""
-    assert process.returncode == AGAIN
-    assert newest(here / "out") == rows(here / "out") - 1
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])

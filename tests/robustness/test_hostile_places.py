@@ -171,15 +171,6 @@ def test_directory_for_scratch_files_that_cannot_be(
     assert not (here / "out").exists()
 
 
-@pytest.mark.parametrize("text", ["", "[]", "grid: 1\nmaterial: {}\n", "title: x\n"])
-def test_what_to_cite_for_a_damaged_job(here: Path, main: Main, text: str) -> None:
-    (here / "out").mkdir()
-    (here / "out" / "job.resolved.yaml").write_text(text)
-    code, _, said = main("cite", "out")
-    assert code == BAD_INPUT
-    assert said.startswith("parcontact: out/job.resolved.yaml is damaged: ")
-
-
 @pytest.mark.parametrize(("verb", "column"), [("report", "seconds"), ("report", "operator_calls"), ("info", "step")])
 def test_table_without_a_column(here: Path, main: Main, verb: str, column: str) -> None:
     assert main("job.yaml", "--quiet", "--out", "out")[0] == DONE

@@ -15,7 +15,6 @@ from conftest import outside
 from parcontact import private
 
 NOBODY, SOMEBODY = 65534, 65533  # users other than the one who runs the tests
-ROOT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
 as_others = pytest.mark.skipif(os.geteuid() != 0, reason="only root can be somebody else")
 
@@ -180,12 +179,3 @@ def test_code_that_somebody_prepared_is_not_loaded(common: Path) -> None:
     assert second.returncode == 0, second.stderr
     assert second.stdout == "None None\n"
     assert not payload.exists()
-
-
-def test_mpirun_without_a_home() -> None:
-    """It takes the user's own, never a directory that others may fill."""
-    clean = outside.environment()
-    clean.pop("HOME")
-    words: list[str | Path] = [BIN / "mpirun", "-n", "1", sys.executable, "-c", "import os; print(os.environ['HOME'])"]
-    said = subprocess.run(words, env=clean, capture_output=True, text=True)
-    assert said.stdout.strip() == os.path.expanduser("~" + subprocess.check_output(["id", "-un"], text=True).strip())
