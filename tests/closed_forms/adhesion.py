@@ -41,25 +41,7 @@ def sphere_approach(contact_radius: Values, radius: Values, work: Values, contac
     return np.asarray(contact_radius**2 / radius - np.sqrt(2 * np.pi * work * contact_radius / contact_modulus))
 
 
-def sphere_contact_radius(force: Values, radius: Values, work: Values, contact_modulus: Values) -> Array:
-    """a in m, stable under a force (N) of at least the pull-off; nan below it."""
-    tension = 3 * np.pi * work * radius  # twice the pull-off
-    load = force + tension + np.sqrt(2 * tension * force + tension**2)
-    return np.asarray(np.cbrt(3 * radius * load / (4 * contact_modulus)))
-
-
-def sphere_pull_off(radius: Values, work: Values) -> Array:
-    """-3/2 pi w R in N: the lowest force, reached under load and under approach control alike."""
-    return np.asarray(-1.5 * np.pi * work * radius)
-
-
 # JKR: cylinder and flat punch
-
-
-def cylinder_force(half_width: Values, radius: Values, work: Values, contact_modulus: Values) -> Array:
-    """P/L in N/m for a contact of half width a (m); in equilibrium, stable or not."""
-    hertz = np.pi * contact_modulus * np.square(half_width) / (4 * radius)
-    return np.asarray(hertz - np.sqrt(2 * np.pi * contact_modulus * work * half_width))
 
 
 def cylinder_pull_off(radius: Values, work: Values, contact_modulus: Values) -> Array:

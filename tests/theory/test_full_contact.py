@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from closed_forms import step_responses
 from numpy.testing import assert_allclose
-from rubbers import TWELVE_DECADES, ZENER, complex_modulus, relaxation
-from scipy.integrate import quad
-from scipy.optimize import minimize_scalar
+from rubbers import TWELVE_DECADES, ZENER, complex_modulus
 
 from parcontact.physics.prony import Integrator, Prony, discrete_modulus
 from parcontact.theory import full_contact
@@ -43,6 +41,12 @@ def test_steady_table(row: tuple[float, ...]) -> None:
     assert_allclose(-np.angle(amplitude) / K, 1e-6 * shift, rtol=4e-5)
 
 
+def stepped_friction(v: float, cells: float, integrator: Integrator) -> np.ndarray:
+    """Friction of the table's wave with a number of cells per step."""
+    wave, dt = (HEIGHT, ALONG, ACROSS), cells * CELL / v
+    return step_responses.discrete_friction_coefficient(MEAN, *wave, v, 0.0, dt, *ZENER, integrator=integrator)
+
+
 @pytest.mark.parametrize("row", STEADY)
 def test_friction_table(row: tuple[float, ...]) -> None:
     """Printed to 7 digits."""
@@ -53,96 +57,9 @@ def test_friction_table(row: tuple[float, ...]) -> None:
     assert_allclose(stepped_friction(v, 1.0, "exponential-linear"), exponential, rtol=3e-7)
 
 
-def stepped_friction(v: float, cells: float, integrator: Integrator) -> np.ndarray:
-    """Friction of the table's wave with a number of cells per step."""
-    wave, dt = (HEIGHT, ALONG, ACROSS), cells * CELL / v
-    return step_responses.discrete_friction_coefficient(MEAN, *wave, v, 0.0, dt, *ZENER, integrator=integrator)
-
-
-@pytest.mark.parametrize(
-    ("integrator", "order"), [("backward-euler", 1), ("exponential-linear", 2), ("exponential", 3)]
-)
-def test_friction_with_ever_smaller_steps(integrator: Integrator, order: int) -> None:
-    exact = full_contact.friction_coefficient(MEAN, HEIGHT, ALONG, ACROSS, FAST, 0.0, *ZENER)
-    errors = [stepped_friction(FAST, cells, integrator) - exact for cells in (0.25, 0.125)]
-    assert_allclose(errors[0] / errors[1], 2**order, rtol=0.02)
-
-
 # changes of velocity: before, after (m/s), 1e4 F/P0 at TIMES, its largest size and when (ms)
 
 TIMES = 1e-3 * np.array([0, 0.1, 0.2, 0.5, 1, 1.5, 2, 3, 5, 10, 30])
-FASTER = [-1.9449, -3.59, -5.0487, -8.3897, -11.18, -11.779, -11.39, -10.224, -9.6941, -9.771, -9.7709]
-STARTED = [0, -1.8566, -3.5199, -7.4113, -10.853, -11.791, -11.524, -10.321, -9.6891, -9.771, -9.7709]
-STOPPED = [-9.7709, -8.8411, -7.9997, -5.9264, -3.5945, -2.1802, -1.3223, -0.48646, -0.065836, -0.0004436, -9.1432e-13]
-REVERSED = [-9.7709, -7.8229, -5.9097, -0.63082, 5.8867, 9.4625, 10.871, 10.734, 9.7336, 9.7717, 9.7709]
-VELOCITY_STEPS = [
-    (0.004, FAST, FASTER, 11.78, 1.471),
-    (0, FAST, STARTED, 11.802, 1.571),
-    (FAST, 0, STOPPED, 9.7709, 0),
-    (FAST, -FAST, REVERSED, 11.081, 2.356),
-]
-
-
-def signed_friction(modulus: np.ndarray) -> np.ndarray:
-    """1e4 times traction over mean pressure for the table's wave, at any number of times."""
-    return 1e4 * full_contact.traction(HEIGHT, ALONG, ACROSS, modulus)[..., 0] / MEAN
-
-
-@pytest.mark.parametrize(("before", "after", "table", "peak", "peak_time"), VELOCITY_STEPS)
-def test_velocity_step_table(before: float, after: float, table: list[float], peak: float, peak_time: float) -> None:
-    """Printed to 5 digits, and to 1 us."""
-
-    def friction(t: float | np.ndarray) -> np.ndarray:
-        return signed_friction(step_responses.velocity_step_modulus(t, before * ALONG, after * ALONG, *ZENER))
-
-    assert_allclose(friction(TIMES), table, rtol=6e-5, atol=1e-15)
-    bounds = (max(0, 1e-3 * (peak_time - 1)), 1e-3 * (peak_time + 1))
-    best = minimize_scalar(lambda t: -np.abs(friction(t)), bounds=bounds, options={"xatol": 1e-9})
-    assert_allclose(-best.fun, peak, rtol=6e-5)
-    assert_allclose(best.x, 1e-3 * peak_time, rtol=0, atol=6e-7)
-
-
-TWO_TERMS = Prony(0.2e6, np.array([2e6, 1e6]), np.array([1e-3, 3e-4]))
-
-
-def remembered(omega: float, start: float, end: float, now: float) -> complex:
-    """The decaying part of int G(now - s) du(s) from start to end, with u = exp(i omega s)."""
-
-    def rate(s: float) -> complex:
-        decaying = relaxation(now - s, *TWO_TERMS) - TWO_TERMS.modulus_inf
-        return complex(decaying * 1j * omega * np.exp(1j * omega * s))
-
-    return complex(quad(rate, start, end, limit=400, complex_func=True)[0])
-
-
-@pytest.mark.parametrize(("before", "after"), [(300.0, 2000.0), (1000.0, -1000.0), (500.0, 0.0)])
-def test_velocity_step_by_boltzmann_integral(before: float, after: float) -> None:
-    """M(t) u(t) = int G(t-s) du(s), with u = exp(i omega s) on either side of 0; 40 ms before are all of the past."""
-    t = 0.7e-3
-    stress = remembered(before, -0.04, 0, t) + remembered(after, 0, t, t)
-    stress += TWO_TERMS.modulus_inf * np.exp(1j * after * t)
-    expected = step_responses.velocity_step_modulus(t, before, after, *TWO_TERMS)
-    assert_allclose(stress * np.exp(-1j * after * t), expected, rtol=1e-9)
-
-
-def test_load_rest_slide_by_boltzmann_integral() -> None:
-    """As before, where u jumps from 0 to 1 at the load and rests."""
-    t, rest, omega = 0.7e-3, 0.4e-3, 2000.0
-    stress = relaxation(t + rest, *TWO_TERMS) + remembered(omega, 0, t, t)
-    stress = stress + TWO_TERMS.modulus_inf * (np.exp(1j * omega * t) - 1)
-    expected = step_responses.load_rest_slide_modulus(t, rest, omega, *TWO_TERMS)
-    assert_allclose(stress * np.exp(-1j * omega * t), expected, rtol=1e-9)
-
-
-def test_velocity_step_ends() -> None:
-    """It starts from the steady state before, whatever comes after, and ends in the steady state after."""
-    before, after = np.array([10.0, 300.0, -5.0]), np.array([2e3, 0.0, 5.0])
-    steady = [complex_modulus(omega, *ZENER) for omega in (before, after)]
-    modulus = step_responses.velocity_step_modulus(np.array([0.0, 1.0]), before, after, *ZENER)
-    assert_allclose(modulus, steady, rtol=1e-13)
-    assert step_responses.velocity_step_modulus(TIMES, before, after, *TWELVE_DECADES).shape == (11, 3)
-
-
 # maps of many waves
 
 NX, NY, LX, LY, VX, VY = 48, 40, 2e-3, 1e-3, 0.03, -0.02
@@ -191,24 +108,6 @@ def test_sums_over_waves_are_means_over_the_map(heights: np.ndarray) -> None:
     assert_allclose(step_responses.pressure_variance(*waves, modulus), p.var(), rtol=1e-12)
     mu = full_contact.friction_coefficient(MEAN, *waves, VX, VY, *TWELVE_DECADES)
     assert_allclose(mu, -(traction @ [VX, VY]) / np.hypot(VX, VY) / MEAN, rtol=1e-12)
-
-
-def test_march_of_a_map(heights: np.ndarray) -> None:
-    """One cell per step along x until steady, backward Euler, mode by mode: the discrete friction."""
-    kx, ky = 2 * np.pi * np.fft.fftfreq(NX, LX / NX), 2 * np.pi * np.fft.fftfreq(NY, LY / NY)[:, None]
-    spectrum, dt = np.fft.fft2(heights), LX / NX / VX
-    keep = 1 / (1 + dt / ZENER.relaxation_times[0])
-    memory, last = np.zeros_like(spectrum), np.zeros_like(spectrum)
-    for n in range(120):
-        now = spectrum * np.exp(-1j * kx * n * VX * dt)
-        memory, last = keep * (memory + ZENER.moduli[0] * (now - last)), now
-    p = np.fft.ifft2(2 * np.hypot(kx, ky) * (ZENER.modulus_inf * now + memory)).real
-    mu = -np.mean(p * np.fft.ifft2(1j * kx * now).real) / MEAN
-    waves = full_contact.waves(heights, LX, LY)
-    expected = step_responses.discrete_friction_coefficient(
-        MEAN, *waves, VX, 0.0, dt, *ZENER, integrator="backward-euler"
-    )
-    assert_allclose(mu, expected, rtol=1e-11)
 
 
 def test_waves_across_the_velocity_give_no_friction() -> None:

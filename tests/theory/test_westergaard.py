@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from closed_forms import step_responses
 from numpy.testing import assert_allclose
-from rubbers import ZENER
 from scipy.integrate import quad
 
 from parcontact.theory import westergaard
@@ -26,28 +24,6 @@ def test_contact_fraction_table() -> None:
     loads = np.array([0.01, 0.05, 0.1, 0.3, 0.5, 0.9, 0.99])
     table = [0.0637686, 0.143566, 0.204833, 0.369010, 0.5, 0.795167, 0.936231]
     assert_allclose(westergaard.contact_fraction(loads * FULL, *WAVE), table, rtol=5e-6)  # printed to 6 digits
-
-
-def test_load_step_table() -> None:
-    """10 kPa on a Zener body; printed to 6 digits."""
-    times = 1e-3 * np.array([0, 0.1, 0.3, 1, 2, 3, 5, 7.5, 10])
-    table = [0.248411, 0.259927, 0.281553, 0.346848, 0.423332, 0.488657, 0.601705, 0.730937, 0.885175]
-    assert_allclose(
-        step_responses.load_step_contact_fraction(times, 1e4, AMPLITUDE, WAVELENGTH, *ZENER), table, rtol=3e-6
-    )
-
-
-def test_load_step_reaches_full_contact() -> None:
-    time = step_responses.load_step_full_contact_time(1e4, AMPLITUDE, WAVELENGTH, *ZENER)
-    # J(t) = 4 pi Delta/(p lambda) by hand: J = 1/G0 + (1 - exp(-t/10 ms))/G1
-    needed = 4 * np.pi * AMPLITUDE / (1e4 * WAVELENGTH)
-    assert_allclose(time, -1e-2 * np.log1p(-(needed - 1 / 2.75e6) * 2.75e6 / 9), rtol=1e-12)
-    assert_allclose(time, 10.695e-3, rtol=1e-4)
-    around = time * np.array([1 - 1e-6, 1 + 1e-6])
-    fractions = step_responses.load_step_contact_fraction(around, 1e4, AMPLITUDE, WAVELENGTH, *ZENER)
-    assert 0.999 < fractions[0] < fractions[1] == 1
-    assert step_responses.load_step_full_contact_time(1e3, AMPLITUDE, WAVELENGTH, *ZENER) == np.inf
-    assert step_responses.load_step_full_contact_time(1e5, AMPLITUDE, WAVELENGTH, *ZENER) == 0
 
 
 @pytest.mark.parametrize("load", [*PARTIAL, 1.01, 3.0])
