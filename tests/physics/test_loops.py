@@ -22,79 +22,12 @@ from parcontact.physics.units import Units
 NY, NX = 5, 7
 BOUNDS = 0.0, np.inf
 OFFSETS = [0, 1, 3, NX - 1, NX, 2 * NX + 2, -1, -NX - 3]
-MAPS = [(NY, NX), (1, 1), (0, NX)]
-
-
 def maps(count: int, shape: tuple[int, int] = (NY, NX)) -> list[np.ndarray]:
     return list(np.random.default_rng(count).normal(size=(count, *shape)))
 
 
 def roll(field: np.ndarray, offset: int) -> np.ndarray:
     return np.roll(field, offset, axis=1)
-
-
-@pytest.mark.parametrize("offset", OFFSETS)
-def test_roll(offset: int) -> None:
-    source, target = maps(2)
-    loops.roll(source, offset, target)
-    assert_array_equal(target, roll(source, offset))
-
-
-@pytest.mark.parametrize("offset", OFFSETS)
-@pytest.mark.parametrize("count", [0, 1, 3, 5])
-def test_begin(offset: int, count: int) -> None:
-    du, work, u, heights, *rest = maps(4 + count)
-    branches, kept = np.array(rest).reshape(count, NY, NX), du.copy()
-    decay, gain, back, weight = np.random.default_rng(1).uniform(size=(4, count))
-    advanced = decay[:, None, None] * branches + gain[:, None, None] * du + back[:, None, None] * work
-    effective = roll(heights, offset) + np.tensordot(weight, advanced, 1) - 0.7 * u + 0.3 * du
-    loops.begin(branches, decay, gain, back, du, work, weight, 0.7, 0.3, u, heights, offset)
-    assert_allclose(branches, advanced, rtol=1e-14, atol=1e-15)
-    assert_allclose(work, effective, rtol=1e-14, atol=1e-14)
-    assert_array_equal(du, kept)
-
-
-@pytest.mark.parametrize("offset", OFFSETS)
-def test_commit(offset: int) -> None:
-    displacement, work, u, heights = maps(4)
-    expected = displacement - work + roll(heights, offset)
-    increment = expected - u
-    new = np.empty_like(u)
-    loops.commit(displacement, work, u, heights, offset, new)
-    assert_allclose(u, maps(4)[2], rtol=0)
-    assert_allclose(new, expected, rtol=1e-14, atol=1e-14)
-    assert_allclose(work, increment, rtol=1e-14, atol=1e-14)
-
-
-def test_commit_on_its_own_map() -> None:
-    """Heights, and the new displacement, may be in the map of the displacement itself."""
-    displacement, work, u = maps(3)
-    expected = displacement - work + u
-    loops.commit(displacement, work, u, u, 0, u)
-    assert_allclose(u, expected, rtol=1e-14, atol=1e-14)
-    assert_allclose(work, displacement - maps(3)[1], rtol=1e-14, atol=1e-14)
-
-
-@pytest.mark.parametrize("shape", MAPS)
-@pytest.mark.parametrize("cyclic", [False, True])
-def test_measure(shape: tuple[int, int], cyclic: bool) -> None:
-    """Sides between what is pressed and what is not are whole numbers."""
-    p, u, h = maps(3, shape)
-    p = np.maximum(p, 0.0)
-    above = np.maximum(maps(1, (1, shape[1]))[0], 0.0)
-    pressed = np.concatenate([above, p]) > 0.0
-    sides = np.count_nonzero(np.diff(pressed, axis=0)) + np.count_nonzero(np.diff(pressed[1:], axis=1))
-    sides += np.count_nonzero(pressed[1:, 0] != pressed[1:, -1]) if cyclic else 0
-    *sums, found, largest = loops.measure(p, u, h, p, above[0], cyclic)
-    assert_allclose([*sums, largest], [p.sum(), np.count_nonzero(p), (u - h).sum(), p.max(initial=0.0)], 1e-13, 1e-13)
-    assert found == sides
-
-
-@pytest.mark.parametrize("shape", MAPS)
-def test_products(shape: tuple[int, int]) -> None:
-    a, b, c = maps(3, shape)
-    assert_allclose(loops.dot(a, b), (a * b).sum(), rtol=1e-13, atol=1e-13)
-    assert_allclose(loops.work(a, 2.0, b, 3.0, c), ((a + 1.5 * b) * c).sum(), rtol=1e-13, atol=1e-13)
 
 
 @pytest.mark.parametrize("shift", OFFSETS)
@@ -110,51 +43,6 @@ def test_travel(shift: int) -> None:
     assert_array_equal(earlier, out)
     loops.travel(out, now, 1.0, 1e3, shift, *BOUNDS, out)
     assert out.min() == 0.0
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_maps_of_either_precision(dtype: type[np.floating]) -> None:
-    p, p_old = (np.maximum(field, 0.0).astype(dtype) for field in maps(2))
-    expected = roll(np.maximum(2.0 * p - roll(p_old, 2), 0.0), 2)
-    out = np.empty_like(p)
-    loops.travel(p, p_old, 2.0, 1.0, 2, *BOUNDS, out)
-    assert_allclose(out, expected, rtol=1e-6, atol=1e-6)
-
-
-def test_tangential() -> None:
-    """The sum over the half spectrum is the sum of pressure times slope over the map, the heights moved by a cell."""
-    p, h = maps(2, (6, 8))
-    qx, qy = 2 * np.pi * np.fft.rfftfreq(8), 2 * np.pi * np.fft.fftfreq(6)
-    phases = np.exp(-1j * qx), np.exp(-2j * qy)
-    qx[-1] = qy[3] = 0.0  # at the Nyquist wavenumber the slope is 0 on the grid
-    weight = np.array([1.0, 2.0, 2.0, 2.0, 1.0])
-    moved = np.roll(h, (2, 1), axis=(0, 1))
-    slopes = [np.fft.irfft2(1j * q * np.fft.rfft2(moved), s=(6, 8)) for q in (qx[None, :], qy[:, None])]
-    found = loops.tangential(np.fft.rfft2(p), np.fft.rfft2(h), np.arange(6), *phases, qx, qy, weight)
-    assert_allclose(np.array(found) / h.size, [(p * slope).sum() for slope in slopes], rtol=1e-12)
-
-
-def test_tangential_of_the_lowest_waves() -> None:
-    """The sum over some rows and columns is that over all, the heights 0 elsewhere."""
-    p, h = (np.fft.rfft2(field) for field in maps(2, (6, 8)))
-    rows, kept = np.array([0, 1, 5]), np.zeros_like(h)
-    kept[rows, :2] = h[rows, :2]
-    factors = np.exp(1j * np.arange(5)), np.exp(2j * np.arange(6)), np.arange(5.0), np.arange(6.0), np.ones(5)
-    assert_allclose(
-        loops.tangential(p, h[rows, :2], rows, *factors),
-        loops.tangential(p, kept, np.arange(6), *factors),
-        rtol=1e-13,
-    )
-
-
-def test_displace() -> None:
-    """Rows and columns that are not given are 0."""
-    h = np.fft.rfft2(maps(1, (6, 8))[0])
-    along_x, along_y = np.exp(1j * np.arange(5)), np.exp(-2j * np.arange(6))
-    rows, out, expected = np.array([0, 1, 5]), np.full_like(h, np.nan), np.zeros_like(h)
-    loops.displace(h[rows, :2], rows, along_x, along_y, out)
-    expected[rows, :2] = (along_x * along_y[:, None] * h)[rows, :2]
-    assert_allclose(out, expected, rtol=1e-14)
 
 
 # -- the tangential force of a pressure on the body's own surface -----------------------------------------------------
