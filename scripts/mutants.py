@@ -30,6 +30,8 @@ OTHERS = {  # further tests that answer for a part
     "march/step.py": f"march/test_sticking.py scenarios/test_viscoelastic.py {SLIDING}",
     "march/errors.py": SLIDING,
     "physics/body.py": "scenarios/test_viscoelastic.py",
+    "solve/constraint.py": "solve/test_contact.py",
+    "solve/kernels.py": "solve/test_contact.py",
     "physics/loops.py": "physics/test_material.py physics/test_probe.py physics/test_surface.py physics/test_energy.py",
 }
 PAIRS = ((ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.Lt, ast.GtE), (ast.Gt, ast.LtE), (ast.Eq, ast.NotEq))

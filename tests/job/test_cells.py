@@ -21,6 +21,7 @@ SIZE = (1e-3, 1e-3)
 WAVE = 6.25e-5
 BOTH = Accuracy(friction=0.01, area=0.01)
 FRICTION = Accuracy(friction=0.003, area=0.1)
+GUESS = cells.Guess(0.05, 0.4, 24.0)
 
 
 @pytest.mark.parametrize("count", [1, 16, 17, 100, 416, 1000])
@@ -32,19 +33,11 @@ def test_fast_lengths(count: int) -> None:
 
 
 def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, float]:
-    """Return the errors of friction and area by the laws of the module, in a slide along a unit vector at 5 % of
-    contact of a body with a phase of 0.4, in a box of 24 waves."""
+    """Return the errors of friction and area in a slide along a unit vector."""
     (nx, ny), (x, y) = points, way
     cx, cy = nx * WAVE / SIZE[0], ny * WAVE / SIZE[1]
-    c, across = 0.25 / math.hypot(x / cx, y / cy), 0.25 / math.hypot(y / cx, x / cy)
-    place = math.sqrt(0.95 / 0.05)  # the standard deviation of one place over its mean, 0.05
-    chance = 0.5 * 0.0034 * (1.0 + 4.6 * 0.4) * math.hypot(c**-2.15, 0.13 * across**-2.7)
-    friction = (0.016 * (1.0 - math.exp(-0.4 / 1.5)) - 0.0004) * c**-1.5 + 1.2 * math.hypot(chance, 0.0028 * c**-1.5)
-    friction += 0.008 * c**-4
-    known = abs(0.067 * 0.4 / c - 0.005 * (1.0 / c + 1.0 / across))
-    chance = 0.5 * 0.0078 * math.hypot(c**-1.2, 0.7 * across**-1.6)
-    area = place**0.8 * known + 1.2 * place * chance
-    return place * friction, area
+    sides = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)
+    return cells.friction_error(*sides, GUESS), cells.area_error(*sides, GUESS)
 
 
 @pytest.mark.parametrize("asked", [BOTH, FRICTION, Accuracy(friction=0.05, area=0.3)])
@@ -52,7 +45,7 @@ def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, fl
 def test_the_mesh_of_fewest_points(asked: Accuracy, angle: float) -> None:
     """It keeps both errors, with no more points than the best of all meshes that transform fast."""
     way = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    found = cells.choose(WAVE, SIZE, [way], asked, [cells.Guess(0.05, 0.4, 24.0)])
+    found = cells.choose(WAVE, SIZE, [way], asked, [GUESS])
     lengths = [n for n in range(16, 800, 16) if cells.fast_length(n) == n]
 
     def keeps(points: tuple[int, int]) -> bool:

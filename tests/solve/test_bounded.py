@@ -13,7 +13,6 @@ from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve.bounded import Bounded
-from parcontact.solve.constraint import Cells, Constraint, NonNegative
 from parcontact.solve.contact import Contact, ContactSolver
 from parcontact.solve.fallback import active_set
 from parcontact.solve.problem import Approach, MeanPressure
@@ -172,41 +171,6 @@ def test_any_load_below_the_hardness_can_be_given(total: float) -> None:
     assert_allclose(p.sum(), total, rtol=ROUNDING)
     assert p.min() >= 0.0
     assert p.max() <= 1.0
-
-
-@pytest.mark.parametrize("shape", [(7, 33), (1, 1), (0, 16)])
-def test_kernels_without_a_bound_are_those_of_pressures_that_are_not_negative(shape: tuple[int, int]) -> None:
-    random = np.random.default_rng(1)
-    p = np.maximum(random.standard_normal(shape), 0.0)
-    u, h, t = random.standard_normal((3, *shape))
-    sets = np.ones((2, *shape), dtype=np.bool_)
-    one, other = NonNegative(), Bounded(np.inf)
-    both: list[Constraint] = [one, other]
-    assert_allclose(other.weigh(p, u, h, 0.2), one.weigh(p, u, h, 0.2), rtol=ROUNDING)
-    marked = [each.mark(p, u, h, 0.2, working) for each, working in zip(both, sets, strict=True)]
-    assert_allclose(marked[1], marked[0], rtol=ROUNDING)
-    np.testing.assert_array_equal(sets[0], sets[1])
-    moved, sums = np.empty((2, *shape)), np.empty((2, 1 + shape[0] // 16 + 1, 2 * (1 + shape[1] // 16)))
-    for each, new, cells in zip(both, moved, sums, strict=True):
-        each.advance(p, t, 0.7, new, Cells(16, 3, 16), cells)
-    np.testing.assert_array_equal(moved[0], moved[1])
-    assert_allclose(sums[1], sums[0], rtol=ROUNDING, atol=ROUNDING)
-
-
-def test_what_is_cut_off_at_both_bounds() -> None:
-    """Cells have the free load, and what was added less what was taken off; a NaN stays one."""
-    random = np.random.default_rng(3)
-    value, p, sums = random.normal(size=(20, 33)), np.empty((20, 33)), np.empty((2, 6))
-    load, cut = Bounded(0.5).advance(np.zeros_like(value), value, -1.0, p, Cells(16, 3, 16), sums)
-    kept = np.clip(value, 0.0, 0.5)
-    np.testing.assert_array_equal(p, kept)
-    assert_allclose([load, cut], [kept.sum(), np.abs(kept - value).sum()], rtol=ROUNDING)
-    for j, rows in enumerate((slice(0, 13), slice(13, 20))):
-        for i, columns in enumerate((slice(0, 16), slice(16, 32), slice(32, 33))):
-            cell, change = kept[rows, columns], (kept - value)[rows, columns]
-            assert_allclose(sums[j, [i, i + 3]], [cell[cell < 0.5].sum(), change.sum()], rtol=ROUNDING, atol=ROUNDING)
-    value[2, 2] = np.nan
-    assert np.isnan(Bounded(0.5).advance(np.zeros_like(value), value, -1.0, p, Cells(16, 3, 16), sums)).all()
 
 
 @pytest.mark.mpi
