@@ -163,6 +163,11 @@ def test_the_last_solve_before_a_change_is_close() -> None:
     assert at_ends([rest, {"pressure": 2 * PRESSURE}])[3] == CLOSE
 
 
+def test_the_last_step_of_a_stage_is_solved_as_closely_as_the_first() -> None:
+    """It seldom moves by whole cells. On a measured road its friction was 4 % too large, as the start was accepted."""
+    assert at_ends([BEFORE], initial=STEADY)[-2:] == [math.inf, FIRST]
+
+
 def test_nothing_is_close_where_nothing_changes() -> None:
     """Velocity and load go on, or the body has no memory; a tolerance that is smaller stays."""
     ramp = {**BEFORE, "pressure": {"from": PRESSURE, "to": 2 * PRESSURE}}
