@@ -30,7 +30,7 @@ def of_file(path: Path, heights: NDArray[np.floating], **sections: Any) -> list[
     np.save(path, heights)
     grid = {"points": list(heights.shape[::-1]), "size": 1e-3}
     job = job_of({"shape": "file", "path": str(path)}, [{"pressure": 1e4}], grid=grid, **sections)
-    return sanity.check_heights(scene.set_up(job, Slab.alone(*job.grid.points)))
+    return [*map(str, sanity.check_heights(scene.set_up(job, Slab.alone(*job.grid.points))))]
 
 
 def rough_heights(points: int, shortest: float, seed: int = 1) -> NDArray[np.floating]:
@@ -48,7 +48,7 @@ def rough_heights(points: int, shortest: float, seed: int = 1) -> NDArray[np.flo
 def run(job: Job, steps: int | None = None) -> list[str]:
     """What is said of the contacts of a job's steps."""
     march = March(scene.build(job, Slab.alone(*job.grid.points)))
-    watch, said = sanity.ContactWatch(job.numerics.strict, Timeline.of(job)), []
+    watch, said = sanity.ContactWatch(job.numerics.strict, Timeline.of(job)), list[str]()
     for step in list(Timeline.of(job))[:steps]:
-        said += watch.judge(step.number, march.advance(step).measures)
+        said += map(str, watch.judge(step.number, march.advance(step).measures))
     return said

@@ -6,14 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..doubts import Doubt
 from ..errors import InputError
 from ..job import Grid, Job
 from ..job.checks.cells import fast_length
 from ..job.sections.spectral_bands import AUTO, LEAST_CELLS, Bands
 from ..parallel.slab import Array
 from ..physics.roughness import EDGE
-from ..scene.measured_range import describe_beyond
-from .limits import describe_slopes
+from ..scene.measured_range import doubt_band
+from .limits import doubt_steep_waves
 from .measured_band import MapBand, band_of_map
 from .wave_spectrum import WaveSpectrum, spectrum_of
 
@@ -117,10 +118,10 @@ def describe_cut(cut: Cut, job: Job) -> list[str]:
     ]
 
 
-def doubts_of_bands(job: Job, cut: Cut, temperatures: Sequence[float] = ()) -> list[str]:
-    """Return warnings about a job in bands: its own, of frequencies that were not measured, and of steep waves."""
+def doubts_of_bands(job: Job, cut: Cut, temperatures: Sequence[float] = ()) -> list[Doubt]:
+    """Return doubts about a job in bands: its own, of frequencies that were not measured, and of steep waves."""
     side = WAVES * cut.spectrum.longest
     points = 2 * math.ceil(side / cut.spectrum.shortest)
     whole = job.model_copy(update={"grid": Grid(points=(points, points), size=(side, side)), "bands": None})
     of_map = cut.measured.doubts if cut.measured else ()
-    return [*job.warnings, *of_map, *describe_beyond(whole, temperatures), *describe_slopes(cut.spectrum)]
+    return [*job.doubts, *of_map, *doubt_band(whole, temperatures), *doubt_steep_waves(cut.spectrum)]

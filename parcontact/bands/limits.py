@@ -1,7 +1,9 @@
 """Where linear theory fails: rms slopes and strains of bands, alone and with all coarser ones."""
 
 import math
+from collections.abc import Iterator
 
+from ..doubts import Doubt
 from .wave_spectrum import WaveSpectrum
 
 STEEP = 0.5  # physics: rms slope, up to which slopes count as small
@@ -9,14 +11,14 @@ USUAL = 1.3  # physics: rms slope at which the literature on rubber friction cut
 STRAIN = math.exp(-1.0)  # physics: rms strain over rms slope, at the depth 1/q where the strain of a wave is largest
 
 
-def describe_slopes(spectrum: WaveSpectrum) -> list[str]:
-    """Return a sentence where the surface is too steep for linear theory, with the cut-off that is usual."""
+def doubt_steep_waves(spectrum: WaveSpectrum) -> Iterator[Doubt]:
+    """Yield a doubt where the surface is too steep for linear theory, with the cut-off that is usual."""
     slope = math.sqrt(spectrum.moment(*spectrum.ends, 2))
     if slope <= STEEP:
-        return []
+        return
     steep, usual = spectrum.steep_beyond(STEEP), spectrum.steep_beyond(USUAL)
-    offer = f"; waves shorter than {usual:.3g} m are usually left out: bands.cutoff_slope: {USUAL:g}" if usual else ""
-    return [
-        f"surface: its rms slope is {slope:.3g} (rms strain {STRAIN * slope:.2g}), and linear theory has small slopes: "
-        f"waves shorter than {steep:.3g} m go beyond a slope of {STEEP:g}{offer}"
-    ]
+    numbers = {"slope": slope, "strain": STRAIN * slope, "steep": steep, "most": STEEP}
+    if usual:
+        yield Doubt("steep waves, cut-off", "surface", {**numbers, "usual": usual, "cutoff": USUAL})
+    else:
+        yield Doubt("steep waves", "surface", numbers)

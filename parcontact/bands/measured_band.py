@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..doubts import Doubt
 from ..errors import InputError
 from ..job import Grid, Job, Topography
 from ..job.checks.cells import fast_length
@@ -25,7 +26,7 @@ class MapBand:
     heights: Array
     rms_slope: float
     notes: tuple[str, ...]
-    doubts: tuple[str, ...]
+    doubts: tuple[Doubt, ...]
 
 
 def band_of_map(job: Job, shortest: float, cells: float) -> MapBand | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..accuracy.budget import ErrorBudget, Parts
 from ..columns import BANDS, names_of
+from ..doubts import Doubt
 from ..effects.relaxation import feeds_back, temperature_of
 from ..errors import InputError, RunError
 from ..job import Job
@@ -88,7 +89,7 @@ class RoadSliding:
         self._results: Results = ()
         self._rises: list[float] = []
 
-    def doubts(self, temperatures: Sequence[float]) -> list[str]:
+    def doubts(self, temperatures: Sequence[float]) -> list[Doubt]:
         """Return warnings about the job."""
         return doubts_of_bands(self.job, self.cut, temperatures)
 

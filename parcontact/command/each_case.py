@@ -12,11 +12,12 @@ from ..parallel.root import on_root
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from ..doubts import Doubt
     from ..job import Case, Job
     from ..parallel.mpi import MPI
     from ..parallel.slab import Slab
 
-    Shows = Callable[[str], bool]  # whether a warning is shown
+    Shows = Callable[[Doubt], bool]  # whether a warning is shown
     Act = Callable[[argparse.Namespace, Job, Slab, Shows], int]
 
 OF_A_CURVE = ("velocities", "pressures", "temperatures")

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
 
+    from ..doubts import Doubt
     from ..job import Job
     from ..parallel.slab import Slab
     from .each_case import Shows
@@ -62,7 +63,7 @@ def check(options: argparse.Namespace) -> int:
     """List all mistakes of a job, or what it says with every default."""
     from .. import job as jobs
     from ..history.chosen import describe_steps
-    from ..run.sweep_warnings import doubts_of
+    from ..run.sweep_warnings import sentences_of
 
     cases, chosen = cases_of(options)
     job = chosen[0].job
@@ -70,7 +71,7 @@ def check(options: argparse.Namespace) -> int:
     steps = describe_steps(job)
     steps = steps and f"chosen time steps: {steps}"
     notes: list[list[str]] = []
-    doubts = doubts_of(chosen, lambda one: _doubts(one, notes))
+    doubts = sentences_of(chosen, lambda one: _doubts(one, notes))
     for text in filter(None, (job.included, job.origin.mesh, steps, *job.facts, "\n".join(notes[0]))):
         print(f"\n{text}")
     for warning in doubts:
@@ -81,7 +82,7 @@ def check(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _doubts(job: Job, notes: list[list[str]]) -> list[str]:
+def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
     """Return the doubts about a job, also those that only a look at heights and measured moduli raises; append what the
     look shows of measured maps and spectra to `notes`."""
     notes.append([])
@@ -92,13 +93,13 @@ def _doubts(job: Job, notes: list[list[str]]) -> list[str]:
         notes[-1] += describe_cut(cut, job)
         return doubts_of_bands(job, cut)
     if not job.depends_on_heights and not job.measured:
-        return list(job.warnings)
+        return list(job.doubts)
     from ..parallel.slab import Slab
     from ..scene import describe_roughness, sanity, set_up
-    from ..scene.measured_range import describe_beyond
+    from ..scene.measured_range import doubt_band
 
     if not sanity.is_quickly_made(job):
-        return [*job.warnings, *describe_beyond(job)]
+        return [*job.doubts, *doubt_band(job)]
     setup = set_up(job, Slab.alone(*job.grid.points))
     notes[-1] += [*setup.told.notes, *describe_roughness(setup)]
     sanity.refuse_beyond_full_contact(setup)
@@ -115,10 +116,10 @@ def plan(options: argparse.Namespace) -> int:
     from ..parallel.slab import Slab
     from ..plan.memory import count_side_by_side
     from ..plan.planning import Planner
-    from ..run.sweep_warnings import doubts_of
+    from ..run.sweep_warnings import sentences_of
 
     chosen = on_root(world, lambda: cases_of(options)[1])
-    doubts = on_root(world, lambda: doubts_of(chosen, lambda job: _doubts(job, [])))
+    doubts = on_root(world, lambda: sentences_of(chosen, lambda job: _doubts(job, [])))
     planner = Planner(options.ranks or sorted({1, world.size, ranks.cores()}), options.seconds, started)
     if len(chosen) > 1:
         at_once = on_root(world, lambda: count_side_by_side([case.job for case in chosen], world.size))
@@ -200,12 +201,12 @@ def surface(options: argparse.Namespace) -> int:
     measured_maps.refuse_taken(options.start)
     job = measured_maps.load(given, options.set) if alone else _load(options)
     base = set_up(job, Slab.alone(*job.grid.points))
-    doubts = [text for text in job.warnings if text.startswith("surface")] + sanity.check_heights(base)
+    doubts = [doubt for doubt in job.doubts if doubt.place.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
     told = describe_surface(job, heights, base.told.notes, base.shortest, picture)
     started = measured_maps.start(job, given, options.start) if alone else ()
-    print("\n".join([*told, *(f"warning: {text}" for text in doubts), *started]))
+    print("\n".join([*told, *(f"warning: {doubt}" for doubt in doubts), *started]))
     return DONE
 
 

@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
 
 from ..columns import added_by
+from ..doubts import Doubt
 from ..job.checks import limits
 from ..job.sections.calculation import Grid
 from ..job.sections.geometry import Sphere, Wave
@@ -20,7 +21,7 @@ from ..physics.adhesion import AdhesionLaw, cell_of, modulus_of, ramp_of, smalle
 from ..physics.entries import Entry, Saved
 from ..physics.units import Units
 from . import adhesive_energies
-from .adhesion_doubts import sizes
+from .adhesion_doubts import doubts_of_adhesion
 from .adhesive_energies import NO_ENERGIES, AdhesiveEnergies
 from .contact_protocol import ContactLaw
 from .effect import Changes, Decision, Effect, Instant
@@ -176,20 +177,17 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         return Decision("adhesion", True, f"{law.work:g} J/m^2 over a range of {law.range:.4g} m ({law.kind})")
 
     @staticmethod
-    def doubts(job: Any) -> Iterator[str]:
-        """Yield what to say of numbers out of all proportion, and of a mesh that does not resolve the attraction."""
+    def doubts(job: Any) -> Iterator[Doubt]:
+        """Yield doubts about physically implausible values, and a mesh that does not resolve the attraction."""
         law = law_of(job.adhesion, job.grid, job.material)
         assert law is not None
         modulus, cell = modulus_of(job.material), cell_of(job.grid)
         zone = law.process_zone(modulus)
-        yield from sizes(job, law, modulus, cell)
+        yield from doubts_of_adhesion(job, law, modulus, cell)
         if 0.0 < zone < cell * (1.0 - SAME):
             least = smallest_range(law.work, modulus, cell, 1.0)
-            yield (
-                f"adhesion: a cell, {cell:.3g} m, is {cell / zone:.2g} times as long as the process zone, and the "
-                f"forces at edges of contact are not resolved: 1.2 times makes pull-off wrong by 4 %, 1.8 times by "
-                f"23 %; use a range of {least:.3g} m or more, or cells of {zone:.3g} m"
-            )
+            numbers = {"cell": cell, "ratio": cell / zone, "enough": least, "zone": zone}
+            yield Doubt("coarse process zone", "adhesion", numbers)
 
     @staticmethod
     def facts(job: Any) -> Iterator[str]:

@@ -11,11 +11,11 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from ..doubts import Doubt
 from ..job.checks import meaning
 from ..job.sections.calculation import Grid
 from ..job.sections.geometry import Sphere
 from ..physics.adhesion import AdhesionLaw
-from ..printed import per_cent
 
 MOST_WORK = 1.0  # physics: surfaces of dry solids have less [J/m^2]; of rubber 0.03 to 0.1
 MOST_STRAIN = 0.5  # physics: as for slopes: the theory is linear
@@ -25,26 +25,17 @@ SMALL = 0.01  # accuracy: of a force; what is less passes
 PULL_OFF = 1.5 * math.pi  # physics: over w R, of a short range, elastic; others are larger
 
 
-def sizes(job: Any, law: AdhesionLaw, modulus: float, cell: float) -> Iterator[str]:
-    """Yield what to say of a work or a range whose magnitude cannot be meant, or that the model is not made for, with
+def doubts_of_adhesion(job: Any, law: AdhesionLaw, modulus: float, cell: float) -> Iterator[Doubt]:
+    """Yield doubts about a work or a range whose magnitude cannot be meant, or that the model is not made for, with
     E* of the relaxed body [Pa] and the side of a cell [m]."""
-    told = f"adhesion.work is {law.work:g} J/m^2 and the range {law.range:.3g} m"
+    given = {"work": law.work, "range": law.range}
     if law.work > MOST_WORK:
-        yield (
-            f"adhesion: {told}: to part dry surfaces takes {MOST_WORK:g} J/m^2 at most, of rubber some 0.05; what a "
-            "body dissipates comes beside it, from its material"
-        )
+        yield Doubt("work", "adhesion", {**given, "most": MOST_WORK})
     elif modulus and (strain := law.strength / modulus) > MOST_STRAIN:
-        yield (
-            f"adhesion: strains at the edges of contact are some work/(E* range) = {strain:.2g}, and the theory is for "
-            f"small ones, at most {MOST_STRAIN:g}: {told}; use a longer range, or less work"
-        )
+        yield Doubt("strained edges", "adhesion", {**given, "strain": strain, "most": MOST_STRAIN})
     sides = [size for size, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1] or list(job.grid.size)
     if law.range > MOST_RANGE * min(sides):
-        yield (
-            f"adhesion: {told}, more than {MOST_RANGE:g} of the box: points then attract more than what lies opposite, "
-            "which the law does not know; use a shorter range"
-        )
+        yield Doubt("long range", "adhesion", {**given, "most": MOST_RANGE})
     for index, shape in enumerate(job.surface):
         if isinstance(shape, Sphere):
             yield from _sphere(f"surface.{index}", shape, job.grid, law, cell)
@@ -53,20 +44,14 @@ def sizes(job: Any, law: AdhesionLaw, modulus: float, cell: float) -> Iterator[s
         yield from meaning.acting_neighbours(job, lambda radius: contact * radius ** (2.0 / 3.0))
 
 
-def _sphere(name: str, sphere: Sphere, grid: Grid, law: AdhesionLaw, cell: float) -> Iterator[str]:
-    """Yield what to say of a sphere, of whose attraction the cells or the box see little, or which is too small."""
+def _sphere(name: str, sphere: Sphere, grid: Grid, law: AdhesionLaw, cell: float) -> Iterator[Doubt]:
+    """Yield doubts about a sphere, of whose attraction the cells or the box see little, or which is too small."""
     radius, ring = sphere.radius, math.sqrt(sphere.radius * law.range)
     if cell > MOST_RING * ring:
-        yield (
-            f"adhesion: a cell, {cell:.3g} m, is {cell / ring:.2g} times sqrt(radius range), how far {name} is "
-            f"attracted around its tip: {MOST_RING:g} times makes the sum over points wrong by 3 %, more is worse; use "
-            f"cells of {MOST_RING * ring:.3g} m, or a range of {cell**2 / MOST_RING**2 / radius:.3g} m"
-        )
+        remedies = {"most": MOST_RING, "fine": MOST_RING * ring, "enough": cell**2 / MOST_RING**2 / radius}
+        yield Doubt("coarse tip", "adhesion", {"cell": cell, "ratio": cell / ring, "sphere": name, **remedies})
     if law.range > radius / 2.0:
-        yield (
-            f"{name}: it attracts out to sqrt(2 radius range), more than its radius, {radius:g} m, and the theory is "
-            f"one of small slopes; use an adhesion.range up to {radius / 2.0:.3g} m"
-        )
+        yield Doubt("small sphere", name, {"radius": radius, "most": radius / 2.0})
     if min(grid.points) == 1:
         return
     x, y = sphere.center or (grid.lx / 2.0, grid.ly / 2.0)
@@ -76,21 +61,13 @@ def _sphere(name: str, sphere: Sphere, grid: Grid, law: AdhesionLaw, cell: float
     share = math.exp(-edge) if exponential else max(1.0 - edge, 0.0)
     if share > SMALL:
         enough = -math.log(SMALL) if exponential else 1.0
-        shorter = f"a range up to {law.range * edge / enough:.3g} m, or " if edge else ""
-        yield (
-            f"{name}: {per_cent(share)} of its attraction over an adhesion.range of {law.range:.3g} m comes from "
-            f"beyond {room:.3g} m, where the box ends; {per_cent(SMALL)} passes: use {shorter}"
-            f"{math.sqrt(2.0 * enough) * ring:.3g} m of room around the sphere"
-        )
+        remedies = {"shorter": law.range * edge / enough, "more": math.sqrt(2.0 * enough) * ring}
+        numbers = {"share": share, "range": law.range, "room": room, "most": SMALL, **remedies}
+        yield Doubt("cut attraction" if edge else "attraction at an edge", name, numbers)
 
 
-def beyond_heights(law: AdhesionLaw, span: float) -> str:
-    """Return what to say of a range above the heights of a rough surface, from its lowest to its highest point [m], or
-    ''; a flat one has none."""
-    if law.range <= span or not span:
-        return ""
-    return (
-        f"adhesion: the range, {law.range:.3g} m, is more than the {span:.3g} m from the lowest to the highest point "
-        "of the surface, which then attracts nearly alike everywhere: adhesion is hardly more than a pressure of "
-        "work/range; use a shorter range (range: auto follows the cells)"
-    )
+def doubt_range(law: AdhesionLaw, span: float) -> Iterator[Doubt]:
+    """Yield a doubt about a range above the heights of a rough surface, from its lowest to its highest point [m]; a
+    flat one has none."""
+    if law.range > span > 0.0:
+        yield Doubt("range beyond heights", "adhesion", {"range": law.range, "span": span})

@@ -88,7 +88,8 @@ class Effect(Protocol[Memory]):
     """The class of an effect; made with a `Scene`, only where the job asks for it, and a part of the run.
 
     It may have `rules` for the whole job, as sections have them, `lifts`: checks of other jobs that do not hold with
-    it, and `doubts` and `facts`: functions of a job that give warnings, and what the section means in it. Methods are
+    it, and `doubts` and `facts`: functions of a job that give warnings (`doubts.Doubt`, or sentences), and what the
+    section means in it. Methods are
     collective, unless they say otherwise. A class that inherits from this one remembers nothing, unless it says so.
     """
 

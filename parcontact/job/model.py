@@ -14,6 +14,7 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
+from ..doubts import Doubt
 from . import added_sections
 from .checks import advice, cells, layer, limits, meaning, size
 from .sections import height_arrays, listing
@@ -138,31 +139,39 @@ class Job(Part):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences about what is allowed but will probably disappoint; errors with `numerics.strict`."""
+        """The sentences of `doubts`."""
+        return tuple(map(str, self.doubts))
+
+    @property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Doubts about what is allowed but will probably disappoint; errors with `numerics.strict`."""
+        of_fit = self.material.doubts if isinstance(self.material, Dma) else ()
+        of_effects = [
+            each if isinstance(each, Doubt) else Doubt("said", "", {"text": str(each)}) for each in self._said("doubts")
+        ]
         if self.bands is not None:
-            doubts = self.material.doubts if isinstance(self.material, Dma) else ()
-            return (*doubts, *meaning.of_moduli(self.material.fitted), *self._told("doubts"))
+            return (*of_fit, *meaning.doubt_moduli(self.material.fitted), *of_effects)
         return (
-            *(self.material.doubts if isinstance(self.material, Dma) else ()),
-            *advice.resolution(self, self.directions, chosen=bool(self._origin.mesh)),
-            *meaning.warnings(self),
-            *layer.warnings(self),
-            *size.warnings(self),
-            *self._told("doubts"),
+            *of_fit,
+            *advice.doubts_of_resolution(self, self.directions, chosen=bool(self._origin.mesh)),
+            *meaning.doubts_of_scene(self),
+            *layer.doubts_of_layer(self),
+            *size.doubts_of_size(self),
+            *of_effects,
         )
 
     @property
     def facts(self) -> tuple[str, ...]:
         """At which temperature the material is, and sentences of effects about what their sections mean in this job."""
-        return tuple(filter(None, (describe_temperature(self.material), *self._told("facts"))))
+        return tuple(filter(None, (describe_temperature(self.material), *self._said("facts"))))
 
-    def _told(self, what: str) -> Iterator[str]:
+    def _said(self, what: str) -> Iterator[Any]:
         """Yield the `doubts` or `facts` of the effects whose sections are given."""
         sections = [name for name in type(self).model_fields if name not in Job.model_fields and self.section(name)]
         for section, effect in added_sections.effects_of(sections).items():
             with added_sections.naming_effect(section):
-                told = list(getattr(effect, what, lambda job: ())(self))
-            yield from told
+                found = list(getattr(effect, what, lambda job: ())(self))
+            yield from found
 
     @property
     def directions(self) -> list[tuple[float, float]]:

@@ -99,7 +99,7 @@ def steady(
         wanted = curve.request(found, *asked.values())
     wisdom.recall(curve.transforms_of(found), slab, None)
     sliding = make_states(found, slab)
-    for text in sliding.doubts(wanted.temperatures):
+    for text in map(str, sliding.doubts(wanted.temperatures)):
         if slab.root:
             warn(text)
     contacts = ContactWatch(found.numerics.strict, sliding.setup.choices.timeline, more=more_points(found.grid))
@@ -117,7 +117,7 @@ def steady(
             warn(str(error), RuntimeWarning)
         sliding.forget()
         points.append(point)
-        doubts += contacts.judge_point(point.measures, str(at)) if point else []
+        doubts += map(str, contacts.judge_point(point.measures, str(at)) if point else [])
     solved = [point for point in points if point]
     for text in (*doubts, *describe_hot(solved), *describe_missed(solved, found)) if slab.root else ():
         warn(text)

@@ -112,9 +112,9 @@ def of_parts(**parts: Any) -> Job:
 
 def warn_of(setup: Setup, temperatures: Sequence[float] = ()) -> None:
     """Warn, on root, of what is allowed but means little, also at temperatures [deg C]; collective."""
-    for text in sanity.find_doubts(setup, temperatures):
+    for doubt in sanity.find_doubts(setup, temperatures):
         if setup.slab.root:
-            warn(text)
+            warn(str(doubt))
 
 
 def warn(text: str, category: type[Warning] = UserWarning) -> None:

@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
 
 from ..columns import cells
+from ..doubts import Doubt
 from ..effects.effect import columns_of
 from ..errors import InputError
 from ..job import Job
@@ -79,8 +80,8 @@ class Simulation:
             march.advance(step)
             if march.detached:
                 return
-            for text in self._contacts.judge(march.row.step, march.row.measures):
-                self._warns(text)
+            for doubt in self._contacts.judge(march.row.step, march.row.measures):
+                self._warns(doubt)
             yield self.row
 
     def run(self, restart: str | os.PathLike[str] = "auto", quiet: bool = True) -> Row:
@@ -216,10 +217,10 @@ class Simulation:
         """Return the watch that warns of contacts which mean little."""
         return ContactWatch(self.job.numerics.strict, self._march.timeline(), more=more_points(self.job.grid))
 
-    def _warns(self, text: str) -> bool:
-        """Warn, on root, in the place of whoever would show the text."""
+    def _warns(self, doubt: Doubt) -> bool:
+        """Warn, on root, in the place of whoever would show the doubt."""
         if self._slab.root:
-            warn(text)
+            warn(str(doubt))
         return False
 
     def _wait_for_all(self, what: str) -> None:

@@ -26,7 +26,7 @@ def section(job: Job) -> ReportSection:
         made, told = rigid_surface.make_surface(job, FFT(slab))
     except InputError as error:
         return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
-    heights, sentences = made.heights((0.0, 0.0), slab.empty()), [*told.notes, *told.doubts]
+    heights, sentences = made.heights((0.0, 0.0), slab.empty()), [*told.notes, *map(str, told.doubts)]
     found = statistics.describe(heights, job.grid.size)
     if not found.rms_height:
         return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])

@@ -6,6 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from .. import scene
+from ..doubts import Doubt
 from ..effects.adhesion import AdhesionMemory
 from ..errors import InputError, RunError
 from ..history.chosen import reached
@@ -42,7 +43,7 @@ class Options:
     until: float | None = None
     wall: float | None = None
     others_file: StopFile | None = None
-    shows: Callable[[str], bool] = always
+    shows: Callable[[Doubt], bool] = always
 
 
 class Run:
@@ -99,11 +100,11 @@ class Run:
             doubts = self.contacts.judge(row.step, row.measures)
         except RunError as error:
             raise RunError(f"{error}{self._leave_checkpoint()}") from error
-        for text in doubts:
-            self.console.warn(text, shown=self.options.shows(text))
+        for doubt in doubts:
+            self.console.warn(str(doubt), shown=self.options.shows(doubt))
         if doubts:
             provenance = self.facts.provenance
-            provenance = replace(provenance, warnings=(*provenance.warnings, *doubts))
+            provenance = replace(provenance, warnings=(*provenance.warnings, *map(str, doubts)))
             self.facts = replace(self.facts, provenance=provenance)
             self.recorder.renew(provenance)
 

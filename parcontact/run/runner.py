@@ -60,13 +60,13 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
         doubts = tuple(sanity.find_doubts(march.scene.setup))
         wisdom.keep(transforms, slab)
         claim = restart.claim(plain, origin)
-        facts = Facts(plain, provenance_of(job, slab, saved, doubts), claim.id)
+        facts = Facts(plain, provenance_of(job, slab, saved, tuple(map(str, doubts))), claim.id)
         recorder = _open_files(march, directory, claim, facts, origin, options)
         try:
             for text in header.lines(slab.comm) if slab.root else ():
                 recorder.console.log(text)
-            for text in doubts:
-                recorder.console.warn(text, shown=options.shows(text))
+            for doubt in doubts:
+                recorder.console.warn(str(doubt), shown=options.shows(doubt))
             for text in (*warnings, *recorder.warnings):
                 recorder.console.warn(text)
             limit = watch.limit(options.wall) if slab.root else None

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TextIO
 
 from ..accuracy.budget import exceeds
+from ..doubts import Doubt
 from ..errors import InputError, InUseError, RunError
 from ..job import Case, Job
 from ..job.reading import CASES
@@ -29,7 +30,7 @@ FAILED = 1
 ELSEWHERE = -1  # no exit code: of a case that another program runs
 ENDS = {DONE: "done", STOPPED_EARLY: "stopped early", FAILED: "failed", ELSEWHERE: "passed over"}
 
-Shows = Callable[[str], bool]
+Shows = Callable[[Doubt], bool]
 Act = Callable[[Job, Slab, Shows], int]
 
 
@@ -38,8 +39,8 @@ class SweepRun:
     """A sweep of `cases`, with each of which `act` is done; making one and its methods are collective.
 
     Several groups of ranks take the cases by turns, each group one at a time. `act` has a job, the slab of the group,
-    and what says whether a warning is shown. `limit` is until when at most, in the time of `time.monotonic`; `told` are
-    the warnings that were shown before. Unless it `runs` its cases, their failures are not noted.
+    and what says whether a warning is shown. `limit` is until when at most, in the time of `time.monotonic`; `shown`
+    are the doubts that were shown before. Unless it `runs` its cases, their failures are not noted.
     """
 
     cases: Sequence[Case]
@@ -48,13 +49,13 @@ class SweepRun:
     stop: StopFile
     quiet: bool = False
     limit: float | None = None
-    told: Sequence[str] = ()
+    shown: Sequence[Doubt] = ()
     runs: bool = True
 
     @cached_property
     def doubts(self) -> SweepWarnings:
         """The warnings of this group of ranks."""
-        return SweepWarnings(self.told, at_once=self.groups.count == 1)
+        return SweepWarnings(self.shown, at_once=self.groups.count == 1)
 
     def run(self, chosen: Sequence[Case]) -> int:
         """Do the chosen cases, and collect what all have come to. Returns the exit code.

@@ -1,32 +1,31 @@
 """Warnings of the cases of a sweep: each kind is shown once, with the cases that it holds for."""
 
-import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+from ..doubts import Doubt
 from ..job import Case, Job
 
-NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(\.\d+)?(e[-+]?\d+)?")  # in which warnings of one kind may differ
-
-Kinds = dict[str, tuple[str, list[int]]]  # the first text of each kind, and the numbers of the cases that have it
+# the first doubt of each subject, and the numbers of the cases that have it
+Kinds = dict[tuple[str, ...], tuple[Doubt, list[int]]]
 
 
 class SweepWarnings:
-    """Warnings by kind. Kinds of which texts were `told` before are not shown; others `at_once`, or only at the end."""
+    """Doubts by their subjects. Those of the subjects `shown` before are not shown; others `at_once`, or at the end."""
 
-    def __init__(self, told: Sequence[str] = (), at_once: bool = True) -> None:
-        self._told, self._at_once, self._case = frozenset(map(_kind, told)), at_once, -1
+    def __init__(self, shown: Sequence[Doubt] = (), at_once: bool = True) -> None:
+        self._shown, self._at_once, self._case = frozenset(doubt.subject for doubt in shown), at_once, -1
         self.kinds: Kinds = {}
 
     def begin(self, case: int) -> None:
         """Take what follows to be of this case."""
         self._case = case
 
-    def shows(self, text: str) -> bool:
-        """Note a warning; whether it is to be shown now."""
-        if _kind(text) in self._told:
+    def shows(self, doubt: Doubt) -> bool:
+        """Note a doubt; whether it is to be shown now."""
+        if doubt.subject in self._shown:
             return False
-        _, cases = self.kinds.setdefault(_kind(text), (text, []))
+        _, cases = self.kinds.setdefault(doubt.subject, (doubt, []))
         new = not cases
         if self._case not in cases:
             cases.append(self._case)
@@ -37,48 +36,41 @@ class SweepWarnings:
         not of one case alone."""
         whole: Kinds = {}
         for kinds in of_groups:
-            for kind, (text, cases) in kinds.items():
-                whole.setdefault(kind, (text, []))[1].extend(cases)
-        told = [(text, sorted(cases)) for text, cases in whole.values() if len(cases) > 1 or not self._at_once]
-        return [f"{text} ({name_cases(cases)})" for text, cases in told]
+            for subject, (doubt, cases) in kinds.items():
+                whole.setdefault(subject, (doubt, []))[1].extend(cases)
+        found = [(doubt, sorted(cases)) for doubt, cases in whole.values() if len(cases) > 1 or not self._at_once]
+        return [f"{doubt} ({name_cases(cases)})" for doubt, cases in found]
 
 
-def _kind(text: str) -> str:
-    return NUMBER.sub("#", text)
-
-
-def doubts_of(cases: Sequence[Case], doubts: Callable[[Job], Iterable[str]]) -> list[str]:
-    """Return the doubts about the jobs of cases, each kind once; of several with the cases that it holds for."""
+def sentences_of(cases: Sequence[Case], doubts: Callable[[Job], Iterable[Doubt]]) -> list[str]:
+    """Return the sentences of the doubts about the jobs of cases, each subject once; of several with the cases that
+    they hold for."""
     if len(cases) == 1:
-        return list(dict.fromkeys(doubts(cases[0].job)))
+        return list(dict.fromkeys(map(str, doubts(cases[0].job))))
     noted = SweepWarnings(at_once=False)
     for case in cases:
         noted.begin(case.number)
-        for text in doubts(case.job):
-            noted.shows(text)
-    return [*noted.summary([noted.kinds]), *_follow_the_mesh(cases)]
+        for doubt in doubts(case.job):
+            noted.shows(doubt)
+    return [*noted.summary([noted.kinds]), *map(str, _doubt_ranges(cases))]
 
 
-def _follow_the_mesh(cases: Sequence[Case]) -> Iterator[str]:
-    """Yield what to say of cases that have different ranges of adhesion, though none is given."""
+def _doubt_ranges(cases: Sequence[Case]) -> Iterator[Doubt]:
+    """Yield a doubt about cases that have different ranges of adhesion, though none is given."""
     if not any(case.job.section("adhesion") for case in cases):
         return
     from ..effects.adhesion import chosen_range  # not for what checks jobs without adhesion
 
     reaches = {reach for case in cases if (reach := chosen_range(case.job)) is not None}
     if len(reaches) > 1:
-        yield (
-            f"adhesion.range: auto follows cells, work and modulus, from {min(reaches):.4g} to {max(reaches):.4g} m in "
-            "these cases, which are different physics; to compare them give one range to all: the cells of each "
-            f"resolve {max(reaches):.4g} m"
-        )
+        yield Doubt("range follows cells", "adhesion.range", {"least": min(reaches), "most": max(reaches)})
 
 
-def warn_once(cases: Sequence[Case]) -> list[str]:
-    """Warn of what is doubtful about the jobs of cases, each kind once; root only. Returns all texts."""
-    for text in doubts_of(cases, lambda job: job.warnings):
+def warn_once(cases: Sequence[Case]) -> list[Doubt]:
+    """Warn of what is doubtful about the jobs of cases, each subject once; root only. Returns all doubts."""
+    for text in sentences_of(cases, lambda job: job.doubts):
         print(f"warning: {text}", file=sys.stderr, flush=True)
-    return [text for case in cases for text in case.job.warnings]
+    return [doubt for case in cases for doubt in case.job.doubts]
 
 
 def name_cases(numbers: Sequence[int]) -> str:

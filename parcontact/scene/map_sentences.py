@@ -1,7 +1,10 @@
 """Sentences about measured maps: what was done to them, and what is doubted."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from ..doubts import Doubt
 from ..job import Topography
 from ..printed import per_cent, quantity
 from ..road import treatment
@@ -41,32 +44,25 @@ def describe_line(part: Topography, line: Map) -> str:
     )
 
 
-def doubt_sizes(prepared: Prepared) -> list[str]:
-    """Return doubts about the size of a map, in which units may be confused."""
-    found = prepared.whole
-    (ny, nx), (lx, ly), doubts = found.heights.shape, found.size, []
+def doubt_sizes(prepared: Prepared) -> Iterator[Doubt]:
+    """Yield doubts about the size of a map, in which units may be confused."""
+    found, name = prepared.whole, prepared.part.path.name
+    (ny, nx), (lx, ly) = found.heights.shape, found.size
     dx, dy = lx / nx, ly / ny
     span = float(np.nanmax(found.heights) - np.nanmin(found.heights))
     if max(lx, ly) > LARGEST:
-        doubts.append(f"the map is {lx:.4g} x {ly:.4g} m; are lengths in m?")
+        yield Doubt("large map", "surface", {"file": name, "lx": lx, "ly": ly})
     if 0.0 < span < FLATTEST * min(lx, ly):
-        doubts.append(
-            f"the map is {quantity(lx, 'm', 4)} x {quantity(ly, 'm', 4)}, and its heights differ by "
-            f"{quantity(span, 'm', 3)} only; do heights and lengths have the right units?"
-        )
+        yield Doubt("flat map", "surface", {"file": name, "lx": lx, "ly": ly, "span": span})
     if max(dx, dy) > OBLONG * min(dx, dy):
-        doubts.append(
-            f"points of the map are {quantity(dx, 'm', 4)} apart along x and {quantity(dy, 'm', 4)} along y; is the "
-            "order of x and y right?"
-        )
-    return [f"surface: {prepared.part.path.name}: {text}" for text in doubts]
+        yield Doubt("oblong points", "surface", {"file": name, "dx": dx, "dy": dy})
 
 
-def doubt_outliers(prepared: Prepared) -> list[str]:
-    """Return a doubt about points that stick out of their neighbours, if there are any and they are kept."""
+def doubt_outliers(prepared: Prepared) -> Iterator[Doubt]:
+    """Yield a doubt about points that stick out of their neighbours, if there are any and they are kept."""
     odd, cut = prepared.treated.outliers, prepared.cut
     if not odd.any() or prepared.part.outliers == "clip":
-        return []
+        return
     slope, without = (
         treatment.rms_slope(treatment.treat(heights, "tilt", "smooth").heights, prepared.size)
         for heights in (cut, np.where(odd, np.nan, cut))
@@ -74,9 +70,5 @@ def doubt_outliers(prepared: Prepared) -> list[str]:
     furthest = cut[odd][np.argmax(np.abs(cut[odd] - np.nanmedian(cut)))]
     count = int(np.count_nonzero(cut == furthest))
     repeated = f"; {quantity(furthest, 'm', 4)} occurs {count} times" if count > 1 else ""
-    return [
-        f"surface: {odd.sum()} points of the map stick out of their neighbours by more than {treatment.OUTLIER:g} "
-        f"times the median deviation{repeated}. Its rms slope is {slope:.3g} with them and {without:.3g} without, "
-        "and they carry load; where they are no part of the surface, give outliers: clip, or nodata: NUMBER if one "
-        "number marks missing points"
-    ]
+    numbers = {"count": int(odd.sum()), "deviations": treatment.OUTLIER, "slope": slope, "without": without}
+    yield Doubt("outliers", "surface", {**numbers, "repeated": repeated})

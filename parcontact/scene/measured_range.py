@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
+from ..doubts import Doubt
 from ..effects.relaxation import time_factor_of
 from ..job import Flat, Grid, Job, Rough, Wave, Zener
 
@@ -70,8 +71,8 @@ def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedB
     return [ExcitedBand(value, time_factor_of(job.at_temperature(value).material), band) for value in degrees]
 
 
-def describe_beyond(job: Job, temperatures: Sequence[float] = ()) -> Iterator[str]:
-    """Yield a sentence for frequencies and one for temperatures that the material of a job was not measured at.
+def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
+    """Yield a doubt for frequencies and one for temperatures that the material of a job was not measured at.
 
     `temperatures` [deg C] are those of a friction curve; without any, that of the material.
     """
@@ -81,21 +82,16 @@ def describe_beyond(job: Job, temperatures: Sequence[float] = ()) -> Iterator[st
     if body.temperatures is not None:
         low, high = body.temperatures
         if beyond := [value for value in degrees if not low <= value <= high]:
-            yield (
-                f"material: {', '.join(f'{value:g}' for value in beyond)} C is beyond the {low:g} to {high:g} C of its "
-                "measurement: the shift is an extrapolation there"
-            )
+            degrees_text = ", ".join(f"{value:g}" for value in beyond)
+            yield Doubt("temperatures", "material", {"degrees": degrees_text, "low": low, "high": high})
     found = excited_bands(job, temperatures)
     if body.band is None or not found:
         return
     low, high = min(one.reduced[0] for one in found), max(one.reduced[1] for one in found)
     for decades, side in ((math.log10(body.band[0] / low), "below"), (math.log10(high / body.band[1]), "above")):
         if decades > NEAR:
-            yield (
-                f"material: the job excites {low:.3g} to {high:.3g} Hz, reduced to the reference temperature, "
-                f"{decades:.1f} decades {side} the measured {body.band[0]:.3g} to {body.band[1]:.3g} Hz: moduli are an "
-                "extrapolation there"
-            )
+            measured = {"decades": decades, "side": side, "first": body.band[0], "last": body.band[1]}
+            yield Doubt("frequencies", "material", {"low": low, "high": high, **measured})
 
 
 def _body(job: Job) -> Zener | None:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import job as jobs
+from ..doubts import Doubt
 from ..job import Grid, Job
 from ..job.checks import meaning
 from ..parallel.fft import FFT, Spectrum
@@ -26,17 +27,15 @@ FLAT = 1e-14  # accuracy: a surface whose highest and lowest points differ by th
 
 
 class Told(NamedTuple):
-    """Sentences on measured maps: root has notes on how they were prepared, and every rank has doubts, of which
-    those about points that stick out are in `spiky`, too."""
+    """Notes on how measured maps were prepared, sentences that root has, and doubts about them, on every rank."""
 
     notes: list[str]
-    doubts: list[str]
-    spiky: list[str]
+    doubts: list[Doubt]
 
 
 def make_surface(job: Job, fft: FFT) -> tuple[Surface, Told]:
     """Return the rigid surface of a job, and what to say of its measured maps; collective. Raises InputError."""
-    grid, told = job.grid, Told([], [], [])
+    grid, told = job.grid, Told([], [])
     spectral = [part for part in job.surface if isinstance(part, jobs.Spectral)]
     waves = reduce(add, (_waves(part, grid, fft, told) for part in spectral)) if spectral else None
     shapes = [_round(part, grid) for part in job.surface if isinstance(part, jobs.Sphere | jobs.Cylinder)]
@@ -136,21 +135,20 @@ def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, told: Told) -> Sp
 
     heights: list[Array] = []
 
-    def make() -> tuple[list[str], list[str], tuple[spectrum.MeasuredSpectrum, tuple[float, float]] | None]:
+    def make() -> tuple[list[Doubt], tuple[spectrum.MeasuredSpectrum, tuple[float, float]] | None]:
         found = map_files.read(part)
         if found.is_line:
             told.notes.append(map_sentences.describe_line(part, found))
-            return [], [], spectrum.of_line(part, found)
+            return [], spectrum.of_line(part, found)
         prepared = prepared_map.prepare(part, grid, found)
         heights.append(prepared.heights)
         told.notes.extend(map_sentences.describe_treatment(prepared))
-        return map_sentences.doubt_sizes(prepared), map_sentences.doubt_outliers(prepared), None
+        return [*map_sentences.doubt_sizes(prepared), *map_sentences.doubt_outliers(prepared)], None
 
-    sizes, outliers, line = on_root(fft.slab.comm, make)
+    doubts, line = on_root(fft.slab.comm, make)
     if line is not None:
         return _random_surface(*line, grid, fft, told.notes)
-    told.doubts.extend([*sizes, *outliers])
-    told.spiky.extend(outliers)
+    told.doubts.extend(doubts)
     return _transform(fft.slab.from_root(heights[0] if heights else None), fft)
 
 

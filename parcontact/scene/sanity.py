@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..effects.adhesion_doubts import beyond_heights
+from ..doubts import Doubt
+from ..effects.adhesion_doubts import doubt_range
 from ..errors import InputError, JobError, RunError
 from ..history.timeline import Timeline
 from ..job import Job, OnOneMesh
@@ -18,12 +19,10 @@ from ..job.checks.limits import MOST_STEPS
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from ..physics.measures import Measures
-from ..printed import per_cent
-from .measured_range import describe_beyond
+from .measured_range import doubt_band
 from .scene import Setup
 
 SEAM = 2.0  # accuracy: the jump across the edge over the largest increment inside: 1 if nothing is special
-ODD_CONTACTS = ("edge", "cells")  # at the edge of the box; a few cells wide
 FEW_CELLS = 0.15  # accuracy: of the area, too large if counted in cells: contacts of three cells, a circle of four
 FEW_POINTS = 2**22  # tuning: heights that are made in seconds
 STRICT = "an error with numerics.strict"
@@ -34,7 +33,7 @@ def refuse_impossible(job: Job, timeline: Timeline) -> None:
     """Raise InputError for a run that cannot begin here: too many points for the memory, or too many instants."""
     count = timeline.count
     endless = f"the history would have {count:.3g} steps; it has at most {MOST_STEPS:.0e}" if count > MOST_STEPS else ""
-    for text in (size.beyond_memory(job.grid), size.beyond_file(count, job.output), endless):
+    for text in (*map(str, size.doubt_memory(job.grid)), size.beyond_file(count, job.output), endless):
         if text:
             raise InputError(text)
 
@@ -44,38 +43,38 @@ def is_quickly_made(job: Job) -> bool:
     return job.depends_on_heights and job.grid.nx * job.grid.ny <= FEW_POINTS
 
 
-def find_doubts(setup: Setup, temperatures: Sequence[float] = ()) -> list[str]:
-    """Return what is allowed but means little, of the job at some temperatures [deg C] and of its heights; collective.
-    Raises InputError with `numerics.strict`."""
-    return [*setup.job.warnings, *describe_beyond(setup.job, temperatures), *check_heights(setup)]
+def find_doubts(setup: Setup, temperatures: Sequence[float] = ()) -> list[Doubt]:
+    """Return doubts about a job at some temperatures [deg C] and about its heights; collective. Raises InputError with
+    `numerics.strict`."""
+    return [*setup.job.doubts, *doubt_band(setup.job, temperatures), *check_heights(setup)]
 
 
-def check_heights(setup: Setup) -> list[str]:
-    """Return what is wrong with the heights of a scene; collective. Raises InputError with `numerics.strict`."""
+def check_heights(setup: Setup) -> list[Doubt]:
+    """Return doubts about the heights of a scene; collective. Raises InputError with `numerics.strict`."""
     found = list(_check_heights(setup))
     if found and setup.choices.numerics.strict:
-        raise InputError("\n".join(f"{text} ({STRICT})" for text in found))
+        raise InputError("\n".join(f"{doubt} ({STRICT})" for doubt in found))
     return found
 
 
-def _check_heights(setup: Setup) -> Iterator[str]:
-    if setup.roughness and (text := meaning.steep(setup.roughness.rms_slope)) and text not in setup.job.warnings:
-        yield text
+def _check_heights(setup: Setup) -> Iterator[Doubt]:
+    known = {doubt.kind for doubt in setup.job.doubts}
+    if setup.roughness and "steep" not in known:
+        yield from meaning.doubt_slope(setup.roughness.rms_slope)
     yield from setup.told.doubts
-    seams: list[str] = []
+    seams: list[Doubt] = []
     if any(isinstance(shape, OnOneMesh) for shape in setup.job.surface) and setup.grid.boundary == "periodic":
         seams = list(_seams(setup, setup.surface.heights((0.0, 0.0), setup.slab.empty())))
         yield from seams
     body, span = setup.job.body, setup.heights.span
-    strained = layer.strained(span, body.thickness) if body is not None and setup.roughness else ""
-    if strained and not any(told.startswith("body.thickness: the surface") for told in setup.job.warnings):
-        yield strained
+    if body is not None and setup.roughness and "high for a layer" not in known:
+        yield from layer.doubt_height(span, body.thickness)
     law = setup.choices.adhesion
-    if law and setup.roughness and not setup.surface.shapes and (text := beyond_heights(law, span)):
-        yield text
+    if law and setup.roughness and not setup.surface.shapes:
+        yield from doubt_range(law, span)
     if setup.shortest is not None and not (seams or setup.job.origin.mesh):  # a seam has waves of its own
-        asked, spiky = setup.choices.numerics.asked, bool(setup.told.spiky)
-        yield from advice.measured(setup.grid, setup.shortest, asked, setup.job.directions, spiky)
+        asked, spiky = setup.choices.numerics.asked, any(doubt.kind == "outliers" for doubt in setup.told.doubts)
+        yield from advice.doubt_measured_waves(setup.grid, setup.shortest, asked, setup.job.directions, spiky)
 
 
 # -- full contact -----------------------------------------------------------------------------------------------------
@@ -115,8 +114,8 @@ def refuse_beyond_full_contact(setup: Setup) -> None:
 # -- the edge of a periodic box ---------------------------------------------------------------------------------------
 
 
-def _seams(setup: Setup, heights: Array) -> Iterator[str]:
-    """Yield where the first and the last points of a periodic box do not fit together."""
+def _seams(setup: Setup, heights: Array) -> Iterator[Doubt]:
+    """Yield doubts where the first and the last points of a periodic box do not fit together."""
     unit, grid = setup.units.height, setup.grid
     for name, (jump, inside, rise), length in (
         ("x", _along_x(setup.slab, heights), grid.lx),
@@ -124,15 +123,9 @@ def _seams(setup: Setup, heights: Array) -> Iterator[str]:
     ):
         if jump <= SEAM * inside:
             continue
-        times, tilt = f"{jump / inside:.3g} times" if inside else "far above", rise / length
-        remedy = "cut it where it fits, or let it fade to its mean towards the edge"
-        if math.sqrt(max(jump**2 - rise**2, 0.0)) <= SEAM * inside:
-            remedy = f"it is tilted by {abs(tilt) * unit:.3g}: subtract its mean plane"
-        yield (
-            f"surface: the heights at the two ends along {name} of the periodic box differ by {jump * unit:.3g} m "
-            f"(rms), {times} the largest step between neighbours inside. Such a step makes friction of its own; "
-            f"{remedy}"
-        )
+        kind = "tilt" if math.sqrt(max(jump**2 - rise**2, 0.0)) <= SEAM * inside else "seam"
+        times, tilt = jump / inside if inside else math.inf, abs(rise) / length * unit
+        yield Doubt(kind, "surface", {"axis": name, "jump": jump * unit, "times": times, "tilt": tilt})
 
 
 def _along_x(slab: Slab, heights: Array) -> tuple[float, float, float]:
@@ -172,40 +165,30 @@ class ContactWatch:
     seen: set[str] = field(default_factory=set)
     more: str = "more grid.points"
 
-    def judge(self, step: int, measures: Measures) -> list[str]:
-        """Return warnings about a step; raises RunError where they are errors."""
+    def judge(self, step: int, measures: Measures) -> list[Doubt]:
+        """Return doubts about a step; raises RunError where they are errors."""
         ends_a_stage = 0 < step <= self.timeline.count and self.timeline.span(step).last == step
         return self.judge_point(measures, f"step {step}", ends_a_stage)
 
-    def judge_point(self, measures: Measures, where: str, final: bool = True) -> list[str]:
-        """Return warnings about a contact, of its cells if it is `final`; raises RunError where they are errors."""
-        found = dict(
-            zip(ODD_CONTACTS, (at_edge(measures), few_cells(measures, self.more) if final else ""), strict=True)
-        )
-        new = {kind: f"{where}: {text}" for kind, text in found.items() if text and kind not in self.seen}
-        self.seen |= new.keys()
+    def judge_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
+        """Return doubts about a contact, of its cells if it is `final`; raises RunError where they are errors."""
+        found = [*doubt_edge(measures, where), *(doubt_cells(measures, where, self.more) if final else ())]
+        new = [doubt for doubt in found if doubt.kind not in self.seen]
+        self.seen |= {doubt.kind for doubt in new}
         if new and self.strict:
-            raise RunError("; ".join(f"{text} ({STRICT})" for text in new.values()))
-        return list(new.values())
+            raise RunError("; ".join(f"{doubt} ({STRICT})" for doubt in new))
+        return new
 
 
-def at_edge(measures: Measures) -> str:
-    """Return what to say of a contact that leaves its box, or ''."""
-    if not measures.at_edge:
-        return ""
-    return (
-        "the contact reaches the edge of the box and is cut off there, so its results are wrong; use a larger "
-        "grid.size, less load or a shorter way"
-    )
+def doubt_edge(measures: Measures, where: str) -> Iterator[Doubt]:
+    """Yield a doubt about a contact that leaves its box."""
+    if measures.at_edge:
+        yield Doubt("edge", "", {"where": where})
 
 
-def few_cells(measures: Measures, more: str) -> str:
-    """Return what to say of contacts that consist of their own edges, or ''; `more` points are where they pay."""
+def doubt_cells(measures: Measures, where: str, more: str) -> Iterator[Doubt]:
+    """Yield a doubt about contacts that consist of their own edges; `more` points are where they pay."""
     area = measures.contact_area
     excess = 1.0 - measures.contact_area_corrected / area if area > 0.0 else 0.0
-    if excess <= FEW_CELLS:
-        return ""
-    return (
-        f"spots of contact are only a few cells wide: contact_area is about {per_cent(excess)} too large (more than "
-        f"{per_cent(FEW_CELLS)} gets this warning); use {more}, a smaller grid.size or a larger load"
-    )
+    if excess > FEW_CELLS:
+        yield Doubt("cells", "", {"where": where, "excess": excess, "most": FEW_CELLS, "more": more})

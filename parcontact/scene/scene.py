@@ -187,7 +187,7 @@ def outline(job: Job, slab: Slab) -> Setup:
     chosen, fft = choices(job), FFT(slab)
     slab.tally.purpose = "surface spectrum"
     surface, flat, units = outline_surface(job, fft), HeightRange(0.0, 0.0, 0.0), Units(1.0, 1.0, 1.0)
-    return Setup(chosen, slab, fft, surface, None, None, flat, units, Told([], [], []))
+    return Setup(chosen, slab, fft, surface, None, None, flat, units, Told([], []))
 
 
 def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:

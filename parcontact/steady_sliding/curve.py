@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from .. import scene
+from ..doubts import Doubt
 from ..errors import InputError, RunError
 from ..history.timeline import Timeline
 from ..job import Job
@@ -91,7 +92,7 @@ class States(Protocol):
     setup: Setup
     table: tuple[str, Sequence[str]] | None
 
-    def doubts(self, temperatures: Sequence[float]) -> list[str]: ...
+    def doubts(self, temperatures: Sequence[float]) -> list[Doubt]: ...
 
     def notes(self) -> list[str]: ...
 
@@ -124,7 +125,7 @@ def run(
     wanted: Request,
     quiet: bool,
     restart: str = "auto",
-    shows: Callable[[str], bool] = always,
+    shows: Callable[[Doubt], bool] = always,
     others_file: StopFile | None = None,
     make: Callable[[Job, Slab], States] = on_one_grid,
 ) -> int:
@@ -208,7 +209,7 @@ class _Curve:
     maps: SteadyMaps | None
     directory: Directory
     signals: Signals
-    shows: Callable[[str], bool]
+    shows: Callable[[Doubt], bool]
     others_file: StopFile | None
     failures: int = 0
 

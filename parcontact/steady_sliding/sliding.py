@@ -10,6 +10,7 @@ import numpy as np
 
 from ..accuracy.budget import ErrorBudget, estimate_steady
 from ..accuracy.time_error import RunProperties, StepObservation
+from ..doubts import Doubt
 from ..effects.relaxation import temperature_of
 from ..errors import InputError, RunError
 from ..march.errors import properties_of
@@ -174,8 +175,8 @@ class SteadySliding:
 
     table: tuple[str, Sequence[str]] | None = None
 
-    def doubts(self, temperatures: Sequence[float]) -> list[str]:
-        """Return warnings about the job, also at these temperatures [deg C]; collective."""
+    def doubts(self, temperatures: Sequence[float]) -> list[Doubt]:
+        """Return doubts about the job, also at these temperatures [deg C]; collective."""
         return sanity.find_doubts(self.setup, temperatures)
 
     def notes(self) -> list[str]:

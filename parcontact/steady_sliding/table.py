@@ -7,6 +7,7 @@ from pathlib import Path
 from .. import progress
 from ..accuracy.budget import advice, describe, exceeds
 from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
+from ..doubts import Doubt
 from ..job import Job
 from ..job.checks.advice import describe_sample
 from ..job.sections.materials import describe_temperature
@@ -100,10 +101,10 @@ class CurveTable:
             self._bar.print(text)
         self._console.log(text)
 
-    def warn(self, texts: list[str], shown: Callable[[str], bool] = always) -> None:
-        """Write warnings to the log, and show those that are `shown` even to those who asked for quiet."""
-        for text in texts:
-            self._console.warn(text, shown(text))
+    def warn(self, doubts: Sequence[Doubt], shown: Callable[[Doubt], bool] = always) -> None:
+        """Write doubts to the log, and show those that are `shown` even to those who asked for quiet."""
+        for doubt in doubts:
+            self._console.warn(str(doubt), shown(doubt))
 
     def write(self, point: Point, rows: Sequence[Sequence[float]]) -> None:
         """Add a point, unless it was there before and is solved for its maps only."""
@@ -128,8 +129,8 @@ class CurveTable:
         self._file.sync()
         if self.known:
             self._sort()
-        self.warn(list(describe_hot(self._points)))
-        self.warn(list(describe_missed(self._points, self._job)))
+        for warning in (*describe_hot(self._points), *describe_missed(self._points, self._job)):
+            self._console.warn(warning)
         if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
             self.say(text)
         from ..plotting import plots  # matplotlib is slow to import, and for pictures only

@@ -10,6 +10,7 @@ from typing import TextIO
 
 from tqdm import tqdm
 
+from ..doubts import Doubt
 from ..streams import printable
 from . import files
 from .row import StepRow
@@ -45,8 +46,8 @@ def lines_of(log: Path) -> list[str]:
     return [STAMP.sub("", line) for line in log.read_text(errors="replace").splitlines()] if log.is_file() else []
 
 
-def always(text: str) -> bool:
-    """Show every warning."""
+def always(doubt: Doubt) -> bool:
+    """Show every doubt."""
     return True
 
 

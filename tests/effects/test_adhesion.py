@@ -10,7 +10,7 @@ from parcontact.effects.adhesion import law_of
 from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.mesh import load, load_cases
-from parcontact.run.sweep_warnings import doubts_of
+from parcontact.run.sweep_warnings import sentences_of
 
 E = 4e6  # E* of an incompressible body of 1 MPa [Pa]
 RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 9e6, "relaxation_time": 1.0}]}
@@ -94,7 +94,7 @@ def test_ranges_that_differ_in_a_sweep_are_told(reach: float | str, key: str, va
         "history": [{"approach": 0.0}],
         "sweep": [{key: values}],
     }
-    found = [text for text in doubts_of(load_cases(data), lambda job: ()) if "different physics" in text]
+    found = [text for text in sentences_of(load_cases(data), lambda job: ()) if "different physics" in text]
     assert [told in text for text in found] == [True] * bool(told)
 
 

@@ -61,7 +61,7 @@ def test_a_range_above_the_roughness() -> None:
     for share, told in ((0.99, False), (1.01, True)):
         wave = {"shape": "wave", "amplitude": 1e-6, "waves": [4, 0]}
         one = job(surface=wave, grid={"points": 64, "size": 4e-4}, **sticking(0.05, 2e-6 * share))
-        found = sanity.find_doubts(set_up(one, Slab.alone(64, 64)))
+        found = map(str, sanity.find_doubts(set_up(one, Slab.alone(64, 64))))
         assert any("more than the 2e-06 m from the lowest to the highest" in text for text in found) == told
 
 

@@ -184,7 +184,7 @@ def test_sizes_that_are_doubted(road: Path, more: str, doubt: str) -> None:
     (road / "job.yaml").write_text(text.format(points=POINTS, more=", outliers: clip"))
     found = scene.set_up(mesh.load(road / "job.yaml"), Slab.alone(POINTS, POINTS)).told.doubts
     assert bool(found) == bool(doubt)
-    assert not doubt or any(doubt in text and text.startswith("surface: road.npy: ") for text in found)
+    assert not doubt or any(doubt in str(each) and str(each).startswith("surface: road.npy: ") for each in found)
 
 
 def test_clipped_outliers_are_no_doubt(road: Path) -> None:
@@ -334,7 +334,7 @@ def test_points_that_stick_out(shared_path: Path, comm: MPI.Intracomm, communica
     comm.barrier()
     job = mesh.load(shared_path / "job.yaml")
     for group in communicators:
-        doubts = sanity.check_heights(scene.set_up(job, Slab(group, POINTS, POINTS)))
+        doubts = [*map(str, sanity.check_heights(scene.set_up(job, Slab(group, POINTS, POINTS))))]
         assert group.allgather(doubts) == [doubts] * group.size
         assert doubts[0].startswith("surface: 2 points of the map stick out of their neighbours by more than 16 times")
         found = [float(text) for text in re.findall(r"([0-9.]+) with(?:out)?\b", doubts[0])]

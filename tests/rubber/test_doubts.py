@@ -13,7 +13,7 @@ from parcontact.job import Flat, Job, Rough, Sphere, Wave
 from parcontact.rubber import compound, sane, tables
 from parcontact.rubber.series import Weigh
 from parcontact.rubber.shift import WLF, Factors, given
-from parcontact.scene.measured_range import describe_beyond, wave_numbers
+from parcontact.scene.measured_range import doubt_band, wave_numbers
 
 from . import measured
 
@@ -195,19 +195,19 @@ def rubber(velocity: float, **more: Any) -> Job:
 
 
 def test_a_job_within_the_measured_range() -> None:
-    assert list(describe_beyond(rubber(0.1))) == []
-    assert list(describe_beyond(rubber(0.1), [20.0, 60.0])) == []
-    assert list(describe_beyond(rubber(1e3, band=None))) == []
+    assert list(doubt_band(rubber(0.1))) == []
+    assert list(doubt_band(rubber(0.1), [20.0, 60.0])) == []
+    assert list(doubt_band(rubber(1e3, band=None))) == []
 
 
 def test_a_job_beyond_the_measured_frequencies() -> None:
     """100 m/s over 0.25 mm are 4e5 Hz, 1.6 decades above 1e4; at -20 C reduced by a_T, 10^5.8 there."""
-    (text,) = describe_beyond(rubber(100.0))
+    (text,) = map(str, doubt_band(rubber(100.0)))
     assert "excites 4e+05 to 4e+05 Hz" in text
     assert "1.6 decades above the measured 1 to 1e+04 Hz" in text
-    (cold,) = describe_beyond(rubber(0.1, temperature=-20.0))
+    (cold,) = map(str, doubt_band(rubber(0.1, temperature=-20.0)))
     assert "decades above" in cold
-    (slow,) = describe_beyond(rubber(1e-5))
+    (slow,) = map(str, doubt_band(rubber(1e-5)))
     assert "1.4 decades below" in slow
 
 
@@ -233,9 +233,9 @@ def test_a_job_says_its_temperature() -> None:
 
 def test_temperatures_beyond_the_measured_ones() -> None:
     job = rubber(0.1, band=None)
-    (text,) = describe_beyond(job, [-60.0, -40.0, 20.0, 120.0])
+    (text,) = map(str, doubt_band(job, [-60.0, -40.0, 20.0, 120.0]))
     assert text.startswith("material: -60, -40, 120 C is beyond the -20 to 60 C")
-    (own,) = describe_beyond(rubber(0.1, band=None, temperature=80.0))
+    (own,) = map(str, doubt_band(rubber(0.1, band=None, temperature=80.0)))
     assert own.startswith("material: 80 C is beyond")
 
 

@@ -19,6 +19,7 @@ from mpi4py import MPI
 from sweeping import JOB, table
 
 from parcontact.__main__ import main
+from parcontact.doubts import Doubt
 from parcontact.errors import InputError, InUseError, RunError
 from parcontact.job import Case, Job, load_cases
 from parcontact.parallel.groups import Groups
@@ -29,6 +30,8 @@ from parcontact.run import sweep, watch
 from parcontact.storage import directory, files
 from parcontact.storage.stopfile import StopFile
 from parcontact.summary import info, slide, sweep_table
+
+CELLS = {"excess": 0.2, "most": 0.15, "more": "more points"}  # of a doubt about contacts of few cells
 
 
 @pytest.fixture
@@ -173,7 +176,8 @@ def test_groups_of_ranks_take_cases_by_turns(
         number = int(job.output.directory.name)
         begun.append(number)
         assert slab.comm.size == sum(rank * groups.count // world.size == groups.number for rank in range(world.size))
-        shown = [shows(f"step {number}: {text}") for text in ("odd", "odd", *["rare"] * (number == 5))]
+        where = {**CELLS, "where": f"step {number}"}
+        shown = [shows(Doubt(kind, "", where)) for kind in ("edge", "edge", *["cells"] * (number == 5))]
         assert any(shown) == (groups.count == 1 and number in (0, 5))
         if number == 3:
             raise RunError("it fell over")
@@ -184,8 +188,9 @@ def test_groups_of_ranks_take_cases_by_turns(
     said = capsys.readouterr()
     told = "".join(world.allgather(said.err)).splitlines()
     assert "parcontact: case 3: it fell over" in told
-    assert sum(line.endswith(": odd (cases 0-5)") for line in told) == 1
-    assert ("warning: step 5: rare (case 5)" in told) == (groups.count > 1)  # else it was shown at once
+    assert sum("the edge of the box" in line and line.endswith(" (cases 0-5)") for line in told) == 1
+    rare = f"warning: {Doubt('cells', '', {**CELLS, 'where': 'step 5'})} (case 5)"
+    assert (rare in told) == (groups.count > 1)  # else it was shown at once
     assert ("case 4: done\n" in "".join(world.allgather(said.out))) == (groups.count > 1)
     if world.rank == 0:
         assert [row["state"] for row in table()] == ["-", "-", "-", "failed", "-", "-"]

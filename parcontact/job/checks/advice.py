@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from ...doubts import Doubt
 from ...printed import per_cent
 from ..sections.calculation import Accuracy, Grid
 from ..sections.geometry import Rough
@@ -28,15 +29,14 @@ LITTLE = 0.05  # tuning: points that lack, as a share of all; so few are not wor
 SEED_FRICTION, SEED_AREA = 0.24, 0.17  # accuracy
 
 
-def resolution(job: Sections, directions: Sequence[Vector] = (), chosen: bool = False) -> Iterator[str]:
-    """Yield sentences, in the order of the sections; the surface slides along these directions (unit vectors). A mesh
+def doubts_of_resolution(job: Sections, directions: Sequence[Vector] = (), chosen: bool = False) -> Iterator[Doubt]:
+    """Yield doubts, in the order of the sections; the surface slides along these directions (unit vectors). A mesh
     that was `chosen` for the job has cells enough, as far as is known before."""
     grid, surface, numerics = job.grid, job.surface, job.numerics
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and max(grid.points) > 1:
             yield from _long_waves(index, shape, grid)
-            if text := out_of_proportion(index, shape, grid):
-                yield f"grid.size {text}"
+            yield from doubt_size(index, shape, grid)
             if not chosen:
                 yield from _short_waves(index, shape, grid, numerics.asked, directions)
     short = min((shape.short_wavelength for shape in surface if isinstance(shape, Rough)), default=None)
@@ -52,47 +52,43 @@ def _directions(grid: Grid) -> list[tuple[str, float, float]]:
     return [(name, length, cell) for name, length, cell, points in found if points > 1]
 
 
-def _long_waves(index: int, shape: Rough, grid: Grid) -> Iterator[str]:
+def _long_waves(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
     name, length, _ = min(_directions(grid), key=lambda direction: direction[1])
     if length < LONG_WAVES * shape.long_wavelength * (1 - SAME_LENGTH):
-        yield (
-            f"surface.{index}: only {length / shape.long_wavelength:.3g} of the longest waves fit into the box along "
-            f"{name}, and a representative surface has at least {LONG_WAVES}; use a grid.size of "
-            f"{LONG_WAVES * shape.long_wavelength:.4g} m or a long_wavelength of {length / LONG_WAVES:.4g} m"
-        )
+        enough = {"size": LONG_WAVES * shape.long_wavelength, "wave": length / LONG_WAVES}
+        numbers = {"waves": length / shape.long_wavelength, "axis": name, "least": LONG_WAVES, **enough}
+        yield Doubt("few long waves", f"surface.{index}", numbers)
 
 
-def out_of_proportion(index: int, shape: Rough, grid: Grid) -> str:
-    """Return what to say of a box that is so large over the longest wave as no box is meant to be, or ''."""
+def doubt_size(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
+    """Yield a doubt about a box that is so large over the longest wave as no box is meant to be."""
     length = max((length for _, length, _ in _directions(grid)), default=0.0)
-    if length <= MOST_LONG_WAVES * shape.long_wavelength:
-        return ""
-    times = f"{length / shape.long_wavelength:.4g} times surface.{index}.long_wavelength, {shape.long_wavelength:g} m"
-    return f"has a side of {length:g} m, {times}; is it in m? {length:g} mm would be {length / 1000:g}"
+    if length > MOST_LONG_WAVES * shape.long_wavelength:
+        of_wave = {"wave": shape.long_wavelength, "times": length / shape.long_wavelength}
+        numbers = {"length": length, "in_milli": length / 1000, "key": f"surface.{index}.long_wavelength", **of_wave}
+        yield Doubt("large box", "grid.size", numbers)
 
 
-def _short_waves(index: int, shape: Rough, grid: Grid, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[str]:
-    otherwise = " or a short_wavelength of {:.4g} m"
-    yield from _few_cells(f"surface.{index}", shape.short_wavelength, "", otherwise, grid, asked, directions)
+def _short_waves(
+    index: int, shape: Rough, grid: Grid, asked: Accuracy, directions: Sequence[Vector]
+) -> Iterator[Doubt]:
+    for numbers in _few_cells(shape.short_wavelength, grid, asked, directions):
+        yield Doubt("few cells", f"surface.{index}", numbers)
 
 
-def measured(
+def doubt_measured_waves(
     grid: Grid, wave: float, asked: Accuracy, directions: Sequence[Vector], spiky: bool = False
-) -> Iterator[str]:
-    """Yield what to say of the shortest wave [m] of a measured surface that slides along these directions; of a `spiky`
+) -> Iterator[Doubt]:
+    """Yield a doubt about the shortest wave [m] of a measured surface that slides along these directions; of a `spiky`
     one it may be that of the points that stick out."""
     spikes = " with the points that stick out" if spiky else ""
-    known = f" ({wave:.3g} m, by the spectrum of the heights{spikes})"
-    otherwise = ", to which a topography is interpolated (resample an array yourself), "
-    otherwise += "or heights without waves shorter than {:.4g} m"
-    yield from _few_cells("surface", wave, known, otherwise, grid, asked, directions)
+    for numbers in _few_cells(wave, grid, asked, directions):
+        yield Doubt("few cells of a map", "surface", {**numbers, "known": wave, "spikes": spikes})
 
 
-def _few_cells(
-    key: str, wave: float, known: str, otherwise: str, grid: Grid, asked: Accuracy, directions: Sequence[Vector]
-) -> Iterator[str]:
-    """Yield a sentence if a shortest wave has too few cells: how many points it needs along the direction that lacks
-    most, at which price, or what else."""
+def _few_cells(wave: float, grid: Grid, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[dict[str, object]]:
+    """Yield the numbers of a doubt if a shortest wave has too few cells: how many points it needs along the direction
+    that lacks most, at which price, or what else."""
     wants = {name: needed("xy".index(name), directions, asked) for name, _, _ in _directions(grid)}
     lacks = {name: max(wants[name]) * cell / wave for name, _, cell in _directions(grid)}
     name, length, cell = max(_directions(grid), key=lambda direction: lacks[direction[0]], default=("", 0.0, 0.0))
@@ -103,12 +99,16 @@ def _few_cells(
     reason = "a resolved contact" if math.isclose(least, of_area) else "friction" if least > of_area else "its area"
     slides = lambda axis: not directions or any(abs(way["xy".index(axis)]) > ASIDE for way in directions)  # noqa: E731
     finer = max((max(lack, 1.0) for axis, lack in lacks.items() if slides(axis)), default=1.0)
-    yield (
-        f"{key}: only {wave / cell:.3g} cells per shortest wave along {name}{known}; {reason} needs "
-        f"{max(wants[name]):.3g}: use {math.ceil((1 - SAME_LENGTH) * max(wants[name]) * length / wave)} points "
-        f"({more:.2g} times the memory{f', some {more * finer:.2g} times the time in sliding' * bool(directions)})"
-        f"{otherwise.format(max(wants[name]) * cell)}"
-    )
+    yield {
+        "cells": wave / cell,
+        "axis": name,
+        "reason": reason,
+        "needed": max(wants[name]),
+        "points": math.ceil((1 - SAME_LENGTH) * max(wants[name]) * length / wave),
+        "memory": more,
+        "time": f", some {more * finer:.2g} times the time in sliding" if directions else "",
+        "wave": max(wants[name]) * cell,
+    }
 
 
 def longest_step(stage: Stage, grid: Grid) -> float:
@@ -123,23 +123,18 @@ def longest_step(stage: Stage, grid: Grid) -> float:
     return min(stage.seconds, step or 0.0)
 
 
-def _steps(index: int, stage: Stage, grid: Grid, resolved: float, short: float | None) -> Iterator[str]:
-    """Yield sentences about the steps of a stage: longer than what is to be resolved [s], than the shortest wave."""
+def _steps(index: int, stage: Stage, grid: Grid, resolved: float, short: float | None) -> Iterator[Doubt]:
+    """Yield doubts about the steps of a stage: longer than what is to be resolved [s], than the shortest wave."""
     step = longest_step(stage, grid)
     slid = step * stage.speed
     if stage.speed and not stage.seconds:
-        yield f"history.{index}: nothing slides in a stage without duration or distance; its velocity has no effect"
+        yield Doubt("slides in no time", f"history.{index}")
     if step > resolved * (1 + SAME_LENGTH):
-        yield (
-            f"history.{index}: time steps up to {step:.3g} s are longer than the shortest relaxation time "
-            f"{resolved:.3g} s, which backward-euler does not resolve; shorten the steps or use integrator: exponential"
-        )
+        yield Doubt("long steps", f"history.{index}", {"step": step, "shortest": resolved})
     if short is not None and slid > short / STEPS_PER_WAVE * (1 + SAME_LENGTH):
-        yield (
-            f"history.{index}: the surface slides {slid:.3g} m in one step, {slid / short:.2g} of its shortest wave; "
-            f"use time steps up to {short / STEPS_PER_WAVE / stage.speed:.3g} s "
-            f"(cells_per_step up to {short / STEPS_PER_WAVE / (one_cell(stage, grid) * stage.speed):.3g})"
-        )
+        enough = short / STEPS_PER_WAVE / stage.speed
+        numbers = {"slid": slid, "share": slid / short, "step": enough, "cells": enough / one_cell(stage, grid)}
+        yield Doubt("skipped waves", f"history.{index}", numbers)
 
 
 def describe_sample(grid: Grid, surface: tuple[Any, ...], slides: bool) -> str:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from ...doubts import Doubt
 from ..sections.calculation import Grid
 from ..sections.geometry import Flat, Rough, Sphere, Wave
 from ..sections.stages import Stage
@@ -21,41 +22,31 @@ LONGEST = 100.0  # physics: thicknesses; to longer waves rubber yields by its co
 NEARLY = 1e-4  # physics: below 1/2, of the Poisson's ratio of a rubber
 
 
-def warnings(job: Sections) -> Iterator[str]:
-    """Yield sentences about the `body` section of a job, which may be None."""
+def doubts_of_layer(job: Sections) -> Iterator[Doubt]:
+    """Yield doubts about the `body` section of a job, which may be None."""
     grid, surface, body, poisson = job.grid, job.surface, job.body, job.material.poisson
     if body is None:
         return
     cell = max(grid.dx, grid.dy)
     smooth = all(isinstance(shape, Wave | Flat) for shape in surface)
     if body.thickness < FEWEST_CELLS * cell and grid.boundary == "periodic" and not smooth:
-        yield (
-            f"body.thickness: {body.thickness:g} m is thinner than {FEWEST_CELLS:g} cells of {cell:.3g} m, and the "
-            f"edges of contacts are not resolved; use {more_points(grid)}, or a smaller grid.size"
-        )
-    if text := strained(2.0 * _rms_height(grid, surface), body.thickness):
-        yield text
+        numbers = {"thickness": body.thickness, "least": FEWEST_CELLS, "cell": cell, "more": more_points(grid)}
+        yield Doubt("thin", "body.thickness", numbers)
+    yield from doubt_height(2.0 * _rms_height(grid, surface), body.thickness)
     yield from _indented(surface, body.thickness, job.history)
     longest = max(_wavelengths(grid, surface), default=0.0)
     if longest > LONGEST * body.thickness and poisson > 0.5 - NEARLY and body.base == "bonded":
-        yield (
-            f"material.poisson: waves of {longest:.3g} m are more than {LONGEST:g} times as long as the layer is thick "
-            f"({body.thickness:g} m), and rubber yields to them by its compressibility; {poisson:g} leaves that out: "
-            "use 0.4995"
-        )
+        numbers = {"wave": longest, "times": LONGEST, "thickness": body.thickness, "poisson": poisson}
+        yield Doubt("incompressible", "material.poisson", numbers)
 
 
-def strained(height: float, thickness: float) -> str:
-    """Return what to say of a layer into which a surface of such a height [m] presses, or ''."""
-    if height <= THICKEST * thickness:
-        return ""
-    return (
-        f"body.thickness: the surface is {height:.3g} m high or more, above a third of the layer ({thickness:g} m), "
-        "where strains are not small; use a thicker layer, or a lower surface"
-    )
+def doubt_height(height: float, thickness: float) -> Iterator[Doubt]:
+    """Yield a doubt about a layer into which a surface of such a height [m] presses."""
+    if height > THICKEST * thickness:
+        yield Doubt("high for a layer", "body.thickness", {"height": height, "thickness": thickness})
 
 
-def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, ...]) -> Iterator[str]:
+def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, ...]) -> Iterator[Doubt]:
     """Judge an indenter by its approach: the layer is strained by its share of the thickness."""
     if len(surface) != 1 or not isinstance(surface[0], Sphere):
         return
@@ -66,10 +57,8 @@ def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, 
     ]
     deepest, index = max(approaches, default=(0.0, 0))
     if deepest > THICKEST * thickness:
-        yield (
-            f"history.{index}.approach: {deepest:.3g} m is more than a third of the layer ({thickness:g} m), where "
-            "strains are not small; use a smaller approach, or a thicker layer"
-        )
+        numbers = {"approach": deepest, "thickness": thickness}
+        yield Doubt("deep for a layer", f"history.{index}.approach", numbers)
 
 
 def _rms_height(grid: Grid, surface: tuple[Any, ...]) -> float:

@@ -14,7 +14,7 @@ from ..sections.height_arrays import SAME_CELL, HeightArray
 from ..sections.materials import AnyMaterial, heated
 from ..sections.stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Stage, Steady
 from ..text.fault import Fault
-from .advice import SAME_LENGTH, out_of_proportion
+from .advice import SAME_LENGTH, doubt_size
 from .cells import has_wave, one_cell
 
 LOADS = {"pressure": PRESSURE, "force": FORCE}
@@ -62,8 +62,8 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Faul
     cell, size, axis, _ = max((one for one in steps if one[-1] > 1), key=itemgetter(0), default=(0.0, 0.0, "", 0))
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and shape.short_wavelength < 2 * cell * (1 - SAME_LENGTH):
-            if text := out_of_proportion(index, shape, grid):
-                yield Fault(text, ("grid", "size"))
+            if large := next(doubt_size(index, shape, grid), None):
+                yield Fault(f"has {large.body}", ("grid", "size"))
                 continue
             needed = math.ceil(2 * size / shape.short_wavelength * (1 - SAME_LENGTH))
             got = f"got {shape.short_wavelength!r}, which needs {needed} points along {axis}"

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from itertools import groupby
 from typing import Any
 
-from ...printed import per_cent
+from ...doubts import Doubt
 from ..sections.calculation import Grid
 from ..sections.geometry import OnOneMesh, Rough, RoughSpectrum, Sphere, Topography, Wave
 from ..sections.materials import Elastic, PronyBranch, Zener
@@ -30,17 +30,13 @@ IMAGES = 20  # accuracy: along each side, on either side: the rest is 3 % of all
 ROUNDS = 1000  # tuning: through the box that are looked at
 SAME = 1e-9  # accuracy: ways this near, relatively, are the same
 BEYOND = 100.0  # physics: times slower or faster than all branches: nothing relaxes
-MANY_UNITS = (
-    "heights and lengths are in m; heights in um need a factor of 1e-6 (scale: 1.0e-6 of a file, unit: um of a "
-    "topography), and missing points are nan"
-)
 
 
-def warnings(job: Sections) -> Iterator[str]:
-    """Yield sentences, in the order of the sections."""
+def doubts_of_scene(job: Sections) -> Iterator[Doubt]:
+    """Yield doubts, in the order of the sections."""
     material = job.material.fitted
     yield from _slopes(job.grid, job.surface)
-    yield from of_moduli(material)
+    yield from doubt_moduli(material)
     yield from _pressures(job, material)
     yield from _instants(job, material)
     yield from _band(job, material)
@@ -48,14 +44,10 @@ def warnings(job: Sections) -> Iterator[str]:
     yield from _room(job, material) if job.grid.boundary == "free" else neighbours(job, material)
 
 
-def steep(slope: float) -> str:
-    """Return what to say of an rms slope, if it is too large."""
-    if slope <= STEEP:
-        return ""
-    return (
-        f"surface: its rms slope is {slope:.3g}, and the theory is one of small slopes, {STEEP:g} at most: "
-        + MANY_UNITS
-    )
+def doubt_slope(slope: float) -> Iterator[Doubt]:
+    """Yield a doubt about an rms slope, if it is too large."""
+    if slope > STEEP:
+        yield Doubt("steep", "surface", {"slope": slope, "most": STEEP})
 
 
 READ = OnOneMesh | RoughSpectrum | Topography  # shapes whose heights only a look at them tells
@@ -66,7 +58,7 @@ def says_all(surface: tuple[Any, ...]) -> bool:
     return not any(isinstance(shape, READ) or getattr(shape, "rms_slope", 0.0) is None for shape in surface)
 
 
-def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[str]:
+def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Doubt]:
     """Judge shapes whose rms slope follows from the job; those of files are known once they are read."""
     if not says_all(surface):
         return
@@ -77,19 +69,16 @@ def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[str]:
             square += (q * shape.amplitude) ** 2 / 2
         elif isinstance(shape, Rough):
             square += (shape.rms_slope or 0.0) ** 2
-    if text := steep(math.sqrt(square)):
-        yield text
+    yield from doubt_slope(math.sqrt(square))
 
 
-def of_moduli(material: Elastic | Zener) -> Iterator[str]:
+def doubt_moduli(material: Elastic | Zener) -> Iterator[Doubt]:
+    """Yield a doubt about moduli that no solid has."""
     modulus = material.instant_modulus
     if modulus < SOFTEST:
-        yield (
-            f"material: its shear modulus at once is {modulus:.3g} Pa, softer than {SOFTEST:g} Pa, as gels are; moduli "
-            f"are in Pa: {modulus:.3g} MPa would be {modulus * 1e6:.3g}"
-        )
+        yield Doubt("soft", "material", {"modulus": modulus, "least": SOFTEST, "in_mega": 1e6 * modulus})
     elif modulus > HARDEST:
-        yield f"material: its shear modulus at once is {modulus:.3g} Pa, above {HARDEST:g} Pa, harder than diamond"
+        yield Doubt("hard", "material", {"modulus": modulus, "most": HARDEST})
 
 
 def contact_modulus(material: Elastic | Zener) -> float:
@@ -104,7 +93,7 @@ def _mean(stage: Stage, load: float, grid: Grid) -> float:
     return load / (grid.lx * grid.ly) if stage.control == "force" else load
 
 
-def _pressures(job: Sections, material: Elastic | Zener) -> Iterator[str]:
+def _pressures(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     loads = [("initial.pressure", job.initial.pressure or 0.0, 0.0)]
     loads.append(("steady.pressures", max((job.steady.pressures if job.steady else None) or (0.0,)), 0.0))
     least, held = 0.0, 0.0
@@ -115,15 +104,12 @@ def _pressures(job: Sections, material: Elastic | Zener) -> Iterator[str]:
     found = [(pressure / modulus_after(material, seconds), key, pressure, seconds) for key, pressure, seconds in loads]
     strain, key, pressure, seconds = max(found)
     if strain > STRAIN:
-        when = f" after {seconds:.3g} s under it" if seconds else ""
-        yield (
-            f"{key}: a mean pressure of {pressure:.3g} Pa is above 2 G/(1 - nu) = {pressure / strain:.3g} Pa{when}, "
-            "where strains are far beyond linear theory; pressures and moduli are both in Pa"
-        )
+        kind = "strain in time" if seconds else "strain at once"
+        yield Doubt(kind, key, {"pressure": pressure, "modulus": pressure / strain, "seconds": seconds})
     yield from _light(job, material, *max((pressure, key) for key, pressure, _ in loads))
 
 
-def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) -> Iterator[str]:
+def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) -> Iterator[Doubt]:
     """Judge the largest load on a rough surface by the share that touches by Persson, erf(sqrt(2) p/(E* h'))."""
     sticks = getattr(job, "adhesion", None) is not None or any(stage.control == "approach" for stage in job.history)
     slopes = [shape.rms_slope or 0.0 if isinstance(shape, Rough) else math.inf for shape in job.surface]
@@ -131,10 +117,7 @@ def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) 
     known = not sticks and pressure > 0.0 and 0.0 < stiffness < math.inf
     touching = math.erf(math.sqrt(2.0) * pressure / stiffness) * math.prod(job.grid.points) if known else 1.0
     if touching < 1.0:
-        yield (
-            f"{key}: under {pressure:.3g} Pa, the largest load, {touching:.2g} points of the grid would touch, "
-            f"and 1 is the least; use a larger load. Pressures are in Pa: {pressure:.3g} MPa is {pressure * 1e6:.3g}"
-        )
+        yield Doubt("light", key, {"pressure": pressure, "touching": touching, "in_mega": 1e6 * pressure})
 
 
 def modulus_after(material: Elastic | Zener, seconds: float) -> float:
@@ -153,18 +136,15 @@ def modulus_after(material: Elastic | Zener, seconds: float) -> float:
 # -- relaxation -------------------------------------------------------------------------------------------------------
 
 
-def _instants(job: Sections, material: Elastic | Zener) -> Iterator[str]:
+def _instants(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     """Judge stages of a rubber that follow each other at one instant, and are all."""
     timeless = len(job.history) > 1 and not any(stage.seconds for stage in job.history)
     if timeless and material.instant_modulus > material.long_modulus and job.initial.state == "virgin":
-        yield (
-            f"history: its {len(job.history)} stages last no time, and the rubber is at its stiffest in all of them, "
-            f"with a shear modulus of {material.instant_modulus:.3g} Pa; give them a duration [s] to let it relax to "
-            f"{material.long_modulus:.3g} Pa"
-        )
+        moduli = {"modulus": material.instant_modulus, "relaxed": material.long_modulus}
+        yield Doubt("at an instant", "history", {"stages": len(job.history), **moduli})
 
 
-def _band(job: Sections, material: Elastic | Zener) -> Iterator[str]:
+def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     """Sliding excites the angular frequencies q v of the surface's waves; branches answer around 1/relaxation time."""
     branches = [one for one in material.branches if isinstance(one, PronyBranch) or one.G0 > 0.0]
     times = [branch.relaxation_time for branch in branches if 0.0 < branch.relaxation_time < math.inf]
@@ -179,40 +159,32 @@ def _band(job: Sections, material: Elastic | Zener) -> Iterator[str]:
     slow, fast = 1.0 / max(times), 1.0 / min(times)
     if high * BEYOND < slow or low > fast * BEYOND:
         how, modulus = ("slower", "long-term") if high < slow else ("faster", "instantaneous")
-        yield (
-            f"material: sliding excites {low:.3g} to {high:.3g} rad/s, all more than {BEYOND:g} times {how} than the "
-            f"branches, which relax at {slow:.3g} to {fast:.3g} rad/s: the body is elastic with its {modulus} modulus; "
-            "are velocities in m/s, lengths in m and relaxation times in s?"
-        )
+        rates = {"low": low, "high": high, "slow": slow, "fast": fast}
+        yield Doubt("elastic", "material", {**rates, "times": BEYOND, "how": how, "modulus": modulus})
 
 
 # -- isolated contacts ------------------------------------------------------------------------------------------------
 
 
-def _room(job: Sections, material: Elastic | Zener) -> Iterator[str]:
+def _room(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     """Judge a single sphere: the least radius its contact can have, where it goes, and whether the box holds that."""
     grid, sphere = job.grid, job.surface[0]
     if len(job.surface) != 1 or not isinstance(sphere, Sphere) or min(grid.points) == 1:
         return
     x, y = sphere.center or (grid.lx / 2, grid.ly / 2)
-    modulus, told = contact_modulus(material), set()
+    modulus, found = contact_modulus(material), set()
     for index, stage in enumerate(job.history):
         x, y = x + stage.velocity[0] * stage.seconds, y + stage.velocity[1] * stage.seconds
         radius = _hertz(stage, sphere.radius, modulus, grid)
-        if radius / sphere.radius > STEEPEST and "steep" not in told:
-            told.add("steep")
-            yield (
-                f"history.{index}: the contact would have a radius of {radius:.3g} m or more, larger than that of the "
-                f"sphere, {sphere.radius:g} m; the theory is one of small slopes: use a smaller load"
-            )
+        if radius / sphere.radius > STEEPEST and "steep" not in found:
+            found.add("steep")
+            yield Doubt("large contact", f"history.{index}", {"contact": radius, "radius": sphere.radius})
         room = min(x, grid.lx - x, y, grid.ly - y)
-        if radius > room and radius > 0.0 and "room" not in told:
-            told.add("room")
-            where = f"centred at ({x:.4g}, {y:.4g}) m in the end" if stage.speed and stage.seconds else "there"
-            yield (
-                f"history.{index}: the contact, {where}, has a radius of {radius:.3g} m or more and leaves the box of "
-                f"{grid.lx:g} x {grid.ly:g} m; use a larger grid.size, less load or a shorter way"
-            )
+        if radius > room and radius > 0.0 and "room" not in found:
+            found.add("room")
+            kind = "slides out of the box" if stage.speed and stage.seconds else "out of the box"
+            numbers = {"contact": radius, "lx": grid.lx, "ly": grid.ly, "x": x, "y": y}
+            yield Doubt(kind, f"history.{index}", numbers)
 
 
 def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
@@ -223,7 +195,7 @@ def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
     return float((0.75 * max(force, 0.0) * radius / modulus) ** (1 / 3))
 
 
-def neighbours(job: Sections, material: Elastic | Zener) -> Iterator[str]:
+def neighbours(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     """Judge a single sphere in a periodic box by the least radius that its contact has."""
     modulus = contact_modulus(material)
     return acting_neighbours(
@@ -231,8 +203,8 @@ def neighbours(job: Sections, material: Elastic | Zener) -> Iterator[str]:
     )
 
 
-def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Iterator[str]:
-    """Yield a sentence on a sphere alone in a periodic box, if the images of its contact change its load.
+def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Iterator[Doubt]:
+    """Yield a doubt about a sphere alone in a periodic box, if the images of its contact change its load.
 
     `contact` gives for the radius R of the sphere that of the contact under the same force by Hertz, a. An image at the
     distance r, where the force P is, bends the body by the curvature `P/(2 pi E* r^3)` of its displacement. So the load
@@ -247,18 +219,16 @@ def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Itera
     change = 2.0 * contact(sphere.radius) ** 3 * images / (3.0 * math.pi)
     if change > ALONE:
         times = (change / ALONE) ** (1.0 / 3.0)
-        yield (
-            f"surface.0: its images in the periodic box of {grid.lx:g} x {grid.ly:g} m change the load at a given "
-            f"radius of contact by {per_cent(change)} or more; {per_cent(ALONE)} passes: use a grid.size "
-            f"{times:.3g} times as large, or boundary: free"
+        yield Doubt(
+            "images", "surface.0", {"lx": grid.lx, "ly": grid.ly, "change": change, "most": ALONE, "times": times}
         )
 
 
 # -- slides that come round -------------------------------------------------------------------------------------------
 
 
-def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[str]:
-    """Yield a sentence about each slide, of stages of one velocity, that goes over the imprint of its own beginning.
+def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+    """Yield a doubt about each slide, of stages of one velocity, that goes over the imprint of its own beginning.
 
     Waves that fill the box repeat themselves on a shorter way, and mean it. A slide that begins in its own steady state
     finds no other imprint.
@@ -279,12 +249,8 @@ def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[str]:
             continue
         start = _round_trip(grid, velocity, seconds + near / speed, near) - near
         if speed * seconds > start * (1.0 + SAME) and memory > REMEMBERS * start / speed:
-            yield (
-                f"history.{index}: after {start:.3g} m of its {speed * seconds:.3g} m the surface is back within "
-                f"{near:.3g} m of where it began, once round the periodic box, and slides over its own imprint, which "
-                f"the body remembers for {memory:.3g} s. From there on friction and mu_dyn depend on the box; "
-                "use a shorter distance or a larger grid.size"
-            )
+            numbers = {"way": start, "length": speed * seconds, "near": near, "memory": memory}
+            yield Doubt("imprint", f"history.{index}", numbers)
 
 
 def _round_trip(grid: Grid, velocity: tuple[float, float], most: float, near: float) -> float:

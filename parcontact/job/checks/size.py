@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+from ...doubts import Doubt
 from ..sections.calculation import Grid, Output
 from . import Sections
 from .limits import count_steps
@@ -17,34 +18,27 @@ GIGA = 1e9
 CGROUP = Path("/sys/fs/cgroup/memory.max")
 
 
-def warnings(job: Sections) -> Iterator[str]:
-    """Yield sentences on memory and disk."""
+def doubts_of_size(job: Sections) -> Iterator[Doubt]:
+    """Yield doubts about memory and disk."""
     grid, output = job.grid, job.output
-    if text := beyond_memory(grid):
-        yield text
+    yield from doubt_memory(grid)
     if output.fields:
         count = count_steps(grid, job.history)
         saved = -(-count // output.every)
         needed, free = float(saved) * len(output.fields) * grid.nx * grid.ny * 8, _free(output.directory)
         if needed > free:
-            yield (
-                f"output.fields: {saved:.4g} instants need {needed / GIGA:.3g} GB, and {output.directory} has "
-                f"{free / GIGA:.3g} GB left; use a larger output.every than {output.every}, or fewer fields"
-            )
+            disk = {"needed": needed / GIGA, "free": free / GIGA, "directory": str(output.directory)}
+            yield Doubt("disk", "output.fields", {"instants": saved, "every": output.every, **disk})
 
 
-def beyond_memory(grid: Grid) -> str:
-    """Return what to say if no run of a grid can fit into the memory of the machines it runs on, or ''."""
+def doubt_memory(grid: Grid) -> Iterator[Doubt]:
+    """Yield a doubt if no run of a grid can fit into the memory of the machines it runs on."""
     needed = (MAPS_FREE if grid.boundary == "free" else MAPS) * 8.0 * grid.nx * grid.ny
     each, count = _memory(), machines()
-    if needed <= each * count:
-        return ""
-    have = "this machine has" if count == 1 else f"{count} such machines have"
-    return (
-        f"grid.points: {grid.nx} x {grid.ny} points need at least {needed / GIGA:.3g} GB of memory on all ranks "
-        f"together, and {have} {each * count / GIGA:.3g} GB; use fewer points, or {int(needed / each) + 1} such "
-        "machines"
-    )
+    if needed > each * count:
+        have = "this machine has" if count == 1 else f"{count} such machines have"
+        numbers = {"nx": grid.nx, "ny": grid.ny, "needed": needed / GIGA, "has": each * count / GIGA}
+        yield Doubt("memory", "grid.points", {**numbers, "machines": have, "count": int(needed / each) + 1})
 
 
 def beyond_file(count: int, output: Output) -> str:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, ValidationInfo, model_validator
 
+from ...doubts import Doubt
 from ...errors import InputError
 from ...rubber import compound
 from ...rubber.shift import log_vertical
@@ -257,7 +258,7 @@ class Dma(Part):
     hardness: Hardness = None
 
     _fitted: Zener = PrivateAttr()
-    _doubts: tuple[str, ...] = PrivateAttr(default=())
+    _doubts: tuple[Doubt, ...] = PrivateAttr(default=())
 
     def model_post_init(self, context: Any) -> None:
         try:
@@ -268,12 +269,12 @@ class Dma(Part):
         made = Zener.model_validate(found.material())
         if faults := list(shifted(made.shift, self.temperature)):
             refuse(*faults)
-        self._doubts = tuple(f"material.path: {text}" for text in found.doubts())
+        self._doubts = tuple(Doubt("said", "material.path", {"text": text}) for text in found.doubts())
         self._fitted = made.model_copy(update={"temperature": self.temperature, "hardness": self.hardness})
 
     @property
-    def doubts(self) -> tuple[str, ...]:
-        """Sentences about the fit."""
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Doubts about the fit."""
         return self._doubts
 
     @property

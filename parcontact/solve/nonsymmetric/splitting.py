@@ -102,9 +102,7 @@ class Splitting:
         p *= wanted / load
         return True
 
-    def _certify(
-        self, h: Array, control: Control, law: InterfaceLaw, p: Array, u: Array
-    ) -> tuple[float, Certificate]:
+    def _certify(self, h: Array, control: Control, law: InterfaceLaw, p: Array, u: Array) -> tuple[float, Certificate]:
         """Return the approach and the certificate of an admissible pressure, and leave its displacement in u."""
         slab, constraint, given = self.slab, NonNegative(), isinstance(control, Approach)
         self.operator.apply(p, u)
