@@ -84,7 +84,7 @@ class Band:
 
     def _take(self, setup: Setup) -> None:
         self.setup = setup
-        self.probe = replace(setup.probe(), interface=None)
+        self.probe = replace(setup.probe(), shears=())
         self._known = properties_of(setup, 0.0, True, None)
         self._velocity: Vector = (math.nan, math.nan)
 

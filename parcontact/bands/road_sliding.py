@@ -195,9 +195,9 @@ class RoadSliding:
 
     def _rub(self, results: Results) -> float:
         """Return the shear stress [Pa] of the interface, in the mean over the whole."""
-        interface = self.setup.choices.interface
-        area = results[-1].contact_area_corrected
-        return 0.0 if interface is None else math.hypot(*interface.force(area, self._cascade.velocity))
+        area, shears = results[-1].contact_area_corrected, self.setup.choices.shears
+        forces = [shear.force(area, self._cascade.velocity) for shear in shears]
+        return math.hypot(*(sum(force[axis] for force in forces) for axis in (0, 1)))
 
     # -- samples and errors -------------------------------------------------------------------------------------------
 

@@ -20,6 +20,7 @@ from ..job import added_sections
 from ..job.sections.part import Part
 from ..parallel.slab import Array
 from ..physics.entries import Entry, Memory, Saved
+from ..physics.interface import Shear
 from ..physics.measures import Measures
 from ..physics.units import Units
 from .contact_protocol import ContactLaw, SolvedContact
@@ -107,6 +108,12 @@ class Effect(Protocol[Memory]):
         """Return the types of the maps that a checkpoint has of it and that it holds. `parcontact plan` counts these;
         of the effects of this package it counts what they allocate."""
         return ()
+
+    @staticmethod
+    def shear(job: Any) -> Shear | None:
+        """Return the friction of the contact area that it adds, in marches and in steady sliding; None if it adds none.
+        The area that touches has the forces of all effects."""
+        return None
 
     def __init__(self, scene: Any) -> None: ...
 

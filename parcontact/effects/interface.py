@@ -15,6 +15,7 @@ from ..job.text.fault import Fault
 from ..physics.interface import InterfaceFriction
 from ..physics.measures import Measures
 from .effect import Changes, Decision, Effect, Instant
+from .relaxation import time_factor_of
 
 LEAST_POISSON = 0.49  # physics: below it shear moves the surface, and the solve would have to be coupled
 
@@ -45,13 +46,6 @@ class Interface(Part):
     rules = (Rule(("velocity", "width"), _whole_bell),)
 
 
-def interface_of(section: Interface | None, time_factor: float) -> InterfaceFriction | None:
-    """Return the law of a section, for a body whose relaxation times are so many times those at the reference."""
-    if section is None:
-        return None
-    return InterfaceFriction(section.shear_stress, section.velocity, section.width or 1.0, time_factor)
-
-
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
     """Return what the body and the interface make of friction: their forces in the direction of both together, over the
     normal force. The part of one is negative where its force is against the whole, as the interface's may be after a
@@ -74,6 +68,12 @@ class InterfaceColumns(Effect[tuple[float, float]]):
         law: Interface | None = job.section("interface")
         why = "there is no interface section" if law is None else f"a shear stress of {law.shear_stress:g} Pa at most"
         return Decision("interface", law is not None, why)
+
+    @staticmethod
+    def shear(job: Any) -> InterfaceFriction:
+        """Return the stress of the section, shifted to the temperature of the material."""
+        law: Interface = job.section("interface")
+        return InterfaceFriction(law.shear_stress, law.velocity, law.width or 1.0, time_factor_of(job.material))
 
     def __init__(self, scene: Any) -> None: ...
 

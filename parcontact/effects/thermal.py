@@ -170,7 +170,7 @@ class ThermalColumns(Effect[ThermalMemory]):
     def __init__(self, scene: Any) -> None:
         self._setup, self._slab, self._job = scene.setup, scene.slab, scene.job
         self._feeds_back = feeds_back(scene.job)
-        self._rubs, self._pulled = scene.choices.interface is not None, scene.job.section("adhesion") is not None
+        self._rubs, self._pulled = bool(scene.choices.shears), scene.job.section("adhesion") is not None
 
     def at_rest(self) -> ThermalMemory:
         job, fft = self._job, self._setup.fft

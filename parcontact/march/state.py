@@ -28,6 +28,8 @@ from .dry_law import law_of
 from .errors import ErrorMemory, ErrorPart
 from .tolerance import StepTolerance, TolerancePart, follows
 
+# names of parts of every run, which no effect may have
+RESERVED = {"row", "contact", "law", "material", "errors", "energy", "steps", "tolerance", "plans"}
 FURTHER = 2  # tuning: pressures before the earlier one that are kept for starts, of three and of four steps ago
 
 
@@ -101,8 +103,14 @@ class State:
 
 
 def parts_of(scene: Scene) -> dict[str, RunPart[Any]]:
-    """Return all that a run of a scene remembers, by the names of its parts in checkpoints."""
+    """Return all that a run of a scene remembers, by the names of its parts in checkpoints. Raises InputError where an
+    effect has the name of another part."""
     choices = scene.choices
+    if taken := sorted(RESERVED & choices.followers.keys()):
+        raise InputError(
+            f"the effect {taken[0]} cannot be used: a run keeps a part of its own under this name in checkpoints; its "
+            f"decide must give another name, none of {', '.join(sorted(RESERVED))}"
+        )
     found: dict[str, RunPart[Any]] = {
         "row": _RowPart(scene),
         "contact": _ContactPart(scene),

@@ -8,9 +8,20 @@ half space does not move along its normal under shear (nu = 1/2): this adds to f
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 Vector = tuple[float, float]
+
+
+class Shear(Protocol):
+    """Friction of the contact area itself, which adds to that of the body."""
+
+    def force(self, area: float, velocity: Vector) -> Vector:
+        """Return the force [N] on the rigid surface that slides with `velocity` [m/s] on an area in contact [m^2]."""
+
+    def shifted(self, factor: float) -> "Shear":
+        """Return the friction at a temperature at which the body relaxes with so many times the relaxation times."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +43,12 @@ class InterfaceFriction:
         decades = math.log10(speed / self.velocity) + math.log10(self.shift)
         return self.shear_stress * math.exp(-((decades / self.width) ** 2))
 
+    def shifted(self, factor: float) -> "InterfaceFriction":
+        """Return the bell shifted like the bulk, whose relaxation times are so many times as long."""
+        return replace(self, shift=self.shift * factor)
+
     def force(self, area: float, velocity: Vector) -> Vector:
-        """Force [N] on the rigid surface that slides with `velocity` [m/s] on an area in contact [m^2]."""
+        """Return the force of the stress; `Shear.force`."""
         speed = math.hypot(*velocity)
         size = self.stress(speed) * area / (speed or 1.0)
         return 0.0 - size * velocity[0], 0.0 - size * velocity[1]

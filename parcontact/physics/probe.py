@@ -8,6 +8,7 @@ longer than wide it is less (`measures.excess_of`).
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from . import loops
-from .interface import InterfaceFriction, Vector
+from .interface import Shear, Vector
 from .measures import Measures, excess_of
 from .surface import Surface
 from .units import Units
@@ -29,7 +30,7 @@ class Probe:
     slab: Slab
     surface: Surface
     units: Units
-    interface: InterfaceFriction | None = None
+    shears: Sequence[Shear] = ()
 
     @property
     def _excess(self) -> float:
@@ -70,7 +71,8 @@ class Probe:
         normal = load / points * unit_pressure * area
         presses = normal > least_load and count > 0
         corrected = (count - self._excess * sides) / points
-        own = (0.0, 0.0) if self.interface is None else self.interface.force(corrected * area, velocity)
+        forces = [shear.force(corrected * area, velocity) for shear in self.shears]
+        own = sum(force[0] for force in forces), sum(force[1] for force in forces)
         force_x, force_y = force_x + own[0], force_y + own[1]
         rubbed = math.hypot(*own)
         return Measures(

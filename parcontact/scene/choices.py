@@ -13,13 +13,12 @@ import numpy as np
 from ..effects.adhesion import law_of
 from ..effects.effect import Decision, Effect, guarded
 from ..effects.folded_branches import FoldedBranches, bounded_error, fold_branches, time_scales
-from ..effects.interface import interface_of
 from ..effects.relaxation import feeds_back, relaxation_of, time_factor_of
 from ..history.chosen import describe_steps
 from ..history.timeline import Timeline
 from ..job import Grid, Job, Numerics, Output, Spectral, added_sections
 from ..physics.adhesion import AdhesionLaw
-from ..physics.interface import InterfaceFriction
+from ..physics.interface import Shear
 from ..physics.prony import Prony
 from ..solve.precision import LOOSE, VERY_LOOSE
 from .decided import Decided, Verdict, decided
@@ -85,9 +84,10 @@ class Choices:
         return law_of(self.job.section("adhesion"), self.grid, self.job.material)
 
     @cached_property
-    def interface(self) -> InterfaceFriction | None:
-        """The friction of the contact area itself; None if the job has no `interface`."""
-        return interface_of(self.job.section("interface"), self.time_factor)
+    def shears(self) -> tuple[Shear, ...]:
+        """The friction of the contact area itself, of each effect that adds some."""
+        found = [effect.shear(self.job) for effect in self.followers.values()]
+        return tuple(shear for shear in found if shear is not None)
 
     @cached_property
     def folded(self) -> FoldedBranches:

@@ -98,8 +98,8 @@ class Setup:
         return velocity[0] / self.units.length, velocity[1] / self.units.length
 
     def probe(self) -> Probe:
-        """Make a new probe, with the shear of the interface if the job has one."""
-        return Probe(self.slab, self.surface, self.units, self.choices.interface)
+        """Make a new probe, with the shear that effects add."""
+        return Probe(self.slab, self.surface, self.units, self.choices.shears)
 
 
 @dataclass
@@ -144,8 +144,8 @@ class Scene:
         for body in (self.material.branched, *(() if self.energy is None else self.energy.bodies)):
             if body is not None:
                 body.set_time_factor(factor)
-        if (own := self.choices.interface) is not None:
-            self.probe = replace(self.probe, interface=replace(own, shift=own.shift * factor))
+        if shears := self.choices.shears:
+            self.probe = replace(self.probe, shears=[shear.shifted(factor) for shear in shears])
 
     @cached_property
     def in_double(self) -> tuple[ContactSolver, Operators]:

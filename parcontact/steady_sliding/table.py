@@ -35,7 +35,7 @@ class CurveTable:
         thermal = self._job.section("thermal")
         there = {
             "temperatures": heated,
-            "interface": setup.choices.interface is not None,
+            "interface": bool(setup.choices.shears),
             "thermal": thermal is not None,
             "feedback": thermal is not None and thermal.feedback != "none",
         }

@@ -17,8 +17,11 @@ from numpy.testing import assert_allclose
 from restarting import Bench
 
 from parcontact import __main__, job, scene
+from parcontact.errors import InputError
 from parcontact.job import Job, JobError
+from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
+from parcontact.steady_sliding.sliding import SteadySliding
 
 from .tread_wear import forget, install, shown
 
@@ -160,3 +163,50 @@ def test_plan_tells_of_it(
     said = capsys.readouterr().out
     assert re.search(r"^  on   wear +the job has a section wear$", said, re.M)
     assert re.search(r"^  wear +0.00192$", said, re.M)
+
+
+SHEAR = """
+    @staticmethod
+    def shear(job):
+        from parcontact.physics.interface import InterfaceFriction
+
+        return InterfaceFriction(2e4)
+
+    @staticmethod
+    def maps"""
+
+
+def test_its_shear_adds_to_that_of_others(shared_path: Path, comm: MPI.Intracomm, monkeypatch: Any) -> None:
+    """Forces of two shear stresses on the area that touches, in a march and in steady sliding: 2e4 and 3e4 Pa make
+    what 5e4 Pa make, to rounding."""
+    if comm.rank == 0:
+        install(shared_path, shown().replace("\n    @staticmethod\n    def maps", SHEAR, 1))
+    comm.Barrier()
+    monkeypatch.syspath_prepend(str(shared_path))
+    forget()
+    both = {**WEAR, "interface": {"shear_stress": 3e4}}
+    alone = {**DATA, "interface": {"shear_stress": 5e4}}
+    found, expected = (marched(data, comm=comm)[1][-1].measures for data in (both, alone))
+    assert found.force_interface == pytest.approx(expected.force_interface, rel=1e-14)
+    assert found.friction == pytest.approx(expected.friction, rel=1e-14)
+    slab = Slab(comm, NX, NY)
+    setups = (scene.set_up(Job.model_validate(data), slab) for data in (both, alone))
+    one, other = (SteadySliding(setup).solve((0.2, 0.0), 1e5) for setup in setups)
+    assert one.friction == pytest.approx(other.friction, rel=1e-14)
+    forget()
+
+
+@pytest.mark.parametrize("name", ["contact", "energy", "plans"])
+def test_names_of_parts_are_refused(shared_path: Path, comm: MPI.Intracomm, monkeypatch: Any, name: str) -> None:
+    """An effect cannot take the place of a part of the run, also where the run has no such part: energies are off."""
+    if comm.rank == 0:
+        install(shared_path, shown().replace('Decision("wear"', f'Decision("{name}"'))
+    comm.Barrier()
+    monkeypatch.syspath_prepend(str(shared_path))
+    forget()
+    with pytest.raises(InputError, match=f"the effect {name} cannot be used: a run keeps a part of its own"):
+        run(comm, shared_path, "taken")
+    assert not (shared_path / "taken").exists()
+    with pytest.raises(InputError, match=f"the effect {name} cannot be used"):
+        memory.total(Job.model_validate(WEAR))
+    forget()

@@ -22,6 +22,8 @@ from parcontact.physics.units import Units
 NY, NX = 5, 7
 BOUNDS = 0.0, np.inf
 OFFSETS = [0, 1, 3, NX - 1, NX, 2 * NX + 2, -1, -NX - 3]
+
+
 def maps(count: int, shape: tuple[int, int] = (NY, NX)) -> list[np.ndarray]:
     return list(np.random.default_rng(count).normal(size=(count, *shape)))
 

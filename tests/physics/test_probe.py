@@ -144,7 +144,7 @@ def test_no_friction_where_pull_and_push_balance(comm: MPI.Intracomm, more: floa
     p, instant = more + np.cos(angle(slab, (3, 0)) - 0.6), ((0.0, 0.0), (0.3, 0.0))
     (tension,) = slab.sum(-float(np.minimum(p, 0.0).sum()))
     pull = tension * ALPHA * UNITS.pressure * LX * LY / (slab.nx * slab.ny)
-    probe = Probe(slab, surface, UNITS, InterfaceFriction(2e5))
+    probe = Probe(slab, surface, UNITS, [InterfaceFriction(2e5)])
     found = probe.measure(p, ALPHA, h, h, 0.0, np.ones_like(p), *instant, least_load=1e-9 * pull)
     assert found.force_x != 0.0
     assert_allclose(found.force_interface, 2e5 * LX * LY, rtol=1e-15)

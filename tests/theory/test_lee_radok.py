@@ -15,6 +15,7 @@ from parcontact.theory import hertz, lee_radok
 FORCE, RADIUS, CREEP_TIME = 0.15, 1e-2, 1e-2
 ELASTIC = Prony(2e6, np.array([]), np.array([]))
 
+
 @pytest.mark.parametrize(
     ("rise_time", "peak_force", "lift_off", "depth"),
     [(1e-4, 0.500399, 0.00019181292, 0.0818708), (1e-3, 0.375215, 0.0015420981, 0.457902)],

@@ -140,6 +140,8 @@ def test_passes_that_begin_again_have_the_same_start_and_no_maps_of_their_own() 
 
 S, RHO = 2.0, 0.3
 LAWS = [law.Law(law.EXPONENTIAL, S, RHO), law.Law(law.DUGDALE, S, RHO, 0.4), law.Law(law.DUGDALE, S, RHO, 2 * RHO)]
+
+
 def maps(shape: tuple[int, int]) -> tuple[np.ndarray, ...]:
     """A gap that is closed at some points, and four other maps."""
     gap, *others = np.random.default_rng(3).normal(size=(5, *shape))
