@@ -84,4 +84,4 @@ class PressureDrop:
         """Return a flow [m^3/s] at the low side in m^3/s, ml/h and, where the density is known, mg/s."""
         density = self.fluid.density_at(self.low)
         mass = "" if math.isnan(density) else f", {1e6 * density * rate:.3g} mg/s"
-        return f"{rate:.3g} m^3/s ({3.6e9 * rate:.3g} ml/h{mass})"
+        return f"{rate:.3g} m³/s ({3.6e9 * rate:.3g} ml/h{mass})"

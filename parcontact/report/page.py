@@ -1,11 +1,13 @@
 """The page: all chapters in one HTML file that loads nothing from elsewhere."""
 
+import re
 import stat
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 
 from .. import progress
 from ..errors import InputError
@@ -14,6 +16,10 @@ from ..storage.provenance import PROGRAM
 from .chapters import compare, describe_directory
 
 NAME, TEMPLATE = "report.html", "page.html.jinja"
+LONG_WORD = re.compile(r"\S{14,}")  # does not fit a column of a phone
+SMALL_NUMBER = re.compile(r"-?\d[\d.]*e-\d+")
+BREAKS = re.compile(r"(?<=[_./,=:])(?=\w)")  # where a long word may go on in the next line
+NUMBER = re.compile(r"(?<=\d) (?=±|%|°C|(?:[nµmkMG]?(?:Pa|N|m|s|J|Hz)|h|min|days|years)\b)|(?<=±) |(?<==) (?=[\d-])")
 
 
 def write(directories: Sequence[Path], out: Path | None = None) -> Path:
@@ -52,5 +58,18 @@ def render(directories: Sequence[Path]) -> str:
     chapters = [*compare(directories), *each]
     loader = PackageLoader("parcontact", "report")
     shown = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    shown.filters |= {"breakable": breakable, "whole_numbers": whole_numbers}
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     return shown.get_template(TEMPLATE).render(chapters=chapters, program=PROGRAM, made=made, mark=files.MARK)
+
+
+def breakable(text: str, mark: str = "<wbr>") -> Markup:
+    """Return a text whose long words, as names of columns and paths, may break after their parts and nowhere else; a
+    browser would break 1e-05 at its hyphen."""
+    parts = LONG_WORD.sub(lambda word: BREAKS.sub(mark, word[0]), str(escape(text)))
+    return Markup(SMALL_NUMBER.sub(r'<span class="n">\g<0></span>', parts))
+
+
+def whole_numbers(text: str) -> str:
+    """Return a sentence in which no line ends between a number, its error and its unit."""
+    return NUMBER.sub("\N{NO-BREAK SPACE}", text)

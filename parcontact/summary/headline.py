@@ -66,16 +66,17 @@ def _leakage(directory: Path, columns: Columns) -> Iterator[str]:
     stops = [text for text in leak_stop.describe(directory) if " between " in text]
     known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
     if known:
-        flows = [_flow(columns, known[-1], axis) for axis in "xy"]
-        yield f"the conductivity of the gap is {' and '.join(flows)}"
+        row = known[-1]
+        closed = [axis for axis in "xy" if not columns[f"flow_{axis}"][row]]
+        flows = [_flow(columns, row, axis) for axis in "xy" if axis not in closed]
+        yield from [f"the conductivity of the gap is {' and '.join(flows)}"] * bool(flows)
+        yield from [f"contact closes the gap along {' and '.join(closed)}"] * bool(closed)
         yield from stops
 
 
 def _flow(columns: Columns, row: int, axis: str) -> str:
     flow, error = columns[f"flow_{axis}"][row], _error(columns, f"error_{axis}", row)
-    return (
-        f"{with_error(flow, flow * error)} m³ along {axis}" if flow else f"0 along {axis}, where contact closes the gap"
-    )
+    return f"{with_error(flow, flow * error)} m³ along {axis}"
 
 
 def _area(job: Job, columns: Columns, detached: bool) -> str:

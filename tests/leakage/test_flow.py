@@ -197,7 +197,7 @@ def test_masses() -> None:
     """Dry air at 20 C and 1 bar has 1.189 kg/m^3; 1e-9 m^3/s of it are 1.189e-3 mg/s, and 3.6 ml/h."""
     drop = PressureDrop(FLUIDS["air"], 2e5, 1e5)
     assert FLUIDS["air"].density_at(1e5) == pytest.approx(1.189, rel=1e-3)
-    assert drop.describe_rate(1e-9) == "1e-09 m^3/s (3.6 ml/h, 0.00119 mg/s)"
+    assert drop.describe_rate(1e-9) == "1e-09 m³/s (3.6 ml/h, 0.00119 mg/s)"
     assert math.isnan(Fluid("oil", 0.1).density_at(1e5))
 
 

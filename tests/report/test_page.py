@@ -22,7 +22,7 @@ from parcontact.steady_sliding import curve
 
 pytestmark = pytest.mark.rendered
 
-VOID = {"meta", "link", "img", "input", "br"}
+VOID = {"meta", "link", "img", "input", "br", "wbr"}
 LOADS_FROM = {"src", "href", "srcset", "data", "poster", "action"}
 
 
@@ -36,7 +36,7 @@ class Page(HTMLParser):
         self.urls: list[tuple[str, str]] = []
         self.headings: list[str] = []
         self.downloads: dict[str, bytes] = {}
-        self.text = text
+        self.text = text.replace("\N{NO-BREAK SPACE}", " ")
         self.feed(text)
         assert not self.open
 
@@ -206,7 +206,8 @@ def test_sweep_and_study(tmp_path: Path) -> None:
     assert found.headings == ["Sweep", "What accuracy costs", "Provenance", "What to cite", "Data"]
     for told in (">failed</td>", ">0.12346</td>", ">exponential</td>", "for 1 %: mesh 64"):
         assert told in found.text
-    named = re.findall(r'<td data-head="([^"]*)"', found.text)  # a phone shows rows of wide tables as names and values
+    # a phone shows rows of wide tables as names, which may break at marks, and values
+    named = re.findall(r'<td data-head="([^"]*)"', found.text.replace("&#8203;", ""))
     units = [name.replace("velocity", "velocity [m/s]") for name in head]
     assert named == [*units, *units, "mesh", "integrator", "mu_max"]
 
@@ -226,6 +227,42 @@ def test_a_sweep_shows_its_first_case_and_what_differs(tmp_path: Path, monkeypat
     assert "There are 2 cases. They differ in surface.scale (1.0, 2.0)." in found.text
     assert "road.npy" in found.text
     assert str(tmp_path) not in found.text
+
+
+def test_long_words_break_after_their_parts_alone(tmp_path: Path) -> None:
+    """On a phone and on paper: names of columns, keys and paths. A number stays whole, and with its unit."""
+    head = ("case", "surface.0.short_wavelength", "state", "contact_area_corrected")
+    with (tmp_path / "sweep.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([head, (0, 1e-5, "done", 0.25)])
+    text = page.render([tmp_path])
+    assert '<th scope="col">contact_<wbr>area_<wbr>corrected</th>' in text
+    assert 'data-head="surface.&#8203;0.&#8203;short_&#8203;wavelength [m]"' in text
+    assert '<span class="n">1e-05</span></td>' in text
+    assert page.breakable("a <b> of /home/somebody/runs") == "a &lt;b&gt; of /<wbr>home/<wbr>somebody/<wbr>runs"
+    said = page.whole_numbers("friction is 0.2 ± 0.1 %, at t = 3 s under 1.2 MPa, in 12 steps")
+    assert said.split(" ") == [
+        "friction",
+        "is",
+        "0.2\xa0±\xa00.1\xa0%,",
+        "at",
+        "t",
+        "=\xa03\xa0s",
+        "under",
+        "1.2\xa0MPa,",
+        "in",
+        "12",
+        "steps",
+    ]
+
+
+def test_columns_of_a_phone_and_of_paper() -> None:
+    """No column may break anywhere, but for a word that is longer than the column; on paper nothing is cut off."""
+    style = re.search(r"<style>(.*?)</style>", (Path(page.__file__).parent / page.TEMPLATE).read_text(), re.S)
+    assert style
+    assert "word-break" not in style[1]
+    paper = style[1].partition("@media print")[2]
+    assert ".scroll { overflow: visible; }" in paper
+    assert "th, td { white-space: normal" in paper
 
 
 def test_heights_that_are_gone(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def replace_rows(out: Path, *rows: Sequence[float]) -> None:
 def test_a_slide(tmp_path: Path) -> None:
     """Friction of 0.2 but for one row; its error is 10 % of it, that of an area of 0.5 is 5 % of this."""
     out = ran(tmp_path, WAVE + ZENER + SLIDE)
-    assert f'<p class="headline">{headline.describe(out)}</p>' in page.render([out])
+    assert f'<p class="headline">{page.whole_numbers(headline.describe(out))}</p>' in page.render([out])
     ways = [k * 5.0e-5 for k in range(21)]
     replace_rows(out, *((way / 0.1, way, 1.0e3, 0.4 if k == 2 else 0.2, 0.5, 0.5, 0, 1) for k, way in enumerate(ways)))
     friction = "The mean friction is 0.200 ± 0.020 and the highest 0.400 ± 0.0"
@@ -68,7 +68,7 @@ def test_a_pull_off_is_told_with_the_area_at_it(tmp_path: Path) -> None:
 def test_leakage_with_its_error(tmp_path: Path) -> None:
     out = ran(tmp_path, WAVE + ELASTIC + "history: [{pressure: 1.0e3}]\n")
     write(out / "leak.csv", ("time", "flow_x", "flow_y", "error_x", "error_y"), (0, 2e-18, 0, 0.1, "nan"))
-    flow = "The conductivity of the gap is 2.00e-18 ± 2.0e-19 m³ along x and 0 along y, where contact closes the gap; "
+    flow = "The conductivity of the gap is 2.00e-18 ± 2.0e-19 m³ along x; contact closes the gap along y; "
     assert headline.describe(out).startswith(flow)
 
 
