@@ -103,16 +103,6 @@ def test_retraction(rise: float) -> None:
     assert column(rows, "approach")[t > lift_off].max() > 0.05 * depth  # no contact, and yet below the surface
 
 
-def test_no_load_on_a_body_at_rest() -> None:
-    """Nothing happens, and nothing is undefined."""
-    history = [{"force": 0.0, "duration": 1e-3, "time_step": 5e-4}, {"force": FORCE}]
-    march, rows = marched(sphere(16, 3e-3, history))
-    assert [row.measures.friction for row in rows[:3]] == [0.0, 0.0, 0.0]
-    assert [row.measures.contact_area for row in rows[:3]] == [0.0, 0.0, 0.0]
-    assert rows[2].work == rows[2].stored == rows[2].dissipated == 0.0
-    assert_allclose(force(march, np.array(rows[-1].measures.pressure)), FORCE, rtol=1e-12)
-
-
 def near(rows: list[StepRow], t: float, name: str) -> float:
     """A number at an instant, between steps linearly."""
     return float(np.interp(t, column(rows, "time"), column(rows, name)))
@@ -162,25 +152,6 @@ def test_contact_that_spreads_until_it_is_full() -> None:
     full = step_responses.load_step_full_contact_time(pressure, amplitude, wavelength, *PRONY)
     assert full == pytest.approx(10.69e-3, rel=1e-3)
     assert np.all((found == 1.0) == (t > full))
-
-
-@pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])
-def test_flat_surface(integrator: str) -> None:
-    """Uniform pressure, no gap, no friction, no energy: a mean pressure moves nothing in a periodic body."""
-    data = {
-        "grid": {"points": 8, "size": 1e-3},
-        "surface": {"shape": "flat"},
-        "material": SLS,
-        "history": [{"pressure": 1e5, "velocity": [0.3, 0.1], "duration": 1e-3, "time_step": 2e-4}],
-        "numerics": {"integrator": integrator},
-        "output": {"energy": True},
-    }
-    march, rows = marched(data)
-    assert_allclose(march.field("pressure"), 1e5, rtol=1e-12)
-    assert_allclose(march.field("gap"), 0.0, atol=1e-15)
-    for row in rows[1:]:
-        assert row.measures.contact_area == 1.0
-        assert_allclose([row.measures.friction, row.work, row.stored, row.dissipated], 0.0, atol=1e-20)
 
 
 # -- a viscoelastic body with branches far from its time steps, and its energies --------------------------------------
