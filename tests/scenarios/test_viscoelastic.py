@@ -19,9 +19,6 @@ from parcontact.theory import lee_radok
 
 Json = dict[str, Any]
 FORCE, RADIUS = 0.15, 1e-2  # N, m
-LONG = 1e-2  # s, the creep time of the body
-
-
 def sphere(points: int, size: float, history: list[Json], **numerics: Any) -> Json:
     return {
         "grid": {"points": points, "size": size, "boundary": "free"},
