@@ -1,5 +1,6 @@
 """Steps that fail: tried again to the same digits on any restart, or given up with a good checkpoint and advice."""
 
+import itertools
 import re
 from contextlib import nullcontext
 from dataclasses import replace
@@ -9,23 +10,27 @@ from typing import Any
 
 import numpy as np
 import pytest
-from marching import begun, marched
+from marching import begun, column, example, marched
+from mpi4py import MPI
 from numpy.typing import NDArray
 from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
 from parcontact.errors import InputError, RunError
-from parcontact.history.timeline import Timeline
+from parcontact.history.chosen import MadeStep
+from parcontact.history.timeline import Step, Timeline
+from parcontact.job import Job
+from parcontact.march.choosing import LEAST_WAY, cells_per_step
 from parcontact.march.failure import StepError
 from parcontact.march.loop import March, run
 from parcontact.physics.convolution import Convolution, MirroredConvolution
 from parcontact.scene import solver_on
 from parcontact.solve.contact import Contact, ContactSolver
+from parcontact.solve.fallback import active_set
 
 GRID: dict[str, Any] = {"points": [64, 64], "size": [1e-3, 1e-3]}
 
 
 # -- tried again ------------------------------------------------------------------------------------------------------
-
 
 @pytest.fixture
 def moody(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,7 +115,6 @@ def test_coarse_grids_have_the_same_plans_every_time(boundary: str, precision: s
 
 
 # -- given up ---------------------------------------------------------------------------------------------------------
-
 
 def remembered(march: March) -> dict[str, NDArray[Any]]:
     """What a step must leave alone when it fails."""
@@ -263,3 +267,156 @@ def test_an_approach_to_full_contact_is_one_to_rounding(share: float, refused: b
     height = begun(data).scene.setup.height
     with pytest.raises(InputError, match="is beyond full contact") if refused else nullcontext():
         run(begun(data | {"history": [{"approach": share * height}]}), ())
+
+
+# -- steps that choose themselves after a jump of the velocity: short ones at first, which grow to whole --------------
+
+POINTS = 32
+CELL = 1e-3 / POINTS
+SUDDEN = {
+    "grid": {"points": POINTS, "size": 1e-3},
+    "surface": {"shape": "wave", "amplitude": 2e-6, "waves": [2, 1]},
+    "material": {"model": "zener", "modulus_inf": 1e5, "branches": [{"modulus": 2e6, "relaxation_time": 3e-5}]},
+    "initial": {"state": "steady", "velocity": 0.01, "pressure": 1e4},
+    "history": [{"pressure": 1e4, "velocity": 1.0, "distance": 6.5 * CELL}],
+}
+
+
+def data(accuracy: float) -> dict[str, Any]:
+    return {**SUDDEN, "numerics": {"accuracy": accuracy}}
+
+
+def test_a_step_that_is_made_anew_leaves_nothing() -> None:
+    """The state after it is that of a march to which the shorter step was proposed at once: to the last bit."""
+    sudden = Job.model_validate(data(1e-3))
+    tried, told = begun(sudden), begun(sudden)
+    made: list[Step] = []
+    rejected = 0
+    for step in itertools.islice(tried.steps(), 12):
+        attempts = [step]
+
+        def judge(error: float, front: float, begins: bool) -> Step | MadeStep:
+            verdict = attempts[-1].judge(error)  # type: ignore[misc]  # noqa: B023  # it is called in this turn only
+            if not isinstance(verdict, Step):
+                return verdict
+            attempts.append(verdict)  # noqa: B023
+            return verdict._replace(judge=judge)
+
+        tried.advance(step._replace(judge=judge) if step.judge else step)
+        made.append(attempts[-1]._replace(judge=None))
+        rejected += len(attempts) - 1
+    for step in made:
+        told.advance(step)
+    assert rejected > 0
+    for name, entry in told.entries().items():
+        if not (name.startswith(("steps/", "row/")) or "position" in name):
+            np.testing.assert_array_equal(np.asarray(entry.value), np.asarray(tried.entries()[name].value), name)
+
+
+def test_steps_double_at_most() -> None:
+    """After a jump, until they are whole cells: but for the part that leads to a multiple of a new length."""
+    for accuracy in (3e-3, 1e-2, 2e-2):
+        march, _ = marched(data(accuracy))
+        assert march.state.chosen is not None
+        ends = np.array([0.0, *march.state.chosen.ends[0]]) / CELL
+        steps = np.diff(ends)
+        assert (steps[1:] <= (1.0 + LEAST_WAY) * 2.0 * steps[:-1]).all()
+        for end in range(1, 7):
+            assert min(abs(ends - end)) < 1e-9
+
+
+def test_lengths_of_steps() -> None:
+    """Whole cells in powers of two; then every part of one, and four to each factor of two below an eighth."""
+    parts = sorted({round(1.0 / cells_per_step(1.0 / most), 9) for most in np.arange(1.0, 40.0, 0.25)})
+    assert parts == [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40]
+    assert [cells_per_step(most) for most in (1.0, 1.9, 2.0, 3.9, 4.0)] == [1, 1, 2, 2, 4]
+    assert all(cells_per_step(1.0 / most) <= (1.0 + 1e-5) / most for most in np.arange(1.0, 100.0, 0.3))
+
+
+def test_a_jump_of_velocity_needs_one_stage() -> None:
+    """`jobs/velocity_step.yaml` on a coarse grid: the highest friction at 2 % is within 1 % of that at 0.3 %; the first
+    steps after the jump are far shorter than a cell."""
+    small = ("grid.points=64", "surface.0.short_wavelength=1.25e-4", "history.1.distance=3.0e-5", "output.fields=[]")
+    peaks = []
+    for accuracy in (0.02, 0.003):
+        march, rows = marched(example("velocity_step", *small, f"numerics.accuracy={accuracy}"))
+        peaks.append(column(rows[1:], "friction").max())
+        jump = march.timeline().spans[1].before
+        assert rows[jump + 1].distance - rows[jump].distance < 0.05 * 1e-3 / 64
+    assert peaks[0] == pytest.approx(peaks[1], rel=1e-2)
+
+
+# -- solves of a job that takes them unconverged ----------------------------------------------------------------------
+
+UNCONVERGED_POINTS = 64
+
+
+def test_what_a_retry_leaves_unconverged_is_not_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A job takes a solve as it ends. Where that is not finite, retries must solve it."""
+    solve, made = ContactSolver.solve, list[Contact]()
+
+    def refuse(solver: ContactSolver, *given: Any, **more: Any) -> Contact:
+        contact = solve(solver, *given, **more)
+        if solver.slab.nx < UNCONVERGED_POINTS:
+            return contact
+        certificate = contact.certificate if made else replace(contact.certificate, penetration=np.nan)
+        made.append(replace(contact, failure="is refused", certificate=certificate))
+        return made[-1]
+
+    data = {
+        "grid": {"points": UNCONVERGED_POINTS, "size": 1e-3},
+        "surface": ROUGH,
+        "material": ELASTIC,
+        "history": [{"pressure": 1e4}],
+    }
+    march = begun(data | {"numerics": {"accept_unconverged": True}})
+    monkeypatch.setattr(ContactSolver, "solve", refuse)
+    monkeypatch.setattr(active_set, "solve", lambda *_: made[-1])
+    with pytest.raises(StepError, match="is refused"):
+        run(march, [])
+
+
+# -- loads beyond the digits of single precision: a solve that stalls is tried again in double precision --------------
+
+@pytest.mark.mpi(2)
+def test_an_operator_in_single_precision_is_made_double(comm: MPI.Intracomm) -> None:
+    """Under a million times the pressure of full contact, which moves the body by roundings of single
+    precision: found as with double precision, to the tolerance; without a load like that nothing is tried again."""
+    series = []
+    for load, precision in ((1e11, "mixed"), (1e11, "double"), (1e4, "mixed")):
+        numerics = {"precision": precision, "tolerance": 1e-3}
+        data = {
+            "grid": {"points": 64, "size": 1e-3},
+            "surface": ROUGH,
+            "material": ELASTIC,
+            "history": [{"pressure": load}],
+        }
+        march, found = marched({**data, "numerics": numerics}, comm=comm)
+        assert found[-1].certificate.worst <= 1e-3
+        series.append((found[-1], march.scene.slab.tally["retry"], march.field("pressure") - load))
+    (mixed, tried, p), (double, none, exact), (_, also_none, _) = series
+    assert (tried, none, also_none) == (1, 0, 0)
+    assert mixed.remark.endswith("solved when retried with an operator in double precision")
+    assert not double.remark
+    largest = comm.allreduce(np.abs(exact).max(initial=0.0), MPI.MAX)
+    np.testing.assert_allclose(p, exact, rtol=0, atol=2e-3 * largest)
+
+
+@pytest.mark.mpi(2)
+@pytest.mark.parametrize(("limit", "solved"), [(500, True), (1, False)])
+def test_what_would_do_is_solved_in_double_precision(comm: MPI.Intracomm, limit: int, solved: bool) -> None:
+    """A job that takes solves as they end has those of double precision, the operator's rounding is not what ends them;
+    what that does not solve is taken, and nothing else is tried."""
+    numerics = {"precision": "mixed", "tolerance": 1e-3, "accept_unconverged": True, "max_iterations": limit}
+    load = 1e11 if solved else 1e4
+    data = {
+        "grid": {"points": 64, "size": 1e-3},
+        "surface": ROUGH,
+        "material": ELASTIC,
+        "history": [{"pressure": load}],
+        "numerics": numerics,
+    }
+    march, found = marched(data, comm=comm)
+    assert march.scene.slab.tally["retry"] == 1
+    assert (found[-1].certificate.worst <= 1e-3) == solved
+    assert found[-1].remark.endswith("with an operator in double precision") == solved
