@@ -8,7 +8,6 @@ place where the surface slides.
 """
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 
 from ..effects.adhesion import chosen_range
@@ -129,27 +128,18 @@ def _sliding(job: Job) -> list[Stage]:
     return [stage for stage in job.history if stage.chooses and stage.speed]
 
 
-def describe_chosen_steps(job: Job) -> list[str]:
-    """Sentences on the stages whose steps are chosen in every case, so that no ladder shows what they add."""
+def describe_choices(job: Job) -> list[str]:
+    """Return sentences on what would follow the mesh or the accuracy, but is the same or chosen in every case."""
+    lines, reach = list[str](), chosen_range(job)
+    if reach is not None:
+        own = f"{job.grid.nx} x {job.grid.ny} points, the job's own mesh"
+        lines.append(f"adhesion.range: {reach:.4g} m in every case, which auto is for {own}")
     sliding = [] if job.study and job.study.cells_per_step else _sliding(job)
     rest = [stage for stage in job.history if stage.chooses and not stage.speed]
-    lines = []
-    if sliding:
-        lines.append(
-            f"{_names(sliding)}: time steps are chosen in every case, for numerics.accuracy = "
-            f"{job.numerics.asked.of_steps:g}; a ladder study.cells_per_step would show what they add to the errors"
-        )
-    if rest:
-        lines.append(f"{_names(rest)}: time steps at rest are chosen in every case, they have no cells per step")
+    steps = f"time steps are chosen in every case, for numerics.accuracy = {job.numerics.asked.of_steps:g}; "
+    steps += "a ladder study.cells_per_step would show what they add to the errors"
+    at_rest = "time steps at rest are chosen in every case, they have no cells per step"
+    for stages, text in ((sliding, steps), (rest, at_rest)):
+        if stages:
+            lines.append(f"{', '.join(dict.fromkeys(stage.name for stage in stages))}: {text}")
     return lines
-
-
-def describe_held_range(job: Job) -> list[str]:
-    """Return a sentence on the range of adhesion where it would follow the mesh, as a list."""
-    reach = chosen_range(job)
-    own = f"{job.grid.nx} x {job.grid.ny} points, the job's own mesh"
-    return [] if reach is None else [f"adhesion.range: {reach:.4g} m in every case, which auto is for {own}"]
-
-
-def _names(stages: Sequence[Stage]) -> str:
-    return ", ".join(dict.fromkeys(stage.name for stage in stages))

@@ -13,7 +13,7 @@ from ..plotting import study as study_plots
 from ..storage import files, marker, stopfile
 from ..storage.directory import Directory
 from . import outcome, verdict
-from .ladders import Ladders, Settings, describe_chosen_steps, describe_held_range, ladders, overrides
+from .ladders import Ladders, Settings, describe_choices, ladders, overrides
 from .outcome import Outcome, read_outcomes, write_outcomes
 
 DONE, AGAIN = 0, 3  # exit codes
@@ -33,9 +33,6 @@ def run(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
         directory.refuse_foreign(job.path, plain, False)
         directory.make(job.path, job.resolved(), marker.Claim(marker.kept(plain)))
         study = _Study(refined, jobs, directory, quiet)
-        held = describe_held_range(job)
-        for text in held:
-            study.say(text)
         stop = directory.stop_file
         ended = study.run(lambda: signals.stop or (slab.root and os.path.lexists(stop)))
         if not ended:
@@ -43,7 +40,7 @@ def run(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
                 raise RunError(problem)
             study.say(f"stopped after {len(study.outcomes)} of {len(jobs)} cases; run again to go on")
             return AGAIN
-        study.conclude([*held, *describe_chosen_steps(job)])
+        study.conclude(describe_choices(job))
     return DONE
 
 

@@ -23,7 +23,7 @@ from parcontact.parallel.slab import Slab
 from parcontact.scene import choices
 from parcontact.study import outcome, study, verdict
 from parcontact.study.extrapolation import Limit, extrapolate
-from parcontact.study.ladders import Ladders, Settings, describe_chosen_steps, describe_held_range, ladders, overrides
+from parcontact.study.ladders import Ladders, Settings, describe_choices, ladders, overrides
 from parcontact.study.outcome import Outcome
 
 WAVE = """
@@ -359,7 +359,7 @@ def test_a_ladder_takes_the_place_of_chosen_steps(path: Path) -> None:
     assert [case.steps for case in found.combine()] == ["4 cells per step", "2 cells per step", "1 cell per step"]
     assert [Timeline.of(one).spans[2].count for one in jobs] == [2, 4, 8]
     assert all(one.history[0].chooses for one in jobs)
-    (line,) = describe_chosen_steps(job)
+    (line,) = describe_choices(job)
     assert line == "stage 1: time steps at rest are chosen in every case, they have no cells per step"
 
 
@@ -369,7 +369,7 @@ def test_steps_without_a_ladder_are_chosen_in_every_case(path: Path) -> None:
     cases = found.combine()
     assert [(case.mesh, case.steps) for case in cases] == [(32, "auto steps"), (64, "auto steps")]
     assert all(load_job(path, overrides(job, found.own, case)).history[2].chooses for case in cases)
-    assert "study.cells_per_step would show" in describe_chosen_steps(job)[0]
+    assert "study.cells_per_step would show" in describe_choices(job)[0]
     assert found.shared == 0.01
 
 
@@ -392,7 +392,7 @@ def test_the_range_of_adhesion_is_that_of_the_job_on_every_mesh(path: Path, reac
     assert {case.grid.nx for case in cases} == {32, 64, 128}
     assert {choices(case).adhesion for case in cases} == {choices(job).adhesion}
     told = f"adhesion.range: {math.sqrt(2 * (1e-3 / 64) * 0.01 / 4e6):.4g} m in every case"
-    assert [text.startswith(told) for text in describe_held_range(job)] == [True] * held
+    assert [text.startswith(told) for text in describe_choices(job)] == [True] * held
 
 
 # -- limits of sequences whose limit is known -------------------------------------------------------------------------
