@@ -117,7 +117,8 @@ GAPS = (
     ),
     _measured(
         *("mean_gap", "m"),
-        "mean of u - h - d; at no load the surface just touches the body, also before the first step",
+        "mean of the gap u - h - d, 0 where a counterbody yields; at no load the surface just touches the body, also "
+        "before the first step",
     ),
     _measured("max_pressure", "Pa", "highest pressure"),
 )
@@ -134,7 +135,10 @@ CERTIFIED = (
         attrgetter("certificate.penetration"),
     ),
 )
-CORRECTED = _measured("contact_area_corrected", "", "`contact_area` without the excess by cells on the edge of contact")
+CORRECTED = _measured(
+    *("contact_area_corrected", ""),
+    "`contact_area` without the excess by cells on the edge of contact; at least the pressure over a hardness",
+)
 FLASH = (
     Column(
         *("flash_temperature", "K"),

@@ -104,6 +104,35 @@ def measure(p, u, h, mask, above, cyclic):
 
 
 @loop
+def measure_yielded(p, u, h, above, below, cyclic, highest):
+    """Over this rank's points: sums for a contact whose pressures end at `highest`, where points have yielded.
+
+    Returns the cells in excess on sharp edges, `sum 1 - p/highest` of points that lie between one that has yielded and
+    one without pressure; the sides between other points that have not yielded and points without pressure; the number
+    of points that have yielded, and their sum of `u - h`. `above` and `below` are the rows of p around these.
+    """
+    ny, nx = p.shape
+    sharp, sides, count, gaps = 0.0, 0.0, 0.0, 0.0
+    for j in range(ny):
+        before, after = p[j - 1] if j > 0 else above, p[j + 1] if j < ny - 1 else below
+        for i in range(nx):
+            if p[j, i] >= highest:
+                count += 1.0
+                gaps += u[j, i] - h[j, i]
+            elif p[j, i] > 0.0:
+                left = p[j, i - 1] if i > 0 or cyclic else p[j, i]
+                right = p[j, i + 1] if i < nx - 1 else (p[j, 0] if cyclic else p[j, i])
+                open_sides = 0.0
+                for beside in (left, right, before[i], after[i]):
+                    open_sides += 0.0 if beside > 0.0 else 1.0
+                if open_sides > 0.0 and max(left, right, before[i], after[i]) >= highest:
+                    sharp += 1.0 - p[j, i] / highest
+                else:
+                    sides += open_sides
+    return sharp, sides, count, gaps
+
+
+@loop
 def embedded(branches, decay, increment, gain, before, past, p, u, heights, offset, first, stride):
     """Over every so many rows: sums of p, of p e^2 with `e = sum decay_k h_k + gain increment + past before`, of p u^2,
     of p times the squared difference of the heights h on both sides, those of `heights(i - offset)`, cyclic, of p h, of

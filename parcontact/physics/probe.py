@@ -5,12 +5,16 @@ length S of all edges of contact, measured along the sides of cells of length dx
 `A - (pi - 1 + ln 2)/24 S dx` (V. A. Yastrebov, G. Anciaux, J.-F. Molinari, Tribology International 114 (2017) 161,
 arXiv:1701.02727). In cells that is `SIDE` for each side between a point in contact and one that is not. Where cells are
 longer than wide it is less (`measures.excess_of`).
+
+That takes it that the pressure goes to 0 at the edge. Where a counterbody yields it ends at the hardness H there, and a
+point on the edge bears the share p/H of it on which there is contact: `1 - p/H` of a cell is in excess, and nothing at
+points that have yielded. Where the pressure falls from H to 0 over several cells the edge is as without yielding.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
@@ -22,15 +26,27 @@ from .measures import Measures, excess_of
 from .surface import Surface
 from .units import Units
 
+YIELDED = 1e-6  # accuracy: relative: of pressures as near to the hardness as this a point has yielded
+
+
+class _Yielding(NamedTuple):
+    """Sums over all points of a contact that may yield: cells in excess on its edge, points that have yielded, and
+    their gaps, which are negative."""
+
+    excess: float
+    points: float
+    gaps: float
+
 
 @dataclass(frozen=True)
 class Probe:
-    """Probe that turns the maps of a solved step into measures."""
+    """Probe that turns the maps of a solved step into measures; pressures are bounded by the `hardness` [Pa]."""
 
     slab: Slab
     surface: Surface
     units: Units
     shears: Sequence[Shear] = ()
+    hardness: float | None = None
 
     @property
     def _excess(self) -> float:
@@ -63,6 +79,12 @@ class Probe:
         edge = 0.0 if cyclic else _touches_edge(self.slab, touching)
         load, count, gaps, sides, largest, edge = self.slab.reduce(sums, [largest, edge])
         unit_pressure = alpha * units.pressure
+        excess, least = self._excess * sides, 0.0
+        if self.hardness is not None and largest > 0.0:
+            highest = self.hardness / unit_pressure
+            yielding = self._measure_yielded(p, u, h, highest)
+            gaps -= yielding.gaps - yielding.points * d
+            excess, least = yielding.excess, min(load / highest, count)
         area = self.surface.size[0] * self.surface.size[1]
         force_x, force_y = 0.0, 0.0
         if load > 0.0 or least_load > 0.0:
@@ -70,7 +92,7 @@ class Probe:
             force_x, force_y = (unit_force * force for force in self.surface.forces(p, displacement))
         normal = load / points * unit_pressure * area
         presses = normal > least_load and count > 0
-        corrected = (count - self._excess * sides) / points
+        corrected = max(count - excess, least) / points
         forces = [shear.force(corrected * area, velocity) for shear in self.shears]
         own = sum(force[0] for force in forces), sum(force[1] for force in forces)
         force_x, force_y = force_x + own[0], force_y + own[1]
@@ -90,6 +112,14 @@ class Probe:
             friction_interface=rubbed / normal if presses else 0.0,
             force_interface=rubbed,
         )
+
+    def _measure_yielded(self, p: Array, u: Array, h: Array, highest: float) -> _Yielding:
+        """Measure a contact whose pressures end at `highest`, in the unit of p; collective."""
+        cyclic = self.surface.periodic
+        above, below = rows.around(self.slab, p, 1, cyclic)
+        found = loops.measure_yielded(p, u, h, above[0], below[0], cyclic, (1.0 - YIELDED) * highest)
+        sharp, sides, count, gaps = self.slab.sum(*found)
+        return _Yielding(sharp + self._excess * sides, count, gaps)
 
 
 def _touches_edge(slab: Slab, touching: NDArray[Any]) -> float:

@@ -98,8 +98,8 @@ class Setup:
         return velocity[0] / self.units.length, velocity[1] / self.units.length
 
     def probe(self) -> Probe:
-        """Make a new probe, with the shear that effects add."""
-        return Probe(self.slab, self.surface, self.units, self.choices.shears)
+        """Make a new probe, with the shear that effects add, and the hardness if the job has one."""
+        return Probe(self.slab, self.surface, self.units, self.choices.shears, self.choices.hardness)
 
 
 @dataclass

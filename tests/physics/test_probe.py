@@ -115,6 +115,30 @@ def test_area_corrected_by_its_edges(nx: int, ny: int, periodic: bool, seed: int
     assert found.contact_area_corrected == (np.count_nonzero(pressed) - excess * sides) / (nx * ny)
 
 
+@settings(max_examples=40)
+@given(st.integers(1, 9), st.integers(1, 5), st.booleans(), st.integers(0, 99))
+def test_area_and_gap_where_points_yield(nx: int, ny: int, periodic: bool, seed: int) -> None:
+    """Between a point that has yielded and an open one the share 1 - p/H of a cell is in excess; nothing at the former;
+    elsewhere edges are those of an elastic contact. Points that have yielded have no gap. Rounding."""
+    slab, hardness = Slab(MPI.COMM_WORLD, nx, ny), 2.0 * PRESSURE
+    surface = Surface(slab, FFT(slab), (LX, LY), shapes=[Round(1e-2, (0.0, 0.0))], periodic=periodic)
+    random = np.random.default_rng(seed)
+    whole, gap = random.choice([0.0, 0.5, 1.5, 2.0], size=(ny, nx)), random.normal(size=(ny, nx))
+    p, u, h = slab.zeros(), slab.zeros(), slab.zeros()
+    p[...], u[...] = whole[slab.rows], gap[slab.rows] + 0.5
+    found = Probe(slab, surface, UNITS, hardness=hardness).measure(p, ALPHA, u, h, 0.5, p, (0.0, 0.0))
+    around = np.pad(whole, 1, mode="wrap" if periodic else "edge")
+    beside = np.array([around[1:-1, :-2], around[1:-1, 2:], around[:-2, 1:-1], around[2:, 1:-1]])
+    sides, partly = (beside == 0.0).sum(axis=0), (whole > 0.0) & (whole < 2.0)
+    sharp = partly & (sides > 0) & (beside == 2.0).any(axis=0)
+    long = min(LX / nx, LY / ny) / max(LX / nx, LY / ny)
+    excess = SIDE if 1 in (nx, ny) else SIDE * long**0.1
+    area = np.count_nonzero(whole) - (1.0 - whole[sharp] / 2.0).sum() - excess * sides[partly & ~sharp].sum()
+    area = max(area, whole.sum() / 2.0) if whole.any() else 0.0
+    assert_allclose(found.contact_area_corrected, area / (nx * ny), rtol=1e-5)
+    assert_allclose(found.mean_gap, gap[whole < 2.0].sum() / (nx * ny) * UNITS.height, atol=1e-13 * UNITS.height)
+
+
 def test_without_load_there_is_no_friction(comm: MPI.Intracomm) -> None:
     surface = wave(comm, (1, 0))
     none = surface.slab.zeros()
