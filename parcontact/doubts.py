@@ -235,6 +235,10 @@ SENTENCES = {
         "than {steep:.3g} m go beyond a slope of {most:g}; waves shorter than {usual:.3g} m are usually left out: "
         "bands.cutoff_slope: {cutoff:g}"
     ),
+    "no waves of the map": (
+        "the spectrum begins at {longest!M}, and of the map only longer waves are taken, hardly any of its {side!M}; "
+        "give the spectrum long_wavelength: {seam:.2g} or so, {points} points of the map"
+    ),
     # measured maps
     "large map": "{file}: the map is {lx:.4g} x {ly:.4g} m; are lengths in m?",
     "flat map": (

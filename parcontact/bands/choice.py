@@ -13,6 +13,7 @@ from ..job.checks.cells import fast_length
 from ..job.sections.spectral_bands import AUTO, LEAST_CELLS, Bands
 from ..parallel.slab import Array
 from ..physics.roughness import EDGE
+from ..printed import quantity
 from ..scene.measured_range import doubt_band
 from .limits import doubt_steep_waves
 from .measured_band import MapBand, band_of_map
@@ -61,6 +62,13 @@ class Cut:
         """Return the longest and the shortest wavelength [m] of a band."""
         return 2.0 * math.pi / float(self.edges[band]), 2.0 * math.pi / float(self.edges[band + 1])
 
+    @property
+    def rms_height(self) -> float:
+        """The rms height of all bands [m]."""
+        of_map = self.measured is not None
+        square = float(np.var(self.measured.heights)) if self.measured else 0.0
+        return math.sqrt(square + self.spectrum.moment(float(self.edges[int(of_map)]), float(self.edges[-1]), 0))
+
     def rms_slope(self, band: int, first: int | None = None) -> float:
         """Return the rms slope of a band, or of all from the `first` to it."""
         start = band if first is None else first
@@ -99,7 +107,7 @@ def choose(job: Job) -> Cut:
 
 
 def describe_cut(cut: Cut, job: Job) -> list[str]:
-    """Return what was chosen, in a sentence."""
+    """Return what was chosen, and how high and steep the surface is."""
     many = f"{cut.samples}" if cut.samples else f"{FEWEST} to {MOST}, as their scatter asks for"
     decades, count = math.log10(float(cut.edges[-1] / cut.edges[-2])), cut.count - bool(cut.measured)
     of_map = []
@@ -115,13 +123,20 @@ def describe_cut(cut: Cut, job: Job) -> list[str]:
         f"m, each on {cut.points[0]} x {cut.points[1]} points with {cut.waves} of its longest waves along the box "
         f"({cut.cells:.3g} cells per shortest wave), for a numerics.accuracy of {job.numerics.asked.friction:g}; "
         f"surfaces of each: {many}",
+        f"surface: rms height {quantity(cut.rms_height, 'm', 4)}, rms slope {cut.rms_slope(cut.count - 1, 0):.4g}; "
+        f"rms slopes of the bands: {', '.join(f'{cut.rms_slope(band):.3g}' for band in range(cut.count))}",
     ]
+
+
+def on_one_grid_of_all(job: Job, cut: Cut) -> Job:
+    """Return a job in bands with one grid that holds all of its waves: who asks which frequencies they excite."""
+    side = cut.wavelengths(0)[0]
+    points = 2 * math.ceil(side / cut.spectrum.shortest)
+    return job.model_copy(update={"grid": Grid(points=(points, points), size=(side, side)), "bands": None})
 
 
 def doubts_of_bands(job: Job, cut: Cut, temperatures: Sequence[float] = ()) -> list[Doubt]:
     """Return doubts about a job in bands: its own, of frequencies that were not measured, and of steep waves."""
-    side = WAVES * cut.spectrum.longest
-    points = 2 * math.ceil(side / cut.spectrum.shortest)
-    whole = job.model_copy(update={"grid": Grid(points=(points, points), size=(side, side)), "bands": None})
+    whole = on_one_grid_of_all(job, cut)
     of_map = cut.measured.doubts if cut.measured else ()
     return [*job.doubts, *of_map, *doubt_band(whole, temperatures), *doubt_steep_waves(cut.spectrum)]

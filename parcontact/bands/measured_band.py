@@ -17,6 +17,9 @@ from ..road import map_files
 from ..road.prepared_map import prepare
 from ..scene import map_sentences
 
+FEWEST_WAVES = 4  # accuracy: of the shortest kind along a map, fewer of which are no surface
+RESOLVED = 8  # accuracy: points of a map along a wave that it has measured well
+
 
 @dataclass(frozen=True)
 class MapBand:
@@ -44,6 +47,10 @@ def band_of_map(job: Job, shortest: float, cells: float) -> MapBand | None:
     smooth = part.model_copy(update={"short_wavelength": max(shortest, part.short_wavelength or 0.0)})
     found = prepare(smooth, grid, whole)
     doubts = [*map_sentences.doubt_sizes(found), *map_sentences.doubt_outliers(found)]
+    if shortest > max(size) / FEWEST_WAVES:
+        cells = max(length / n for length, n in zip(whole.size, whole.heights.shape[::-1], strict=True))
+        seam = {"longest": shortest, "side": max(size), "points": RESOLVED, "seam": RESOLVED * cells}
+        doubts.append(Doubt("no waves of the map", "surface", seam))
     waves = np.fft.fft2(found.heights) / found.heights.size
     qy, qx = (2.0 * np.pi * np.fft.fftfreq(n, length / n) for n, length in zip((ny, nx), size[::-1], strict=True))
     slope = math.sqrt(float(np.sum(np.abs(waves) ** 2 * (qx[None, :] ** 2 + qy[:, None] ** 2))))

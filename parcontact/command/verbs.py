@@ -86,12 +86,13 @@ def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
     """Return the doubts about a job, also those that only a look at heights and measured moduli raises; append what the
     look shows of measured maps and spectra to `notes`."""
     notes.append([])
+    degrees = (job.steady.temperatures if job.steady else None) or ()
     if job.bands is not None:
         from ..bands.choice import choose, describe_cut, doubts_of_bands
 
         cut = choose(job)
         notes[-1] += describe_cut(cut, job)
-        return doubts_of_bands(job, cut)
+        return doubts_of_bands(job, cut, degrees)
     if not job.depends_on_heights and not job.measured:
         return list(job.doubts)
     from ..parallel.slab import Slab
@@ -99,11 +100,11 @@ def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
     from ..scene.measured_range import doubt_band
 
     if not sanity.is_quickly_made(job):
-        return [*job.doubts, *doubt_band(job)]
+        return [*job.doubts, *doubt_band(job, degrees)]
     setup = set_up(job, Slab.alone(*job.grid.points))
     notes[-1] += [*setup.told.notes, *describe_roughness(setup)]
     sanity.refuse_beyond_full_contact(setup)
-    return sanity.find_doubts(setup)
+    return sanity.find_doubts(setup, degrees)
 
 
 def plan(options: argparse.Namespace) -> int:
@@ -150,6 +151,15 @@ def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) ->
     return DONE
 
 
+def _on_one_grid(job: Job) -> Job:
+    """Return a job with one grid for all of its waves."""
+    if job.bands is None:
+        return job
+    from ..bands.choice import choose, on_one_grid_of_all
+
+    return on_one_grid_of_all(job, choose(job))
+
+
 @ranks.root_alone
 def fit(options: argparse.Namespace) -> int:
     """Fit a compound to measured moduli: a material file and a picture."""
@@ -161,7 +171,7 @@ def fit(options: argparse.Namespace) -> int:
 
     target = options.out or options.table.with_suffix(".yaml")
     files.refuse_foreign(target)
-    band = excited_band(mesh.load(options.job)) if options.job else None
+    band = excited_band(_on_one_grid(mesh.load(options.job))) if options.job else None
     law = given(options.shift, options.reference)
     of_fit = (options.error, options.weight, options.vertical)
     made = compound.fitted(options.table, options.poisson, options.reference, law, *of_fit)

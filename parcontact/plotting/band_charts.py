@@ -4,6 +4,7 @@ Persson's theory for the same spectrum is drawn beside them where `bands_theory.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,8 @@ def charts(directory: Path) -> list[Chart]:
     """Return panels of a table of bands: of its first pressure and temperature, where there are several."""
     if not (directory / TABLE).is_file():
         return []
-    columns = _choose(read_table(directory / TABLE, (*NEEDED, "friction", "contact_area", "flash_temperature")))
+    whole = read_table(directory / TABLE, (*NEEDED, "friction", "contact_area", "flash_temperature"))
+    columns = _choose(whole)
     if not columns["velocity"].size:
         return []
     theory = None
@@ -33,7 +35,16 @@ def charts(directory: Path) -> list[Chart]:
     found = [_friction(columns, theory), _over_bands(columns, theory, "contact_area")]
     if np.isfinite(columns["flash_temperature"]).any():
         found.append(_over_bands(columns, None, "flash_temperature"))
+    if at := _describe_first(whole):
+        found = [replace(chart, y=replace(chart.y, name=f"{chart.y.name}\nat {at}")) for chart in found]
     return found
+
+
+def _describe_first(columns: dict[str, Array]) -> str:
+    """Return the first pressure and temperature, as far as there are others."""
+    firsts = [(name, columns[name][0], unit) for name, unit in (("pressure", "Pa"), ("temperature", "°C"))]
+    several = [one for one in firsts if np.unique(columns[one[0]].round(9)).size > 1]
+    return ", ".join(units.quantity(float(value), unit) for _, value, unit in several)
 
 
 def _choose(columns: dict[str, Array]) -> dict[str, Array]:

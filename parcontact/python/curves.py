@@ -19,7 +19,7 @@ from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..scene.sanity import ContactWatch
 from ..steady_sliding import curve
-from ..steady_sliding.heating import describe_hot
+from ..steady_sliding.heating import describe_hot, describe_unmeasured
 from ..steady_sliding.point import Point
 from ..steady_sliding.table import describe_missed
 from ..storage import wisdom
@@ -119,7 +119,8 @@ def steady(
         points.append(point)
         doubts += map(str, contacts.judge_point(point.measures, str(at)) if point else [])
     solved = [point for point in points if point]
-    for text in (*doubts, *describe_hot(solved), *describe_missed(solved, found)) if slab.root else ():
+    of_points = *describe_hot(solved), *describe_unmeasured(solved, found), *describe_missed(solved, found)
+    for text in (*doubts, *of_points) if slab.root else ():
         warn(text)
     return _curve(wanted.points, points, tuple(failures))
 

@@ -2,12 +2,15 @@
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..bands.choice import choose, on_one_grid_of_all
 from ..effects.relaxation import relaxation_of
+from ..errors import InputError
 from ..job import Dma, Job, Zener
 from ..physics.prony import complex_modulus
 from ..plotting import style, units
@@ -21,6 +24,9 @@ CAPTION = "moduli and loss tangent over frequency, at the temperature of the job
 
 def section(job: Job) -> ReportSection:
     """Return the section about the material of a job at its temperature."""
+    if job.bands is not None:
+        with suppress(InputError):  # its files are gone
+            job = on_one_grid_of_all(job, choose(job))
     series = relaxation_of(job.material)
     instant = series.modulus_inf + float(np.sum(series.moduli))
     rows = [

@@ -4,6 +4,7 @@ import csv
 import io
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -27,6 +28,7 @@ POINTS = (
     *("velocity", "temperature", "pressure", "friction", "error_friction", *INTERFACE),
     *("contact_area_corrected", "error_area", "mean_gap", "max_pressure"),
 )
+PLACE = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C"}  # of a point of a curve in bands
 DIGITS = 5
 LEAKAGE = ("time", "pressure", "flow_x", "flow_y", "constriction")
 MOST_ROWS = 200  # of a table: the whole is in the data
@@ -100,7 +102,29 @@ def describe_curve(directory: Path) -> ReportSection:
     states = partial(_label_states, find_free_area(directory))
     job = find_curve_job(directory)
     browsers = _browse_file(directory / "steady.h5", states, job) if job else []
-    return ReportSection("Friction curve", (), [table], pictures, browsers)
+    return ReportSection("Friction curve", (), [table, *_list_main_bands(directory)], pictures, browsers)
+
+
+def _list_main_bands(directory: Path) -> list[ReportTable]:
+    """Return which band makes most of the friction at each point of a curve in bands."""
+    if not (directory / "bands.csv").is_file():
+        return []
+    columns = tables.read(directory / "bands.csv")
+    names = [name for name in PLACE if any(value == value for value in columns[name])]
+    points: dict[tuple[str, ...], list[int]] = {}
+    for row in range(len(columns["velocity"])):
+        points.setdefault(tuple(format_cell(columns[name][row]) for name in names), []).append(row)
+    found = []
+    for place, rows in points.items():
+        friction = [columns["friction"][row] for row in rows]
+        most = rows[friction.index(max(friction))]
+        waves = " to ".join(units.quantity(columns[f"{end}_wavelength"][most], "m") for end in ("long", "short"))
+        share = f"{100 * max(friction) / sum(friction):.0f} %" if sum(friction) > 0.0 else "–"
+        found.append((*place, waves, share))
+    head = [f"{_to_words(name)} [{unit}]" for name, unit in PLACE.items() if name in names]
+    table = _shorten([*head, "waves", "share of friction"], found)
+    told = filter(None, ["the band that makes most of the friction", table.caption])
+    return [replace(table, caption="; ".join(told))]
 
 
 def describe_sweep(directory: Path) -> ReportSection:

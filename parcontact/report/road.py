@@ -2,6 +2,11 @@
 
 from functools import partial
 
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..bands.band import Band
+from ..bands.choice import Cut, choose, describe_cut
 from ..derived.surface_summary import NOT_SELF_AFFINE
 from ..errors import InputError
 from ..job import Job
@@ -9,16 +14,21 @@ from ..job.sections import listing
 from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics import surface_statistics as statistics
-from ..plotting import surface, units
+from ..plotting import style, surface, units
 from ..scene import rigid_surface
-from .parts import ReportSection, ReportTable, draw_panel
+from .parts import Picture, ReportSection, ReportTable, draw_panel
 
+POINTS = 400  # of a line
 MOST_POINTS = 2**22  # of a surface that is made anew for a report
 
 
 def section(job: Job) -> ReportSection:
     """Describe the surface of a job, made anew; where its files are gone or it is too large, as the job says."""
     shapes = ReportTable(("shape",), [(listing.line(part),) for part in job.surface], "shapes, whose heights add up")
+    if job.bands is not None:
+        return _describe_bands(job, shapes)
+    if job.grid.nx * job.grid.ny == 1:  # a job in bands of which only the rest could be read
+        return ReportSection("Surface", ["The surface cannot be made anew: the files of the job are not there."])
     if job.grid.nx * job.grid.ny > MOST_POINTS:
         return ReportSection("Surface", ["The surface has too many points to be made anew for a report."], [shapes])
     slab = Slab.alone(*job.grid.points)
@@ -30,6 +40,43 @@ def section(job: Job) -> ReportSection:
     found = statistics.describe(heights, job.grid.size)
     if not found.rms_height:
         return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
+    tables = [shapes, _tabulate(found, "on the grid of the job")]
+    return ReportSection("Surface", sentences, tables, _draw(surface.Sketch(heights, job.grid.size, found)))
+
+
+def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
+    """Describe the bands of a job, and the surface of the coarsest one."""
+    try:
+        cut = choose(job)
+        setup = Band(job, cut, 0, 0).setup
+    except InputError as error:
+        return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
+    rows = []
+    for band in range(cut.count):
+        ends = " to ".join(units.quantity(end, "m") for end in cut.wavelengths(band))
+        rows.append((ends, f"{cut.rms_slope(band):.3g}", f"{cut.rms_slope(band, 0):.3g}"))
+    bands = ReportTable(("waves", "rms slope", "with all longer waves"), rows, "bands, each on a grid of its own")
+    heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
+    found = statistics.describe(heights, setup.grid.size)
+    pictures = [
+        draw_panel(partial(_draw_spectrum, cut=cut), "spectrum of the job, cut at the dotted lines"),
+        *_draw(surface.Sketch(heights, setup.grid.size, found), ", coarsest band"),
+    ]
+    tables = [shapes, bands, _tabulate(found, "of the coarsest band")]
+    return ReportSection("Surface", [f"{text}." for text in describe_cut(cut, job)], tables, pictures)
+
+
+def _draw_spectrum(axes: Axes, cut: Cut) -> None:
+    """Draw the spectrum over wavenumbers, and where bands begin and end."""
+    low, high = cut.spectrum.ends
+    q = np.geomspace(low, high, POINTS)
+    axes.loglog(q, cut.spectrum.phi(q) / (4.0 * np.pi**2), **style.line(0))
+    for edge in cut.edges:
+        axes.axvline(edge, color=style.GREY, ls=":")
+    axes.set(xlabel="wavenumber [1/m]", ylabel="PSD over directions [m⁴]")
+
+
+def _tabulate(found: statistics.Statistics, where: str) -> ReportTable:
     rows = [
         ("rms height", units.quantity(found.rms_height, "m", 4)),
         ("rms slope", f"{found.rms_slope:.4g}"),
@@ -37,7 +84,8 @@ def section(job: Job) -> ReportSection:
         ("Nayak's parameter", f"{found.nayak:.4g}"),
         ("Hurst exponent", f"{found.hurst:.3g}" if found.hurst == found.hurst else NOT_SELF_AFFINE),
     ]
-    tables = [shapes, ReportTable(("on the grid of the job", "value"), rows)]
-    sketch = surface.Sketch(heights, job.grid.size, found)
-    pictures = [draw_panel(partial(panel, sketch=sketch), caption) for caption, panel in surface.PANELS.items()]
-    return ReportSection("Surface", sentences, tables, pictures)
+    return ReportTable((where, "value"), rows)
+
+
+def _draw(sketch: surface.Sketch, of: str = "") -> list[Picture]:
+    return [draw_panel(partial(panel, sketch=sketch), f"{caption}{of}") for caption, panel in surface.PANELS.items()]

@@ -11,8 +11,10 @@ from functools import partial
 
 import numpy as np
 
+from ..effects.relaxation import feeds_back, temperature_of
 from ..effects.thermal import Thermal
 from ..errors import RunError
+from ..job import Job, Zener
 from ..parallel.slab import Array
 from ..physics.flash import Flash, flash_of, share_of, spread_over
 from ..physics.heat import depths_of, sliding_heat
@@ -116,4 +118,24 @@ def describe_hot(points: Sequence[Point]) -> Iterator[str]:
         yield (
             f"flash temperatures of {len(hot)} of {len(points)} points are above {HOTTEST:g} K, up to {rise:.3g} K at "
             f"{speed:g} m/s: rubber decomposes there; take a smaller thermal.distance, velocity or pressure"
+        )
+
+
+def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[str]:
+    """Yield a sentence where rubber that relaxes at its flash temperature is beyond those it was measured at."""
+    body = job.material.fitted
+    if not feeds_back(job) or not isinstance(body, Zener) or body.temperatures is None:
+        return
+    own, (low, high) = temperature_of(job.material), body.temperatures
+    warm = [
+        ((own if math.isnan(point.temperature) else point.temperature) + point.flash.mean, point.speed)
+        for point in points
+        if point.flash
+    ]
+    if beyond := [one for one in warm if not low <= one[0] <= high]:
+        hottest, speed = max(beyond)
+        yield (
+            f"material: with its flash temperature the rubber is beyond the {low:g} to {high:g} C of its measurement "
+            f"at {len(beyond)} of {len(points)} points, up to {hottest:.3g} C at {speed:g} m/s: the shift is an "
+            "extrapolation there"
         )

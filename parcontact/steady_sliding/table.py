@@ -16,7 +16,7 @@ from ..storage import curve_points, files, tables
 from ..storage.console import Console, always
 from ..storage.curve_points import LOG, Wanted
 from ..storage.tables import GrowingTable
-from .heating import describe_hot
+from .heating import describe_hot, describe_unmeasured
 from .point import Point
 
 WAVES = ("steady_waves.csv", names_of(STEADY_WAVES))  # a further table
@@ -129,7 +129,8 @@ class CurveTable:
         self._file.sync()
         if self.known:
             self._sort()
-        for warning in (*describe_hot(self._points), *describe_missed(self._points, self._job)):
+        hot = *describe_hot(self._points), *describe_unmeasured(self._points, self._job)
+        for warning in (*hot, *describe_missed(self._points, self._job)):
             self._console.warn(warning)
         if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
             self.say(text)
