@@ -166,18 +166,16 @@ from parcontact.march import loop as march
 advance = march.March.advance
 def failing(self, step):
     if step.number == 5 and MPI.COMM_WORLD.rank == 1:
-        raise {error}
+        raise RunError('a mistake of ours')
     return advance(self, step)
 march.March.advance = failing
 sys.exit(__main__.main(sys.argv[1:]))
 """
 
 
-@pytest.mark.parametrize("error", ["ZeroDivisionError('a mistake of ours')", "RunError('a mistake of ours')"])
-def test_error_of_one_rank(runs: Runs, tmp_path: Path, error: str) -> None:
+def test_error_of_one_rank(runs: Runs, tmp_path: Path) -> None:
     """All ranks end within seconds, with one message, even when it is an error that all of them should have had."""
-    program = FAILING.replace("{error}", error)
-    code, errors = ended(runs.start(tmp_path / "out", program=("-c", program)))
+    code, errors = ended(runs.start(tmp_path / "out", program=("-c", FAILING)))
     assert code == 1
     said = [line for line in errors.splitlines() if line.startswith("parcontact:")]
     assert len(said) == 1

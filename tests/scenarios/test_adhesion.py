@@ -486,9 +486,9 @@ def excess(velocity: float, way: float, count: int, cells: int, thickness: int) 
 
 
 @pytest.mark.filterwarnings("ignore:surface")  # of cells per wave: it is a step
-@pytest.mark.parametrize(("velocity", "way", "count"), [(0.1, 6, 600), (10, 20, 400)])
+@pytest.mark.parametrize(("velocity", "way", "count"), [(10, 20, 400)])
 def test_steady_crack(velocity: float, way: float, count: int) -> None:
-    """G/w is 1.1981 and 4.5272 for edges that open with `velocity`, 0.8175 and 0.2001 for those that close. The error
+    """G/w is 4.5272 for edges that open with `velocity`, 0.2001 for those that close. The error
     is of second order in the cells, here a quarter and an eighth of l, and of first order in l/T: both extrapolated,
     0.2 % are left, to which the instants add some 0.2 %. Alone, the meshes are up to 3 % and 1.3 % off."""
     coarse, fine, thick = (excess(velocity, way, count, *each) for each in ((4, 80), (8, 80), (4, 160)))

@@ -219,7 +219,6 @@ STEADY = [
     (FAST, 0.0009763055, 0.0009302677),
     (0.1, 0.0006707329, 0.0006487824),
     (0.4, 0.0001923269, 0.0001904834),
-    (1.0, 7.756915e-05, 7.726771e-05),
 ]
 
 
@@ -294,8 +293,8 @@ def test_start_after_a_rest() -> None:
     ("integrator", "order"), [("exponential", 3.0), ("exponential-linear", 2.0), ("backward-euler", 1.0)]
 )
 def test_order_of_a_velocity_step(integrator: Integrator, order: float) -> None:
-    errors = [transient(0.004, FAST, steps, integrator) for steps in (100, 200, 400)]
-    assert_allclose(np.log2(errors[:-1]) - np.log2(errors[1:]), order, rtol=0.05)
+    coarse, fine = (transient(0.004, FAST, steps, integrator) for steps in (100, 200))
+    assert_allclose(np.log2(coarse / fine), order, rtol=0.05)
 
 
 @pytest.mark.parametrize("waves", [(1, 1), (2, 1), (1, -2)])

@@ -44,7 +44,7 @@ def test_agrees_with_polonsky_and_keer(load: float) -> None:
     assert found.iterations < iterations
 
 
-@pytest.mark.parametrize("points", [256, 512, 1024])
+@pytest.mark.parametrize("points", [256, 512])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_iterations_from_a_cold_start(points: int, seed: int) -> None:
     """The promise: at most 32 to 5e-6 on every grid, for 5 to 75 % of contact; at most 14 where contact is 99.8 %.
