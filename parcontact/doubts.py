@@ -241,6 +241,7 @@ SENTENCES = {
     ),
     # measured maps
     "large map": "{file}: the map is {lx:.4g} x {ly:.4g} m; are lengths in m?",
+    "near points": "{file}: points of the map are {dx!m} apart, less than atoms; are lengths in this unit?",
     "flat map": (
         "{file}: the map is {lx!m} x {ly!m}, and its heights differ by {span!M} only; do heights and lengths have the "
         "right units?"

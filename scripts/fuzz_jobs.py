@@ -6,7 +6,8 @@
 Jobs are drawn by tests/robustness/any_job.py, on grids of a few hundred points. Half of them stay as they are. In a
 quarter some values are changed to extreme ones or to values of another kind. The others have characters of the text
 changed, cut, doubled or put in, or a file of heights, or a job file, that is damaged, of another type or length, no
-regular file, or leads elsewhere. All go through the command line, in this process: `check`, then the run.
+regular file, or leads elsewhere. All go through the command line, in this process: `check`, then the run. Of what ran
+small shares go through `report`, `leak`, `plan` and `study` as well.
 
 Counted as faults: an exception that is not a sentence, a warning of NumPy, a run that refuses what `check` accepts or
 fails for a reason that is none of physics, a result that is not finite or out of its bounds (area, pressure, load,
@@ -43,7 +44,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from robustness import any_job
 
-from parcontact import __main__
+from parcontact import __main__, mesh
 from parcontact import job as jobs
 from parcontact.effects.adhesion import chosen_range
 from parcontact.job.checks import limits
@@ -57,6 +58,7 @@ STEPS = 400  # of a history that is run here
 LATER = 8.0  # times the tolerance that steps may have
 SLACK = 1e-6  # of a load, relative: sums over all points
 DONE, FAILED, REFUSED = 0, 1, 2  # exit codes
+LATER_SHARES = {"report": 0.08, "leak": 0.5, "plan": 0.08, "study": 1.0}  # of what ran
 PLACE = re.compile(r"^(.+:\d+:\d+|--set .+|parcontact|.+job\.yaml: cannot be read): \S|^\.\.\. and \d+ more")
 NOT_FINITE = re.compile(r"(?<![\w.-])-?(nan|inf)(?![\w])(?<!points are nan)", re.IGNORECASE)
 EXTREME = (
@@ -110,19 +112,38 @@ def drive(path: Path, here: Path) -> Iterator[str]:
         yield "ended in check"
         yield f"check ends with {code}: {said[-400:]}"
         return
-    cases = jobs.load_cases(path)
+    cases = mesh.load_cases(path)
     if any(is_large(case.job) for case in cases):
         yield "large"
         return
     code, said = command(path, "--out", here / "results", "--quiet")
     yield {DONE: "ran", FAILED: "failed to run", REFUSED: "refused by the run"}.get(code, f"ended with {code}")
     yield from run_faults(code, said)
+    if code == DONE:
+        yield from later_faults(path, here, cases[0].job)
     for case in cases:
         directory = here / "results" / (f"cases/{case.number:03d}" if case.settings else "")
         if (directory / "measures.csv").exists():
             yield from history_faults(directory, case.job)
         if (directory / "steady.csv").exists():
             yield from curve_faults(directory / "steady.csv")
+
+
+def later_faults(path: Path, here: Path, job: jobs.Job) -> Iterator[str]:
+    """Faults of what is done with a job that has run, one time in LATER_SHARE each: its text decides."""
+    out, dice = here / "results", Random(path.read_bytes())
+    directory = out if (out / "measures.csv").exists() else out / "cases" / "000"
+    words = {
+        "report": ("report", out),
+        "leak": ("leak", directory) if "gap" in job.output.fields and job.history else (),
+        "plan": ("plan", path, "--seconds", "0.01", "--ranks", "1,3"),
+        "study": ("study", path, "--out", here / "study", "--quiet") if job.study is not None else (),
+    }
+    for verb, line in words.items():
+        if line and dice.random() < LATER_SHARES[verb]:
+            code, said = command(*line)
+            if code not in (DONE, REFUSED) or "Traceback" in said or NOT_FINITE.search(said):
+                yield f"{verb} ends with {code}: {said[-400:]}"
 
 
 def is_large(job: jobs.Job) -> bool:
@@ -157,7 +178,11 @@ def run_faults(code: int, said: str) -> Iterator[str]:
         yield f"says nan or inf: {said[-400:]}"
 
 
-PHYSICS = ("double precision reaches only", "the flash temperature")  # what a run that fails may say
+PHYSICS = (  # what a run that fails may say
+    "double precision reaches only",
+    "the flash temperature",
+    "an error with numerics.strict",
+)
 
 
 # -- results ----------------------------------------------------------------------------------------------------------

@@ -125,11 +125,18 @@ def _read(
     except ValidationError as error:
         return None, [*source.mistakes, *_mistakes(source, error)], sweep
     if job.numerics.strict:
-        place = NOWHERE if from_python else Place(str(path))
-        source.mistakes += [Mistake(place, f"{text} ({STRICT})") for text in job.warnings]
+        places = [NOWHERE if from_python else _locate(source, doubt.place) for doubt in job.doubts]
+        doubts = zip(places, job.doubts, strict=True)
+        source.mistakes += [Mistake(place, f"{doubt} ({STRICT})") for place, doubt in doubts]
     if source.mistakes:
         return None, source.mistakes, sweep
     return _case(job, index, sweep), [], sweep
+
+
+def _locate(source: Source, key: str) -> Place:
+    """Return the place of a key such as `surface.0.amplitude`; that of `numerics.strict` where there is none."""
+    steps = tuple(int(step) if step.isdigit() else step for step in key.split("."))
+    return source.locate(steps if key else ("numerics", "strict")).place
 
 
 def _refuse_no_job(given: Any, overrides: Any) -> None:

@@ -11,7 +11,7 @@ from ..road import treatment
 from ..road.map_files import Map
 from ..road.prepared_map import Prepared
 
-LARGEST = 1.0  # m: a map that is longer is doubted
+LARGEST, SMALLEST = 1.0, 5e-11  # m: a longer map is doubted, and points that are nearer than atoms
 FLATTEST = 1e-5  # physics: range of heights over the shorter side; a polished wafer has some 1e-5
 OBLONG = 1.5  # of the sides of a pixel: instruments have squares, with few exceptions
 
@@ -52,6 +52,8 @@ def doubt_sizes(prepared: Prepared) -> Iterator[Doubt]:
     span = float(np.nanmax(found.heights) - np.nanmin(found.heights))
     if max(lx, ly) > LARGEST:
         yield Doubt("large map", "surface", {"file": name, "lx": lx, "ly": ly})
+    if max(dx, dy) < SMALLEST:
+        yield Doubt("near points", "surface", {"file": name, "dx": dx})
     if 0.0 < span < FLATTEST * min(lx, ly):
         yield Doubt("flat map", "surface", {"file": name, "lx": lx, "ly": ly, "span": span})
     if max(dx, dy) > OBLONG * min(dx, dy):

@@ -171,13 +171,15 @@ def test_waves_that_are_taken_out_are_reported(road: Path) -> None:
     [
         ("size: [1.5, 1.5]", "the map is 1.5 x 1.5 m; are lengths in m?"),
         ("pixel: 0.01", "the map is 1.92 x 1.92 m; are lengths in m?"),
+        ("pixel: 2.0e-12", "points of the map are 0.002 nm apart, less than atoms; are lengths in this unit?"),
         ("pixel: [1.3e-5, 3.0e-5]", "points of the map are 13 µm apart along x and 30 µm along y"),
         ("unit: nm, size: [1.0e-2, 1.0e-2]", "the map is 10 mm x 10 mm, and its heights differ by 3"),
         ("pixel: [1.3e-5, 1.4e-5]", ""),
     ],
 )
 def test_sizes_that_are_doubted(road: Path, more: str, doubt: str) -> None:
-    """A map of more than a metre, heights of less than 1e-5 of its side, and pixels that are no squares."""
+    """A map of more than a metre, points nearer than atoms, heights of less than 1e-5 of its side, and
+    pixels that are no squares."""
     text = JOB.replace("unit: um, size: [1.0e-3, 1.0e-3]", more if "unit" in more else f"unit: um, {more}").replace(
         "size: {size}", "size: from surface"
     )

@@ -87,7 +87,20 @@ def draw(dice: Random, directory: Path) -> Json:
         job["checkpoint"] = {"every": dice.choice([1, 3]), "keep": dice.choice([0, 1, 2])}
     if dice.random() < 0.06:
         job["sweep"] = _sweep(dice, job)
-    return job if dice.random() < 0.05 else _reconciled(dice, job)
+    job = job if dice.random() < 0.05 else _reconciled(dice, job)
+    return _with_rare_keys(Random(repr(job)), job)
+
+
+def _with_rare_keys(dice: Random, job: Json) -> Json:
+    """Return a job with what few jobs have: from dice of its own, so that other jobs stay as they were."""
+    if dice.random() < 0.05:
+        job["numerics"]["strict"] = True
+    if dice.random() < 0.03:
+        job["grid"]["points"] = "auto"
+    elif dice.random() < 0.03 and "history" in job:
+        nx = job["grid"]["points"][0]
+        job["study"] = dice.choice([{"mesh": [nx, 2 * nx]}, {"integrator": ["exponential", "backward-euler"]}])
+    return job
 
 
 def _reconciled(dice: Random, job: Json) -> Json:
