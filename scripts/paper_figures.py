@@ -54,7 +54,7 @@ def there(path: Path) -> Path:
 
 
 def columns(directory: Path, name: str = "measures.csv") -> dict[str, np.ndarray]:
-    return {key: np.array(values) for key, values in tables.read(there(directory / name)).items()}
+    return {key: np.array(values) for key, values in tables.read_columns(there(directory / name)).items()}
 
 
 def panels(count: int, height: float = HEIGHT) -> tuple[Figure, Sequence[Axes]]:
@@ -97,7 +97,7 @@ def rows_of(directory: Path) -> list[dict[str, Any]]:
     for row in rows:
         case = directory / "cases" / f"{int(row['case']):03d}"
         if row["state"] == "done":
-            found = tables.read(case / "measures.csv")
+            found = tables.read_columns(case / "measures.csv")
             found["contact_area"] = found[slide.CORRECTED]
             measured = slide.measure(load(case / "job.resolved.yaml").history, found)
             row["contact_area"] = measured.contact_area if measured else np.nan

@@ -122,8 +122,8 @@ def cut(bench: Bench, whole: Path, step: int) -> Path:
             if int(path.stem.removeprefix("step-")) > step:
                 path.unlink()
         if step == 0:  # before its first checkpoint
-            claims = marker.read(copy)
-            marker.write(copy, {"run": replace(claims["run"], saved=False)})
+            claims = marker.read_claims(copy)
+            marker.write_claims(copy, {"run": replace(claims["run"], saved=False)})
     bench.comm.Barrier()
     return copy
 

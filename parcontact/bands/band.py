@@ -125,7 +125,7 @@ class Band:
             raise RunError(f"a band of {max(setup.grid.size):.3g} m under {pressure:.3g} Pa {contact.failure}")
         seen = contact.u, self._heights, contact.d, NonNegative().touches(contact.p)
         measures = self.probe.measure(contact.p, 1.0, *seen, (0.0, 0.0), velocity)
-        lost = self.operator.loss(contact.p, setup.size, _unit(velocity)) / kernels.total(contact.p)
+        lost = self.operator.loss(contact.p, setup.size, _unit(velocity)) / kernels.sum_of(contact.p)
         state = SteadyState(contact, self._heights, lost * units.height / units.length)
         friction, budget = judge_state(setup, self._known, state, velocity, measures)
         weights, above = (np.zeros(0), 0.0) if below is None else below.weigh(contact.p * units.pressure)

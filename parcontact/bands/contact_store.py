@@ -81,7 +81,7 @@ class ContactStore:
             file.write("".join(f"{line}\n" for line in lines))
 
     def _on_root(self, act: Callable[[], None]) -> None:
-        hdf5.on_root(self._slab, act, f"cannot keep the contacts of a point in {self._path}", RunError)
+        hdf5.write_on_root(self._slab, act, f"cannot keep the contacts of a point in {self._path}", RunError)
 
 
 def _plain(rung: Rung) -> dict[str, Any]:

@@ -57,7 +57,7 @@ def start(job: Job, path: Path, target: Path | None) -> Iterator[str]:
         return
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        files.write(target, text)
+        files.replace_file(target, text)
     except OSError as error:
         raise RunError(f"{target} cannot be written: {error}") from error
     yield f"job: {target}"

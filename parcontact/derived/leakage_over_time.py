@@ -79,7 +79,7 @@ class Gaps:
         job = self.job
         self.size, self.periodic = job.grid.size, job.grid.boundary == "periodic"
         self.cells = job.grid.nx * job.grid.ny
-        self.columns = tables.read(directory / "measures.csv")
+        self.columns = tables.read_columns(directory / "measures.csv")
         try:
             with self._open() as file:
                 if not {"gap", "pressure"} <= set(file):
@@ -171,7 +171,7 @@ def write(directory: Path, at: str, over: str, comm: MPI.Intracomm, drop: Pressu
     name = f"leak.{gaps.fields.steps[gaps.shown[0]]}" if at else "leak"
     table, picture = (directory / f"{name}.{kind}" for kind in ("csv", "png"))
     columns = choose_columns(LEAK, when={"--fluid"} if drop else ())
-    files.write(table, to_csv(names_of(columns), (values_of(columns, row) for row in rows)))
+    files.replace_file(table, to_csv(names_of(columns), (values_of(columns, row) for row in rows)))
     instant = PlottedRun(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
     flows = leaks[drawn].leak.along_x, leaks[drawn].leak.along_y
     leakage.draw(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)

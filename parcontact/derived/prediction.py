@@ -71,7 +71,7 @@ def _times_of_run(job: Job) -> dict[int, float]:
     path = job.output.directory / "measures.csv"
     if not Timeline.of(job).chooses or not path.is_file():
         return {}
-    columns = tables.read(path)
+    columns = tables.read_columns(path)
     return dict(zip(map(int, columns["step"]), columns["time"], strict=True))
 
 

@@ -24,13 +24,15 @@ def describe_surface(job: Job, heights: Array, told: list[str], shortest: float 
     """
     if picture.suffix[1:] not in style.MARKED:
         raise InputError(f"--out must end in .{', .'.join(style.MARKED)}, got {str(picture)!r}")
-    found, part, measured = statistics.describe(heights, job.grid.size), job.surface[0], None
+    found, part, measured = statistics.surface_statistics(heights, job.grid.size), job.surface[0], None
     lines = []
     whole = map_files.read(part) if isinstance(part, Topography) and len(job.surface) == 1 else None
     if isinstance(part, Topography) and whole and not whole.is_line:  # at its own points, its edges joined smoothly
         prepared = prepare(part, job.grid, whole)
         (ny, nx), (lx, ly) = prepared.cut.shape, prepared.size
-        measured = statistics.describe(treatment.treat(prepared.cut, part.detrend, "smooth").heights, prepared.size)
+        measured = statistics.surface_statistics(
+            treatment.treat(prepared.cut, part.detrend, "smooth").heights, prepared.size
+        )
         lines = [f"size           {quantity(lx, 'm', 5)} x {quantity(ly, 'm', 5)}", f"points         {nx} x {ny}"]
         lines.append(f"pixel          {quantity(lx / nx, 'm', 4)} x {quantity(ly / ny, 'm', 4)}")
         lines.append(f"missing        {per_cent(float(np.isnan(prepared.cut).mean()))} of its points")

@@ -212,7 +212,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan, math.nan
         if self._scene.energy is not None:
             if solved.end != "open":
-                energies = adhesive_energies.advance(energies, instant, self._area)
+                energies = adhesive_energies.advance_energies(energies, instant, self._area)
             columns = (*columns[:2], energies.surfaces, energies.lost, energies.error)
         far = instant.front > SNAP_FRONT and not instant.untouched
         chosen = instant.step.judge is not None

@@ -57,7 +57,7 @@ class PathWork:
         self.approach, self.pressure = contact.d, pressure
 
 
-def advance(past: AdhesiveEnergies, instant: Instant, area: float) -> AdhesiveEnergies:
+def advance_energies(past: AdhesiveEnergies, instant: Instant, area: float) -> AdhesiveEnergies:
     """Return the energies after a step, in a box of an area [m^2]."""
     numbers, before, measures = instant.solved.numbers, instant.before, instant.measures
     surfaces = numbers[SURFACES]

@@ -239,10 +239,10 @@ class AdhesiveLaw:
         along_x, along_y = (round(moved) % count for moved, count in zip(cells, self.grid.points, strict=True))
         older = before.gap
         if along_y and growth > 0.0:
-            older = rows.roll(self.slab, before.gap, along_y, out)
+            older = rows.roll_rows(self.slab, before.gap, along_y, out)
         loops.travel(now.gap, older, 1.0 + growth, growth, along_x, 0.0, np.inf, out)
         if along_y:
-            out[...] = rows.roll(self.slab, out, along_y, self.scene.solver.workspace.pressure)
+            out[...] = rows.roll_rows(self.slab, out, along_y, self.scene.solver.workspace.pressure)
         if path.closes_gap_first:
             out += self.slab.reduce((), [-float(out.min(initial=np.inf))])[0]
 

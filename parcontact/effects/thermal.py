@@ -23,7 +23,7 @@ from ..parallel import spectra
 from ..parallel.fft import Spectrum
 from ..parallel.slab import Array
 from ..physics.entries import Entry, Saved
-from ..physics.exponentials import Exponentials, fit
+from ..physics.exponentials import Exponentials, fit_exponentials
 from ..physics.heat import Conductor, Depths, depths_of
 from ..physics.heat_memory import Heating, HeatMemory
 from ..physics.prony import Prony
@@ -106,7 +106,9 @@ def exponentials_of(job: Any) -> Exponentials:
         slides = slides or span.moves
         if slides and span.count:
             steps += span.extremes
-    return fit(min(step for step in steps if step > 0.0), longest, min(LOOSEST, SHARE * job.numerics.asked.strictest))
+    return fit_exponentials(
+        min(step for step in steps if step > 0.0), longest, min(LOOSEST, SHARE * job.numerics.asked.strictest)
+    )
 
 
 @dataclass(frozen=True)

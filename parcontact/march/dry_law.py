@@ -51,7 +51,7 @@ class DryLaw:
         make_start(scene, past.pressures, step, trial.alpha, past.spare)
         if past.last.alpha == 0.0:  # nothing has been solved before
             on = partial(solver_on, scene.setup)
-            contact = cold_start.prepare(scene.solver, problem, past.spare, on, solver_on_tiles(scene.setup))
+            contact = cold_start.prepare_start(scene.solver, problem, past.spare, on, solver_on_tiles(scene.setup))
         contact = contact or scene.solver.solve(problem, past.spare, tolerance=tolerance)
         if contact.failure:
             contact, remark = self._retry(step, past, problem, contact)

@@ -62,8 +62,8 @@ def _travel(
     )
     older, share = before.pressure, growth * before.alpha / alpha
     if along_y and growth > 0.0:
-        older = rows.roll(slab, before.pressure, along_y, out)
+        older = rows.roll_rows(slab, before.pressure, along_y, out)
     bounds = scene.constraint(alpha).bounds
     loops.travel(now.pressure, older, (1.0 + growth) * now.alpha / alpha, share, along_x, *bounds, out)
     if along_y:
-        out[...] = rows.roll(slab, out, along_y, scene.solver.workspace.pressure)
+        out[...] = rows.roll_rows(slab, out, along_y, scene.solver.workspace.pressure)

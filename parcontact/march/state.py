@@ -17,7 +17,7 @@ from ..history.chosen import ChosenSteps
 from ..parallel.slab import Array
 from ..physics.body import BodyMemory
 from ..physics.energy import EnergyMemory
-from ..physics.entries import Entry, RunPart, Saved, part_of, prefixed
+from ..physics.entries import Entry, RunPart, Saved, part_of, with_part
 from ..physics.measures import Measures
 from ..physics.units import Units
 from ..scene import Scene
@@ -262,14 +262,14 @@ def entries(scene: Scene, state: State) -> dict[str, Entry]:
     """Return everything that a run remembers, by the names `part/name` that checkpoints have; maps are no copies."""
     found: dict[str, Entry] = {}
     for name, part in parts_of(scene).items():
-        found |= prefixed(name, part.entries(state.memories[name], scene.units))
+        found |= with_part(name, part.entries(state.memories[name], scene.units))
     return found
 
 
 def save(path: Path, scene: Scene, state: State, facts: Facts) -> None:
     """Write a checkpoint of a state, with the plans of its transforms; collective. Raises RunError."""
     everything = {**entries(scene, state), "plans/all": Entry(wisdom.gather(scene.slab))}
-    checkpoint.write(path, scene.slab, replace(facts, step=state.row.step, time=state.row.time), everything)
+    checkpoint.write_checkpoint(path, scene.slab, replace(facts, step=state.row.step, time=state.row.time), everything)
 
 
 def restored(scene: Scene, state: State, contents: Contents) -> State:
@@ -281,7 +281,7 @@ def restored(scene: Scene, state: State, contents: Contents) -> State:
     declared = entries(scene, state)
     wanted = {name: entry for name, entry in declared.items() if not entry.optional or name in contents.units}
     _compare(contents, wanted)
-    checkpoint.read(contents, scene.slab, wanted)
+    checkpoint.read_maps(contents, scene.slab, wanted)
     saved = {name: _value(name, entry, contents) for name, entry in wanted.items()}
     memories: Mapping[str, Any] = {
         name: part.restored(state.memories[name], part_of(name, saved)) for name, part in parts_of(scene).items()

@@ -22,7 +22,7 @@ Shape = tuple[int, int]  # points of a cell along x and y: 1 or 2
 FEW = 8  # tuning: times fewer cells than a rank has points: then every rank has all cells
 
 
-def steps_of(slab: Slab, pairs: int = 0) -> list["PyramidStep"]:
+def pyramid_steps(slab: Slab, pairs: int = 0) -> list["PyramidStep"]:
     """All steps from a grid to a single cell, the finest first; so many to `pairs` come first. A grid that every rank
     has is that of a rank alone."""
     grids, shapes = [slab], []

@@ -10,7 +10,7 @@ from .regrid import fetch
 from .slab import Array, Slab
 
 
-def roll(slab: Slab, field: Array, count: int, out: Array) -> Array:
+def roll_rows(slab: Slab, field: Array, count: int, out: Array) -> Array:
     """`out(j) = field(j - count)` along y, cyclic, for this rank's rows; not in place; collective."""
     count %= slab.ny
     for low, high, shift in ((0, count, slab.ny - count), (count, slab.ny, -count)):

@@ -58,7 +58,7 @@ class RunPart(Protocol[Memory]):
         arrays in the run's units."""
 
 
-def prefixed(part: str, entries: Mapping[str, Entry]) -> dict[str, Entry]:
+def with_part(part: str, entries: Mapping[str, Entry]) -> dict[str, Entry]:
     """Return the entries of a part by the names that they have in a checkpoint."""
     return {f"{part}/{name}": entry for name, entry in entries.items()}
 

@@ -39,7 +39,7 @@ class Exponentials:
     spacing: float
 
 
-def fit(shortest: float, longest: float, error: float) -> Exponentials:
+def fit_exponentials(shortest: float, longest: float, error: float) -> Exponentials:
     """Return the sum for times from `shortest` to `longest` [s] with a relative error of at most `error` < 1/10."""
     h = np.pi**2 / (2.0 * np.log(4.0 * np.sqrt(2.0) / error))  # half of the error
     below = np.exp(-h * np.arange(1.0, 40.0 / h))  # m/m_0 of the waves that become one

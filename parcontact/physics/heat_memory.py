@@ -19,7 +19,7 @@ from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array, allocate
 from . import loops
 from .convolution import wavenumbers
-from .exponentials import Exponentials, fit, shares_of_step
+from .exponentials import Exponentials, fit_exponentials, shares_of_step
 from .heat import Conductor, Depths, Vector
 
 MEAN_TIMES, MEAN_ERROR = (1e-12, 1e12), 1e-9  # accuracy: of the mean of the box
@@ -49,7 +49,7 @@ class MeanMemory:
     """The mean temperature of a box [K] and its `waves` along the depth; the same on every rank."""
 
     def __init__(self, body: Conductor) -> None:
-        self.body, self.sum = body, fit(*MEAN_TIMES, MEAN_ERROR)
+        self.body, self.sum = body, fit_exponentials(*MEAN_TIMES, MEAN_ERROR)
         self.waves = np.zeros(self.sum.rates.size)
 
     @property

@@ -15,7 +15,7 @@ from ..parallel.slab import Array, Slab
 Values = NDArray[Any]  # as they stand in the file
 
 
-def read(path: Path, dataset: str, slab: Slab, scale: float = 1.0) -> Array:
+def read_heights(path: Path, dataset: str, slab: Slab, scale: float = 1.0) -> Array:
     """This rank's rows of the map of shape (ny, nx) in a .npy, .h5 or text file, times `scale`; collective.
 
     Raises InputError on every rank when a rank cannot read its rows, the shape is another one, or a value is no finite

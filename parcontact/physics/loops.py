@@ -74,7 +74,7 @@ def commit(displacement, buffer, u, heights, offset, out):
 
 
 @loop
-def measure(p, u, h, mask, above, cyclic):
+def sum_measures(p, u, h, mask, above, cyclic):
     """Over this rank's points: sum of p, points in contact, where `mask` is not 0, sum of `u - h`; how many cell sides
     separate a point in contact from one that is not, along x and y, each counted once; largest p.
 

@@ -75,7 +75,7 @@ class Probe:
         """
         units, points = self.units, self.slab.points
         cyclic = self.surface.periodic
-        *sums, largest = loops.measure(p, u, h, touching, rows.before_first(self.slab, touching, cyclic), cyclic)
+        *sums, largest = loops.sum_measures(p, u, h, touching, rows.before_first(self.slab, touching, cyclic), cyclic)
         edge = 0.0 if cyclic else _touches_edge(self.slab, touching)
         load, count, gaps, sides, largest, edge = self.slab.reduce(sums, [largest, edge])
         unit_pressure = alpha * units.pressure

@@ -42,7 +42,7 @@ class Statistics:
     hurst: float
 
 
-def describe(heights: Array, size: tuple[float, float]) -> Statistics:
+def surface_statistics(heights: Array, size: tuple[float, float]) -> Statistics:
     """Return the statistics of a map, from its Fourier series."""
     ny, nx = heights.shape
     power = np.abs(fft.fft2(heights - heights.mean()) / (nx * ny)) ** 2

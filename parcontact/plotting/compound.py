@@ -39,7 +39,7 @@ def write(compound: Compound, target: Path, job_band: tuple[float, float] | None
     text, picture = compound.text(), target.with_suffix(".png")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        files.write(target, text)
+        files.replace_file(target, text)
         draw(compound, picture, job_band)
     except OSError as error:
         raise RunError(f"{target} cannot be written: {error}") from error

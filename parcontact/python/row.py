@@ -21,7 +21,7 @@ class Row(Mapping[str, float]):
     def of(cls, row: recorded.StepRow, added: tuple[str, ...] = ()) -> Row:
         """A recorded row; `added` names the columns of effects."""
         branches = len(row.branch_dissipation)
-        return cls(dict(zip(recorded.columns(branches, added), recorded.numbers(row, branches), strict=True)))
+        return cls(dict(zip(recorded.columns(branches, added), recorded.row_numbers(row, branches), strict=True)))
 
     @classmethod
     def of_line(cls, line: str, added: tuple[str, ...] = ()) -> Row:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..storage.console import WARNING, lines_of
+from ..storage.console import WARNING, log_lines
 from ..storage.curve_points import LOG
 
 LOGS = ("run.log", LOG)
@@ -44,7 +44,7 @@ class Log:
 
 def read(directory: Path) -> Log:
     """Return what the logs of a directory say; nothing where there is none."""
-    lines = [line for name in LOGS for line in lines_of(directory / name)]
+    lines = [line for name in LOGS for line in log_lines(directory / name)]
     warnings = [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]
     counted = [line.removeprefix(COUNTS) for line in lines if line.startswith(COUNTS)]  # allreduce 12, fft 64x64 3
     counts: list[Sequence[str]] = [part.rsplit(" ", 1) for part in counted[-1].split(", ")] if counted else []

@@ -10,7 +10,7 @@ from ..accuracy.budget import exceeds
 from ..job import Job
 from ..job.sections.listing import plain
 from ..storage import hdf5, provenance
-from ..storage.tables import read as read_table
+from ..storage.tables import read_columns as read_table
 from ..summary.slide import ERRORS
 from . import log
 from .parts import ReportSection, ReportTable

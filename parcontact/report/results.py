@@ -40,7 +40,7 @@ MAP_SIZE = (4.2, 3.5)  # [inch]
 
 def describe_run(directory: Path) -> ReportSection:
     """Return histories, the largest and last values, and the maps over time."""
-    run, columns = PlottedRun(directory), tables.read(directory / "measures.csv")
+    run, columns = PlottedRun(directory), tables.read_columns(directory / "measures.csv")
     known = {name: [value for value in columns.get(name, ()) if value == value] for name in SHOWN}
     rows = [
         (_to_words(name), *map(format_cell, (values[-1], min(values), max(values))), UNITS.get(name, ""))
@@ -93,7 +93,7 @@ def _leakage(directory: Path) -> list[tuple[str, str]]:
 
 def describe_curve(directory: Path) -> ReportSection:
     """Return the points of a friction curve, and their maps."""
-    columns = tables.read(directory / "steady.csv")
+    columns = tables.read_columns(directory / "steady.csv")
     names = [name for name in POINTS if name in columns]
     units_of = {column.name: column.unit for column in STEADY}
     head = [f"{_to_words(name)} [{units_of[name]}]" if units_of[name] else _to_words(name) for name in names]

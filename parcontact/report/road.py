@@ -37,7 +37,7 @@ def section(job: Job) -> ReportSection:
     except InputError as error:
         return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
     heights, sentences = made.heights((0.0, 0.0), slab.empty()), [*told.notes, *map(str, told.doubts)]
-    found = statistics.describe(heights, job.grid.size)
+    found = statistics.surface_statistics(heights, job.grid.size)
     if not found.rms_height:
         return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
     tables = [shapes, _tabulate(found, "on the grid of the job")]

@@ -189,7 +189,7 @@ def fitted(
     from . import series, tables  # scipy is for fits only
     from .superposition import log_factors, superpose
 
-    measured = tables.read(path, poisson)
+    measured = tables.read_moduli(path, poisson)
     if isinstance(law, str):
         measured = measured.without_short_sets()
     temperatures = measured.temperatures

@@ -122,7 +122,7 @@ class _Column(NamedTuple):
     unit: str | None  # None: of a one-row header that names none
 
 
-def read(path: Path, poisson: float = 0.5) -> Measurement:
+def read_moduli(path: Path, poisson: float = 0.5) -> Measurement:
     """Read a table; Young's moduli become those of shear, `G = E/(2 (1 + nu))`. Raises InputError."""
     lines = read_lines(path, "a table of moduli")
     columns, first = _columns(path, lines)

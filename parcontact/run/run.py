@@ -205,7 +205,7 @@ class Run:
             grid, tolerance = self.job.grid, self.job.numerics.tolerance
             box = grid.lx * grid.ly
             with suppress(OSError, InputError):  # a table that cannot be read now ends no run
-                rows = tables.read(self.directory.path / "measures.csv")
+                rows = tables.read_columns(self.directory.path / "measures.csv")
                 told = slide.describe(self.job.history, self.job.initial, grid.dx, rows)
                 for text in (*told, *pull_off.describe(rows, box, tolerance, bool(self.march.detached))):
                     console.say(text)

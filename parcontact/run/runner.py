@@ -21,7 +21,7 @@ from ..storage import header, heights, marker, row, wisdom
 from ..storage.checkpoint import Contents, Facts
 from ..storage.directory import Directory
 from ..storage.marker import Claim
-from ..storage.provenance import Link, Provenance, cite_lines, extended
+from ..storage.provenance import Link, Provenance, cite_lines, extend_chain
 from ..storage.recorder import Recorder, Recording
 from . import restart, watch
 from .restart import RestartPoint
@@ -110,7 +110,7 @@ def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[st
     """Return where the files of a run come from that begins, or goes on from a checkpoint."""
     link = Link(job.resolved(), slab.comm.size, saved.step if saved else 0)
     seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough | RoughSpectrum))
-    chain = extended(saved.chain if saved else (), link)
+    chain = extend_chain(saved.chain if saved else (), link)
     included = str(job.included) if job.included else ""
     return Provenance(chain, seeds, included, doubts, references=cite_lines(listing.plain(job)))
 

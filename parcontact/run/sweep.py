@@ -197,14 +197,14 @@ def refuse_foreign(cases: Sequence[Case]) -> None:
         if path.is_symlink():
             raise InputError(f"{path} is a link, through which no case is written: remove it, or give --out")
     try:
-        claims = marker.read(directory)
+        claims = marker.read_claims(directory)
         entries = [path.name for path in directory.iterdir()] if directory.is_dir() else []
     except (OSError, ValueError) as error:
         raise InputError(f"the output directory {directory} cannot be used: {error}") from error
     refuse_other_jobs(directory, claims, plain_job(first.job))
     for case in cases:
         there = case.job.output.directory
-        refuse_other_jobs(there, marker.read(there), plain_job(case.job))
+        refuse_other_jobs(there, marker.read_claims(there), plain_job(case.job))
     if not claims and not {CASES, sweep_table.TABLE} & set(entries):
         refuse_files(directory, entries)
 

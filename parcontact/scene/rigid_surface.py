@@ -117,7 +117,7 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: Told) -> Spectrum:
     if isinstance(part, jobs.Topography):
         return _measured_map(part, grid, fft, told)
     if isinstance(part, jobs.HeightFile):
-        return _transform(heightfile.read(part.path, part.dataset, fft.slab, part.scale), fft)
+        return _transform(heightfile.read_heights(part.path, part.dataset, fft.slab, part.scale), fft)
     if isinstance(part, jobs.HeightArray):
         return _transform(fft.slab.from_root(part.heights.values), fft)
     limits = part.long_wavelength, part.rolloff_wavelength, part.short_wavelength

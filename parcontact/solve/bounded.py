@@ -39,7 +39,7 @@ class Bounded:
         return p
 
     def weigh(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
-        load, work, gaps, squares = kernels.weigh(p, u, h, d)
+        load, work, gaps, squares = kernels.pressure_sums(p, u, h, d)
         return load, work, gaps, squares, *_weigh_free(p, u, h, d, self.highest)
 
     def mark(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
@@ -74,7 +74,7 @@ class Bounded:
 
     def clip(self, p: Array) -> float:
         np.clip(p, 0.0, self.highest, out=p)
-        return float(kernels.total(p))
+        return float(kernels.sum_of(p))
 
     def next_set(self, x: Array, gap: Array, working: Set) -> Set:
         """Points of the set that are free, others that penetrate without having yielded or have under an open gap."""

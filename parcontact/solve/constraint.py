@@ -75,7 +75,7 @@ class NonNegative:
         return p
 
     def weigh(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
-        load, work, gaps, squares = kernels.weigh(p, u, h, d)
+        load, work, gaps, squares = kernels.pressure_sums(p, u, h, d)
         return load, work, gaps, squares, load, gaps
 
     def mark(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
@@ -100,7 +100,7 @@ class NonNegative:
     def next_set(self, x: Array, gap: Array, working: Set) -> Set:
         return np.where(working, x > 0.0, gap < 0.0)
 
-    def choose(self, x: Array, u: Array, h: Array, d: float, kappa: float, working: Set) -> tuple[float, ...]:
+    def choose_active(self, x: Array, u: Array, h: Array, d: float, kappa: float, working: Set) -> tuple[float, ...]:
         """Mark the next set of a method whose x is admissible only in the end: points with `x > kappa g`. Returns the
         sums of x > 0, of -x < 0, of |x g|, the number of these points, how many others there are than before, and
         max(-g)."""

@@ -44,7 +44,7 @@ from ..physics import loops
 from ..physics.layer import LongWaves
 from . import kernels
 from .certificate import Certificate
-from .iterate import Iterate, certify, weigh
+from .iterate import Iterate, certify, contact_sums
 from .local_load import LEAST_CUT, LocalLoad
 from .preconditioner.extension import ALL, ExtendedPreconditioner, Grids
 from .preconditioner.long_waves import LongWavePreconditioner
@@ -168,7 +168,7 @@ class ContactSolver:
         """Give the start its load and forget the last solve's direction."""
         self.workspace.direction.fill(0.0)
         if problem.mean is not None:
-            load = self.slab.sum(kernels.total(p))[0]
+            load = self.slab.sum(kernels.sum_of(p))[0]
             if load > 0.0:
                 problem.constraint.give_load(self.slab, p, load, problem.mean * self.slab.points)
             else:
@@ -178,7 +178,7 @@ class ContactSolver:
 
     def _weigh(self, problem: Problem, p: Array, d: float) -> Iterate:
         """A pressure in numbers, for the approach d or the one that suits it."""
-        iterate = weigh(self.slab, problem.constraint, p, self.workspace.displacement, problem.heights, d)
+        iterate = contact_sums(self.slab, problem.constraint, p, self.workspace.displacement, problem.heights, d)
         return iterate if problem.mean is None else iterate.settled()
 
     def _certify(self, problem: Problem, p: Array, iterate: Iterate) -> tuple[float, float, Certificate]:
@@ -211,9 +211,9 @@ class ContactSolver:
         work, h = self.workspace, problem.heights
         u, t, working = work.displacement, work.direction, work.working
         z = reused(free, free.shape, t.dtype)
-        kernels.residual(working, u, h, level, z)
+        kernels.gap_residual(working, u, h, level, z)
         self._extended.apply(problem.preconditioner, working, z)
-        sums = kernels.products(working, u, h, level, work.other_displacement, z, t)
+        sums = kernels.step_products(working, u, h, level, work.other_displacement, z, t)
         sum_z, sum_t, sum_change, r_z, change_z, r_t = self.slab.sum(*sums)
         centred = problem.mean is not None
         mean_z, mean_t = (sum_z / members, sum_t / members) if centred else (0.0, 0.0)
@@ -244,7 +244,7 @@ class ContactSolver:
                 self._local_load.restore(constraint, p, load, mean * self.slab.points, near_by)
             problem.operator.apply(p, work.other_displacement)
             work.swap_displacements()
-            new = weigh(self.slab, constraint, p, work.displacement, problem.heights, old.d)
+            new = contact_sums(self.slab, constraint, p, work.displacement, problem.heights, old.d)
             if new.f - old.f <= ENERGY_ROUNDING * new.energy or halvings == MAX_HALVINGS:
                 break
             work.swap_displacements()

@@ -91,7 +91,7 @@ def resolve(s, h, gamma, pressures, sums, p, reflected):
 
 
 @loop
-def follow(s, y, p, shift):
+def update_split(s, y, p, shift):
     """`s <- s + y + shift - p`."""
     for j in range(s.shape[0]):
         for i in range(s.shape[1]):

@@ -86,7 +86,7 @@ def certify(
     return members, excess, Certificate(complementarity, max(deepest / length, 0.0), load, length, share)
 
 
-def weigh(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array, d: float) -> Iterate:
+def contact_sums(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array, d: float) -> Iterate:
     """A pressure and its image u in numbers, for an approach d; collective."""
     load, work, gaps, squares, free_load, free_gaps = slab.sum(*constraint.weigh(p, u, h, d))
     between = _approaches(slab, constraint, p, u, h) if free_load <= 0.0 < load else None

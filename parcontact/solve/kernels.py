@@ -8,7 +8,7 @@ from ..compiled import loop
 
 
 @loop
-def weigh(p, u, h, d):
+def pressure_sums(p, u, h, d):
     """Sums of p, p u, p g and p u^2, with the gap `g = u - h - d`."""
     load, work, squares, gaps = 0.0, 0.0, 0.0, 0.0
     for j in range(p.shape[0]):
@@ -27,7 +27,7 @@ def weigh(p, u, h, d):
 
 
 @loop
-def residual(working, u, h, d, r):
+def gap_residual(working, u, h, d, r):
     """`r = u - h - d` on the working set and 0 elsewhere."""
     for j in range(r.shape[0]):
         for i in range(r.shape[1]):
@@ -35,7 +35,7 @@ def residual(working, u, h, d, r):
 
 
 @loop
-def products(working, u, h, d, u_old, z, t):
+def step_products(working, u, h, d, u_old, z, t):
     """Over the working set, with `r = u - h - d` in the precision of maps and `c = u - u_old`: sums of z, t, c, r z,
     c z and r t."""
     sum_z, sum_t, sum_change, r_z, change_z, r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -69,7 +69,7 @@ def turn(working, z, beta, mean, t):
 
 
 @loop
-def total(a):
+def sum_of(a):
     """Sum of a."""
     result = 0.0
     for j in range(a.shape[0]):

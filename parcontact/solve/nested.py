@@ -18,7 +18,7 @@ class Level:
     heights: Array
 
 
-def levels_of(slab: Slab, heights: Array) -> list[Level]:
+def coarser_levels(slab: Slab, heights: Array) -> list[Level]:
     """A grid and all coarser ones, the finest first; collective."""
     levels = [Level(slab, heights)]
     while (coarse := regrid.coarser(levels[-1].slab)) is not None:

@@ -56,7 +56,7 @@ def is_block_grid(slab: Slab, finest: Slab) -> bool:
     return longest <= max(BLOCKS, max(finest.nx, finest.ny) // SIDE)
 
 
-def choose(
+def choose_tiles(
     blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array, constraint: Constraint
 ) -> Tiles | None:
     """Return the tiles of a grid that may touch, from the contact on the next coarser one; None where these are none,

@@ -185,7 +185,7 @@ def _table(path: Path, sliding: States, wanted: Request, quiet: bool) -> CurveTa
     """Begin the tables, or continue them, on root; collective. Raises InputError where that cannot be."""
     further, made = WAVES if wanted.waves else sliding.table, list[CurveTable]()
     act = lambda: made.append(CurveTable(path, sliding.setup, further, bool(wanted.temperatures), quiet))  # noqa: E731
-    hdf5.on_root(sliding.setup.slab, act, "cannot write the table of the curve", InputError)
+    hdf5.write_on_root(sliding.setup.slab, act, "cannot write the table of the curve", InputError)
     return made[0] if made else None
 
 
@@ -268,5 +268,5 @@ class _Curve:
                 table.write(point, rows)
                 table.warn(self.watch.judge_point(point.measures, str(wanted)), self.shows)
 
-        hdf5.on_root(self.slab, write, f"cannot write {self.directory.path / 'steady.csv'}")
+        hdf5.write_on_root(self.slab, write, f"cannot write {self.directory.path / 'steady.csv'}")
         self.sliding.forget()

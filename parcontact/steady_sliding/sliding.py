@@ -72,7 +72,7 @@ class SteadySliding:
         self._tolerance = min(tolerance_of(setup.choices.numerics.tolerance), most)
         self.probe = setup.probe()
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty())
-        finest, *coarser = nested.levels_of(setup.slab, heights)
+        finest, *coarser = nested.coarser_levels(setup.slab, heights)
         self.levels = [SteadyLevel(setup.slab, setup.fft, finest.heights)]
         self.levels += [SteadyLevel(level.slab, FFT(level.slab), level.heights) for level in coarser]
         self._known = properties_of(setup, 0.0, True, None)
@@ -257,7 +257,7 @@ class SteadySliding:
         else:
             p[...] = start
         contact, operator = solve(self.levels[0], p)
-        unit, load = self.setup.units.height / self.setup.units.length, kernels.total(p)
+        unit, load = self.setup.units.height / self.setup.units.length, kernels.sum_of(p)
         lost = max(operator.loss(p, self.setup.size, _direction(velocity)), 0.0)  # not of rounding, of an elastic body
         return contact, calls, lost / (self.setup.slab.sum(load)[0] or math.nan) * unit
 

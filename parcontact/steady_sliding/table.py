@@ -58,7 +58,7 @@ class CurveTable:
         """Return the points that are there; a line that was not finished is removed."""
         if not self.path.exists():
             return []
-        columns = tables.read(self.path)
+        columns = tables.read_columns(self.path)
         if tuple(columns) != self._names:
             files.put_aside(self.path)
             return []
@@ -72,14 +72,14 @@ class CurveTable:
         """Remove the lines of a further table whose points are not there: those of one that was being solved."""
         if not path.exists():
             return
-        head, *lines = tables.lines_of(path)
+        head, *lines = tables.whole_lines(path)
         places = [head.index(name) for name in ("velocity", "pressure", "temperature") if name in head]
         kept = []
         for line in lines:
             speed, pressure, *degrees = (float(line[place] or "nan") for place in places)
             point = Wanted(speed, pressure, degrees[0] if heated and degrees else math.nan)
             kept += [] if curve_points.lacking([point], self.known) else [line]
-        files.write(path, "".join(f"{','.join(line)}\n" for line in [head, *kept]))
+        files.replace_file(path, "".join(f"{','.join(line)}\n" for line in [head, *kept]))
 
     def lacking(self, points: Sequence[Wanted], bare: Sequence[int] = ()) -> list[int]:
         """Return the numbers of the points that are not there, or are `bare` of the maps that are asked for."""
@@ -142,13 +142,13 @@ class CurveTable:
 
     def _sort(self) -> None:
         """Sort the lines by temperature, then by pressure, then by speed."""
-        columns = tables.read(self.path)
+        columns = tables.read_columns(self.path)
         head, *lines = self.path.read_text().splitlines()
         degrees = columns["temperature"] if self.heated else [0.0] * len(lines)
         points = zip(degrees, columns["pressure"], columns["velocity"], strict=True)
         keys = [(t, round(math.log(p), 5), v) for t, p, v in points]
         order = sorted(range(len(lines)), key=keys.__getitem__)
-        files.write(self.path, "\n".join([head, *(lines[k] for k in order)]) + "\n")
+        files.replace_file(self.path, "\n".join([head, *(lines[k] for k in order)]) + "\n")
 
     def close(self) -> None:
         self._bar.close()

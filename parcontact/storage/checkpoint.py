@@ -85,7 +85,7 @@ class Facts:
         self.provenance.write(file)
 
 
-def write(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry]) -> None:
+def write_checkpoint(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry]) -> None:
     """Write a checkpoint; collective. On an error nothing of it is left, and what had the name before still has it."""
     maps = _maps(entries)
     part = slab.agree(files.unused(path))
@@ -108,11 +108,11 @@ def write(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry]) ->
     try:
         size = sum(rows.itemsize for rows in maps.values()) * slab.nx * slab.ny
         hdf5.lay_out(part, slab, build, size, SEAL)
-        hdf5.write(part, slab, [hdf5.Slice(name, (), rows) for name, rows in maps.items()])
+        hdf5.write_rows(part, slab, [hdf5.Slice(name, (), rows) for name, rows in maps.items()])
         everyone = slab.from_all({name: row_sums(rows) for name, rows in maps.items()})
-        hdf5.on_root(slab, finish, f"cannot write {part}")
+        hdf5.write_on_root(slab, finish, f"cannot write {part}")
         hdf5.sync(part, slab)
-        hdf5.on_root(slab, lambda: _publish(part, path), f"cannot make {path}")
+        hdf5.write_on_root(slab, lambda: _publish(part, path), f"cannot make {path}")
     except RunError:
         if slab.root:
             with suppress(OSError):
@@ -228,7 +228,7 @@ def verify(contents: Contents, slab: Slab) -> str:
         for name, dtype in contents.maps.items():
             if rows.dtype != dtype or rows.shape != slab.shape:
                 rows = np.empty(slab.shape, dtype)
-            hdf5.read(contents.path, slab, [hdf5.Slice(name, (), rows)])
+            hdf5.read_rows(contents.path, slab, [hdf5.Slice(name, (), rows)])
             bad = np.flatnonzero(row_sums(rows) != contents.sums[name][slab.rows])
             if count := int(slab.sum(float(bad.size))[0]):
                 return f"{contents.path} is damaged: {count} of {slab.ny} rows of {name} do not match their checksums"
@@ -237,10 +237,10 @@ def verify(contents: Contents, slab: Slab) -> str:
     return ""
 
 
-def read(contents: Contents, slab: Slab, entries: Mapping[str, Entry]) -> None:
+def read_maps(contents: Contents, slab: Slab, entries: Mapping[str, Entry]) -> None:
     """Read the maps of a checkpoint into those of `entries`, in their units; collective. Numbers are in `contents`."""
     maps = _maps(entries)
-    hdf5.read(contents.path, slab, [hdf5.Slice(name, (), rows) for name, rows in maps.items()])
+    hdf5.read_rows(contents.path, slab, [hdf5.Slice(name, (), rows) for name, rows in maps.items()])
     for name, rows in maps.items():
         if contents.units[name] != entries[name].unit:
             rows *= contents.units[name] / entries[name].unit

@@ -22,7 +22,7 @@ EVERY_SECONDS = 0.5  # tuning: a bar is redrawn, and lines are shortened to a ba
 LEFT_SECONDS = 30.0  # tuning: between two lines with the time left, where there is no terminal for a bar
 
 
-def line(row: StepRow) -> str:
+def step_line(row: StepRow) -> str:
     """Return the line of a step, under `HEAD`."""
     m = row.measures
     return (
@@ -33,15 +33,15 @@ def line(row: StepRow) -> str:
 
 def warnings_of(log: Path) -> list[str]:
     """Return the warnings in a log, each once and in their order; none where there is no log."""
-    return list(dict.fromkeys(line.removeprefix(WARNING) for line in lines_of(log) if line.startswith(WARNING)))
+    return list(dict.fromkeys(line.removeprefix(WARNING) for line in log_lines(log) if line.startswith(WARNING)))
 
 
 def meshes_of(log: Path) -> list[str]:
     """Return what a log says of meshes that were chosen (`mesh.chosen_mesh`), the last of it; nothing as a rule."""
-    return [line for line in lines_of(log) if line.startswith(MESH)][-1:]
+    return [line for line in log_lines(log) if line.startswith(MESH)][-1:]
 
 
-def lines_of(log: Path) -> list[str]:
+def log_lines(log: Path) -> list[str]:
     """Return the lines of a log without their stamps; none where there is no log."""
     return [STAMP.sub("", line) for line in log.read_text(errors="replace").splitlines()] if log.is_file() else []
 
@@ -81,7 +81,7 @@ class Console:
 
     def step(self, row: StepRow) -> None:
         """Say the line of a step, and how far the run is."""
-        text = line(row)
+        text = step_line(row)
         self.log(text)
         if self._quiet:
             return

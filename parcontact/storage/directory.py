@@ -106,14 +106,14 @@ class Directory:
         def act() -> None:
             self._put_aside_what_is_not_ours(job)
             self.claims = {**self.claims, self.verb: claim}
-            marker.write(self.path, self.claims)
+            marker.write_claims(self.path, self.claims)
             if self.verb == "run":
                 self.checkpoints.mkdir(exist_ok=True)
             copy, table = COPIES[self.verb]
             if not _same(self.path / copy, job):
                 with files.replaced(self.path / copy) as new, job.open("rb") as given:
                     shutil.copyfileobj(given, new)
-            files.write(self.path / table, resolved)
+            files.replace_file(self.path / table, resolved)
 
         self._on_root(act)
 
@@ -150,7 +150,7 @@ class Directory:
         if (claim := self.claim) and (changed := replace(claim, **facts)) != claim:
             self.claims = {**self.claims, self.verb: changed}
             with suppress(OSError):
-                marker.write(self.path, self.claims)
+                marker.write_claims(self.path, self.claims)
 
     def saved(self) -> list[tuple[int, Path]]:
         """Return checkpoints and their steps, the newest first; root only."""
@@ -185,7 +185,7 @@ class Directory:
 
     def _on_root(self, act: Callable[[], None]) -> None:
         """Act on root; collective. Raises InputError on all ranks if that fails."""
-        hdf5.on_root(self.slab, act, f"the output directory {self.path} cannot be written", InputError)
+        hdf5.write_on_root(self.slab, act, f"the output directory {self.path} cannot be written", InputError)
 
     # -- the lock -----------------------------------------------------------------------------------------------------
 
@@ -193,7 +193,7 @@ class Directory:
         self._made = [path for path in (self.path, *self.path.parents) if not path.exists()]
         self._take_lock()
         try:
-            self.claims = marker.read(self.path)
+            self.claims = marker.read_claims(self.path)
         except ValueError as error:
             raise InputError(
                 f"{error}, so that the owner of {self.path} is unknown; --out chooses another directory"

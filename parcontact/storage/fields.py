@@ -66,7 +66,7 @@ class FieldsFile:
         self._kept = frozenset(kept)
         if found and found.steps == tuple(self.steps) and set(found.names) == set(self.names):
             hdf5.change(self.path, self.slab, provenance.renew)
-            hdf5.mark(self.path, self.slab, slice(len(kept), None), {"t": np.nan})
+            hdf5.set_marks(self.path, self.slab, slice(len(kept), None), {"t": np.nan})
             self._draw()
         else:
             self._replace(found, kept)
@@ -111,7 +111,7 @@ class FieldsFile:
         hdf5.lay_out(new, self.slab, self._build, size)
         if found:
             self._copy(found, kept, new)
-        hdf5.on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
+        hdf5.write_on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
         self._draw()
 
     def _copy(self, found: "SavedFields", kept: Sequence[int], new: Path) -> None:
@@ -120,10 +120,10 @@ class FieldsFile:
             for name in self.names:
                 rows.fill(np.nan)
                 if name in found.names:
-                    hdf5.read(self.path, self.slab, [hdf5.Slice(name, (found.steps.index(step),), rows)])
-                hdf5.write(new, self.slab, [hdf5.Slice(name, (self.steps[step],), rows)])
+                    hdf5.read_rows(self.path, self.slab, [hdf5.Slice(name, (found.steps.index(step),), rows)])
+                hdf5.write_rows(new, self.slab, [hdf5.Slice(name, (self.steps[step],), rows)])
         times = [found.times[found.steps.index(step)] for step in kept]
-        hdf5.mark(new, self.slab, [self.steps[step] for step in kept], {"t": times})
+        hdf5.set_marks(new, self.slab, [self.steps[step] for step in kept], {"t": times})
         hdf5.sync(new, self.slab)
 
     def _draw(self) -> None:
@@ -133,7 +133,7 @@ class FieldsFile:
                 with h5py.File(self.path, "r", locking=False) as file:
                     times, steps = file["t"][...], file["step"][...]
                 points = (self.slab.ny, self.slab.nx)
-                files.write(target, xdmf(self.path.name, times, steps, points, self.size, self.names))
+                files.replace_file(target, xdmf(self.path.name, times, steps, points, self.size, self.names))
                 self.trouble = ""
             except hdf5.FAILURES as error:
                 self.trouble = f"cannot write {target}: {hdf5.reason(error)}"
@@ -149,7 +149,7 @@ def cut_back(path: Path, slab: Slab, step: int) -> str:
         return ""
     found, problem = _found(path, slab)
     if found:
-        hdf5.mark(path, slab, np.array(found.steps) > step, {"t": np.nan})
+        hdf5.set_marks(path, slab, np.array(found.steps) > step, {"t": np.nan})
     return problem
 
 

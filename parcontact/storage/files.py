@@ -48,7 +48,7 @@ def open_to_append(path: Path) -> FileIO:
     return FileIO(handle, "ab")
 
 
-def write(path: Path, text: str) -> None:
+def replace_file(path: Path, text: str) -> None:
     """Replace a file by a text, in UTF-8."""
     with replaced(path) as file:
         file.write(text.encode(errors="backslashreplace"))

@@ -38,12 +38,12 @@ class Slice(NamedTuple):
     rows: Array
 
 
-def write(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
+def write_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
     """Write the rows of every rank; collective."""
     _move(path, slab, list(parts), True)
 
 
-def read(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
+def read_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
     """Read the rows of every rank into `part.rows`; collective."""
     _move(path, slab, list(parts), False)
 
@@ -81,7 +81,7 @@ def sync_one(path: Path) -> None:
         os.close(handle)
 
 
-def on_root(slab: Slab, action: Callable[[], T], what: str, kind: type[Exception] = RunError) -> T:
+def write_on_root(slab: Slab, action: Callable[[], T], what: str, kind: type[Exception] = RunError) -> T:
     """Return what root does; collective. Its failure is an error of this kind on every rank, beginning with `what`."""
 
     def attempt() -> T:
@@ -195,7 +195,7 @@ def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], size: in
             path.unlink(missing_ok=True)
             raise
 
-    on_root(slab, make, f"cannot make {path}")
+    write_on_root(slab, make, f"cannot make {path}")
 
 
 def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
@@ -205,7 +205,7 @@ def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
         with h5py.File(path, "r+", locking=False) as file:
             act(file)
 
-    on_root(slab, apply, f"cannot write {path}")
+    write_on_root(slab, apply, f"cannot write {path}")
 
 
 def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
@@ -221,11 +221,13 @@ def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
 
 def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], marks: Mapping[str, float]) -> None:
     """Put maps of one instant or point into their place, and then its coordinates, the `marks`; collective."""
-    write(path, slab, [Slice(name, (index,), np.ascontiguousarray(rows, np.float64)) for name, rows in maps.items()])
-    mark(path, slab, index, marks)
+    write_rows(
+        path, slab, [Slice(name, (index,), np.ascontiguousarray(rows, np.float64)) for name, rows in maps.items()]
+    )
+    set_marks(path, slab, index, marks)
 
 
-def mark(path: Path, slab: Slab, index: Any, marks: Mapping[str, Any]) -> None:
+def set_marks(path: Path, slab: Slab, index: Any, marks: Mapping[str, Any]) -> None:
     """Set coordinates of instants or points, which tell that their maps are saved (NaN: not saved); collective."""
 
     def act() -> None:
@@ -235,7 +237,7 @@ def mark(path: Path, slab: Slab, index: Any, marks: Mapping[str, Any]) -> None:
             axes[name][index] = value
         put(path, axes)
 
-    on_root(slab, act, f"cannot write {path}")
+    write_on_root(slab, act, f"cannot write {path}")
 
 
 def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> h5py.Dataset:

@@ -22,7 +22,7 @@ def store(surface: Iterable[Any], directory: Path, slab: Slab) -> None:
                 with files.replaced(path) as file:
                     np.save(file, np.asarray(heights.values))
 
-    hdf5.on_root(slab, write, f"cannot write the heights of the surface into {directory}", InputError)
+    hdf5.write_on_root(slab, write, f"cannot write the heights of the surface into {directory}", InputError)
 
 
 def located(job: dict[str, Any], checkpoint: Path, elsewhere: bool) -> dict[str, Any]:

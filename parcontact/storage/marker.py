@@ -41,7 +41,7 @@ def kept(data: Mapping[str, Any]) -> dict[str, Any]:
     return {name: data[name] for name in SECTIONS if name in data}
 
 
-def read(directory: Path) -> dict[str, Claim]:
+def read_claims(directory: Path) -> dict[str, Claim]:
     """Read the claims of a directory by verb, none where there is no marker; raises OSError, or ValueError."""
     path = directory / MARKER
     try:
@@ -61,7 +61,7 @@ def read(directory: Path) -> dict[str, Claim]:
 def claim_of_run(directory: Path) -> Claim | None:
     """Return the claim of the run in a directory; raises InputError for a marker that cannot be read."""
     try:
-        return read(directory).get("run")
+        return read_claims(directory).get("run")
     except (OSError, ValueError) as error:
         raise InputError(str(error)) from error
 
@@ -80,7 +80,7 @@ def find_lost_rows(directory: Path) -> str:
     if claim is None or claim.finished is None:
         return ""
     with suppress(InputError, OSError, IndexError):
-        if tables.read(table)["step"][-1] >= claim.finished[0]:
+        if tables.read_columns(table)["step"][-1] >= claim.finished[0]:
             return ""
     return (
         f"{table} is damaged: its run has finished with step {claim.finished[0]}, and the table lacks rows; mend it, "
@@ -92,9 +92,9 @@ def _pair(value: Sequence[float] | None) -> tuple[int, float] | None:
     return None if value is None else (int(value[0]), float(value[1]))
 
 
-def write(directory: Path, claims: Mapping[str, Claim]) -> None:
+def write_claims(directory: Path, claims: Mapping[str, Claim]) -> None:
     data = {"format": FORMAT, **{verb: asdict(claim) for verb, claim in claims.items()}}
-    files.write(directory / MARKER, json.dumps(data, indent=1) + "\n")
+    files.replace_file(directory / MARKER, json.dumps(data, indent=1) + "\n")
 
 
 def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence[str]) -> Iterator[str]:

@@ -90,7 +90,7 @@ def read_budget(file: h5py.File) -> dict[str, Any]:
     return dict(json.loads(bytes(file.attrs.get(BUDGET, b"{}"))))
 
 
-def extended(chain: Sequence[Link], link: Link) -> tuple[Link, ...]:
+def extend_chain(chain: Sequence[Link], link: Link) -> tuple[Link, ...]:
     """Return the chain with one more run; a run like the last is only counted."""
     if chain and (chain[-1].job, chain[-1].ranks, chain[-1].program) == (link.job, link.ranks, link.program):
         return (*chain[:-1], replace(chain[-1], runs=chain[-1].runs + 1))
@@ -115,10 +115,10 @@ def _chain_text(chain: Sequence[Link], job: str) -> str:
 
 def cite_lines(job: dict[str, Any]) -> tuple[str, ...]:
     """Return the references of a job, as plain data, with what they stand for, one a line."""
-    return tuple(f"{reference} ({what})" for reference, what in cite(job))
+    return tuple(f"{reference} ({what})" for reference, what in references_of(job))
 
 
-def cite(job: dict[str, Any], features: Collection[str] = ()) -> list[tuple[str, str]]:
+def references_of(job: dict[str, Any], features: Collection[str] = ()) -> list[tuple[str, str]]:
     """Return references of a resolved job, as plain data, and what they stand for; with those of further `features`.
 
     Raises KeyError or TypeError for what is no whole job.

@@ -61,10 +61,10 @@ class Recorder:
         def begin_table() -> None:
             self._measures = MeasuresFile(table, kept, *columns)
 
-        kept, self.warnings = hdf5.on_root(self.slab, cut_back, f"cannot write {table}", InputError)
+        kept, self.warnings = hdf5.write_on_root(self.slab, cut_back, f"cannot write {table}", InputError)
         self._fields = self._begin_fields(provenance, saved)
-        hdf5.on_root(self.slab, begin_log, f"cannot write {log}", InputError)
-        hdf5.on_root(self.slab, begin_table, f"cannot write {table}", InputError)
+        hdf5.write_on_root(self.slab, begin_log, f"cannot write {log}", InputError)
+        hdf5.write_on_root(self.slab, begin_table, f"cannot write {table}", InputError)
 
     def _begin_fields(self, provenance: Provenance, saved: Contents | None) -> FieldsFile | None:
         path, recording = self.path / "fields.h5", self._recording
@@ -144,7 +144,7 @@ class Recorder:
         """
         with self._noting_problems():
             sync = self._measures.sync if self._measures else lambda: None
-            hdf5.on_root(self.slab, sync, f"cannot write {self.path / 'measures.csv'}")
+            hdf5.write_on_root(self.slab, sync, f"cannot write {self.path / 'measures.csv'}")
             if self._fields:
                 self._fields.sync(provenance)
         if self._fields and self._fields.trouble:

@@ -14,7 +14,7 @@ from ..physics.measures import Measures
 from ..solve.certificate import Certificate
 from . import files
 from .checkpoint import TableMark
-from .tables import MEND, GrowingTable, lines_of
+from .tables import MEND, GrowingTable, whole_lines
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
     return names
 
 
-def numbers(row: StepRow, branches: int) -> list[float]:
+def row_numbers(row: StepRow, branches: int) -> list[float]:
     """Return the numbers of a row, in the order of `columns`; NaN for what was not asked for."""
     return [*values_of(_always(branches), row), *row.added]
 
@@ -83,7 +83,7 @@ class MeasuresFile(GrowingTable):
 
     def write(self, row: StepRow) -> None:
         """Append a row; on an error the file is as it was before, but `table` has the row, which the next run adds."""
-        line = cells(numbers(row, self._branches))
+        line = cells(row_numbers(row, self._branches))
         self.table = TableMark(self.table.rows + 1, ",".join(line))
         self.append(line)
 
@@ -98,7 +98,7 @@ def cut_back_table(
     """
     if not path.exists():
         return TableMark(), [f"{path} is missing: the rows up to step {step} are lost"]
-    found, wanted = lines_of(path), columns(branches, added)
+    found, wanted = whole_lines(path), columns(branches, added)
     names = next(found, [])
     if "step" not in names:
         raise InputError(f"{path}, line 1, does not name the columns, step among them; move it away or mend it")

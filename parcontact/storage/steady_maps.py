@@ -65,7 +65,7 @@ class SteadyMaps:
         new = self.slab.agree(files.unused(self.path))
         size = len(self.points) * len(self.names) * self.slab.nx * self.slab.ny * hdf5.DOUBLE
         hdf5.lay_out(new, self.slab, lambda file: self._build(file, provenance), size)
-        hdf5.on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
+        hdf5.write_on_root(self.slab, lambda: new.replace(self.path), f"cannot write {self.path}")
 
     def _build(self, file: h5py.File, provenance: Provenance) -> None:
         file.attrs["kind"] = KIND

@@ -43,7 +43,7 @@ class GrowingTable:
             self._file.close()
 
 
-def lines_of(path: Path) -> Iterator[list[str]]:
+def whole_lines(path: Path) -> Iterator[list[str]]:
     """Yield the cells of each whole line, the names of the columns first, all as many; raises InputError."""
     count = 0
     with path.open("rb") as file:
@@ -68,12 +68,12 @@ class Columns(dict[str, list[float]]):
         raise InputError(f"{self.path}, line 1, names no column {name}; mend it, or move the file away")
 
 
-def read(path: Path) -> Columns:
+def read_columns(path: Path) -> Columns:
     """Read the columns of a table by name, also of one that still grows; NaN for what was not asked for.
 
     Raises InputError, which names the line, for what is no table of numbers.
     """
-    rows = lines_of(path)
+    rows = whole_lines(path)
     names = next(rows, [])
     if not names:
         raise InputError(f"{path} is empty: it does not even name its columns")

@@ -134,7 +134,7 @@ def write_outcomes(
         given = (AUTO if value is None else value for value in astuple(settings))
         missed = [errors[settings].get(name) if errors else None for name in QUANTITIES]
         rows.append([fingerprints[settings], *given, *astuple(outcome), *missed])
-    files.write(path, to_csv(COLUMNS, rows))
+    files.replace_file(path, to_csv(COLUMNS, rows))
 
 
 def _value(name: str, text: str) -> Any:

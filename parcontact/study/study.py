@@ -99,7 +99,7 @@ class _Study:
         write_outcomes(self.path, self.prints, ordered, errors)
         lines = [*notes, *map(str, verdict.limits(self.refined, ordered))]
         lines += verdict.sentences(ordered, reference, self.slab.comm.size)
-        files.write(self.path.with_suffix(".txt"), "\n".join(lines) + "\n")
+        files.replace_file(self.path.with_suffix(".txt"), "\n".join(lines) + "\n")
         proven = {case: verdict.proven(error, reference) for case, error in errors.items()}
         doubts = {name: limit.doubt for name, limit in reference.items()}
         points = {quantity: _points(ordered, proven, quantity) for quantity in verdict.NEEDED if quantity in doubts}

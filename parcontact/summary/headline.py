@@ -33,7 +33,7 @@ def _run(directory: Path) -> str:
     if not (directory / RESOLVED).is_file():
         return ""
     job = shown_job(directory / RESOLVED)
-    columns = tables.read(directory / "measures.csv")
+    columns = tables.read_columns(directory / "measures.csv")
     if not columns["time"]:
         return ""
     detached = bool(marker.detached(directory))
@@ -62,7 +62,7 @@ def _pull_off(job: Job, columns: Columns, detached: bool) -> Iterator[str]:
 def _leakage(directory: Path, columns: Columns) -> Iterator[str]:
     """Yield the last conductivities, of `leak.csv` with their errors, else of the run itself."""
     table = directory / "leak.csv"
-    columns = tables.read(table) if table.is_file() else columns
+    columns = tables.read_columns(table) if table.is_file() else columns
     stops = [text for text in leak_stop.describe(directory) if " between " in text]
     known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
     if known:
@@ -109,7 +109,7 @@ def _size(job: Job, share: float, error: float) -> str:
 
 def _curve(directory: Path) -> str:
     """Return the highest friction of a friction curve, and where it is; '' without a point."""
-    columns = tables.read(directory / "steady.csv")
+    columns = tables.read_columns(directory / "steady.csv")
     if not columns["velocity"]:
         return ""
     best = max(range(len(columns["friction"])), key=columns["friction"].__getitem__)

@@ -117,7 +117,7 @@ def _short(value: NDArray[Any]) -> str:
 def describe_directory(directory: Path) -> tuple[str, bool]:
     """Describe a directory, and tell whether all of it can be read; raises InputError where nothing is."""
     try:
-        claims = marker.read(directory)
+        claims = marker.read_claims(directory)
     except (OSError, ValueError) as error:
         return f"{directory}: {hdf5.reason(error)}", False
     if not claims and not any((directory / name).exists() for name in ("measures.csv", sweep_table.TABLE)):
@@ -147,7 +147,7 @@ def _title(directory: Path) -> str:
 
 
 def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    columns, claim = tables.read(table), claims.get("run")
+    columns, claim = tables.read_columns(table), claims.get("run")
     if not columns["step"]:
         yield "  run: no step yet"
         return
@@ -177,7 +177,7 @@ def _slides(job: Job | None) -> bool:
 
 
 def _theory(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    count = f"  Persson's theory: {len(tables.read(table)['time'])} rows, "
+    count = f"  Persson's theory: {len(tables.read_columns(table)['time'])} rows, "
     try:
         settings = theory_settings.read(table.parent)
     except InputError:
@@ -190,7 +190,7 @@ def _theory(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
 
 
 def _curve(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    columns = tables.read(table)
+    columns = tables.read_columns(table)
     if speeds := columns["velocity"]:
         best = int(np.argmax(columns["friction"]))
         place = curve_points.Wanted(speeds[best], columns["pressure"][best])
@@ -225,7 +225,7 @@ def _saved_maps(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
 
 
 def _leakage(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    yield f"  leakage: {len(tables.read(path)['time'])} instants in leak.csv"
+    yield f"  leakage: {len(tables.read_columns(path)['time'])} instants in leak.csv"
 
 
 def _sweep(path: Path, claims: dict[str, Claim]) -> Iterator[str]:

@@ -177,7 +177,7 @@ def _columns(path: Path) -> dict[str, list[float]]:
     """Return the columns of a table by name; none where there is no table, or a damaged one: it concerns its case
     alone, which fails for it."""
     with suppress(InputError):
-        columns = tables.read(path) if path.is_file() else {}
+        columns = tables.read_columns(path) if path.is_file() else {}
         return columns if {*columns} >= {*FIRST.get(path.name, ())} else {}
     return {}
 
@@ -234,7 +234,7 @@ def _means(
 
 
 def save(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
-    files.write(path, to_csv(columns, ([row.get(name) for name in columns] for row in rows)))
+    files.replace_file(path, to_csv(columns, ([row.get(name) for name in columns] for row in rows)))
 
 
 def _number(text: str) -> Any:

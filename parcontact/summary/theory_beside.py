@@ -36,7 +36,7 @@ def compare(directory: Path, history: Sequence[Stage], cell: float) -> list[Besi
 
 def _results(path: Path, history: Sequence[Stage], cell: float) -> dict[str, tuple[float, float]]:
     """Return results and their errors, by name."""
-    columns = tables.read(path) if path.is_file() else {}
+    columns = tables.read_columns(path) if path.is_file() else {}
     if not columns.get("time"):
         return {}
     columns.setdefault(slide.CORRECTED, columns["contact_area"])

@@ -62,7 +62,7 @@ class Dilute(Cold):
     def solve(self, solver: Solver) -> Map:
         start, (own, operators) = np.zeros_like(self.heights), solver
         coarse = lambda slab, tolerance: self.solver(tolerance, slab=slab)  # noqa: E731
-        contact = cold_start.prepare(own, self.problem(operators), start, coarse, self.on_tiles)
+        contact = cold_start.prepare_start(own, self.problem(operators), start, coarse, self.on_tiles)
         return np.asarray((self.go_on(solver, start) if contact is None else contact).p)
 
     def counted(self, solver: Solver, error: float) -> Iterator[Line]:

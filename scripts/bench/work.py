@@ -72,7 +72,7 @@ class Cold:
     def start(self, solver: Solver) -> Map:
         """The pressure from nested grids."""
         start, (own, operators) = np.zeros_like(self.heights), solver
-        cold_start.prepare(own, self.problem(operators), start, lambda slab, tol: self.solver(tol, slab=slab))
+        cold_start.prepare_start(own, self.problem(operators), start, lambda slab, tol: self.solver(tol, slab=slab))
         return start
 
     def go_on(self, solver: Solver, start: Map) -> Contact:

@@ -225,10 +225,10 @@ def test_a_curve_that_was_killed_goes_on(tmp_path: Path, monkeypatch: pytest.Mon
     lines = Path("out/job/bands.csv").read_text().splitlines()
     assert lines[:3] == first.splitlines()
     assert [line.split(",")[0] for line in lines[1:]] == ["0.1", "0.1", "0.2", "0.2"]
-    found, of_bands = tables.read(Path("out/job/steady.csv")), tables.read(Path("out/job/bands.csv"))
+    found, of_bands = tables.read_columns(Path("out/job/steady.csv")), tables.read_columns(Path("out/job/bands.csv"))
     for k, friction in enumerate(found["friction"]):
         assert sum(of_bands["friction"][2 * k : 2 * k + 2]) == pytest.approx(friction, rel=1e-12)
-    assert len(tables.read(Path("out/job/bands_theory.csv"))["friction"]) == 4
+    assert len(tables.read_columns(Path("out/job/bands_theory.csv"))["friction"]) == 4
     assert main(["report", "out/job"]) == 0
     assert "bands.csv" in Path("out/job/report.html").read_text()
 
@@ -269,7 +269,7 @@ def test_a_point_that_was_killed_goes_on(tmp_path: Path, monkeypatch: pytest.Mon
     assert calls[0] == whole + lost
     assert not Path("out/job/bands.part").exists()
     assert Path("out/job/bands.csv").read_text() == Path("whole/bands.csv").read_text()
-    one, other = (tables.read(Path(name) / "steady.csv") for name in ("whole", "out/job"))
+    one, other = (tables.read_columns(Path(name) / "steady.csv") for name in ("whole", "out/job"))
     assert [one[name] for name in one if name != "seconds"] == [other[name] for name in other if name != "seconds"]
 
 

@@ -65,7 +65,7 @@ def test_dissipation_per_branch(run: Callable[..., Path]) -> None:
     assert [row(job(material=RUBBER, output=out), name).on for out in (off, energies, on)] == [False, False, True]
     assert not row(job(output=on), name).on
     found = [
-        tables.read(run(str(n), material=RUBBER, output=out) / "measures.csv")
+        tables.read_columns(run(str(n), material=RUBBER, output=out) / "measures.csv")
         for n, out in enumerate((off, energies, on))
     ]
     assert ["dissipated_0" in columns for columns in found] == [False, False, True]

@@ -121,7 +121,7 @@ def test_rolls_like_numpy(ny: int, count: int, single: bool) -> None:
     whole = np.arange(3.0 * ny).reshape(ny, 3).astype(np.float32 if single else np.float64)
     field, out = slab.empty(whole.dtype), slab.empty(whole.dtype)
     field[...] = whole[slab.rows]
-    np.testing.assert_array_equal(rows.roll(slab, field, count, out), np.roll(whole, count, axis=0)[slab.rows])
+    np.testing.assert_array_equal(rows.roll_rows(slab, field, count, out), np.roll(whole, count, axis=0)[slab.rows])
     np.testing.assert_array_equal(field, whole[slab.rows])
 
 
@@ -142,7 +142,7 @@ def test_row_before_the_first(ny: int, cyclic: bool) -> None:
 
 def test_counts_what_is_sent() -> None:
     slab = Slab(MPI.COMM_WORLD, 4, 8)
-    rows.roll(slab, slab.zeros(), 8, slab.empty())
+    rows.roll_rows(slab, slab.zeros(), 8, slab.empty())
     assert slab.tally["bytes sent"] == 0
-    rows.roll(slab, slab.zeros(), 1, slab.empty())
+    rows.roll_rows(slab, slab.zeros(), 1, slab.empty())
     assert slab.tally["bytes sent"] == (32 if slab.comm.size > 1 else 0)

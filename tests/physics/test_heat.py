@@ -11,7 +11,7 @@ from scipy.special import ive
 from parcontact.parallel import spectra
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics.exponentials import fit, shares_of_step
+from parcontact.physics.exponentials import fit_exponentials, shares_of_step
 from parcontact.physics.flash import flash_of
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.heat import Conductor, Depths, depths_of, sliding_heat
@@ -246,7 +246,7 @@ MEMORY_LENGTH, NX, NY = 1e-3, 16, 6
 @pytest.mark.parametrize("range_", [(1e-6, 1.0), (1e-3, 1e-2)])
 def test_the_sum_keeps_its_bound(error: float, range_: tuple[float, float]) -> None:
     """At a thousand times of the range; it is not idle: the bound is at most twice what is asked, and half reached."""
-    found = fit(*range_, error)
+    found = fit_exponentials(*range_, error)
     times = np.geomspace(*range_, 1000)
     kept = slice(0, found.kept)
     series = np.exp(-np.outer(times, found.rates[kept])) @ found.weights[kept] * np.sqrt(np.pi * times)
@@ -264,7 +264,7 @@ def test_shares_of_a_step() -> None:
 
 def memory(shortest: float = 1e-5, comm: MPI.Intracomm = MPI.COMM_WORLD, body: Conductor = RUBBER) -> HeatMemory:
     fft = FFT(Slab(comm, NX, NY), measured=False)
-    return HeatMemory(fft, (MEMORY_LENGTH, MEMORY_LENGTH / 4), body, fit(shortest, 1.0, 1e-6), rubs=True)
+    return HeatMemory(fft, (MEMORY_LENGTH, MEMORY_LENGTH / 4), body, fit_exponentials(shortest, 1.0, 1e-6), rubs=True)
 
 
 def wave(made: HeatMemory, phase: float = 0.0) -> np.ndarray:

@@ -42,7 +42,7 @@ def test_areas_are_corrected(tmp_path: Path, drawn: list[Figure]) -> None:
     for kind in ("Hertz", "creep"):
         (tmp_path / kind).mkdir()
         plots.plot([ran(tmp_path / kind, KINDS[kind][0])])
-    hertz, creep = (tables.read(tmp_path / kind / "out" / "measures.csv") for kind in ("Hertz", "creep"))
+    hertz, creep = (tables.read_columns(tmp_path / kind / "out" / "measures.csv") for kind in ("Hertz", "creep"))
     (told,) = re.findall(r"contact area (\S+) mm²", drawn[0].get_suptitle())
     corrected, raw = (hertz[name][-1] * BOX * 1e6 for name in ("contact_area_corrected", "contact_area"))
     assert abs(float(told) - corrected) < 1e-3 * corrected < abs(corrected - raw)
@@ -100,7 +100,7 @@ def test_theory_beside_a_run_with_an_interface(tmp_path: Path, drawn: list[Figur
     plots.plot([out])
     lines = {str(line.get_label()): np.array(line.get_ydata()) for line in drawn[0].axes[0].get_lines()}
     assert np.all(lines["simulation"][1:] > lines["without interface"][1:])
-    saved = tables.read(out / "measures.csv")["friction_viscous"]
+    saved = tables.read_columns(out / "measures.csv")["friction_viscous"]
     assert np.allclose(lines["without interface"], saved[-len(lines["without interface"]) :])
 
 

@@ -173,7 +173,7 @@ def test_panels_axes_and_scales(tmp_path: Path, drawn: list[Figure]) -> None:
     ] * 2
     assert asked(out, "--panels", "friction", "--over", "velocity") == 0
     line = drawn[1].axes[0].get_lines()[0]
-    table = tables.read(out / "measures.csv")
+    table = tables.read_columns(out / "measures.csv")
     last = [table["distance"].index(value) for value in sorted(table["distance"]) if value <= 1.0001e-3][-1]
     assert np.array(line.get_xdata()).tolist() == [0.1, 0.2]
     assert drawn[1].axes[0].get_xlabel() == "sliding velocity [mm/s]"

@@ -13,7 +13,9 @@ def test_a_map_has_the_proportions_of_its_box() -> None:
     heights, size = np.random.default_rng(1).standard_normal((20, 60)), (6e-3, 4e-3)
     figure = Figure(figsize=(5.0, 5.0))
     axes = figure.subplots()
-    surface.PANELS["map of the heights"](axes, surface.Sketch(heights, size, statistics.describe(heights, size)))
+    surface.PANELS["map of the heights"](
+        axes, surface.Sketch(heights, size, statistics.surface_statistics(heights, size))
+    )
     figure.draw_without_rendering()
     box = axes.get_window_extent()
     assert box.width / box.height == pytest.approx(1.5, rel=1e-6)

@@ -88,7 +88,7 @@ def test_each_wave_has_the_asked_density(tmp_path: Path) -> None:
     expected = np.exp(np.interp(np.log(q[inside]), np.log(Q), np.log(c2(Q))))
     assert found[inside] == pytest.approx(expected, rel=1e-9, abs=0.0)
     assert found[~inside].max() < 1e-20 * expected.max()
-    own = statistics.describe(heights, (L, L))
+    own = statistics.surface_statistics(heights, (L, L))
     assert own.rms_height**2 == pytest.approx(found.sum() * (2 * np.pi / L) ** 2, rel=1e-12, abs=0.0)
 
 
@@ -109,7 +109,7 @@ def test_profiles_of_the_surface_are_those_of_the_table(tmp_path: Path) -> None:
     """
     q = np.geomspace(5e3, 4.0e5, 80)
     heights, _, _ = heights_of(load(tmp_path, table("q[1/m] C1D[m^3]", q, c1(q))))
-    own = statistics.describe(heights, (L, L))
+    own = statistics.surface_statistics(heights, (L, L))
     chosen = (own.qx > 1.5e4) & (own.qx < 1.0e5)
     assert chosen.sum() > 8
     assert own.psd_x[chosen] == pytest.approx(c1(own.qx[chosen]), rel=0.05, abs=0.0)
@@ -350,7 +350,7 @@ def test_a_wave() -> None:
     """A sin(qx): rms A/sqrt 2, slope q A/sqrt 2, curvature half of q^2 A/sqrt 2, spectra that hold its whole power."""
     x = np.arange(64) * LENGTH / 64
     q, amplitude = 2 * np.pi * 5 / LENGTH, 2e-6
-    found = statistics.describe(np.tile(amplitude * np.sin(q * x), (32, 1)), (LENGTH, LENGTH / 2))
+    found = statistics.surface_statistics(np.tile(amplitude * np.sin(q * x), (32, 1)), (LENGTH, LENGTH / 2))
     rms = amplitude / np.sqrt(2.0)
     assert found.rms_height == pytest.approx(rms, rel=1e-12)
     assert found.rms_slope == pytest.approx(q * rms, rel=1e-12)
@@ -362,7 +362,7 @@ def test_a_wave() -> None:
 def test_a_self_affine_road() -> None:
     """The exponent that it was made with, to 0.05; the square height is the integral of either spectrum."""
     heights = truth.rough(256, LENGTH, LENGTH, LENGTH / 100, 0.1, hurst=0.8)
-    found = statistics.describe(heights, (LENGTH, LENGTH))
+    found = statistics.surface_statistics(heights, (LENGTH, LENGTH))
     assert found.hurst == pytest.approx(0.8, abs=0.05)
     assert found.rms_slope == pytest.approx(0.1, rel=1e-12)
     one = np.sum(found.psd_y) * 2 * np.pi / LENGTH
@@ -378,6 +378,6 @@ def test_a_steeper_or_flatter_spectrum_is_not_self_affine(hurst: float) -> None:
 
 
 def test_white_noise_has_no_hurst_exponent() -> None:
-    found = statistics.describe(np.random.default_rng(3).standard_normal((64, 64)), (1.0, 1.0))
+    found = statistics.surface_statistics(np.random.default_rng(3).standard_normal((64, 64)), (1.0, 1.0))
     assert np.isnan(found.hurst)
     assert found.nayak > 1.5  # of an isotropic random surface at least 1.5

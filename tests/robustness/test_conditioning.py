@@ -193,7 +193,7 @@ def test_sums_over_large_maps(communicators: list[MPI.Intracomm], nx: int, ny: i
     for comm in communicators:
         slab = Slab(comm, nx, ny)
         own = np.ascontiguousarray(whole[slab.rows])
-        found = slab.sum(kernels.total(own), loops.dot(own, own), *kernels.weigh(own, own, own, -1.0))
+        found = slab.sum(kernels.sum_of(own), loops.dot(own, own), *kernels.pressure_sums(own, own, own, -1.0))
         assert_allclose(found[:5], [exact, squares, exact, squares, exact], rtol=(nx + ny) * np.finfo(float).eps)
         assert {tuple(other) for other in comm.allgather(found)} == {tuple(found)}
 

@@ -396,7 +396,7 @@ def test_full_disk_while_maps_are_written(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The map that had no room is saved by the run that goes on."""
-    write, maps = hdf5.write, []
+    write, maps = hdf5.write_rows, []
 
     def full(path: Path, slab: Any, parts: Any) -> None:
         if path.name == "fields.h5":
@@ -406,7 +406,7 @@ def test_full_disk_while_maps_are_written(
         write(path, slab, parts)
 
     with monkeypatch.context() as patch:
-        patch.setattr(hdf5, "write", full)
+        patch.setattr(hdf5, "write_rows", full)
         assert __main__.main(["job.yaml", "--out", "out", "--quiet"]) == FAILED
     assert "No space left on device; the newest checkpoint is out/checkpoint/step-3.h5" in capsys.readouterr().err
     assert __main__.main(["job.yaml", "--out", "out", "--quiet"]) == DONE

@@ -180,4 +180,4 @@ def test_table_without_a_column(here: Path, main: Main, verb: str, column: str) 
     assert code == BAD_INPUT
     assert f"out/measures.csv, line 1, names no column {column}; mend it" in shown + said
     with pytest.raises(InputError, match="names no column"):
-        tables.read(table)[column]
+        tables.read_columns(table)[column]

@@ -58,7 +58,7 @@ def test_the_error_budget_is_that_of_the_whole_run(bench: Bench) -> None:
     assert bench.run(data, whole) == 0
     part = cut(bench, whole, 9)
     assert bench.run(data, part) == 0
-    table = tables.read(part / "measures.csv")
+    table = tables.read_columns(part / "measures.csv")
     slid, friction, errors, area = (
         np.array(column)[1:]
         for column in (
@@ -366,5 +366,5 @@ def test_no_error_is_stated_where_the_box_cuts_a_contact_off(
         assert main(["job.yaml", "--set", f"history.1.force={force}", "--set", f"output.directory={name}"]) == 0
         out = capsys.readouterr().out
         assert ("no error is stated of steps whose contact reaches the edge of the box" in out) != inside
-        errors = tables.read(tmp_path / name / "measures.csv")["error_area"]
+        errors = tables.read_columns(tmp_path / name / "measures.csv")["error_area"]
         assert [math.isnan(error) for error in errors] == [True, False, not inside]

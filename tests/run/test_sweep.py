@@ -76,7 +76,7 @@ def test_a_full_disk_ends_no_case(
     def full(path: Path, text: str) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(files, "write", full)
+    monkeypatch.setattr(files, "replace_file", full)
     assert seeds_done(cases, {}) == (1, [1, 2, 3, 1, 2, 3])
     assert "cannot write the tables of out/job: No space left on device; run again" in capsys.readouterr().err
 

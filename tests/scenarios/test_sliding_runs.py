@@ -390,7 +390,7 @@ def test_example_of_a_velocity_step(run_parcontact: "RunParcontact", main: "Main
     smaller = ["--set", "grid.points=128", "--set", "surface.0.short_wavelength=1.25e-4", "--quiet"]
     ran = run_parcontact([job, "--out", tmp_path / "out", *smaller], ranks=2)
     assert ran.returncode == 0, ran.stderr
-    table = tables.read(tmp_path / "out/measures.csv")
+    table = tables.read_columns(tmp_path / "out/measures.csv")
     distance, friction, area = (np.array(table[name]) for name in ("distance", "friction", "contact_area"))
     slow, late = distance < 2.01e-5, distance > 2e-4
     peak = int(friction.argmax())

@@ -252,7 +252,7 @@ def test_calls_in_a_box_with_nothing_around(load: float) -> None:
 
     solving, p = solver(h, tolerance=1e-5, **free), np.zeros_like(h)
     before = solving.slab.tally["operator"]
-    cold_start.prepare(solving.solver, solving.problem(h, MeanPressure(load)), p, on)
+    cold_start.prepare_start(solving.solver, solving.problem(h, MeanPressure(load)), p, on)
     found = keep(solving.solve(h, MeanPressure(load), p))
     assert np.linalg.norm(found.p - exact.p) <= 1e-5 * np.linalg.norm(exact.p)
     assert solving.slab.tally["operator"] - before <= 25

@@ -22,7 +22,7 @@ def test_sums_are_double_whatever_the_maps_are(dtype: type[np.floating]) -> None
     p = np.full((1000, 1000), 0.1, dtype=dtype)
     zero = np.zeros_like(p)
     exact = 1e6 * float(p[0, 0])
-    for found in (kernels.total(p), kernels.weigh(p, zero, zero, 0.0)[0]):
+    for found in (kernels.sum_of(p), kernels.pressure_sums(p, zero, zero, 0.0)[0]):
         assert abs(found / exact - 1.0) < 1e-14
 
 
@@ -31,7 +31,7 @@ def test_nothing_hides_a_nan(dtype: type[np.floating]) -> None:
     for name in ("p", "u", "h"):
         maps = Maps((5, 32), dtype)
         getattr(maps, name)[2, 3] = np.nan
-        assert np.isnan(kernels.weigh(maps.p, maps.u, maps.h, 0.0)[2])
+        assert np.isnan(kernels.pressure_sums(maps.p, maps.u, maps.h, 0.0)[2])
     maps = Maps((5, 32), dtype)
     maps.t[2, 3] = np.nan
     assert np.isnan(loops.dot(maps.t, maps.t))

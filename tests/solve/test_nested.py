@@ -6,7 +6,7 @@ from mpi4py import MPI
 from numpy.testing import assert_array_equal
 
 from parcontact.parallel.slab import Array, Slab
-from parcontact.solve.nested import Level, descend, levels_of
+from parcontact.solve.nested import Level, coarser_levels, descend
 
 pytestmark = pytest.mark.mpi
 NX, NY = 64, 128
@@ -16,7 +16,7 @@ def starts(comm: MPI.Intracomm, bad: float | None = None) -> tuple[list[Level], 
     """The levels, and the start of each in the order in which they have one. The solution on each is its start and 1,
     but for one point of one rank of the second coarsest."""
     slab, found = Slab(comm, NX, NY), list[Array]()
-    levels = levels_of(slab, slab.zeros())
+    levels = coarser_levels(slab, slab.zeros())
     start = slab.empty()
     start.fill(7.0)
 

@@ -59,7 +59,7 @@ def found(
 
     solver, operators = solver_on(slab, tolerance)
     problem, p = Problem(*operators, h, NonNegative(), control), slab.zeros()
-    contact = cold_start.prepare(solver, problem, p, solver_on, tiles_on if on_tiles else None)
+    contact = cold_start.prepare_start(solver, problem, p, solver_on, tiles_on if on_tiles else None)
     before = slab.tally["operator"]
     contact = contact or solver.solve(problem, p)
     return contact, slab.to_root(contact.p), slab.tally["operator"] - before

@@ -16,7 +16,7 @@ from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding import start as steadystart
 from parcontact.steady_sliding.curve import request
-from parcontact.storage.tables import read
+from parcontact.storage.tables import read_columns
 from parcontact.theory import full_contact
 
 WAVE = """\
@@ -114,7 +114,7 @@ def test_curve_from_the_command_line(run_parcontact: Callable, tmp_path: Path) -
     (tmp_path / "wave.yaml").write_text(WAVE)
     done = run_parcontact(["steady", "wave.yaml", "--velocities", "0.004:0.4:3", "--pressures", "2e5,4e5"], ranks=2)
     assert done.returncode == 0, done.stderr
-    columns = read(tmp_path / "out/wave/steady.csv")
+    columns = read_columns(tmp_path / "out/wave/steady.csv")
     assert columns["friction_x"] == columns["friction"]  # along +x, the force against it
     assert columns["friction_slopes"] == pytest.approx(columns["friction"], rel=1e-9)  # in full contact, all waves seen
     last = ["friction_x", "contact_area_corrected", "error_friction", "error_area", "friction_slopes"]
@@ -150,7 +150,7 @@ def test_shares_of_wavelengths_add_up(main: Main, tmp_path: Path) -> None:
     text = ROUGH.split("initial")[0] + "steady: {velocities: [0.2], pressures: [1.0e5], waves: true}\n"
     (tmp_path / "rough.yaml").write_text(text)
     assert main("rough.yaml", "--quiet")[:2] == (0, "")
-    shares = read(tmp_path / "out/rough/steady_waves.csv")["share"]
+    shares = read_columns(tmp_path / "out/rough/steady_waves.csv")["share"]
     assert sum(shares) == pytest.approx(1.0, rel=1e-12)
     assert max(shares[1:3]) > 0.3  # the waves of the surface, 0.5 to 0.25 mm, in a box of 1 mm
 

@@ -17,7 +17,7 @@ from parcontact import __main__
 from parcontact.mesh import load_cases
 from parcontact.solve import constraint
 from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.storage.tables import read
+from parcontact.storage.tables import read_columns
 from parcontact.summary import sweep_table
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="in this process, on one rank")
@@ -64,7 +64,7 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
 
 
 def points(table: Path) -> list[tuple[float, float]]:
-    columns = read(table)
+    columns = read_columns(table)
     return [
         (float(f"{v:.6g}"), float(f"{p:.6g}")) for v, p in zip(columns["velocity"], columns["pressure"], strict=True)
     ]
@@ -257,5 +257,5 @@ def test_kernel_of_cells(main: Main, tmp_path: Path) -> None:
     """With `love` a wave of n cells is stiffer by the factor of a cell, 1/sinc(1/n), and so is friction."""
     assert main(*CURVE)[0] == DONE
     assert main(*CURVE[:3], "love", *CURVE[4:], "--set", "numerics.kernel=love")[0] == DONE
-    frictions = [np.array(read(tmp_path / out / "steady.csv")["friction"]) for out in ("out", "love")]
+    frictions = [np.array(read_columns(tmp_path / out / "steady.csv")["friction"]) for out in ("out", "love")]
     assert frictions[1] / frictions[0] == pytest.approx(1.0 / np.sinc(1.0 / 32.0), rel=1e-3)

@@ -15,7 +15,7 @@ from parcontact.parallel.slab import Slab
 from parcontact.plotting import steady
 from parcontact.steady_sliding.curve import request
 from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.storage.tables import read
+from parcontact.storage.tables import read_columns
 from parcontact.theory import full_contact
 
 C1, C2, REFERENCE = 17.4, 51.6, 20.0
@@ -97,7 +97,7 @@ def test_table_theory_and_picture(tmp_path: Path, main: Main, run_parcontact: Ru
     before = (tmp_path / "out/steady.csv").read_text().splitlines()[1:]
     done = run_parcontact([*words, "--temperatures=20,-5,60"], ranks=2)
     assert done.returncode == 0, done.stderr
-    found = read(tmp_path / "out/steady.csv")
+    found = read_columns(tmp_path / "out/steady.csv")
     assert found["temperature"] == [-5.0, -5.0, 20.0, 20.0, 60.0, 60.0]
     assert (tmp_path / "out/steady.csv").read_text().splitlines()[3:5] == before
     assert found["shift_factor"] == pytest.approx([factor(t) for t in found["temperature"]], rel=1e-12)

@@ -14,7 +14,7 @@ from parcontact.parallel.slab import Array, Slab
 from parcontact.storage import checkpoint, fields, hdf5
 from parcontact.storage.fields import FieldsFile
 from parcontact.storage.hdf5 import Slice
-from parcontact.storage.provenance import Link, Provenance, extended, read_chain
+from parcontact.storage.provenance import Link, Provenance, extend_chain, read_chain
 from parcontact.summary import info
 
 pytestmark = pytest.mark.mpi
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.mpi
 NX, NY = 6, 5
 SIZE = (3.0, 2.0)
 FIRST = Provenance((Link("title: first\n", 1),), (4,))
-SECOND = Provenance(extended(FIRST.chain, Link("title: second\n", 2, from_step=4)))
+SECOND = Provenance(extend_chain(FIRST.chain, Link("title: second\n", 2, from_step=4)))
 
 
 def field(slab: Slab, step: int, name: str) -> Array:
@@ -197,7 +197,7 @@ def test_chain_of_long_jobs(comm: MPI.Intracomm, shared_path: Path) -> None:
     with h5py.File(path) as h5:
         assert read_chain(h5) == (long,)
     comm.Barrier()
-    file.resume(0, Provenance(extended((long,), longer)))
+    file.resume(0, Provenance(extend_chain((long,), longer)))
     comm.Barrier()
     with h5py.File(path) as h5:
         assert [(link.job[:5], link.from_step) for link in read_chain(h5)] == [("aaaaa", 0), ("(too ", 5)]
@@ -205,9 +205,9 @@ def test_chain_of_long_jobs(comm: MPI.Intracomm, shared_path: Path) -> None:
 
 def test_chain_counts_runs_that_are_alike() -> None:
     link = Link("title: a\n", 2)
-    assert extended((link,), Link("title: a\n", 2, from_step=9))[0].runs == 2
-    assert len(extended((link,), Link("title: a\n", 3, from_step=9))) == 2
-    assert len(extended((link,), Link("title: b\n", 2, from_step=9))) == 2
+    assert extend_chain((link,), Link("title: a\n", 2, from_step=9))[0].runs == 2
+    assert len(extend_chain((link,), Link("title: a\n", 3, from_step=9))) == 2
+    assert len(extend_chain((link,), Link("title: b\n", 2, from_step=9))) == 2
 
 
 # -- files that all ranks write together: the same bytes whichever way, and one error for all -------------------------
@@ -246,7 +246,7 @@ def test_both_ways_are_interchangeable(
         make(path, slab)
         a, b = field_hdf5(slab, 1), field_hdf5(slab, 2)
         monkeypatch.setattr(hdf5, "MPI_IO", writes)
-        hdf5.write(path, slab, [Slice("a", (), a), Slice("group/b", (), b), Slice("stack", (2,), a)])
+        hdf5.write_rows(path, slab, [Slice("a", (), a), Slice("group/b", (), b), Slice("stack", (2,), a)])
         monkeypatch.setattr(hdf5, "MPI_IO", reads)
         for reader in communicators:
             if reader.size > writer.size:
@@ -254,7 +254,7 @@ def test_both_ways_are_interchangeable(
             other = Slab(reader, 5, ny)
             found = [np.full(other.shape, np.nan) for _ in range(3)]
             names: tuple[tuple[str, tuple[int, ...]], ...] = (("a", ()), ("group/b", ()), ("stack", (2,)))
-            hdf5.read(path, other, [Slice(*n, rows) for n, rows in zip(names, found, strict=True)])
+            hdf5.read_rows(path, other, [Slice(*n, rows) for n, rows in zip(names, found, strict=True)])
             for rows, seed in zip(found, (1, 2, 1), strict=True):
                 assert np.array_equal(rows, field_hdf5(other, seed))
 
@@ -264,7 +264,9 @@ def test_same_bytes(comm: MPI.Intracomm, shared_path: Path, monkeypatch: pytest.
     for name, together in (("together.h5", True), ("in turn.h5", False)):
         monkeypatch.setattr(hdf5, "MPI_IO", together)
         make(shared_path / name, slab)
-        hdf5.write(shared_path / name, slab, [Slice("a", (), field_hdf5(slab)), Slice("stack", (1,), field_hdf5(slab))])
+        hdf5.write_rows(
+            shared_path / name, slab, [Slice("a", (), field_hdf5(slab)), Slice("stack", (1,), field_hdf5(slab))]
+        )
     comm.Barrier()
     assert (shared_path / "together.h5").read_bytes() == (shared_path / "in turn.h5").read_bytes()
 
@@ -276,7 +278,7 @@ def test_writing_leaves_all_else_alone(comm: MPI.Intracomm, shared_path: Path) -
     comm.Barrier()
     before = path.read_bytes()
     comm.Barrier()
-    hdf5.write(path, slab, [Slice("a", (), field_hdf5(slab))])
+    hdf5.write_rows(path, slab, [Slice("a", (), field_hdf5(slab))])
     comm.Barrier()
     after = path.read_bytes()
     with h5py.File(path) as file:
@@ -293,10 +295,10 @@ def test_one_error_for_all(
     monkeypatch.setattr(hdf5, "MPI_IO", together)
     slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
     with pytest.raises(RunError, match=r"cannot open .*absent\.h5: No such file"):
-        hdf5.write(shared_path / "absent.h5", slab, [Slice("a", (), field_hdf5(slab))])
+        hdf5.write_rows(shared_path / "absent.h5", slab, [Slice("a", (), field_hdf5(slab))])
     make(path, slab)
     with pytest.raises(RunError, match=r"cannot write .*file\.h5"):
-        hdf5.write(path, slab, [Slice("a", (), field_hdf5(slab)), Slice("absent", (), field_hdf5(slab))])
+        hdf5.write_rows(path, slab, [Slice("a", (), field_hdf5(slab)), Slice("absent", (), field_hdf5(slab))])
     with pytest.raises(RunError, match=r"cannot make .*: No such file"):
         make(shared_path / "absent" / "file.h5", slab)
 
@@ -309,17 +311,17 @@ def test_error_of_one_rank(comm: MPI.Intracomm, shared_path: Path) -> None:
     if comm.rank == comm.size - 1:
         rows = np.zeros((slab.shape[0] + 50, 6))
     with pytest.raises(RunError, match="cannot write"):
-        hdf5.write(path, slab, [Slice("a", (), rows), Slice("group/b", (), field_hdf5(slab))])
+        hdf5.write_rows(path, slab, [Slice("a", (), rows), Slice("group/b", (), field_hdf5(slab))])
 
 
 def test_change_keeps_maps(comm: MPI.Intracomm, shared_path: Path) -> None:
     slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
     make(path, slab)
-    hdf5.write(path, slab, [Slice("a", (), field_hdf5(slab))])
+    hdf5.write_rows(path, slab, [Slice("a", (), field_hdf5(slab))])
     hdf5.change(path, slab, lambda file: file.attrs.modify("text", np.bytes_("y")))
-    hdf5.on_root(slab, lambda: hdf5.put(path, {"t": np.array([1.0, 2.0, np.nan])}), "put")
+    hdf5.write_on_root(slab, lambda: hdf5.put(path, {"t": np.array([1.0, 2.0, np.nan])}), "put")
     rows = np.empty(slab.shape)
-    hdf5.read(path, slab, [Slice("a", (), rows)])
+    hdf5.read_rows(path, slab, [Slice("a", (), rows)])
     assert np.array_equal(rows, field_hdf5(slab))
     with h5py.File(path) as file:
         assert file.attrs["text"] == b"y"

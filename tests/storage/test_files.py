@@ -270,7 +270,7 @@ def written(path: Path, count: int, branches: int = 0) -> None:
 def test_numbers_read_back(tmp_path: Path) -> None:
     path = tmp_path / "measures.csv"
     written(path, 3)
-    found = tables.read(path)
+    found = tables.read_columns(path)
     assert list(found) == [column.name for column in choose_columns(MEASURES)]
     assert found["step"] == [0, 1, 2]
     assert found["time"] == [0.0, 0.1, 0.2]
@@ -290,7 +290,7 @@ def test_signed_friction(tmp_path: Path, forces: tuple[float, float], signed: fl
     file = MeasuresFile(tmp_path / "measures.csv", TableMark(), 1)
     file.write(StepRow(1, measures=found, branch_dissipation=(0.1,)))
     file.close()
-    table = tables.read(tmp_path / "measures.csv")
+    table = tables.read_columns(tmp_path / "measures.csv")
     assert list(table).index("friction_x") == list(table).index("dissipated_0") + 1
     assert table["friction_x"] == [found.friction_x]
 
@@ -322,9 +322,9 @@ def test_other_columns(tmp_path: Path) -> None:
     path = tmp_path / "measures.csv"
     written(path, 3)
     assert cut_back_table(path, 2, TableMark(), 2)[1] == []
-    assert list(tables.read(path)) == [column.name for column in choose_columns(MEASURES, 2)]
-    assert math.isnan(tables.read(path)["dissipated_1"][2])
+    assert list(tables.read_columns(path)) == [column.name for column in choose_columns(MEASURES, 2)]
+    assert math.isnan(tables.read_columns(path)["dissipated_1"][2])
     assert cut_back_table(path, 2, TableMark(), 0)[1] == []
-    assert list(tables.read(path)) == [column.name for column in choose_columns(MEASURES)]
+    assert list(tables.read_columns(path)) == [column.name for column in choose_columns(MEASURES)]
     written(tmp_path / "split.csv", 2, branches=2)
-    assert tables.read(tmp_path / "split.csv")["dissipated_1"] == [0.1, 0.1]
+    assert tables.read_columns(tmp_path / "split.csv")["dissipated_1"] == [0.1, 0.1]

@@ -199,7 +199,7 @@ def test_pull_offs_of_cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     Path("pulls.yaml").write_text("\n".join(lines))
     assert main(["pulls.yaml", "--quiet"]) == 0
     came_off, holds = sweep_table.read(Path("out/pulls/sweep.csv"))
-    rows = tables.read(Path("out/pulls/cases/000/measures.csv"))
+    rows = tables.read_columns(Path("out/pulls/cases/000/measures.csv"))
     assert came_off["state"] == holds["state"] == "done"
     assert came_off["pull_off"] == pytest.approx(-min(rows["pressure"]) * 4e-4**2, rel=1e-15)
     assert came_off["pull_off_approach"] == rows["approach"][-1]
@@ -209,6 +209,6 @@ def test_pull_offs_of_cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     error = before - last - 0.25 * 0.05 * last  # the last step, and a quarter of the tolerance, half of the accuracy
     assert came_off["pull_off_error"] == pytest.approx(error * 4e-4**2, rel=1e-12)
     for case, number in ((came_off, 0), (holds, 1)):
-        rows = tables.read(Path(f"out/pulls/cases/00{number}/measures.csv"))
+        rows = tables.read_columns(Path(f"out/pulls/cases/00{number}/measures.csv"))
         assert case["dissipated"] == rows["dissipated"][-1]
         assert case["flow_x"] == rows["flow_x"][-1] > 0.0

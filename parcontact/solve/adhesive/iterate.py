@@ -76,7 +76,7 @@ class GapIterate:
     step: float = 1.0
 
 
-def certify(slab: Slab, it: GapIterate, working: Array, g: Array, q: Array, sigma: Array, z: Array) -> Certificate:
+def certify_gap(slab: Slab, it: GapIterate, working: Array, g: Array, q: Array, sigma: Array, z: Array) -> Certificate:
     """Return how wrong the gap is: by z, weighted by the pressure, over a length; and the load; collective.
 
     The length is by how much the body is deformed in the contact, at most the range, and at least a tenth of it. Wrong

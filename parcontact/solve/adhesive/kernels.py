@@ -36,7 +36,7 @@ def press(g, q, sigma, step, image):
 
 
 @loop
-def residual(g, q, sigma, mean, working, c):
+def pressure_residual(g, q, sigma, mean, working, c):
     """`c = q + mean + sigma` on the working set, open points and those in contact that are pulled, else 0. Returns the
     size of the set, the sums of c over it and of sigma over all points, and the largest -g."""
     count, total, attracted = 0.0, 0.0, 0.0
@@ -85,7 +85,7 @@ def judge(working, g, h, q, mean, sigma, z):
 
 
 @loop
-def products(working, q, mean, sigma, step, image, sigma_old, shift, z, t):
+def gap_products(working, q, mean, sigma, step, image, sigma_old, shift, z, t):
     """Over the working set, with `c = q + mean + sigma` and its change `e = step image + sigma - sigma_old + shift` in
     the last step: sums of z, t, c z, e z and c t."""
     sum_z, sum_t, c_z, e_z, c_t = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -182,7 +182,7 @@ def move(law, g, q, mean, sigma, step, way, image, g_new, sigma_new):
 
 
 @loop
-def weigh(p, a):
+def weighted_sums(p, a):
     """Sums of |p| and of |p| a."""
     load, total = 0.0, 0.0
     for j in range(p.shape[0]):

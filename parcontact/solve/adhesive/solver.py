@@ -45,7 +45,7 @@ from ..certificate import Certificate
 from ..preconditioner.cell_sums import CellSums
 from ..problem import Approach, Control, MeanPressure
 from . import kernels
-from .iterate import GapIterate, GapOperators, GapSolution, certify
+from .iterate import GapIterate, GapOperators, GapSolution, certify_gap
 from .law import Law
 
 # tuning
@@ -114,7 +114,7 @@ class GapSolver:
     def _begin(self, law: Law, heights: Array, control: Control, gap: Array, operators: GapOperators) -> GapIterate:
         """Give the start its mean where that is given, find its pressure, and forget the last direction."""
         self._t.fill(0.0)
-        sums = self.slab.sum(maps.total(heights), maps.total(gap))
+        sums = self.slab.sum(maps.sum_of(heights), maps.sum_of(gap))
         mean_h, mean_g = (each / self.slab.points for each in sums)
         given = None
         if isinstance(control, Approach) and operators.mean == 0.0:
@@ -145,7 +145,7 @@ class GapSolver:
             it.m = self._uniform(it, it.mean_gap)
         else:
             it.m = -total / count if count else self._least_uniform(it)
-        sums = kernels.residual(g, q, sigma, it.m, self._working, self._way)
+        sums = kernels.pressure_residual(g, q, sigma, it.m, self._working, self._way)
         members, total, attracted, least = self.slab.reduce(sums[:3], sums[3:])
         if it.given is not None and members:
             it.m -= total / members
@@ -195,11 +195,11 @@ class GapSolver:
         certificate that z makes, and whether it is that of A c; collective."""
         if self._cells is not None:
             self._cells.apply(self._way, z)
-            certificate = certify(self.slab, it, self._working, g, self._q, self._sigma, z)
+            certificate = certify_gap(self.slab, it, self._working, g, self._q, self._sigma, z)
             if not certificate.complementarity <= near:
                 return certificate, False
         it.operators.operator.apply(self._way, z)
-        return certify(self.slab, it, self._working, g, self._q, self._sigma, z), True
+        return certify_gap(self.slab, it, self._working, g, self._q, self._sigma, z), True
 
     def _turn(self, it: GapIterate, members: float, scale: float, z: Array) -> float:
         """Make the new direction from z; returns `<c, z>`; collective.
@@ -208,7 +208,7 @@ class GapSolver:
         """
         working = self._working
         step = it.share, self._image, self._other_sigma, it.change
-        sums = kernels.products(working, self._q, it.m, self._sigma, *step, z, self._t)
+        sums = kernels.gap_products(working, self._q, it.m, self._sigma, *step, z, self._t)
         sum_z, sum_t, c_z, e_z, c_t = self.slab.sum(*sums)
         beta = max(0.0, e_z / scale) if scale > 0.0 else 0.0
         if c_z + beta * c_t <= LEAST_DESCENT * c_z:

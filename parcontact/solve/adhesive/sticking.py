@@ -135,7 +135,7 @@ class StickingSolver:
         """Say in the certificate by how much displacements have changed in a pass, but for what only changes the
         approach; returns this number too; collective."""
         certificate, slab = found.certificate, self.workspace.slab
-        load, sum_change = slab.sum(*kernels.weigh(p, change))
+        load, sum_change = slab.sum(*kernels.weighted_sums(p, change))
         shift = sum_change / load if isinstance(control, MeanPressure) and load > 0.0 else 0.0
         (wrong,) = slab.sum(kernels.weigh_off(p, change, shift))
         worst = SHARPER * wrong / load / certificate.length if load > 0.0 else 0.0

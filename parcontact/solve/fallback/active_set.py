@@ -75,7 +75,7 @@ class _Search:
         iterations = 0
         while self._residual(u, r) > goal and iterations < self.solver.max_iterations:
             z = problem.preconditioner.apply(r, w)
-            sum_z, sum_t, _, r_z, _, _ = slab.sum(*kernels.products(working, u, self.h, self.d, u, z, t))
+            sum_z, sum_t, _, r_z, _, _ = slab.sum(*kernels.step_products(working, u, self.h, self.d, u, z, t))
             beta, product = r_z / product if product > 0.0 else 0.0, r_z
             mean = (sum_z + beta * sum_t) / self.members if self.load is not None else 0.0
             kernels.turn(working, z, beta, mean, t)
@@ -100,7 +100,7 @@ class _Search:
         x, working = self.x, self.working
         lower, upper = self.problem.constraint.bounds
         x[...] = np.where(working, x, np.where(x < upper, lower, upper))
-        self.members, total = self.slab.sum(float(np.count_nonzero(working)), kernels.total(x))
+        self.members, total = self.slab.sum(float(np.count_nonzero(working)), kernels.sum_of(x))
         if self.load is not None and self.members:
             x += (self.load - total) / self.members * working
         self.problem.operator.apply(x, u)
@@ -109,5 +109,5 @@ class _Search:
         """Put the gap on the set into r, for the d at which its mean is 0 unless that is given; its largest size."""
         if self.load is not None and self.members:
             self.d = self.slab.sum(float(np.sum((u - self.h) * self.working)))[0] / self.members
-        kernels.residual(self.working, u, self.h, self.d, r)
+        kernels.gap_residual(self.working, u, self.h, self.d, r)
         return self.slab.reduce((), [float(np.abs(r).max(initial=0.0))])[0]

@@ -21,7 +21,7 @@ WORTHWHILE = 256 * 256  # tuning: points: on fewer, making coarser grids takes l
 SolverOn = Callable[[Slab, float], tuple[ContactSolver, Operators]]  # of the same body on a grid, with a tolerance
 
 
-def prepare(
+def prepare_start(
     solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: SolverOnTiles | None = None
 ) -> Contact | None:
     """On a large grid put a start into `start`, which is 0, for a body that nothing has been pressed into; collective.
@@ -40,7 +40,7 @@ def start_on_coarse_grids(
 ) -> tuple[int, Contact | None]:
     """Solve loosely on coarser grids and put the start that follows into `start`, 0 if there is none; returns how many
     grids there are, and the contact if it was solved on tiles and holds at all points; collective."""
-    levels = nested.levels_of(solver.slab, problem.heights)
+    levels = nested.coarser_levels(solver.slab, problem.heights)
     descent = _Descent(solver, problem, solver_on, on_tiles)
     nested.descend(levels, descent.solve, start)
     contact = descent.solve_finest(levels[0], start)
@@ -94,7 +94,7 @@ class _Descent:
         if self._below is None or self._blocks is None or tiles.is_block_grid(level.slab, self._solver.slab):
             return None
         below, law = (*self._blocks, self._below), self._problem.constraint
-        return tiles.choose(*below, level.slab, level.heights, law)
+        return tiles.choose_tiles(*below, level.slab, level.heights, law)
 
     def _solve_on(self, chosen: Tiles, level: nested.Level, tolerance: float, p: Array) -> tiles.OnTheseTiles:
         """Solve on tiles of a level from p."""

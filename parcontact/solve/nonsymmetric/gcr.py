@@ -61,7 +61,7 @@ class Directions:
         if members == 0.0:
             return 0
         r = self._residual()
-        size = self.slab.sum(residual(working, u, h, total / members, r))[0]
+        size = self.slab.sum(centred_residual(working, u, h, total / members, r))[0]
         goal = reduction**2 * size
         norms: list[float] = []
         means: list[float] = []
@@ -116,7 +116,7 @@ def gaps_on(working, u, h):
 
 
 @loop
-def residual(working, u, h, mean, r):
+def centred_residual(working, u, h, mean, r):
     """`r = u - h - mean` on the set, 0 elsewhere; returns its sum of squares."""
     size = 0.0
     for j in range(u.shape[0]):

@@ -18,7 +18,7 @@ from ..constraint import Constraint
 from ..local_load import LEAST_CUT, LocalLoad
 from ..preconditioner.extension import ExtendedPreconditioner, Grids
 from ..problem import Operator
-from .gcr import gaps_on, residual, sum_on
+from .gcr import centred_residual, gaps_on, sum_on
 
 Set = NDArray[np.bool_]
 DIRECTIONS = 3  # the residual's, and the last two changes
@@ -73,7 +73,7 @@ class Projected:
         """Move x, which is then admissible and has the sum `load`, and its image u with it; collective."""
         members, total = self.slab.sum(*gaps_on(working, u, h))
         level, t = total / members, self.t[0]
-        residual(working, u, h, level, t)
+        centred_residual(working, u, h, level, t)
         self.extended.apply(self.preconditioner, working, t)
         (mean,) = self.slab.sum(sum_on(working, t))
         kernels.turn(working, t, 0.0, mean / members, t)

@@ -22,8 +22,8 @@ from ...parallel.slab import Array, Slab
 from .. import kernels
 from ..certificate import Certificate
 from ..constraint import NonNegative
-from ..interface_law import InterfaceLaw, follow, resolve
-from ..iterate import certify, weigh
+from ..interface_law import InterfaceLaw, resolve, update_split
+from ..iterate import certify, contact_sums
 from ..problem import Approach, Control, Operator
 from .steady import SteadyContact
 
@@ -75,7 +75,7 @@ class Splitting:
                     (total,) = slab.sum(resolve(s, h, gamma, law.pressures, sums, p, u))
             inverse.apply(u, y)
             given = isinstance(control, Approach)
-            follow(s, y, p, gamma * control.value if given else control.value - total / slab.points)
+            update_split(s, y, p, gamma * control.value if given else control.value - total / slab.points)
         reached = f"the residual is {certificate.worst:.3g} where {self.tolerance:.3g} was asked for"
         return SteadyContact(p, u, d, certificate, 0, 0, steps, f"has not converged in {steps} steps: {reached}")
 
@@ -95,7 +95,7 @@ class Splitting:
         """Scale a pressure to its mean where that is given and nearly reached; returns whether it is; collective."""
         if isinstance(control, Approach):
             return True
-        (load,) = self.slab.sum(kernels.total(p))
+        (load,) = self.slab.sum(kernels.sum_of(p))
         wanted = control.value * self.slab.points
         if not load > 0.0 or abs(load / wanted - 1.0) > self.tolerance:
             return False
@@ -107,7 +107,7 @@ class Splitting:
         slab, constraint, given = self.slab, NonNegative(), isinstance(control, Approach)
         self.operator.apply(p, u)
         whole = u + law.closing(p)
-        iterate = weigh(slab, constraint, p, whole, h, control.value if given else 0.0)
+        iterate = contact_sums(slab, constraint, p, whole, h, control.value if given else 0.0)
         iterate, mean = (iterate, None) if given else (iterate.settled(), control.value)
         found = certify(slab, constraint, p, whole, h, iterate, mean, self.height, np.zeros(slab.shape, np.bool_))
         return iterate.d, found[-1]

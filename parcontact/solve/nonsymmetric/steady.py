@@ -27,7 +27,7 @@ from ...parallel.slab import Array, Slab
 from .. import kernels
 from ..certificate import Certificate
 from ..constraint import NonNegative
-from ..iterate import certify, weigh
+from ..iterate import certify, contact_sums
 from ..local_load import LEAST_CUT
 from ..precision import precision_of_directions
 from ..problem import Operator
@@ -132,7 +132,7 @@ class SteadySolver:
         return self._certify(p, h, mean)
 
     def _solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
-        cold = not self.slab.sum(kernels.total(start))[0] > 0.0
+        cold = not self.slab.sum(kernels.sum_of(start))[0] > 0.0
         if cold:
             start.fill(mean)
         d, certificate, projections = self._project(start, h, mean)
@@ -198,7 +198,7 @@ class SteadySolver:
         proportion where waves as long as the box are far softer than others; and u its image."""
         slab, working = self.slab, self._working
         np.copyto(x, 0.0, where=~working)
-        total, members = slab.sum(kernels.total(x), float(np.count_nonzero(working)))
+        total, members = slab.sum(kernels.sum_of(x), float(np.count_nonzero(working)))
         if self._striped:
             self.constraint.give_load(slab, x, total, mean * slab.points)
         else:
@@ -239,7 +239,7 @@ class SteadySolver:
     def _next_set(self, x: Array, h: Array, kappa: float) -> tuple[float, float]:
         """Mark the next set; returns how far from a solution x seems to be, and how many points came or went."""
         count, gaps = self.slab.sum(*gaps_on(self._working, self._u, h))
-        *sums, deepest = self.constraint.choose(x, self._u, h, gaps / count, kappa, self._working)
+        *sums, deepest = self.constraint.choose_active(x, self._u, h, gaps / count, kappa, self._working)
         positive, negative, wrong, members, changed, deepest = self.slab.reduce(sums, [deepest])
         if members == 0.0 or positive <= 0.0:
             return np.inf, changed
@@ -258,7 +258,7 @@ class SteadySolver:
 
     def _certify(self, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
         """The approach and the certificate of an admissible pressure, whose set is marked."""
-        iterate = weigh(self.slab, self.constraint, p, self._u, h, 0.0).settled()
+        iterate = contact_sums(self.slab, self.constraint, p, self._u, h, 0.0).settled()
         found = certify(self.slab, self.constraint, p, self._u, h, iterate, mean, self.height, self._working)
         certificate = found[-1]
         self._length = certificate.length

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...parallel.slab import Array, Slab
 from .extension import pairs_for
-from .levels import interpolate, interpolate_back, levels_of
+from .levels import cell_levels, interpolate, interpolate_back
 
 Compliance = Callable[[Array], Array]  # displacement over pressure of waves, over their wavenumbers
 POINTS, CELLS = 1.5, 2.5  # tuning: with them M is near A: most waves yield 0.9 to 1.5 of what they should
@@ -29,7 +29,7 @@ class CellSums:
     """M on one grid; a map in single precision on each grid of larger cells, and a byte for each point or cell."""
 
     def __init__(self, slab: Slab, pairs: int, weights: list[float]) -> None:
-        self._weights, self._levels = weights, levels_of(slab, pairs)
+        self._weights, self._levels = weights, cell_levels(slab, pairs)
         grids = [level.coarse for level in self._levels]
         self._cells = [grid.empty(np.float32) for grid in grids]
         self._known = [grid.zeros(np.bool_) for grid in [slab, *grids]]  # interpolation replaces no point

@@ -50,7 +50,7 @@ def add_up_back(cells, beside, above, wide, tall, points):
 
 
 @loop
-def interpolate(cells, beside, above, wide, tall, known, points):
+def interpolate_cells(cells, beside, above, wide, tall, known, points):
     """Add `1 - known` times what is interpolated between cells."""
     pairs, columns = points.shape[1] // 2, cells.shape[1]
     line = np.empty(columns + 2, cells.dtype)
@@ -76,7 +76,7 @@ def interpolate(cells, beside, above, wide, tall, known, points):
 
 
 @loop
-def interpolate_back(known, known_beside, points, beside, above, wide, tall, cells):
+def gather_cells(known, known_beside, points, beside, above, wide, tall, cells):
     """Put points into cells: `1 - known` times their values, by the weights of the interpolation."""
     count, columns = points.shape[1], cells.shape[1]
     line = np.zeros(wide * columns + 2, cells.dtype)

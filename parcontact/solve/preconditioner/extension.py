@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...compiled import loop
 from ...parallel.slab import Array, Slab
 from ..problem import Operator
-from .levels import interpolate, interpolate_back, levels_of
+from .levels import cell_levels, interpolate, interpolate_back
 
 FLOOR = 0.3  # tuning: of the points of a cell: so many count as having the value of the larger cell
 LONG = 16.0  # tuning: times its width: with points further apart along one direction, square cells are worse than none
@@ -78,7 +78,7 @@ class ExtendedPreconditioner:
         """With another floor, or other grids of `larger` cells than all."""
         most, pairs, last = larger
         down, across = max(pairs, 0), max(-pairs, 0)
-        self._levels = levels_of(slab, pairs)[:most]
+        self._levels = cell_levels(slab, pairs)[:most]
         grids = [level.coarse for level in self._levels]
         self._floors = [
             (np.float32(floor) * lengths(slab.ny, level - down)[grid.rows], lengths(slab.nx, level - across))

@@ -39,19 +39,21 @@ class CellLevel:
 
     def interpolate(self, cells: Map, known: Map, points: Map) -> None:
         step = self.step
-        loops.interpolate(cells[step.own], step.cells_beside(cells, 0, -1), step.above, *step.shape, known, points)
+        loops.interpolate_cells(
+            cells[step.own], step.cells_beside(cells, 0, -1), step.above, *step.shape, known, points
+        )
 
     def interpolate_back(self, known: Map, points: Map, cells: Map) -> None:
         step = self.step
         around = [step.points_beside(field, 0, 1, -2, -1) for field in (known, points)]
         own = cells[step.own]
-        loops.interpolate_back(known, around[0], points, around[1], step.above, *step.shape, own)
+        loops.gather_cells(known, around[0], points, around[1], step.above, *step.shape, own)
         step.complete(cells)
 
 
-def levels_of(slab: Slab, pairs: int = 0) -> list[CellLevel]:
+def cell_levels(slab: Slab, pairs: int = 0) -> list[CellLevel]:
     """All levels of a grid up to a single cell, the finest first, of which so many are of pairs."""
-    return [CellLevel(step) for step in pyramid.steps_of(slab, pairs)]
+    return [CellLevel(step) for step in pyramid.pyramid_steps(slab, pairs)]
 
 
 def interpolate(levels: list[CellLevel], known: list[Map], maps: list[Map]) -> None:

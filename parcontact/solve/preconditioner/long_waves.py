@@ -25,7 +25,7 @@ from ...parallel.slab import Array, Slab
 from ...physics.layer import LongWaves
 from ..problem import Operator
 from .extension import ExtendedPreconditioner, lengths
-from .levels import levels_of
+from .levels import cell_levels
 
 DAMPING = np.float32(0.8)  # tuning: of the Jacobi steps
 DECAY = 2.0  # tuning: thicknesses over which z decays outside contact
@@ -38,7 +38,7 @@ class LongWavePreconditioner:
     """An extended preconditioner and what long waves add; four maps in single precision on each grid of cells."""
 
     def __init__(self, slab: Slab, waves: LongWaves, extended: ExtendedPreconditioner) -> None:
-        self._extended, self._levels = extended, levels_of(slab)
+        self._extended, self._levels = extended, cell_levels(slab)
         self._first = _first_grid(slab.nx, slab.ny, waves)
         grids = [slab, *(level.coarse for level in self._levels)]
         kept = [grid if level or not self._first else None for level, grid in enumerate(grids)]

@@ -14,7 +14,7 @@ from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve.constraint import NonNegative
 from parcontact.solve.interface_law import HARD, InterfaceLaw
 from parcontact.solve.nonsymmetric import steady
-from parcontact.solve.nonsymmetric.gcr import Directions, residual
+from parcontact.solve.nonsymmetric.gcr import Directions, centred_residual
 from parcontact.solve.nonsymmetric.projected import Projected
 from parcontact.solve.nonsymmetric.splitting import Splitting
 from parcontact.solve.nonsymmetric.steady import SteadySolver
@@ -83,7 +83,7 @@ def test_residual_of_a_set() -> None:
     """Small whole numbers, without rounding: u - h - mean on the set, nothing beside it, and the sum of squares."""
     working = np.array([[True, False, True], [False, True, False]])
     u, h, r = np.array([[5.0, 9.0, 2.0], [9.0, 4.0, 9.0]]), np.ones((2, 3)), np.full((2, 3), np.nan)
-    assert residual(working, u, h, 2.0, r) == 2.0**2 + 1.0**2 + 1.0**2
+    assert centred_residual(working, u, h, 2.0, r) == 2.0**2 + 1.0**2 + 1.0**2
     assert r.tolist() == [[2.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
 
 

@@ -14,7 +14,7 @@ from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.layer import Layer, LongWaves
 from parcontact.solve.preconditioner.cell_sums import CellSums
 from parcontact.solve.preconditioner.extension import FADING, FLOOR, ExtendedPreconditioner, Grids, grids_for, pairs_for
-from parcontact.solve.preconditioner.levels import levels_of
+from parcontact.solve.preconditioner.levels import cell_levels
 from parcontact.solve.preconditioner.long_waves import DECAY, LongWavePreconditioner
 
 Map = NDArray[np.float64]
@@ -267,7 +267,7 @@ def weighted(c: Map, weights: list[float], pairs: int) -> Map:
 def test_sums_over_cells_of_all_lengths(ny: int, nx: int, pairs: int, seed: int) -> None:
     """`M c` is that of products of matrices, to single precision."""
     random = np.random.default_rng([ny, nx, seed])
-    count = len(levels_of(Slab.alone(nx, ny), pairs))
+    count = len(cell_levels(Slab.alone(nx, ny), pairs))
     weights, c = random.random(count + 1).tolist(), random.normal(size=(ny, nx))
     slab = Slab(MPI.COMM_WORLD, nx, ny)
     out = slab.empty()
