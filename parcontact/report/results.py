@@ -109,7 +109,7 @@ def _list_main_bands(directory: Path) -> list[ReportTable]:
     """Return which band makes most of the friction at each point of a curve in bands."""
     if not (directory / "bands.csv").is_file():
         return []
-    columns = tables.read(directory / "bands.csv")
+    columns = tables.read_columns(directory / "bands.csv")
     names = [name for name in PLACE if any(value == value for value in columns[name])]
     points: dict[tuple[str, ...], list[int]] = {}
     for row in range(len(columns["velocity"])):

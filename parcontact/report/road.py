@@ -57,7 +57,7 @@ def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
         rows.append((ends, f"{cut.rms_slope(band):.3g}", f"{cut.rms_slope(band, 0):.3g}"))
     bands = ReportTable(("waves", "rms slope", "with all longer waves"), rows, "bands, each on a grid of its own")
     heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
-    found = statistics.describe(heights, setup.grid.size)
+    found = statistics.surface_statistics(heights, setup.grid.size)
     pictures = [
         draw_panel(partial(_draw_spectrum, cut=cut), "spectrum of the job, cut at the dotted lines"),
         *_draw(surface.Sketch(heights, setup.grid.size, found), ", coarsest band"),

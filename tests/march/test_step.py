@@ -32,6 +32,7 @@ GRID: dict[str, Any] = {"points": [64, 64], "size": [1e-3, 1e-3]}
 
 # -- tried again ------------------------------------------------------------------------------------------------------
 
+
 @pytest.fixture
 def moody(monkeypatch: pytest.MonkeyPatch) -> None:
     """Solves that fail once or not at all: this is a matter of the contact, and so is the same when repeated."""
@@ -115,6 +116,7 @@ def test_coarse_grids_have_the_same_plans_every_time(boundary: str, precision: s
 
 
 # -- given up ---------------------------------------------------------------------------------------------------------
+
 
 def remembered(march: March) -> dict[str, NDArray[Any]]:
     """What a step must leave alone when it fails."""
@@ -377,6 +379,7 @@ def test_what_a_retry_leaves_unconverged_is_not_accepted(monkeypatch: pytest.Mon
 
 
 # -- loads beyond the digits of single precision: a solve that stalls is tried again in double precision --------------
+
 
 @pytest.mark.mpi(2)
 def test_an_operator_in_single_precision_is_made_double(comm: MPI.Intracomm) -> None:

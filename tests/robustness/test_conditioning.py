@@ -23,6 +23,8 @@ from .scenes import Sketch
 from .witness import witness
 
 Json = dict[str, Any]
+
+
 def job(
     heights: NDArray[np.float64], where: Path, load: Json, size: float = 1e-3, modulus: float = 1e6, **numerics: Any
 ) -> Json:

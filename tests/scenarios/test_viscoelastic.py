@@ -19,6 +19,8 @@ from parcontact.theory import lee_radok
 
 Json = dict[str, Any]
 FORCE, RADIUS = 0.15, 1e-2  # N, m
+
+
 def sphere(points: int, size: float, history: list[Json], **numerics: Any) -> Json:
     return {
         "grid": {"points": points, "size": size, "boundary": "free"},
