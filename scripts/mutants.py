@@ -21,7 +21,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 HOUSE, TESTS = ROOT / "parcontact", ROOT / "tests"
-ROOMS = ("physics", "parallel", "solve", "march", "scene", "storage", "plan", "effects", "history")
+ROOMS = ("accuracy", "physics", "parallel", "solve", "march", "scene", "storage", "plan", "effects", "history")
 LONGEST = 600.0  # seconds for the tests of one change
 SEEN = 0.8  # share of the changes that must be seen
 FEWEST = 8  # places to break in a part
@@ -30,8 +30,9 @@ OTHERS = {  # further tests that answer for a part
     "march/step.py": f"march/test_sticking.py scenarios/test_viscoelastic.py {SLIDING}",
     "march/errors.py": SLIDING,
     "physics/body.py": "scenarios/test_viscoelastic.py",
-    "solve/constraint.py": "solve/test_contact.py",
-    "solve/kernels.py": "solve/test_contact.py",
+    "effects/adhesion_doubts.py": "effects/test_adhesion.py",
+    "solve/adhesive/kernels.py": "solve/adhesive/test_solver.py",
+    **dict.fromkeys(("solve/constraint.py", "solve/kernels.py"), "solve/test_contact.py"),
     "physics/loops.py": "physics/test_material.py physics/test_probe.py physics/test_surface.py physics/test_energy.py "
     "physics/test_heat.py accuracy/test_embedded.py",
 }

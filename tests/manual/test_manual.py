@@ -14,15 +14,17 @@ import matplotlib
 import numpy as np
 import pytest
 import yaml
-from marching import ROOT
+from csv_rows import rows
+from marching import JOBS, ROOT
 from pydantic import TypeAdapter
 
+from manual.printed import compare_lines
 from parcontact import __main__, mesh
 from parcontact.columns import TABLES
 from parcontact.command.arguments import parse_arguments
 from parcontact.job import schema
 from parcontact.job.text import yamltext
-from parcontact.manual import reference, texts
+from parcontact.manual import reference, terminal, texts
 
 PAGES = texts.names()
 NOTEBOOKS = sorted((texts.PAGES.parent / "notebooks").glob("*.ipynb"))
@@ -94,7 +96,6 @@ def test_the_page_on_python_is_text() -> None:
 
 # -- keys ------------------------------------------------------------------------------------------------------------
 
-
 def test_every_key_has_its_meaning() -> None:
     """A key that was added needs a line in parcontact/manual/keys.yaml: [meaning, example]."""
     written = {part: set(known) for part, known in reference.meanings().items()}
@@ -131,7 +132,6 @@ def test_the_page_has_range_unit_and_default() -> None:
 
 # -- columns ---------------------------------------------------------------------------------------------------------
 
-
 @pytest.mark.parametrize("file", TABLES)
 def test_every_table_is_on_its_page(file: str) -> None:
     """The page has a section for each table, with all of its columns."""
@@ -141,7 +141,6 @@ def test_every_table_is_on_its_page(file: str) -> None:
 
 
 # -- blocks ----------------------------------------------------------------------------------------------------------
-
 
 @pytest.mark.parametrize(("language", "name", "index"), BLOCKS)
 def test_a_block(language: str, name: str, index: int, elsewhere: Path) -> None:
@@ -204,7 +203,6 @@ def run_code(pieces: list[str]) -> None:
 
 # -- verbs -----------------------------------------------------------------------------------------------------------
 
-
 def test_printing_pages(capsys: pytest.CaptureFixture[str]) -> None:
     assert __main__.main(["manual"]) == 0
     assert "outputs" in capsys.readouterr().out
@@ -215,7 +213,6 @@ def test_printing_pages(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 # -- gallery ---------------------------------------------------------------------------------------------------------
-
 
 @pytest.mark.parametrize("path", sorted((ROOT / "jobs").glob("*.yaml")), ids=lambda path: path.stem)
 def test_the_picture_of_a_job_is_of_this_job(path: Path) -> None:
@@ -238,3 +235,158 @@ def test_messages_name_pages_that_there_are() -> None:
     named = {page for text in sources for page in re.findall(r"\(see parcontact manual (\w+)\)", text)}
     assert named
     assert named <= set(PAGES)
+
+
+# -- rEADME is short and true: its commands are parsed, its job is run, its files and pages exist ---------------------
+
+README = (ROOT / "README.md").read_text()
+
+
+def blocks_readme(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.M | re.S)
+
+
+def test_length() -> None:
+    assert len(README.splitlines()) <= 150
+
+
+@pytest.mark.parametrize("line", [line for block in blocks_readme("sh") for line in block.splitlines()])
+def test_a_command(line: str) -> None:
+    parse_command(line)
+
+
+def test_files_exist() -> None:
+    linked = re.findall(r"\]\(([^)]+)\)", README)
+    quoted = re.findall(r"`((?:scripts|jobs)/[^` ]+|[A-Z]+\.cff)`", README)
+    assert linked
+    assert quoted
+    assert [name for name in (*linked, *quoted) if not (ROOT / name).exists()] == []
+
+
+def test_it_names_the_pages_of_the_manual() -> None:
+    (section,) = re.findall(r"^## Manual\n(.*?)^## ", README, re.M | re.S)
+    lists = re.findall(r"^\* .*", section, re.M)
+    assert [name for line in lists for name in re.findall(r"`(\w+)`", line)] == texts.names()[1:]
+    assert set(re.findall(r"parcontact manual (\w+)`", README)) <= set(texts.names())
+
+
+def test_the_first_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """The block is the file, and the run prints what README says."""
+    (block,) = blocks_readme("yaml")
+    assert yamltext.parse(block, "README").data == yamltext.parse((JOBS / "slide.yaml").read_text(), "slide").data
+    monkeypatch.chdir(tmp_path)
+    assert __main__.main([str(JOBS / "slide.yaml"), "--quiet"]) == 0
+    log = capsys.readouterr().out + (tmp_path / "out" / "slide" / "run.log").read_text()
+    compare_lines(blocks_readme("text")[0], log)
+    for words in ("plot", "report", "cite", "info"):  # as README has them, below its job and at its end
+        assert f"parcontact {words} out/slide" in README or words == "info"
+        assert __main__.main([words, "out/slide"]) == 0
+    assert "Bugnicourt" in capsys.readouterr().out
+
+
+def test_the_first_picture_is_of_the_first_job() -> None:
+    """README begins with the picture of the job that it explains, and scripts/demo runs and draws the same job."""
+    first, *others = re.findall(r"!\[[^]]+\]\(([^)]+)\)", README)
+    assert (first, others) == ("jobs/pictures/gallery/slide.png", [])
+    demo = (ROOT / "scripts" / "demo").read_text().partition("<<'END'")[0]
+    assert re.findall(r"parcontact ((?:plot )?\S+)$", demo, re.M) == ["jobs/slide.yaml", "plot out/slide"]
+
+
+def test_a_road_and_a_rubber(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The commands of README on a table of heights and one of moduli, of a body whose moduli are known."""
+    monkeypatch.chdir(tmp_path)
+    x, y = np.meshgrid(np.arange(16) / 16, np.arange(16) / 16)
+    np.savetxt("road.txt", 0.5 * np.cos(2 * np.pi * (2 * x + y)) + 0.3 * np.cos(2 * np.pi * 3 * y))
+    f = np.logspace(-1, 5, 25)
+    z = 2 * np.pi * f * 1e-3
+    moduli = 3 * (1 + 9 * z**2 / (1 + z**2)), 3 * 9 * z / (1 + z**2)  # [MPa], tension
+    np.savetxt("compound.csv", np.transpose([f, *moduli]), delimiter=",", header="f[Hz],E'[MPa],E''[MPa]", comments="")
+    (block,) = (block for block in blocks_readme("sh") if "compound.csv" in block)
+    for line in block.splitlines():
+        words = shlex.split(line.removeprefix("mpirun -n 2 "))
+        assert __main__.main([*words[1:], *(["--quiet"] if "steady" in words else [])]) == 0, line
+    (modulus,) = re.findall(r"material.modulus_inf +(\S+)", capsys.readouterr().out)
+    assert float(modulus) == pytest.approx(1e6, rel=0.05)  # the fit's error is 2 % (rms)
+    assert len(Path("out/job/steady.csv").read_text().splitlines()) == 1 + 9
+    assert Path("out/job/report.html").is_file()
+
+
+# -- the jobs of the page "Which settings?": each runs, meets its accuracy without a warning, has the numbers ---------
+
+CASES = re.findall(r"^```yaml\n(title: .*?)^```\n(.*?)(?=^```yaml|\Z)", texts.page("settings"), re.M | re.S)
+
+
+def test_the_four_users() -> None:
+    assert len(CASES) == 4
+
+
+@pytest.mark.parametrize(("job", "after"), CASES, ids=["tyre", "seal", "indenter", "student"])
+def test_a_job(
+    job: str, after: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("job.yaml").write_text(job)
+    assert __main__.main(["job.yaml", "--quiet"]) == 0
+    assert "warning" not in capsys.readouterr().err
+    log = (tmp_path / "out" / "job" / "run.log").read_text()
+    assert log.count("; within the") == log.count("estimated error of") > 0  # as budget.advice says
+    for text in re.findall(r"^```text\n(.*?)^```", after, re.M | re.S):
+        compare_lines(text, log)
+    compare_table(after, Path("out/job/measures.csv"))
+
+
+def compare_table(text: str, path: Path) -> None:
+    """Hold each line of a table of columns to a row of measures.csv: three digits are printed, and machines round."""
+    head = re.search(r"^(\| `\w+` (?:\| `\w+` )+\|)\n\|[-|]+\n((?:\|.*\n)+)", text, re.M)
+    if head is None:
+        return
+    names = re.findall(r"`(\w+)`", head[1])
+    for line in head[2].splitlines():
+        expected = [float(cell) for cell in line.strip("|").split("|")]
+        found = [[float(row[name] or "nan") for name in names] for row in rows(path)]
+        assert any(each == pytest.approx(expected, rel=0.05, abs=1e-40) for each in found), (names, expected)
+
+
+# -- pages in a terminal of 80 letters: no prose is wider, code is as it was, no word is lost -------------------------
+
+TABLES_terminal = re.compile(r"^[|\s:-]+$|[|;]", re.MULTILINE)  # rules and marks of tables, and of the web site
+
+
+@pytest.mark.parametrize("name", texts.names())
+def test_prose_is_not_wider(name: str) -> None:
+    text = texts.plain(name, {"verbs": lambda: ""})
+    prose = terminal.CODE.sub("", text)
+    wide = [line for line in prose.splitlines() if len(line) > 80 and not line.startswith(("#", "!["))]
+    assert not [line for line in wide if " " in line.strip()]
+
+
+@pytest.mark.parametrize("name", texts.names())
+def test_no_word_is_lost(name: str) -> None:
+    text = texts.FENCE.sub("", texts.page(name, {"verbs": lambda: ""}))
+    found = terminal.wrapped(text, 80)
+    assert terminal.CODE.findall(found) == terminal.CODE.findall(text)
+    assert TABLES_terminal.sub(" ", found).split() == TABLES_terminal.sub(" ", text).split()
+
+
+def test_lists_keys_and_tables() -> None:
+    """Items hang, keys and examples keep their lines; a row of a wide table is its first cell and the others."""
+    text = (
+        "* one two three\n  four five\n\n`key`\n: what it means\n  Example: `key: 1`\n\n| a | b | c |\n|---|---|---|\n"
+    )
+    assert terminal.wrapped(f"{text}| row | one | two three |", 16).splitlines() == [
+        "* one two three",
+        "  four five",
+        "",
+        "`key`",
+        ": what it means",
+        "  Example: `key:",
+        "  1`",
+        "",
+        "a",
+        "    b; c",
+        "row",
+        "    one; two",
+        "    three",
+    ]
