@@ -77,7 +77,7 @@ class Gaps:
             raise InputError(f"{directory} is no {what}")
         self.directory, self.job = directory, shown_job(directory / RESOLVED)
         job = self.job
-        self.size, self.periodic = job.grid.size, job.grid.boundary == "periodic"
+        self.size, self.periodic = job.grid.size, job.grid.cyclic
         self.cells = job.grid.nx * job.grid.ny
         self.columns = tables.read_columns(directory / "measures.csv")
         try:
@@ -116,12 +116,16 @@ class Gaps:
         gap, flows, errors, shown = self.read(index), list[Flow](), list[float](), list[Map]()
         rates = list[float]()
         for axis in ("x", "y"):
-            flow = solve_flow(gap, self.size, axis, self.periodic)
+            flow = solve_flow(gap, self.size, axis, self._sides(axis))
             shown.append(leakage.flux(gap, flow.pressure, self.size))
             flows.append(replace(flow, pressure=np.empty((0, 0))))
             rates.append(self._rate(gap, flow, axis))
-            errors.append(mesh_error(gap, flow, self.size, axis, self.periodic))
+            errors.append(mesh_error(gap, flow, self.size, axis, self._sides(axis)))
         return SolvedLeak(Leak(*flows), (errors[0], errors[1]), (rates[0], rates[1])), shown
+
+    def _sides(self, axis: str) -> bool:
+        """Return whether the sides along a flow are periodic."""
+        return self.periodic["yx".index(axis)]
 
     def _rate(self, gap: Map, flow: Flow, axis: str) -> float:
         """Return the flow of the fluid along an axis [m^3/s], NaN without one."""
@@ -129,7 +133,7 @@ class Gaps:
             return np.nan
         length, width = self.size if axis == "x" else self.size[::-1]
         slipping = self.drop.mean_free_path > 0.0
-        found = solve_flow(self.drop.conducting_gap(gap), self.size, axis, self.periodic) if slipping else flow
+        found = solve_flow(self.drop.conducting_gap(gap), self.size, axis, self._sides(axis)) if slipping else flow
         return self.drop.flow_rate(found.conductivity, length, width)
 
     def row(self, index: int, solved: SolvedLeak, bare: Leak | None) -> LeakInstant:

@@ -221,7 +221,7 @@ def _refuse_unknown(job: Job) -> None:
 
 
 def _refuse_free(job: Job) -> None:
-    if job.grid.boundary == "free":
+    if not all(job.grid.cyclic):
         raise InputError("grid.boundary: Persson's theory is for periodic surfaces, and this box is free")
 
 

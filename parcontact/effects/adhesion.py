@@ -148,6 +148,10 @@ class AdhesionMemory:
     columns: tuple[float, ...] = (0.0, 0.0, math.nan, math.nan, math.nan)
 
 
+def _no_strip(adhesion: Any, grid: Any) -> Iterator[Fault]:
+    return limits.no_strip("adhesion", grid) if adhesion is not None else iter(())
+
+
 def _no_bands(adhesion: Any, bands: Any) -> Iterator[Fault]:
     if adhesion is not None and bands is not None:
         yield Fault("does not go with bands: they are coupled by pressures alone", ("adhesion",))
@@ -164,6 +168,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         Rule(("adhesion", "grid", "material"), _zone_is_resolved),
         Rule(("adhesion", "initial", "steady"), _no_steady),
         Rule(("adhesion", "bands"), _no_bands),
+        Rule(("adhesion", "grid"), _no_strip),
     )
     lifts: ClassVar[tuple[Any, ...]] = (limits.loads_press, limits.some_load)
 

@@ -59,7 +59,7 @@ class LeakageColumns(Effect[tuple[float, ...]]):
 
         def act() -> tuple[float, float, float]:
             assert whole is not None
-            found = leak(whole, setup.grid.size, setup.grid.boundary == "periodic")
+            found = leak(whole, setup.grid.size, setup.grid.cyclic)
             return found.flow_x, found.flow_y, found.constriction
 
         return Changes(on_root(scene.slab.comm, act))

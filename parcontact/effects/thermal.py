@@ -62,6 +62,10 @@ def _in_curves(thermal: Thermal | None, history: Any, grid: Grid, bands: Any) ->
         yield Fault("needs grid.boundary: periodic", ("thermal", "counterbody"))
 
 
+def _no_strip_of_heat(thermal: Thermal | None, grid: Grid) -> Iterator[Fault]:
+    return limits.no_strip("thermal", grid) if thermal is not None else iter(())
+
+
 class Counterbody(Part):
     """The rigid body, as it conducts heat."""
 
@@ -143,6 +147,7 @@ class ThermalColumns(Effect[ThermalMemory]):
         Rule(("thermal", "material"), _shifts),
         Rule(("thermal", "initial"), _no_warm_start),
         Rule(("thermal", "history", "grid", "bands"), _in_curves),
+        Rule(("thermal", "grid"), _no_strip_of_heat),
     )
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_temperature,)
 

@@ -63,6 +63,7 @@ class Job(Part):
         Rule(("grid", "body"), limits.layer_is_resolved),
         Rule(("grid", "body"), limits.layer_is_in_proportion),
         Rule(("grid", "body", "initial", "steady"), limits.no_wake_in_a_layer),
+        Rule(("grid", "body", "initial", "steady"), limits.half_space_at_rest),
         Rule(("grid", "steady"), limits.waves_are_independent),
         Rule(("surface",), limits.some_shape),
         Rule(("grid", "surface", "bands"), limits.waves_fit),
@@ -87,8 +88,9 @@ class Job(Part):
         data = prepared(data)
         if data.get("bands") is not None:
             data.setdefault("grid", dict(NO_GRID))
-        free = isinstance(data.get("grid"), dict) and data["grid"].get("boundary") == "free"
-        _default(data, "numerics", "kernel", "love" if free else "spectral")
+        boundary = data["grid"].get("boundary") if isinstance(data.get("grid"), dict) else None
+        padded = boundary == "free" or (isinstance(boundary, list | tuple) and "free" in boundary)
+        _default(data, "numerics", "kernel", "love" if padded else "spectral")
         _default(data, "output", "directory", str(Path("out", context.path.stem if context else "job")))
         return data
 

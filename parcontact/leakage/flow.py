@@ -118,7 +118,7 @@ class Leak:
         return max(self.along_x.constriction, self.along_y.constriction)
 
 
-def leak(gap: ArrayLike, size: Sequence[float], periodic: bool = True) -> Leak:
+def leak(gap: ArrayLike, size: Sequence[float], periodic: bool | tuple[bool, bool] = True) -> Leak:
     """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m], along x and along y.
 
     Contact is where the gap is 0 or less. Sides along the flow are `periodic`, or closed. Raises InputError for gaps
@@ -141,7 +141,8 @@ def leak(gap: ArrayLike, size: Sequence[float], periodic: bool = True) -> Leak:
         raise InputError(f"gap must be finite, {missing} of {gaps.size} points are not: fill or close (0) them")
     gaps, lengths = np.maximum(gaps, 0.0), _lengths(size)
     datafiles.refuse_extreme("gap", float(gaps.max()))
-    return Leak(*(solve_flow(gaps, lengths, axis, periodic) for axis in ("x", "y")))
+    along_x, along_y = periodic if isinstance(periodic, tuple) else (periodic, periodic)
+    return Leak(*(solve_flow(gaps, lengths, axis, sides) for axis, sides in (("x", along_y), ("y", along_x))))
 
 
 def _lengths(size: Sequence[float]) -> tuple[float, float]:

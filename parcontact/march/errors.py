@@ -172,7 +172,7 @@ def _compare_views(scene: Scene, solved: SolvedStep) -> float:
     if scene.material.branched is None or measures.friction == 0.0:
         return max(measures.friction - measures.friction_interface, 0.0)
     direction, own = _viscous(step.velocity, measures)
-    maps, cyclic = (solved.contact.p, surface_of(solved.body)), grid.boundary == "periodic"
+    maps, cyclic = (solved.contact.p, surface_of(solved.body)), grid.cyclic
     other = friction_by_energy(scene.slab, *maps, (grid.dx, grid.dy), direction, cyclic)
     return abs(other * scene.units.height - own)
 

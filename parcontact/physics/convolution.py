@@ -139,11 +139,17 @@ def padded_lengths(nx: int, ny: int) -> tuple[int, int]:
 
 
 def tabulate(
-    fft: FFT, size: tuple[float, float], coefficient: Callable[..., Array], even: bool = False, inside: bool = False
+    fft: FFT,
+    size: tuple[float, float],
+    coefficient: Callable[..., Array],
+    even: bool = False,
+    inside: bool = False,
+    symmetric: bool = True,
 ) -> NDArray[np.complexfloating]:
     """Symbol on the padded transform `fft` of `coefficient(x, y, dx, dy)`, the displacement at distance (x, y) [length]
     that a unit pressure on one cell causes; collective, and no rank holds the whole table. One that is `even` in x and
-    in y is calculated for each distance once. One made `inside` the memory of the transform is lost at its next call.
+    in y is calculated for each distance once, for half of them if it is `symmetric` in both on square cells. One made
+    `inside` the memory of the transform is lost at its next call.
     """
     transform = table_transform(fft, inside)
     if fft.slab.only_counts:
@@ -154,7 +160,7 @@ def tabulate(
         table = coefficient(dx * x[None, :], dy * y[:, None], dx, dy)
         return transform.forward(np.ascontiguousarray(table))
     (near_x, from_x), (near_y, from_y) = (np.unique(np.abs(each), return_inverse=True) for each in (x, y))
-    if dx == dy and np.array_equal(near_x, near_y):
+    if symmetric and dx == dy and np.array_equal(near_x, near_y):
         quadrant = _symmetric(coefficient, near_x, dx)
     else:
         quadrant = coefficient(dx * near_x[None, :], dy * near_y[:, None], dx, dy)

@@ -32,6 +32,7 @@ from ..parallel.cosines import Cosines
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array
 from ..parallel.tally import Tally
+from . import strip
 from .convolution import (
     ALL,
     Convolution,
@@ -58,7 +59,8 @@ UNIFORM = 2.113  # tuning: wavenumber, times the side of a square, whose waves a
 class HalfSpace:
     """A half space of shear modulus 1 that is loaded inside a box of `size = (lx, ly)` [any unit of length].
 
-    `free`: there is nothing around the box, and the coefficients are Love's; else the box repeats for ever, with the
+    `free`: there is nothing around the box, and the coefficients are Love's; with `repeats_along_x` the box repeats
+    along x, and there is nothing beside it along y (`physics.strip`). Else the box repeats for ever, with the
     `kernel`. Transforms are handed in: `fft` is one of the maps' own size, in whose precision operators calculate;
     symbols have its shape, or that of the rows that are asked for. A free half space makes a padded transform for each
     of its operators, which nobody outside sees.
@@ -69,6 +71,7 @@ class HalfSpace:
     kernel: Literal["spectral", "love"] = "spectral"
     free: bool = False
     layer: Layer | None = None
+    repeats_along_x: bool = False
 
     @property
     def moves_in_the_mean(self) -> bool:
@@ -141,7 +144,10 @@ class HalfSpace:
 
     def own_lengths(self, points: tuple[int, int]) -> tuple[int, int] | None:
         """Lengths of the transform of an operator of its own on so many points; None where it uses that of the maps."""
-        return padded_lengths(*points) if self.free else None
+        if not self.free:
+            return None
+        lengths = padded_lengths(*points)
+        return (points[0], lengths[1]) if self.repeats_along_x else lengths
 
     def operator(self, fft: FFT) -> Convolution:
         """Pressure -> displacement; collective where the half space is free.
@@ -152,11 +158,14 @@ class HalfSpace:
         """
         if not self.free:
             return Convolution(fft, partial(self.symbol, fft), fft.dtype)
-        padded = _padded(fft, fft.dtype, fft.measured)
+        padded = FFT(fft.slab, self.own_lengths((fft.slab.nx, fft.slab.ny)), fft.dtype, fft.measured)
         table_transform(padded, inside=True)
 
         @cache
         def table() -> Spectrum:
+            if self.repeats_along_x:
+                images = partial(strip.coefficients, size=self.size, poisson=self.poisson)
+                return tabulate(padded, self.size, images, even=True, inside=True, symmetric=False)
             return tabulate(padded, self.size, self._coefficient, self.layer is None, inside=True)
 
         return Convolution(padded, lambda rows: table()[rows].real, fft.dtype, later=True)
@@ -170,7 +179,7 @@ class HalfSpace:
         """Displacement -> pressure: exact for the periodic half space with the spectral kernel, but for the mean; else
         (a layer included) a preconditioner. That of a box with nothing around takes displacements to go on mirrored at
         its edges: so they have no jump there, as they would have if the box were repeated."""
-        if self.free:
+        if self.free and not self.repeats_along_x:
             cosines = Cosines(fft)
             return MirroredConvolution(cosines, partial(self._mirrored_inverse_symbol, cosines))
         return Convolution(fft, partial(self.inverse_symbol, fft), fft.dtype)
@@ -178,7 +187,9 @@ class HalfSpace:
     def works_on_tiles(self, nx: int, ny: int) -> bool:
         """Return whether tiles have operators: on a half space in a free box, on cells that are not long."""
         dx, dy = self.size[0] / nx, self.size[1] / ny
-        return self.free and self.layer is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)
+        return (
+            self.free and not self.repeats_along_x and self.layer is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)
+        )
 
     def on_tiles(self, tiles: Tiles, tally: Tally) -> tuple[TileOperator, TileConvolution]:
         """The operator of a free half space on tiles of its grid, and a preconditioner."""

@@ -74,9 +74,9 @@ class Probe:
         pressure is tension, and a load above 0 is an error of the solve.
         """
         units, points = self.units, self.slab.points
-        cyclic = self.surface.periodic
-        *sums, largest = loops.sum_measures(p, u, h, touching, rows.before_first(self.slab, touching, cyclic), cyclic)
-        edge = 0.0 if cyclic else _touches_edge(self.slab, touching)
+        along_x, along_y = self.surface.periodic
+        *sums, largest = loops.sum_measures(p, u, h, touching, rows.before_first(self.slab, touching, along_y), along_x)
+        edge = _touches_edge(self.slab, touching, self.surface.periodic)
         load, count, gaps, sides, largest, edge = self.slab.reduce(sums, [largest, edge])
         unit_pressure = alpha * units.pressure
         excess, least = self._excess * sides, 0.0
@@ -115,16 +115,17 @@ class Probe:
 
     def _measure_yielded(self, p: Array, u: Array, h: Array, highest: float) -> _Yielding:
         """Measure a contact whose pressures end at `highest`, in the unit of p; collective."""
-        cyclic = self.surface.periodic
-        above, below = rows.around(self.slab, p, 1, cyclic)
-        found = loops.measure_yielded(p, u, h, above[0], below[0], cyclic, (1.0 - YIELDED) * highest)
+        along_x, along_y = self.surface.periodic
+        above, below = rows.around(self.slab, p, 1, along_y)
+        found = loops.measure_yielded(p, u, h, above[0], below[0], along_x, (1.0 - YIELDED) * highest)
         sharp, sides, count, gaps = self.slab.sum(*found)
         return _Yielding(sharp + self._excess * sides, count, gaps)
 
 
-def _touches_edge(slab: Slab, touching: NDArray[Any]) -> float:
-    """Return 1 if the surfaces touch on this rank at an edge of the box, across which there is more than one point."""
-    sides = [touching[:, 0], touching[:, -1]] if slab.nx > 1 else []
-    if slab.ny > 1 and len(touching):
+def _touches_edge(slab: Slab, touching: NDArray[Any], periodic: tuple[bool, bool]) -> float:
+    """Return 1 if the surfaces touch on this rank at a free edge of the box, across which there is more than one
+    point."""
+    sides = [touching[:, 0], touching[:, -1]] if slab.nx > 1 and not periodic[0] else []
+    if slab.ny > 1 and len(touching) and not periodic[1]:
         sides += [touching[0]] * (slab.rows.start == 0) + [touching[-1]] * (slab.rows.stop == slab.ny)
     return float(any(side.any() for side in sides))

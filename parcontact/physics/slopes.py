@@ -26,20 +26,20 @@ WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 
 
 def friction_by_energy(
-    slab: Slab, p: Array, u: Array, cell: tuple[float, float], direction: tuple[float, float], cyclic: bool
+    slab: Slab, p: Array, u: Array, cell: tuple[float, float], direction: tuple[float, float], cyclic: tuple[bool, bool]
 ) -> float:
     """Return `-<p, du/ds>/<p, 1>` for the slope along a unit `direction`; collective.
 
     `u` and `cell = (dx, dy)` are in units of their own: the result is in that of u over that of the cells. A box that
-    is not `cyclic` ends with rows and columns like its last ones.
+    is not `cyclic` along x or y ends with columns or rows like its last ones.
     """
     along_x, along_y = direction[0] / cell[0], direction[1] / cell[1]
     if along_y == 0.0:
         nothing = np.empty((0, slab.nx), u.dtype)
         above, below = nothing, nothing
     else:
-        above, below = rows.around(slab, u, WIDTH, cyclic)
-    load, force = slab.sum(*_sums(p, u, above, below, along_x, along_y, cyclic))
+        above, below = rows.around(slab, u, WIDTH, cyclic[1])
+    load, force = slab.sum(*_sums(p, u, above, below, along_x, along_y, cyclic[0]))
     return -force / load if load > 0.0 else math.nan
 
 

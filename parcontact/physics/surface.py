@@ -28,8 +28,8 @@ class Surface:
     """A sum of waves and shapes on a box of `size = (lx, ly)` [m].
 
     `waves` is this rank's part of the transform of the periodic heights, or of its lowest waves (`lowest`) if there are
-    no others, or None; `periodic` wraps the shapes around the box; `scale` turns m into the unit of heights;
-    `datum` [m] is the height from which heights are counted.
+    no others, or None; `periodic` wraps the shapes around the box along x and y; `scale` turns m into the unit of
+    heights; `datum` [m] is the height from which heights are counted.
     """
 
     slab: Slab
@@ -37,7 +37,7 @@ class Surface:
     size: tuple[float, float]
     waves: Spectrum | None = None
     shapes: Sequence[Shape] = ()
-    periodic: bool = True
+    periodic: tuple[bool, bool] = (True, True)
     scale: float = 1.0
     datum: float = 0.0
 
@@ -139,8 +139,8 @@ class Surface:
         rows = self.slab.rows
         x = np.arange(self.slab.nx) * self.cell[0] - shape.centre[0] - shift[0]
         y = np.arange(rows.start, rows.stop) * self.cell[1] - shape.centre[1] - shift[1]
-        if self.periodic:
-            x, y = (d - length * np.round(d / length) for d, length in zip((x, y), self.size, strict=True))
+        for distances, length, wraps in zip((x, y), self.size, self.periodic, strict=True):
+            distances -= wraps * length * np.round(distances / length)
         return x[None, :], y[:, None]
 
     def _slopes(self, shape: Shape, shift: tuple[float, float], rows: Indices, columns: Indices) -> tuple[Array, Array]:

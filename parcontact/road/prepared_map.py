@@ -28,7 +28,7 @@ class Prepared:
 
 def prepare(part: Topography, grid: Grid, found: map_files.Map) -> Prepared:
     """Return the map of a job on its grid; root only. Raises InputError for a map that is smaller than the box."""
-    periodic = part.periodic or ("smooth" if grid.boundary == "periodic" else "none")
+    periodic = part.periodic or ("smooth" if any(grid.cyclic) else "none")
     copies = part.copies
     rows, columns = (
         _range(part, axis, grid.size[axis] / copies, found.size[axis], found.heights.shape[1 - axis], grid.points[axis])

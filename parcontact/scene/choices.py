@@ -17,6 +17,7 @@ from ..effects.relaxation import feeds_back, relaxation_of, time_factor_of
 from ..history.chosen import describe_steps
 from ..history.timeline import Timeline
 from ..job import Grid, Job, Numerics, Output, Spectral, added_sections
+from ..job.sections import listing
 from ..physics.adhesion import AdhesionLaw
 from ..physics.interface import Shear
 from ..physics.prony import Prony
@@ -118,8 +119,8 @@ class Choices:
     @decided("isolated contact")
     def isolated(self) -> Verdict:
         """Padded transforms, four times as large."""
-        free = self.grid.boundary == "free"
-        return free, f"the boundary is {self.grid.boundary}" + ": padded" * free
+        free = not all(self.grid.cyclic)
+        return free, f"the boundary is {listing.text(self.grid.boundary)}" + ": padded" * free
 
     @decided("layer")
     def layer(self) -> Verdict:

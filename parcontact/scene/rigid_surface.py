@@ -39,7 +39,7 @@ def make_surface(job: Job, fft: FFT) -> tuple[Surface, Told]:
     spectral = [part for part in job.surface if isinstance(part, jobs.Spectral)]
     waves = reduce(add, (_waves(part, grid, fft, told) for part in spectral)) if spectral else None
     shapes = [_round(part, grid) for part in job.surface if isinstance(part, jobs.Sphere | jobs.Cylinder)]
-    surface = Surface(fft.slab, fft, grid.size, waves, shapes, grid.boundary == "periodic")
+    surface = Surface(fft.slab, fft, grid.size, waves, shapes, grid.cyclic)
     surface.level()
     if surface.waves is not None:
         surface.waves = lowest(surface.waves, fft, highest_waves(job))
@@ -74,7 +74,7 @@ def shortest_measured(job: Job, surface: Surface) -> float | None:
     spectrum = surface.waves
     maps = [part for part in job.surface if isinstance(part, jobs.Topography)]
     windows = 2 if any(part.periodic == "mirror" for part in maps) else 1  # side by side
-    windowed = job.grid.boundary == "free" or bool(maps)
+    windowed = not all(job.grid.cyclic) or bool(maps)
     if windowed:
         heights = replace(surface, shapes=()).heights((0.0, 0.0), surface.slab.empty())
         rows, columns = (

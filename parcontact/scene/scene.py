@@ -91,7 +91,7 @@ class Setup:
         poisson, kernel = self.job.material.poisson, self.choices.numerics.kernel
         body = self.job.body
         layer = None if body is None else Layer(body.thickness / self.units.length, body.base, poisson)
-        return HalfSpace(self.size, poisson, kernel, self.choices.isolated.on, layer)
+        return HalfSpace(self.size, poisson, kernel, self.choices.isolated.on, layer, self.grid.cyclic[0])
 
     def in_units(self, velocity: tuple[float, float]) -> tuple[float, float]:
         """Return a velocity [m/s] in the run's units of length per second."""

@@ -36,7 +36,9 @@ GRID = {
     "grid: {points: 6.5, size: 1}": "1:16: grid.points must be a positive whole number of points, got 6.5",
     "grid: {points: 64}": "1:7: grid.size is missing; it must be a positive length [m]",
     "grid: {points: 64, size: }": "1:25: grid.size is missing; it must be a positive length [m]",
-    "grid: {points: 64, size: 1, boundary: open}": "1:39: grid.boundary must be periodic | free, got 'open'",
+    "grid: {points: 64, size: 1, boundary: open}": (
+        "1:39: grid.boundary must be periodic | free | [periodic, free], got 'open'"
+    ),
     "grid: {pionts: 1, points: 64, size: 1}": "1:8: grid.pionts is not a known key; did you mean points?",
     "grid: {points: 64, size: 1, zz: 1}": "1:29: grid.zz is not a known key; there are points, size, boundary",
 }

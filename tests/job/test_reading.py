@@ -58,7 +58,8 @@ def test_every_mistake_in_order(tmp_path: Path) -> None:
         "job.yaml:1:1: titel is not a known key; did you mean title?",
         "job.yaml:3:16: grid.points.1 must be a positive whole number of points, got 0",
         "job.yaml:4:9: grid.size must be a positive length [m], got -1.0",
-        "job.yaml:5:13: grid.boundary must be periodic | free, got 'peridic'; did you mean periodic?",
+        "job.yaml:5:13: grid.boundary must be periodic | free | [periodic, free], got 'peridic'; "
+        "did you mean periodic?",
         "job.yaml:7:47: surface.0.waves.1 must be two whole numbers of waves in the box, along x and along y, got 0.5",
         "job.yaml:8:29: surface.1.radius must be a positive length [m], got 0",
         "job.yaml:8:32: surface.1.hurst is not a key of shape sphere; there are shape, radius, profile, center",

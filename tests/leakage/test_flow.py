@@ -284,3 +284,11 @@ def test_pressures_are_those_of_the_full_matrix(shape: tuple[int, int], periodic
     with np.errstate(divide="ignore"):
         found = Balance(1.0 / cubes, 0.7, periodic).solve(given)
     np.testing.assert_allclose(found, dense(cubes, 0.7, periodic, given), rtol=0, atol=1e-13)
+
+
+def test_sides_that_are_periodic_along_x_alone() -> None:
+    """Flow along y has them at its sides, flow along x has the free ones."""
+    gap = np.random.default_rng(3).uniform(0.0, 1.0, (12, 16))
+    one, all_, none = (leak(gap, (1.0, 1.0), periodic) for periodic in ((True, False), True, False))
+    assert one.flow_x == none.flow_x != all_.flow_x
+    assert one.flow_y == all_.flow_y != none.flow_y

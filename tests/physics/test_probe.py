@@ -78,7 +78,7 @@ def test_partial_contact(comm: MPI.Intracomm) -> None:
 def test_force_on_a_shape(comm: MPI.Intracomm) -> None:
     """One loaded point on the flank of a paraboloid: p dA times its slope -x/R; rounding."""
     slab = Slab(comm, NX, NY)
-    surface = Surface(slab, FFT(slab), (LX, LY), shapes=[Round(1e-2, (LX / 2, LY / 2))], periodic=False)
+    surface = Surface(slab, FFT(slab), (LX, LY), shapes=[Round(1e-2, (LX / 2, LY / 2))], periodic=(False, False))
     surface.rescale(UNITS.height)
     p, u = slab.zeros(), slab.zeros()
     for row in range(NY)[slab.rows]:
@@ -100,7 +100,7 @@ def test_area_corrected_by_its_edges(nx: int, ny: int, periodic: bool, seed: int
     edge of a free box do not count.
     """
     slab = Slab(MPI.COMM_WORLD, nx, ny)
-    surface = Surface(slab, FFT(slab), (LX, LY), shapes=[Round(1e-2, (0.0, 0.0))], periodic=periodic)
+    surface = Surface(slab, FFT(slab), (LX, LY), shapes=[Round(1e-2, (0.0, 0.0))], periodic=(periodic, periodic))
     pressed = np.random.default_rng(seed).random((ny, nx)) < 0.5
     p, none = slab.zeros(), slab.zeros()
     p[...] = pressed[slab.rows]
@@ -121,7 +121,7 @@ def test_area_and_gap_where_points_yield(nx: int, ny: int, periodic: bool, seed:
     """Between a point that has yielded and an open one the share 1 - p/H of a cell is in excess; nothing at the former;
     elsewhere edges are those of an elastic contact. Points that have yielded have no gap. Rounding."""
     slab, hardness = Slab(MPI.COMM_WORLD, nx, ny), 2.0 * PRESSURE
-    surface = Surface(slab, FFT(slab), (LX, LY), shapes=[Round(1e-2, (0.0, 0.0))], periodic=periodic)
+    surface = Surface(slab, FFT(slab), (LX, LY), shapes=[Round(1e-2, (0.0, 0.0))], periodic=(periodic, periodic))
     random = np.random.default_rng(seed)
     whole, gap = random.choice([0.0, 0.5, 1.5, 2.0], size=(ny, nx)), random.normal(size=(ny, nx))
     p, u, h = slab.zeros(), slab.zeros(), slab.zeros()

@@ -99,7 +99,7 @@ def test_heights_of_shapes(communicators: list[MPI.Intracomm], name: str, shift:
     for comm in communicators:
         slab = Slab(comm, 18, 13)
         x, y = coordinates(slab, SIZE)
-        surface = Surface(slab, FFT(slab), SIZE, shapes=[shape], periodic=False)
+        surface = Surface(slab, FFT(slab), SIZE, shapes=[shape], periodic=(False, False))
         heights = surface.heights(shift, slab.empty())
         expected = formula(x - CENTRE[0] - shift[0], y - CENTRE[1] - shift[1])
         assert_allclose(heights, expected, rtol=0, atol=1e-15 * R)
@@ -216,7 +216,7 @@ def test_force_on_shapes(communicators: list[MPI.Intracomm], name: str, periodic
             x, y = x - SIZE[0] * np.round(x / SIZE[0]), y - SIZE[1] * np.round(y / SIZE[1])
         pressure = np.maximum(random_map(18, 13), 0.0)[slab.rows]
         expected = [product(pressure, slope, slab) for slope in shape.slope(x, y)]
-        surface = Surface(slab, FFT(slab), SIZE, shapes=[shape], periodic=periodic)
+        surface = Surface(slab, FFT(slab), SIZE, shapes=[shape], periodic=(periodic, periodic))
         assert_allclose(surface.forces(pressure, shift), expected, rtol=1e-11, atol=1e-12)
 
 

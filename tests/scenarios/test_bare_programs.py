@@ -66,7 +66,7 @@ def lasting(planned: Job) -> Counter[str]:
             load = found.pressure * slab.points / (alpha * base.units.pressure)
             pair = EmbeddedPair(slab, body, base.job.grid.dx / base.units.length)
             pair.compare(step.dt, trial, held, contact.p, contact.u, load, found.contact_area, step.growth)
-            friction_by_energy(slab, contact.p, contact.u, (1.0, 1.0), (1.0, 0.0), True)  # as often
+            friction_by_energy(slab, contact.p, contact.u, (1.0, 1.0), (1.0, 0.0), (True, True))  # as often
         earlier, last, p = last, p, earlier
     return slab.tally.copy()
 

@@ -24,8 +24,21 @@ MOST_STEPS = 10**8  # tuning: of a history; at a millisecond each they take more
 
 
 def kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:
-    if grid.boundary == "free" and numerics.kernel == "spectral":
+    if not all(grid.cyclic) and numerics.kernel == "spectral":
         yield Fault("must be love when grid.boundary is free: the spectral kernel is periodic", ("numerics", "kernel"))
+
+
+def no_strip(what: str, grid: Grid) -> Iterator[Fault]:
+    """Refuse `what` needs other kernels than a box has that is free along y alone."""
+    if any(grid.cyclic) and not all(grid.cyclic):
+        yield Fault(f"must be periodic or free with {what}; [periodic, free] goes without", ("grid", "boundary"))
+
+
+def half_space_at_rest(grid: Grid, body: Body | None, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
+    """Check that a box which is free along y alone has no layer and no steady sliding, whose kernels it lacks."""
+    asked = {"a layer (body)": body is not None, "steady sliding": steady is not None or initial.state == "steady"}
+    for what in (what for what, given in asked.items() if given):
+        yield from no_strip(what, grid)
 
 
 def layer_is_resolved(grid: Grid, body: Body | None) -> Iterator[Fault]:

@@ -41,7 +41,7 @@ def doubts_of_scene(job: Sections) -> Iterator[Doubt]:
     yield from _instants(job, material)
     yield from _band(job, material)
     yield from _imprints(job, material)
-    yield from _room(job, material) if job.grid.boundary == "free" else neighbours(job, material)
+    yield from _room(job, material) if not any(job.grid.cyclic) else neighbours(job, material)
 
 
 def doubt_slope(slope: float) -> Iterator[Doubt]:
@@ -212,7 +212,7 @@ def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Itera
     """
     grid, sphere = job.grid, job.surface[0]
     single = len(job.surface) == 1 and isinstance(sphere, Sphere) and min(grid.points) > 1
-    if not single or grid.boundary == "free" or job.body is not None:
+    if not single or not all(grid.cyclic) or job.body is not None:
         return
     around = range(-IMAGES, IMAGES + 1)
     images = math.fsum(math.hypot(i * grid.lx, j * grid.ly) ** -3 for i in around for j in around if i or j)
@@ -235,7 +235,7 @@ def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     """
     grid, initial = job.grid, job.initial
     times = [branch.relaxation_time for branch in material.branches if branch.relaxation_time < math.inf]
-    if grid.boundary != "periodic" or not times or all(isinstance(shape, Wave) for shape in job.surface):
+    if not all(grid.cyclic) or not times or all(isinstance(shape, Wave) for shape in job.surface):
         return
     memory = max(times) * material.time_factor
     longest = max((shape.long_wavelength for shape in job.surface if isinstance(shape, Rough)), default=0.0)

@@ -33,7 +33,7 @@ def doubts_of_size(job: Sections) -> Iterator[Doubt]:
 
 def doubt_memory(grid: Grid) -> Iterator[Doubt]:
     """Yield a doubt if no run of a grid can fit into the memory of the machines it runs on."""
-    needed = (MAPS_FREE if grid.boundary == "free" else MAPS) * 8.0 * grid.nx * grid.ny
+    needed = (MAPS if all(grid.cyclic) else MAPS_FREE) * 8.0 * grid.nx * grid.ny
     each, count = _memory(), machines()
     if needed > each * count:
         have = "this machine has" if count == 1 else f"{count} such machines have"

@@ -17,7 +17,7 @@ from pydantic import (
     ValidationInfo,
 )
 
-from ..text.fault import Fault
+from ..text.fault import Fault, did_you_mean, quote, refuse
 from .part import Instead, Origin, Part, Rule
 from .quantities import (
     AUTO_POINTS,
@@ -51,6 +51,21 @@ def _different(name: str) -> Rule:
     return Rule((name,), check)
 
 
+def _boundary(value: Any) -> Any:
+    """Return `periodic`, `free`, or the pair of both; a pair of two that are the same is one of them."""
+    pair = tuple(value) if isinstance(value, list | tuple) else (value, value)
+    if pair == STRIP[::-1]:
+        refuse(Fault("must be periodic along x where it is free along y, got [free, periodic]: exchange x and y"))
+    if len(pair) != 2 or any(one not in STRIP for one in pair):
+        refuse(Fault(f"must be {BOUNDARY}, got {quote(value)}{did_you_mean(value, STRIP)}"))
+    return pair if pair == STRIP else pair[0]
+
+
+STRIP = ("periodic", "free")  # along x and along y
+BOUNDARY = "periodic | free | [periodic, free]"
+Boundary = Literal["periodic", "free"] | tuple[Literal["periodic"], Literal["free"]]
+
+
 class Grid(Part):
     """The box and its cells; x comes first in `points` and `size`."""
 
@@ -60,7 +75,14 @@ class Grid(Part):
     size: Annotated[tuple[Positive, Positive], BeforeValidator(both), FROM_SURFACE] = Field(
         description="a positive length [m]"
     )
-    boundary: Literal["periodic", "free"] = "periodic"
+    boundary: Annotated[Boundary, PlainValidator(_boundary, json_schema_input_type=Boundary)] = Field(
+        default="periodic", description=BOUNDARY
+    )
+
+    @property
+    def cyclic(self) -> tuple[bool, bool]:
+        """Whether the box repeats itself along x, and along y."""
+        return self.boundary != "free", self.boundary == "periodic"
 
     @property
     def nx(self) -> int:
