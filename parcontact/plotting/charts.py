@@ -19,6 +19,7 @@ NAMES, LINE = 9, 12  # size of the names of stages, and of their lines [points]
 MAX_NAME = 24  # letters of the name of a stage: longer ones would leave no room for the curve
 LEVELS = 3  # of names above each other, before they are turned
 FEW_NAMES, MANY_NAMES = 2, 4  # of lines, for which a legend finds room among them: always, and in half the width
+SMALL, NAMES_BESIDE = 5.0, 2  # width of a small picture [inch], and the names in a row under it
 HEADROOM, PEAK_ROOM = 1.08, 1.25  # of a panel over its highest point, and over one that the legend names
 FRACTION = "contact area /\nnominal area"
 BAR_SHARE = 0.8  # of the room of a bar, in the logarithm
@@ -94,10 +95,15 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
         units.label(axes.yaxis, chart.y.name, chart.y.unit)
     _mark_stages(axes, chart.stages, chart.named)
     if names := len(axes.get_legend_handles_labels()[1]):
-        place: dict[str, Any] = style.BESIDE if names > FEW_NAMES and _panels_beside(axes) == 1 else {}
-        if names > MANY_NAMES and not place:
-            place = style.ABOVE
-        axes.legend(title=chart.legend_title or None, **place)
+        axes.legend(title=chart.legend_title or None, **_place_legend(axes, names))
+
+
+def _place_legend(axes: Axes, names: int) -> dict[str, Any]:
+    """Return where the legend of so many lines goes: among them, or beside, above or below the panel."""
+    small = axes.figure.bbox.width / axes.figure.dpi < SMALL
+    if names > (MANY_NAMES if small else FEW_NAMES) and _panels_beside(axes) == 1:
+        return style.BELOW | {"ncols": NAMES_BESIDE} if small else style.BESIDE
+    return style.ABOVE if names > MANY_NAMES else {}
 
 
 def _draw_bars(axes: Axes, series: Sequence[ChartLine]) -> None:

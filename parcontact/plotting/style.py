@@ -54,7 +54,13 @@ BESIDE: dict[str, Any] = {  # where the legend of a panel is that leaves it no r
     "loc": "upper left",
     "bbox_to_anchor": (1.0, 1.0),
     "borderaxespad": 0.0,
-    "handlelength": 1.2,
+    "handlelength": 1.8,
+}
+BELOW: dict[str, Any] = {  # where that of a small picture is
+    "loc": "upper center",
+    "bbox_to_anchor": (0.5, -0.22),
+    "columnspacing": 1.0,
+    "handlelength": 1.8,
 }
 MARKED = {"png": "Software", "pdf": "Creator", "svg": "Creator"}  # where pictures name the program
 

@@ -2,8 +2,8 @@
 
 Those of a sweep of friction curves are over velocity, or what else has several values in each curve.
 
-Points are cases, lines their means over seeds alone: each value of another key has a line of its own. A colour is such
-a value, in all panels; what is drawn of it has its own marks and dashes.
+Points are cases, lines their means over seeds alone: each value of another key has a line of its own. A colour is a
+value of the first of these keys, in all panels, dashes are those of further keys.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,6 +26,7 @@ UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N"
 UNITS |= {"duration": "s", "work": "J/m²", "range": "m", "shear_modulus": "Pa", "modulus_inf": "Pa"}
 UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m"}
 MARKERS, DASHES = ("o", "s"), ("--", ":")  # of means and theories of the first and the second column of a panel
+STYLES = ("-", "--", ":", "-.")  # of lines, by what differs besides the key that has the colours
 WIDE = 10.0  # ratio of the largest to the smallest number from which on an axis is logarithmic
 Panels = tuple[tuple[str, Axis, dict[str, str]], ...]
 FRICTION, AREA = Axis("friction coefficient"), Axis(FRACTION)
@@ -40,6 +41,8 @@ CURVE_PANELS: Panels = (
     ("friction", FRICTION, {"steady sliding": "friction"}),
     ("area", AREA, {"steady sliding": CORRECTED}),
 )
+SHARES = {"friction": "error_friction", CORRECTED: "error_area"}  # columns of relative errors of columns
+SIZES = {name: f"{name}_error" for name in ("mu_max", "mu_dyn", "pull_off")}  # those of errors in the unit of these
 
 Rows = Sequence[dict[str, Any]]
 
@@ -59,12 +62,16 @@ def charts(directory: Path) -> list[Chart]:
     word = key.split(".")[-1]
     x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
     for panel, y, columns in panels:
-        series, lines = list[ChartLine](), list(_split(rows, key))
-        for j, (part, own) in enumerate(lines):
+        series, lines, hues = list[ChartLine](), _split(rows, key), dict[str, list[str]]()
+        for (hue, *rest), own in lines.items():
+            dashes = hues.setdefault(hue, [])
             for k, (name, column) in enumerate(columns.items()):
-                look = {"color": style.line(j if len(lines) > 1 else k)["color"]}
+                color = style.line(list(hues).index(hue) if len(lines) > 1 else k)["color"]
+                look = {"color": color, "linestyle": STYLES[len(dashes) % len(STYLES)]}
                 theory = f"theory, {name}" if len(columns) > 1 else "theory"
-                series += _make_lines((name + part, theory), own, column, key, look, k)
+                told = ", ".join([*([name] if len(columns) > 1 else []), *filter(None, [hue, *rest])]) or name
+                series += _make_lines((told, theory), own, column, key, look, k)
+            dashes.append(", ".join(rest))
         if any(one.y.any() for one in series):  # surfaces that come off have no friction and no area in the end
             series = list(_name_once(series))
             values = np.concatenate([one.x for one in series])
@@ -103,21 +110,24 @@ def _tell_apart(rows: Rows, names: Sequence[str]) -> list[str]:
     return list(found.values())
 
 
-def _split(rows: Rows, key: str) -> Iterator[tuple[str, Rows]]:
-    """Yield the rows of each line and its name: those that agree in all but `key`, what moves together with it, and
-    what chooses a sample."""
+def _split(rows: Rows, key: str) -> dict[tuple[str, ...], Rows]:
+    """Return the rows of each line by the values of the other keys: rows that agree in all but `key`, what moves
+    together with it, and what chooses a sample."""
     places = [name for name in sweep_table.PLACES if name in rows[0]]
     others = [name for name in _tell_apart(rows, [key, *places, *_swept(rows)]) if name != key]
-    lines: dict[str, list[dict[str, Any]]] = {}
+    lines: dict[tuple[str, ...], list[dict[str, Any]]] = {}
     for row in rows:
-        lines.setdefault("".join(f", {_named(name, row[name])}" for name in others), []).append(row)
-    yield from lines.items()
+        lines.setdefault(tuple(_named(name, row[name]) for name in others) or ("",), []).append(row)
+    return dict(lines)
 
 
 def _named(key: str, value: Any) -> str:
-    """Return a value with its unit, after the name of its key unless that is a pressure or a temperature."""
-    word = key.split(".")[-1]
-    text = units.quantity(value, UNITS.get(word, "")) if isinstance(value, float) else str(value)
+    """Return a value with its unit, after the name of its key unless that is clear: a pressure, a temperature, a word
+    or a file."""
+    word = key.split(".")[-1].removesuffix("s")
+    if not isinstance(value, float):
+        return Path(str(value)).stem
+    text = units.quantity(value, UNITS.get(word, ""))
     return text if word in sweep_table.PLACES else f"{word.replace('_', ' ')} {text}"
 
 
@@ -129,7 +139,8 @@ def _make_lines(
     x, y, theory = (_read_column(rows, wanted) for wanted in (key, column, f"theory_{theirs}"))
     if (there := np.isfinite(y)).any():
         at, means = _average(x[there], y[there])
-        yield ChartLine(names[0], at, means, look | {"marker": MARKERS[number], "linestyle": "-"})
+        error = _read_errors(rows, column, y)[there][np.argsort(x[there])] if at.size == there.sum() else None
+        yield ChartLine(names[0], at, means, look | {"marker": MARKERS[number]}, error)
         if at.size < there.sum():
             dots = {"marker": ".", "linestyle": "none", "alpha": 0.5, "markersize": 3}
             yield ChartLine("each case", x[there], y[there], look | dots)
@@ -148,6 +159,14 @@ def _name_once(series: Sequence[ChartLine]) -> Iterator[ChartLine]:
 def _average(x: Array, y: Array) -> tuple[Array, Array]:
     at = np.unique(x)
     return at, np.array([y[x == value].mean() for value in at])
+
+
+def _read_errors(rows: Rows, column: str, values: Array) -> Array:
+    """Return the errors of a column as shares of its values, NaN where they are not known."""
+    if column in SHARES:
+        return _read_column(rows, SHARES[column])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(_read_column(rows, SIZES.get(column, "")) / np.abs(values))
 
 
 def _read_column(rows: Rows, name: str) -> Array:

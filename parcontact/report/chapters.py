@@ -35,7 +35,8 @@ def describe_directory(directory: Path) -> Chapter:
         raise InputError(f"{directory} holds no results: it has none of {', '.join(KINDS)}")
     sections = [KINDS[name][1](directory) for name in there]
     found, title, cited, places = log.read(directory), "", origin.list_citations(None), [f"{directory.absolute()}/"]
-    jobs_there = [*(directory / name for name in JOBS), *sorted(directory.glob(f"cases/*/{RESOLVED}"))]
+    of_cases = (path for name in (RESOLVED, STEADY_RESOLVED) for path in sorted(directory.glob(f"cases/*/{name}")))
+    jobs_there = [*(directory / name for name in JOBS), *of_cases]
     if resolved := next((path for path in jobs_there if path.is_file()), None):  # of a sweep that of its first case
         job, warnings = _read_job(resolved)
         title, places = job.title, [*_places(job), *places]
@@ -91,11 +92,12 @@ def _name_first_case(sections: Sequence[ReportSection]) -> list[ReportSection]:
 
 
 def _describe_example(directory: Path, case: Path) -> list[ReportSection]:
-    """Return the results of the first case of a sweep as an example, where it is a run that is done."""
+    """Return the results of the first case of a sweep as an example, where it is done."""
     first = sweep_table.read(directory / "sweep.csv")[0]
-    if first["state"] != "done" or not (case / "measures.csv").is_file():
+    kinds = [describe for table, (_, describe) in KINDS.items() if (case / table).is_file()]
+    if first["state"] != "done" or not kinds:
         return []
-    return [replace(results.describe_run(case), title="The first case as an example")]
+    return [replace(kinds[0](case), title="The first case as an example")]
 
 
 def _describe_swept(directory: Path) -> str:

@@ -2,6 +2,7 @@
 
 import base64
 import io
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,6 +12,7 @@ from matplotlib.figure import Figure
 
 from ..plotting import charts, style
 
+NAME_HEIGHT = 0.19  # of a row of a legend [inch]
 SIZE = (4.2, 2.9)  # of the picture of a chart [inch]: two beside each other on a laptop, one on a phone
 RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes: a page looks the same on every machine
 
@@ -76,7 +78,11 @@ def draw_panel(panel: style.Panel, caption: str) -> Picture:
     file = io.BytesIO()
     with style.drawing(RC):
         figure = Figure(figsize=SIZE, layout="constrained")
-        panel(figure.subplots())
+        axes = figure.subplots()
+        panel(axes)
+        names = len(axes.get_legend_handles_labels()[1])
+        if names > charts.MANY_NAMES:  # the legend is below the panel, and takes no room from it
+            figure.set_figheight(SIZE[1] + NAME_HEIGHT * math.ceil(names / charts.NAMES_BESIDE))
         figure.savefig(file, format="svg", dpi=style.DPI, metadata={"Date": None})
     return to_uri(file.getvalue(), "image/svg+xml"), caption
 

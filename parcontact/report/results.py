@@ -96,6 +96,7 @@ def describe_curve(directory: Path) -> ReportSection:
     columns = tables.read_columns(directory / "steady.csv")
     names = [name for name in POINTS if name in columns]
     units_of = {column.name: column.unit for column in STEADY}
+    units_of |= dict.fromkeys(slide.ERRORS, "relative")
     head = [f"{_to_words(name)} [{units_of[name]}]" if units_of[name] else _to_words(name) for name in names]
     table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
     pictures = [draw_chart(chart) for chart in steady.charts(directory)]
@@ -137,8 +138,12 @@ def describe_sweep(directory: Path) -> ReportSection:
 
 def _add_unit(name: str) -> str:
     """Return a column of a sweep, or a key of its job, with its unit: `pull_off [N]`, `history.0.velocity [m/s]`."""
-    known = {column.name: column.unit for column in (*SWEEP, *STEADY)} | sweep.UNITS
-    unit = known.get(name) or sweep.UNITS.get(name.split(".")[-1], "")
+    known = (
+        {column.name: column.unit for column in (*SWEEP, *STEADY)}
+        | sweep.UNITS
+        | dict.fromkeys(slide.ERRORS, "relative")
+    )
+    unit = known.get(name) or sweep.UNITS.get(name.split(".")[-1].removesuffix("s"), "")
     return f"{name} [{unit}]" if unit else name
 
 

@@ -49,7 +49,10 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
         rows, points = [_row(case) for case in cases], [row for case in cases for row in _points(case)]
         there = {section for case in cases for section in SECTIONS if _asks_for(case, section)}
         more = [name for section in SECTIONS if section in there for name in SECTIONS[section]]
-        save(directory / TABLE, ["case", *keys, *names_of(choose_columns(SWEEP, when=there))[1:]], rows)
+        names = names_of(choose_columns(SWEEP, when=there))[1:]
+        if not any(case.job.history for case in cases):  # results of curves are in the table of their points
+            names = tuple(name for name in names if any(name in row for row in rows))
+        save(directory / TABLE, ["case", *keys, *names], rows)
         if points:
             save(directory / CURVES, ["case", *keys, *CURVE_COLUMNS], points)
         if seeded and any(case.job.history for case in cases):
@@ -67,7 +70,9 @@ def results(directory: Path) -> Path:
     """Return the table with the results of a sweep: of its cases, or of the points of its friction curves where the
     cases have none."""
     curves, table = directory / CURVES, directory / TABLE
-    if not curves.is_file() or (table.is_file() and any(row["residual"] == row["residual"] for row in read(table))):
+    if not curves.is_file() or (
+        table.is_file() and any(math.isfinite(row.get("residual", math.nan)) for row in read(table))
+    ):
         return table
     return curves
 

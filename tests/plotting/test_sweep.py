@@ -73,10 +73,26 @@ def test_every_value_of_every_other_key_has_a_line(tmp_path: Path) -> None:
     friction, _ = sweep.charts(saved(tmp_path, *rows, head=head))
     found = {one.name: one.y.tolist() for one in friction.series if one.name.startswith("highest")}
     assert found == {
-        f"highest, include {compound}, size {size:.0f} mm": pytest.approx([12.0 + own + size, 22.0 + own + size])
+        f"highest, {compound}, size {size:.0f} mm": pytest.approx([12.0 + own + size, 22.0 + own + size])
         for compound, own in (("soft", 0.1), ("hard", 0.2))
         for size in (1, 2)
     }
+    looks = {one.name: (one.look["color"], one.look["linestyle"]) for one in friction.series}
+    of_compounds = [{looks[f"highest, {name}, size {size} mm"] for size in (1, 2)} for name in ("soft", "hard")]
+    assert [len({color for color, _ in found}) for found in of_compounds] == [1, 1]  # a colour for each compound
+    assert [len({dashes for _, dashes in found}) for found in of_compounds] == [2, 2]  # and dashes for each size
+
+
+def test_bars_of_errors(tmp_path: Path) -> None:
+    """Those of forces and of friction of slides are absolute in the table, those of curves relative: shares here."""
+    head = (*HEAD[:2], "state", *RESULTS, "pull_off", "pull_off_error", "mu_dyn_error")
+    rows = [(0, v, "done", "", 0.2, 0.0, 1e-3 * v, 1e-4, 0.05) for v in (1.0, 2.0)]
+    shares = {
+        chart.key: [one.error.tolist() for one in chart.series if one.error is not None]
+        for chart in sweep.charts(saved(tmp_path, *rows, head=head))
+    }
+    assert shares["friction"] == [pytest.approx([0.25, 0.25])]
+    assert shares["pull-off"] == [pytest.approx([0.1, 0.05])]
 
 
 def test_what_a_sweep_with_adhesion_is_about(tmp_path: Path) -> None:

@@ -265,6 +265,23 @@ def test_columns_of_a_phone_and_of_paper() -> None:
     assert "th, td { white-space: normal" in paper
 
 
+def test_a_sweep_of_curves_says_what_was_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a sweep of runs: title, job, rubber, surface and references of its first case. The table of cases has no
+    column without a number."""
+    monkeypatch.chdir(tmp_path)
+    curve = "steady: {velocities: [0.1, 1.0], pressures: [1.0e+4]}\nsweep: [{steady.pressures: [1.0e+3, 2.0e+3]}]\n"
+    Path("job.yaml").write_text(
+        f"title: Two loads\ngrid: {{points: 16, size: 1.0e-3}}\n{WAVE[WAVE.index('surface') :]}{ZENER}{curve}"
+    )
+    assert __main__.main(["steady", "job.yaml", "--quiet"]) == 0
+    found = Page(page.write([Path("out/job")]).read_text())
+    of_first = [f"{name} of the first case" for name in ASKED]
+    assert found.headings[:5] == ["Sweep", "The first case as an example", *of_first]
+    assert "<h1>Two loads</h1>" in found.text
+    assert "Polonsky" in found.text
+    assert Path("out/job/sweep.csv").read_text().splitlines()[0] == "case,steady.pressures,state"
+
+
 def test_heights_that_are_gone(tmp_path: Path) -> None:
     """A report tells what there is: the surface cannot be made anew, all else is there."""
     np.save(tmp_path / "road.npy", np.random.default_rng(1).normal(size=(32, 32)))
