@@ -251,8 +251,6 @@ def leak(options: argparse.Namespace) -> int:
     if (options.fluid is None) != (options.pressures is None):
         raise InputError("--fluid and --pressures HIGH:LOW [Pa] go together: give both, or none")
     drop = PressureDrop(options.fluid, *options.pressures) if options.fluid else None
-    if drop and drop.fluid.molar_mass and not drop.low:
-        raise InputError("--pressures: those of a gas are absolute ones, above 0 Pa")
     for directory in options.directories:
         said = write(directory, options.at or "", options.over, world, drop)
         print(*said, sep="\n", end="\n" if world.rank == 0 else "")

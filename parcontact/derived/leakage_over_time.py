@@ -35,7 +35,8 @@ class LeakInstant(NamedTuple):
     `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` these over K of the surface that just
     touches, NaN where that is not known; `constriction` [m] is the smallest gap on the widest path of the direction
     that leaks more; `error_x` and `error_y` are by what share K differs on half the mesh (`flow.mesh_error`);
-    `flow_rate` [m^3/s] is that of a fluid in this direction (`leakage.fluids`), NaN without one.
+    `flow_rate` [m^3/s] and `mass_flow` [kg/s] are those of a fluid in this direction (`leakage.fluids`), NaN without
+    one.
     """
 
     time: float
@@ -53,15 +54,16 @@ class LeakInstant(NamedTuple):
     error_x: float
     error_y: float
     flow_rate: float = np.nan
+    mass_flow: float = np.nan
 
 
 class SolvedLeak(NamedTuple):
-    """The flow at an instant, without its maps, the error that the mesh makes along x and along y, and the flow rates
-    [m^3/s] of a fluid."""
+    """The flow at an instant, without its maps, the error that the mesh makes along x and along y, and the
+    conductivities [m^3] for a fluid, which may slip."""
 
     leak: Leak
     errors: tuple[float, float]
-    rates: tuple[float, float]
+    of_fluid: tuple[float, float]
 
 
 class Gaps:
@@ -114,30 +116,30 @@ class Gaps:
     def solve(self, index: int) -> tuple[SolvedLeak, list[Map]]:
         """Return the flow at a saved instant, and for both directions where it is."""
         gap, flows, errors, shown = self.read(index), list[Flow](), list[float](), list[Map]()
-        rates = list[float]()
+        of_fluid = list[float]()
         for axis in ("x", "y"):
             flow = solve_flow(gap, self.size, axis, self._sides(axis))
             shown.append(leakage.flux(gap, flow.pressure, self.size))
             flows.append(replace(flow, pressure=np.empty((0, 0))))
-            rates.append(self._rate(gap, flow, axis))
+            of_fluid.append(self._conductivity(gap, flow, axis))
             errors.append(mesh_error(gap, flow, self.size, axis, self._sides(axis)))
-        return SolvedLeak(Leak(*flows), (errors[0], errors[1]), (rates[0], rates[1])), shown
+        return SolvedLeak(Leak(*flows), (errors[0], errors[1]), (of_fluid[0], of_fluid[1])), shown
 
     def _sides(self, axis: str) -> bool:
         """Return whether the sides along a flow are periodic."""
         return self.periodic["yx".index(axis)]
 
-    def _rate(self, gap: Map, flow: Flow, axis: str) -> float:
-        """Return the flow of the fluid along an axis [m^3/s], NaN without one."""
-        if self.drop is None:
-            return np.nan
-        length, width = self.size if axis == "x" else self.size[::-1]
-        slipping = self.drop.mean_free_path > 0.0
-        found = solve_flow(self.drop.conducting_gap(gap), self.size, axis, self._sides(axis)) if slipping else flow
-        return self.drop.flow_rate(found.conductivity, length, width)
+    def _conductivity(self, gap: Map, flow: Flow, axis: str) -> float:
+        """Return the conductivity for the fluid along an axis [m^3], NaN without one."""
+        if self.drop is None or not self.drop.mean_free_path:
+            return np.nan if self.drop is None else flow.conductivity
+        return solve_flow(self.drop.conducting_gap(gap), self.size, axis, self._sides(axis)).conductivity
 
     def row(self, index: int, solved: SolvedLeak, bare: Leak | None) -> LeakInstant:
         found = solved.leak
+        wider = int(found.along_y.constriction > found.along_x.constriction)
+        through = solved.of_fluid[wider], *self.size[:: -1 if wider else 1]
+        flows = (self.drop.flow_rate(*through), self.drop.mass_flow(*through)) if self.drop else ()
         rows = np.flatnonzero(self.columns["step"] == self.fields.steps[index])
         row = {name: float(self.columns[name][rows[-1]]) if rows.size else np.nan for name in LeakInstant._fields[1:3]}
         return LeakInstant(
@@ -154,7 +156,7 @@ class Gaps:
             found.along_x.constriction,
             found.along_y.constriction,
             *solved.errors,
-            solved.rates[int(found.along_y.constriction > found.along_x.constriction)],
+            *flows,
         )
 
 
@@ -181,7 +183,8 @@ def write(directory: Path, at: str, over: str, comm: MPI.Intracomm, drop: Pressu
     leakage.draw(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
     yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
     yield from (text for axis in "xy" for text in _describe(rows, axis))
-    yield from _describe_fluid(gaps, rows[-1], leaks[gaps.shown[-1]]) if drop else ()
+    told = max((k for k, row in enumerate(rows) if row.percolates_x + row.percolates_y), default=len(rows) - 1)
+    yield from _describe_fluid(gaps, rows[told], leaks[gaps.shown[told]]) if drop else ()
     yield from _describe_missing(gaps, at)
     if missing:
         yield f"share_x and share_y are left empty, as the undeformed surface cannot be made: {missing}"
@@ -233,13 +236,13 @@ def _describe(rows: Sequence[LeakInstant], axis: str) -> Iterator[str]:
 
 
 def _describe_fluid(gaps: Gaps, last: LeakInstant, solved: SolvedLeak) -> Iterator[str]:
-    """Say how much of the fluid flows at the last instant, and where it is no continuum."""
+    """Say how much of the fluid flows at the last instant with a flow, and where it is no continuum."""
     drop = gaps.drop
     assert drop is not None
     pressures = f"from {quantity(drop.high, 'Pa')} to {quantity(drop.low, 'Pa')}"
-    for axis, rate, size in zip("xy", solved.rates, (gaps.size, gaps.size[::-1]), strict=True):
+    for axis, through, size in zip("xy", solved.of_fluid, (gaps.size, gaps.size[::-1]), strict=True):
         box = f"a length of {quantity(size[0], 'm')} and a width of {quantity(size[1], 'm')}"
-        flows = f"along {axis} {drop.describe_rate(rate)} at the low side, over {box}"
+        flows = f"along {axis} {drop.describe_rate(through, *size)}, over {box}"
         yield f"{drop.fluid.name} {pressures} at t = {quantity(last.time, 's')}: {flows}"
         narrow, path = getattr(last, f"constriction_{axis}"), drop.mean_free_path
         if 0.0 < narrow < path:

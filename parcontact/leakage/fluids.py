@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 GAS_CONSTANT = 8.31446261815324  # physics: [J/(mol K)]
+BAR = 1.0e5  # [Pa]
 ROOM = 293.15  # physics: temperature of the table [K]
 
 
@@ -74,14 +75,25 @@ class PressureDrop:
         return np.cbrt(gap**2 * (gap + 6.0 * path))
 
     def flow_rate(self, conductivity: float, length: float, width: float) -> float:
-        """Return the flow [m^3/s] at the low side through a conductivity [m^3] over a length and a width [m]."""
+        """Return the flow [m^3/s] at the low side through a conductivity [m^3] over a length and a width [m]; NaN of a
+        gas that flows into a vacuum, where it has no end."""
         drive = self.high - self.low
         if self.fluid.molar_mass is not None:
-            drive *= 0.5 * (self.high + self.low) / self.low
+            drive = drive * 0.5 * (self.high + self.low) / self.low if self.low else math.nan
         return conductivity / (12.0 * self.fluid.viscosity) * drive * width / length
 
-    def describe_rate(self, rate: float) -> str:
-        """Return a flow [m^3/s] at the low side in m^3/s, ml/h and, where the density is known, mg/s."""
-        density = self.fluid.density_at(self.low)
-        mass = "" if math.isnan(density) else f", {1e6 * density * rate:.3g} mg/s"
-        return f"{rate:.3g} m³/s ({3.6e9 * rate:.3g} ml/h{mass})"
+    def mass_flow(self, conductivity: float, length: float, width: float) -> float:
+        """Return the flow [kg/s] through a conductivity [m^3] over a length and a width [m]; NaN where no density is
+        known."""
+        mean = self.fluid.density_at(0.5 * (self.high + self.low))
+        return conductivity / (12.0 * self.fluid.viscosity) * (self.high - self.low) * mean * width / length
+
+    def describe_rate(self, conductivity: float, length: float, width: float) -> str:
+        """Return the flow through a conductivity [m^3] over a length and a width [m]: in ml/h at the low side, of a gas
+        at 1 bar too, and in mg/s where the density is known."""
+        rate, mass = (flow(conductivity, length, width) for flow in (self.flow_rate, self.mass_flow))
+        said = [] if math.isnan(rate) else [f"{rate:.3g} m³/s ({3.6e9 * rate:.3g} ml/h) at the low side"]
+        said += [] if math.isnan(mass) else [f"{1e6 * mass:.3g} mg/s"]
+        if self.fluid.molar_mass is not None and self.low != BAR:
+            said.append(f"{3.6e9 * mass / self.fluid.density_at(BAR):.3g} ml/h of gas at 1 bar")
+        return ", ".join(said)

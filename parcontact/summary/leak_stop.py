@@ -30,7 +30,7 @@ def describe(directory: Path) -> list[str]:
 def describe_axis(columns: Columns, axis: str) -> str:
     """Return how leakage along an axis goes over the rows of a table: `stops between 1.05 and 1.10 MPa`; '' where no
     row has it."""
-    flows, pressures, times = (columns.get(name, ()) for name in (f"flow_{axis}", "pressure", "time"))
+    flows, pressures = (columns.get(name, ()) for name in (f"flow_{axis}", "pressure"))
     pairs = enumerate(zip(flows, pressures, strict=False))
     known = [row for row, pair in pairs if not any(map(math.isnan, pair))]
     stopped = next((place for place, row in enumerate(known) if flows[row] == 0.0), None)
@@ -38,9 +38,16 @@ def describe_axis(columns: Columns, axis: str) -> str:
         return ""
     if stopped is None:
         return f"does not stop, up to {quantity(max(pressures[row] for row in known), 'Pa')}"
-    row, before = known[stopped], known[max(stopped - 1, 0)]
+    closed = max(place for place, row in enumerate(known) if flows[row] == 0.0)
+    opens = f", and begins again {_between(columns, *known[closed : closed + 2])}" if known[closed + 1 :] else ""
     if stopped == 0:
-        return f"has stopped at the first instant, under {quantity(pressures[row], 'Pa')}"
-    if pressures[before] < pressures[row]:
-        return f"stops between {span(pressures[before], pressures[row], 'Pa')}"
-    return f"stops between {span(times[before], times[row], 's')}, under {quantity(pressures[row], 'Pa')}"
+        return f"has stopped at the first instant, under {quantity(pressures[known[0]], 'Pa')}{opens}"
+    return f"stops {_between(columns, *known[stopped - 1 : stopped + 1])}{opens}"
+
+
+def _between(columns: Columns, before: int, after: int) -> str:
+    """Return between which pressures two rows are; between which times, where the pressure stays."""
+    ends = columns["pressure"][before], columns["pressure"][after]
+    if ends[0] != ends[1]:
+        return f"between {span(min(ends), max(ends), 'Pa')}"
+    return f"between {span(columns['time'][before], columns['time'][after], 's')}, under {quantity(ends[1], 'Pa')}"

@@ -194,11 +194,18 @@ def test_mean_free_paths(name: str, path: float) -> None:
 
 
 def test_masses() -> None:
-    """Dry air at 20 C and 1 bar has 1.189 kg/m^3; 1e-9 m^3/s of it are 1.189e-3 mg/s, and 3.6 ml/h."""
-    drop = PressureDrop(FLUIDS["air"], 2e5, 1e5)
-    assert FLUIDS["air"].density_at(1e5) == pytest.approx(1.189, rel=1e-3)
-    assert drop.describe_rate(1e-9) == "1e-09 m³/s (3.6 ml/h, 0.00119 mg/s)"
-    assert math.isnan(Fluid("oil", 0.1).density_at(1e5))
+    """Dry air at 20 C and 1 bar has 1.189 kg/m^3; 1e-9 m^3/s of it are 1.189e-3 mg/s, and 3.6 ml/h. Into a vacuum the
+    mass is that of p1^2, though no volume is; a flow has one mass at both ends."""
+    air, oil = FLUIDS["air"], Fluid("oil", 0.1)
+    drop, vacuum = PressureDrop(air, 2e5, 1e5), PressureDrop(air, 2e5, 0.0)
+    assert air.density_at(1e5) == pytest.approx(1.189, rel=1e-3)
+    through = 1e-9 / drop.flow_rate(1.0, *SIZE), *SIZE
+    assert drop.describe_rate(*through) == "1e-09 m³/s (3.6 ml/h) at the low side, 0.00119 mg/s"
+    assert drop.mass_flow(*through) == pytest.approx(air.density_at(1e5) * drop.flow_rate(*through), rel=1e-14)
+    assert vacuum.mass_flow(*through) == pytest.approx(4 / 3 * drop.mass_flow(*through), rel=1e-14)
+    assert vacuum.describe_rate(*through) == "0.00158 mg/s, 4.8 ml/h of gas at 1 bar"
+    assert PressureDrop(oil, 2e5, 0.0).describe_rate(*through).endswith("ml/h) at the low side")
+    assert math.isnan(oil.density_at(1e5))
 
 
 # -- connected cells and critical constrictions against a search that grows from the first row ------------------------

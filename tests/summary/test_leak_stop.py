@@ -55,6 +55,16 @@ def test_waves_close_at_the_pressure_of_full_contact(tmp_path: Path, capsys: pyt
         ([3e-18, 0.0], [1e6, 1e6], "stops between 1 and 2 h, under 1 MPa"),
         ([math.nan, 3e-18, math.nan, 0.0], [1.0e6, 1.04e6, 1.05e6, 1.1e6], "stops between 1.04 and 1.10 MPa"),
         ([3e-18, 0.0, 2e-18, 0.0], [1e6, 2e6, 1e6, 3e6], "stops between 1 and 2 MPa"),
+        (
+            [3e-18, 0.0, 0.0, 2e-18],
+            [1e6, 2e6, 3e5, 2e5],
+            "stops between 1 and 2 MPa, and begins again between 200 and 300 kPa",
+        ),
+        (
+            [0.0, 2e-18],
+            [1e6, 1e6],
+            "has stopped at the first instant, under 1 MPa, and begins again between 1 and 2 h, under 1 MPa",
+        ),
         ([0.0, 0.0], [1e6, 2e6], "has stopped at the first instant, under 1 MPa"),
         ([3e-18, 1e-18], [2e6, 1e6], "does not stop, up to 2 MPa"),
         ([math.nan, math.nan], [1e6, 2e6], ""),
