@@ -29,7 +29,7 @@ from .limits import STRAIN
 MOST_ROUNDS = 20  # tuning: of temperatures, more than any case has needed
 LEAST_ERROR, RELATIVE = 0.1, 0.02  # accuracy: of the rise of a band [K], and relative
 HARD_SHARE = 0.25  # accuracy: of the difference to hard walls, all of profiles; found on 17 cases with the next one
-LEAST_METHOD = 0.03  # accuracy: relative; both were chosen on 26 cases (`scripts/band_errors.py`), 102 of 104
+LEAST_METHOD = 0.03  # accuracy: relative; chosen on 26 cases (`scripts/band_errors.py`), covers 99 of 104 of others
 NEARLY_ALL = 0.1  # accuracy: of the area; where less is not in contact, errors go to 0 with it
 SURE = 2.0  # accuracy: standard errors of the scatter of surfaces that count as an error
 TABLE = "bands.csv"

@@ -15,11 +15,12 @@ from parcontact.bands.band import Band, Rung
 from parcontact.bands.band_heat import uniform, waves_along_depth
 from parcontact.bands.cascade import Cascade, mean_rungs
 from parcontact.bands.choice import choose
+from parcontact.bands.ladder import PressureLadder
 from parcontact.bands.road_sliding import RoadSliding
 from parcontact.bands.wave_spectrum import spectrum_of
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import JobError
-from parcontact.parallel.slab import Slab
+from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.heat import Conductor
 from parcontact.physics.prony import complex_modulus
 from parcontact.scene import set_up
@@ -285,3 +286,27 @@ def test_elastic_contact_in_two_bands(pressure: float) -> None:
     assert two.measures.mean_gap == pytest.approx(one.measures.mean_gap, rel=0.01)
     assert two.friction == one.friction == 0.0
     assert two.errors.friction is None
+
+
+def test_weights_of_a_ladder() -> None:
+    """They keep the load, also beyond both ends, to rounding; f(p) = p times a cubic in log p is right in between, and
+    f(p)/p is level beyond."""
+    ladder = PressureLadder.over(1e5, 3e5)
+    rungs = ladder.rungs
+    chance = np.random.default_rng(1)
+    inside = np.asarray(rungs[0] * (rungs[-1] / rungs[0]) ** chance.random((20, 20)), np.float64)
+    weights, above = ladder.weigh(inside)
+    assert above == 0.0
+    assert weights @ rungs == pytest.approx(inside.mean(), rel=1e-14)
+
+    def cubic(p: Array) -> Array:
+        x = np.log(p / 1e5)
+        return np.asarray(p * (2.0 - 0.3 * x + 0.1 * x**2 + 0.05 * x**3))
+
+    assert weights @ cubic(rungs) == pytest.approx(cubic(inside).mean(), rel=1e-12)
+    beyond = np.array([[0.0, 0.1 * rungs[0], 2.0 * rungs[-1], rungs[3]]])
+    weights, above = ladder.weigh(beyond)
+    assert weights @ rungs == pytest.approx(beyond.mean(), rel=1e-14)
+    level = 0.1 * cubic(rungs[:1]).sum() + 2.0 * cubic(rungs[-1:]).sum() + cubic(rungs[3:4]).sum()
+    assert weights @ cubic(rungs) == pytest.approx(level / 4, rel=1e-12)
+    assert above == pytest.approx(2.0 * rungs[-1] / beyond.sum(), rel=1e-14)
