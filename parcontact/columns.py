@@ -267,16 +267,12 @@ STEADY: Table = (  # of `steady_sliding.point.Point`
     Column("seconds", "s", "wall time", lambda point: round(point.seconds, 3)),
     Column(PER_BRANCH, "W", "power that branch K dissipates", attrgetter("dissipated")),
     Column(
-        *("friction_x", ""),
-        "signed friction along x",
-        lambda point: point.friction * (point.velocity[0] / point.speed),
+        *("friction_x", ""), "signed friction along x", lambda point: point.friction * (point.velocity[0] / point.speed)
     ),
     CORRECTED,
     Column("temperature", "°C", "of the point (with `temperatures`)", when="temperatures"),
     Column(
-        *("shift_factor", ""),
-        "relaxation times over those at the reference (with `temperatures`)",
-        when="temperatures",
+        *("shift_factor", ""), "relaxation times over those at the reference (with `temperatures`)", when="temperatures"
     ),
     Column(
         *("friction_viscous", ""),
@@ -430,11 +426,7 @@ SWEEP: Table = tuple(
             "with adhesion: force of the last pull-off, empty where contact holds ({doc}`adhesion`)",
             when="adhesion",
         ),
-        Column(
-            *("pull_off_error", "N"),
-            "error of it by the steps and the solves",
-            when="adhesion",
-        ),
+        Column(*("pull_off_error", "N"), "error of it by the steps and the solves", when="adhesion"),
         Column("pull_off_approach", "m", "approach at it", when="adhesion"),
         Column("dissipated", "J", "with `output.energy`: dissipated energy in the end", when="output.energy"),
         Column("flow_x", "m³", "with `leakage`: K along x, the last one that was calculated", when="leakage"),
@@ -464,8 +456,7 @@ STUDY: Table = (
     Column("transform_work", "", "transforms times N log2 N of their N points"),
     Column("cpu_seconds", "s", "of all ranks"),
     Column(
-        *("error_mu_max", ""),
-        "relative, over the extrapolated limit; empty where nothing slides, as `error_mu_end`",
+        *("error_mu_max", ""), "relative, over the extrapolated limit; empty where nothing slides, as `error_mu_end`"
     ),
     Column("error_mu_end", "", "relative, over the extrapolated limit"),
     Column("error_area", "", "relative, over the extrapolated limit"),

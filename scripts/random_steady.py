@@ -70,12 +70,7 @@ def trial(asked: Any, counts: Counter[str], calls: list[float], number: int) -> 
 
 
 def main() -> int:
-    options = campaign.parser(
-        __doc__,
-        trials=200,
-        what="bodies",
-        most=(600.0, "operator calls"),
-    )
+    options = campaign.parser(__doc__, trials=200, what="bodies", most=(600.0, "operator calls"))
     options.set_defaults(seed=1)
     asked, counts, calls = options.parse_args(), Counter[str](), list[float]()
     faulty = campaign.go(asked, partial(trial, asked, counts, calls), counts)

@@ -58,12 +58,7 @@ def high_load_contact_fraction(
 
 
 def full_contact_pressure_field(
-    x: Values,
-    y: Values,
-    mean_pressure: Values,
-    amplitude: Values,
-    wavelength: Values,
-    shear_modulus: Values,
+    x: Values, y: Values, mean_pressure: Values, amplitude: Values, wavelength: Values, shear_modulus: Values
 ) -> Array:
     """p + p* cos(2 pi x/lambda) cos(2 pi y/lambda) in Pa, the exact pressure wherever the mean pressure p >= p*."""
     k = 2 * np.pi / wavelength

@@ -29,10 +29,7 @@ ELASTIC = {"model": "elastic", "shear_modulus": 1e6}
 ZENER = {
     "model": "zener",
     "modulus_inf": 1e6,
-    "branches": [
-        {"modulus": 2e6, "relaxation_time": 1e-3},
-        {"G0": 1e6, "G1": 5e5, "eta1": 20.0},
-    ],
+    "branches": [{"modulus": 2e6, "relaxation_time": 1e-3}, {"G0": 1e6, "G1": 5e5, "eta1": 20.0}],
 }
 PRESS = {"name": "press", "pressure": 1e5, "duration": 1e-3, "time_step": {"first": 1e-4, "growth": 2.0}}
 SLIDE = {"name": "slide", "pressure": 1e5, "velocity": 0.2, "distance": 2e-4, "cells_per_step": 1}

@@ -13,9 +13,7 @@ ZENER = Prony(0.275e6, np.array([2.475e6]), np.array([1e-3]))
 
 # twelve decades, made up; no measured rubber
 TWELVE_DECADES = Prony(
-    1e6,
-    1e6 * np.array([300, 350, 220, 80, 24, 7, 2.4, 1.0, 0.5, 0.3, 0.2, 0.15]),
-    5 * np.logspace(-9, 2, 12),
+    1e6, 1e6 * np.array([300, 350, 220, 80, 24, 7, 2.4, 1.0, 0.5, 0.3, 0.2, 0.15]), 5 * np.logspace(-9, 2, 12)
 )
 
 

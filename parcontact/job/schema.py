@@ -24,17 +24,7 @@ from . import added_sections
 from .model import Job, extended
 from .sections.materials import Dma, Elastic, Zener
 from .sections.part import Part, kind_key, literal_words
-from .sections.quantities import (
-    AUTO_POINTS,
-    FROM_SURFACE,
-    LARGEST,
-    MOST,
-    along_x,
-    both,
-    bounded,
-    countable,
-    listed,
-)
+from .sections.quantities import AUTO_POINTS, FROM_SURFACE, LARGEST, MOST, along_x, both, bounded, countable, listed
 from .sections.stages import numbers
 from .text.fault import choices
 

@@ -161,12 +161,7 @@ class ZenerBody:
     """
 
     def __init__(
-        self,
-        slab: Slab,
-        prony: Prony,
-        integrator: str,
-        memoryless: Collection[int] = (),
-        frozen: Collection[int] = (),
+        self, slab: Slab, prony: Prony, integrator: str, memoryless: Collection[int] = (), frozen: Collection[int] = ()
     ) -> None:
         self.slab, self.prony, self.integrator = slab, prony, integrator
         self._cold = prony.relaxation_times

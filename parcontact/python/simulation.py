@@ -173,10 +173,7 @@ class Simulation:
 
     @classmethod
     def restore(
-        cls,
-        path: str | os.PathLike[str],
-        set: Mapping[str, Any] | None = None,
-        comm: MPI.Intracomm | None = None,
+        cls, path: str | os.PathLike[str], set: Mapping[str, Any] | None = None, comm: MPI.Intracomm | None = None
     ) -> Simulation:
         """Go on from a checkpoint, in memory unless `set` names `output.directory`.
 

@@ -36,10 +36,7 @@ def costs(table: Path, found: log.Log, job: Job) -> Iterator[ReportSection]:
 
 
 def describe_errors(
-    columns: Mapping[str, Sequence[float]],
-    estimates: Sequence[log.LoggedEstimate],
-    job: Job,
-    of_curve: bool,
+    columns: Mapping[str, Sequence[float]], estimates: Sequence[log.LoggedEstimate], job: Job, of_curve: bool
 ) -> ReportSection:
     """Return nothing for a table without errors, else those of the points of a friction curve, or of the means over a
     run and of its steps. The log has the parts: of a curve those of the worst point, if that misses the accuracy."""

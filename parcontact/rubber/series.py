@@ -155,10 +155,7 @@ class ReducedData:
 
 
 def reduce_sets(
-    sets: Sequence[Set],
-    kind: Kind,
-    logs: tuple[Sequence[float], Sequence[float]] | None = None,
-    weigh: Weigh = "both",
+    sets: Sequence[Set], kind: Kind, logs: tuple[Sequence[float], Sequence[float]] | None = None, weigh: Weigh = "both"
 ) -> ReducedData:
     """Return the data of all sets at one temperature; `logs` are log10 of a_T and of b_T of each set."""
     sign, (horizontal, vertical) = 1.0 if kind == "frequency" else -1.0, logs or [[0.0] * len(sets)] * 2

@@ -107,10 +107,7 @@ def test_ranks_agree() -> None:
     assert together.rows((0.1, 0.0)) == [pytest.approx(row, rel=1e-9, nan_ok=True) for row in alone.rows((0.1, 0.0))]
 
 
-SHIFTED = {
-    "include": "synthetic_tyre",
-    "shift": {"law": "wlf", "C1": 8.86, "C2": 101.6, "reference": 20.0},
-}
+SHIFTED = {"include": "synthetic_tyre", "shift": {"law": "wlf", "C1": 8.86, "C2": 101.6, "reference": 20.0}}
 THERMAL = {"conductivity": 0.2, "diffusivity": 1e-7, "distance": 0.02}
 
 

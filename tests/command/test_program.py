@@ -48,7 +48,7 @@ def test_from_job_to_result(run_parcontact: RunParcontact, tmp_path: Path) -> No
     out = tmp_path / "out" / "job"
     assert [int(row["step"]) for row in measures(out)] == list(range(STEPS + 1))
     assert {path.name for path in out.iterdir()} == {
-        *("measures.csv", "run.log", "job.yaml", "job.resolved.yaml", "checkpoint", ".parcontact"),
+        *("measures.csv", "run.log", "job.yaml", "job.resolved.yaml", "checkpoint", ".parcontact")
     }
     again = run_parcontact(["job.yaml"], ranks=2)
     assert again.returncode == 0

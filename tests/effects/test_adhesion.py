@@ -240,6 +240,7 @@ def test_neighbours_make_a_sphere_blunter_or_sharper_as_told() -> None:
 
 # -- full contact -----------------------------------------------------------------------------------------------------
 
+
 def test_approaches_beyond_full_contact_are_refused_before_the_first_step() -> None:
     """A sphere in a periodic box closes when its mean is at the level of the body: at `L^2 (1 + 2/n^2)/(12 R)` for the
     mean of r^2/(2 R) over n points a side of a box L."""

@@ -26,10 +26,7 @@ CELL = 1e-3 / POINTS
 WAVES = {"shape": "wave", "amplitude": 2e-6, "waves": [2, 1]}
 PRESS = {"name": "press", "pressure": 1e4, "duration": 5e-3}
 SLIDE = {"name": "slide", "pressure": 1e4, "velocity": 0.1, "distance": 6.5 * CELL}
-STEADY = {
-    "initial": {"state": "steady", "velocity": 0.1, "pressure": 1e4},
-    "history": [SLIDE],
-}
+STEADY = {"initial": {"state": "steady", "velocity": 0.1, "pressure": 1e4}, "history": [SLIDE]}
 LIFT = {"name": "lift", "pressure": {"from": 1e4, "to": 2e3}, "velocity": 0.1, "distance": 3 * CELL}
 
 

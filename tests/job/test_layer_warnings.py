@@ -35,13 +35,7 @@ def test_a_layer_thinner_than_two_cells() -> None:
 
 @pytest.mark.parametrize(
     ("surface", "height"),
-    [
-        ([{**WAVE, "amplitude": 2e-5}], math.sqrt(2) * 2e-5),
-        (
-            [{**ROUGH, "rms_height": 1e-5}],
-            2e-5,
-        ),
-    ],
+    [([{**WAVE, "amplitude": 2e-5}], math.sqrt(2) * 2e-5), ([{**ROUGH, "rms_height": 1e-5}], 2e-5)],
 )
 def test_a_surface_higher_than_a_third_of_the_layer(surface: Any, height: float) -> None:
     """The height is twice the rms height, which no wave and no roughness is lower than."""

@@ -63,10 +63,7 @@ def test_text_that_cannot_be_read(text: str | bytes, mistake: str) -> None:
         ("1: x", "6:1: a key must be a word, got '1'"),
         ("body: {thickness: 1,0e-3}", "6:21: a key must be a word, got '0e-3'; write decimals with a point"),
         ("body: {thickness: 1,02}", "6:21: a key must be a word, got '02'; write decimals with a point"),
-        (
-            "body: {thickness: 1 mm}",
-            "6:19: body.thickness must be a positive thickness [m], got '1 mm'; write 1.0e-3",
-        ),
+        ("body: {thickness: 1 mm}", "6:19: body.thickness must be a positive thickness [m], got '1 mm'; write 1.0e-3"),
         ("? [a]\n: x", "6:3: a key must be a word, got a list or a mapping"),
         ("<<: 3", "6:5: << takes a mapping, or a list of mappings"),
     ],

@@ -89,12 +89,13 @@ def test_the_page_on_python_is_text() -> None:
     for method in ("steps()", "run(restart='auto', quiet=True)", "row", "restore(path, set=None, comm=None)"):
         assert f"\n### {method}\n\n" in text
     assert re.findall(r"^### (.*)", text.partition("## Material")[2], re.MULTILINE) == [
-        *("complex_modulus(omega)", "relaxation(t)", "creep(t)"),
+        *("complex_modulus(omega)", "relaxation(t)", "creep(t)")
     ]
     assert "{eval-rst}" not in text
 
 
 # -- keys ------------------------------------------------------------------------------------------------------------
+
 
 def test_every_key_has_its_meaning() -> None:
     """A key that was added needs a line in parcontact/manual/keys.yaml: [meaning, example]."""
@@ -132,6 +133,7 @@ def test_the_page_has_range_unit_and_default() -> None:
 
 # -- columns ---------------------------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize("file", TABLES)
 def test_every_table_is_on_its_page(file: str) -> None:
     """The page has a section for each table, with all of its columns."""
@@ -141,6 +143,7 @@ def test_every_table_is_on_its_page(file: str) -> None:
 
 
 # -- blocks ----------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize(("language", "name", "index"), BLOCKS)
 def test_a_block(language: str, name: str, index: int, elsewhere: Path) -> None:
@@ -203,6 +206,7 @@ def run_code(pieces: list[str]) -> None:
 
 # -- verbs -----------------------------------------------------------------------------------------------------------
 
+
 def test_printing_pages(capsys: pytest.CaptureFixture[str]) -> None:
     assert __main__.main(["manual"]) == 0
     assert "outputs" in capsys.readouterr().out
@@ -213,6 +217,7 @@ def test_printing_pages(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 # -- gallery ---------------------------------------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize("path", sorted((ROOT / "jobs").glob("*.yaml")), ids=lambda path: path.stem)
 def test_the_picture_of_a_job_is_of_this_job(path: Path) -> None:

@@ -17,10 +17,7 @@ HEAD = (
 
 
 def curve(
-    directory: Path,
-    scene: str = WAVE,
-    pressures: tuple[float, ...] = (1e3,),
-    degrees: tuple[float, ...] = (20.0,),
+    directory: Path, scene: str = WAVE, pressures: tuple[float, ...] = (1e3,), degrees: tuple[float, ...] = (20.0,)
 ) -> Path:
     """A directory with three speeds at each pressure and temperature, whose areas are 0.2, corrected 0.15 ± 10 %."""
     rows = [
@@ -62,10 +59,7 @@ def test_errors_and_the_corrected_area(tmp_path: Path, drawn: list[Figure]) -> N
     friction, area = drawn[0].axes
     (line,) = area.get_lines()[:1]
     assert line.get_ydata() == pytest.approx([0.15, 0.15, 0.15])
-    for axes, expected in (
-        (friction, [(0.095, 0.105), (0.001, 0.3), (0.1, 0.1)]),
-        (area, [(0.135, 0.165)] * 3),
-    ):
+    for axes, expected in ((friction, [(0.095, 0.105), (0.001, 0.3), (0.1, 0.1)]), (area, [(0.135, 0.165)] * 3)):
         (bars,) = (one for one in axes.collections if isinstance(one, LineCollection))
         ends = [(low, high) for (_, low), (_, high) in bars.get_segments()]
         assert np.allclose(ends, expected)

@@ -15,11 +15,7 @@ X, Y = np.meshgrid(np.linspace(-1.0, 1.0, 128), np.linspace(-1.0, 1.0, 128))
 
 @pytest.mark.parametrize(
     ("detrend", "trend"),
-    [
-        ("mean", [3e-6]),
-        ("tilt", [3e-6, 2e-5, -1e-5]),
-        ("curvature", [3e-6, 2e-5, -1e-5, 4e-6, 5e-6, -6e-6]),
-    ],
+    [("mean", [3e-6]), ("tilt", [3e-6, 2e-5, -1e-5]), ("curvature", [3e-6, 2e-5, -1e-5, 4e-6, 5e-6, -6e-6])],
 )
 def test_a_trend_is_found_and_taken_off(detrend: str, trend: list[float]) -> None:
     """Exactly, where nothing else is there and a tenth of the points is missing."""

@@ -386,11 +386,7 @@ def test_energies_of_a_contact_that_comes_about_follow_the_accuracy(accuracy: fl
 # -- what adhesion costs: operator calls of steps with it, over those of the same steps without -----------------------
 
 SIZE, POINTS, SLOPE = 1e-4, 128, 0.1
-RUBBER: Job = {
-    "model": "zener",
-    "modulus_inf": MODULUS / 4,
-    "branches": [{"modulus": 9e6, "relaxation_time": 1.0}],
-}
+RUBBER: Job = {"model": "zener", "modulus_inf": MODULUS / 4, "branches": [{"modulus": 9e6, "relaxation_time": 1.0}]}
 
 
 def counted(job: Job) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -413,12 +413,7 @@ def calls_per_step(points: int, history: list[Json], tolerance: float = 5e-3) ->
 
 @pytest.mark.parametrize(
     ("most", "change"),
-    [
-        (11, {}),
-        (11, {"velocity": [0.0, 0.3]}),
-        (13, {"cells_per_step": 0.25}),
-        (15, {"velocity": [0.2, 0.2]}),
-    ],
+    [(11, {}), (11, {"velocity": [0.0, 0.3]}), (13, {"cells_per_step": 0.25}), (15, {"velocity": [0.2, 0.2]})],
 )
 def test_warm_starts_save_work(most: float, change: Json) -> None:
     """A start that moves with the surface and is extrapolated: 9, 9, 10 and 13 operator applications are measured."""

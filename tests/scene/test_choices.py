@@ -86,11 +86,7 @@ ROWS: dict[str, tuple[Json, Json, dict[str, int] | None]] = {  # off, on, and wh
         {"history": [PRESS], "material": RUBBER, "numerics": {"kernel": "love"}, "output": {"energy": True}},
         {"allreduce": 5, "map bytes": 4 * MAP},
     ),
-    "preconditioner in single precision": (
-        {},
-        {"numerics": {"precision": "mixed"}},
-        None,
-    ),
+    "preconditioner in single precision": ({}, {"numerics": {"precision": "mixed"}}, None),
     "operator in single precision": (
         {"numerics": {"precision": "mixed", "tolerance": 0.99e-3}},
         {"numerics": {"precision": "mixed", "tolerance": 1e-3}},
@@ -158,11 +154,7 @@ def test_single_operator(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(
     ("changes", "on"),
-    [
-        ({"precision": "mixed"}, True),
-        ({"precision": "double"}, False),
-        ({"precision": "mixed", "energy": True}, False),
-    ],
+    [({"precision": "mixed"}, True), ({"precision": "double"}, False), ({"precision": "mixed", "energy": True}, False)],
 )
 def test_operator_of_very_loose_solves(changes: Json, on: bool) -> None:
     """In single precision only where that is asked for, and no energies are balanced."""

@@ -400,25 +400,6 @@ def test_points_left_out_are_taken_in_again(shared_path: Path, comm: MPI.Intraco
         )
 
 
-@pytest.mark.mpi
-def test_what_is_taken_in(shared_path: Path, comm: MPI.Intracomm) -> None:
-    """The points within the given distance of the surface, and none is taken out."""
-    states, pressure = cylinder_on(shared_path, comm, 10.0, 30.0)
-    velocity = (LINE / CREEP_TIME, 0.0)
-    states.solve(velocity, pressure)
-    level, contact = states.levels[0], states.contact
-    assert contact is not None
-    solver, _ = states._solver(level, velocity)
-    solver._u[...] = contact.u
-    gap = contact.u - level.heights - contact.d
-    distance = 0.1 * solver.height
-    solver._working[...] = (contact.p > 0.0) & (np.arange(level.slab.nx) % 3 > 0)
-    before = solver._working.copy()
-    solver._take_in(level.heights, distance)
-    sure = np.abs(gap - distance) > 1e-5 * solver.height  # by the tolerance the gap is not closed on the set
-    np.testing.assert_array_equal((solver._working == before | (gap <= distance))[sure], True)
-
-
 # -- a steady start holds what is planned, and comes before the maps of the march; a start at rest --------------------
 
 Json = dict[str, Any]

@@ -7,15 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Field,
-    PlainValidator,
-    PrivateAttr,
-    TypeAdapter,
-    ValidationInfo,
-)
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, PrivateAttr, TypeAdapter, ValidationInfo
 
 from ..text.fault import Fault, did_you_mean, quote, refuse
 from .part import Instead, Origin, Part, Rule

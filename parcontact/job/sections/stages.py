@@ -102,8 +102,7 @@ def _time_step(value: Any, info: ValidationInfo) -> float | GeometricStep | Auto
 
 
 TimeStep = Annotated[
-    float | GeometricStep | Auto,
-    PlainValidator(_time_step, json_schema_input_type=Positive | GeometricStep | Auto),
+    float | GeometricStep | Auto, PlainValidator(_time_step, json_schema_input_type=Positive | GeometricStep | Auto)
 ]
 
 

@@ -17,10 +17,7 @@ from .quantities import NonNegative, Positive, Real
 
 LOWEST, HIGHEST = -273.15, 5000.0  # physics: deg C
 LARGEST_SHIFT = 60.0  # accuracy: log10 of a_T, either way: relaxation times remain numbers that can be computed with
-Celsius = Annotated[
-    Real,
-    Field(gt=LOWEST, le=HIGHEST, description="a temperature [deg C], up to 5000"),
-]
+Celsius = Annotated[Real, Field(gt=LOWEST, le=HIGHEST, description="a temperature [deg C], up to 5000")]
 
 
 def _rising(

@@ -44,14 +44,7 @@ class StickingSolver:
     free: Operator | None = None
 
     def solve(
-        self,
-        law: Law,
-        heights: Array,
-        control: Control,
-        gap: Array,
-        lag: Array | None,
-        out: Array,
-        loose: float = 1.0,
+        self, law: Law, heights: Array, control: Control, gap: Array, lag: Array | None, out: Array, loose: float = 1.0
     ) -> tuple[Contact, bool]:
         """Solve from a gap, in whose place the solution will be, and put the pressure into `out`; collective.
 
