@@ -30,10 +30,10 @@ checkpoint, run again"""
 Add = Callable[..., Any]  # argparse's add_argument of one verb
 
 
-def _job(add: Add, text: str = "job file (YAML)") -> None:
+def _job(add: Add, text: str = "job file (YAML)", out: tuple[str, str] = ("DIR", "output directory")) -> None:
     add("job", help=text)
     add("--set", metavar="KEY=VALUE", action="append", default=[], help="override a key of the job")
-    add("--out", metavar="DIR", type=values.directory, help="output directory")
+    add("--out", metavar=out[0], type=values.directory, help=out[1])
     text = "one case of the job's sweep, from 0 (default: all)"
     add("--case", metavar="I", type=values.natural, help=text)
 
@@ -104,7 +104,8 @@ def _fit(add: Add) -> None:
 
 
 def _surface(add: Add) -> None:
-    _job(add, "job file (YAML), or a measured map; of one without unit: --set surface.unit=um ...")
+    text = "job file (YAML), or a measured map; of one without unit: --set surface.unit=um ..."
+    _job(add, text, ("FILE", "the picture: .png, .pdf or .svg"))
     add("--job", dest="start", metavar="FILE", type=Path, help="write a job to start from (of a map)")
 
 

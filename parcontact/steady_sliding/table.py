@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from .. import progress
 from ..accuracy.budget import advice, describe, exceeds
@@ -11,6 +12,7 @@ from ..doubts import Doubt
 from ..job import Job
 from ..job.checks.advice import describe_sample
 from ..job.sections.materials import describe_temperature
+from ..printed import per_cent
 from ..scene import Setup
 from ..storage import curve_points, files, tables
 from ..storage.console import Console, always
@@ -21,6 +23,13 @@ from .point import Point
 
 WAVES = ("steady_waves.csv", names_of(STEADY_WAVES))  # a further table
 HEAD = "velocity [m/s]    load [Pa] corr.area  error  friction  error  calls  residual"  # the area as corrected
+
+
+class EarlierPoint(NamedTuple):
+    """A point that an earlier run has solved, and its relative errors of friction and of the corrected area."""
+
+    at: Wanted
+    errors: tuple[float, float]
 
 
 class CurveTable:
@@ -130,7 +139,7 @@ class CurveTable:
         if self.known:
             self._sort()
         hot = *describe_hot(self._points), *describe_unmeasured(self._points, self._job)
-        for warning in (*hot, *describe_missed(self._points, self._job)):
+        for warning in (*hot, *describe_missed(self._points, self._job, self._earlier())):
             self._console.warn(warning)
         if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
             self.say(text)
@@ -139,6 +148,15 @@ class CurveTable:
         picture = plots.draw_steady(self.path)
         failed = f"parcontact: {failures} of the points could not be solved; {self.path} has the others"
         self.say(failed if failures else f"done: {self.path} and {picture}")
+
+    def _earlier(self) -> list[EarlierPoint]:
+        """Return the points that were there before."""
+        if not self.known:
+            return []
+        columns = tables.read_columns(self.path)
+        errors = zip(columns["error_friction"], columns["error_area"], strict=True)
+        there = map(EarlierPoint, curve_points.of_table(columns), errors)
+        return [one for one in there if not curve_points.lacking([one.at], self.known)]
 
     def _sort(self) -> None:
         """Sort the lines by temperature, then by pressure, then by speed."""
@@ -158,22 +176,27 @@ class CurveTable:
             self._further.close()
 
 
-def describe_missed(points: Sequence[Point], job: Job) -> Iterator[str]:
+def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[str]:
     """Yield a sentence for friction and one for the corrected area, as far as points are more wrong than the job asks
-    for."""
+    for, also `earlier` ones, of which the parts of the error are not known."""
     chosen = ["solver"] * ("tolerance" in job.numerics.chosen) + ["mesh"] * bool(job.origin.mesh)
     friction = [(point, point.errors.friction) for point in points if point.errors.friction is not None]
     area = [(point, point.errors.area) for point in points]
     names = ("friction", "the corrected contact area")
-    for name, each, accuracy in zip(names, (friction, area), job.numerics.asked.both, strict=True):
+    for column, (name, each) in enumerate(zip(names, (friction, area), strict=True)):
+        accuracy = job.numerics.asked.both[column]
         missed = [(parts.total, point, parts) for point, parts in each if exceeds(parts.total, accuracy)]
+        before = [(one.errors[column], one.at) for one in earlier if exceeds(one.errors[column], accuracy)]
+        many = f"at {len(missed) + len(before)} of {len(points) + len(earlier)} points"
         if missed:
             _, point, parts = max(missed, key=lambda one: one[0])
             place = Wanted(point.speed, point.pressure, point.temperature)
-            yield (
-                f"estimated error of {name} at {len(missed)} of {len(points)} points: up to {describe(parts, name)}, "
-                f"at {place}{advice(parts, accuracy, chosen)}"
-            )
+            told = f"{describe(parts, name)}, at {place}{advice(parts, accuracy, chosen)}"
+            yield f"estimated error of {name} {many}: up to {told}"
+        elif before:
+            error, place = max(before, key=lambda one: one[0])
+            asked = f"more than the {100 * accuracy:g} % that numerics.accuracy asks for"
+            yield f"estimated error of {name} {many}: up to {per_cent(error, 3)}, at {place}; {asked}"
 
 
 def _percent(share: float) -> str:

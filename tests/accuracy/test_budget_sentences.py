@@ -10,7 +10,8 @@ import pytest
 from parcontact.accuracy.budget import ErrorBudget, ErrorSums, Parts, advice
 from parcontact.job import Job
 from parcontact.report import log
-from parcontact.steady_sliding.table import describe_missed
+from parcontact.steady_sliding.table import EarlierPoint, describe_missed
+from parcontact.storage.curve_points import Wanted
 from parcontact.storage.row import StepRow
 
 
@@ -35,6 +36,24 @@ def test_a_curve_advises_the_key_that_was_given(numerics: dict[str, Any], key: s
     point: Any = SimpleNamespace(errors=errors, speed=1.0, pressure=1e4, temperature=math.nan)
     (told,) = describe_missed([point], Job.model_validate(data))
     assert told.endswith(f"try a smaller numerics.{key}")
+
+
+def test_a_curve_that_goes_on_counts_earlier_points() -> None:
+    """With those of now, whose parts are known; and alone, where no point of now is wrong."""
+    data = {
+        "grid": {"points": 16, "size": 1e-3},
+        "surface": {"shape": "flat"},
+        "material": {"model": "elastic", "shear_modulus": 1e6},
+        "steady": {"velocities": [1.0], "pressures": [1e4]},
+        "numerics": {"accuracy": 0.05},
+    }
+    job, earlier = Job.model_validate(data), [EarlierPoint(Wanted(2.0, 1e4), (0.1, 0.2))]
+    for solver, told in ((0.06, ["10 %, at 2 m/s", "7 % ("]), (0.01, ["10 %, at 2 m/s", "20 %, at 2 m/s"])):
+        errors = ErrorBudget(None, Parts(solver=solver, time=0.0, folded=0.0, mesh=0.01))
+        point: Any = SimpleNamespace(errors=errors, speed=1.0, pressure=1e4, temperature=math.nan)
+        of_friction, of_area = describe_missed([point], job, earlier)
+        assert f"friction at 1 of {1 + 1} points: up to {told[0]}" in of_friction
+        assert f"area at {1 + (solver > 0.05)} of 2 points: up to {told[1]}" in of_area
 
 
 @pytest.mark.parametrize(("mesh", "stated"), [(0.3, 0.31), (0.75, 1.0), (6.0, 6.01)])
