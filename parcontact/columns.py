@@ -382,10 +382,7 @@ LEAK: Table = (
         *("flow_rate", "m³/s", "flow of the fluid of `--fluid` at the low side, in the direction that leaks more"),
         when="--fluid",
     ),
-    Column(
-        *("mass_flow", "kg/s", "the same flow as a mass, empty where no density is known"),
-        when="--fluid",
-    ),
+    Column(*("mass_flow", "kg/s", "the same flow as a mass, empty where no density is known"), when="--fluid"),
 )
 
 

@@ -35,7 +35,7 @@ def main() -> int:
     options = parser.parse_args()
     target: Path = options.to
     target.mkdir(parents=True, exist_ok=True)
-    for name in texts.names():
+    for name in texts.page_names():
         (target / f"{name}.md").write_text(texts.page(name, {"verbs": describe_verbs}))
     shutil.copy(texts.PAGES.parent / "conf.py", target)
     (target / "static").mkdir(exist_ok=True)

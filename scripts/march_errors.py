@@ -109,18 +109,18 @@ def trial(seed: int, found: dict[Any, list[tuple[float, ...]]], number: int) -> 
     """March in all ways; keep errors."""
     job = march_of(seed, number)
     columns, _, stages = run(job, 0.125, **EXACT)
-    exact = slide.measure(stages, columns)
+    exact = slide.measure_slide(stages, columns)
     assert exact is not None
     for name, cells in GIVEN:
         columns, rows, stages = run(job, cells, integrator=name, tolerance=1e-5, branch_error=0.0)
-        mine, calls = slide.measure(stages, columns), sum(row.operator_calls for row in rows)
+        mine, calls = slide.measure_slide(stages, columns), sum(row.operator_calls for row in rows)
         assert mine is not None
         seen = late(columns, "time_error"), late(columns, "mesh_error")
         found[name, cells].append((number, mine.mu_dyn / exact.mu_dyn - 1.0, calls, *seen))
     for name in ("exponential-linear", "exponential"):
         for accuracy in ACCURACIES:
             columns, rows, stages = run(job, integrator=name, accuracy=accuracy)
-            mine, stated = slide.measure(stages, columns), slide.absolute_errors(stages, columns, CELL)
+            mine, stated = slide.measure_slide(stages, columns), slide.absolute_errors(stages, columns, CELL)
             assert mine is not None
             calls = sum(row.operator_calls for row in rows)
             off = mine.mu_dyn - exact.mu_dyn, mine.mu_max - exact.mu_max

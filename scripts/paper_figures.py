@@ -64,7 +64,7 @@ def panels(count: int, height: float = HEIGHT) -> tuple[Figure, Sequence[Axes]]:
 
 def explain(axes: Axes, directory: Path, **look: Any) -> None:
     """The legend of a panel, with the settings of the theory if they are known, and those of all cases of a sweep."""
-    axes.legend(**look, title=theory_settings.describe(directory) or None, title_fontsize=TITLE)
+    axes.legend(**look, title=theory_settings.describe_settings(directory) or None, title_fontsize=TITLE)
 
 
 def moduli(job: Job) -> tuple[float, float]:
@@ -93,13 +93,13 @@ def means(rows: Sequence[dict[str, Any]], key: str, name: str) -> tuple[np.ndarr
 
 def rows_of(directory: Path) -> list[dict[str, Any]]:
     """Rows of the table of a sweep, with the contact area of simulations as corrected for its edges."""
-    rows = sweep_table.read(there(directory / "sweep.csv"))
+    rows = sweep_table.read_cases(there(directory / "sweep.csv"))
     for row in rows:
         case = directory / "cases" / f"{int(row['case']):03d}"
         if row["state"] == "done":
             found = tables.read_columns(case / "measures.csv")
             found["contact_area"] = found[slide.CORRECTED]
-            measured = slide.measure(load(case / "job.resolved.yaml").history, found)
+            measured = slide.measure_slide(load(case / "job.resolved.yaml").history, found)
             row["contact_area"] = measured.contact_area if measured else np.nan
     return rows
 

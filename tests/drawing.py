@@ -54,7 +54,7 @@ def ran(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "job.yaml"
     path.write_text(text)
     loaded = job.load(path, [f"output.directory={tmp_path / 'out'}"])
-    assert runner.run(loaded, Slab.alone(*loaded.grid.points), Options(quiet=True)) == 0
+    assert runner.run_job(loaded, Slab.alone(*loaded.grid.points), Options(quiet=True)) == 0
     return tmp_path / "out"
 
 

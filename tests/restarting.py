@@ -87,7 +87,7 @@ class Bench:
             path.write_text(yaml.safe_dump(data))
         self.comm.Barrier()
         loaded = job.load(path, [f"output.directory={out}"])
-        return runner.run(loaded, Slab(self.comm, *loaded.grid.points), Options(quiet=True, **options))
+        return runner.run_job(loaded, Slab(self.comm, *loaded.grid.points), Options(quiet=True, **options))
 
 
 def maps(path: Path) -> dict[str, bytes]:

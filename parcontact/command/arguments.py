@@ -33,7 +33,7 @@ Add = Callable[..., Any]  # argparse's add_argument of one verb
 def _job(add: Add, text: str = "job file (YAML)", out: tuple[str, str] = ("DIR", "output directory")) -> None:
     add("job", help=text)
     add("--set", metavar="KEY=VALUE", action="append", default=[], help="override a key of the job")
-    add("--out", metavar=out[0], type=values.directory, help=out[1])
+    add("--out", metavar=out[0], type=values.output_directory, help=out[1])
     text = "one case of the job's sweep, from 0 (default: all)"
     add("--case", metavar="I", type=values.natural, help=text)
 
@@ -60,7 +60,7 @@ def _run(add: Add) -> None:
 def _steady(add: Add) -> None:
     for name, unit in (("velocities", "m/s"), ("pressures", "Pa")):
         text = f"{name} [{unit}]: N from A to B, equally spaced in the logarithm, or a list A,B,..."
-        add(f"--{name}", metavar="A:B:N", type=values.numbers, default=(), help=text)
+        add(f"--{name}", metavar="A:B:N", type=values.spaced_numbers, default=(), help=text)
     text = "temperatures [deg C], T,T,... (negative ones first: --temperatures=-20,0); the material needs a shift"
     add("--temperatures", metavar="T,...", type=values.degrees, default=(), help=text)
     text = "add the points that are missing (auto, the default), or start afresh and replace what is there (never)"
@@ -114,10 +114,10 @@ def _plot(add: Add) -> None:
     add("--format", choices=("png", "pdf", "svg"), default="", help="default: that of --out, else png")
     names = "friction,area,approach,gap,pressure,load,energy,leakage,steady,maps"
     text = f"which panels, in this order: {names} (default: all)"
-    add("--panels", metavar="NAME,...", type=values.names, default=(), help=text)
+    add("--panels", metavar="NAME,...", type=values.comma_names, default=(), help=text)
     text = "what is along the x axis (default: as the job suggests)"
     add("--over", choices=("time", "distance", "velocity", "load", "approach"), default="", help=text)
-    add("--log", metavar="x,y", type=values.names, default=(), help="logarithmic axes: x, y, x,y or none")
+    add("--log", metavar="x,y", type=values.comma_names, default=(), help="logarithmic axes: x, y, x,y or none")
     add("--compare", action="store_true", help="several directories in one picture, comparison.png")
     text = (
         "a movie of this map over its saved instants instead: pressure, displacement, gap or height; a GIF, and an MP4"

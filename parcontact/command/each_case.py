@@ -38,7 +38,7 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
     from ..plan.memory import count_side_by_side
     from ..run import sweep, sweep_warnings, watch
 
-    on_root(world, lambda: sweep.refuse_foreign(cases))
+    on_root(world, lambda: sweep.refuse_foreign_sweep(cases))
     told = on_root(world, lambda: sweep_warnings.warn_once(chosen)) if runs and len(chosen) > 1 else ()
     afresh = getattr(options, "restart", "") == "never" or not runs
     groups = Groups(world, on_root(world, lambda: count_side_by_side(sweep.to_do(chosen, afresh), world.size)))
@@ -55,13 +55,13 @@ def cases_of(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case
     from .. import job as jobs
     from .. import mesh
 
-    cases = mesh.load_cases(options.job, overrides(options))
+    cases = mesh.load_cases(options.job, job_overrides(options))
     if getattr(options, "until", None) is not None and not cases[0].job.history:
         raise InputError("--until: a friction curve has no time to go on to; leave it out")
-    return cases, jobs.choose(cases, options.case)
+    return cases, jobs.select_cases(cases, options.case)
 
 
-def overrides(options: argparse.Namespace) -> list[str]:
+def job_overrides(options: argparse.Namespace) -> list[str]:
     """Return the changes that the command line makes to a job.
 
     The name of a directory is taken as it is, whatever YAML would read. Velocities, pressures and temperatures of a

@@ -10,7 +10,7 @@ from typing import Any
 from .. import mesh
 from ..errors import InputError, RunError
 from ..job import Job
-from ..job.sections.listing import plain
+from ..job.sections.listing import plain_data
 from ..job.text import yamltext
 from ..storage import files
 
@@ -27,7 +27,7 @@ def is_map(path: Path) -> bool:
     return path.suffix.lower() not in JOBS
 
 
-def load(path: Path, overrides: Sequence[str]) -> Job:
+def load_map(path: Path, overrides: Sequence[str]) -> Job:
     """The job of a whole map on its own points, with some keys changed. Raises InputError."""
     try:
         return mesh.load(_job_of(str(path)), overrides)
@@ -41,11 +41,11 @@ def refuse_taken(target: Path | None) -> None:
         raise InputError(f"--job: {target} is there already; give another name")
 
 
-def start(job: Job, path: Path, target: Path | None) -> Iterator[str]:
+def start_job(job: Job, path: Path, target: Path | None) -> Iterator[str]:
     """Write a job to start from to a file, or say it; maps of very many points are thinned out. Raises RunError."""
     directory, grid = (target or Path("job.yaml")).absolute().parent, job.grid
     found = _job_of(os.path.relpath(path, directory))
-    found["surface"] |= {key: value for key, value in plain(job.surface[0]).items() if key != "path"}
+    found["surface"] |= {key: value for key, value in plain_data(job.surface[0]).items() if key != "path"}
     found["surface"].setdefault("periodic", "smooth")
     coarser = math.ceil(math.sqrt(grid.nx * grid.ny / MANY_POINTS))
     found["grid"] = {"points": [grid.nx // coarser, grid.ny // coarser], "size": list(grid.size)}

@@ -57,7 +57,7 @@ def started() -> MPI.Intracomm | None:
     return None if module is None else module.COMM_WORLD
 
 
-def start() -> MPI.Intracomm:
+def start_ranks() -> MPI.Intracomm:
     """All ranks; starts MPI. Raises InputError where that must fail, and for a rank that is alone but should not be."""
     _refuse_surroundings()
     from ..parallel.mpi import MPI
@@ -95,7 +95,7 @@ def root_alone(verb: Verb) -> Verb:
     @wraps(verb)
     def act(options: argparse.Namespace) -> int:
         if launched() > 1:
-            return on_root(start(), lambda: verb(options))
+            return on_root(start_ranks(), lambda: verb(options))
         return verb(options) if is_root() else 0
 
     return act

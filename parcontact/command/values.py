@@ -59,17 +59,17 @@ def instant(text: str) -> str:
     return text.strip()
 
 
-def directory(text: str) -> str:
+def output_directory(text: str) -> str:
     if not text:
         raise argparse.ArgumentTypeError("must name a directory, got ''")
     return str(Path.cwd() / text) if text.startswith("~") else text  # a shell has said all there is to say of homes
 
 
-def names(text: str) -> tuple[str, ...]:
+def comma_names(text: str) -> tuple[str, ...]:
     return tuple(filter(None, (part.strip() for part in text.split(","))))
 
 
-def numbers(text: str) -> tuple[float, ...]:
+def spaced_numbers(text: str) -> tuple[float, ...]:
     """Numbers equally spaced in their logarithm, `first:last:count`, or a list `a,b,c`."""
     try:
         return _spaced(text) if ":" in text else _floats(text)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from ..parallel.root import on_root
 from . import ranks
-from .each_case import OF_A_CURVE, cases_of, each_case, overrides
+from .each_case import OF_A_CURVE, cases_of, each_case, job_overrides
 
 if TYPE_CHECKING:
     import argparse
@@ -23,7 +23,7 @@ DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes; the runner has another one: sto
 
 def run(options: argparse.Namespace) -> int:
     """Run a job, or go on with it (the default verb)."""
-    return each_case(options, ranks.start(), _run)
+    return each_case(options, ranks.start_ranks(), _run)
 
 
 def _run(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
@@ -34,12 +34,12 @@ def _run(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int
         return _curve(options, job, slab, shows)
     others_file = getattr(options, "others_file", None)  # of a sweep
     chosen = (options.quiet, options.restart, options.until, options.wall)
-    return runner.run(job, slab, Options(*chosen, others_file=others_file, shows=shows))
+    return runner.run_job(job, slab, Options(*chosen, others_file=others_file, shows=shows))
 
 
 def steady(options: argparse.Namespace) -> int:
     """Solve steady sliding directly: a friction curve."""
-    return each_case(options, ranks.start(), _curve)
+    return each_case(options, ranks.start_ranks(), _curve)
 
 
 def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
@@ -52,7 +52,7 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
     if options.restart not in ("auto", "never"):
         raise InputError(f"--restart: a friction curve goes on (auto) or starts afresh (never), got {options.restart}")
     others_file = getattr(options, "others_file", None)
-    code = curve.run(job, slab, wanted, options.quiet, options.restart, shows, others_file, make_states)
+    code = curve.run_curve(job, slab, wanted, options.quiet, options.restart, shows, others_file, make_states)
     if code == DONE and prediction.has_spectrum(job):
         on_root(slab.comm, lambda: prediction.write_steady(job, wanted))
     return code
@@ -67,7 +67,7 @@ def check(options: argparse.Namespace) -> int:
 
     cases, chosen = cases_of(options)
     job = chosen[0].job
-    print(jobs.describe(job))
+    print(jobs.describe_job(job))
     steps = describe_steps(job)
     steps = steps and f"chosen time steps: {steps}"
     notes: list[list[str]] = []
@@ -103,7 +103,7 @@ def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
         return [*job.doubts, *doubt_band(job, degrees)]
     setup = set_up(job, Slab.alone(*job.grid.points))
     notes[-1] += [*setup.told.notes, *describe_roughness(setup)]
-    sanity.refuse_beyond_full_contact(setup)
+    sanity.refuse_approaches(setup)
     return sanity.find_doubts(setup, degrees)
 
 
@@ -112,7 +112,7 @@ def plan(options: argparse.Namespace) -> int:
     from ..run import watch
 
     started = watch.age()
-    world = ranks.start()
+    world = ranks.start_ranks()
     from ..parallel.groups import Groups
     from ..parallel.slab import Slab
     from ..plan.memory import count_side_by_side
@@ -139,7 +139,7 @@ def plan(options: argparse.Namespace) -> int:
 
 def theory(options: argparse.Namespace) -> int:
     """Predict friction and area by Persson's theory, into theory.csv."""
-    return each_case(options, ranks.start(), _predict, runs=False)
+    return each_case(options, ranks.start_ranks(), _predict, runs=False)
 
 
 def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
@@ -182,7 +182,7 @@ def fit(options: argparse.Namespace) -> int:
 
 def study(options: argparse.Namespace) -> int:
     """Run a job on finer and finer settings: what accuracy costs; goes on after a stop."""
-    world = ranks.start()
+    world = ranks.start_ranks()
     from ..parallel.slab import Slab
     from ..study import study as whole_study
 
@@ -209,13 +209,13 @@ def surface(options: argparse.Namespace) -> int:
     if options.start and not alone:
         raise InputError(f"--job writes a job for a measured map; {given} is a job")
     measured_maps.refuse_taken(options.start)
-    job = measured_maps.load(given, options.set) if alone else _load(options)
+    job = measured_maps.load_map(given, options.set) if alone else _load(options)
     base = set_up(job, Slab.alone(*job.grid.points))
     doubts = [doubt for doubt in job.doubts if doubt.place.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
     told = describe_surface(job, heights, base.told.notes, base.shortest, picture)
-    started = measured_maps.start(job, given, options.start) if alone else ()
+    started = measured_maps.start_job(job, given, options.start) if alone else ()
     print("\n".join([*told, *(f"warning: {doubt}" for doubt in doubts), *started]))
     return DONE
 
@@ -244,15 +244,15 @@ def plot(options: argparse.Namespace) -> int:
 
 def leak(options: argparse.Namespace) -> int:
     """Calculate what leaks through the gaps of a run, into leak.csv; draw it."""
-    world = ranks.start()
-    from ..derived.leakage_over_time import write
+    world = ranks.start_ranks()
+    from ..derived.leakage_over_time import write_leakage
     from ..leakage.fluids import PressureDrop
 
     if (options.fluid is None) != (options.pressures is None):
         raise InputError("--fluid and --pressures HIGH:LOW [Pa] go together: give both, or none")
     drop = PressureDrop(options.fluid, *options.pressures) if options.fluid else None
     for directory in options.directories:
-        said = write(directory, options.at or "", options.over, world, drop)
+        said = write_leakage(directory, options.at or "", options.over, world, drop)
         print(*said, sep="\n", end="\n" if world.rank == 0 else "")
     return DONE
 
@@ -268,7 +268,7 @@ def report(options: argparse.Namespace) -> int:
 
 def doctor(options: argparse.Namespace) -> int:
     """Check this installation: exact cases, ranks, files and times."""
-    world = ranks.start()
+    world = ranks.start_ranks()
     from pathlib import Path
 
     from ..doctor import checks, machine
@@ -296,7 +296,9 @@ def manual(options: argparse.Namespace) -> int:
     from ..manual import texts
 
     width = min(shutil.get_terminal_size().columns, 100)
-    print(texts.plain(options.page, {"verbs": options.describe_verbs}, width) if options.page else texts.contents())
+    print(
+        texts.plain_page(options.page, {"verbs": options.describe_verbs}, width) if options.page else texts.contents()
+    )
     return DONE
 
 
@@ -312,7 +314,7 @@ def schema(options: argparse.Namespace) -> int:
     unknown = (f"{added_sections.whose(name)} {reason}" for name, reason in job_schema.without_schema().items())
     for text in (*added_sections.unusable(), *unknown):
         print(f"warning: {text}; the schema is without it", file=sys.stderr)
-    print(json.dumps(job_schema.schema(), indent=1))
+    print(json.dumps(job_schema.json_schema(), indent=1))
     return DONE
 
 
@@ -321,7 +323,7 @@ def cite(options: argparse.Namespace) -> int:
     """Say what to cite for a run."""
     from ..summary import citations
 
-    print(citations.describe(options.directory))
+    print(citations.describe_citations(options.directory))
     return DONE
 
 
@@ -329,4 +331,4 @@ def _load(options: argparse.Namespace, changes: Sequence[str] = ()) -> Job:
     """The job that the command line is about, with some more changes."""
     from .. import mesh
 
-    return mesh.load(options.job, [*overrides(options), *changes], options.case)
+    return mesh.load(options.job, [*job_overrides(options), *changes], options.case)

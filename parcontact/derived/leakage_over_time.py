@@ -160,7 +160,9 @@ class Gaps:
         )
 
 
-def write(directory: Path, at: str, over: str, comm: MPI.Intracomm, drop: PressureDrop | None = None) -> Iterator[str]:
+def write_leakage(
+    directory: Path, at: str, over: str, comm: MPI.Intracomm, drop: PressureDrop | None = None
+) -> Iterator[str]:
     """Solve for the flow of the saved instants and write leak.csv and leak.png; of one instant leak.STEP.csv and
     leak.STEP.png, with K `over` pressure or time, "" for a choice; with the flow of a fluid under a pressure `drop`.
     Collective: ranks take an instant each.

@@ -169,8 +169,8 @@ def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
     settings = TheorySettings(gamma, waves)
     if not job.history:
         return _foretell_curve(job, settings)
-    path = write(job, predict(job, Slab.alone(*job.grid.points), gamma, waves), settings)
-    beside = theory_beside.describe(path.parent, job.history, job.grid.dx)
+    path = write_theory(job, predict(job, Slab.alone(*job.grid.points), gamma, waves), settings)
+    beside = theory_beside.describe_theory(path.parent, job.history, job.grid.dx)
     return [f"Persson's theory, {settings.sentence}: {path}", *beside]
 
 
@@ -188,7 +188,7 @@ def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
     ]
 
 
-def write(job: Job, rows: Iterator[PredictedInstant], settings: TheorySettings) -> Path:
+def write_theory(job: Job, rows: Iterator[PredictedInstant], settings: TheorySettings) -> Path:
     """Write the rows as theory.csv, and theory.yaml beside it, for the job; returns the table's path."""
     return _write(job.output.directory / theory_settings.TABLE, THEORY, rows, settings)
 
@@ -201,7 +201,7 @@ def _write(path: Path, table: Table, rows: Iterable[object], settings: TheorySet
             lines = (map(float, values_of(table, row)) for row in rows)
             file.write(to_csv(names_of(table), lines).encode())
         if settings:
-            theory_settings.write(path.parent, settings)
+            theory_settings.write_settings(path.parent, settings)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {hdf5.reason(error)}") from None
     return path

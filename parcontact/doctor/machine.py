@@ -63,7 +63,7 @@ def find_broken_files(comm: "MPI.Intracomm", where: Path) -> str:
         job = load(place / "job.yaml")
         slab = Slab(comm, *job.grid.points)
         for until in (0.5e-3, None):
-            runner.run(job, slab, Options(quiet=True, until=until))
+            runner.run_job(job, slab, Options(quiet=True, until=until))
         bench = Bench(comm)
         march, _ = bench.march(crossed([stage], numerics=job.numerics.model_dump()))
         expected = bench.whole(march, "pressure")

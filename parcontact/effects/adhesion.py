@@ -52,7 +52,7 @@ class Adhesion(Part):
     detached: Literal["end", "open"] = "end"
 
 
-def law_of(section: Adhesion | None, grid: Grid, material: Any) -> AdhesionLaw | None:
+def adhesion_law(section: Adhesion | None, grid: Grid, material: Any) -> AdhesionLaw | None:
     """Return the law of a section; the range `auto` is the smallest that the cells of the grid resolve."""
     if section is None:
         return None
@@ -66,7 +66,7 @@ def law_of(section: Adhesion | None, grid: Grid, material: Any) -> AdhesionLaw |
 def chosen_range(job: Any) -> float | None:
     """Return the range [m] that `auto` has on the mesh of a job; None where it is given, or nothing sticks."""
     section = job.section("adhesion")
-    law = None if section is None or section.range != AUTO else law_of(section, job.grid, job.material)
+    law = None if section is None or section.range != AUTO else adhesion_law(section, job.grid, job.material)
     return None if law is None else law.range
 
 
@@ -103,7 +103,7 @@ def _no_steady(adhesion: Adhesion | None, initial: Any, steady: Any) -> Iterator
 
 
 def _facts(job: Any) -> Iterator[str]:
-    law, modulus, cell = law_of(job.adhesion, job.grid, job.material), modulus_of(job.material), cell_of(job.grid)
+    law, modulus, cell = adhesion_law(job.adhesion, job.grid, job.material), modulus_of(job.material), cell_of(job.grid)
     assert law is not None
     if modulus == 0.0:
         yield "adhesion: a body without long-term modulus has no process zone of its own"
@@ -177,14 +177,14 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         section: Adhesion | None = job.section("adhesion")
         if section is None:
             return Decision("adhesion", False, "there is no adhesion section")
-        law = law_of(section, job.grid, job.material)
+        law = adhesion_law(section, job.grid, job.material)
         assert law is not None
         return Decision("adhesion", True, f"{law.work:g} J/m^2 over a range of {law.range:.4g} m ({law.kind})")
 
     @staticmethod
     def doubts(job: Any) -> Iterator[Doubt]:
         """Yield doubts about physically implausible values, and a mesh that does not resolve the attraction."""
-        law = law_of(job.adhesion, job.grid, job.material)
+        law = adhesion_law(job.adhesion, job.grid, job.material)
         assert law is not None
         modulus, cell = modulus_of(job.material), cell_of(job.grid)
         zone = law.process_zone(modulus)

@@ -198,7 +198,7 @@ def columns_of(effects: Effects) -> tuple[str, ...]:
     return tuple(name for effect in effects.values() for name in effect.columns)
 
 
-def values_of(effects: Effects, memories: Memories) -> tuple[float, ...]:
+def effect_values(effects: Effects, memories: Memories) -> tuple[float, ...]:
     """Return what effects have for their columns in the row of the last step; raises InputError for what does not
     fit."""
     return tuple(number for name, effect in effects.items() for number in _numbers(name, effect, memories[name]))

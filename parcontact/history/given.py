@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from ..job.checks.limits import first_step, steps_of
+from ..job.checks.limits import estimate_steps, first_step
 from ..job.sections.calculation import Grid
 from ..job.sections.stages import AUTO, GeometricStep, Stage
 from .chosen import RAMP_STEPS, SAME_TIME, reached
@@ -61,6 +61,6 @@ def divide(stage: Stage, grid: Grid) -> GivenEnds:
         return GivenEnds(0, 1.0, 0.0)
     if stage.time_step == AUTO and not stage.load.constant and not stage.speed:
         return GivenEnds(RAMP_STEPS, 1.0, stage.seconds)
-    steps = steps_of(stage, stage.seconds, first_step(stage, grid))
+    steps = estimate_steps(stage, stage.seconds, first_step(stage, grid))
     growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
     return GivenEnds(max(1, math.ceil(steps * (1.0 - SAME_TIME))), growth, stage.seconds)

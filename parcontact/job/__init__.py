@@ -1,8 +1,8 @@
 """A job: what is simulated and how, from a YAML file or a mapping into frozen sections. The door of its room."""
 
 from ..errors import JobError
-from .model import Job, describe
-from .reading import Case, choose, load, load_cases
+from .model import Job, describe_job
+from .reading import Case, load, load_cases, select_cases
 from .sections.calculation import Checkpoint, Grid, Numerics, Output, Study
 from .sections.geometry import (
     Cylinder,

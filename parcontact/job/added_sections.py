@@ -60,7 +60,7 @@ def whose(section: str) -> str:
 
 def is_ours(section: str) -> bool:
     """Return whether a section is added by an effect of this package."""
-    return section in names()
+    return section in own_sections()
 
 
 def unusable() -> list[str]:
@@ -78,7 +78,7 @@ def _is_ours(entry: EntryPoint) -> bool:
     return entry.value.startswith(f"{__package__.partition('.')[0]}.")
 
 
-def names() -> list[str]:
+def own_sections() -> list[str]:
     """Return the sections that effects of this package add."""
     return sorted(name for name, entry in _registered().items() if _is_ours(entry))
 

@@ -101,7 +101,7 @@ class Job(Part):
         if cls is Job and isinstance(data, dict):
             others = [key for key, value in data.items() if key not in cls.model_fields and value is not None]
             if added := added_sections.effects_of(others):
-                return extended(tuple(sorted(added))).model_validate(data, context=info.context)
+                return extended_model(tuple(sorted(added))).model_validate(data, context=info.context)
         return handler(data)
 
     def model_post_init(self, context: Any) -> None:
@@ -111,7 +111,7 @@ class Job(Part):
     @classmethod
     def words(cls) -> tuple[str, ...]:
         """Return the sections, those of our effects too, and the sweep, which is gone once a case is read."""
-        return (*dict.fromkeys((*super().words(), *added_sections.names())), "sweep")
+        return (*dict.fromkeys((*super().words(), *added_sections.own_sections())), "sweep")
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Job) and dict(self) == dict(other)
@@ -215,14 +215,14 @@ class Job(Part):
         What `numerics.accuracy` has chosen is a comment, as it is not given.
         """
         chosen = ", ".join(f"{name} {value!r}" for name, value in self.numerics.chosen.items())
-        return dump(listing.plain(self)) + (f"# chosen by numerics.accuracy: {chosen}\n" if chosen else "")
+        return dump(listing.plain_data(self)) + (f"# chosen by numerics.accuracy: {chosen}\n" if chosen else "")
 
 
 SEPARATOR = ":"  # of sections in the name of an extended job, by which other ranks find its class
 
 
 @cache
-def extended(sections: tuple[str, ...]) -> type[Job]:
+def extended_model(sections: tuple[str, ...]) -> type[Job]:
     """Return the model of a job that may have these sections of effects too."""
     effects = added_sections.effects_of(sections)
     fields: dict[str, Any] = {
@@ -254,7 +254,7 @@ def __getattr__(name: str) -> Any:
     """Return the class of an extended job, where a job of another rank arrives."""
     head, *sections = name.split(SEPARATOR)
     if head == "Job" and sections:
-        return extended(tuple(sections))
+        return extended_model(tuple(sections))
     raise AttributeError(name)
 
 
@@ -278,7 +278,7 @@ def _default(data: dict[str, Any], section: str, key: str, value: Any) -> None:
         data[section] = {**given, key: value}
 
 
-def describe(job: Job) -> str:
+def describe_job(job: Job) -> str:
     """Return a table of the job with every default and its unit; times and cells that follow from it come last."""
     rows = list(listing.rows(job))
     if job.bands is not None:

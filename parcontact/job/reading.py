@@ -56,7 +56,7 @@ def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill
     Of a job with a sweep it reads one `case`, and raises InputError if none is chosen or there is no such case.
     """
     if case is not None:
-        return choose(load_cases(given, overrides, fill_grid=fill_grid), case)[0].job
+        return select_cases(load_cases(given, overrides, fill_grid=fill_grid), case)[0].job
     found, mistakes, sweep = _read(given, overrides, 0, fill_grid)
     if found is None:
         raise _job_error(given, mistakes)
@@ -82,7 +82,7 @@ def load_cases(given: Given, overrides: Changes = (), *, fill_grid: FillGrid = l
     return tuple(case for case, _ in read if case)
 
 
-def choose(cases: Sequence[Case], number: int | None) -> Sequence[Case]:
+def select_cases(cases: Sequence[Case], number: int | None) -> Sequence[Case]:
     """Return all cases, or the one of a number; raises InputError if there is none."""
     if number is None:
         return cases

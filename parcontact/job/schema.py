@@ -21,11 +21,11 @@ from pydantic_core.core_schema import (
 )
 
 from . import added_sections
-from .model import Job, extended
+from .model import Job, extended_model
 from .sections.materials import Dma, Elastic, Zener
 from .sections.part import Part, kind_key, literal_words
 from .sections.quantities import AUTO_POINTS, FROM_SURFACE, LARGEST, MOST, along_x, both, bounded, countable, listed
-from .sections.stages import numbers
+from .sections.stages import expand_range
 from .text.fault import choices
 
 Schema = dict[str, Any]
@@ -38,7 +38,7 @@ BOUNDS = {
     "exclusiveMaximum": "below {:g}",
     "maximum": "at most {:g}",
 }
-SHORT = (both, along_x, listed, numbers)  # validators that let one value stand for several
+SHORT = (both, along_x, listed, expand_range)  # validators that let one value stand for several
 
 
 class SchemaOfKeys(GenerateJsonSchema):
@@ -56,7 +56,7 @@ class SchemaOfKeys(GenerateJsonSchema):
         array = next(one for one in found.get("anyOf", [found]) if one.get("type") == "array")
         one_value = array["items"] if "items" in array else array["prefixItems"][0]
         words = [FROM_SURFACE, *([AUTO_POINTS] if one_value.get("type") == "integer" else [])]
-        ranges = [RANGE] if function is numbers else [{"enum": words}] if function is both else []
+        ranges = [RANGE] if function is expand_range else [{"enum": words}] if function is both else []
         return {"anyOf": [one_value, array, *ranges]}
 
     def function_after_schema(self, schema: AfterValidatorFunctionSchema) -> Schema:
@@ -79,9 +79,9 @@ def without_schema() -> dict[str, str]:
     return reasons
 
 
-def schema() -> Schema:
+def json_schema() -> Schema:
     """Return the schema of a whole job, with the sections of all effects that are installed and have one."""
-    kind = extended(tuple(name for name in added_sections.find_effects() if name not in without_schema()))
+    kind = extended_model(tuple(name for name in added_sections.find_effects() if name not in without_schema()))
     found = kind.model_json_schema(schema_generator=SchemaOfKeys)
     properties = found["properties"]
     properties["material"] = {"anyOf": [_included(found["$defs"]), properties["material"]]}
@@ -138,7 +138,7 @@ def sections() -> list[SectionSchema]:
     found: dict[type[Part], SectionSchema] = {Job: SectionSchema("", Job, tuple(_keys(Job)))}
     for name, field in Job.model_fields.items():
         _collect(name, field, found)
-    for name, effect in added_sections.effects_of(added_sections.names()).items():
+    for name, effect in added_sections.effects_of(added_sections.own_sections()).items():
         _collect(name, effect.section, found)
     return list(found.values())
 

@@ -27,13 +27,13 @@ OURS: Writers = {
 }
 
 
-def names() -> list[str]:
+def page_names() -> list[str]:
     """The names of the pages, in the order of the table of contents."""
     listed = re.findall(r"^([a-z_]+)$", (PAGES / "index.md").read_text(encoding="utf-8"), re.MULTILINE)
     return ["index", *listed]
 
 
-def title(name: str) -> str:
+def page_title(name: str) -> str:
     """The heading of a page."""
     found = re.search(r"^# (.+)$", (PAGES / f"{name}.md").read_text(encoding="utf-8"), re.MULTILINE)
     return found.group(1) if found else name
@@ -41,16 +41,16 @@ def title(name: str) -> str:
 
 def page(name: str, writers: Writers | None = None) -> str:
     """A page in full, as MyST Markdown. Raises InputError for a name that no page has."""
-    if name not in names():
-        close = difflib.get_close_matches(name, names(), n=1)
-        hint = f"; did you mean {close[0]}?" if close else f"; there are {', '.join(names())}"
+    if name not in page_names():
+        close = difflib.get_close_matches(name, page_names(), n=1)
+        hint = f"; did you mean {close[0]}?" if close else f"; there are {', '.join(page_names())}"
         raise InputError(f"the manual has no page {name!r}{hint}")
     known = {**OURS, **(writers or {})}
     text = (PAGES / f"{name}.md").read_text(encoding="utf-8")
     return MARK.sub(lambda found: known[found.group(1)](), text)
 
 
-def plain(name: str, writers: Writers | None = None, width: int = 80) -> str:
+def plain_page(name: str, writers: Writers | None = None, width: int = 80) -> str:
     """A page to be read in a terminal of so many letters: without the marks of the web site."""
     text = FENCE.sub("", docstrings.written(page(name, writers)))
     text = re.sub(r"\{(?:doc|download)\}`(?:([^<`]+) <([^>`]+)>|([^`]+))`", _reference, text)
@@ -65,6 +65,6 @@ def _reference(found: re.Match[str]) -> str:
 
 
 def contents() -> str:
-    width = max(map(len, names()))
-    lines = [f"  {name:<{width}}  {title(name)}" for name in names()]
+    width = max(map(len, page_names()))
+    lines = [f"  {name:<{width}}  {page_title(name)}" for name in page_names()]
     return "\n".join(["parcontact manual PAGE prints a page:", "", *lines])

@@ -66,14 +66,7 @@ class StepChooser:
         return self._step(span, number, self._first(span) if first else self.chosen.next)
 
     def judge(
-        self,
-        span: Span,
-        step: Step,
-        end: float,
-        rejected: bool,
-        error: float,
-        front: float = 0.0,
-        begins: bool = False,
+        self, span: Span, step: Step, end: float, rejected: bool, error: float, front: float = 0.0, begins: bool = False
     ) -> Step | MadeStep:
         """Return the shorter step to make instead of one with such an error, or how the step is noted as made.
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..accuracy.budget import ErrorSums
 from ..effects.contact_protocol import PreviousContacts, PreviousPressure
-from ..effects.effect import Memories, values_of
+from ..effects.effect import Memories, effect_values
 from ..errors import InputError
 from ..history.chosen import ChosenSteps
 from ..parallel.slab import Array
@@ -234,7 +234,7 @@ def pressed_state(scene: Scene, state: State, row: StepRow, pressure: Array, app
 def completed(scene: Scene, state: State) -> State:
     """Return the state with the energies [J] and the columns of effects in its row."""
     work, stored, lost, split = energies_of(scene, state.energy, state.memories)
-    added = values_of(scene.effects, state.memories)
+    added = effect_values(scene.effects, state.memories)
     row = replace(state.row, work=work, stored=stored, dissipated=lost, branch_dissipation=split, added=added)
     return state.after(row=row)
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..effects.contact_protocol import EdgeMotion, PreviousContacts, PreviousPressure
-from ..effects.effect import Changes, Instant, values_of
+from ..effects.effect import Changes, Instant, effect_values
 from ..history.chosen import MadeStep
 from ..history.timeline import Step
 from ..physics.body import Trial, surface_of
@@ -68,7 +68,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         seconds=time.perf_counter() - began,
         remark="; ".join(f"{failure.where(scene, step)}: {remark}" for remark in remarks if remark),
         errors=errors.budget if states_errors else None,
-        added=values_of(scene.effects, followed),
+        added=effect_values(scene.effects, followed),
     )
     pressure = PreviousPressure(contact.p, solved.trial.alpha, step.position)
     pasts = state.contact.pressures

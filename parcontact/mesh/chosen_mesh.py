@@ -20,7 +20,7 @@ from ..job.checks import cells
 from ..job.model import prepared
 from ..job.sections.calculation import Accuracy, Grid, Numerics
 from ..job.sections.geometry import OnOneMesh, Rough, RoughSpectrum, Shape, Topography, Wave
-from ..job.sections.listing import plain
+from ..job.sections.listing import plain_data
 from ..job.sections.materials import Material
 from ..job.sections.part import Origin, Part
 from ..job.sections.quantities import AUTO_POINTS, FROM_SURFACE
@@ -75,7 +75,7 @@ def _choose_points(source: Source, origin: Origin) -> Origin:
 def points_for(job: Job, accuracy: float) -> tuple[int, int]:
     """Return the points along x and y that `auto` takes for a job at another accuracy. Raises InputError."""
     numerics = job.numerics.model_copy(update={"accuracy": accuracy})
-    (nx, ny), _ = _choose(job.model_copy(update={"numerics": numerics}), job.grid, plain(job), job.origin)
+    (nx, ny), _ = _choose(job.model_copy(update={"numerics": numerics}), job.grid, plain_data(job), job.origin)
     return nx, ny
 
 
@@ -88,7 +88,7 @@ def _choose(scenery: Scenery | Job, box: Grid, data: dict[str, Any], origin: Ori
     asked, share = scenery.numerics.asked, MESH_SHARE if scenery.history else STEADY_SHARE
     own = Accuracy(friction=share * asked.friction, area=share * asked.area)
     touching = guesses(scenery, wave, box.lx * box.ly)
-    points = cells.choose(wave, box.size, directions, own, touching)
+    points = cells.choose_points(wave, box.size, directions, own, touching)
     dx, dy = (length / n for length, n in zip(box.size, points, strict=True))
     slides = " and ".join(f"({x:.3g}, {y:.3g})" for x, y in directions)
     return list(points), (

@@ -32,7 +32,9 @@ class Costs:
         """Return the bytes that a rank holds in maps at once: those of steps, to the byte, or more while a first
         contact or steady state is found on nested grids, which was seen when the job was tried."""
         ranks = self.sample.ranks
-        known = max(memory.total(self.job, ranks), memory.steady_start(self.job, ranks)) if self.job.history else 0
+        known = (
+            max(memory.total_bytes(self.job, ranks), memory.steady_start(self.job, ranks)) if self.job.history else 0
+        )
         return max(float(known), self.sample.held * _points(self.job) / _points(self.sample.job))
 
     @property

@@ -54,7 +54,7 @@ def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int
     return found
 
 
-def total(job: Job, ranks: int = 1, rank: int | None = None) -> int:
+def total_bytes(job: Job, ranks: int = 1, rank: int | None = None) -> int:
     return sum(holdings(job, ranks, rank).values())
 
 
@@ -152,5 +152,5 @@ def count_side_by_side(jobs: Sequence[Job], ranks: int) -> int:
     if largest.grid.nx * largest.grid.ny > MOST_POINTS:
         return 1
     here = -(-at_once // machines())
-    held = here * SPARE * total(largest, max(1, ranks // at_once))
+    held = here * SPARE * total_bytes(largest, max(1, ranks // at_once))
     return at_once if held <= FREE_SHARE * free_bytes() else 1

@@ -18,7 +18,7 @@ from ..history.chosen import ChosenEnds
 from ..history.timeline import Span, Timeline
 from ..job import Job, OnOneMesh, Rough
 from ..job.checks.cells import cells_per_wave, fast_length, one_cell
-from ..job.sections.listing import plain
+from ..job.sections.listing import plain_data
 from ..mesh import points_for
 from ..printed import per_cent
 from .costs import Costs
@@ -82,7 +82,7 @@ def _steps(span: Span, sample: Sample, job: Job) -> int:
 
 def _on_mesh(job: Job, accuracy: float, points: tuple[int, int]) -> Job:
     """Return the job with the numerics of an accuracy; on its own mesh if its surface cannot be put on another."""
-    data: dict[str, Any] = plain(job)
+    data: dict[str, Any] = plain_data(job)
     data["numerics"] |= {"accuracy": accuracy, "tolerance": None, "branch_error": None}
     try:
         return Job.model_validate({**data, "grid": {**data["grid"], "points": list(points)}})

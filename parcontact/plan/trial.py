@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from ..job import Job
-from ..job.sections.listing import plain
+from ..job.sections.listing import plain_data
 from ..scene import choices
 from . import memory
 
@@ -25,7 +25,7 @@ def choose_grid(job: Job, ranks: int, seconds: float) -> Job | None:
 
 def make_tiny(job: Job) -> Job | None:
     """The job with a single wave, or a sphere, on the fewest points: all that runs is the same, and costs nothing."""
-    data: dict[str, Any] = plain(job)
+    data: dict[str, Any] = plain_data(job)
     free, long = choices(job).isolated.on, max(job.grid.size)
     data["grid"]["points"] = [min(n, FEW) for n in job.grid.points]
     wave = {"shape": "wave", "amplitude": FLAT * long, "waves": [1, 0] if job.grid.nx > 1 else [0, 1]}
@@ -41,13 +41,13 @@ def _feasible(job: Job, ranks: int, seconds: float) -> bool:
     per_point = PER_POINT * (PADDED if choices(job).isolated.on else 1.0)
     calls = CALLS + (STEADY_START if choices(job).steady_start.on else 0)
     quick = calls * per_point * job.grid.nx * job.grid.ny / ranks <= seconds
-    return quick and memory.total(job, ranks) * ranks <= memory.FREE_SHARE * memory.free_bytes()
+    return quick and memory.total_bytes(job, ranks) * ranks <= memory.FREE_SHARE * memory.free_bytes()
 
 
 def _coarser(job: Job) -> Iterator[Job]:
     """The job with 1, 2, 4, ... times its cells, as long as its surface can be put on them."""
     yield job
-    data: dict[str, Any] = plain(job)
+    data: dict[str, Any] = plain_data(job)
     while all(n % 2 == 0 for n in data["grid"]["points"]) and min(data["grid"]["points"]) > 64:
         data["grid"]["points"] = [n // 2 for n in data["grid"]["points"]]
         cell = max(length / n for length, n in zip(data["grid"]["size"], data["grid"]["points"], strict=True))

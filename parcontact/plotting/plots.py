@@ -123,7 +123,7 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
         raise InputError(f"{directory} holds no run and no friction curve: {lacking}")
     if options.panels and not any((*groups, fields)):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
-    title = "\n".join(filter(None, (*titles[:1], theory_settings.describe(directory))))
+    title = "\n".join(filter(None, (*titles[:1], theory_settings.describe_settings(directory))))
     return style.figure_of(title, groups, legend=has_curve and len(groups) == 1, maps=fields)
 
 
@@ -174,7 +174,7 @@ def _name_cases(directories: Sequence[Path]) -> list[str]:
     table = paths[0].parent.parent / sweep.TABLE if paths else Path()
     if {path.parent for path in paths} != {table.parent / CASES} or not table.is_file():
         return []
-    known = {f"{int(row['case']):03d}": row for row in sweep_table.read(table)}
+    known = {f"{int(row['case']):03d}": row for row in sweep_table.read_cases(table)}
     rows = [known[path.name] for path in paths if path.name in known]
     keys = list(rows[0])[1 : list(rows[0]).index("state")] if rows else []
     differing = [key for key in keys if len({row[key] for row in rows}) > 1]

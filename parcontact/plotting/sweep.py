@@ -50,7 +50,7 @@ Rows = Sequence[dict[str, Any]]
 def charts(directory: Path) -> list[Chart]:
     """Return panels of a sweep; none if no case has a number to draw, or no key with numbers is swept."""
     table = sweep_table.results(directory)
-    rows, panels = sweep_table.read(table), PANELS
+    rows, panels = sweep_table.read_cases(table), PANELS
     keys = _find_keys(rows)
     if table.name == sweep_table.CURVES:
         panels = CURVE_PANELS

@@ -24,7 +24,7 @@ from ..steady_sliding.point import Point
 from ..steady_sliding.table import describe_missed
 from ..storage import wisdom
 from ..storage.curve_points import Wanted
-from .given_jobs import Given, all_ranks, read, warn
+from .given_jobs import Given, all_ranks, read_job_here, warn
 from .wording import python_words
 
 Array = NDArray[np.float64]
@@ -93,7 +93,7 @@ def steady(
         "temperatures": _numbers("temperatures", temperatures, ranges=False),
     }
     keys = {f"steady.{name}": list(values) for name, values in asked.items() if values}  # a job needs no history then
-    found = read(job, {**set, **keys} if isinstance(set, Mapping) else set or keys, comm)
+    found = read_job_here(job, {**set, **keys} if isinstance(set, Mapping) else set or keys, comm)
     slab = Slab(all_ranks(comm), *found.grid.points)
     with python_words():
         wanted = curve.request(found, *asked.values())

@@ -31,7 +31,7 @@ SHOWN = 60  # characters of a value in a message
 PACKAGE = str(Path(__file__).parents[1]) + os.sep
 
 
-def read(given: Given, changes: Mapping[str, Any] | None = None, comm: MPI.Intracomm | None = None) -> Job:
+def read_job_here(given: Given, changes: Mapping[str, Any] | None = None, comm: MPI.Intracomm | None = None) -> Job:
     """The job of a file or mapping with some keys changed, on every rank of `comm`; collective.
 
     Raises JobError, also where ranks give different jobs, and InputError for a run that cannot begin here.

@@ -31,7 +31,7 @@ from ..steady_sliding import start
 from ..storage import checkpoint, heights, wisdom
 from ..storage.checkpoint import Contents, Facts, TableMark
 from ..storage.fields import UNITS
-from .given_jobs import Given, agree, all_ranks, path_of, read, warn, warn_of
+from .given_jobs import Given, agree, all_ranks, path_of, read_job_here, warn, warn_of
 from .row import Row
 from .wording import python_words
 
@@ -49,7 +49,7 @@ class Simulation:
 
     def __init__(self, job: Given, set: Mapping[str, Any] | None = None, comm: MPI.Intracomm | None = None) -> None:
         self.comm = all_ranks(comm)
-        self.job = read(job, set, self.comm)
+        self.job = read_job_here(job, set, self.comm)
         if not self.job.history:
             raise InputError("the job has no history to run; parcontact.steady solves its steady states")
         self._slab = Slab(self.comm, *self.job.grid.points)
@@ -184,7 +184,9 @@ class Simulation:
         agree(world, file, set)
         text = on_root(world, lambda: checkpoint.inspect(file).chain[-1].job)
         elsewhere = "surface" in str(set)
-        job = read(on_root(world, lambda: heights.located(parse(text, str(file)).data, file, elsewhere)), set, world)
+        job = read_job_here(
+            on_root(world, lambda: heights.located(parse(text, str(file)).data, file, elsewhere)), set, world
+        )
         if not any(key.startswith("output") for key in set or {}):  # `read` has found its keys to be words
             job = job.of(job.origin._replace(names_directory=False))
         simulation = cls(job, comm=world)

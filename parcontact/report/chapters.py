@@ -57,7 +57,7 @@ def describe_directory(directory: Path) -> Chapter:
     shown = [one.without(sorted(places, key=len, reverse=True)) for one in sections if one]
     here, there_is = Path.cwd(), directory.absolute()
     named = there_is.relative_to(here) if there_is.is_relative_to(here) else Path(there_is.name)
-    return Chapter(title or there_is.name, named, kinds, shown, headline.describe(directory))
+    return Chapter(title or there_is.name, named, kinds, shown, headline.find_headline(directory))
 
 
 def compare(directories: Sequence[Path]) -> Iterator[Chapter]:
@@ -93,7 +93,7 @@ def _name_first_case(sections: Sequence[ReportSection]) -> list[ReportSection]:
 
 def _describe_example(directory: Path, case: Path) -> list[ReportSection]:
     """Return the results of the first case of a sweep as an example, where it is done."""
-    first = sweep_table.read(directory / "sweep.csv")[0]
+    first = sweep_table.read_cases(directory / "sweep.csv")[0]
     kinds = [describe for table, (_, describe) in KINDS.items() if (case / table).is_file()]
     if first["state"] != "done" or not kinds:
         return []
@@ -102,7 +102,7 @@ def _describe_example(directory: Path, case: Path) -> list[ReportSection]:
 
 def _describe_swept(directory: Path) -> str:
     """Return what differs between the cases of a sweep."""
-    rows = sweep_table.read(directory / "sweep.csv")
+    rows = sweep_table.read_cases(directory / "sweep.csv")
     names = list(rows[0]) if rows else ["case", "state"]
     swept = {name: dict.fromkeys(str(row[name]) for row in rows) for name in names[1 : names.index("state")]}
     values = "; ".join(f"{name} ({', '.join(found)})" for name, found in swept.items())

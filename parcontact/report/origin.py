@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..accuracy.budget import exceeds
 from ..job import Job
-from ..job.sections.listing import plain
+from ..job.sections.listing import plain_data
 from ..storage import hdf5, provenance
 from ..storage.tables import read_columns as read_table
 from ..summary.slide import ERRORS
@@ -128,4 +128,4 @@ def section(directory: Path, found: log.Log) -> ReportSection:
 
 def list_citations(job: Job | None) -> ReportSection:
     """Return what a paper that uses the results of a job should cite."""
-    return ReportSection("What to cite", [provenance.PROGRAM, *(provenance.cite_lines(plain(job)) if job else ())])
+    return ReportSection("What to cite", [provenance.PROGRAM, *(provenance.cite_lines(plain_data(job)) if job else ())])

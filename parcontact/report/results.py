@@ -50,10 +50,10 @@ def describe_run(directory: Path) -> ReportSection:
     numbers = ReportTable(("measure", "in the end", "smallest", "largest", "unit"), rows)
     box = run.job.grid.lx * run.job.grid.ly
     told = [
-        *slide.describe(run.job.history, run.job.initial, run.job.grid.dx, columns),
-        *pull_off.describe(columns, box, run.job.numerics.tolerance, bool(marker.detached(directory))),
-        *leak_stop.describe(directory),
-        theory_settings.describe(directory),
+        *slide.describe_slide(run.job.history, run.job.initial, run.job.grid.dx, columns),
+        *pull_off.describe_pull_off(columns, box, run.job.numerics.tolerance, bool(marker.detached(directory))),
+        *leak_stop.describe_leak_stop(directory),
+        theory_settings.describe_settings(directory),
     ]
     pictures = [draw_chart(chart) for chart in histories.charts(run)] + _leakage(directory)
     shown = [numbers, *_leakage_of_stages(run), *_theory(directory, run)]
@@ -64,7 +64,7 @@ def _theory(directory: Path, run: PlottedRun) -> list[ReportTable]:
     """Return the results of Persson's theory beside those of the run, where there is a theory."""
     rows = [
         (one.name, *map(format_cell, (one.run or math.nan, one.theory)), f"{one.theory / one.run - 1:+.0%}")
-        for one in theory_beside.compare(directory, run.job.history, run.job.grid.dx)
+        for one in theory_beside.compare_with_theory(directory, run.job.history, run.job.grid.dx)
         if one.run
     ]
     head = ("result", "run", "Persson's theory", "difference of the theory")
@@ -129,10 +129,10 @@ def _list_main_bands(directory: Path) -> list[ReportTable]:
 
 
 def describe_sweep(directory: Path) -> ReportSection:
-    rows = sweep_table.read(sweep_table.results(directory))
+    rows = sweep_table.read_cases(sweep_table.results(directory))
     used = [name for name in (rows[0] if rows else ()) if any(format_cell(row[name]) not in ("", "–") for row in rows)]
     table = _shorten(list(map(_add_unit, used)), [[row[name] for name in used] for row in rows])
-    told = list(filter(None, [theory_settings.describe(directory)]))
+    told = list(filter(None, [theory_settings.describe_settings(directory)]))
     return ReportSection("Sweep", told, [table], [draw_chart(chart) for chart in sweep.charts(directory)])
 
 

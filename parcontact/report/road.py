@@ -24,7 +24,9 @@ MOST_POINTS = 2**22  # of a surface that is made anew for a report
 
 def section(job: Job) -> ReportSection:
     """Describe the surface of a job, made anew; where its files are gone or it is too large, as the job says."""
-    shapes = ReportTable(("shape",), [(listing.line(part),) for part in job.surface], "shapes, whose heights add up")
+    shapes = ReportTable(
+        ("shape",), [(listing.listed_line(part),) for part in job.surface], "shapes, whose heights add up"
+    )
     if job.bands is not None:
         return _describe_bands(job, shapes)
     if job.grid.nx * job.grid.ny == 1:  # a job in bands of which only the rest could be read

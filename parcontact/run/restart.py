@@ -33,7 +33,7 @@ class RestartPoint:
     own: bool
 
 
-def choose(
+def choose_origin(
     job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str
 ) -> tuple[RestartPoint | None, list[str]]:
     """Return where to begin, and warnings about checkpoints that were skipped; collective.

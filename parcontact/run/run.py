@@ -13,7 +13,7 @@ from ..history.chosen import reached
 from ..job import Job
 from ..job.checks.advice import describe_sample
 from ..job.checks.cells import more_points
-from ..job.sections.listing import plain
+from ..job.sections.listing import plain_data
 from ..march import loop
 from ..march.failure import StepError
 from ..march.loop import March
@@ -166,7 +166,7 @@ class Run:
 
     def _sync(self) -> None:
         """Bring what was recorded to the disk, with the error budget so far."""
-        budget = self.march.state.errors.facts(plain(self.job.numerics.accuracy))
+        budget = self.march.state.errors.facts(plain_data(self.job.numerics.accuracy))
         self.facts = replace(self.facts, provenance=replace(self.facts.provenance, budget=budget))
         self.recorder.sync(self.facts.provenance)
 
@@ -206,8 +206,8 @@ class Run:
             box = grid.lx * grid.ly
             with suppress(OSError, InputError):  # a table that cannot be read now ends no run
                 rows = tables.read_columns(self.directory.path / "measures.csv")
-                told = slide.describe(self.job.history, self.job.initial, grid.dx, rows)
-                for text in (*told, *pull_off.describe(rows, box, tolerance, bool(self.march.detached))):
+                told = slide.describe_slide(self.job.history, self.job.initial, grid.dx, rows)
+                for text in (*told, *pull_off.describe_pull_off(rows, box, tolerance, bool(self.march.detached))):
                     console.say(text)
         for line in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
             console.say(line)

@@ -38,7 +38,7 @@ class Ended:
     contents: Contents | None = None
 
 
-def run(job: Job, slab: Slab, options: Options) -> int:
+def run_job(job: Job, slab: Slab, options: Options) -> int:
     """Run a job; collective. Returns the exit code. Nothing is written before the whole job has proved sound."""
     return run_to_end(job, slab, options).code
 
@@ -85,7 +85,7 @@ def _find_origin(
     slab, until = directory.slab, options.until
     timeline = Timeline.of(job, until or 0.0)
     reason = restart.finished_before(job, plain, slab, directory, options.restart, timeline)
-    origin, warnings = (None, []) if reason else restart.choose(job, plain, slab, directory, options.restart)
+    origin, warnings = (None, []) if reason else restart.choose_origin(job, plain, slab, directory, options.restart)
     if origin:
         timeline = Timeline.of(job, until or 0.0, ChosenSteps.of(job, part_of("steps", origin.contents.numbers)))
     if until is not None and not reached(timeline.end, until):
@@ -112,7 +112,7 @@ def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[st
     seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough | RoughSpectrum))
     chain = extend_chain(saved.chain if saved else (), link)
     included = str(job.included) if job.included else ""
-    return Provenance(chain, seeds, included, doubts, references=cite_lines(listing.plain(job)))
+    return Provenance(chain, seeds, included, doubts, references=cite_lines(listing.plain_data(job)))
 
 
 def _open_files(

@@ -85,7 +85,7 @@ class SweepRun:
     def _tell_errors(self, chosen: Sequence[Case]) -> None:
         """Say how wrong the results are at most, and warn of cases that are more so than they ask for; root only."""
         asked = {case.number: case.job.numerics.asked.both for case in chosen}
-        for k, found in enumerate(sweep_table.errors(chosen)):
+        for k, found in enumerate(sweep_table.sweep_errors(chosen)):
             if not found:
                 continue
             worst, what = max(found, key=lambda number: found[number]), ("friction", "the corrected contact area")[k]
@@ -121,7 +121,7 @@ class SweepRun:
         """Write the tables of the sweep; returns the exit code, FAILED where that cannot be. Root only."""
         directory = _directory(self.cases)
         try:
-            sweep_table.write(directory, self.cases)
+            sweep_table.write_sweep_tables(directory, self.cases)
         except OSError as error:
             reason = error.strerror or error
             print_line(
@@ -189,7 +189,7 @@ def to_do(chosen: Sequence[Case], afresh: bool) -> list[Job]:
     return [case.job for case in chosen if afresh or sweep_table.state(case) != "done"]
 
 
-def refuse_foreign(cases: Sequence[Case]) -> None:
+def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
     """Raise InputError where the files of others, or of another job, are in the directory of a sweep, or a link in
     place of the directory of a case; root only."""
     directory, first = _directory(cases), cases[0]

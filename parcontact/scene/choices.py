@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..effects.adhesion import law_of
+from ..effects.adhesion import adhesion_law
 from ..effects.effect import Decision, Effect, guarded
 from ..effects.folded_branches import FoldedBranches, bounded_error, fold_branches, time_scales
 from ..effects.relaxation import feeds_back, relaxation_of, time_factor_of
@@ -82,7 +82,7 @@ class Choices:
     @cached_property
     def adhesion(self) -> AdhesionLaw | None:
         """The law of adhesion; None if the surfaces do not stick."""
-        return law_of(self.job.section("adhesion"), self.grid, self.job.material)
+        return adhesion_law(self.job.section("adhesion"), self.grid, self.job.material)
 
     @cached_property
     def shears(self) -> tuple[Shear, ...]:

@@ -99,7 +99,7 @@ def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
     )
 
 
-def refuse_beyond_full_contact(setup: Setup) -> None:
+def refuse_approaches(setup: Setup) -> None:
     """Raise JobError for stages whose approach goes beyond the full contact of the surface where it begins."""
     mistakes = []
     for index, stage in enumerate(setup.job.history if has_full_contact(setup) else ()):

@@ -119,7 +119,7 @@ def transforms_of(job: Job) -> list[Any]:
     return [*scene.choices(job).transforms, "curve"]
 
 
-def run(
+def run_curve(
     job: Job,
     slab: Slab,
     wanted: Request,
@@ -193,7 +193,7 @@ def _maps(job: Job, slab: Slab, wanted: Request, directory: Directory) -> Steady
     """Make the file for the maps that the job asks for, if it does; collective."""
     if not job.output.fields:
         return None
-    cited = cite_lines(listing.plain(job))
+    cited = cite_lines(listing.plain_data(job))
     provenance = Provenance((Link(job.resolved(), slab.comm.size),), references=cited)
     points = [point if wanted.temperatures else point[:2] for point in wanted.points]
     return SteadyMaps(directory.path / "steady.h5", slab, job.grid.size, job.output.fields, points, provenance)

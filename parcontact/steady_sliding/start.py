@@ -22,7 +22,7 @@ def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = Non
     and for approaches beyond full contact.
     """
     setup = set_up(job, slab, until)
-    sanity.refuse_beyond_full_contact(setup)
+    sanity.refuse_approaches(setup)
     if saved is None and setup.choices.steady_start.on:
         return _from_steady_sliding(setup)
     march = March(build_on(setup))

@@ -12,7 +12,7 @@ from ..storage import hdf5
 from ..storage.provenance import PROGRAM, references_of
 
 
-def describe(directory: Path) -> str:
+def describe_citations(directory: Path) -> str:
     """Return what to cite for the run in a directory. Raises InputError where none is, or its job is damaged."""
     names = (RESOLVED, STEADY_RESOLVED)
     found = next((directory / name for name in names if (directory / name).is_file()), None)

@@ -22,7 +22,7 @@ SWEPT = (  # results of a sweep, from the most telling one on: column, words, un
 Columns = Mapping[str, Sequence[float]]
 
 
-def describe(directory: Path) -> str:
+def find_headline(directory: Path) -> str:
     """Return the headline of an output directory: a sentence for each of its run, friction curve, sweep and study."""
     parts = {"measures.csv": _run, "steady.csv": _curve, "sweep.csv": _sweep, "study.txt": _study}
     return " ".join(filter(None, (part(directory) for name, part in parts.items() if (directory / name).is_file())))
@@ -43,7 +43,7 @@ def _run(directory: Path) -> str:
 
 def _friction(job: Job, columns: Columns) -> Iterator[str]:
     """Yield friction of the slide where something slides and friction is defined."""
-    found, errors = slide.measure(job.history, columns), slide.absolute_errors(job.history, columns, job.grid.dx)
+    found, errors = slide.measure_slide(job.history, columns), slide.absolute_errors(job.history, columns, job.grid.dx)
     if found is None or math.isnan(found.mu_dyn):
         return
     mean, peak = (with_error(getattr(found, name), errors.get(name, math.nan)) for name in ("mu_dyn", "mu_max"))
@@ -63,7 +63,7 @@ def _leakage(directory: Path, columns: Columns) -> Iterator[str]:
     """Yield the last conductivities, of `leak.csv` with their errors, else of the run itself."""
     table = directory / "leak.csv"
     columns = tables.read_columns(table) if table.is_file() else columns
-    stops = [text for text in leak_stop.describe(directory) if " between " in text]
+    stops = [text for text in leak_stop.describe_leak_stop(directory) if " between " in text]
     known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
     if known:
         row = known[-1]
@@ -81,7 +81,7 @@ def _flow(columns: Columns, row: int, axis: str) -> str:
 
 def _area(job: Job, columns: Columns, detached: bool) -> str:
     """Return the mean contact area of the slide; without one that of the row which shows the contact best."""
-    if (found := slide.measure(job.history, columns)) is not None:
+    if (found := slide.measure_slide(job.history, columns)) is not None:
         error = slide.absolute_errors(job.history, columns, job.grid.dx).get("contact_area", math.nan)
         return f"the mean contact area is {_size(job, found.contact_area_corrected, error)}"
     row = pull_off.choose_row(columns, detached)
@@ -122,7 +122,7 @@ def _curve(directory: Path) -> str:
 def _sweep(directory: Path) -> str:
     """Return the smallest and the largest of the first of the results `SWEPT` that the cases of a sweep have; ''
     without any."""
-    rows = sweep_table.read(sweep_table.results(directory))
+    rows = sweep_table.read_cases(sweep_table.results(directory))
     for name, words, unit, error in SWEPT:
         known = sorted((row for row in rows if math.isfinite(row.get(name, math.nan))), key=itemgetter(name))
         if known and known[-1][name]:

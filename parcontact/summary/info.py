@@ -28,10 +28,10 @@ SHOWN = 20  # tuning: numbers of one name, or failed cases, at most
 NOT_HDF5 = "file signature not found"  # what HDF5 says of another file
 
 
-def describe(path: Path) -> tuple[str, bool]:
+def describe_path(path: Path) -> tuple[str, bool]:
     """Describe a checkpoint, a file of fields or an output directory, and tell whether it is sound; on one rank."""
     if path.is_dir():
-        return describe_directory(path)
+        return describe_files(path)
     try:
         if checkpoint.is_one(path):
             return _checkpoint(path)
@@ -52,7 +52,7 @@ def describe_all(paths: Sequence[Path]) -> tuple[str, bool]:
     found = []
     for path in paths:
         try:
-            found.append(describe(path))
+            found.append(describe_path(path))
         except InputError as error:
             if len(paths) == 1:
                 raise
@@ -114,7 +114,7 @@ def _short(value: NDArray[Any]) -> str:
     return json.dumps(value.tolist()) if np.size(value) <= SHOWN else f"{np.size(value)} values"
 
 
-def describe_directory(directory: Path) -> tuple[str, bool]:
+def describe_files(directory: Path) -> tuple[str, bool]:
     """Describe a directory, and tell whether all of it can be read; raises InputError where nothing is."""
     try:
         claims = marker.read_claims(directory)
@@ -166,9 +166,11 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.3g} s"
     if job is not None:
         box = job.grid.lx * job.grid.ly
-        yield from (f"  {text}" for text in slide.describe(job.history, job.initial, job.grid.dx, columns))
-        yield from (f"  {text}" for text in pull_off.describe(columns, box, job.numerics.tolerance, bool(came_off)))
-    yield from (f"  {text}" for text in leak_stop.describe(table.parent))
+        yield from (f"  {text}" for text in slide.describe_slide(job.history, job.initial, job.grid.dx, columns))
+        yield from (
+            f"  {text}" for text in pull_off.describe_pull_off(columns, box, job.numerics.tolerance, bool(came_off))
+        )
+    yield from (f"  {text}" for text in leak_stop.describe_leak_stop(table.parent))
 
 
 def _slides(job: Job | None) -> bool:
@@ -179,14 +181,14 @@ def _slides(job: Job | None) -> bool:
 def _theory(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     count = f"  Persson's theory: {len(tables.read_columns(table)['time'])} rows, "
     try:
-        settings = theory_settings.read(table.parent)
+        settings = theory_settings.read_settings(table.parent)
     except InputError:
         yield count + "of unknown settings"
         raise
     yield count + (settings.sentence if settings else "of unknown settings")
     if (resolved := table.with_name(RESOLVED)).exists():
         job = shown_job(resolved)
-        yield from (f"  {text}" for text in theory_beside.describe(table.parent, job.history, job.grid.dx))
+        yield from (f"  {text}" for text in theory_beside.describe_theory(table.parent, job.history, job.grid.dx))
 
 
 def _curve(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
@@ -229,7 +231,7 @@ def _leakage(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
 
 
 def _sweep(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    rows = sweep_table.read(path)
+    rows = sweep_table.read_cases(path)
     states = Counter(str(row["state"]) for row in rows)
     counts = ", ".join(f"{number} {'not begun' if state == '-' else state}" for state, number in states.items())
     yield f"  sweep of {states.total()} cases: {counts}"

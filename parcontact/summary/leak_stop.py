@@ -13,7 +13,7 @@ from ..storage import tables
 Columns = Mapping[str, Sequence[float]]
 
 
-def describe(directory: Path) -> list[str]:
+def describe_leak_stop(directory: Path) -> list[str]:
     """Return a sentence for each direction in which the leakage of an output directory is known; one where both agree.
 
     A sentence names the pressures of the last instant with a flow and of the first one without, or their times where

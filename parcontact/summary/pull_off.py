@@ -98,7 +98,7 @@ def choose_row(columns: Columns, detached: bool = False) -> int:
     return pulls[-1].row if pulls else int(np.flatnonzero(pressure >= (1.0 - SAME_LOAD) * pressure.max())[-1])
 
 
-def describe(columns: Columns, area: float, tolerance: float, detached: bool = False) -> Iterator[str]:
+def describe_pull_off(columns: Columns, area: float, tolerance: float, detached: bool = False) -> Iterator[str]:
     """Yield a sentence for each pull-off, and for the largest pull of a contact that holds; `area` is the box [m^2],
     solves have the `tolerance`."""
     pulls = find(columns, detached)

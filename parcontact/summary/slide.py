@@ -45,7 +45,7 @@ def mean_over_end(distance: ArrayLike, values: ArrayLike, share: float = DYNAMIC
     return float(np.trapezoid(y, x) / (x[-1] - x[0]))
 
 
-def measure(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> Slide | None:
+def measure_slide(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> Slide | None:
     """Measure the slide of a history, from the columns `time`, `distance`, `friction`, `contact_area` of its rows, and
     `contact_area_corrected` where it is there.
 
@@ -82,7 +82,7 @@ def _tangential(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) 
 def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]], cell: float) -> dict[str, float]:
     """Return the absolute errors of mu_max, mu_dyn and the corrected contact area of a slide, as far as they are
     estimated; `cell` is the spacing of the grid along x [m]."""
-    known, slid = errors(history, columns), measure(history, columns)
+    known, slid = slide_errors(history, columns), measure_slide(history, columns)
     rows, found = _during(history, np.asarray(columns["time"], float)), dict[str, float]()
     if slid is None:
         return {}
@@ -94,10 +94,12 @@ def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[flo
     return found
 
 
-def errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
+def slide_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
     """Return the largest relative errors of friction and contact area in the rows of the slide, or in the last row if
     nothing has slid, by their columns as far as these are there; nan where none is known."""
-    rows = _during(history, np.asarray(columns["time"], float))[1:].tolist() if measure(history, columns) else [-1]
+    rows = (
+        _during(history, np.asarray(columns["time"], float))[1:].tolist() if measure_slide(history, columns) else [-1]
+    )
     return {name: largest(columns[name][row] for row in rows) for name in ERRORS if name in columns}
 
 
@@ -105,7 +107,7 @@ def mean_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]
     """Return the relative errors of friction and contact area that the end of a run tells of its slide: means over the
     distance slid, of friction in proportion to it. Without a slide that of the area in the last row; nan where no error
     is known."""
-    if measure(history, columns) is None:
+    if measure_slide(history, columns) is None:
         return {ERRORS[1]: columns[ERRORS[1]][-1]} if ERRORS[1] in columns else {}
     rows, found = _during(history, np.asarray(columns["time"], float)), dict[str, float]()
     far, friction = np.diff(np.asarray(columns["distance"], float)[rows]), np.asarray(columns["friction"], float)
@@ -149,7 +151,7 @@ def _mean(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: 
     return mean_over_end(distance, values), mean_over_end(distance, within)
 
 
-def describe(
+def describe_slide(
     history: Sequence[Stage], initial: Initial, cell: float, columns: Mapping[str, Sequence[float]]
 ) -> Iterator[str]:
     """Yield sentences about the slide so far, from the columns of `measure` and of `errors`; none where nothing slid.
@@ -160,7 +162,7 @@ def describe(
     last, begun = _slide(history), _begun(history, columns["time"])
     not_begun = begun <= last.start
     so_far = history[:begun] if not_begun else history
-    found = measure(so_far, columns)
+    found = measure_slide(so_far, columns)
     if found is None:
         return
     if not_begun:
@@ -178,7 +180,7 @@ def describe(
         flash, _ = _mean(columns, rows, "flash_temperature", "")
         hottest = largest(columns["max_temperature"][row] for row in rows[1:])
         yield f"the mean flash temperature over the same distance is {flash:.3g} K, at most {hottest:.3g} K at a point"
-    known = {name: value for name, value in errors(so_far, columns).items() if value == value}
+    known = {name: value for name, value in slide_errors(so_far, columns).items() if value == value}
     if known:
         what = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
         parts = ", ".join(f"{what[name]} {stated_error(value)}" for name, value in known.items())

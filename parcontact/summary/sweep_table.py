@@ -39,7 +39,7 @@ DAMAGED = "damaged"
 FAILURE = ".failure"  # why a case has failed
 
 
-def write(directory: Path, cases: Sequence[Case]) -> None:
+def write_sweep_tables(directory: Path, cases: Sequence[Case]) -> None:
     """Write all tables in the directory of a sweep, from what its cases have left in theirs; root only.
 
     Several programs, each with a case, may do so at a time.
@@ -52,13 +52,13 @@ def write(directory: Path, cases: Sequence[Case]) -> None:
         names = names_of(choose_columns(SWEEP, when=there))[1:]
         if not any(case.job.history for case in cases):  # results of curves are in the table of their points
             names = tuple(name for name in names if any(name in row for row in rows))
-        save(directory / TABLE, ["case", *keys, *names], rows)
+        save_cases(directory / TABLE, ["case", *keys, *names], rows)
         if points:
-            save(directory / CURVES, ["case", *keys, *CURVE_COLUMNS], points)
+            save_cases(directory / CURVES, ["case", *keys, *CURVE_COLUMNS], points)
         if seeded and any(case.job.history for case in cases):
-            save(directory / "sweep_mean.csv", *_means(rows, keys, [*RESULTS, *more, *THEORY]))
+            save_cases(directory / "sweep_mean.csv", *_means(rows, keys, [*RESULTS, *more, *THEORY]))
         if seeded and points:
-            save(directory / "sweep_curves_mean.csv", *_means(points, [*keys, *PLACES], CURVE_RESULTS))
+            save_cases(directory / "sweep_curves_mean.csv", *_means(points, [*keys, *PLACES], CURVE_RESULTS))
 
 
 def _asks_for(case: Case, section: str) -> bool:
@@ -71,13 +71,13 @@ def results(directory: Path) -> Path:
     cases have none."""
     curves, table = directory / CURVES, directory / TABLE
     if not curves.is_file() or (
-        table.is_file() and any(math.isfinite(row.get("residual", math.nan)) for row in read(table))
+        table.is_file() and any(math.isfinite(row.get("residual", math.nan)) for row in read_cases(table))
     ):
         return table
     return curves
 
 
-def read(path: Path) -> list[dict[str, Any]]:
+def read_cases(path: Path) -> list[dict[str, Any]]:
     """Read the rows of a table, numbers as such, an empty field as nan; raises InputError for what is no such table."""
     try:
         text = path.read_text(encoding="utf-8")
@@ -93,7 +93,7 @@ def read(path: Path) -> list[dict[str, Any]]:
         raise InputError(f"{path} cannot be read: {error}; {MEND}") from error
 
 
-def errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
+def sweep_errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
     """Yield of each column of errors the largest one of each case that is done, by its number, as far as known."""
     rows = [row for case in cases for row in ([_row(case)] if case.job.history else _points(case))]
     for name in slide.ERRORS:
@@ -137,7 +137,7 @@ def _results(case: Case) -> dict[str, Any]:
         if len(columns["time"]) < 2 and not prefix:  # nothing but the start
             continue
         if columns["time"]:
-            found = slide.measure(case.job.history, columns)
+            found = slide.measure_slide(case.job.history, columns)
             ends = {name: columns[name][-1] for name in RESULTS if name in columns}
             known = ends if found is None else {key: value for key, value in found._asdict().items() if value == value}
             row |= {f"{prefix}{key}": value for key, value in known.items()}
@@ -238,7 +238,7 @@ def _means(
     return [*kept, "number", *(f"{name}_{what}" for name in names for what in MEANS)], table
 
 
-def save(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
+def save_cases(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
     files.replace_file(path, to_csv(columns, ([row.get(name) for name in columns] for row in rows)))
 
 

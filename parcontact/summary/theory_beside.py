@@ -22,12 +22,12 @@ class Beside(NamedTuple):
     error: float = math.nan
 
 
-def compare(directory: Path, history: Sequence[Stage], cell: float) -> list[Beside]:
+def compare_with_theory(directory: Path, history: Sequence[Stage], cell: float) -> list[Beside]:
     """Return results of theory.csv and of measures.csv in a directory; nothing without the former;
     `cell` is the spacing of the grid along x [m].
 
-    They are mu_max, mu_dyn and the mean contact area of the slide (`slide.measure`), the run's as corrected for its
-    edges; without a slide the contact area of the last instant. Raises InputError for damaged tables.
+    They are mu_max, mu_dyn and the mean contact area of the slide (`slide.measure_slide`), the run's as corrected
+    for its edges; without a slide the contact area of the last instant. Raises InputError for damaged tables.
     """
     predicted, found = (_results(directory / name, history, cell) for name in (theory_settings.TABLE, RUN))
     nothing = None, math.nan
@@ -40,7 +40,7 @@ def _results(path: Path, history: Sequence[Stage], cell: float) -> dict[str, tup
     if not columns.get("time"):
         return {}
     columns.setdefault(slide.CORRECTED, columns["contact_area"])
-    found = slide.measure(history, columns)
+    found = slide.measure_slide(history, columns)
     if found is None:
         area = columns[slide.CORRECTED][-1]
         return {"contact area": (area, columns.get(slide.ERRORS[1], [math.nan])[-1] * area)}
@@ -50,9 +50,9 @@ def _results(path: Path, history: Sequence[Stage], cell: float) -> dict[str, tup
     return {name: (value, within.get(name.replace(" ", "_"), math.nan)) for name, value in defined.items()}
 
 
-def describe(directory: Path, history: Sequence[Stage], cell: float) -> Iterator[str]:
+def describe_theory(directory: Path, history: Sequence[Stage], cell: float) -> Iterator[str]:
     """Yield a sentence, if there is a theory. Raises InputError for damaged tables."""
-    results = compare(directory, history, cell)
+    results = compare_with_theory(directory, history, cell)
     if results:
         pairs = (f"{one.name} {one.theory:.3g}{_run(one)}" for one in results)
         yield f"Persson's theory predicts {', '.join(pairs)}"

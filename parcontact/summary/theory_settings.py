@@ -36,13 +36,13 @@ class TheorySettings(NamedTuple):
         return f"gamma {self.gamma:g}, for {OF_WAVES.get(self.waves, self.waves)}"
 
 
-def write(directory: Path, settings: TheorySettings) -> None:
+def write_settings(directory: Path, settings: TheorySettings) -> None:
     """Leave the settings beside the table; raises OSError."""
-    with files.replaced(directory / FILE, is_ours) as file:
+    with files.replaced(directory / FILE, is_our_settings) as file:
         file.write(TEXT.format(**settings._asdict(), version=__version__).encode())
 
 
-def is_ours(path: Path) -> bool:
+def is_our_settings(path: Path) -> bool:
     """Return whether this program wrote a file of settings; raises OSError."""
     return path.read_bytes().startswith(HEAD.encode())
 
@@ -52,7 +52,7 @@ def is_own_table(path: Path) -> bool:
     return path.with_name(FILE).is_file() and path.read_bytes().startswith(b"time,distance,pressure,")
 
 
-def read(directory: Path) -> TheorySettings | None:
+def read_settings(directory: Path) -> TheorySettings | None:
     """Return the settings of the table in a directory, None if there are none; raises InputError for a damaged file."""
     path = directory / FILE
     try:
@@ -68,11 +68,11 @@ def read(directory: Path) -> TheorySettings | None:
 
 def shared(directories: Iterable[Path]) -> TheorySettings | None:
     """Return the settings that the tables in these directories have in common, if any. Raises as `read`."""
-    found = {read(directory) for directory in directories if (directory / TABLE).is_file()}
+    found = {read_settings(directory) for directory in directories if (directory / TABLE).is_file()}
     return found.pop() if len(found) == 1 else None
 
 
-def describe(directory: Path) -> str:
+def describe_settings(directory: Path) -> str:
     """Return a sentence about the theory in a directory, or in the cases of a sweep there; '' if there is none."""
     try:
         settings = shared([directory, *directory.glob("cases/*")])

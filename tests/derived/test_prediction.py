@@ -170,30 +170,33 @@ def test_settings_are_those_of_the_table_beside_them(tmp_path: Path) -> None:
     ran, other = (job(output={"directory": str(tmp_path / name)}) for name in ("ran", "other"))
     first, second = TheorySettings(0.5, "lattice"), TheorySettings(0.6, "lattice")
     for one in (ran, other):
-        prediction.write(one, iter([]), first)
+        prediction.write_theory(one, iter([]), first)
     paths = [one.output.directory for one in (ran, other)]
-    assert theory_settings.read(paths[0]) == first
+    assert theory_settings.read_settings(paths[0]) == first
     assert theory_settings.shared(paths) == first
-    assert theory_settings.describe(paths[0]) == "Persson's theory: gamma 0.5, for the waves of the surface in its box"
-    prediction.write(other, iter([]), second)
+    assert (
+        theory_settings.describe_settings(paths[0])
+        == "Persson's theory: gamma 0.5, for the waves of the surface in its box"
+    )
+    prediction.write_theory(other, iter([]), second)
     assert theory_settings.shared(paths) is None
     table = (paths[0] / "theory.csv").read_bytes()
     with pytest.raises(ZeroDivisionError):
-        prediction.write(ran, (1 / 0 for _ in range(1)), second)  # type: ignore[misc]
+        prediction.write_theory(ran, (1 / 0 for _ in range(1)), second)  # type: ignore[misc]
     assert (paths[0] / "theory.csv").read_bytes() == table
-    assert theory_settings.read(paths[0]) == first
+    assert theory_settings.read_settings(paths[0]) == first
 
 
 def test_damaged_settings_are_told_by_name(tmp_path: Path) -> None:
     """By `parcontact info`, and where pictures and reports name them."""
     one = job(output={"directory": str(tmp_path / "out")})
-    prediction.write(one, iter([]), TheorySettings(0.5, "lattice"))
+    prediction.write_theory(one, iter([]), TheorySettings(0.5, "lattice"))
     path = tmp_path / "out" / "theory.yaml"
     path.write_text("gamma: 0.5\n")
     damaged = f"{path} is damaged: it does not say gamma and waves"
-    assert theory_settings.describe(path.parent) == f"theory of unknown settings: {damaged}"
+    assert theory_settings.describe_settings(path.parent) == f"theory of unknown settings: {damaged}"
     (path.parent / "measures.csv").write_text("")
-    told, sound = info.describe(path.parent)
+    told, sound = info.describe_path(path.parent)
     assert not sound
     assert "  Persson's theory: 0 rows, of unknown settings\n" in told
     assert f"  {damaged}" in told.splitlines()
@@ -202,7 +205,7 @@ def test_damaged_settings_are_told_by_name(tmp_path: Path) -> None:
 def test_a_directory_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"theory.csv cannot be written"):
-        prediction.write(
+        prediction.write_theory(
             job(output={"directory": str(tmp_path / "file" / "x")}), iter([]), TheorySettings(0.45, "lattice")
         )
 

@@ -73,7 +73,7 @@ def test_files_that_come_back_as_they_were(comm: MPI.Intracomm, tmp_path: Path) 
 
 def test_files_that_do_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run whose result is another one, as after a stop from which it went on wrongly."""
-    run = runner.run
-    monkeypatch.setattr(runner, "run", lambda job, slab, options: run(job, slab, Options(until=0.5e-3)))
+    run = runner.run_job
+    monkeypatch.setattr(runner, "run_job", lambda job, slab, options: run(job, slab, Options(until=0.5e-3)))
     assert "fields.h5" in machine.find_broken_files(MPI.COMM_SELF, tmp_path)
     assert list(tmp_path.iterdir()) == []

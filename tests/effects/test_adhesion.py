@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import parcontact as pc
-from parcontact.effects.adhesion import law_of
+from parcontact.effects.adhesion import adhesion_law
 from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.mesh import load, load_cases
@@ -74,7 +74,7 @@ def test_loads_may_pull() -> None:
 def test_the_range_that_the_mesh_resolves() -> None:
     """Two cells are one process zone, `l = E* rho^2/w`."""
     auto = job(adhesion={"work": 0.05})
-    law = law_of(auto.section("adhesion"), auto.grid, auto.material)
+    law = adhesion_law(auto.section("adhesion"), auto.grid, auto.material)
     assert law is not None
     assert law.process_zone(E) == pytest.approx(2 * 4e-4 / 64, rel=1e-12)
 
@@ -155,7 +155,7 @@ def test_what_check_tells() -> None:
 def test_the_ramp_of_dugdales_law(reach: float, cells: float) -> None:
     """`2 h/l` of the range; on cells longer than a process zone from a gap of 0 on, so that no work is lost."""
     dugdale = job(adhesion={"work": 0.05, "range": reach, "law": "dugdale"})
-    law = law_of(dugdale.section("adhesion"), dugdale.grid, dugdale.material)
+    law = adhesion_law(dugdale.section("adhesion"), dugdale.grid, dugdale.material)
     assert law is not None
     assert law.ramp == pytest.approx(cells * reach, rel=1e-12)
 
@@ -255,4 +255,4 @@ def test_approaches_beyond_full_contact_are_refused_before_the_first_step() -> N
             if refused
             else does_not_raise()
         ):
-            sanity.refuse_beyond_full_contact(setup)
+            sanity.refuse_approaches(setup)

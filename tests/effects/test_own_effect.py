@@ -208,5 +208,5 @@ def test_names_of_parts_are_refused(shared_path: Path, comm: MPI.Intracomm, monk
         run(comm, shared_path, "taken")
     assert not (shared_path / "taken").exists()
     with pytest.raises(InputError, match=f"the effect {name} cannot be used"):
-        memory.total(Job.model_validate(WEAR))
+        memory.total_bytes(Job.model_validate(WEAR))
     forget()

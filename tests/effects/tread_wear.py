@@ -26,6 +26,6 @@ def install(directory: Path, module: str) -> None:
 
 def forget() -> None:
     """The program forgets the sections that it has found, and looks for them anew."""
-    for found in (added_sections._registered, added_sections._load, added_sections.why_unusable, model.extended):
+    for found in (added_sections._registered, added_sections._load, added_sections.why_unusable, model.extended_model):
         found.cache_clear()
     sys.modules.pop("tread_wear", None)

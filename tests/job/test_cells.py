@@ -45,7 +45,7 @@ def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, fl
 def test_the_mesh_of_fewest_points(asked: Accuracy, angle: float) -> None:
     """It keeps both errors, with no more points than the best of all meshes that transform fast."""
     way = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    found = cells.choose(WAVE, SIZE, [way], asked, [GUESS])
+    found = cells.choose_points(WAVE, SIZE, [way], asked, [GUESS])
     lengths = [n for n in range(16, 800, 16) if cells.fast_length(n) == n]
 
     def keeps(points: tuple[int, int]) -> bool:
@@ -62,7 +62,7 @@ def test_slow_sliding_needs_cells_in_the_first_order() -> None:
     """As many as the term of slow sliding asks for, where others are small; half as many for twice the error."""
     guess = cells.Guess(share=0.2, phase=0.0, waves=100.0, slow=1.0)
     for asked in (0.02, 0.01):
-        nx, _ = cells.choose(WAVE, SIZE, [(1.0, 0.0)], Accuracy(friction=asked, area=0.9), [guess])
+        nx, _ = cells.choose_points(WAVE, SIZE, [(1.0, 0.0)], Accuracy(friction=asked, area=0.9), [guess])
         least = 0.09 * 4.0 * 2.0 / asked * SIZE[0] / WAVE  # 2 = (0.8/0.2)^0.5
         assert least <= nx < 1.15 * least
 
@@ -70,7 +70,7 @@ def test_slow_sliding_needs_cells_in_the_first_order() -> None:
 def test_long_cells_lie_across_the_sliding() -> None:
     asked, guess = Accuracy(friction=0.001, area=0.1), [cells.Guess(0.2, 0.4, 12.0)]
     along_x, along_y, both, still = (
-        cells.choose(WAVE, SIZE, ways, asked, guess)
+        cells.choose_points(WAVE, SIZE, ways, asked, guess)
         for ways in ([(1.0, 0.0)], [(0.0, 1.0)], [(1.0, 0.0), (0.0, 1.0)], [])
     )
     assert along_x == along_y[::-1]
@@ -85,7 +85,7 @@ def test_the_worst_of_all_loads_decides() -> None:
     whose error is by those along it: neither mesh does for both."""
     still, lossy = cells.Guess(0.2, 0.0, 24.0), cells.Guess(0.2, 0.5, 24.0)
     one, other, both = (
-        cells.choose(WAVE, SIZE, [(1.0, 0.0)], BOTH, found) for found in ([still], [lossy], [still, lossy])
+        cells.choose_points(WAVE, SIZE, [(1.0, 0.0)], BOTH, found) for found in ([still], [lossy], [still, lossy])
     )
     assert one[0] < both[0]
     assert other[1] < both[1]

@@ -17,7 +17,7 @@ from parcontact.job import (
     Stage,
     ZenerBranch,
     added_sections,
-    describe,
+    describe_job,
     load,
 )
 from parcontact.job.checks.cells import cells_per_wave, has_wave
@@ -156,7 +156,7 @@ def test_the_duration_of_an_approach_follows_from_its_velocity(tmp_path: Path) -
     assert (press.load.start, press.load.end, press.speed) == (-1e-6, 2e-6, 3.0)
     assert press.chooses
     assert pull.time_step == 0.01
-    assert "approach -1e-06 to 2e-06 m at 1.5e-06 m/s, velocity" in listing.line(press)
+    assert "approach -1e-06 to 2e-06 m at 1.5e-06 m/s, velocity" in listing.listed_line(press)
 
 
 def test_a_maxwell_fluid_is_legal(tmp_path: Path) -> None:
@@ -212,7 +212,7 @@ def test_resolved_round_trip(tmp_path: Path, text: str) -> None:
 
 def test_describe_has_keys_values_and_units(tmp_path: Path) -> None:
     (tmp_path / "road.npy").touch()
-    table = " ".join(describe(job_of(tmp_path, CONTRACT)).split())
+    table = " ".join(describe_job(job_of(tmp_path, CONTRACT)).split())
     for part in (
         "grid.points [1024, 1024]", "grid.size [0.001, 0.001] m", "material.modulus_inf 1e+06 Pa", "rms_slope 0.02,",
         "G0 2.75e+06 Pa, G1 305560 Pa, eta1 3055.6 Pa s", "pressure 100000 Pa", "velocity [3, 0] m/s", "phase 0 rad",
@@ -243,7 +243,7 @@ def test_a_resolved_job_that_is_none(tmp_path: Path) -> None:
 # -- sections of effects, as a job's own keys -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("section", added_sections.names())
+@pytest.mark.parametrize("section", added_sections.own_sections())
 def test_an_empty_section_of_an_effect_is_an_absent_one(tmp_path: Path, section: str) -> None:
     assert job_of(tmp_path, SMALL + f"{section}:\n") == job_of(tmp_path, SMALL)
     with pytest.raises(InputError, match=f"zzzzzz is not a known key; there are .*\\b{section}\\b"):
@@ -255,9 +255,9 @@ def test_an_empty_section_of_an_effect_is_an_absent_one(tmp_path: Path, section:
 
 def test_words_have_no_unit() -> None:
     """A stage that chooses its steps says auto, and not auto s."""
-    line = listing.line(Stage.model_validate({"pressure": 1.0e5, "duration": 1.0}))
+    line = listing.listed_line(Stage.model_validate({"pressure": 1.0e5, "duration": 1.0}))
     assert line.endswith("duration 1 s, time_step auto")
-    line = listing.line(Stage.model_validate({"pressure": 1.0e5, "duration": 1.0, "time_step": 0.5}))
+    line = listing.listed_line(Stage.model_validate({"pressure": 1.0e5, "duration": 1.0, "time_step": 0.5}))
     assert line.endswith("time_step 0.5 s")
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from parcontact.errors import InputError
-from parcontact.job import Case, JobError, choose, load, load_cases
+from parcontact.job import Case, JobError, load, load_cases, select_cases
 
 from . import texts
 from .texts import SMALL, with_material
@@ -311,7 +311,7 @@ def test_overrides_reach_every_case_and_the_sweep_itself(path: Path) -> None:
 def test_one_case(path: Path) -> None:
     cases = cases_of(path, TIMES)
     assert load(path, case=1) == cases[1].job
-    assert choose(cases, None) == cases
+    assert select_cases(cases, None) == cases
     with pytest.raises(InputError, match="the sweep has 3 cases, numbered from 0"):
         load(path, case=3)
     with pytest.raises(JobError, match=r"job.yaml:7:3: sweep has 3 cases, numbered from 0; choose one"):

@@ -195,7 +195,7 @@ WRONG = {
 
 @pytest.fixture(scope="module")
 def validator() -> jsonschema.Draft202012Validator:
-    found = schema.schema()
+    found = schema.json_schema()
     jsonschema.Draft202012Validator.check_schema(found)
     return jsonschema.Draft202012Validator(found)
 
@@ -234,7 +234,7 @@ def test_every_key_is_in_it(validator: jsonschema.Draft202012Validator) -> None:
 
 def test_nothing_is_left_open(validator: jsonschema.Draft202012Validator) -> None:
     """A type for which there is no schema would allow anything; only a material beside an include has some."""
-    found = schema.schema()
+    found = schema.json_schema()
     empty = [path for path, value in walk(found) if value == {} or value == {"description": value_of(value)}]
     assert not empty
 
@@ -251,5 +251,5 @@ def walk(node: Any, path: str = "") -> Any:
 
 def test_the_verb(capsys: pytest.CaptureFixture[str]) -> None:
     assert __main__.main(["schema"]) == 0
-    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(schema.schema()))
+    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(schema.json_schema()))
     assert yaml.safe_load(RIGHT)

@@ -26,7 +26,7 @@ from parcontact.job import schema
 from parcontact.job.text import yamltext
 from parcontact.manual import reference, terminal, texts
 
-PAGES = texts.names()
+PAGES = texts.page_names()
 NOTEBOOKS = sorted((texts.PAGES.parent / "notebooks").glob("*.ipynb"))
 WHOLE: dict[str, Any] = {  # what a block of YAML that is not a whole job is put into
     "grid": {"points": 64, "size": 1.0e-3},
@@ -72,8 +72,8 @@ def test_the_table_of_contents_has_every_page() -> None:
 @pytest.mark.parametrize("name", PAGES)
 def test_pages_refer_to_pages(name: str) -> None:
     assert set(re.findall(r"\{doc\}`(\w+)`", texts.page(name, WRITERS))) <= set(PAGES)
-    assert "{doc}" not in texts.plain(name, WRITERS)
-    assert ".. auto" not in texts.plain(name, WRITERS)
+    assert "{doc}" not in texts.plain_page(name, WRITERS)
+    assert ".. auto" not in texts.plain_page(name, WRITERS)
 
 
 def test_only_languages_that_are_run_or_output() -> None:
@@ -83,7 +83,7 @@ def test_only_languages_that_are_run_or_output() -> None:
 
 def test_the_page_on_python_is_text() -> None:
     """Calls and docstrings of what it names, with all methods of a simulation, and only some of a material."""
-    text = texts.plain("python", WRITERS)
+    text = texts.plain_page("python", WRITERS)
     assert "## pc.Simulation(job, set=None, comm=None)\n\nA job, run from Python" in text
     assert re.search(r"^pc\.Simulation +A job, run from Python on the ranks", text, re.MULTILINE)  # in a list of names
     for method in ("steps()", "run(restart='auto', quiet=True)", "row", "restore(path, set=None, comm=None)"):
@@ -271,8 +271,8 @@ def test_files_exist() -> None:
 def test_it_names_the_pages_of_the_manual() -> None:
     (section,) = re.findall(r"^## Manual\n(.*?)^## ", README, re.M | re.S)
     lists = re.findall(r"^\* .*", section, re.M)
-    assert [name for line in lists for name in re.findall(r"`(\w+)`", line)] == texts.names()[1:]
-    assert set(re.findall(r"parcontact manual (\w+)`", README)) <= set(texts.names())
+    assert [name for line in lists for name in re.findall(r"`(\w+)`", line)] == texts.page_names()[1:]
+    assert set(re.findall(r"parcontact manual (\w+)`", README)) <= set(texts.page_names())
 
 
 def test_the_first_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -359,15 +359,15 @@ def compare_table(text: str, path: Path) -> None:
 TABLES_terminal = re.compile(r"^[|\s:-]+$|[|;]", re.MULTILINE)  # rules and marks of tables, and of the web site
 
 
-@pytest.mark.parametrize("name", texts.names())
+@pytest.mark.parametrize("name", texts.page_names())
 def test_prose_is_not_wider(name: str) -> None:
-    text = texts.plain(name, {"verbs": lambda: ""})
+    text = texts.plain_page(name, {"verbs": lambda: ""})
     prose = terminal.CODE.sub("", text)
     wide = [line for line in prose.splitlines() if len(line) > 80 and not line.startswith(("#", "!["))]
     assert not [line for line in wide if " " in line.strip()]
 
 
-@pytest.mark.parametrize("name", texts.names())
+@pytest.mark.parametrize("name", texts.page_names())
 def test_no_word_is_lost(name: str) -> None:
     text = texts.FENCE.sub("", texts.page(name, {"verbs": lambda: ""}))
     found = terminal.wrapped(text, 80)

@@ -36,13 +36,13 @@ def lengths(text: str) -> dict[str, int]:
     return {each: words for each, words in found.items() if words > 2}
 
 
-@pytest.mark.parametrize("name", texts.names())
+@pytest.mark.parametrize("name", texts.page_names())
 def test_no_sentence_of_a_page_is_long(name: str) -> None:
     found = lengths((texts.PAGES / f"{name}.md").read_text())
     assert {each: words for each, words in found.items() if words > LONGEST} == {}
 
 
-@pytest.mark.parametrize("name", texts.names())
+@pytest.mark.parametrize("name", texts.page_names())
 def test_a_page_begins_with_what_the_reader_can_do(name: str) -> None:
     """Its first paragraph speaks to the reader; that of the first page to four of them."""
     first = (texts.PAGES / f"{name}.md").read_text().split("\n\n")[1]
@@ -50,7 +50,7 @@ def test_a_page_begins_with_what_the_reader_can_do(name: str) -> None:
 
 
 def test_the_mean_of_the_manual() -> None:
-    words = [n for name in texts.names() for n in lengths((texts.PAGES / f"{name}.md").read_text()).values()]
+    words = [n for name in texts.page_names() for n in lengths((texts.PAGES / f"{name}.md").read_text()).values()]
     assert len(words) > 500
     assert sum(words) / len(words) <= MEAN
 

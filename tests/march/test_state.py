@@ -12,7 +12,7 @@ from marching import begun, marched
 
 from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
-from parcontact.job.sections.listing import plain
+from parcontact.job.sections.listing import plain_data
 from parcontact.march.loop import March, run
 from parcontact.physics.units import Units
 from parcontact.storage import checkpoint
@@ -47,7 +47,7 @@ CASES = [
 
 def written(march: March, path: Path) -> Path:
     """A checkpoint of a march."""
-    march.save(path, Facts(plain(march.scene.job), Provenance((Link("", 1),))))
+    march.save(path, Facts(plain_data(march.scene.job), Provenance((Link("", 1),))))
     return path
 
 

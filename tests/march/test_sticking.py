@@ -104,7 +104,7 @@ def test_detached(bench: Bench) -> None:
     last = len(rows(out)) - 1
     assert 0 < last < 10
     assert "detached at t = " in (out / "run.log").read_text()
-    assert "detached at t = " in info.describe_directory(out)[0]
+    assert "detached at t = " in info.describe_files(out)[0]
     assert bench.run(data, out) == 0
     assert len(rows(out)) - 1 == last
 
@@ -174,7 +174,7 @@ def test_no_adhesion_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert march.scene.law is None
     assert march.state.law is None
     assert not [name for name in march.entries() if name.startswith(("law", "adhesion"))]
-    assert march.scene.slab.tally["map bytes"] == memory.total(planned)
+    assert march.scene.slab.tally["map bytes"] == memory.total_bytes(planned)
     with pytest.raises(AssertionError, match="without an adhesion section"):
         marched({**job, "adhesion": STICK})
 
@@ -202,7 +202,7 @@ def test_the_memory_that_a_plan_tells(bench: Bench, tmp_path: Path) -> None:
     for name in ("rough", "free"):
         planned = Job.model_validate(sticking(bench, name))
         march, _ = marched(planned)
-        assert memory.total(planned) == march.scene.slab.tally["map bytes"]
+        assert memory.total_bytes(planned) == march.scene.slab.tally["map bytes"]
         maps = [np.asarray(entry.value) for entry in march.entries().values() if entry.is_map]
         assert sum(each.nbytes + 4 * len(each) for each in maps) == memory.saved(planned)
 

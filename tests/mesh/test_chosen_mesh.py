@@ -96,10 +96,10 @@ def test_a_run_and_a_curve_say_what_was_chosen(comm: MPI.Intracomm, shared_path:
     comm.barrier()
     job = on_root(comm, lambda: load(path, [f"output.directory={shared_path / 'out'}"]))
     slab = Slab(comm, *job.grid.points)
-    assert runner.run(job, slab, Options(quiet=True)) == 0
-    assert curve.run(job, slab, curve.request(job), quiet=True) == 0
+    assert runner.run_job(job, slab, Options(quiet=True)) == 0
+    assert curve.run_curve(job, slab, curve.request(job), quiet=True) == 0
     if comm.rank == 0:
-        said, sound = info.describe(shared_path / "out")
+        said, sound = info.describe_path(shared_path / "out")
         assert sound
         nx, ny = points_of(shared_path)
         text = f"mesh: {nx} x {ny} points, chosen by numerics.accuracy (friction 5 %, area 30 %): the shortest wave, "

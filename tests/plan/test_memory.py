@@ -25,7 +25,7 @@ def test_memory(comm: MPI.Intracomm, name: str) -> None:
     planned = job(**JOBS[name])
     march, _ = marched(planned, comm=comm)
     slab = march.scene.slab
-    assert memory.total(planned, comm.size, comm.rank) == slab.tally["map bytes"]
+    assert memory.total_bytes(planned, comm.size, comm.rank) == slab.tally["map bytes"]
     maps = [np.asarray(entry.value) for entry in march.entries().values() if entry.is_map]
     saved = sum(rows.nbytes + 4 * len(rows) for rows in maps)
     assert sum(slab.from_all(saved)) == memory.saved(planned)
@@ -35,9 +35,9 @@ def test_no_rank_has_more_than_is_planned() -> None:
     """The last has the most but for the few waves of the surface, which another one may have."""
     for name, ranks in [("free", 7), ("mixed", 3), ("viscoelastic", 100)]:
         planned = job(**JOBS[name])
-        most = max(memory.total(planned, ranks, rank) for rank in range(ranks))
+        most = max(memory.total_bytes(planned, ranks, rank) for rank in range(ranks))
         waves = memory.holdings(planned, ranks).get("surface spectrum", 0)
-        assert most <= memory.total(planned, ranks) <= most + waves
+        assert most <= memory.total_bytes(planned, ranks) <= most + waves
 
 
 def test_the_most_that_is_held() -> None:

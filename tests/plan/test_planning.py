@@ -13,7 +13,7 @@ import parcontact as pc
 from parcontact import __main__
 from parcontact.history.timeline import Timeline
 from parcontact.job import load_cases
-from parcontact.job.sections.listing import plain
+from parcontact.job.sections.listing import plain_data
 from parcontact.parallel.groups import Groups
 from parcontact.parallel.slab import Slab
 from parcontact.plan import report
@@ -129,7 +129,7 @@ def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Pat
 
 
 def test_plan_of_a_whole_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "job.yaml").write_text(yaml.safe_dump({**plain(job()), **SWEEP}))
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump({**plain_data(job()), **SWEEP}))
     assert __main__.main(["plan", str(tmp_path / "job.yaml"), "--seconds", "0.1", "--ranks", "1"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert "first of 3 cases: history.0.duration = 0.001" in lines
@@ -141,7 +141,7 @@ def test_plan_of_a_whole_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str
 
 def test_times_of_a_sweep_add_up() -> None:
     """Work goes with the steps; a case that was not tried is like the nearest one that was."""
-    cases = load_cases({**plain(job()), **SWEEP})
+    cases = load_cases({**plain_data(job()), **SWEEP})
     steps = [11, 21, 41]  # with the jump of the load
     assert case_times(cases, {0: 1.0}) == pytest.approx([count / 11 for count in steps])
     assert case_times(cases, {0: 1.0, 2: 3.0}) == pytest.approx([1, 21 / 11, 3.0])
@@ -151,7 +151,7 @@ def test_times_of_a_sweep_add_up() -> None:
 @pytest.mark.mpi(2)
 def test_small_cases_are_planned_side_by_side(comm: MPI.Intracomm) -> None:
     """Each group tries the first case on its own ranks; all have the same lines."""
-    cases = load_cases({**plain(job()), **SWEEP})
+    cases = load_cases({**plain_data(job()), **SWEEP})
     lines = list(Planner([1], 0.1, 0.0).plan_sweep(cases, Groups(comm, 2)))
     assert any("on 1 rank in" in line for line in lines)
     assert re.fullmatch(

@@ -15,7 +15,7 @@ from parcontact.accuracy.time_error import CURVED_ORDER, TIME_ORDER
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.job.checks.cells import cells_per_wave
-from parcontact.job.sections.listing import plain
+from parcontact.job.sections.listing import plain_data
 from parcontact.mesh import load_cases
 from parcontact.parallel.slab import Slab
 from parcontact.plan import price
@@ -76,7 +76,7 @@ def test_meshes_of_spots_go_by_their_error() -> None:
 def test_with_points_auto_meshes_are_those_of_auto() -> None:
     """Meshes are those of the whole job, also where its steady states alone are priced, and its own at its accuracy."""
     steady = {"velocities": [1e-2], "pressures": [1e4]}
-    given = {**plain(job(steady=steady)), "grid": {"points": "auto", "size": 1e-3}}
+    given = {**plain_data(job(steady=steady)), "grid": {"points": "auto", "size": 1e-3}}
 
     def at(accuracy: float) -> Job:
         return load_cases({**given, "numerics": {"accuracy": accuracy}})[0].job
@@ -154,7 +154,7 @@ def test_what_is_offered_keeps_its_promise(accuracy: float) -> None:
     seen = sample(planned, Slab.alone(*planned.grid.points), 1e6)
     found = price.offer(costs_of(planned, seen, 1e30), accuracy)
     stage = {**{k: v for k, v in SLIDE.items() if k != "cells_per_step"}, "time_step": 0.01 / (found.sample.steps - 1)}
-    _, rows = marched(Job.model_validate({**plain(found.job), "history": [stage]}))
+    _, rows = marched(Job.model_validate({**plain_data(found.job), "history": [stage]}))
     budget, calls = ErrorSums(), sum(row.operator_calls for row in rows)
     for before, row in pairwise(rows):
         assert row.errors is not None

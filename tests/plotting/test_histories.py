@@ -79,7 +79,7 @@ def test_theory_beside_a_run(tmp_path: Path, drawn: list[Figure]) -> None:
         assert np.allclose(np.array(found["theory"].get_xdata())[0], 0.0)
         assert "simulation" in found
     assert not any(line.get_label() == "theory" for axes in others for line in axes.get_lines())
-    theory_settings.write(out, theory_settings.TheorySettings(0.5, "lattice"))
+    theory_settings.write_settings(out, theory_settings.TheorySettings(0.5, "lattice"))
     plots.plot([out])
     assert (
         drawn[1].get_suptitle().splitlines()[-1]

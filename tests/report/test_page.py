@@ -116,7 +116,7 @@ def solved(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "curve.yaml"
     path.write_text(text)
     loaded = job.load(path, [f"output.directory={tmp_path / 'steady'}", "steady.pressures=[1.0e3]"])
-    assert curve.run(loaded, Slab.alone(*loaded.grid.points), curve.request(loaded), quiet=True) == 0
+    assert curve.run_curve(loaded, Slab.alone(*loaded.grid.points), curve.request(loaded), quiet=True) == 0
     return tmp_path / "steady"
 
 

@@ -82,7 +82,7 @@ def test_the_error_budget_is_that_of_the_whole_run(bench: Bench) -> None:
         assert said in [line for line in lines if "error of friction" in line][-1]
         assert (
             f"error of friction: solver {100 * budget['friction']['solver']:.2g} %"
-            in info.describe(out / "fields.h5")[0]
+            in info.describe_path(out / "fields.h5")[0]
         )
         with h5py.File(max(out.glob("checkpoint/*.h5"), key=lambda path: path.stat().st_mtime)) as file:
             assert read_budget(file) == budget

@@ -87,7 +87,7 @@ def test_a_case_that_fails_does_not_stop_the_others(
     assert seeds_done(cases, {1: 1}) == (1, [1, 2, 3, 1, 2, 3])
     assert capsys.readouterr().err == "parcontact: case 1: the third law does not hold; try another planet\n"
     assert [row["state"] for row in table()] == ["-", "failed", "-", "-", "-", "-"]
-    told, _ = info.describe(cases[0].job.output.directory.parent.parent)
+    told, _ = info.describe_path(cases[0].job.output.directory.parent.parent)
     assert told.splitlines()[-1] == "  case 1 failed: the third law does not hold"
     assert seeds_done(cases, {})[0] == 0
     assert [row["state"] for row in table()] == ["-"] * 6
@@ -236,7 +236,7 @@ def test_another_jobs_directory_is_refused(cases: tuple[Case, ...], capsys: pyte
         assert main(["job.yaml", "--quiet", "--out", out]) == 2
         assert told in capsys.readouterr().err
     assert sorted(Path(".").rglob("*")) == before
-    sweep.refuse_foreign(cases)  # the directory of its own job, which may be there already
+    sweep.refuse_foreign_sweep(cases)  # the directory of its own job, which may be there already
 
 
 @pytest.mark.parametrize("planted", ["cases", "cases/001"])
@@ -249,7 +249,7 @@ def test_nothing_is_written_through_a_link_in_place_of_a_case(
     link.parent.mkdir(parents=True, exist_ok=True)
     link.symlink_to(elsewhere)
     with pytest.raises(InputError, match=rf"{planted} is a link, through which no case is written"):
-        sweep.refuse_foreign(cases)
+        sweep.refuse_foreign_sweep(cases)
 
 
 def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_path: Path) -> None:
@@ -280,7 +280,7 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
         assert float(mean["mu_dyn_sem"]) == pytest.approx((spread / 3) ** 0.5, rel=1e-9)
         assert all(0.0 < float(row["mu_dyn"]) <= float(row["mu_max"]) for row in rows)
     case = here / "cases" / "001"
-    for text in ((case / "run.log").read_text(), info.describe(case)[0]):
+    for text in ((case / "run.log").read_text(), info.describe_path(case)[0]):
         found = re.search(r"last three quarters of this slide of 500 µm, is (\S+) ± (\S+)\n", text)
         assert found
         assert float(found[1]) == pytest.approx(float(rows[1]["mu_dyn"]), abs=0.1 * float(found[2]))
@@ -363,10 +363,10 @@ def test_tables_are_written_by_one_program_at_a_time(tmp_path: Path, monkeypatch
     """Jobs of an array end together: the last one to write has read what all others left."""
     cases, _ = cases_in_groups(tmp_path, monkeypatch)
     out = Path("out/job")
-    sweep_table.write(out, cases)
+    sweep_table.write_sweep_tables(out, cases)
     with (out / ".sweep.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        other = threading.Thread(target=sweep_table.write, args=(out, cases))
+        other = threading.Thread(target=sweep_table.write_sweep_tables, args=(out, cases))
         other.start()
         other.join(0.2)
         assert other.is_alive()

@@ -37,7 +37,7 @@ def predicted(job: Job, waves: prediction.WavesOf = "continuum") -> dict[str, ND
 
 
 def slid(job: Job, columns: dict[str, Any]) -> Slide:
-    found = slide.measure(job.history, columns)
+    found = slide.measure_slide(job.history, columns)
     assert found is not None
     return found
 

@@ -272,6 +272,6 @@ def test_approaches_beyond_full_contact_are_told_with_their_places(tmp_path: Pat
     stages = "{approach: 1e-7}\n  - {name: up, approach: {from: 0, to: 1e-6}, duration: 1}"
     path.write_text(SMALL.replace("{pressure: 1e4}", stages))
     with pytest.raises(JobError) as caught:
-        sanity.refuse_beyond_full_contact(scene.set_up(load(path), Slab.alone(64, 64)))
+        sanity.refuse_approaches(scene.set_up(load(path), Slab.alone(64, 64)))
     found = [text.partition(" an approach")[0] for text in caught.value.mistakes]
     assert found == [f"{path}:5:16: history.0:", f"{path}:6:26: history.1:"]

@@ -470,7 +470,9 @@ def test_no_more_than_steps_hold(comm: MPI.Intracomm) -> None:
     slab = Slab(comm, *planned.grid.points)
     march = start.first(planned, slab)
     assert march.row.measures.friction > 0.0
-    assert slab.tally["map bytes at most"] == slab.tally["map bytes"] == memory.total(planned, comm.size, comm.rank)
+    assert (
+        slab.tally["map bytes at most"] == slab.tally["map bytes"] == memory.total_bytes(planned, comm.size, comm.rank)
+    )
 
 
 @pytest.mark.parametrize("name", SCENES)

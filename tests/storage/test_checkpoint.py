@@ -204,7 +204,7 @@ def test_damage_in_a_sentence(comm: MPI.Intracomm, tmp_path: Path, act: Callable
 def test_info(comm: MPI.Intracomm, tmp_path: Path) -> None:
     path = tmp_path / "file.h5"
     write(path, comm)
-    text, sound = info.describe(path)
+    text, sound = info.describe_path(path)
     assert sound
     for part in ("step 7", "t = 0.25 s", "6 x 9 points", "2 ranks", "contact/pressure", "modulus = 6.0", "sound"):
         assert part in text
@@ -213,15 +213,15 @@ def test_info(comm: MPI.Intracomm, tmp_path: Path) -> None:
     data = bytearray(path.read_bytes())
     data[start + 8 * NX] ^= 1
     path.write_bytes(data)
-    text, sound = info.describe(path)
+    text, sound = info.describe_path(path)
     assert not sound
     assert "1 of 9 rows of contact/pressure do not match" in text
     with pytest.raises(InputError, match="does not exist"):
-        info.describe(tmp_path / "absent.h5")
+        info.describe_path(tmp_path / "absent.h5")
     (tmp_path / "other.h5").write_bytes(b"something else")
     with pytest.raises(InputError, match="it is no HDF5 file"):
-        info.describe(tmp_path / "other.h5")
+        info.describe_path(tmp_path / "other.h5")
     with h5py.File(tmp_path / "other.h5", "w"):
         pass
     with pytest.raises(InputError, match="neither a checkpoint nor a file of fields"):
-        info.describe(tmp_path / "other.h5")
+        info.describe_path(tmp_path / "other.h5")

@@ -74,7 +74,7 @@ def test_layout(comm: MPI.Intracomm, shared_path: Path) -> None:
         assert file["pressure"].attrs["units"] == "Pa"
         assert file.attrs["job"] == "title: first\n"
         assert file.attrs["seeds"].tolist() == [4]
-    text, sound = info.describe(path)
+    text, sound = info.describe_path(path)
     assert sound
     assert "2 of 3 instants saved, t = 0.2 s (step 2) to 0.4 s (step 4)" in text
 

@@ -36,13 +36,13 @@ def test_waves_close_at_the_pressure_of_full_contact(tmp_path: Path, capsys: pyt
     """Along the grooves at p*, across them from the first contact on; from the run's own table, and from `leak`."""
     out = press(tmp_path, [0.5, 0.95, 1.05, 1.5], leakage={"every": 1})
     across = "leakage along x has stopped at the first instant, under 50 kPa"
-    assert leak_stop.describe(out) == [across, ALONG_Y]
+    assert leak_stop.describe_leak_stop(out) == [across, ALONG_Y]
     assert __main__.main(["leak", str(out)]) == 0
-    assert leak_stop.describe(out) == [across, ALONG_Y]
+    assert leak_stop.describe_leak_stop(out) == [across, ALONG_Y]
     printed = capsys.readouterr().out
     half = "along y leakage stops between 95 and 105 kPa; along y contact closes the gap at 2 of 4 instants, "
     assert f"{half}at the first with 100 % of the area in contact" in printed
-    assert f"; {ALONG_Y}" in headline.describe(out)
+    assert f"; {ALONG_Y}" in headline.find_headline(out)
     assert f"<p>{page.whole_numbers(ALONG_Y)}</p>" in page.render([out])
     assert __main__.main(["info", str(out)]) == 0
     assert f"  {ALONG_Y}\n" in capsys.readouterr().out
@@ -78,8 +78,8 @@ def test_where_leakage_stops(flows: list[float], pressures: list[float], said: s
 def test_directions_that_agree_share_a_sentence(tmp_path: Path) -> None:
     text = "time,pressure,flow_x,flow_y\n0,1.05e6,1e-18,2e-18\n1,1.1e6,0,0\n"
     (tmp_path / "leak.csv").write_text(text)
-    assert leak_stop.describe(tmp_path) == ["leakage along x and y stops between 1.05 and 1.10 MPa"]
-    assert leak_stop.describe(tmp_path / "nowhere") == []
+    assert leak_stop.describe_leak_stop(tmp_path) == ["leakage along x and y stops between 1.05 and 1.10 MPa"]
+    assert leak_stop.describe_leak_stop(tmp_path / "nowhere") == []
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from parcontact.job import Job, Stage
-from parcontact.summary.slide import describe, mean_over_end, measure, ripple
+from parcontact.summary.slide import describe_slide, mean_over_end, measure_slide, ripple
 
 REST = {"pressure": 1.0, "duration": 1.0, "time_step": 0.5}
 CLIMB = {"pressure": 1.0, "velocity": 2.0, "duration": 0.5, "time_step": 0.1}
@@ -25,7 +25,7 @@ def said(history: list[dict[str, Any]], table: dict[str, list[float]], cell: flo
     data = {"grid": {"points": 8, "size": 8 * cell}, "surface": {"shape": "wave", "amplitude": 1e-9, "waves": [1, 1]}}
     material = {"model": "elastic", "shear_modulus": 1e6}
     job = Job.model_validate({**data, "material": material, "history": history, **more})
-    return list(describe(job.history, job.initial, job.grid.dx, table))
+    return list(describe_slide(job.history, job.initial, job.grid.dx, table))
 
 
 def rows(*rows: tuple[float, float, float]) -> dict[str, list[float]]:
@@ -45,7 +45,7 @@ def test_mean_over_the_last_share() -> None:
 def test_all_stages_at_one_velocity_are_one_slide() -> None:
     """From the last row before it; what friction was before, higher or not, is not of the slide."""
     table = rows((0, 0, 9), (1, 0, 8), (1.1, 0.2, 3), (1.5, 1, 4), (2.0, 2, 2), (3.0, 4, 2))
-    found = measure(stages(REST, CLIMB, SETTLE), table)
+    found = measure_slide(stages(REST, CLIMB, SETTLE), table)
     assert found is not None
     assert (found.mu_max, found.mu_max_distance) == (4.0, 1.0)
     assert found.mu_dyn == pytest.approx((3.0 * 1 + 2.0 * 2) / 3, rel=1e-14)  # over the last 3 of 4 m
@@ -56,14 +56,14 @@ def test_all_stages_at_one_velocity_are_one_slide() -> None:
 @pytest.mark.parametrize("before", [SLOW, BACK])
 def test_another_velocity_before_is_another_slide(before: dict[str, Any]) -> None:
     table = rows((0, 0, 9), (0.5, 1, 8), (0.6, 1.2, 3), (1.0, 2.0, 3))
-    found = measure(stages(before, CLIMB), table)
+    found = measure_slide(stages(before, CLIMB), table)
     assert found is not None
     assert (found.mu_max, found.mu_max_distance, found.mu_dyn) == (3.0, pytest.approx(0.2), pytest.approx(3.0))
 
 
 def test_what_comes_after_the_slide_is_not_of_it() -> None:
     table = rows((0, 0, 2), (0.25, 0.5, 2), (0.5, 1, 2), (1.0, 1, 5), (1.5, 1, 5))
-    found = measure(stages(CLIMB, REST), table)
+    found = measure_slide(stages(CLIMB, REST), table)
     assert found is not None
     assert (found.mu_max, found.mu_dyn) == (2.0, pytest.approx(2.0))
 
@@ -77,7 +77,7 @@ def test_what_comes_after_the_slide_is_not_of_it() -> None:
     ],
 )
 def test_no_slide(history: list[dict[str, Any]], table: dict[str, list[float]]) -> None:
-    assert measure(stages(*history), table) is None
+    assert measure_slide(stages(*history), table) is None
 
 
 def test_sentences_about_a_slide() -> None:
@@ -101,7 +101,7 @@ def test_forces_of_a_slide_under_no_load() -> None:
     """Surfaces that stick have forces where friction is not defined: the largest and the mean are told."""
     table = rows((0, 0, 0), (1, 0, 0), (1.5, 1, 0), (2.0, 2, 0), (3.0, 4, 6))
     table |= {"force_x": [9.0, 9.0, -3.0, 0.0, -1.0], "force_y": [0.0, 0.0, 4.0, 2.0, 0.0]}
-    found = measure(stages(REST, CLIMB, SETTLE), table)
+    found = measure_slide(stages(REST, CLIMB, SETTLE), table)
     assert found is not None
     assert math.isnan(found.mu_max + found.mu_dyn)
     (force, *_), where = said([REST, CLIMB, SETTLE], table), "in 2 of 3 steps of the slide, in which no load presses"
@@ -118,7 +118,7 @@ def test_sentences_about_a_slide_that_others_follow() -> None:
     told = said(history, table)
     assert told[0] == "the last slide has not begun; these numbers are of the one before, which ends with history.1"
     assert told[1:] == said(history[:2], table)
-    assert measure(stages(*history), table) is None
+    assert measure_slide(stages(*history), table) is None
     assert len(said([REST, CLIMB, SETTLE], rows((0, 0, 9), (1, 0, 8), (1.2, 0.4, 5)))) == 3
     begun = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 2), (2.5, 1, 1), (3.0, 2.5, 7))
     late = "1.5 m after its start, in its last tenth: friction may still rise"

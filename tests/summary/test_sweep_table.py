@@ -28,7 +28,7 @@ def test_before_a_slide_no_error_of_friction_is_told(cases: tuple[Case, ...]) ->
     directory.mkdir(parents=True)
     head = "step,time,distance,friction,contact_area,residual,seconds,error_friction,contact_area_corrected"
     (directory / "measures.csv").write_text(f"{head}\n0,0,0,0.1,0.2,2e-5,0.5,,0.1\n1,1,0,0.1,0.2,1e-5,0.25,3e-3,0.15\n")
-    sweep_table.write(Path("out/job"), cases)
+    sweep_table.write_sweep_tables(Path("out/job"), cases)
     row = table()[0]
     assert [row[name] for name in ("residual", "error_friction", "error_area")] == ["2e-05", "", ""]
     assert (row["state"], row["seconds"], row["mu_max"]) == ("begun", "0.75", "")
@@ -52,7 +52,7 @@ def test_errors_are_those_of_the_slide(cases: tuple[Case, ...]) -> None:
         for step, ((time, distance), (friction, area)) in enumerate(zip(instants, errors, strict=True))
     ]
     (changed.job.output.directory / "measures.csv").write_text("\n".join([head, *lines, ""]))
-    sweep_table.write(Path("out/job"), (changed,))
+    sweep_table.write_sweep_tables(Path("out/job"), (changed,))
     found = [float(table()[0][name]) for name in ("error_friction", "error_area")]
     assert found == pytest.approx([(0.1 * 0.02 + 0.3 * 0.01) / 0.4, 0.035], rel=1e-9)
 
@@ -68,7 +68,7 @@ def test_points_of_curves_and_their_means_over_seeds(tmp_path: Path, monkeypatch
         rows = f"0.1,{1e4 * (1 + case.number * 1e-15)!r},{friction},0.5\n1.0,1e4,{friction / 2},0.25\n"
         text = "velocity,pressure,friction,contact_area_corrected\n" + rows
         (case.job.output.directory / "steady.csv").write_text(text)
-    sweep_table.write(Path("out/job"), cases)
+    sweep_table.write_sweep_tables(Path("out/job"), cases)
     points, means = table("sweep_curves.csv"), table("sweep_curves_mean.csv")
     assert [(row["surface.seed"], row["velocity"], row["friction"]) for row in points[2:4]] == [
         ("2", "0.1", "0.2"),
@@ -108,7 +108,7 @@ def test_a_damaged_table_concerns_its_case_alone(
     for case, lines in zip(cases, (text, sound), strict=True):
         case.job.output.directory.mkdir(parents=True)
         (case.job.output.directory / "steady.csv").write_text(lines)
-    sweep_table.write(Path("out/job"), cases)
+    sweep_table.write_sweep_tables(Path("out/job"), cases)
     assert [row["state"] for row in table()] == [state, "done"]
     assert {row["case"] for row in table("sweep_curves.csv")} == ({"0", "1"} if state == "done" else {"1"})
     assert len(sweep.to_do(cases, afresh=False)) == (state != "done")
@@ -120,7 +120,7 @@ def test_so_does_a_table_without_a_column(cases: tuple[Case, ...]) -> None:
         head = f"step,time,distance,friction,{name},residual,seconds"
         rows = "0,0,0,0,0,0,0\n1,1,0,0.1,0.2,2e-5,0.5\n"
         (case.job.output.directory / "measures.csv").write_text(f"{head}\n{rows}")
-    sweep_table.write(Path("out/job"), cases)
+    sweep_table.write_sweep_tables(Path("out/job"), cases)
     assert [(row["state"], row["contact_area"]) for row in table()[:2]] == [("begun", "0.2"), ("damaged", "")]
 
 
@@ -130,7 +130,7 @@ def test_the_start_is_no_result(cases: tuple[Case, ...]) -> None:
     head = "step,time,distance,friction,contact_area,residual,seconds"
     (cases[0].job.output.directory / "measures.csv").write_text(f"{head}\n0,0,0,0,0,0,0\n")
     (cases[0].job.output.directory / "theory.csv").write_text("time,distance,friction,contact_area\n0,0,0,0.3\n")
-    sweep_table.write(Path("out/job"), cases)
+    sweep_table.write_sweep_tables(Path("out/job"), cases)
     assert [table()[0][name] for name in ("contact_area", "residual", "seconds")] == ["", "", ""]
     assert table()[0]["theory_contact_area"] == "0.3"
 
@@ -147,7 +147,7 @@ def test_lines_of_curves_differ_in_all_that_is_no_sample(tmp_path: Path, monkeyp
         rows = [f"{v},{p},{case.number + p / 1e5 + v},0.5" for p in (1e4, 2e4) for v in (0.1, 1.0)]
         text = "\n".join(["velocity,pressure,friction,contact_area", *rows, ""])
         (case.job.output.directory / "steady.csv").write_text(text)
-    sweep_table.write(Path("out/job"), cases)
+    sweep_table.write_sweep_tables(Path("out/job"), cases)
     lines = [line for line in pictures.charts(Path("out/job"))[0].series if line.look.get("linestyle") != "none"]
     found = {line.name: line.y.tolist() for line in lines}
     assert found == {
@@ -168,7 +168,7 @@ def test_errors_of_the_highest_and_the_mean_friction(cases: tuple[Case, ...]) ->
     rows = [(0, 0.0, 0.0, 0.0, ""), (1, 0.25, 0.25, 0.3, "0.1"), (2, 1.0, 1.0, 0.2, "0.3")]
     lines = [f"{k},{t * slide.seconds},{x * way},{mu},0.2,1e-5,1.0,{error},0.1" for k, t, x, mu, error in rows]
     (changed.job.output.directory / "measures.csv").write_text("\n".join([head, *lines, ""]))
-    sweep_table.write(Path("out/job"), (changed,))
+    sweep_table.write_sweep_tables(Path("out/job"), (changed,))
     row = table()[0]
     found = [float(row[name]) for name in ("mu_max", "mu_max_error", "mu_dyn", "mu_dyn_error")]
     assert found == pytest.approx([0.3, 0.03, 0.25, (0.03 + 0.06) / 2], rel=1e-9)
@@ -180,7 +180,7 @@ def test_theory_of_all_cases_stands_beside_them(cases: tuple[Case, ...]) -> None
         directory.mkdir(parents=True)
         text = "time,distance,pressure,friction,contact_area\n0.0,0.0,1e5,0.0,0.1\n0.001,0.0,1e5,0.0,0.2\n"
         (directory / "theory.csv").write_text(f"{text}0.051,0.0005,1e5,0.02,0.3\n")
-    sweep_table.write(Path("out/job"), cases)
+    sweep_table.write_sweep_tables(Path("out/job"), cases)
     assert [row["theory_mu_max"] for row in table()] == ["0.02", "0.02", "", "", "", ""]
     assert [row["mu_max"] for row in table()] == [""] * 6
 
@@ -198,7 +198,7 @@ def test_pull_offs_of_cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     )
     Path("pulls.yaml").write_text("\n".join(lines))
     assert main(["pulls.yaml", "--quiet"]) == 0
-    came_off, holds = sweep_table.read(Path("out/pulls/sweep.csv"))
+    came_off, holds = sweep_table.read_cases(Path("out/pulls/sweep.csv"))
     rows = tables.read_columns(Path("out/pulls/cases/000/measures.csv"))
     assert came_off["state"] == holds["state"] == "done"
     assert came_off["pull_off"] == pytest.approx(-min(rows["pressure"]) * 4e-4**2, rel=1e-15)

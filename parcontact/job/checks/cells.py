@@ -160,7 +160,7 @@ def fast_length(least: float) -> int:
     return MULTIPLE * count
 
 
-def choose(
+def choose_points(
     wave: float, size: Vector, directions: Sequence[Vector], asked: Accuracy, guesses: Sequence[Guess]
 ) -> tuple[int, int]:
     """Return the fewest points along x and y on which a surface with this shortest wave [m] has the errors asked for,

@@ -224,7 +224,7 @@ def steps_can_be_made(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator
         if stage is None:
             return
         if stage.seconds:
-            total += steps_of(stage, stage.seconds, first_step(stage, grid))
+            total += estimate_steps(stage, stage.seconds, first_step(stage, grid))
         if total > MOST_STEPS:
             key = "cells_per_step" if stage.cells_per_step is not None else "time_step"
             yield Fault(f"leads to {total:.3g} steps; a history has at most {MOST_STEPS:.0e}", ("history", index, key))
@@ -234,7 +234,7 @@ def steps_can_be_made(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator
 def count_steps(grid: Grid, history: tuple[Stage, ...]) -> int:
     """Return about how many steps a history has; jumps are left out."""
     lasting = [stage for stage in history if stage.seconds]
-    return math.ceil(sum(steps_of(stage, stage.seconds, first_step(stage, grid)) for stage in lasting))
+    return math.ceil(sum(estimate_steps(stage, stage.seconds, first_step(stage, grid)) for stage in lasting))
 
 
 def first_step(stage: Stage, grid: Grid) -> float:
@@ -248,7 +248,7 @@ def first_step(stage: Stage, grid: Grid) -> float:
     return stage.time_step or 0.0
 
 
-def steps_of(stage: Stage, seconds: float, first: float) -> float:
+def estimate_steps(stage: Stage, seconds: float, first: float) -> float:
     """Return about how many steps a stage that lasts so long has."""
     count = seconds / first if first else math.inf
     growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0

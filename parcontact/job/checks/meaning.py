@@ -81,7 +81,7 @@ def doubt_moduli(material: Elastic | Zener) -> Iterator[Doubt]:
         yield Doubt("hard", "material", {"modulus": modulus, "most": HARDEST})
 
 
-def contact_modulus(material: Elastic | Zener) -> float:
+def instant_contact_modulus(material: Elastic | Zener) -> float:
     """E* = 2 G/(1 - nu) at a sudden strain [Pa], the largest there is."""
     return 2.0 * material.instant_modulus / (1.0 - material.poisson)
 
@@ -172,7 +172,7 @@ def _room(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     if len(job.surface) != 1 or not isinstance(sphere, Sphere) or min(grid.points) == 1:
         return
     x, y = sphere.center or (grid.lx / 2, grid.ly / 2)
-    modulus, found = contact_modulus(material), set()
+    modulus, found = instant_contact_modulus(material), set()
     for index, stage in enumerate(job.history):
         x, y = x + stage.velocity[0] * stage.seconds, y + stage.velocity[1] * stage.seconds
         radius = _hertz(stage, sphere.radius, modulus, grid)
@@ -197,7 +197,7 @@ def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
 
 def neighbours(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     """Judge a single sphere in a periodic box by the least radius that its contact has."""
-    modulus = contact_modulus(material)
+    modulus = instant_contact_modulus(material)
     return acting_neighbours(
         job, lambda radius: max((_hertz(stage, radius, modulus, job.grid) for stage in job.history), default=0.0)
     )

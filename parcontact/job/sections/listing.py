@@ -14,19 +14,19 @@ from .part import Part
 from .stages import Ramp
 
 
-def plain(value: Any) -> Any:
+def plain_data(value: Any) -> Any:
     """Return a value of a job as the plain data it was written as; keys without a value are left out, and those that
     the accuracy has chosen: it chooses them again."""
     if isinstance(value, HeightArray):
         return value.stored()
     if isinstance(value, Part):
         chosen = value.chosen if isinstance(value, Numerics) else ()
-        return {key: plain(inner) for key, inner in items(value) if key not in chosen}
+        return {key: plain_data(inner) for key, inner in items(value) if key not in chosen}
     if isinstance(value, Ramp):
         velocity = {"velocity": value.velocity} if value.velocity else {}
         return value.start if value.constant else {"from": value.start, "to": value.end, **velocity}
     if isinstance(value, tuple):
-        return [plain(inner) for inner in value]
+        return [plain_data(inner) for inner in value]
     return str(value) if isinstance(value, Path) else value
 
 
@@ -38,7 +38,7 @@ def items(part: Part) -> Iterator[tuple[str, Any]]:
 
 def plain_job(job: Any) -> dict[str, Any]:
     """Return a job as plain data by which it is known; files that are read are known by what they hold."""
-    data: dict[str, Any] = plain(job)
+    data: dict[str, Any] = plain_data(job)
     data["numerics"] |= job.numerics.chosen
     for part, given in zip([*data["surface"], data["material"]], [*job.surface, job.material], strict=True):
         for key in ("path", "spectrum"):
@@ -65,7 +65,7 @@ def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
             yield from rows(value, f"{name}.")
         elif isinstance(value, tuple) and value and isinstance(value[0], Part):
             for index, item in enumerate(value):
-                yield f"{name}.{index}", line(item), ""
+                yield f"{name}.{index}", listed_line(item), ""
         else:
             yield name, text(value), _unit_of(value, part, key)
 
@@ -77,7 +77,7 @@ def _unit_of(value: Any, part: Part, key: str) -> str:
     return "" if isinstance(value, str | Part) else unit(part, key)
 
 
-def line(part: Part) -> str:
+def listed_line(part: Part) -> str:
     """Return a part in one line."""
     pairs = [(key, value, _unit_of(value, part, key)) for key, value in items(part)]
     return ", ".join(f"{key} {text(value)} {unit}".rstrip() for key, value, unit in pairs)
@@ -92,7 +92,7 @@ def text(value: Any) -> str:
     if isinstance(value, Ramp):
         return text(value.start) if value.constant else f"{text(value.start)} to {text(value.end)}"
     if isinstance(value, Part):
-        return f"({line(value)})"
+        return f"({listed_line(value)})"
     if isinstance(value, tuple):
         return f"[{', '.join(text(inner) for inner in value)}]"
     return str(value)

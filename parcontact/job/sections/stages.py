@@ -222,7 +222,7 @@ class Initial(Part):
     rules = (Rule(("state", "velocity", "pressure"), _steady_start),)
 
 
-def numbers(value: Any) -> Any:
+def expand_range(value: Any) -> Any:
     """Return a list, or the numbers of a range first:last:count."""
     if not isinstance(value, str):
         return listed(value)
@@ -232,7 +232,7 @@ def numbers(value: Any) -> Any:
         refuse(Fault(f"must be {error}, got {quote(value)}"))
 
 
-SomeNumbers = Annotated[tuple[Positive, ...], Field(min_length=1), BeforeValidator(numbers)]
+SomeNumbers = Annotated[tuple[Positive, ...], Field(min_length=1), BeforeValidator(expand_range)]
 
 
 def _directed(direction: tuple[float, float]) -> Iterator[Fault]:
