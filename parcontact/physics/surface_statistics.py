@@ -58,9 +58,11 @@ def surface_statistics(heights: Array, size: tuple[float, float]) -> Statistics:
 
 
 def _over_directions(q: Array, power: Array, size: tuple[float, float]) -> tuple[Array, Array]:
-    """Means over rings of wavenumbers; each wave stands for an area 4 pi^2/(Lx Ly)."""
+    """Means over rings of wavenumbers, none of a map of one point; each wave stands for an area 4 pi^2/(Lx Ly)."""
     cell = 4 * np.pi**2 / (size[0] * size[1])
     known = q > 0.0
+    if not known.any():
+        return np.empty(0), np.empty(0)
     low, high = float(q[known].min()), float(q.max())
     count = max(2, math.ceil(BINS * math.log10(high / low))) if high > low else 1
     edges = np.geomspace(low * (1 - 1e-9), high * (1 + 1e-9), count + 1)
@@ -84,7 +86,7 @@ def _hurst(q: Array, psd: Array) -> float:
     Waves beyond those that make up the slopes are what an instrument, a filter or an edge has left.
     """
     slopes = np.cumsum(psd * q**4)  # of rings as wide as their wavenumbers, as these are spaced
-    used = (psd > 0.0) & (slopes <= WHOLE * slopes[-1])
+    used = (psd > 0.0) & (slopes <= WHOLE * slopes.max(initial=0.0))
     x, y = np.log(q[used]), np.log(psd[used])
     best, found = 0.0, math.nan
     for first in range(x.size - FEWEST):

@@ -65,7 +65,7 @@ def _draw_distribution(axes: Axes, sketch: Sketch) -> None:
 def _draw_spectra(axes: Axes, sketch: Sketch, spectra: list[tuple[str, Array, Array, int]], name: str) -> None:
     """Draw spectra, each with its name, wavenumbers, powers and number, beside the limits of the grid."""
     for label, q, power, number in spectra:
-        drawn = power > ROUNDING * power.max()
+        drawn = power > ROUNDING * power.max(initial=0.0)
         axes.loglog(q[drawn], power[drawn], label=label, **style.line(number))
     cell = max(length / n for length, n in zip(sketch.size, sketch.heights.shape[::-1], strict=True))
     axes.axvline(2 * np.pi / (RESOLVED * cell), color=style.GREY, ls=":", label=f"{RESOLVED} cells")

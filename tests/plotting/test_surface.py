@@ -19,3 +19,14 @@ def test_a_map_has_the_proportions_of_its_box() -> None:
     figure.draw_without_rendering()
     box = axes.get_window_extent()
     assert box.width / box.height == pytest.approx(1.5, rel=1e-6)
+
+
+@pytest.mark.parametrize("shape", [(2, 20), (20, 1), (1, 1)])
+def test_a_map_of_few_rows_has_all_panels(shape: tuple[int, int]) -> None:
+    """Two rows or columns have no waves of their own: no spectrum is drawn along them."""
+    heights, size = np.random.default_rng(1).standard_normal(shape), (6e-3, 4e-3)
+    sketch = surface.Sketch(heights, size, statistics.surface_statistics(heights, size))
+    for panel in surface.PANELS.values():
+        figure = Figure()
+        panel(figure.subplots(), sketch)
+        figure.draw_without_rendering()
