@@ -19,17 +19,18 @@ Json = dict[str, Any]
 Map = NDArray[np.float64]
 SECOND = 1e-3  # relaxation times are some decades around it [s]
 HISTORIES = {
-    "static": 5,
+    "static": 8,
     "rest": 6,
-    "ramp": 7,
-    "slide": 24,
-    "velocity step": 10,
-    "reversal": 12,
-    "oblique": 13,
-    "steady start": 5,
-    "steady": 18,
+    "ramp": 8,
+    "slide": 20,
+    "velocity step": 9,
+    "reversal": 9,
+    "oblique": 11,
+    "steady start": 4,
+    "steady": 25,
 }
 SLIDES = ("slide", "velocity step", "reversal", "oblique", "steady start", "steady")
+EFFECTS = {"none": 60, "layer": 12, "hardness": 9, "heat": 12, "adhesion": 7}
 SURFACES = {"rough": 40, "wave": 12, "sphere": 16, "cylinder": 12, "measured": 20}
 FINER = 4  # times as fine is the grid of a reference
 
@@ -92,14 +93,21 @@ class _Draw:
     def __init__(self, number: int) -> None:
         self.number, self.dice = number, Random(f"coverage {number}")
         dice = self.dice
-        self.history = dice.choices(list(HISTORIES), list(HISTORIES.values()))[0]
+        self.effect = dice.choices(list(EFFECTS), list(EFFECTS.values()))[0]
+        fits = {"hardness": ("static", "rest", "ramp", "slide", "velocity step", "reversal"), "adhesion": ("ramp",)}
+        fits["heat"] = ("slide", "velocity step", "steady")
+        histories = {name: HISTORIES[name] for name in fits.get(self.effect, HISTORIES)}
+        self.history = dice.choices(list(histories), list(histories.values()))[0]
         self.surface = dice.choices(list(SURFACES), list(SURFACES.values()))[0]
+        if self.effect == "adhesion":
+            self.surface = dice.choice(["sphere", "wave", "rough"])
         free = {"sphere": 0.6, "cylinder": 0.0, "rough": 0.2, "measured": 0.15, "wave": 0.0}[self.surface]
-        self.free = self.history != "steady start" and dice.random() < free
+        self.free = self.history != "steady start" and self.effect != "layer" and dice.random() < free
         self.points = self._points()
         self.size = decades(dice, -4, -2)
         self.dx = self.size / self.points[0]
         elastic = 0.2 if self.history not in ("velocity step", "steady start", "steady") else 0.05
+        elastic = 0.0 if self.effect == "heat" else elastic
         self.body = self._elastic() if dice.random() < elastic else self._zener()
         self.cells = min(decades(dice, math.log10(2.05), math.log10(16.0)), max(self.points) / 2.6)
         self.waves: dict[tuple[int, int], complex] = {}
@@ -114,7 +122,7 @@ class _Draw:
             if radius
             else slope * (2.0 * area + 8.0 * max(area - 0.5, 0.0))
         )
-        accuracy = round(decades(self.dice, math.log10(0.003), -1.0), 5)
+        accuracy = round(decades(self.dice, math.log10(0.005), -1.0), 5)
         plain: Json = {
             "title": f"coverage, scene {self.number}",
             "grid": {"points": self.points, "size": [self.dx * n if n > 1 else self.size for n in self.points]},
@@ -127,11 +135,13 @@ class _Draw:
         if self.history not in ("steady", "static", "steady start") and self.dice.random() < 0.08:
             plain["numerics"]["integrator"] = "backward-euler"
         self._story(plain, pressure, speed)
+        self._add_effect(plain, pressure, pressure / area)
         kind = {
             "body": "elastic" if self.body["model"] == "elastic" else _branches(len(self.body["branches"])),
             "surface": self.surface,
             "boundary": "free" if self.free else "line" if 1 in self.points else "periodic",
             "history": self.history,
+            "effect": self.effect,
             "cells": round(2.0 * self._radius(area) if radius else self.cells, 2),
             "asked": accuracy,
         }
@@ -142,9 +152,10 @@ class _Draw:
     def _points(self) -> list[int]:
         dice = self.dice
         if self.surface in ("cylinder", "wave") and not self.free and dice.random() < 0.5:
-            return [dice.choice([64, 96, 128, 128]), 1]
+            return [dice.choice([64, 96, 128, 128]), 1] if self.effect != "adhesion" else [64, 1]
         few = self.history in ("static", "steady", "rest")
-        n = dice.choice([32, 48, 64, 96, 96] if few else [32, 48, 64, 80, 96])
+        n = dice.choice([48, 64, 96] if few else [32, 48, 64, 80])
+        n = dice.choice([24, 32]) if self.effect == "adhesion" else n
         return [n, n // 2] if dice.random() < 0.2 and self.surface in ("rough", "measured") else [n, n]
 
     def _elastic(self) -> Json:
@@ -282,6 +293,38 @@ class _Draw:
         elif self.history == "steady start":
             plain["initial"] = {"state": "steady", "velocity": v, "pressure": p}
             plain["history"] = [slide(v * decades(dice, -1.5, 1.5), way)]
+
+
+    def _add_effect(self, plain: Json, p: float, mean: float) -> None:
+        """A layer, a hardness, heat, or adhesion, whose history is another; `mean` is the pressure of what touches."""
+        dice = self.dice
+        if self.effect == "layer":
+            base = dice.choice(["bonded", "smooth"])
+            plain["body"] = {"thickness": max(2.0 * self.dx, self.size * decades(dice, -1.3, 0.0)), "base": base}
+        elif self.effect == "hardness":
+            plain["material"] = {**plain["material"], "hardness": max(1.5 * p, mean * decades(dice, -0.2, 0.5))}
+        elif self.effect == "heat":
+            plain["thermal"] = {"conductivity": 0.2, "diffusivity": 1e-7}
+        elif self.effect == "adhesion":
+            self._stick(plain)
+        if "history" in plain and "initial" not in plain and (self.effect == "adhesion" or dice.random() < 0.4):
+            plain["output"] = {"energy": True}
+
+    def _stick(self, plain: Json) -> None:
+        """Press and pull by a height of the surface, with a process zone of two to eight cells."""
+        dice, modulus = self.dice, 4.0 * self.body.get("modulus_inf", self.body.get("shear_modulus"))
+        shape, zone = plain["surface"][0], self.dx * decades(dice, 0.3, 0.9)
+        top, height = 0.0, self.size**2 / (8.0 * shape.get("radius", 1.0))
+        if "radius" not in shape:
+            waves = self.dx * self.cells if shape["shape"] == "rough" else self.size / shape["waves"][0]
+            height = 2.0 * shape.get("amplitude", shape.get("rms_slope", 0.0) * waves)
+            top = 0.5 * height * len(plain["surface"]) if shape["shape"] == "wave" else 1.5 * height
+        work = modulus * height**2 / self.size * decades(dice, -2.0, 0.0)
+        plain["adhesion"] = {"work": work, "range": math.sqrt(zone * work / modulus)}
+        far, near, rest = -top - 0.3 * height, 0.2 * height - top, SECOND * decades(dice, -1, 1)
+        press = {"name": "press", "approach": {"from": far, "to": near}, "duration": rest}
+        pull = {"name": "pull", "approach": {"from": near, "to": far}, "duration": rest * decades(dice, -1, 1)}
+        plain["history"] = [press, pull]
 
 
 def _branches(count: int) -> str:
