@@ -294,7 +294,6 @@ class _Draw:
             plain["initial"] = {"state": "steady", "velocity": v, "pressure": p}
             plain["history"] = [slide(v * decades(dice, -1.5, 1.5), way)]
 
-
     def _add_effect(self, plain: Json, p: float, mean: float) -> None:
         """A layer, a hardness, heat, or adhesion, whose history is another; `mean` is the pressure of what touches."""
         dice = self.dice

@@ -9,10 +9,8 @@ holds the part `time` of the error budget to it, where the two views of friction
 numbers. The third has steps that are chosen: operator calls, the errors, and how often mu_dyn and mu_max are right
 within what the run states.
 
-CURVED_PASSING of `accuracy.time_error` was fitted to 30 of 60 marches of an earlier version of this script, which drew
-others and averaged over more rows: this one does not repeat the numbers. In steps of one and two cells estimate over
-error is 2.2 to 2.7 there in the median, 0.9 to 1.0 of the errors are less. Of the other 30 it is 2.0 to 2.2, and 0.90
-to 0.95; one in ten is below 1.06, or above 8.
+PASSING of `accuracy.constants` was fitted to 30 of 60 marches of an earlier version of this script, which drew others;
+what this one prints is in the manual's pages `method` and `accuracy`.
 """
 
 import math

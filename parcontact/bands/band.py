@@ -6,10 +6,10 @@ from itertools import product
 
 import numpy as np
 
+from ..accuracy.observation import properties_of
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job
 from ..job.sections.height_arrays import GivenHeights
-from ..march.errors import properties_of
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution, wavenumbers
@@ -21,7 +21,7 @@ from ..solve.interface_law import InterfaceLaw
 from ..solve.nonsymmetric.splitting import Splitting, step_for
 from ..solve.problem import MeanPressure
 from ..steady_sliding.losses import branch_powers
-from ..steady_sliding.sliding import SteadyState, judge_state, tolerance_of
+from ..steady_sliding.sliding import judge_state, tolerance_of
 from .band_heat import Warming, shares_of_depth, warming_of, waves_along_depth
 from .choice import Cut
 from .ladder import PressureLadder
@@ -85,7 +85,7 @@ class Band:
     def _take(self, setup: Setup) -> None:
         self.setup = setup
         self.probe = replace(setup.probe(), shears=())
-        self._known = properties_of(setup, 0.0, True, None)
+        self._known = properties_of(setup.job, setup.shortest)
         self._velocity: Vector = (math.nan, math.nan)
 
     def heat(self, temperature: float) -> None:
@@ -126,8 +126,8 @@ class Band:
         seen = contact.u, self._heights, contact.d, NonNegative().touches(contact.p)
         measures = self.probe.measure(contact.p, 1.0, *seen, (0.0, 0.0), velocity)
         lost = self.operator.loss(contact.p, setup.size, _unit(velocity)) / kernels.sum_of(contact.p)
-        state = SteadyState(contact, self._heights, lost * units.height / units.length)
-        friction, budget = judge_state(setup, self._known, state, velocity, measures)
+        by_energy = lost * units.height / units.length
+        friction, budget = judge_state(setup, self._known, contact.certificate, by_energy, velocity, measures)
         weights, above = (np.zeros(0), 0.0) if below is None else below.weigh(contact.p * units.pressure)
         area, along = setup.grid.lx * setup.grid.ly, _unit(velocity)
         parts = [(part.solver, part.mesh) if part else (0.0, 0.0) for part in (budget.friction, budget.area)]

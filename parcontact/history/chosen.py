@@ -1,8 +1,9 @@
 """Stages that choose their own time steps: within which bounds, which were chosen, and a guess of those to come.
 
-The next step is decided when the one before it has been made (`march.choosing`). The chosen steps are kept, so that a
-history has numbered steps here as everywhere, and a run goes on from them. Those to come are guessed as a ladder: steps
-double from the shortest to the longest that are allowed and go on with these, as they do where the error permits it.
+The next step is decided when the one before it has been made (`accuracy.controller`). The chosen steps are kept, so
+that a history has numbered steps here as everywhere, and a run goes on from them. Those to come are guessed as a
+ladder: steps double from the shortest to the longest that are allowed and go on with these, as they do where the error
+permits it.
 """
 
 import math

@@ -1,7 +1,6 @@
 """The error budget of a step: what the step shows, with what is known of the run."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -9,20 +8,18 @@ import numpy as np
 
 from ..accuracy.budget import ErrorBudget, ErrorSums, estimate
 from ..accuracy.embedded import EmbeddedPair, IntegratorDifference
-from ..accuracy.time_error import RunProperties, StepObservation, error_of_rise, time_error
+from ..accuracy.observation import RunProperties, StepObservation, properties_of
+from ..accuracy.time_error import time_error
 from ..effects.contact_protocol import SolvedContact
 from ..history.timeline import Step
-from ..job import Cylinder, Flat, Rough, Wave
 from ..physics.body import BodyMemory, Trial, surface_of
 from ..physics.entries import Entry, Saved
 from ..physics.measures import Measures
-from ..physics.prony import Prony
 from ..physics.slopes import friction_by_energy
 from ..physics.units import Units
-from ..scene import Scene, Setup
+from ..scene import Scene
 from ..solve.contact import Contact
 
-REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are all alike
 NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
 
 
@@ -93,50 +90,43 @@ class ErrorPart:
 def estimate_errors(scene: Scene, friction: float, solved: SolvedStep) -> StepErrors:
     """Return how wrong a step is, with the `friction` of the body in the step before, infinite where that is not known
     or was a jump; collective."""
-    step, measures, certificate = solved.step, solved.measures, solved.contact.certificate
-    points, branches, grid = scene.slab.points, scene.material.branched, scene.choices.grid
+    step, measures = solved.step, solved.measures
+    branches = scene.material.branched
     prony = None if branches is None else branches.prony
-    integrator = scene.choices.numerics.integrator
-    curved = integrator == "exponential" and step.growth > 0.0
-    run = properties_of(scene.setup, scene.folded.bound, integrator != "backward-euler", prony)
-    integrators, apart = _compare_integrators(scene, solved), _compare_views(scene, solved)
+    run = properties_of(scene.job, scene.setup.shortest, scene.folded.bound, prony)
     own = measures.friction - measures.friction_interface
     change, own = own - friction, math.inf if step.jump else own
+    observed = replace(_observe(scene, run, solved), change=change)
+    time = time_error(run, observed)
     if not solved.touches:
-        still = StepObservation(
-            0.0, integrators.difference, integrators.order, 0.0, 0.0, 0.0, 0.0, seconds=step.dt, curved=curved
-        )
-        return StepErrors(None, time_error(run, still, points), own, None)
-    observed = StepObservation(
+        return StepErrors(None, time, own, None)
+    return StepErrors(estimate(run, observed), time, own, estimate(run, replace(observed, change=0.0)))
+
+
+def _observe(scene: Scene, run: RunProperties, solved: SolvedStep) -> StepObservation:
+    """Return what a step shows; collective."""
+    step, measures, certificate = solved.step, solved.measures, solved.contact.certificate
+    pair, apart, grid = _compare_integrators(scene, solved), _compare_views(scene, solved), scene.choices.grid
+    curved = scene.choices.numerics.integrator == "exponential" and step.growth > 0.0
+    of_steps: dict[str, Any] = {"difference": pair.difference, "order": pair.order, "seconds": step.dt}
+    if not solved.touches:
+        return StepObservation(0.0, 0.0, 0.0, 0.0, curved=curved, **of_steps)
+    return StepObservation(
         complementarity=certificate.complementarity,
-        difference=integrators.difference,
-        order=integrators.order,
-        slope=integrators.slope * (scene.units.height / scene.units.length),
         friction=measures.friction,
         area=measures.contact_area,
         corrected=measures.contact_area_corrected,
-        slid=_cells_slid(run, step, (grid.dx, grid.dy)),
-        seconds=step.dt,
-        penetrating=max(certificate.members / measures.contact_area - 1.0, 0.0),
-        angle=integrators.angle,
-        views_apart=apart,
+        slope=pair.slope * (scene.units.height / scene.units.length),
         interface=measures.friction_interface,
+        penetrating=max(certificate.members / measures.contact_area - 1.0, 0.0),
+        views_apart=apart,
         way=step.velocity,
+        slid=_cells_slid(run, step, (grid.dx, grid.dy)),
+        angle=pair.angle,
         curved=curved,
+        uneven=min(1.0, measures.max_pressure / measures.pressure - 1.0) if measures.pressure > 0.0 else 1.0,
+        **of_steps,
     )
-    time = time_error(run, observed, points)
-    lasting = estimate(run, observed, points, time)
-    uneven = min(1.0, measures.max_pressure / measures.pressure - 1.0) if measures.pressure > 0.0 else 1.0
-    budget = _with_rise(lasting, error_of_rise(run, observed, points, change, uneven))
-    return StepErrors(budget, time, own, lasting)
-
-
-def _with_rise(budget: ErrorBudget, rise: float) -> ErrorBudget:
-    """Return the budget with the error of a rise of friction, where it is more than that of the time steps."""
-    parts = budget.friction
-    if parts is None or rise <= parts.time:
-        return budget
-    return replace(budget, friction=replace(parts, time=rise))
 
 
 def _cells_slid(run: RunProperties, step: Step, cell: tuple[float, float]) -> float:
@@ -175,28 +165,6 @@ def _compare_views(scene: Scene, solved: SolvedStep) -> float:
     maps, cyclic = (solved.contact.p, surface_of(solved.body)), grid.cyclic
     other = friction_by_energy(scene.slab, *maps, (grid.dx, grid.dy), direction, cyclic)
     return abs(other * scene.units.height - own)
-
-
-def properties_of(setup: Setup, folded: float, exponential: bool, prony: Prony | None) -> RunProperties:
-    """Return what is known of a job before it begins, with the bound of its `folded` branches and what relaxes."""
-    job = setup.job
-    waves = [shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)]
-    waves += [setup.shortest] if setup.shortest is not None else []
-    (nx, ny), (dx, dy) = job.grid.points, (job.grid.dx, job.grid.dy)
-    cell = (dx if nx > 1 else dy, dy if ny > 1 else dx)  # across a line of points there is nothing
-    cells = min(waves) / max(cell) if waves else None
-    straight = 1 in job.grid.points or _ridges(job.surface)
-    alike = 1 in job.grid.points or all(isinstance(shape, REGULAR) for shape in job.surface)
-    free, measured = job.grid.boundary == "free", setup.shortest is not None
-    return RunProperties(cells, straight, folded, exponential, prony, cell, free, alike, measured)
-
-
-def _ridges(shapes: Sequence[Any]) -> bool:
-    """Return whether the surface is of cylinders and waves along one axis of the grid, as then edges of contact are."""
-    across = {"y" if shape.axis == "x" else "x" for shape in shapes if isinstance(shape, Cylinder)}
-    waves = [shape.waves for shape in shapes if isinstance(shape, Wave)]
-    across |= {axis for x, y in waves for axis, count in (("x", x), ("y", y)) if count}
-    return len(across) == 1 and all(isinstance(shape, REGULAR) for shape in shapes)
 
 
 def _viscous(velocity: tuple[float, float], measures: Measures) -> tuple[tuple[float, float], float]:

@@ -13,7 +13,6 @@ from ..physics.entries import Entry
 from ..scene import Scene
 from ..storage.checkpoint import Contents, Facts
 from ..storage.row import StepRow
-from .choosing import StepChooser
 from .dry_law import law_of
 from .errors import ErrorMemory
 from .failure import DetachedError
@@ -134,7 +133,7 @@ def next_step(scene: Scene, state: State, timeline: Timeline, stop: int) -> Step
     number = state.row.step + 1
     span = timeline.span(number)
     if state.chosen is not None and span.stage.chooses and span.place(number) > 0:
-        return StepChooser(scene, state.chosen).propose(span, number)
+        return scene.controller.propose(state.chosen, span, number)
     if scene.material.branched is not None or not span.rests or span.place(number) < 1:
         return span.step(number)
     output = scene.choices.output

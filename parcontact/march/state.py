@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accuracy.budget import ErrorSums
+from ..accuracy.controller import StepTolerance, TolerancePart
 from ..effects.contact_protocol import PreviousContacts, PreviousPressure
 from ..effects.effect import Memories, effect_values
 from ..errors import InputError
@@ -26,7 +27,6 @@ from ..storage.checkpoint import Contents, Facts
 from ..storage.row import StepRow
 from .dry_law import law_of
 from .errors import ErrorMemory, ErrorPart
-from .tolerance import StepTolerance, TolerancePart, follows
 
 # names of parts of every run, which no effect may have
 RESERVED = {"row", "contact", "law", "material", "errors", "energy", "steps", "tolerance", "plans"}
@@ -122,7 +122,7 @@ def parts_of(scene: Scene) -> dict[str, RunPart[Any]]:
         found["energy"] = scene.energy
     if choices.timeline.chooses:
         found["steps"] = _ChosenStepsPart(scene)
-    if follows(scene):
+    if scene.controller.follows:
         found["tolerance"] = TolerancePart()
     return found | dict(scene.effects)
 

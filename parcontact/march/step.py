@@ -79,7 +79,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         material=solved.body,
         errors=ErrorMemory(errors.friction, state.errors),
         energy=energy,
-        tolerance=state.tolerance.after(scene, contact, errors.lasting),
+        tolerance=scene.controller.learn(state.tolerance, contact.certificate.worst, errors.lasting),
         **followed,
     )
 
@@ -112,7 +112,7 @@ def _solve(scene: Scene, state: State, step: Step) -> SolvedStep:
     """Solve a step, measure it and let the body go on; collective. Raises StepError and DetachedError."""
     body, law, before = scene.material, law_of(scene), state.row.measures
     trial = body.begin(state.body, step.dt, scene.motion.at(step.position), step.growth)
-    control, tolerance = _control(scene, step, trial), state.tolerance.of(scene, step)
+    control, tolerance = _control(scene, step, trial), scene.controller.tolerance(state.tolerance, step)
     of_law = law.solve(trial, step, control, state.law, state.contact, before, tolerance)
     contact = of_law.contact
     if of_law.end == "detached":

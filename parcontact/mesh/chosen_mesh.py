@@ -2,8 +2,7 @@
 
 `auto` is the mesh of fewest points on which the errors are those of `numerics.accuracy`. It follows from the shortest
 wave of the surface, from the directions of sliding (`job.checks.cells`) and from a guess of what touches
-(`mesh.contact_guess`). The mesh may make MESH_SHARE of the error of a march, whose time steps make the rest, and
-STEADY_SHARE of that of a friction curve.
+(`mesh.contact_guess`). The mesh may make its share of the error (`accuracy.shares`).
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from typing import Any
 
 from pydantic import Field, ValidationError
 
+from ..accuracy.shares import FRICTION, STEADY
 from ..errors import InputError
 from ..job import Job
 from ..job.checks import cells
@@ -29,7 +29,6 @@ from ..job.text.places import UNREADABLE, Source
 from ..job.text.python_data import is_array
 from .contact_guess import guesses
 
-MESH_SHARE, STEADY_SHARE = 0.7, 0.9  # accuracy: of numerics.accuracy
 KEYS = ("points", "size")  # of a grid, which a measured map has
 Extent = tuple[tuple[int, int], tuple[float, float] | None]
 
@@ -85,7 +84,7 @@ def _choose(scenery: Scenery | Job, box: Grid, data: dict[str, Any], origin: Ori
     if not math.isfinite(wave):
         raise InputError("the surface has no shortest wave, from which cells follow; give numbers of points")
     directions = cells.directions_of(scenery.history, scenery.initial, scenery.steady)
-    asked, share = scenery.numerics.asked, MESH_SHARE if scenery.history else STEADY_SHARE
+    asked, share = scenery.numerics.asked, (FRICTION if scenery.history else STEADY).mesh
     own = Accuracy(friction=share * asked.friction, area=share * asked.area)
     touching = guesses(scenery, wave, box.lx * box.ly)
     points = cells.choose_points(wave, box.size, directions, own, touching)

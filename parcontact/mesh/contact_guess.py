@@ -9,7 +9,7 @@ here with the modulus G at FEW times the frequency with which the shortest wave 
 50 steady states 1 - (1 - A)^MORE was right to 17 % of the exponent, at any loss. The phase of the modulus is that at
 EDGES times this frequency. Of 4 to 32 times, 4 told the most of what the mesh makes of friction, and as much of
 the area. Where the loss angle is still in proportion to the frequency at FINEST times it, sliding is slow, and edges
-lose power in waves shorter than the cells (`accuracy.edge_loss`).
+lose power in waves shorter than the cells (`accuracy.sources`).
 """
 
 from __future__ import annotations

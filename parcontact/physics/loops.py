@@ -177,21 +177,6 @@ def embedded(branches, decay, increment, gain, before, past, p, u, heights, offs
 
 
 @loop
-def slope_under(p, touching, heights):
-    """Sums, where `touching` is not 0, of p and of p times the squared difference of the heights on both sides along x,
-    cyclic."""
-    nx = p.shape[1]
-    load, slope = 0.0, 0.0
-    for j in range(p.shape[0]):
-        for i in range(nx):
-            if touching[j, i] != 0.0:
-                rise = heights[j, (i + 1) % nx] - heights[j, i - 1]
-                load += p[j, i]
-                slope += p[j, i] * rise * rise
-    return load, slope
-
-
-@loop
 def dot(a, b):
     """Sum of a b."""
     total = 0.0

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from ..accuracy.controller import tolerance_before
 from ..job import Job
 from ..job.checks.size import machines
 from ..march.state import parts_of
-from ..march.tolerance import tolerance_before
 from ..parallel.slab import Slab
 from ..physics.convolution import Convolution, MirroredConvolution
 from ..physics.lowest import shape_of
@@ -68,7 +68,7 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
     if not choices(job).steady_start.on:
         return 0
     slab = _slab(job, ranks, rank)
-    sliding = SteadySliding(outline(job, slab), tolerance_before(choices(job), 0))
+    sliding = SteadySliding(outline(job, slab), tolerance_before(job, 0, choices(job).viscoelasticity.on))
     held = sliding.hold(job.initial.velocity, sets)
     bytes_held = slab.tally["map bytes"]
     del held

@@ -1,8 +1,8 @@
 """The price of accuracy: mesh, steps, calls and time of a job at other accuracies, from the errors seen in a trial.
 
-The mesh may make MESH_SHARE of an accuracy, time steps TIME_SHARE of it, or CHOSEN_SHARE where stages choose them. What
-the mesh makes of friction falls with the power SPOTS_ORDER of the cell, of the area with the first; what time steps
-make falls with the order of the integrator (`accuracy.time_error`). Nothing more is tried.
+Mesh and time steps may make their shares of an accuracy (`accuracy.shares`), time steps CHOSEN of what they are allowed
+where stages choose them. What the mesh makes of friction and of the area falls with the order of its fit
+(`accuracy.constants`); what time steps make with the order of the integrator. Nothing more is tried.
 """
 
 import math
@@ -12,7 +12,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from ..accuracy.mesh_error import SPOTS_ORDER
+from ..accuracy.constants import AREA, VIEWS
+from ..accuracy.shares import FRICTION, TIME_MEDIAN
 from ..accuracy.time_error import order_of_time_error
 from ..history.chosen import ChosenEnds
 from ..history.timeline import Span, Timeline
@@ -26,8 +27,7 @@ from .report import duration_text, ranks_text, unit_of
 from .sample import Sample
 
 ACCURACIES = (0.05, 0.01, 3e-3, 1e-3)
-MESH_SHARE, TIME_SHARE = 0.6, 0.35  # of the accuracy, for the mesh and for time steps; the rest is the solver's
-CHOSEN_SHARE = 0.65  # accuracy: of the accuracy, what time steps make that follow it, in the mean of a stage
+CHOSEN = 0.8  # accuracy: of what they are allowed, what time steps make that are chosen, in the mean of a stage
 CALLS_PER_DECADE = 1.5  # tuning: for a tenth of the tolerance: 1.4 to 1.7 in eight scenes, 1 near full contact
 MOST = 16.0  # times finer or coarser than the trial, at most
 SAME = 1e-9  # rounding: relative: numbers this close are the same
@@ -48,12 +48,12 @@ def offer(costs: Costs, accuracy: float, whole: Job | None = None) -> Costs:
 
 def mesh_for(job: Job, sample: Sample, accuracy: float) -> tuple[int, int]:
     """Return the points along x and y with which the mesh makes its share of an accuracy."""
-    grid, share = job.grid, MESH_SHARE * accuracy
+    grid, share = job.grid, FRICTION.mesh * accuracy
     if any(isinstance(shape, OnOneMesh) for shape in job.surface):
         return grid.points
-    error, order = error_of(sample, "friction", "mesh"), SPOTS_ORDER
+    error, order = error_of(sample, "friction", "mesh"), VIEWS.order
     if error is None or error >= 1.0:  # no mesh makes friction exact to a share that cannot be told from none
-        error, order = error_of(sample, "area", "mesh") or 0.0, 1.0
+        error, order = error_of(sample, "area", "mesh") or 0.0, AREA.order
     times = (error / share) ** (1.0 / order) * max(sample.job.grid.points) / max(grid.points)
     times = min(max(times, 1.0 / MOST), MOST) if error else 0.0
     if wave := min((shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)), default=None):
@@ -71,7 +71,8 @@ def error_of(sample: Sample, name: str, source: str) -> float | None:
 def _steps(span: Span, sample: Sample, job: Job) -> int:
     """Return the steps of a stage in the job at another accuracy; a slide with given steps has one a cell at least."""
     error = next((e for name in ("friction", "area") if (e := error_of(sample, name, "time")) is not None), 0.0)
-    share = (CHOSEN_SHARE if isinstance(span.ends, ChosenEnds) else TIME_SHARE) * job.numerics.asked.of_steps
+    chosen = CHOSEN * TIME_MEDIAN if isinstance(span.ends, ChosenEnds) else 1.0
+    share = FRICTION.time * chosen * job.numerics.asked.of_steps
     tried = Timeline.of(sample.job).spans[span.index].count
     order = order_of_time_error(job.numerics.integrator, curved=True)
     count = max(tried * (error / share) ** (1.0 / order), span.count / MOST)

@@ -182,7 +182,7 @@ class Choices:
 
     @decided("chosen time steps")
     def chosen_steps(self) -> Verdict:
-        """Time steps that follow the error of the last one (`march.choosing`)."""
+        """Time steps that follow the error of the last one (`accuracy.controller`)."""
         why = describe_steps(self.job)
         return bool(why) and self.job.remembers, why or "every stage gives its steps"
 

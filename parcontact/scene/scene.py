@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..accuracy.controller import Controller
 from ..effects import contact_law
 from ..effects.contact_protocol import ContactLaw
 from ..effects.effect import Effect, Memories
@@ -146,6 +147,13 @@ class Scene:
                 body.set_time_factor(factor)
         if shears := self.choices.shears:
             self.probe = replace(self.probe, shears=[shear.shifted(factor) for shear in shears])
+
+    @cached_property
+    def controller(self) -> Controller:
+        """The controller of the tolerance of solves and of the length of steps."""
+        choices = self.choices
+        energies, adhesive = self.energy is not None, choices.adhesion is not None
+        return Controller(self.job, choices.timeline, self.material, energies, adhesive)
 
     @cached_property
     def in_double(self) -> tuple[ContactSolver, Operators]:

@@ -9,19 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from ..accuracy.budget import ErrorBudget, estimate_steady
-from ..accuracy.time_error import RunProperties, StepObservation
+from ..accuracy.observation import RunProperties, StepObservation, properties_of
 from ..doubts import Doubt
 from ..effects.relaxation import temperature_of
 from ..errors import InputError, RunError
-from ..march.errors import properties_of
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution
 from ..physics.flash import Flash
-from ..physics.loops import slope_under
 from ..physics.measures import Measures
 from ..scene import Setup, choices, sanity
 from ..solve import kernels, nested
+from ..solve.certificate import Certificate
 from ..solve.local_load import LEAST_CUT
 from ..solve.nonsymmetric import proximal
 from ..solve.nonsymmetric.proximal import Proximal
@@ -33,7 +32,10 @@ from .point import Point
 from .stiffness import loses_most, soft_stripes
 
 COARSE_TOLERANCE = 0.02  # tuning: of the certificate on all grids but the finest
-LOOSE, SHARE = 1e-3, 0.6  # accuracy: so much of a tolerance above LOOSE leaves the contact area as right as in a march
+LOOSE, AS_RIGHT = (
+    1e-3,
+    0.6,
+)  # accuracy: so much of a tolerance above LOOSE leaves the contact area as right as in a march
 GIVE_UP = 250  # tuning: linear steps of the usual solver on a grid, where there are stripes: sets have not settled then
 NEAR = 1.1  # tuning: a velocity this many times the last one, or less, is near it
 Vector = tuple[float, float]
@@ -46,15 +48,6 @@ class SteadyLevel:
     slab: Slab
     fft: FFT
     heights: Array
-
-
-@dataclass(frozen=True)
-class SteadyState:
-    """A contact under a map of heights, and its friction by energy without an interface."""
-
-    contact: SteadyContact
-    heights: Array
-    by_energy: float
 
 
 Make = Callable[[SteadyLevel, Vector], tuple[SteadySolver | Proximal, Convolution]]
@@ -75,7 +68,7 @@ class SteadySliding:
         finest, *coarser = nested.coarser_levels(setup.slab, heights)
         self.levels = [SteadyLevel(setup.slab, setup.fft, finest.heights)]
         self.levels += [SteadyLevel(level.slab, FFT(level.slab), level.heights) for level in coarser]
-        self._known = properties_of(setup, 0.0, True, None)
+        self._known = properties_of(setup.job, setup.shortest)
         self.contact: SteadyContact | None = None
         self._rise: Array | None = None
         self._speed = self._pressure = 0.0  # the speed times the shift factor: that is what a state depends on
@@ -144,8 +137,8 @@ class SteadySliding:
             raise RunError(f"{what}: its results would not be finite")
         powers = None if self.setup.half_space.free else branch_powers(self.setup, contact, velocity)
         lost = () if powers is None else tuple(powers.sum(axis=1).tolist())
-        state = SteadyState(contact, heights, by_energy)
-        friction, errors = judge_state(self.setup, self._known, state, velocity, measures)
+        judged = self._known, contact.certificate, by_energy, velocity, measures
+        friction, errors = judge_state(self.setup, *judged)
         flash = self._warm(contact, by_energy, velocity, measures)
         seconds, place = time.perf_counter() - began, (velocity, pressure, self.temperature, factor)
         return Point(*place, measures, friction, errors, contact.certificate, calls, contact.sets, seconds, lost, flash)
@@ -298,33 +291,25 @@ class SteadySliding:
 
 
 def judge_state(
-    setup: Setup, known: RunProperties, state: SteadyState, velocity: Vector, measures: Measures
+    setup: Setup, known: RunProperties, certificate: Certificate, by_energy: float, velocity: Vector, measures: Measures
 ) -> tuple[float, ErrorBudget]:
-    """Return friction by energy, with what an interface adds, and how wrong it and the area are; collective."""
-    contact, (x, y) = state.contact, _direction(velocity)
-    touching = SteadySolver.constraint.touches(contact.p)
-    load, rise = setup.slab.sum(*slope_under(contact.p, touching, state.heights))
-    slopes = -(measures.force_x * x + measures.force_y * y) / measures.normal_force
-    friction = state.by_energy + measures.friction_interface
+    """Return friction by energy, with what an interface adds, and how wrong it and the area are."""
+    friction = by_energy + measures.friction_interface
     seen = StepObservation(
-        contact.certificate.complementarity,
-        difference=0.0,
-        order=2.0,
-        slope=math.sqrt(rise / load) / (2.0 * setup.grid.dx) * setup.units.height,
+        certificate.complementarity,
         friction=friction,
         area=measures.contact_area,
         corrected=measures.contact_area_corrected,
-        penetrating=max(contact.certificate.members / measures.contact_area - 1.0, 0.0),
-        views_apart=abs(slopes - friction),
         interface=measures.friction_interface,
+        penetrating=max(certificate.members / measures.contact_area - 1.0, 0.0),
         way=velocity,
     )
-    return friction, estimate_steady(replace(known, prony=setup.prony), seen, setup.slab.points)
+    return friction, estimate_steady(replace(known, prony=setup.prony), seen)
 
 
 def tolerance_of(asked: float) -> float:
     """Return the tolerance on the certificate of a steady state for the one that a job asks for."""
-    return max(SHARE * asked, min(LOOSE, asked))
+    return max(AS_RIGHT * asked, min(LOOSE, asked))
 
 
 def _direction(velocity: Vector) -> tuple[float, float]:

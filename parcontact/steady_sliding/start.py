@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
+from ..accuracy.controller import tolerance_before
 from ..job import Job
 from ..march.loop import March
 from ..march.state import first_state, pressed_state
-from ..march.tolerance import tolerance_before
 from ..parallel.slab import Slab
 from ..scene import Setup, build_on, sanity, set_up
 from ..solve.nonsymmetric.steady import SteadyContact
@@ -60,7 +60,10 @@ def _from_steady_sliding(setup: Setup) -> March:
 
 def _solve(setup: Setup) -> tuple[Point, SteadyContact]:
     """The state, and its contact, without the maps that it took to find it; collective."""
-    sliding, initial = SteadySliding(setup, tolerance_before(setup.choices, 0)), setup.job.initial
+    sliding, initial = (
+        SteadySliding(setup, tolerance_before(setup.job, 0, setup.choices.viscoelasticity.on)),
+        setup.job.initial,
+    )
     point = sliding.solve(initial.velocity, initial.pressure or 0.0)
     assert sliding.contact is not None
     return point, sliding.contact

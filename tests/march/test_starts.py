@@ -9,6 +9,7 @@ import pytest
 from marching import SLS, begun, column, marched
 
 import parcontact.march.errors
+from parcontact.accuracy.budget import estimate
 from parcontact.history.timeline import Step, Timeline
 from parcontact.job import Job
 from parcontact.march.loop import March
@@ -82,11 +83,12 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
     """The change of friction and the unevenness of every step."""
     made: list[tuple[float, float]] = []
 
-    def error_of_rise(_run: Any, _observed: Any, _points: int, change: float, uneven: float) -> float:
-        made.append((change, uneven))
-        return 0.0
+    def note(run: Any, observed: Any) -> Any:
+        if observed.change or not made or observed.uneven != made[-1][1]:  # not that without a change
+            made.append((observed.change, observed.uneven))
+        return estimate(run, observed)
 
-    monkeypatch.setattr(parcontact.march.errors, "error_of_rise", error_of_rise)
+    monkeypatch.setattr(parcontact.march.errors, "estimate", note)
     return made
 
 

@@ -15,11 +15,11 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
+from parcontact.accuracy.controller import LEAST_WAY, cells_per_step
 from parcontact.errors import InputError, RunError
 from parcontact.history.chosen import MadeStep
 from parcontact.history.timeline import Step, Timeline
 from parcontact.job import Job
-from parcontact.march.choosing import LEAST_WAY, cells_per_step
 from parcontact.march.failure import StepError
 from parcontact.march.loop import March, run
 from parcontact.physics.convolution import Convolution, MirroredConvolution

@@ -16,9 +16,9 @@ from scipy.special import gamma
 import parcontact as pc
 from parcontact import job as jobs
 from parcontact import scene
+from parcontact.accuracy.observation import properties_of
 from parcontact.derived import prediction
 from parcontact.errors import InputError
-from parcontact.march.errors import properties_of
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics import surface_statistics as statistics
@@ -293,7 +293,7 @@ def saved(path: Path, surface: dict[str, Any], points: int) -> dict[str, Any]:
 
 
 def cells(setup: scene.Setup) -> float:
-    found = properties_of(setup, 0.0, True, None).cells_per_wave
+    found = properties_of(setup.job, setup.shortest).cells_per_wave
     assert found is not None
     return found
 

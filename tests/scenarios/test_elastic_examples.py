@@ -339,7 +339,8 @@ def steady(points: tuple[int, int], along: tuple[int, int] = (1, 0)) -> tuple[fl
 
 def test_friction_comes_from_the_cells_along_the_sliding() -> None:
     """With 16 and 4 cells per shortest wave, against 16 and 16: friction within 1 %, the corrected area within 2 %.
-    With 4 along and 16 across friction is more wrong; either is within twice its estimate, as 95 % are."""
+    With 4 along and 16 across friction is more wrong; either is within twice its estimate, as 95 % are, and
+    the one of short cells along the sliding states less."""
     (fine, area, _), (long, of_long, stated), (wide, _, of_wide) = (
         steady(points) for points in ((192, 192), (192, 48), (48, 192))
     )
@@ -347,7 +348,7 @@ def test_friction_comes_from_the_cells_along_the_sliding() -> None:
     assert of_long == pytest.approx(area, rel=0.02)
     assert abs(long / fine - 1.0) < abs(wide / fine - 1.0) < 2.0 * of_wide
     assert abs(long / fine - 1.0) < 2.0 * stated
-    assert stated < 0.2 * of_wide
+    assert stated < 0.5 * of_wide
 
 
 def calls_of_a_slide(points: tuple[int, int], velocity: tuple[float, float]) -> float:

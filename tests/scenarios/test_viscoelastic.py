@@ -10,7 +10,7 @@ from marching import BRANCHES, PRONY, SLS, begun, column, example, marched
 from numpy.testing import assert_allclose
 from sliding import TYRE
 
-import parcontact.march.errors
+import parcontact.accuracy.sources
 from parcontact.march.loop import March
 from parcontact.physics.body import BodyMemory, ZenerBody, surface_of
 from parcontact.physics.energy import ElasticPressure, ZenerEnergy
@@ -306,7 +306,7 @@ def test_stated_errors_cover_what_comes_late(material: Any, speed: float, seed: 
 def test_solves_do_not_follow_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """All results are the same without that error, digit by digit."""
     with_it, rows = marched(job(TYRE, 1e-3, 1))
-    monkeypatch.setattr(parcontact.march.errors, "error_of_rise", lambda *_: 0.0)
+    monkeypatch.setattr(parcontact.accuracy.sources, "error_of_rise", lambda *_: 0.0)
     without, others = marched(job(TYRE, 1e-3, 1))
     for name in ("friction", "contact_area", "approach", "operator_calls"):
         np.testing.assert_array_equal(column(rows, name), column(others, name))

@@ -7,19 +7,20 @@ import numpy as np
 import pytest
 from marching import SLS, begun
 
+from parcontact.accuracy.controller import MOST_GROWTH, REJECTED, SAFETY
+from parcontact.accuracy.shares import FRICTION, TIME_MEDIAN
 from parcontact.history.chosen import MadeStep, most_cells
 from parcontact.history.timeline import Step
 from parcontact.job import Grid, Job
 from parcontact.job.sections.geometry import Flat, HeightFile, Rough, Sphere, Wave
 from parcontact.job.sections.stages import Stage
-from parcontact.march.choosing import MOST_GROWTH, REJECTED, SAFETY, StepChooser
 from parcontact.march.loop import March
 
 Json = dict[str, Any]
 CELL = 1e-3 / 32
 PRESS: Json = {"pressure": 1e4, "duration": 5e-3}
 SLIDE: Json = {"pressure": 1e4, "velocity": 0.1, "distance": 6.3 * CELL}
-ALLOWED = 0.8 * 1e-2  # of numerics.accuracy
+ALLOWED = FRICTION.time * TIME_MEDIAN * 1e-2  # of numerics.accuracy
 Errors = Callable[[int, Step], float]
 
 
@@ -34,12 +35,11 @@ def attempts(march: March, error: Errors, most: int = 1000) -> list[list[Step]]:
     so many steps."""
     chosen, found, number = march.state.chosen, list[list[Step]](), 0
     assert chosen is not None
-    chooser = StepChooser(march.scene, chosen)
     while (number := number + 1) <= len(march.timeline()) and len(found) < most:
         span = march.timeline().span(number)
         if span.place(number) == 0:
             continue
-        tries = [chooser.propose(span, number)]
+        tries = [march.scene.controller.propose(chosen, span, number)]
         while isinstance(verdict := judged(tries[-1], error(number, tries[-1])), Step):
             tries.append(verdict)
         chosen.add(verdict)

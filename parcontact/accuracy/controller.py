@@ -1,0 +1,291 @@
+"""The tolerance of solves and the length of steps, both from the error budget of the steps made so far.
+
+**Tolerance.** `numerics.tolerance` is chosen for the worst scene. Where `numerics.accuracy` has chosen it, a solve may
+have a larger one: the solver may make its share (`shares`) of the accuracy, or of what the other parts of the budget
+make where that is more. Errors go with the certificate
+that a solve has reached. A mean over the last steps says in which proportion; it is a power of the root of two, so that
+rounding has no part in it, and a part of the state: a run goes on as if it had never stopped. The last solve before a
+change of velocity or load is a close one, and so is a steady start: the body remembers a displacement that is as wrong
+as the certificate allows, and holds it after the change with a modulus that may be far above the one before (on the
+compound synthetic_tyre, 300 times as fast, forty times). The last step of a stage seldom moves the surface by whole
+cells: its start is worse than those of the steps before it, from which its tolerance was learnt.
+
+**Length.** The error E of a step of length dt is estimated from that step alone (`time_error`). It may be E0, the share
+of time steps. As E goes with dt^p (p = 3 for steps in which the displacement is quadratic, 1.7 where it is linear, 1
+for backward Euler), the next is
+
+    dt <- dt clip(SAFETY (E0/E)^(1/p), 1, MOST_GROWTH),
+
+and a step with E > REJECTED E0 is made anew from the same state, `max((REJECTED E0/E)^(1/p), MOST_SHRINK)` times as
+long; the one after it does not grow (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I
+(1993), II.4). At rest steps are a shortest one times powers of the fourth root of two, so that rounding has no part in
+their length. While the surface slides, steps end at multiples of their length, counted in cells from where the surface
+was at first (block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after
+a jump, parts of a cell, as large as E allows, lead back to whole cells, by which heights are moved without a
+transform. Halves, thirds and quarters start from the pressure of a whole cell ago (`march.starts`).
+"""
+
+import math
+from dataclasses import dataclass
+from functools import partial
+
+from ..history.chosen import Bounds, ChosenEnds, ChosenSteps, MadeStep, reached
+from ..history.timeline import Span, Step, Timeline
+from ..job import Job
+from ..job.checks.cells import one_cell
+from ..physics.body import Body
+from ..physics.entries import Entry, Saved
+from ..physics.units import Units
+from .budget import ErrorBudget, Parts
+from .shares import AREA, FRICTION, SOLVER_MEDIAN, TIME_MEDIAN
+from .time_error import order_of_time_error
+
+MOST = 8.0  # accuracy: times the job's tolerance, at most
+LOOSEST = 0.05  # accuracy: the largest tolerance, with which single steps may be wrong by a few times the mean
+CLOSE = 2.5e-4  # accuracy: before a change, if the tolerance is not smaller: 1 % over a rise of the modulus by 40
+FIRST = 0.01  # accuracy: in the first step of a stage, and in the last, which is seldom of whole cells, at most
+NEWEST = 0.25  # tuning: weight of the last step in the mean
+NAME = "mean logarithm"  # in a checkpoint
+SAFETY = 0.98  # tuning: of the length with which the error would be the one allowed
+REJECTED = 1.19  # accuracy: times the error allowed; that of a slide varies from step to step, and its mean counts
+MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0  # tuning: of a step over the one before it, or over one rejected
+LEVELS = 2  # tuning: the power of two of the number of lengths, of steps below a quarter of a cell, per factor of two
+REST_LEVELS = 4  # tuning: the same at rest
+LEAST_WAY = 0.35  # tuning: of a step that ends at a multiple of its length
+STRETCH = 1.1  # tuning: of the last step of a stage: no step shorter than a tenth of the one before is left over
+SNAP_SHARE = 1.0 / 64.0  # accuracy: of the longest step of a stage: in a shorter one the edge of contact may snap
+RELAXING = 0.1  # accuracy: of the shortest relaxation time: the same; and the first step at rest after a jump
+SAME_LEVEL = 1e-6  # rounding: of a level
+
+
+@dataclass(frozen=True)
+class StepTolerance:
+    """Memory of the tolerance that steps may have over that of the job, the mean over the last ones of its logarithm
+    to the base 2."""
+
+    mean: float = 0.0
+
+
+class TolerancePart:
+    """The tolerance of solves; with a checkpoint that lacks it all is to be learnt again."""
+
+    def at_rest(self) -> StepTolerance:
+        return StepTolerance()
+
+    def entries(self, memory: StepTolerance, units: Units) -> dict[str, Entry]:
+        return {NAME: Entry(memory.mean, optional=True)}
+
+    def restored(self, memory: StepTolerance, saved: Saved) -> StepTolerance:
+        return StepTolerance(float(saved[NAME])) if NAME in saved else StepTolerance()
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Controller of a run: of a job with its stages, whose `body` may relax, whose `energies` are asked for or not, and
+    whose surfaces stick (`adhesive`) or not."""
+
+    job: Job
+    timeline: Timeline
+    body: Body
+    energies: bool = False
+    adhesive: bool = False
+
+    @property
+    def relaxes(self) -> bool:
+        return self.body.branched is not None
+
+    # -- tolerance ----------------------------------------------------------------------------------------------------
+
+    @property
+    def follows(self) -> bool:
+        """Whether the tolerance of steps follows the error budget: where `numerics.accuracy` has chosen that of the
+        job, and stages last. Contacts with adhesion are solved to that of the job."""
+        return "tolerance" in self.job.numerics.chosen and self.timeline.lasts and not self.adhesive
+
+    def tolerance(self, memory: StepTolerance, step: Step) -> float | None:
+        """Return the tolerance of the solve of a step, None where it is that of the job, as it is in a jump. Before a
+        change and in the first and last step of a stage it is smaller."""
+        own = self.job.numerics.tolerance
+        if step.dt == 0.0:
+            return None
+        span = self.timeline.spans[step.stage]
+        ends = reached(step.time, span.time(span.count))
+        most = tolerance_before(self.job, step.stage + 1, self.relaxes) if ends else math.inf
+        if (step.growth == 0.0 or ends) and self.relaxes:
+            most = min(most, FIRST)
+        if not self.follows:
+            return most if most < own else None
+        return float(min(own * 2.0 ** (0.5 * round(2.0 * memory.mean)), max(LOOSEST, own), most))
+
+    def learn(self, memory: StepTolerance, certificate: float, budget: ErrorBudget | None) -> StepTolerance:
+        """Return the memory after a step with this budget, whose solve has reached a `certificate`."""
+        if not self.follows or budget is None or certificate <= 0.0:
+            return memory
+        asked = self.job.numerics.asked
+        of_area = _room(budget.area, AREA.solver, asked.area)
+        room = min(of_area, _room(budget.friction, FRICTION.solver, asked.friction) if budget.friction else math.inf)
+        ratio = certificate * room / self.job.numerics.tolerance
+        now = min(max(math.log2(ratio) if ratio > 0.0 else 0.0, 0.0), math.log2(MOST))
+        return StepTolerance(memory.mean + NEWEST * (now - memory.mean))
+
+    # -- length of steps ----------------------------------------------------------------------------------------------
+
+    def propose(self, chosen: ChosenSteps, span: Span, number: int) -> Step:
+        """Return the next step of a stage that chooses its own; it has this number, and `chosen` are those made."""
+        first = number == span.before + span.jumps + 1
+        return self._step(chosen, span, number, self._first(chosen, span) if first else chosen.next)
+
+    def judge(
+        self,
+        chosen: ChosenSteps,
+        span: Span,
+        step: Step,
+        end: float,
+        rejected: bool,
+        error: float,
+        front: float = 0.0,
+        begins: bool = False,
+    ) -> Step | MadeStep:
+        """Return the shorter step to make instead of one with such an error, or how the step is noted as made.
+
+        It ends the stage at `end` [s]; `rejected` says whether a longer one was tried before. The `front` of a contact
+        with adhesion has moved by so many half process zones, of which one is allowed, but where it snaps. Steps in
+        which it snaps, `begins` or ends are a share of the shortest relaxation time: what is sudden meets the body
+        before it relaxes. Where energies are asked for, so is what each point loses as it closes: then the root of the
+        accuracy is allowed.
+        """
+        numerics = self.job.numerics
+        order = order_of_time_error(numerics.integrator, step.growth > 0.0)
+        ratio = error / (FRICTION.time * TIME_MEDIAN * numerics.asked.of_steps)
+        sudden = min(SNAP_SHARE * _bounds(span).most, RELAXING * self.body.shortest_time)
+        if step.dt > sudden:
+            allowed = math.sqrt(numerics.asked.of_steps) if self.relaxes and self.energies else 1.0
+            at_once = (step.dt / sudden) ** order if begins and self.relaxes else 0.0
+            ratio = max(ratio, (front / allowed) ** order, at_once)
+        wanted = SAFETY * ratio ** (-1.0 / order) if ratio > 0.0 else MOST_GROWTH
+        if ratio > REJECTED:
+            share = max((REJECTED / ratio) ** (1.0 / order), MOST_SHRINK)
+            if shorter := self._shorter(chosen, span, step, share):
+                return shorter
+            rejected = True
+        most = 1.0 if rejected else MOST_GROWTH
+        return MadeStep(span.index, end, self._level(span, step.dt * min(max(wanted, 1.0), most)))
+
+    def _shorter(self, chosen: ChosenSteps, span: Span, step: Step, share: float) -> Step | None:
+        """Return a step that is at most that share of one, None if that one is the shortest."""
+        least, dt = _bounds(span).least, share * step.dt
+        while True:
+            wanted = self._level(span, dt)
+            shorter = self._step(chosen, span, step.number, wanted, rejected=True)
+            if shorter.dt < step.dt * (1.0 - SAME_LEVEL):
+                return shorter
+            if wanted <= least:
+                return None
+            dt = 0.5 * wanted
+
+    def _level(self, span: Span, dt: float) -> float:
+        """Return the longest of the lengths that steps may have which is no longer than dt."""
+        limits = _bounds(span)
+        if dt <= limits.least or dt >= limits.most:
+            return min(max(dt, limits.least), limits.most)
+        if span.stage.speed:
+            cell = one_cell(span.stage, self.job.grid)
+            return min(cell * cells_per_step(dt / cell), limits.most)
+        power = math.floor(REST_LEVELS * math.log2(dt / limits.least) + SAME_LEVEL)
+        return min(limits.least * 2.0 ** (power / REST_LEVELS), limits.most)
+
+    def _first(self, chosen: ChosenSteps, span: Span) -> float:
+        """Return how long to try the first step of a stage."""
+        limits = _bounds(span)
+        if self._goes_on(span) and chosen.next:
+            return self._level(span, chosen.next)
+        if span.stage.speed:
+            return min(limits.most, one_cell(span.stage, self.job.grid))
+        return self._level(span, RELAXING * self.body.shortest_time)
+
+    def _goes_on(self, span: Span) -> bool:
+        """Return whether nothing has changed since the stage before, which chose its steps too."""
+        if span.index == 0 or span.jumps:
+            return False
+        before = self.timeline.history[span.index - 1]
+        return before.chooses and before.velocity == span.stage.velocity
+
+    def _step(self, chosen: ChosenSteps, span: Span, number: int, dt: float, rejected: bool = False) -> Step:
+        """Return the step that is about so long: it ends at a multiple of its length, or with the stage."""
+        ends = span.ends
+        assert isinstance(ends, ChosenEnds)
+        now = ends.made[-1] if ends.made else 0.0
+        stop = next(stop for stop in ends.stops if not reached(now, stop))
+        if span.stage.speed:
+            dt = self._to_a_multiple(span, now, dt)
+        elif STRETCH * dt < stop - now < 2.0 * dt:
+            dt = 0.5 * (stop - now)
+        if stop - now <= (STRETCH if not span.stage.speed else 1.0 + SAME_LEVEL) * dt:
+            return self._ending(chosen, span, number, stop - now, stop, rejected)
+        return self._ending(chosen, span, number, dt, now + dt, rejected)
+
+    def _to_a_multiple(self, span: Span, now: float, dt: float) -> float:
+        """Return how long until the surface is at a multiple of the way of such a step: LEAST_WAY of it, or longer.
+
+        From half a multiple it is half of one: a step that has just grown is not three times the one before.
+        """
+        if span.stage.velocity[1]:
+            return dt
+        (x, _), (along, _) = span.origin, span.stage.velocity
+        cell = one_cell(span.stage, self.job.grid)
+        at = math.copysign(1.0, along) * x / self.job.grid.dx + now / cell
+        size = dt / cell
+        way = (math.ceil(at / size + LEAST_WAY) * size - at) * cell
+        return dt if math.isclose(way, dt, rel_tol=SAME_LEVEL) else way
+
+    def _ending(self, chosen: ChosenSteps, span: Span, number: int, dt: float, end: float, rejected: bool) -> Step:
+        """Return the step that is so long and ends so long after the start of the stage."""
+        (x, y), (along_x, along_y) = span.origin, span.stage.velocity
+        made = chosen.ends.get(span.index, [])
+        last = made[-1] - (made[-2] if len(made) > 1 else 0.0) if made else 0.0
+        step = Step(
+            number,
+            span.index,
+            span.start + end,
+            dt,
+            (x + along_x * end, y + along_y * end),
+            span.stage.velocity,
+            span.stage.control,
+            span.stage.load.at(min(end / span.stage.seconds, 1.0)),
+            dt / last if last > 0.0 else 0.0,
+        )
+        return step._replace(judge=partial(self.judge, chosen, span, step, end, rejected))
+
+
+def tolerance_before(job: Job, stage: int, relaxes: bool) -> float:
+    """Return the largest tolerance of the solve before a stage: CLOSE where velocity, control or load change there and
+    the body relaxes, else infinite."""
+    history, start = job.history, job.initial
+    if stage == len(history) or not relaxes:
+        return math.inf
+    before = start.velocity, "pressure", start.pressure or 0.0
+    if stage:
+        before = history[stage - 1].velocity, history[stage - 1].control, history[stage - 1].load.end
+    after = history[stage].velocity, history[stage].control, history[stage].load.start
+    return math.inf if before == after else CLOSE
+
+
+def cells_per_step(most: float) -> float:
+    """Return the longest way of a step that is no longer: 1, 2, 4 cells, or a half, a 3rd, ... 8th, 10th, ... of
+    one."""
+    if most >= 1.0 - SAME_LEVEL:
+        return 2.0 ** math.floor(math.log2(most) + SAME_LEVEL)
+    count = (1.0 - SAME_LEVEL) / most
+    unit = max(1, 2 ** (math.floor(math.log2(count)) - LEVELS))
+    return 1.0 / (math.ceil(count / unit) * unit)
+
+
+def _room(parts: Parts, share: float, accuracy: float) -> float:
+    """Return how many times the estimated error by the solver may be; infinite where it makes none."""
+    allowed = share * SOLVER_MEDIAN * max(accuracy, parts.total - parts.solver)
+    return allowed / parts.solver if parts.solver > 0.0 else math.inf
+
+
+def _bounds(span: Span) -> Bounds:
+    assert isinstance(span.ends, ChosenEnds)
+    return span.ends.limits

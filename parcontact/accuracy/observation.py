@@ -1,0 +1,155 @@
+"""What the error budget sees: properties of a run, and observations of a step or of a steady state.
+
+Spots of contact are taken as round. With S sides of cells between points in contact and others, on n points of which a
+share A touches, their mean radius in cells is
+
+    r = (8/pi) min(A, 1 - A) n/S,
+
+of the gaps between them where these are the smaller. Contacts of waves, cylinders and flats are all alike; they lie in
+the same way on the grid, so that they count as one.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..job import Cylinder, Flat, Job, Rough, Wave
+from ..physics.measures import excess_of
+from ..physics.prony import Prony
+
+REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are all alike
+ROUND = 8.0 / math.pi  # physics: cells of a round spot over its sides on the edge, times this: its radius in cells
+SPOTS_POWER = 0.25  # accuracy: of the number of spots, by which errors of many are smaller
+Vector = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class RunProperties:
+    """Properties of a run that are known before it begins.
+
+    `points` of the grid; `cell`: its sides [m]; `cells_per_wave`: longer sides per shortest wave of a rough surface,
+    None without one; `measured`: the surface has a map, which may lack waves on a coarse grid; `straight`: edges of
+    contact follow the grid; `alike`: all contacts are, as those of waves; `free`: the box; `prony`: what relaxes, None
+    of an elastic body; `folded`: the bound of its folded branches; `exponential`: the integrator is.
+    """
+
+    points: int
+    cell: Vector = (1.0, 1.0)
+    cells_per_wave: float | None = None
+    measured: bool = False
+    straight: bool = False
+    alike: bool = False
+    free: bool = False
+    prony: Prony | None = None
+    folded: float = 0.0
+    exponential: bool = True
+
+    @property
+    def mean_cell(self) -> float:
+        """The mean of the sides of a cell, in which radii of spots are counted."""
+        return 0.5 * (self.cell[0] + self.cell[1])
+
+
+@dataclass(frozen=True)
+class StepObservation:
+    """Observation of a step, or of a steady state.
+
+    `complementarity` of the certificate; `penetrating`: points that penetrate without pressure, as a share of those in
+    contact; `slope`: rms slope of the surface under the pressure; `friction`, and what an `interface` adds to it;
+    `area`, counted, and `corrected`, as shares; `views_apart`: by how much friction by the slopes of the rigid surface
+    and of the body differ; `way`: the direction of sliding, (0, 0) at rest.
+
+    Of steps also: by what the embedded pair differs, `difference`, with its `order` in the step; cells (of mean sides)
+    `slid` in it, in so many `seconds`; the `angle` by which a wave turned that is as high as the surface under the
+    pressure and changes as much; `curved`: whether the displacement is quadratic in the step; the `change` of friction
+    since the step before, infinite after a jump; how `uneven` pressures are, as a share of their mean, 1 at most.
+    """
+
+    complementarity: float
+    friction: float
+    area: float
+    corrected: float
+    slope: float = 0.0
+    interface: float = 0.0
+    penetrating: float = 0.0
+    views_apart: float = 0.0
+    way: Vector = (0.0, 0.0)
+    difference: float = 0.0
+    order: float = 2.0
+    slid: float = 0.0
+    seconds: float = 0.0
+    angle: float = 0.0
+    curved: bool = False
+    change: float = 0.0
+    uneven: float = 1.0
+
+    @property
+    def correction(self) -> float:
+        """The counted area less the corrected one, over the latter."""
+        return (self.area - self.corrected) / self.corrected if self.corrected > 0.0 else 0.0
+
+
+def properties_of(job: Job, shortest: float | None, folded: float = 0.0, prony: Prony | None = None) -> RunProperties:
+    """Return the properties of a job: `shortest` is the shortest wave of its map [m], `folded` the bound of its folded
+    branches, and `prony` what relaxes."""
+    waves = [shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)]
+    waves += [shortest] if shortest is not None else []
+    (nx, ny), (dx, dy) = job.grid.points, (job.grid.dx, job.grid.dy)
+    cell = (dx if nx > 1 else dy, dy if ny > 1 else dx)  # across a line of points there is nothing
+    line = 1 in job.grid.points
+    return RunProperties(
+        points=nx * ny,
+        cell=cell,
+        cells_per_wave=min(waves) / max(cell) if waves else None,
+        measured=shortest is not None,
+        straight=line or _ridges(job.surface),
+        alike=line or all(isinstance(shape, REGULAR) for shape in job.surface),
+        free=job.grid.boundary == "free",
+        prony=prony,
+        folded=folded,
+        exponential=job.numerics.integrator != "backward-euler",
+    )
+
+
+def _ridges(shapes: Sequence[Any]) -> bool:
+    """Return whether the surface is of cylinders and waves along one axis of the grid, as then edges of contact are."""
+    across = {"y" if shape.axis == "x" else "x" for shape in shapes if isinstance(shape, Cylinder)}
+    waves = [shape.waves for shape in shapes if isinstance(shape, Wave)]
+    across |= {axis for x, y in waves for axis, count in (("x", x), ("y", y)) if count}
+    return len(across) == 1 and all(isinstance(shape, REGULAR) for shape in shapes)
+
+
+def radius_of(run: RunProperties, observed: StepObservation) -> float:
+    """Return the radius of round spots of contact, or of the gaps between them where these are the smaller, in cells of
+    mean sides; half the width of straight ones; infinite where there are no edges."""
+    sides = (observed.area - observed.corrected) * run.points / excess_of(*run.cell, run.straight)
+    if sides <= 0.0:
+        return math.inf
+    radius = ROUND * min(observed.area, 1.0 - observed.area) * run.points / sides
+    return radius / ROUND if run.straight else radius
+
+
+def count_spots(run: RunProperties, observed: StepObservation) -> float:
+    """Return the number of spots of contact, or of the gaps between them where these are the smaller; of contacts that
+    are all alike 1, and in full contact as many as half waves of the shortest length."""
+    radius, share = radius_of(run, observed), min(observed.area, 1.0 - observed.area)
+    if run.alike:
+        return 1.0
+    if run.cells_per_wave is not None:
+        share = share if radius < math.inf else observed.area
+        radius = min(radius, 0.5 * run.cells_per_wave * (max(run.cell) / run.mean_cell))
+    one = math.pi * radius**2 * run.mean_cell**2 / (run.cell[0] * run.cell[1])
+    return max(1.0, share * run.points / one) if one > 0.0 else 1.0
+
+
+def mean_over_spots(run: RunProperties, observed: StepObservation) -> float:
+    """Return by what factor an error of a single spot is smaller in the mean over all of them."""
+    return count_spots(run, observed) ** -SPOTS_POWER
+
+
+def cell_along(run: RunProperties, way: Vector) -> float:
+    """Return the length of cells along a way, in the unit of `run.cell`; at rest the longer one."""
+    (dx, dy), (x, y) = run.cell, way
+    length = math.hypot(x, y)
+    return math.hypot(x * dx, y * dy) / length if length else max(dx, dy)

@@ -1,0 +1,186 @@
+"""Sources of error: what a solve, time steps, folded branches and the mesh make of friction and of the contact area.
+
+Each is an estimate of a relative error (1 is all of it), from numbers that a step has anyway; its constants are fitted
+to true errors (`constants`). With c the counted area less the corrected one, over the latter, and N spots of contact:
+
+solver: from the `complementarity` C of the certificate (see `solve.certificate`). Friction is wrong in proportion to
+    it, less where many spots average it out. Where friction is far less than the slopes it is the small difference of
+    large forces: what is wrong with pressures counts more, by the root of the ratio, and pressures that are wrong by C
+    may have tangential forces of that share of the slopes (NOISE). Area is wrong by the points that penetrate and have
+    no pressure; and somewhat, as C^0.7, where there happen to be none.
+time: from how far the spots of contact, or the waves of the surface, pass in a step, and from the embedded pair
+    (`time_error`).
+folded: the bound of the branches without a map, of the area where the gap is open.
+mesh: of the area AREA c/N^(1/4), STEADY in steady sliding, a cell at least. Of friction in a march VIEWS times the
+    difference of its two views, by the slopes of the rigid surface and of the body. Of steady friction, which is a sum
+    of squares and does not vanish by cancellation, STEADY_LOST times what edges of contact lose in waves shorter than
+    the cells, and STEADY_AREA c/N^(1/4). Contacts that are all alike lie on the grid in the same way: their errors do
+    not average out (N = 1), and are larger by ALIKE (STEADY_ALIKE), those of the area along straight edges by STRAIGHT.
+    A map lacks waves on a grid of less than FEW_CELLS per shortest wave: friction is then wrong by WAVES (4/cells)^2.5
+    as well.
+
+Power that edges lose: pressure rises from an edge of contact as the root of the distance, so that its waves of
+wavenumber q across the edge have a mean square that falls as q^-3. A steadily sliding surface loses power in them in
+proportion to q^-3 sin delta(q v), with the loss angle delta of the body at the frequency with which they pass. For
+Hertz's contacts of a body whose loss angle grows with the frequency, all waves together lose as much as this law does
+from a wavenumber q0 on: q0 = 2/(pi a) for a strip of half width a, q0 = 3/(pi a) for a circle of radius a, from the
+integrals of J1(x)^2/x and j1(x)^2. A mesh of cells of length dx has waves up to Q = pi/dx. The others lose
+
+    s m = (q0/Q)^2 M(Q v)/M(q0 v),      M(w) = int_0^1 2 t sin delta(w/t) dt,      s = q0/Q
+
+of all. Far below the frequencies of the body m is 1, and what is lost of the first order in the cell. Far above m is
+s^2.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..physics.prony import Prony, complex_modulus
+from .constants import (
+    ALIKE,
+    AREA,
+    FREE_LOST,
+    LOST,
+    NOISE,
+    PENETRATING,
+    SOLVER,
+    SOLVER_AREA,
+    STEADY,
+    STEADY_ALIKE,
+    STEADY_AREA,
+    STEADY_LOST,
+    STRAIGHT,
+    VIEWS,
+    WAVES,
+    Fit,
+)
+from .observation import RunProperties, StepObservation, cell_along, count_spots, mean_over_spots, radius_of
+from .time_error import error_of_rise, share_of_area, time_error
+
+STRIP, CIRCLE = 2.0 / math.pi, 3.0 / math.pi  # physics: q0 times the half width, and times the radius
+NODES = 16  # accuracy: of the integral, within 2 % of it for one branch
+AT, WEIGHTS = np.polynomial.legendre.leggauss(NODES)
+STRAIGHT_POWER = 0.5  # accuracy: of m along edges that follow the grid, which move by whole cells
+GAPS = 2.0  # accuracy: times what is open: from half contact on radii are those of gaps, with fewer edges
+FEW_CELLS = 3.0  # accuracy: per shortest wave of a map, below which it lacks waves
+ROUNDING = 1e-12  # rounding: of the slope of the surface: friction of pressures that are right to all digits
+
+
+@dataclass(frozen=True)
+class ErrorPair:
+    """Relative errors of friction and of the corrected contact area."""
+
+    friction: float
+    area: float
+
+
+@dataclass(frozen=True)
+class ErrorSource:
+    """A source of error: its name, what makes it smaller, and the errors that it makes of an observation."""
+
+    name: str
+    remedy: str
+    error: Callable[[RunProperties, StepObservation], ErrorPair]
+    shown: str = ""  # in sentences, where that is not its name
+
+
+def solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
+    """Return what the solve of a step makes wrong."""
+    certificate, ratio = observed.complementarity, observed.slope / observed.friction if observed.friction else 0.0
+    friction = SOLVER.value * certificate * math.sqrt(max(1.0, ratio)) * mean_over_spots(run, observed)
+    noise = NOISE.value * max(certificate, ROUNDING) * ratio / math.sqrt(count_spots(run, observed))
+    return ErrorPair(max(friction, noise), _solver_of_area(observed))
+
+
+def steady_solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
+    """Return the same of steady sliding, whose friction is a sum of squares."""
+    friction = SOLVER.value * max(observed.complementarity, ROUNDING) * mean_over_spots(run, observed)
+    return ErrorPair(friction, _solver_of_area(observed))
+
+
+def _solver_of_area(observed: StepObservation) -> float:
+    return SOLVER_AREA.value * observed.complementarity**SOLVER_AREA.order + PENETRATING.value * observed.penetrating
+
+
+def steps_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
+    """Return what the length of a step makes wrong, a rise of friction within it included."""
+    error = time_error(run, observed)
+    return ErrorPair(max(error, error_of_rise(run, observed)), share_of_area(run, observed) * error)
+
+
+def folded_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
+    """Return the bound of the folded branches."""
+    return ErrorPair(run.folded, run.folded * (1.0 - observed.area))
+
+
+def mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
+    """Return what the mesh makes wrong in a step of a march."""
+    friction = VIEWS.value * observed.views_apart / observed.friction if observed.friction else 0.0
+    return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(AREA, run, observed))
+
+
+def steady_mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
+    """Return the same of steady sliding."""
+    correction = observed.correction * mean_over_spots(run, observed)
+    friction = STEADY_LOST.value * lost_at_edges(run, observed) + STEADY_AREA.value * correction
+    friction = friction * (STEADY_ALIKE.value if run.alike else 1.0) + _lacking_waves(run)
+    return ErrorPair(friction, _mesh_of_area(STEADY, run, observed))
+
+
+def _lacking_waves(run: RunProperties) -> float:
+    """Return the error of friction by the waves that a map lacks on a coarse grid."""
+    cells = run.cells_per_wave
+    if not run.measured or cells is None or cells >= FEW_CELLS:
+        return 0.0
+    return WAVES.value * (4.0 / cells) ** WAVES.order
+
+
+def _mesh_of_area(fit: Fit, run: RunProperties, observed: StepObservation) -> float:
+    larger = STRAIGHT.value if run.straight else ALIKE.value if run.alike else 1.0
+    error = fit.value * larger * observed.correction * mean_over_spots(run, observed)
+    return max(error, 1.0 / (run.points * observed.area)) if observed.area > 0.0 else error
+
+
+def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
+    """Return the share of friction that edges of contact lose in waves shorter than the cells along the sliding, at
+    most; 0 at rest, and of an elastic body."""
+    if run.prony is None or not any(observed.way):
+        return 0.0
+    cell = cell_along(run, observed.way)
+    size = radius_of(run, observed) * (run.mean_cell / cell)
+    share, slow = lost_in_short_waves(run.prony, size, math.hypot(*observed.way) / cell, run.straight)
+    few = min(1.0, GAPS * (1.0 - observed.area))
+    most = FREE_LOST.value if run.free else LOST.value
+    return min(1.0, most * few * share * slow ** (STRAIGHT_POWER if run.straight else 1.0))
+
+
+def lost_in_short_waves(prony: Prony, radius: float, speed: float, straight: bool) -> tuple[float, float]:
+    """Return s and m of the module, where spots of contact of a `radius` in cells, or `straight` ones of that half
+    width, slide by so many cells in a second; both are 1 at most, and 0 where there are no edges or no losses."""
+    if radius == math.inf or not prony.moduli.size:
+        return 0.0, 0.0
+    first = (STRIP if straight else CIRCLE) / radius if radius > 0.0 else math.inf
+    if first >= math.pi:
+        return 1.0, 1.0
+    share = first / math.pi
+    return share, share * _mean_loss(prony, math.pi * speed) / _mean_loss(prony, first * speed)
+
+
+def _mean_loss(prony: Prony, frequency: float) -> float:
+    """Return M at a frequency [rad/s]."""
+    t = 0.5 * (1.0 + AT)
+    modulus = complex_modulus(frequency / t, *prony)
+    return float(np.sum(WEIGHTS * t * (modulus.imag / np.abs(modulus))))
+
+
+SOLVE = ErrorSource("solver", "a smaller numerics.tolerance", solver_error)
+MARCH_SOURCES = (
+    SOLVE,
+    ErrorSource("time", "shorter time steps", steps_error, "time steps"),
+    ErrorSource("folded", "a smaller numerics.branch_error", folded_error, "folded branches"),
+    ErrorSource("mesh", "a finer grid", mesh_error),
+)
+STEADY_SOURCES = (replace(SOLVE, error=steady_solver_error), replace(MARCH_SOURCES[-1], error=steady_mesh_error))

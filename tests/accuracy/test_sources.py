@@ -1,0 +1,211 @@
+"""Errors by solver, folded branches and mesh: the arithmetic; of real runs: scripts/error_coverage.py."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import j1, spherical_jn
+
+from parcontact.accuracy.budget import Parts, estimate, estimate_steady
+from parcontact.accuracy.observation import RunProperties, StepObservation, count_spots, radius_of
+from parcontact.accuracy.sources import lost_at_edges, lost_in_short_waves
+from parcontact.physics.measures import SIDE
+from parcontact.physics.prony import Prony
+
+RUN = RunProperties(10_000, cells_per_wave=8.0, folded=1e-4)
+SEEN = StepObservation(1e-3, 0.02, 0.1, 0.095, slope=0.02)
+ONE = Prony(1e6, np.array([1e6]), np.array([1e-3]))
+SLOW, FAST = 1e-6, 1e9  # cells in a second
+KNOWN = replace(RUN, folded=0.0, prony=ONE, cell=(1e-6, 1e-6))
+MOVES = replace(SEEN, complementarity=1e-9, way=(1e-12, 0.0))
+
+
+def friction_of(run: RunProperties, seen: StepObservation, steady: bool = False) -> Parts:
+    found = (estimate_steady if steady else estimate)(run, seen).friction
+    assert found is not None
+    return found
+
+
+# -- what is seen -----------------------------------------------------------------------------------------------------
+
+
+def test_radius_of_a_spot() -> None:
+    """Of a circle of ten cells: pi r^2 cells and 8 r sides; of one hole in full contact the same."""
+    points, cells, sides = 10_000, 100 * math.pi, 80
+    spot = replace(SEEN, area=cells / points, corrected=(cells - SIDE * sides) / points)
+    hole = replace(SEEN, area=1 - cells / points, corrected=1 - (cells + SIDE * sides) / points)
+    assert radius_of(RUN, spot) == pytest.approx(10.0)
+    assert radius_of(RUN, hole) == pytest.approx(10.0)
+    assert radius_of(RUN, replace(SEEN, area=1.0, corrected=1.0)) == math.inf
+
+
+def test_spots_are_counted() -> None:
+    """Four circles of ten cells, and four such holes; in full contact those of half the shortest wave; one where all
+    are alike."""
+    points, cells, sides = 10_000, 400 * math.pi, 4 * 80
+    four = replace(SEEN, area=cells / points, corrected=(cells - SIDE * sides) / points)
+    holes = replace(SEEN, area=1 - cells / points, corrected=1 - (cells + SIDE * sides) / points)
+    full = replace(SEEN, area=1.0, corrected=1.0)
+    bare = replace(RUN, cells_per_wave=None)
+    assert count_spots(bare, four) == pytest.approx(4.0)
+    assert count_spots(bare, holes) == pytest.approx(4.0)
+    assert count_spots(RUN, full) == pytest.approx(points / (16 * math.pi))
+    assert count_spots(bare, full) == count_spots(replace(bare, alike=True), four) == 1.0
+
+
+def test_spots_of_long_cells() -> None:
+    """A circle of 10 units on cells of 1 x 4: its radius is 4 mean sides of 2.5."""
+    run, cells = replace(RUN, cell=(1.0, 4.0), cells_per_wave=None), 100 * math.pi / 4.0
+    seen = replace(SEEN, area=cells / 10_000, corrected=0.9 * cells / 10_000)
+    radius = radius_of(run, seen)
+    assert count_spots(run, seen) == pytest.approx(max(1.0, cells / (math.pi * (2.5 * radius) ** 2 / 4.0)))
+
+
+# -- solver and folded branches -------------------------------------------------------------------------------------
+
+
+def test_parts_add_up() -> None:
+    """Friction and area have the same parts, none of them negative; the folded branches count where the gap is open."""
+    budget = estimate(RUN, SEEN)
+    assert budget.friction is not None
+    for parts in (budget.friction, budget.area):
+        assert parts.total == pytest.approx(parts.solver + parts.time + parts.folded + parts.mesh, rel=1e-15)
+        assert min(parts.plain().values()) >= 0.0
+    assert (budget.friction.folded, budget.area.folded) == (1e-4, pytest.approx(0.9e-4))
+
+
+def test_little_friction_counts_more() -> None:
+    """A quarter of the slope's friction: twice the relative error; none at all: no budget. Steady friction is a sum of
+    squares, whose error does not grow."""
+    one, other = friction_of(RUN, SEEN), friction_of(RUN, replace(SEEN, slope=0.08))
+    assert other.solver == pytest.approx(2 * one.solver)
+    assert (other.time, other.folded, other.mesh) == (one.time, one.folded, one.mesh)
+    assert estimate(RUN, replace(SEEN, slope=0.08, friction=0.0)).friction is None
+    assert friction_of(RUN, replace(SEEN, slope=0.08), steady=True).solver == pytest.approx(one.solver)
+
+
+@pytest.mark.parametrize("friction", [1e-18, 1e-7, 1e-6])
+def test_friction_that_is_noise_is_0_within_its_error(friction: float) -> None:
+    """Pressures wrong by 1e-3 on slopes of 0.02 may have tangential forces of 0.4 of 2e-5 of the load where there is
+    one spot, by the root of their number less where there are more."""
+    seen = replace(SEEN, friction=friction)
+    budget = friction_of(RUN, seen)
+    assert budget.solver * friction == pytest.approx(0.4 * 2e-5 / count_spots(RUN, seen) ** 0.5)
+    assert budget.of_friction >= 1.0
+
+
+def test_an_interface_has_the_error_of_the_area() -> None:
+    """Of its part of friction, and of the body's part that of the body."""
+    body = friction_of(RUN, SEEN)
+    mixed, area = estimate(RUN, replace(SEEN, friction=0.08, interface=0.06)), estimate(RUN, SEEN).area
+    assert mixed.friction is not None
+    assert mixed.friction.total == pytest.approx(0.25 * body.total + 0.75 * area.total)
+
+
+# -- mesh -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("steady", [False, True])
+def test_the_mesh_makes_the_area_wrong(steady: bool) -> None:
+    """By 0.6 of the correction over the fourth root of the number of spots, 0.8 in steady sliding, a cell at least;
+    twice that of one spot where all are alike, four times along straight edges."""
+    judge, share = (estimate_steady, 0.8) if steady else (estimate, 0.6)
+    found = judge(RUN, SEEN).area.mesh
+    assert found == pytest.approx(share / 19.0 / count_spots(RUN, SEEN) ** 0.25)
+    for straight, times in (False, 2.0), (True, 4.0):
+        run = replace(RUN, alike=True, straight=straight)
+        assert judge(run, SEEN).area.mesh == pytest.approx(times * share / 19.0)
+    assert judge(RUN, replace(SEEN, area=0.5, corrected=0.5)).area.mesh == pytest.approx(2e-4)
+
+
+def test_the_two_views_bound_the_mesh_of_marches() -> None:
+    """Friction by slopes and by energy that are 0.004 apart, of 0.02: 1.1 of a fifth."""
+    assert friction_of(RUN, replace(SEEN, views_apart=4e-3)).mesh == pytest.approx(0.22)
+    assert friction_of(RUN, SEEN).mesh == 0.0
+
+
+def test_steady_friction_has_no_error_of_time_steps() -> None:
+    """Nor of folded branches; without friction there is no budget."""
+    found = estimate_steady(RUN, SEEN)
+    assert found.friction is not None
+    assert (found.friction.time, found.friction.folded, found.area.time) == (0.0, 0.0, 0.0)
+    assert found.friction.mesh == pytest.approx(0.24 / 19.0 / count_spots(RUN, SEEN) ** 0.25)
+    assert estimate_steady(RUN, replace(SEEN, friction=0.0)).friction is None
+
+
+@pytest.mark.parametrize("steady", [False, True])
+def test_a_map_lacks_waves_on_a_coarse_grid(steady: bool) -> None:
+    """Below three cells per shortest wave: 0.05 at four cells, with the power 2.5. A rough surface has all of them."""
+    for cells, measured, lacks in ((2.0, True, 0.05 * 2.0**2.5), (2.0, False, 0.0), (3.5, True, 0.0)):
+        seen = replace(SEEN, area=1.0, corrected=1.0)
+        run = replace(RUN, cells_per_wave=cells, measured=measured)
+        assert friction_of(run, seen, steady).mesh == pytest.approx(lacks)
+
+
+# -- power that edges lose ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("straight", [True, False])
+def test_hertz_contacts_of_a_body_that_loses_in_proportion_to_the_frequency(straight: bool) -> None:
+    """Beyond Q a of J1(x)^2/x, of which all is 1/2, and of j1(x)^2, of which all is pi/6: a strip of half width a and a
+    circle. Their waves average out where Q a is a multiple of pi for one, and a quarter of it more for the other.
+    """
+    for radius in (5.25, 20.25) if straight else (5.0, 20.0):
+        x = math.pi * radius
+        inside = (
+            quad(lambda t: j1(t) ** 2 / t, 0.0, x, limit=500)[0] / 0.5
+            if straight
+            else quad(lambda t: spherical_jn(1, t) ** 2, 0.0, x, limit=500)[0] / (math.pi / 6.0)
+        )
+        share, slow = lost_in_short_waves(ONE, radius, SLOW, straight)
+        assert share == pytest.approx(1.0 - inside, rel=0.02)
+        assert slow == pytest.approx(1.0, rel=1e-4)
+
+
+def test_far_above_the_frequencies_of_the_body() -> None:
+    """The loss angle falls with the frequency: s^3 in all."""
+    share, slow = lost_in_short_waves(ONE, 5.0, FAST, False)
+    assert slow == pytest.approx(share**2, rel=1e-4)
+
+
+def test_between_both() -> None:
+    """m by adaptive quadrature, to 2 %."""
+
+    def mean(frequency: float) -> float:
+        def loss(t: float) -> float:
+            turn = 1j * frequency / t * 1e-3
+            modulus = 1.0 + turn / (1.0 + turn)
+            return 2.0 * t * modulus.imag / abs(modulus)
+
+        return float(quad(loss, 0.0, 1.0)[0])
+
+    for speed in (1e2, 1e3):
+        share, slow = lost_in_short_waves(ONE, 5.0, speed, False)
+        assert slow == pytest.approx(share * mean(math.pi * speed) / mean(share * math.pi * speed), rel=0.02)
+
+
+def test_without_edges_or_losses() -> None:
+    """Full contact, an elastic body; and spots too small for the mesh."""
+    assert lost_in_short_waves(ONE, math.inf, SLOW, False) == (0.0, 0.0)
+    assert lost_in_short_waves(Prony(1e6, np.array([]), np.array([])), 5.0, SLOW, False) == (0.0, 0.0)
+    assert lost_in_short_waves(ONE, 0.0, SLOW, False) == lost_in_short_waves(ONE, 0.2, SLOW, True) == (1.0, 1.0)
+
+
+def test_steady_friction_has_what_edges_lose() -> None:
+    """0.8 of twice the share that is lost, of all up to half contact, and of twice what is open beyond; six times in
+    free boxes; none at rest and where waves pass fast. Cells count along the sliding."""
+    share, _ = lost_in_short_waves(ONE, radius_of(KNOWN, MOVES), SLOW, False)
+    assert lost_at_edges(KNOWN, MOVES) == pytest.approx(2.0 * share, rel=1e-4)
+    assert lost_at_edges(replace(KNOWN, free=True), MOVES) == pytest.approx(6.0 * share, rel=1e-4)
+    still, fast = (replace(MOVES, way=way) for way in ((0.0, 0.0), (1e3, 0.0)))
+    assert lost_at_edges(KNOWN, still) == 0.0
+    assert lost_at_edges(KNOWN, fast) < 0.01 * share
+    both = (friction_of(KNOWN, seen, steady=True).mesh for seen in (MOVES, still))
+    assert next(both) - next(both) == pytest.approx(0.8 * 2.0 * share, rel=1e-4)
+    seen = replace(MOVES, area=0.75, corrected=0.745)
+    share, _ = lost_in_short_waves(ONE, radius_of(KNOWN, seen), SLOW, False)
+    assert lost_at_edges(KNOWN, seen) == pytest.approx(2.0 * 0.5 * share, rel=1e-4)
+    along, across = (lost_at_edges(replace(KNOWN, cell=cell), MOVES) for cell in ((1e-6, 4e-6), (4e-6, 1e-6)))
+    assert across == pytest.approx(4.0 * along, rel=1e-3)
