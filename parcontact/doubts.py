@@ -98,7 +98,7 @@ SENTENCES = {
         "the theory is one of small slopes: use a smaller load"
     ),
     "out of the box": (
-        "the contact, there, has a radius of {contact:.3g} m or more and leaves the box of {lx:g} x {ly:g} m; use a "
+        "the contact has a radius of {contact:.3g} m or more and leaves the box of {lx:g} x {ly:g} m; use a "
         "larger grid.size, less load or a shorter way"
     ),
     "slides out of the box": (

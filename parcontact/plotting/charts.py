@@ -125,13 +125,14 @@ def _drop_hidden_points(one: ChartLine, log_x: bool, log_y: bool) -> ChartLine:
 
 def _mark_zeros(axes: Axes, chart: Chart) -> None:
     """Mark at the lower edge where a line is 0, a row of marks for each line."""
+    label = chart.zeros  # once: colours tell the lines apart
     for row, one in enumerate(chart.series):
         zeros = np.asarray(one.x)[np.asarray(one.y) == 0.0]
         if zeros.size:
             height = np.full(zeros.size, ZERO_ROW * (row + 0.5))
             look: dict[str, Any] = {"color": one.look["color"], "marker": "x", "linestyle": "none", "ms": 4}
-            label = f"{one.name}: {chart.zeros}".removeprefix(": ")
-            axes.plot(zeros, height, transform=axes.get_xaxis_transform(), label=label, **look)
+            axes.plot(zeros, height, transform=axes.get_xaxis_transform(), label=label or None, **look)
+            label = ""
 
 
 def _draw_errors(axes: Axes, one: ChartLine, share: Array) -> None:

@@ -29,7 +29,7 @@ def chart(
     for number, (name, flow) in enumerate(flows.items()):
         known = np.isfinite(flow)
         lines.append(ChartLine(name, at[known], flow[known], style.line(number) | {"marker": "."}))
-        narrow = known & is_thin(constrictions[name])
+        narrow = known & (flow > 0.0) & is_thin(constrictions[name])
         if narrow.any():
             thin.append(ChartLine(THIN * (not thin), at[narrow], flow[narrow], THIN_LOOK))
     return Chart("leakage", over, Axis("conductivity K", "m³"), lines + thin, log_x=log_x, zeros="closed")

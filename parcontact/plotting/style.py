@@ -8,6 +8,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from ..storage import files
@@ -118,11 +119,23 @@ def _split_rows(group: Sequence[Panel]) -> list[Sequence[Panel]]:
     return [group[len(group) * row // count : len(group) * (row + 1) // count] for row in range(count)]
 
 
+def _find_look(handle: Any) -> tuple[str, ...]:
+    """Return what tells the mark of a legend from others: its colour, dashes and marker."""
+    if hasattr(handle, "get_linestyle"):
+        return to_hex(handle.get_color()), str(handle.get_linestyle()), str(handle.get_marker())
+    return (to_hex(handle.patches[0].get_facecolor()),) if hasattr(handle, "patches") else (repr(handle),)
+
+
 def _put_legend_above(figure: Figure, title: str) -> None:
-    """Replace the legends of all panels by one above them, whose title is that of the figure."""
+    """Replace the legends of all panels by one above them, whose title is that of the figure; leave them where two
+    names have the same look."""
     found: dict[str, Artist] = {}
     for axes in figure.axes:
         found |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    if len(set(map(_find_look, found.values()))) < len(found):
+        figure.suptitle(plain(title), fontsize=11)
+        return
+    for axes in figure.axes:
         if legend := axes.get_legend():
             legend.remove()
     columns = max(1, min(len(found), LINE // (8 + max(map(len, found), default=0))))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,6 +13,7 @@ from ..physics.surface_statistics import Statistics
 from . import style, units
 
 BINS = 60
+FEW, OUTLYING = 1e-3, 1.5  # share of the points on either side that may stick out, and how far all are drawn
 RESOLVED = 8  # cells that a wave needs to be resolved in a contact
 COARSEST = 800  # points of a map along a side: a finer one is drawn from every second, third, ... point
 ROUNDING = 1e-20  # rounding: powers below this share of the largest are not drawn
@@ -42,18 +44,29 @@ def _draw_map(axes: Axes, sketch: Sketch) -> None:
     step = max(1, -(-max(sketch.heights.shape) // COARSEST))
     lx, ly = sketch.size
     heights, place = sketch.heights[::step, ::step], (0.0, lx, 0.0, ly)
-    image = axes.imshow(heights, origin="lower", extent=place, cmap="cividis", aspect="equal")
+    low, high = _find_ends(heights)
+    look: dict[str, Any] = {"origin": "lower", "extent": place, "cmap": "cividis", "aspect": "equal"}
+    image = axes.imshow(heights, vmin=low, vmax=high, **look)
     axes.grid(False)
     units.label(axes.figure.colorbar(image, ax=axes, shrink=min(1.0, ly / lx)).ax.yaxis, "height", "m")
     units.label(axes.xaxis, "x", "m")
     units.label(axes.yaxis, "y", "m")
 
 
+def _find_ends(heights: Array) -> tuple[float, float]:
+    """Return the range of heights that is drawn, which does not follow a few points that stick out."""
+    low, most, highest, high = (float(end) for end in np.quantile(heights, [0.0, FEW, 1.0 - FEW, 1.0]))
+    middle = 0.5 * (most + highest)
+    low, high = max(low, middle - OUTLYING * (middle - most)), min(high, middle + OUTLYING * (highest - middle))
+    return (low, high) if low < high else (float(heights.min()), float(heights.max()))
+
+
 def _draw_distribution(axes: Axes, sketch: Sketch) -> None:
     heights = sketch.heights.ravel() - sketch.heights.mean()
-    unit, size = units.prefixed("m", np.abs(heights).max())
-    heights, rms = heights / size, sketch.heights.std() / size
-    axes.hist(heights, bins=BINS, density=True, color=style.BLUE, alpha=0.6, label="heights")
+    ends = np.array(_find_ends(heights))
+    unit, size = units.prefixed("m", np.abs(ends).max())
+    heights, rms, (low, high) = heights / size, sketch.heights.std() / size, ends / size
+    axes.hist(np.clip(heights, low, high), bins=BINS, density=True, color=style.BLUE, alpha=0.6, label="heights")
     if rms > 0.0:
         x = np.linspace(-4 * rms, 4 * rms, 200)
         axes.plot(x, np.exp(-0.5 * (x / rms) ** 2) / (rms * np.sqrt(2 * np.pi)), color=style.RED, label="normal")
@@ -68,8 +81,8 @@ def _draw_spectra(axes: Axes, sketch: Sketch, spectra: list[tuple[str, Array, Ar
         drawn = power > ROUNDING * power.max(initial=0.0)
         axes.loglog(q[drawn], power[drawn], label=label, **style.line(number))
     cell = max(length / n for length, n in zip(sketch.size, sketch.heights.shape[::-1], strict=True))
-    axes.axvline(2 * np.pi / (RESOLVED * cell), color=style.GREY, ls=":", label=f"{RESOLVED} cells")
-    axes.axvline(np.pi / cell, color=style.GREY, ls="--", label="2 cells")
+    axes.axvline(2 * np.pi / (RESOLVED * cell), color=style.GREY, ls=":", label=f"waves of {RESOLVED} cells")
+    axes.axvline(np.pi / cell, color=style.GREY, ls="--", label="waves of 2 cells")
     axes.set(xlabel="wavenumber [1/m]", ylabel=name)
     axes.legend(loc="lower left", fontsize=LEGEND)
 

@@ -1,5 +1,6 @@
 """Units with the prefix that suits the numbers on an axis: 1.04 kPa, not 0.00104167 MPa."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,6 +13,7 @@ __all__ = ["label", "label_log_times", "prefixed", "quantity"]
 
 MARKS = {"1 ns": 1e-9, "1 µs": 1e-6, "1 ms": 1e-3, "1 s": 1.0, "1 min": 60.0, "1 h": 3600.0}
 MARKS |= {"1 day": TIMES["days"], "1 year": TIMES["years"]}  # of a logarithmic axis [s]
+LETTER = 0.085  # width of a letter of a tick [inch]
 FEW_MARKS = 3  # less leave a reader without a scale
 
 
@@ -30,11 +32,23 @@ def label_log_times(axis: Axis, name: str) -> bool:
     marks = {size: mark for mark, size in MARKS.items() if low <= size <= high}
     if high < LONG_TIME * TIMES["min"] or len(marks) < FEW_MARKS:
         return False
+    marks = _thin_out(marks, axis.axes.get_position().width * axis.axes.figure.bbox.width / axis.axes.figure.dpi)
     axis.set_major_locator(FixedLocator(list(marks)))
     axis.set_major_formatter(FixedFormatter(list(marks.values())))
     axis.set_minor_locator(NullLocator())
     axis.set_label_text(name)
     return True
+
+
+def _thin_out(marks: dict[float, str], width: float) -> dict[float, str]:
+    """Return marks of a logarithmic axis of a `width` [inch] that do not touch, from the longest time on."""
+    kept, scale = dict[float, str](), width / math.log(max(marks) / min(marks))
+    for size, mark in sorted(marks.items(), reverse=True):
+        nearest = min(kept, default=math.inf)
+        room = 0.5 * LETTER * (len(mark) + len(kept.get(nearest, ""))) + LETTER
+        if scale * math.log(nearest / size) >= room:
+            kept[size] = mark
+    return dict(sorted(kept.items()))
 
 
 class _RoundTimes(MaxNLocator):

@@ -40,13 +40,13 @@ def section(job: Job) -> ReportSection:
         rows.append(("included from", str(job.included)))
     tables = [ReportTable(("property", "value"), rows)]
     if not series.moduli.size:
-        return ReportSection("Rubber", tables=tables)
+        return ReportSection("Material", tables=tables)
     branches = zip(series.relaxation_times, series.moduli, strict=True)
     listed = [(units.quantity(float(tau), "s"), units.quantity(float(modulus), "Pa")) for tau, modulus in branches]
     tables.append(ReportTable(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
     if (excited := _list_bands(job)).rows:
         tables.append(excited)
-    return ReportSection("Rubber", tables=tables, pictures=[draw_panel(partial(_draw_moduli, job=job), CAPTION)])
+    return ReportSection("Material", tables=tables, pictures=[draw_panel(partial(_draw_moduli, job=job), CAPTION)])
 
 
 def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:

@@ -77,9 +77,12 @@ def _leakage_of_stages(run: PlottedRun) -> list[ReportTable]:
     """Return the conductivities at the end of each stage, where the run has calculated them: the last row that has."""
     if "flow_x" not in run.columns:
         return []
-    known = [[row for row in rows if run.columns["flow_x"][row] >= 0.0] for rows in run.rows_of_stages.values()]
-    rows = [[format_cell(float(run.columns[name][found[-1]])) for name in LEAKAGE] for found in known if found]
-    head = [f"{_to_words(name)} [{UNITS[name]}]" for name in LEAKAGE]
+    rows = []
+    for stage, its_rows in run.rows_of_stages.items():
+        if known := [row for row in its_rows if run.columns["flow_x"][row] >= 0.0]:
+            cells = [format_cell(float(run.columns[name][known[-1]])) for name in LEAKAGE]
+            rows.append([run.job.history[stage].name, *cells])
+    head = ["stage", *(f"{_to_words(name)} [{UNITS[name]}]" for name in LEAKAGE)]
     return [ReportTable(head, rows, "leakage at the end of each stage")] * bool(rows)
 
 

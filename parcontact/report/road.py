@@ -9,7 +9,7 @@ from ..bands.band import Band
 from ..bands.choice import Cut, choose, describe_cut
 from ..derived.surface_summary import NOT_SELF_AFFINE
 from ..errors import InputError
-from ..job import Job
+from ..job import Cylinder, Job, Sphere
 from ..job.sections import listing
 from ..parallel.fft import FFT
 from ..parallel.slab import Slab
@@ -42,7 +42,8 @@ def section(job: Job) -> ReportSection:
     found = statistics.surface_statistics(heights, job.grid.size)
     if not found.rms_height:
         return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
-    tables = [shapes, _tabulate(found, "on the grid of the job")]
+    waves = any(not isinstance(part, Sphere | Cylinder) for part in job.surface)
+    tables = [shapes, *([_tabulate(found, "on the grid of the job")] if waves else [])]
     return ReportSection("Surface", sentences, tables, _draw(surface.Sketch(heights, job.grid.size, found)))
 
 

@@ -24,7 +24,7 @@ def test_closed_instants_and_narrow_constrictions() -> None:
     narrowest = np.array([1e-6, 9e-9, 0.0, np.nan])
     chart = conductivity.chart(charts.Axis("time", "s"), at, {"along x": flow}, {"along x": narrowest})
     shown = drawn(chart)
-    assert shown["along x: closed"].tolist() == [3.0]
+    assert shown["closed"].tolist() == [3.0]
     assert shown["constriction under 10 nm"].tolist() == [2.0]
     assert shown["limits"][0] <= 1.0
     assert shown["limits"][1] >= 3.0

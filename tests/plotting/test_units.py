@@ -1,5 +1,7 @@
 """Units with prefixes, as words and on axes."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -89,3 +91,16 @@ def test_logarithmic_axes_of_long_times(end: float, ticks: list[str]) -> None:
     if long:
         assert [tick.get_text() for tick in axes.get_xticklabels()] == ticks
     assert axes.get_xscale() == "log"
+
+
+@pytest.mark.parametrize("width", [2.2, 3.0, 6.0])
+def test_marks_of_long_times_do_not_touch(width: float) -> None:
+    """In panels of a half and of the whole width, from a millisecond to ten years."""
+    figure = Figure(figsize=(width, 2.0), layout="constrained")
+    axes = figure.subplots()
+    axes.set(xscale="log", xlim=(1e-3, 3.2e8))
+    assert units.label_log_times(axes.xaxis, "time")
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in axes.get_xticklabels()]
+    assert len(boxes) >= 3
+    assert all(one.x1 < other.x0 for one, other in pairwise(boxes))

@@ -85,7 +85,7 @@ def check(found: Page) -> None:
     assert all(min(size(picture)) > 100 for picture in found.pictures)
 
 
-ASKED = ["What was asked", "Rubber", "Surface"]
+ASKED = ["What was asked", "Material", "Surface"]
 COMMON = [*ASKED, "Error budget", "Cost", "Warnings", "Provenance", "What to cite", "Data"]
 
 
