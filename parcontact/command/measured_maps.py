@@ -17,7 +17,9 @@ from ..storage import files
 JOBS = (".yaml", ".yml", ".json", "")  # how names of jobs end: others are those of measured maps
 MANY_POINTS = 2**20  # tuning: of a job to start from, at most
 UNSAID = ("give unit", "give size")  # in messages about maps that do not say all
-HOW = "on the command line: --set surface.unit=um --set surface.size=[1e-3,1e-3]"
+OF_POSITIONS = "units: {xy: UNIT"  # in those about maps that say their size, but not in which unit
+HOW = "on the command line: --set surface.unit=um"
+HOW_SIZE = f"{HOW} --set surface.size=[1e-3,1e-3]"
 ACCURACIES = (0.01, 0.02, 0.05, 0.1, 0.2)  # tuning: of a job to start from, the first that its points keep
 LOAD = {"pressure": 1.0e5}
 
@@ -32,7 +34,9 @@ def load_map(path: Path, overrides: Sequence[str]) -> Job:
     try:
         return mesh.load(_job_of(str(path)), overrides)
     except InputError as error:
-        raise InputError(f"{error}; {HOW}") if any(text in str(error) for text in UNSAID) else error from None
+        if not any(text in str(error) for text in UNSAID):
+            raise
+        raise InputError(f"{error}; {HOW if OF_POSITIONS in str(error) else HOW_SIZE}") from None
 
 
 def refuse_taken(target: Path | None) -> None:

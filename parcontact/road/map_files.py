@@ -83,7 +83,9 @@ def _in_metres(part: Topography, found: MapContents) -> Map:
     if found.unit is not None and given not in (None, found.unit):
         raise InputError(f"{path} has a unit of its own: give no unit")
     if (unit := found.unit or given) is None:
-        raise InputError(f"{path} does not say the unit of its heights: give unit: {TO_GIVE}")
+        both = found.size is not None
+        whose, more = ("positions and heights", ", or units: {xy: UNIT, z: UNIT}") if both else ("heights", "")
+        raise InputError(f"{path} does not say the unit of its {whose}: give unit: {TO_GIVE}{more}")
     values = np.ma.masked_invalid(np.asarray(found.values, dtype=np.float64)).filled(np.nan)
     if (values := np.atleast_2d(values)).ndim != 2:
         raise InputError(f"{path} has {values.ndim} dimensions; a map of two, or a line, was expected")

@@ -292,7 +292,11 @@ def test_a_map_without_a_job(road: Path, main: "Main", monkeypatch: pytest.Monke
     code, _, err = main("surface", "road.npy")
     assert code == 2
     assert "does not say the unit of its heights" in err
-    assert "--set surface.unit=um" in err
+    assert "--set surface.unit=um --set surface.size=[1e-3,1e-3]" in err
+    (road / "grid.xyz").write_text("".join(f"{x} {y} {x * y % 3}\n" for y in range(8) for x in range(9)))
+    _, _, err = main("surface", "grid.xyz")
+    assert "the unit of its positions and heights: give unit: m | mm | um | nm, or units: {xy: UNIT, z: UNIT}" in err
+    assert err.endswith("--set surface.unit=um\n")
 
 
 @pytest.mark.parametrize(
