@@ -51,7 +51,7 @@ def extra(on: Job, off: Job) -> dict[str, int]:
 
 
 def row(planned: Job, name: str) -> Decision:
-    return next(effect for effect in scene.choices(planned).effects if effect.name == name)
+    return next(effect for effect in scene.choices(planned).decisions if effect.name == name)
 
 
 TRANSFORM = f"fft {NX}x{NY} float64"

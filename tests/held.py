@@ -23,7 +23,7 @@ class HeldBody:
     @property
     def branches(self) -> Array:
         """The maps of its branches, advanced."""
-        self.body.settle(self.memory)
+        self.body.advance_branches(self.memory)
         return self.memory.branches
 
     def begin(self, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:

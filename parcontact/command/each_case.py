@@ -45,7 +45,7 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
     limit = watch.limit(getattr(options, "wall", None))
     own = argparse.Namespace(**vars(options))
     stop = on_root(world, lambda: sweep.stop_file(cases))
-    own.quiet, own.others_file = options.quiet or groups.count > 1, stop
+    own.quiet, own.sweep_stop_file = options.quiet or groups.count > 1, stop
     whole = sweep.SweepRun(cases, groups, partial(act, own), stop, options.quiet, limit, told, runs)
     return whole.run(chosen)
 

@@ -32,9 +32,9 @@ def _run(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int
 
     if not job.history:
         return _curve(options, job, slab, shows)
-    others_file = getattr(options, "others_file", None)  # of a sweep
+    sweep_stop_file = getattr(options, "sweep_stop_file", None)  # of a sweep
     chosen = (options.quiet, options.restart, options.until, options.wall)
-    return runner.run_job(job, slab, Options(*chosen, others_file=others_file, shows=shows))
+    return runner.run_job(job, slab, Options(*chosen, sweep_stop_file=sweep_stop_file, shows=shows))
 
 
 def steady(options: argparse.Namespace) -> int:
@@ -51,8 +51,8 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
     wanted = curve.request(job, *asked)
     if options.restart not in ("auto", "never"):
         raise InputError(f"--restart: a friction curve goes on (auto) or starts afresh (never), got {options.restart}")
-    others_file = getattr(options, "others_file", None)
-    code = curve.run_curve(job, slab, wanted, options.quiet, options.restart, shows, others_file, make_states)
+    sweep_stop_file = getattr(options, "sweep_stop_file", None)
+    code = curve.run_curve(job, slab, wanted, options.quiet, options.restart, shows, sweep_stop_file, make_states)
     if code == DONE and prediction.has_spectrum(job):
         on_root(slab.comm, lambda: prediction.write_steady(job, wanted))
     return code

@@ -106,7 +106,7 @@ def parts_of(scene: Scene) -> dict[str, RunPart[Any]]:
     """Return all that a run of a scene remembers, by the names of its parts in checkpoints. Raises InputError where an
     effect has the name of another part."""
     choices = scene.choices
-    if taken := sorted(RESERVED & choices.followers.keys()):
+    if taken := sorted(RESERVED & choices.effects.keys()):
         raise InputError(
             f"the effect {taken[0]} cannot be used: a run keeps a part of its own under this name in checkpoints; its "
             f"decide must give another name, none of {', '.join(sorted(RESERVED))}"

@@ -236,7 +236,7 @@ class ZenerBody:
     def displacement(self, memory: BodyMemory, of_pressure: Callable[[], Array], alpha: float) -> Array:
         return surface_of(memory)
 
-    def settle(self, memory: BodyMemory) -> None:
+    def advance_branches(self, memory: BodyMemory) -> None:
         """Advance the branch maps now, for somebody who reads them; the run goes on to the same digits."""
         if self.slab.only_counts:
             return
@@ -261,7 +261,7 @@ class ZenerBody:
 
         Maps of branches that had none when a checkpoint was written are restored without.
         """
-        self.settle(memory)
+        self.advance_branches(memory)
         frozen = np.array([float(k not in self.moving) for k in range(len(self.prony.moduli))])
         maps = zip(self.kept, memory.branches, strict=True)
         branches = {f"branch {k}": Entry(branch, branch_unit, branch_symbol, optional=True) for k, branch in maps}

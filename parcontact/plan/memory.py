@@ -46,7 +46,7 @@ def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int
     scene = build_on(outline(job, slab))
     _memories = scene, _completed(scene)
     found = slab.tally.by_purpose
-    for name, effect in choices(job).followers.items():
+    for name, effect in choices(job).effects.items():
         if name not in scene.effects:
             found[name] = sum(np.dtype(dtype).itemsize for dtype in effect.maps(job)) * math.prod(slab.shape)
     if rank is None and choices(job).spectrum.on:
@@ -103,7 +103,7 @@ def saved(job: Job) -> int:
     parts = {name: part for name, part in parts_of(scene).items() if name not in scene.effects}
     entries = [entry for name, part in parts.items() for entry in part.entries(memories[name], scene.units).values()]
     itemsizes = [np.asarray(entry.value).itemsize for entry in entries if entry.is_map]
-    for effect in choices(job).followers.values():
+    for effect in choices(job).effects.values():
         itemsizes += [np.dtype(dtype).itemsize for dtype in effect.maps(job)]
     return sum(nx * ny * itemsize + 4 * ny for itemsize in itemsizes)
 

@@ -23,7 +23,7 @@ STEADY_STARTS = (("steady start, before", False), ("steady start, with sets", Tr
 
 def effects(job: Job) -> Iterator[str]:
     """Every effect, on or off, and why; of a friction curve alone, those that a steady state can have."""
-    found = [effect for effect in choices(job).effects if job.history or effect.name in OF_STEADY_STATES]
+    found = [effect for effect in choices(job).decisions if job.history or effect.name in OF_STEADY_STATES]
     width = max(len(effect.name) for effect in found)
     yield "effects"
     for effect in sorted(found, key=lambda effect: not effect.on):

@@ -34,15 +34,15 @@ DONE, STOPPED_EARLY = 0, 3  # exit codes: as asked; stopped early with a good ch
 class Options:
     """Options beside a job: where to begin, `until` in s of the history, `wall` in s of this program.
 
-    A case of a sweep ends with the stop file of all cases, `others_file`, too. Doubts about a scene for which `shows`
-    is False go into run.log only.
+    `sweep_stop_file` is a stop file shared by all cases of a sweep; it is not removed. Doubts about a scene for which
+    `shows` is False go into run.log only.
     """
 
     quiet: bool = False
     restart: str = "auto"
     until: float | None = None
     wall: float | None = None
-    others_file: StopFile | None = None
+    sweep_stop_file: StopFile | None = None
     shows: Callable[[Doubt], bool] = always
 
 

@@ -71,7 +71,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
                 recorder.console.warn(text)
             limit = watch.limit(options.wall) if slab.root else None
             with Signals().noted() as signals:
-                watching = Watch(slab, job.checkpoint, directory.stop_file, signals, limit, options.others_file)
+                watching = Watch(slab, job.checkpoint, directory.stop_file, signals, limit, options.sweep_stop_file)
                 code = Run(march, directory, recorder, watching, facts, options).go(saved)
                 return Ended(code, march)
         finally:

@@ -38,14 +38,14 @@ class Verdict:
 @dataclass
 class Watch:
     """Asked after every step. `limit` is the time (of `time.monotonic`) at which the run must have ended, if any;
-    `others_file` a stop file of more than this run, which stays where it is."""
+    `sweep_stop_file` is shared by all cases of a sweep; it is not removed."""
 
     slab: Slab
     rules: Checkpoint
     stop_file: Path
     signals: Signals
     limit: float | None = None
-    others_file: StopFile | None = None
+    sweep_stop_file: StopFile | None = None
     state_bytes: int = 0
     _saved: float = field(default_factory=time.monotonic)
     _looked: float = 0.0
@@ -82,7 +82,7 @@ class Watch:
             return WALL
         if now - self._looked > LOOK_SECONDS:
             self._looked = now
-            asked = os.path.lexists(self.stop_file) or (self.others_file is not None and self.others_file.asks)
+            asked = os.path.lexists(self.stop_file) or (self.sweep_stop_file is not None and self.sweep_stop_file.asks)
             return FILE if asked else GO
         return GO
 

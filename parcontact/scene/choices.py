@@ -44,7 +44,7 @@ class Choices:
     until: float = 0.0
 
     @property
-    def effects(self) -> list[Decision]:
+    def decisions(self) -> list[Decision]:
         """Every effect that there is, on or off, and why."""
         own = [getattr(self, name) for name, part in vars(Choices).items() if isinstance(part, Decided)]
         return own + [self._decide(section, effect) for section, effect in added_sections.find_effects().items()]
@@ -56,7 +56,7 @@ class Choices:
         return guarded(section, effect).decide(self.job)
 
     @cached_property
-    def followers(self) -> dict[str, type[Effect[Any]]]:
+    def effects(self) -> dict[str, type[Effect[Any]]]:
         """The effects that the job's further sections ask for, by their names in checkpoints."""
         known = added_sections.effects_of(type(self.job).model_fields)
         found = [guarded(section, effect) for section, effect in known.items()]
@@ -87,7 +87,7 @@ class Choices:
     @cached_property
     def shears(self) -> tuple[Shear, ...]:
         """The friction of the contact area itself, of each effect that adds some."""
-        found = [effect.shear(self.job) for effect in self.followers.values()]
+        found = [effect.shear(self.job) for effect in self.effects.values()]
         return tuple(shear for shear in found if shear is not None)
 
     @cached_property

@@ -211,7 +211,7 @@ def build_on(setup: Setup) -> Scene:
     tally.purpose = "heights"
     material, energy = _body_and_energy(setup, folded, inverse)
     scene = Scene(setup, _motion(setup), folded, material, solver, operators, setup.probe(), energy)
-    for name, effect in chosen.followers.items():
+    for name, effect in chosen.effects.items():
         if setup.slab.only_counts and not is_ours(name):
             continue  # it may look at heights
         tally.purpose = name

@@ -54,9 +54,9 @@ class Bounded:
     def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, cells: Cells) -> None:
         """Free pressures give back load; those that reach H by it stay there."""
         _scale_cells(p, self.highest, cells, kept)
-        self.give_load(slab, p, load, total)
+        self.rescale_to_load(slab, p, load, total)
 
-    def give_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
+    def rescale_to_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
         """Scale free pressures. If they cannot make up for the load, mix all pressures with none, or with H."""
         factor = 1.0
         for _ in range(MAX_PASSES):

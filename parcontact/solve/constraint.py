@@ -55,7 +55,7 @@ class Constraint(Protocol):
     def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, cells: Cells) -> None:
         """Scale p in each cell by its share that is `kept`, which makes its sum `load`, and then to the sum `total`."""
 
-    def give_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
+    def rescale_to_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
         """Make `total` the sum of an admissible p, which is `load`, not 0."""
 
     def clip(self, p: Array) -> float:
@@ -91,7 +91,7 @@ class NonNegative:
     def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, cells: Cells) -> None:
         scale_cells(p, cells, total / load * kept)
 
-    def give_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
+    def rescale_to_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
         p *= total / load
 
     def clip(self, p: Array) -> float:

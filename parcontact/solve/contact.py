@@ -170,7 +170,7 @@ class ContactSolver:
         if problem.mean is not None:
             load = self.slab.sum(kernels.sum_of(p))[0]
             if load > 0.0:
-                problem.constraint.give_load(self.slab, p, load, problem.mean * self.slab.points)
+                problem.constraint.rescale_to_load(self.slab, p, load, problem.mean * self.slab.points)
             else:
                 p.fill(problem.mean)
         problem.operator.apply(p, self.workspace.displacement)

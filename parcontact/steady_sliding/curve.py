@@ -126,14 +126,14 @@ def run_curve(
     quiet: bool,
     restart: str = "auto",
     shows: Callable[[Doubt], bool] = always,
-    others_file: StopFile | None = None,
+    sweep_stop_file: StopFile | None = None,
     make: Callable[[Job, Slab], States] = on_one_grid,
 ) -> int:
     """Solve all points that are not there yet, writing each at once; collective. Returns the exit code.
 
     A point that fails does so alone: the others are solved, and the exit code is 1. `restart` is `auto` or `never`;
-    of the warnings those are printed that it `shows`. The file `others_file` stops it like its own stop file, and stays
-    where it is. `make` makes the steady states.
+    of the warnings those are printed that it `shows`. `sweep_stop_file` is shared by all cases of a sweep; it is
+    not removed. `make` makes the steady states.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
@@ -158,7 +158,7 @@ def run_curve(
         sliding.keep_in(directory.path)
         try:
             with Signals().noted() as signals:
-                return _Curve(sliding, wanted, table, maps, directory, signals, shows, others_file).go()
+                return _Curve(sliding, wanted, table, maps, directory, signals, shows, sweep_stop_file).go()
         finally:
             if table:
                 table.close()
@@ -210,7 +210,7 @@ class _Curve:
     directory: Directory
     signals: Signals
     shows: Callable[[Doubt], bool]
-    others_file: StopFile | None
+    sweep_stop_file: StopFile | None
     failures: int = 0
 
     def __post_init__(self) -> None:
@@ -234,7 +234,7 @@ class _Curve:
 
     def _stopped(self) -> bool:
         """Return whether it is asked to stop; its own stop file is removed then."""
-        others = self.others_file is not None and self.others_file.asks
+        others = self.sweep_stop_file is not None and self.sweep_stop_file.asks
         asked = self.signals.stop or (self.slab.root and (others or os.path.lexists(self.directory.stop_file)))
         if not self.slab.reduce((), [float(asked)])[0]:
             return False

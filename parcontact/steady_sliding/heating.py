@@ -79,7 +79,9 @@ class Feedback:
     def __init__(self) -> None:
         self._speed, self._rise, self._place = 1.0, 0.0, (math.nan, math.nan)
 
-    def settle(self, warmed: Callable[[float], Point], speed: float, place: Vector, tolerance: float) -> Point:
+    def solve_fixed_point(
+        self, warmed: Callable[[float], Point], speed: float, place: Vector, tolerance: float
+    ) -> Point:
         """Return the point whose flash temperature is the rise [K] at which it was solved, `warmed(rise)`, to the
         `tolerance`, within 0.1 and 3 %. `place` is pressure and temperature of the body.
 

@@ -113,7 +113,7 @@ class SteadySliding:
             return self._solve(velocity, pressure)
 
         tolerance = self.setup.choices.numerics.tolerance
-        return self._feedback.settle(warmed, math.hypot(*velocity), (pressure, cold), tolerance)
+        return self._feedback.solve_fixed_point(warmed, math.hypot(*velocity), (pressure, cold), tolerance)
 
     def _solve(self, velocity: Vector, pressure: float) -> Point:
         """Solve at the temperature that was taken."""

@@ -101,7 +101,7 @@ def test_plan_counts_its_bytes(installed: Path, comm: MPI.Intracomm) -> None:
     assert held["wear"] == 8 * slab.shape[0] * NX
     assert sum(held.values()) == slab.tally["map bytes"]
     assert memory.saved(planned) - memory.saved(Job.model_validate(DATA)) == 8 * NX * NY + 4 * NY
-    assert [decision.why for decision in scene.choices(planned).effects if decision.name == "wear"] == [
+    assert [decision.why for decision in scene.choices(planned).decisions if decision.name == "wear"] == [
         "the job has a section wear"
     ]
 
@@ -120,7 +120,7 @@ def test_absent_it_costs_nothing(installed: Path, comm: MPI.Intracomm) -> None:
     expected = {"map bytes": 8 * NX * on.scene.slab.shape[0], "allreduce": len(rows) - 1}
     assert extra == {name: count for name, count in expected.items() if count}
     assert not next(
-        decision.on for decision in scene.choices(Job.model_validate(DATA)).effects if decision.name == "wear"
+        decision.on for decision in scene.choices(Job.model_validate(DATA)).decisions if decision.name == "wear"
     )
 
 
@@ -132,7 +132,7 @@ def test_a_job_reaches_other_ranks(installed: Path, comm: MPI.Intracomm) -> None
     assert own.section("wear").coefficient == COEFFICIENT
     again = Job.model_validate(yaml.safe_load(own.resolved()))
     assert again == own
-    assert list(scene.choices(again).followers) == ["wear"]
+    assert list(scene.choices(again).effects) == ["wear"]
     assert begun(DATA).scene.job.section("wear") is None
 
 

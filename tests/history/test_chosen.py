@@ -291,7 +291,7 @@ def test_a_timeline_of_so_many_steps(tmp_path: Path, way: str) -> None:
     assert timeline[timeline.count].time == float(COUNT)
     assert timeline[timeline.count // 2].time == pytest.approx(COUNT / 2, rel=2e-8)
     assert timeline[timeline.count].dt == 1.0
-    assert scene.choices(job).effects
+    assert scene.choices(job).decisions
     assert time.process_time() - began < 10.0
 
 

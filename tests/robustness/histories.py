@@ -60,7 +60,7 @@ class Periods:
         if march.row.step > 1 and (march.row.step - 1) % PERIOD == 0:
             material, memory = march.scene.material, march.state.body
             assert isinstance(material, ZenerBody)
-            material.settle(memory)
+            material.advance_branches(memory)
             units = march.scene.units
             maps = [march.field("displacement"), *(units.modulus * units.height * value for value in memory.branches)]
             self.states.append(np.array(maps))

@@ -84,7 +84,9 @@ def test_elastic_static() -> None:
     assert counts["operator"] == 2 * (1 + 2 * ITERATIONS)
     assert counts["shift"] == 0
     assert not any(
-        effect.on for effect in scene.choices(planned).effects if effect.name not in ("surface spectrum", "checkpoints")
+        effect.on
+        for effect in scene.choices(planned).decisions
+        if effect.name not in ("surface spectrum", "checkpoints")
     )
 
 

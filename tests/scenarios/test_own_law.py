@@ -62,7 +62,7 @@ class InFluid:
         self.dry.restore(slab, p, load - even, total - even, kept, cells)
         p += self.fluid
 
-    def give_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
+    def rescale_to_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
         even = self.fluid * slab.points
         p[...] = self.fluid + (p - self.fluid) * ((total - even) / (load - even))
 

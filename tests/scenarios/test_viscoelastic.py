@@ -242,7 +242,7 @@ def test_energies_are_those_of_the_maps(boundary: str, kernel: str) -> None:
 def maps_of(body: ZenerBody, memory: BodyMemory | None) -> list[np.ndarray]:
     """The displacement and the branch maps."""
     assert memory is not None
-    body.settle(memory)
+    body.advance_branches(memory)
     return [surface_of(memory), *memory.branches]
 
 

@@ -47,7 +47,7 @@ def iterations_alike(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_every_row_has_a_test() -> None:
     """By name, in ROWS or TESTED."""
-    assert {effect.name for effect in scene.choices(job()).effects} == {*ROWS, *TESTED}
+    assert {effect.name for effect in scene.choices(job()).decisions} == {*ROWS, *TESTED}
 
 
 FROZEN = {**RUBBER, "branches": [*RUBBER["branches"], {"modulus": 1e5, "relaxation_time": 1e6}]}

@@ -167,7 +167,7 @@ def test_any_load_below_the_hardness_can_be_given(total: float) -> None:
     p = np.zeros((10, 10))
     p[:5], p[5:7] = 1.0, 0.1
     slab = Slab.alone(10, 10)
-    Bounded(1.0).give_load(slab, p, float(p.sum()), total)
+    Bounded(1.0).rescale_to_load(slab, p, float(p.sum()), total)
     assert_allclose(p.sum(), total, rtol=ROUNDING)
     assert p.min() >= 0.0
     assert p.max() <= 1.0

@@ -45,7 +45,7 @@ def test_no_load_is_held_at_a_bound(dtype: type[np.floating]) -> None:
     maps = Maps((5, 32), dtype)
     assert NonNegative().mark(maps.p, maps.u, maps.h, 0.25, maps.working)[3] == 0.0
     before = maps.wide("p").copy()
-    NonNegative().give_load(Slab.alone(32, 5), maps.p, float(before.sum()), 3.0)
+    NonNegative().rescale_to_load(Slab.alone(32, 5), maps.p, float(before.sum()), 3.0)
     assert maps.close(3.0, maps.wide("p"))
     assert np.allclose(maps.wide("p"), 3.0 / before.sum() * before, rtol=4 * ROUNDING[dtype], atol=0.0)
 

@@ -44,15 +44,22 @@ class StickingSolver:
     free: Operator | None = None
 
     def solve(
-        self, law: Law, heights: Array, control: Control, gap: Array, lag: Array | None, out: Array, loose: float = 1.0
+        self,
+        law: Law,
+        heights: Array,
+        control: Control,
+        gap: Array,
+        free_correction: Array | None,
+        out: Array,
+        loose: float = 1.0,
     ) -> tuple[Contact, bool]:
         """Solve from a gap, in whose place the solution will be, and put the pressure into `out`; collective.
 
-        `lag` is `(A - B) p` of a free body, in whose place the new one will be. Returns the contact, and whether the
-        surface has come off. The tolerance is `loose` times that of the run.
+        `free_correction` is `(A - B) p` of a free body, in whose place the new one will be. Returns the contact,
+        and whether the surfaces have detached. The tolerance is `loose` times that of the run.
         """
         tolerance = loose * self.tolerance
-        if self.free is None or lag is None:
+        if self.free is None or free_correction is None:
             found = self.gaps.solve(law, heights, control, gap, tolerance)
             out[...] = found.p
             u = self.workspace.displacement
@@ -61,26 +68,33 @@ class StickingSolver:
             return self._contact(found, out, found.iterations), found.detached
         start = self.workspace.pressure
         start[...] = gap
-        found, iterations = self._settle(law, heights, control, gap, lag, out, tolerance)
+        found, iterations = self._settle(law, heights, control, gap, free_correction, out, tolerance)
         if found.failure:
             gap[...] = start
-            found = self._solve_free(law, heights, control, gap, lag, out, tolerance)
+            found = self._solve_free(law, heights, control, gap, free_correction, out, tolerance)
             iterations += found.iterations
         return self._contact(found, out, iterations), found.detached
 
     def _settle(
-        self, law: Law, heights: Array, control: Control, gap: Array, lag: Array, out: Array, tolerance: float
+        self,
+        law: Law,
+        heights: Array,
+        control: Control,
+        gap: Array,
+        free_correction: Array,
+        out: Array,
+        tolerance: float,
     ) -> tuple[GapSolution, int]:
         """Repeat the solve of a free body until what is lagged changes no more; returns the solution, which has failed
         where it does not settle, and the iterations of all passes; collective."""
-        iterations, share, last = 0, 1.0, lag
+        iterations, share, last = 0, 1.0, free_correction
         for passes in range(1, MAX_PASSES + 1):
-            found = self.gaps.solve(law, heights - lag, control, gap, tolerance)
+            found = self.gaps.solve(law, heights - free_correction, control, gap, tolerance)
             iterations += found.iterations
             found, change, worst = self._compare(heights, control, gap, found, out)
             share = self._share(share, out, change, last) if passes > 1 else 1.0
             last = change
-            lag += share * change
+            free_correction += share * change
             if found.failure or worst <= tolerance or (found.detached and passes == 1):
                 return found, iterations
             if passes > 1 and (found.jumped or found.detached):
@@ -88,12 +102,24 @@ class StickingSolver:
         return replace(found, failure=UNSETTLED), iterations
 
     def _solve_free(
-        self, law: Law, heights: Array, control: Control, gap: Array, lag: Array, out: Array, tolerance: float
+        self,
+        law: Law,
+        heights: Array,
+        control: Control,
+        gap: Array,
+        free_correction: Array,
+        out: Array,
+        tolerance: float,
     ) -> GapSolution:
         """Solve with the operator of a free body itself, and find what is lagged; collective."""
         assert self.free is not None
         work, repeated = self.workspace, self.gaps.operators
-        maps = work.pressure, work.displacement, work.other_displacement, lag  # in double precision with adhesion
+        maps = (
+            work.pressure,
+            work.displacement,
+            work.other_displacement,
+            free_correction,
+        )  # in double precision with adhesion
         inverse = FreeInverse(work.slab, self.free, repeated, DIGITS * tolerance, maps, isinstance(control, Approach))
         operators = repeated._replace(operator=self.free, inverse=inverse)
         if isinstance(control, Approach):
@@ -105,8 +131,8 @@ class StickingSolver:
             lifted = heights - control.value * self.free.apply(work.displacement, work.displacement)
             found = self.gaps.solve(law, lifted, control, gap, LEFT * tolerance, operators)
         found, _, worst = self._compare(heights, control, gap, found, out)
-        repeated.operator.apply(out, lag)
-        np.subtract(work.displacement, lag, out=lag)
+        repeated.operator.apply(out, free_correction)
+        np.subtract(work.displacement, free_correction, out=free_correction)
         if not found.failure and worst > tolerance:
             asked = f"changes are {worst:.3g} where {tolerance:.3g} was asked for"
             return replace(found, failure=f"{UNSETTLED}: {asked}")

@@ -200,7 +200,7 @@ class SteadySolver:
         np.copyto(x, 0.0, where=~working)
         total, members = slab.sum(kernels.sum_of(x), float(np.count_nonzero(working)))
         if self._striped:
-            self.constraint.give_load(slab, x, total, mean * slab.points)
+            self.constraint.rescale_to_load(slab, x, total, mean * slab.points)
         else:
             np.add(x, (mean * slab.points - total) / members, out=x, where=working)
         self.operator.apply(x, self._u)
@@ -253,7 +253,7 @@ class SteadySolver:
     def _admit(self, x: Array, mean: float) -> None:
         """Make x admissible: not negative, under the load; and u its image."""
         load = self.slab.sum(self.constraint.clip(x))[0]
-        self.constraint.give_load(self.slab, x, load, mean * self.slab.points)
+        self.constraint.rescale_to_load(self.slab, x, load, mean * self.slab.points)
         self.operator.apply(x, self._u)
 
     def _certify(self, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
