@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -14,6 +15,7 @@ from . import style, units
 from .run import Fields, PlottedRun
 
 INSTANTS = 5  # at most so many lines in one panel
+MANY_LINES: dict[str, Any] = {"fontsize": 8, "labelspacing": 0.2}  # of a legend: not to end below its panel
 MOST_LETTERS = 16  # of the name of a stage in a legend
 RANGE = 1.3  # that is shown over that of the contact
 
@@ -60,7 +62,7 @@ def _draw_pressures(
     axes.locator_params(nbins=5)
     units.label(axes.xaxis, along, "m")
     units.label(axes.yaxis, "pressure", "Pa")
-    axes.legend(**style.BESIDE)
+    axes.legend(**style.BESIDE, **MANY_LINES)
 
 
 def _make_strip(run: PlottedRun, fields: Fields) -> style.Panel:
