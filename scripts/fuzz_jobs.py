@@ -60,6 +60,7 @@ SLACK = 1e-6  # of a load, relative: sums over all points
 DONE, FAILED, REFUSED = 0, 1, 2  # exit codes
 LATER_SHARES = {"report": 0.05, "leak": 0.5, "plan": 0.08, "study": 0.5}  # of what ran
 PLACE = re.compile(r"^(.+:\d+:\d+|--set .+|parcontact|.+job\.yaml: cannot be read): \S|^\.\.\. and \d+ more")
+PHYSICS = ("double precision reaches only", "the flash temperature", "an error with numerics.strict")  # of a failed run
 NOT_FINITE = re.compile(r"(?<![\w.-])-?(nan|inf)(?![\w])(?<!points are nan)", re.IGNORECASE)
 EXTREME = (
     *(0, -0.0, 1, -1, 0.5, 5e-324, 1e-300, 1e-150, 1e-30, 1e30, 1e150, 1e300, 1.7e308, -1e300, 1e18, 2**31,
@@ -97,7 +98,7 @@ def command(*words: str | Path) -> tuple[int, str]:
 
 def drive(path: Path, here: Path) -> Iterator[str]:
     """Check a job, and run it if that accepts it: yields how it ended, then faults."""
-    before, began = listing(here), time.process_time()
+    before, began = set(here.rglob("*")), time.process_time()
     code, said = command("check", path)
     spent = time.process_time() - began
     if code == REFUSED:
@@ -105,8 +106,8 @@ def drive(path: Path, here: Path) -> Iterator[str]:
         yield from refusal_faults(said)
         if spent > CPU_SECONDS:
             yield f"{spent:.1f} s to refuse it"
-        if listing(here) != before:
-            yield f"wrote {listing(here) - before}"
+        if wrote := set(here.rglob("*")) - before:
+            yield f"wrote {wrote}"
         return
     if code != DONE:
         yield "ended in check"
@@ -126,7 +127,8 @@ def drive(path: Path, here: Path) -> Iterator[str]:
         if (directory / "measures.csv").exists():
             yield from history_faults(directory, case.job)
         if (directory / "steady.csv").exists():
-            yield from curve_faults(directory / "steady.csv")
+            for row in rows_of(directory / "steady.csv"):
+                yield from row_faults(f"{row['velocity']:g} m/s", row, math.inf)
 
 
 def later_faults(path: Path, here: Path, job: jobs.Job) -> Iterator[str]:
@@ -178,13 +180,6 @@ def run_faults(code: int, said: str) -> Iterator[str]:
         yield f"says nan or inf: {said[-400:]}"
 
 
-PHYSICS = (  # what a run that fails may say
-    "double precision reaches only",
-    "the flash temperature",
-    "an error with numerics.strict",
-)
-
-
 # -- results ----------------------------------------------------------------------------------------------------------
 
 
@@ -199,7 +194,9 @@ def history_faults(directory: Path, job: jobs.Job) -> Iterator[str]:
     """Faults of a table of measures and of maps of pressure."""
     stick, hardness = job.section("adhesion"), job.material.hardness
     most = math.inf if hardness is None else hardness * (1.0 + SLACK)
-    strength = stick.work / range_of(job) if stick else 0.0
+    strength = 0.0
+    if stick:
+        strength = stick.work / float((chosen_range(job) or math.nan) if stick.range == "auto" else stick.range)
     for row in rows_of(directory / "measures.csv"):
         yield from row_faults(f"step {row['step']:g}", row, most)
         if not stick:
@@ -224,19 +221,12 @@ def load_faults(row: dict[str, float], job: jobs.Job) -> Iterator[str]:
         began += stage.seconds
         if -SLACK <= share <= 1.0 + SLACK and not (share and not stage.seconds):
             load = stage.load.start + min(max(share, 0.0), 1.0) * (stage.load.end - stage.load.start)
-            name, unit = (
-                "approach" if stage.control == "approach" else "pressure",
-                box if stage.control == "force" else 1.0,
-            )
+            name = "approach" if stage.control == "approach" else "pressure"
+            unit = box if stage.control == "force" else 1.0
             most = max(abs(stage.load.start), abs(stage.load.end)) / unit
             loads.append((name, load / unit, most))
     if not any(abs(row[name] - load) <= SLACK * most for name, load, most in loads):
         yield f"step {row['step']:g} at {row['time']:g} s: {row['pressure']:g} Pa, {row['approach']:g} m, not {loads}"
-
-
-def range_of(job: jobs.Job) -> float:
-    section = job.section("adhesion")
-    return float(section.range) if section.range != "auto" else float(chosen_range(job) or math.nan)
 
 
 def row_faults(where: str, row: dict[str, float], most: float) -> Iterator[str]:
@@ -253,16 +243,6 @@ def row_faults(where: str, row: dict[str, float], most: float) -> Iterator[str]:
         yield f"{where}: mean pressure {row['pressure']:g} above the highest, {row['max_pressure']:g}"
     if row["friction"] < 0.0:
         yield f"{where}: friction {row['friction']:g}"
-
-
-def curve_faults(table: Path) -> Iterator[str]:
-    """Faults of a friction curve."""
-    for row in rows_of(table):
-        yield from row_faults(f"{row['velocity']:g} m/s", row, math.inf)
-
-
-def listing(directory: Path) -> set[str]:
-    return {str(path) for path in directory.rglob("*")}
 
 
 @contextlib.contextmanager

@@ -117,12 +117,6 @@ def draw(part: str, chance: random.Random, source: Path = ROOT) -> tuple[str, st
     return what, ast.unparse(tree)
 
 
-def copy(target: Path) -> None:
-    """The last commit."""
-    archive = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, capture_output=True).stdout
-    subprocess.run(["tar", "-x", "-C", target], input=archive, check=True)
-
-
 def first_failure(tree: Path, files: tuple[str, ...]) -> str:
     """The first test that fails, '' if none does."""
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *files]
@@ -164,7 +158,8 @@ def main() -> int:
     unseen = 0
     with tempfile.TemporaryDirectory() as place:
         tree = Path(place)
-        copy(tree)
+        archive = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, capture_output=True).stdout
+        subprocess.run(["tar", "-x", "-C", tree], input=archive, check=True)
         for part in dict.fromkeys(part for part, *_ in drawn):
             if failure := first_failure(tree, tests_of(part)):
                 print(f"{part} as it is: {failure}", flush=True)

@@ -13,6 +13,7 @@ from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve.bounded import Bounded
+from parcontact.solve.constraint import Cells
 from parcontact.solve.contact import Contact, ContactSolver
 from parcontact.solve.fallback import active_set
 from parcontact.solve.problem import Approach, MeanPressure
@@ -191,3 +192,19 @@ def test_any_number_of_ranks(comm: MPI.Intracomm, control: MeanPressure | Approa
     assert together.converged
     assert alone.p.max() == 1.0
     assert_allclose(together.p, alone.p[slab.rows], rtol=0, atol=1e-8)
+
+
+def test_what_is_cut_off_at_both_bounds() -> None:
+    """Cells have the free load, and what was added less what was taken off; a NaN stays one."""
+    random = np.random.default_rng(3)
+    value, p, sums = random.normal(size=(20, 33)), np.empty((20, 33)), np.empty((2, 6))
+    load, cut = Bounded(0.5).advance(np.zeros_like(value), value, -1.0, p, Cells(16, 3, 16), sums)
+    kept = np.clip(value, 0.0, 0.5)
+    np.testing.assert_array_equal(p, kept)
+    assert_allclose([load, cut], [kept.sum(), np.abs(kept - value).sum()], rtol=ROUNDING)
+    for j, rows in enumerate((slice(0, 13), slice(13, 20))):
+        for i, columns in enumerate((slice(0, 16), slice(16, 32), slice(32, 33))):
+            cell, change = kept[rows, columns], (kept - value)[rows, columns]
+            assert_allclose(sums[j, [i, i + 3]], [cell[cell < 0.5].sum(), change.sum()], rtol=ROUNDING, atol=ROUNDING)
+    value[2, 2] = np.nan
+    assert np.isnan(Bounded(0.5).advance(np.zeros_like(value), value, -1.0, p, Cells(16, 3, 16), sums)).all()

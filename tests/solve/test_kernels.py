@@ -10,9 +10,9 @@ import pytest
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 from parcontact.solve import constraint, kernels
-from parcontact.solve.constraint import NonNegative
+from parcontact.solve.constraint import CELL, Cells, NonNegative
 
-from .random_maps import ROUNDING, Maps
+from .random_maps import ROUNDING, SHAPES, Maps
 
 pytestmark = pytest.mark.parametrize("dtype", [np.float64, np.float32])
 
@@ -48,6 +48,71 @@ def test_no_load_is_held_at_a_bound(dtype: type[np.floating]) -> None:
     NonNegative().rescale_to_load(Slab.alone(32, 5), maps.p, float(before.sum()), 3.0)
     assert maps.close(3.0, maps.wide("p"))
     assert np.allclose(maps.wide("p"), 3.0 / before.sum() * before, rtol=4 * ROUNDING[dtype], atol=0.0)
+
+
+@SHAPES
+def test_mark(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+    maps = Maps(shape, dtype)
+    working = np.ones(shape, dtype=np.bool_)
+    wrong, count, gaps, deepest = constraint.mark(maps.p, maps.u, maps.h, 0.25, working)
+    p, gap = maps.wide("p"), maps.wide("u") - maps.wide("h") - 0.25
+    assert np.array_equal(working, (p > 0) | (gap < 0))
+    assert maps.close(wrong, p * np.abs(gap))
+    assert count == np.count_nonzero(working)
+    assert maps.close(gaps, gap[working])
+    assert deepest == -np.inf if gap.size == 0 else abs(deepest + gap.min()) <= 4 * ROUNDING[dtype]
+
+
+@SHAPES
+def test_choose(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+    """Points where x outweighs its gap, and how far x is from a solution."""
+    maps = Maps(shape, dtype)
+    working = np.random.default_rng(2).random(shape) < 0.5
+    before = working.copy()
+    positive, negative, wrong, count, changed, deepest = NonNegative().choose_active(
+        maps.z, maps.u, maps.h, 0.25, 0.5, working
+    )
+    x, gap = maps.wide("z"), maps.wide("u") - maps.wide("h") - 0.25
+    assert np.array_equal(working, x > 0.5 * gap)
+    assert maps.close(positive, np.maximum(x, 0.0))
+    assert maps.close(negative, np.maximum(-x, 0.0))
+    assert maps.close(wrong, np.abs(x * gap))
+    assert count == np.count_nonzero(working)
+    assert changed == np.count_nonzero(working != before)
+    assert deepest == -np.inf if gap.size == 0 else abs(deepest + gap.min()) <= 4 * ROUNDING[dtype]
+
+
+@SHAPES
+def test_next_set(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+    """Pressed points of the set, and others that penetrate."""
+    maps = Maps(shape, dtype)
+    found = NonNegative().next_set(maps.z, maps.u, maps.working)
+    assert np.array_equal(found, (maps.working & (maps.z > 0.0)) | (~maps.working & (maps.u < 0.0)))
+
+
+@pytest.mark.parametrize(("high", "above"), [(CELL, 0), (CELL, 3), (4, 3)])
+@pytest.mark.parametrize("wide", [CELL, 4])
+@pytest.mark.parametrize("shape", [(40, 33), (1, 1), (16, 16)])
+def test_cells(shape: tuple[int, int], high: int, above: int, wide: int, dtype: type[np.floating]) -> None:
+    """Pressures cut off at 0, what that adds to each cell, and cells scaled one by one; the first is cut by a rank."""
+    maps = Maps(shape, dtype)
+    p, step = np.empty(shape), 0.7
+    rows, columns = (shape[0] + above - 1) // high + 1, (shape[1] - 1) // wide + 1
+    sums, factors = np.full((rows, 2 * columns), 9.0), np.random.default_rng(2).random((rows, columns))
+    load, cut = NonNegative().advance(maps.u, maps.t, step, p, Cells(high, above, wide), sums)
+    value = maps.wide("u") - step * maps.wide("t")
+    kept = np.maximum(value, 0.0)
+    np.testing.assert_allclose(p, kept, rtol=0, atol=10 * ROUNDING[dtype])
+    whole = np.zeros((2, rows * high, columns * wide))
+    whole[0, above : above + shape[0], : shape[1]] = kept
+    whole[1, above : above + shape[0], : shape[1]] = kept - value
+    expected = whole.reshape(2, rows, high, columns, wide).sum(axis=(2, 4))
+    np.testing.assert_allclose(sums, np.hstack(list(expected)), atol=1e3 * ROUNDING[dtype])
+    np.testing.assert_allclose([load, cut], expected.sum(axis=(1, 2)), rtol=1e3 * ROUNDING[dtype])
+    before = p.copy()
+    constraint.scale_cells(p, Cells(high, above, wide), factors)
+    of_points = np.repeat(np.repeat(factors, high, axis=0), wide, axis=1)[above : above + shape[0], : shape[1]]
+    np.testing.assert_allclose(p, before * of_points, rtol=1e-15)
 
 
 def test_nothing_hides_a_nan_constraint(dtype: type[np.floating]) -> None:
