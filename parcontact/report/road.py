@@ -62,18 +62,21 @@ def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
     heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
     found = statistics.surface_statistics(heights, setup.grid.size)
     pictures = [
-        draw_panel(partial(_draw_spectrum, cut=cut), "spectrum of the job, cut at the dotted lines"),
+        draw_panel(partial(_draw_spectrum, cut=cut, coarsest=found), "spectrum, cut into bands at the dotted lines"),
         *_draw(surface.Sketch(heights, setup.grid.size, found), ", coarsest band"),
     ]
     tables = [shapes, bands, _tabulate(found, "of the coarsest band")]
     return ReportSection("Surface", [f"{text}." for text in describe_cut(cut, job)], tables, pictures)
 
 
-def _draw_spectrum(axes: Axes, cut: Cut) -> None:
-    """Draw the spectrum over wavenumbers, and where bands begin and end."""
+def _draw_spectrum(axes: Axes, cut: Cut, coarsest: statistics.Statistics) -> None:
+    """Draw the spectrum of the job and that of the coarsest band over wavenumbers, and where bands begin and end."""
     low, high = cut.spectrum.ends
     q = np.geomspace(low, high, POINTS)
-    axes.loglog(q, cut.spectrum.phi(q) / (4.0 * np.pi**2), **style.line(0))
+    axes.loglog(q, cut.spectrum.phi(q) / (4.0 * np.pi**2), label="spectrum of the job", **style.line(0))
+    there = (coarsest.q >= cut.edges[0]) & (coarsest.q <= cut.edges[1])
+    axes.loglog(coarsest.q[there], coarsest.psd_2d[there], label="coarsest band", **style.line(1))
+    axes.legend(loc="lower left")
     for edge in cut.edges:
         axes.axvline(edge, color=style.GREY, ls=":")
     axes.set(xlabel="wavenumber [1/m]", ylabel="PSD over directions [m⁴]")
