@@ -19,6 +19,7 @@ from .command.arguments import parse_arguments
 from .command.verbs import BAD_INPUT, DONE, FAILED
 from .errors import InputError, JobError, RunError
 from .parallel.signals import STOP
+from .storage import files
 from .streams import describe_loss, tolerant_streams
 
 STAGGER_SECONDS = 0.5  # for which other ranks let root report an error that all of them have
@@ -35,6 +36,10 @@ LEAVE_FILES = {
     "report",
     "leak",
 }  # what they print is also there
+REFUSALS = {  # of the system, for a file that a user can choose or make room for
+    *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EFBIG),
+    *(errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG),
+}
 UNCOLLECTED_OBJECTS = 20_000  # that Python may make before it looks for cycles among them; imports make far more
 
 
@@ -81,6 +86,10 @@ def _run(words: list[str]) -> int:
     except (InputError, RunError) as error:
         code = FAILED if isinstance(error, RunError) else BAD_INPUT
         return _end_together(str(error) if isinstance(error, JobError) else f"parcontact: {error}", code)
+    except OSError as error:
+        if not (text := _describe_refusal(error)):
+            _end_all(error)
+        return _end_together(f"parcontact: {text}", BAD_INPUT)
     except (Exception, KeyboardInterrupt) as error:
         _end_all(error)
 
@@ -142,6 +151,13 @@ def _end_all(error: BaseException) -> NoReturn:
     if world is not None and several:
         world.Abort(code)
     sys.exit(code)
+
+
+def _describe_refusal(error: OSError) -> str:
+    """Return which file the system does not let the program open or write, and why; '' for any other error."""
+    if error.errno not in REFUSALS or not isinstance(error.filename, str | Path):
+        return ""
+    return f"{files.without_mark(Path(error.filename))} cannot be opened or written: {os.strerror(error.errno)}"
 
 
 def _describe_surroundings(error: BaseException) -> str:

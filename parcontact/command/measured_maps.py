@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from .. import mesh
-from ..errors import InputError, RunError
+from ..errors import InputError
 from ..job import Job
 from ..job.sections.listing import plain_data
 from ..job.text import yamltext
-from ..storage import files
+from ..storage import files, hdf5
 
 JOBS = (".yaml", ".yml", ".json", "")  # how names of jobs end: others are those of measured maps
 MANY_POINTS = 2**20  # tuning: of a job to start from, at most
@@ -46,7 +46,7 @@ def refuse_taken(target: Path | None) -> None:
 
 
 def start_job(job: Job, path: Path, target: Path | None) -> Iterator[str]:
-    """Write a job to start from to a file, or say it; maps of very many points are thinned out. Raises RunError."""
+    """Write a job to start from to a file, or say it; maps of very many points are thinned out. Raises InputError."""
     directory, grid = (target or Path("job.yaml")).absolute().parent, job.grid
     found = _job_of(os.path.relpath(path, directory))
     found["surface"] |= {key: value for key, value in plain_data(job.surface[0]).items() if key != "path"}
@@ -63,7 +63,7 @@ def start_job(job: Job, path: Path, target: Path | None) -> Iterator[str]:
         directory.mkdir(parents=True, exist_ok=True)
         files.replace_file(target, text)
     except OSError as error:
-        raise RunError(f"{target} cannot be written: {error}") from error
+        raise InputError(f"{target} cannot be written: {hdf5.reason(error)}") from error
     yield f"job: {target}"
 
 

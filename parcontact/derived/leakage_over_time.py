@@ -22,7 +22,7 @@ from ..parallel.slab import Slab
 from ..plotting import conductivity, leakage
 from ..plotting.run import Fields, PlottedRun
 from ..printed import per_cent, quantity, stated_error
-from ..storage import files, hdf5, tables
+from ..storage import files, hdf5, read_back
 from ..summary import leak_stop
 
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
@@ -81,7 +81,7 @@ class Gaps:
         job = self.job
         self.size, self.periodic = job.grid.size, job.grid.cyclic
         self.cells = job.grid.nx * job.grid.ny
-        self.columns = tables.read_columns(directory / "measures.csv")
+        self.columns = read_back.read_results(directory / "measures.csv")
         try:
             with self._open() as file:
                 if not {"gap", "pressure"} <= set(file):

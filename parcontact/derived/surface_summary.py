@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError, RunError
+from ..errors import InputError
 from ..job import Job, Topography
 from ..parallel.slab import Array
 from ..physics import surface_statistics as statistics
@@ -13,6 +13,7 @@ from ..plotting import style, surface
 from ..printed import per_cent, quantity
 from ..road import map_files, treatment
 from ..road.prepared_map import prepare
+from ..storage import hdf5
 
 NOT_SELF_AFFINE = "no self-affine range was found"
 
@@ -40,7 +41,7 @@ def describe_surface(job: Job, heights: Array, told: list[str], shortest: float 
         picture.parent.mkdir(parents=True, exist_ok=True)
         surface.draw(surface.Sketch(heights, job.grid.size, found, measured), picture)
     except OSError as error:
-        raise RunError(f"{picture} cannot be written: {error}") from error
+        raise InputError(f"{picture} cannot be written: {hdf5.reason(error)}") from error
     yield from (*lines, *told)
     yield f"rms height     {quantity(found.rms_height, 'm', 4)}"
     yield f"rms slope      {found.rms_slope:.4g}"

@@ -21,13 +21,17 @@ SHOWN = (
     "adhesion",
     "bands",
 )  # others differ by version
+LAST = "checkpoint"  # section of a job with every default
 FILES = ("file", "topography")  # shapes that come from files
 
 
 def shown_job(path: Path) -> Job:
     """Return what pictures show of the resolved job; its files of heights need not be there any more."""
     try:
-        data = yamltext.parse(path.read_bytes(), str(path)).data
+        text = path.read_bytes()
+        data = yamltext.parse(text, str(path)).data
+        if not text.endswith(b"\n") or not isinstance(data, dict) or LAST not in data:
+            raise InputError(f"{path} is cut off: it lacks its section {LAST}; put the whole file in its place")
         data = {name: data[name] for name in SHOWN if name in data}
         data["surface"] = [
             {"shape": "flat"} if shape["shape"] in FILES or "spectrum" in shape else shape for shape in data["surface"]

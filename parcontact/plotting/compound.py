@@ -11,12 +11,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..errors import InputError, RunError
+from ..errors import InputError
 from ..parallel.slab import Array
 from ..rubber.compound import TITLE, Compound
 from ..rubber.series import reduce_sets
 from ..rubber.superposition import log_factors
-from ..storage import files
+from ..storage import files, hdf5
 from . import style
 
 COLORS = (style.BLUE, style.RED)  # of storage and loss
@@ -35,14 +35,14 @@ def refuse_foreign(target: Path) -> None:
 
 
 def write(compound: Compound, target: Path, job_band: tuple[float, float] | None) -> Iterator[str]:
-    """Write both files and say so, line by line; `job_band` [Hz] are the frequencies of a job. Raises RunError."""
+    """Write both files and say so, line by line; `job_band` [Hz] are the frequencies of a job. Raises InputError."""
     text, picture = compound.text(), target.with_suffix(".png")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         files.replace_file(target, text)
         draw(compound, picture, job_band)
     except OSError as error:
-        raise RunError(f"{target} cannot be written: {error}") from error
+        raise InputError(f"{target} cannot be written: {hdf5.reason(error)}") from error
     yield from (line.removeprefix("# ") for line in text.splitlines() if line.startswith("#"))
     yield f"material file: {target}, picture: {picture}"
     yield from (f"warning: {text}" for text in compound.doubts())

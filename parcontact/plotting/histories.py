@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..columns import UNITS
 from ..errors import InputError
 from ..parallel.slab import Array
-from ..storage import tables
+from ..storage import read_back
 from . import conductivity, style, units
 from .charts import Axis, Chart, ChartLine
 from .run import PlottedRun
@@ -72,7 +72,7 @@ def _add_theory(chart: Chart, run: PlottedRun) -> Chart:
     table = run.directory / "theory.csv"
     if column is None or run.backwards or not table.is_file():
         return chart
-    theory = {name: np.array(values) for name, values in tables.read_columns(table).items()}
+    theory = {name: np.array(values) for name, values in read_back.read_results(table).items()}
     over = "distance" if chart.x.unit == "m" else "time"
     (own,) = chart.series
     lines = [replace(own, name="simulation"), ChartLine("theory", theory[over], theory[column], style.line(1))]

@@ -32,10 +32,10 @@ def write(directory: Path, name: str, out: Path | None = None) -> list[Path]:
         raise InputError(f"an MP4 needs the program {FFMPEG} on the path; give an --out that ends in .gif")
     try:
         frames, rate = _draw(directory, name)
-        for target in targets:
-            _write_gif(target, frames, rate) if target.suffix == ".gif" else _write_mp4(target, frames, rate)
     except hdf5.FAILURES as error:
         raise InputError(f"no movie from {directory / 'fields.h5'}: {hdf5.reason(error)}") from error
+    for target in targets:
+        _write_gif(target, frames, rate) if target.suffix == ".gif" else _write_mp4(target, frames, rate)
     return targets
 
 

@@ -13,7 +13,7 @@ from ..history.timeline import Timeline
 from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
-from ..storage import marker, tables
+from ..storage import marker, read_back
 from ..summary import pull_off
 from . import units
 from .charts import FRACTION, Axis
@@ -165,7 +165,7 @@ def label_frames(run: PlottedRun, file: h5py.File) -> dict[int, str]:
 
 def read_table(path: Path, names: Sequence[str]) -> dict[str, Array]:
     """Return columns of a table by name; raises InputError where one of those that are needed is missing."""
-    columns = {name: np.array(values, dtype=float) for name, values in tables.read_columns(path).items()}
+    columns = {name: np.array(values, dtype=float) for name, values in read_back.read_results(path).items()}
     if missing := [name for name in names if name not in columns]:
         raise InputError(f"{path} has no column {', '.join(missing)}")
     return columns

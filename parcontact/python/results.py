@@ -11,7 +11,7 @@ import numpy as np
 
 from ..columns import UNITS
 from ..errors import InputError
-from ..storage import fields, hdf5, tables
+from ..storage import fields, hdf5, read_back
 from .given_jobs import path_of
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
     path = path_of(directory)
     if not (path / "measures.csv").is_file():
         raise InputError(f"{path} holds no measures.csv: it is no output directory of a run")
-    columns = tables.read_columns(path / "measures.csv")
+    columns = read_back.read_results(path / "measures.csv")
     steps, times = np.array(columns["step"], dtype=int), columns["time"]
     found: dict[str, Any] = {name: ("step", values, _units(name)) for name, values in columns.items()}
     del found["step"], found["time"]

@@ -10,7 +10,7 @@ from ..accuracy.budget import exceeds
 from ..job import Job
 from ..job.sections.listing import plain_data
 from ..storage import hdf5, provenance
-from ..storage.tables import read_columns as read_table
+from ..storage.read_back import read_results
 from ..summary.slide import ERRORS
 from . import log
 from .parts import ReportSection, ReportTable
@@ -21,7 +21,7 @@ NAMES = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
 
 def costs(table: Path, found: log.Log, job: Job) -> Iterator[ReportSection]:
     """Yield the errors of a run or a curve of a job, given by its table, then wall time, operator calls and counts."""
-    columns = read_table(table)
+    columns = read_results(table)
     yield describe_errors(columns, found.estimates, job, table.name == "steady.csv")
     calls = [value for value in columns["operator_calls"] if value == value]
     rows = [

@@ -17,7 +17,7 @@ from ..columns import STEADY, SWEEP, UNITS
 from ..job import Job
 from ..plotting import histories, maps, steady, style, sweep, units
 from ..plotting.run import Fields, PlottedRun, choose_evenly, find_curve_job, find_free_area, label_frames, to_load
-from ..storage import hdf5, marker, tables
+from ..storage import hdf5, marker, read_back
 from ..summary import leak_stop, pull_off, slide, sweep_table, theory_beside, theory_settings
 from .parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
 
@@ -40,7 +40,7 @@ MAP_SIZE = (4.2, 3.5)  # [inch]
 
 def describe_run(directory: Path) -> ReportSection:
     """Return histories, the largest and last values, and the maps over time."""
-    run, columns = PlottedRun(directory), tables.read_columns(directory / "measures.csv")
+    run, columns = PlottedRun(directory), read_back.read_results(directory / "measures.csv")
     known = {name: [value for value in columns.get(name, ()) if value == value] for name in SHOWN}
     rows = [
         (_to_words(name), *map(format_cell, (values[-1], min(values), max(values))), UNITS.get(name, ""))
@@ -96,7 +96,7 @@ def _leakage(directory: Path) -> list[tuple[str, str]]:
 
 def describe_curve(directory: Path) -> ReportSection:
     """Return the points of a friction curve, and their maps."""
-    columns = tables.read_columns(directory / "steady.csv")
+    columns = read_back.read_results(directory / "steady.csv")
     names = [name for name in POINTS if name in columns]
     units_of = {column.name: column.unit for column in STEADY}
     units_of |= dict.fromkeys(slide.ERRORS, "relative")
@@ -113,7 +113,7 @@ def _list_main_bands(directory: Path) -> list[ReportTable]:
     """Return which band makes most of the friction at each point of a curve in bands."""
     if not (directory / "bands.csv").is_file():
         return []
-    columns = tables.read_columns(directory / "bands.csv")
+    columns = read_back.read_results(directory / "bands.csv")
     names = [name for name in PLACE if any(value == value for value in columns[name])]
     points: dict[tuple[str, ...], list[int]] = {}
     for row in range(len(columns["velocity"])):
@@ -152,6 +152,7 @@ def _add_unit(name: str) -> str:
 
 def describe_study(directory: Path) -> ReportSection:
     """Return settings, their errors and costs."""
+    read_back.refuse_cut(directory / "study.csv")
     with (directory / "study.csv").open(newline="") as file:
         names, *rows = list(csv.reader(file)) or [[]]
     kept = [k for k, name in enumerate(names) if name != "fingerprint"]
@@ -198,7 +199,8 @@ def browse_run(run: PlottedRun) -> list[Browser]:
 def _browse_file(
     path: Path, label: Callable[[h5py.File], dict[int, str]], job: Job, step: int | None = None
 ) -> list[Browser]:
-    """Return maps, first shown as after a `step`, or the last ones; none where the file is missing or unreadable."""
+    """Return maps, first shown as after a `step`, or the last ones; none where the file is missing. Raises InputError
+    for a damaged one."""
     try:
         with hdf5.open_results(path) as file, style.drawing(RC):
             labels = choose_evenly(label(file), MOST_MAPS)

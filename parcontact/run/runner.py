@@ -1,6 +1,8 @@
 """From a job to a run in its output directory: it begins, or goes on from a checkpoint."""
 
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from ..effects.adhesive_law import end_of
@@ -17,7 +19,7 @@ from ..parallel.slab import Slab
 from ..physics.entries import part_of
 from ..scene import choices, sanity
 from ..steady_sliding import start as steadystart
-from ..storage import header, heights, marker, row, wisdom
+from ..storage import hdf5, header, heights, read_back, row, wisdom
 from ..storage.checkpoint import Contents, Facts
 from ..storage.directory import Directory
 from ..storage.marker import Claim
@@ -101,9 +103,17 @@ def _find_origin(
         reason = f"detached before, at t = {end.time:g} s (--restart never: run it afresh)"
     elif origin and until is not None and reached(origin.contents.time, until):
         reason = f"is at t = {origin.contents.time:g} s already, and --until {until:g} is not later"
-    if reason and (lost := on_root(slab.comm, lambda: marker.find_lost_rows(directory.path))):
-        raise InputError(lost)
+    if reason:
+        on_root(slab.comm, lambda: _refuse_damaged(directory.path))
     return origin, warnings, reason
+
+
+def _refuse_damaged(directory: Path) -> None:
+    """Raise InputError for results of a run with nothing to do that are not whole."""
+    if lost := read_back.find_lost_rows(directory):
+        raise InputError(lost)
+    with suppress(FileNotFoundError):
+        hdf5.open_results(directory / "fields.h5").close()
 
 
 def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[str, ...] = ()) -> Provenance:

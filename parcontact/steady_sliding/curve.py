@@ -230,6 +230,7 @@ class _Curve:
                 self.table.pass_on()
         if self.table:
             self.table.conclude(self.failures)
+            self.directory.note(finished=(self.table.count, 0.0))
         return FAILED if self.failures else DONE
 
     def _stopped(self) -> bool:

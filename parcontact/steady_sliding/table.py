@@ -101,6 +101,11 @@ class CurveTable:
         self._bar = progress.Bar(len(found), "steady states", "point", not self.quiet)
         return found
 
+    @property
+    def count(self) -> int:
+        """The number of points that the table has."""
+        return len(self.known) + len(self._points)
+
     def pass_on(self) -> None:
         """Count a point, solved or not."""
         self._bar.step()

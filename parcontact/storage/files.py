@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import secrets
 import sys
 from collections.abc import Callable, Iterator
@@ -16,6 +17,11 @@ MARK = "made by the program parcontact"  # in pages and in pictures, where their
 def unused(path: Path) -> Path:
     """Return a name beside `path` for what is to take its place."""
     return path.with_name(f"{path.name}.{secrets.token_hex(6)}.part")
+
+
+def without_mark(path: Path) -> Path:
+    """Return the name that a new file is to have; any other path as it is."""
+    return path.with_name(re.sub(r"\.[0-9a-f]{12}\.part$", "", path.name))
 
 
 @contextmanager

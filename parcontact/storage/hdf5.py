@@ -25,6 +25,7 @@ T = TypeVar("T")
 MPI_IO = h5py.get_config().mpi  # else ranks act in turn
 FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)  # of a damaged file
 TOO_LARGE = "file too large for its file system, or for the limit that ulimit -f shows"
+MEND = "put the whole file in its place, or move it away to go on without its maps"
 FULL = 1 << 16  # tuning: bytes: MPI-IO does not say why it failed, but with less than this left the file system is full
 DOUBLE = 8  # bytes of a number in a map
 RESERVE = 1 << 20  # tuning: bytes: more than HDF5 writes of what is not a map; it does not survive a disk that is full
@@ -49,9 +50,14 @@ def read_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
 
 
 def open_results(path: Path) -> h5py.File:
-    """Open a file of results to read it. Raises InputError where one of its members is that of another file, which
-    whoever made the file chose, and one of FAILURES where it cannot be read."""
-    file = h5py.File(path, "r", locking=False)
+    """Open a file of results to read it. Raises InputError where it is damaged, or one of its members is that of
+    another file, which whoever made the file chose, and FileNotFoundError."""
+    try:
+        file = h5py.File(path, "r", locking=False)
+    except FileNotFoundError:
+        raise
+    except FAILURES as error:
+        raise InputError(f"{path} cannot be read: {reason(error)}; {MEND}") from error
     for name in file:
         if isinstance(file.get(name, getlink=True), h5py.ExternalLink) or _has_outside_data(file[name]):
             file.close()
@@ -104,6 +110,10 @@ def reason(error: BaseException) -> str:
     text = str(error)
     if found := re.search(r"error message = '([^']+)'", text):
         return found.group(1)
+    if found := re.search(r"truncated file: eof = (\d+), sblock->base_addr = (\d+), stored_eof = (\d+)", text):
+        return f"it is cut off: {int(found[1]) + int(found[2])} of its {found[3]} bytes are there"
+    if "file signature not found" in text:
+        return "it is no HDF5 file, or cut off"
     if isinstance(error, OSError) and error.strerror and error.errno:
         return TOO_LARGE if error.errno == errno.EFBIG else os.strerror(error.errno)
     return text.splitlines()[0] if text else type(error).__name__

@@ -6,14 +6,13 @@ Only what the marker (or a sealed checkpoint) proves to be ours is ever replaced
 import json
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from . import files, tables
+from . import files
 
 MARKER = ".parcontact"
 FORMAT = 1
@@ -27,7 +26,8 @@ SECTIONS = (*SCENE, "thermal", "interface", "adhesion", "initial", "numerics", "
 @dataclass(frozen=True)
 class Claim:
     """The part of a verb in a directory: the `id` of its run, its job, whether it has `saved` a checkpoint, and the
-    step and time after which it has `finished`; of surfaces that came off, how it has `detached`."""
+    step and time after which it has `finished`, of a curve the number of its points; of surfaces that came off, how it
+    has `detached`."""
 
     job: dict[str, Any]
     id: str = field(default_factory=lambda: secrets.token_hex(16))
@@ -58,12 +58,17 @@ def read_claims(directory: Path) -> dict[str, Claim]:
     raise ValueError(f"{path} was written by a newer parcontact")
 
 
-def claim_of_run(directory: Path) -> Claim | None:
-    """Return the claim of the run in a directory; raises InputError for a marker that cannot be read."""
+def sound_claims(directory: Path) -> dict[str, Claim]:
+    """Return the claims of a directory; raises InputError for a marker that cannot be read."""
     try:
-        return read_claims(directory).get("run")
+        return read_claims(directory)
     except (OSError, ValueError) as error:
         raise InputError(str(error)) from error
+
+
+def claim_of_run(directory: Path) -> Claim | None:
+    """Return the claim of the run in a directory; raises InputError for a marker that cannot be read."""
+    return sound_claims(directory).get("run")
 
 
 def detached(directory: Path) -> str:
@@ -71,21 +76,6 @@ def detached(directory: Path) -> str:
     InputError."""
     claim = claim_of_run(directory)
     return "" if claim is None else claim.detached
-
-
-def find_lost_rows(directory: Path) -> str:
-    """Return what to say of a run that has finished, and whose table is damaged or lacks rows, or ''; raises
-    InputError for a marker that cannot be read."""
-    claim, table = claim_of_run(directory), directory / "measures.csv"
-    if claim is None or claim.finished is None:
-        return ""
-    with suppress(InputError, OSError, IndexError):
-        if tables.read_columns(table)["step"][-1] >= claim.finished[0]:
-            return ""
-    return (
-        f"{table} is damaged: its run has finished with step {claim.finished[0]}, and the table lacks rows; mend it, "
-        f"or move {directory} away to run it afresh"
-    )
 
 
 def _pair(value: Sequence[float] | None) -> tuple[int, float] | None:

@@ -9,7 +9,7 @@ from typing import Any
 from ..job import Job
 from ..job.resolved import RESOLVED, shown_job
 from ..printed import quantity, with_error
-from ..storage import marker, tables
+from ..storage import marker, read_back
 from . import leak_stop, pull_off, slide, sweep_table
 
 SWEPT = (  # results of a sweep, from the most telling one on: column, words, unit, and the column of its error
@@ -33,7 +33,7 @@ def _run(directory: Path) -> str:
     if not (directory / RESOLVED).is_file():
         return ""
     job = shown_job(directory / RESOLVED)
-    columns = tables.read_columns(directory / "measures.csv")
+    columns = read_back.read_results(directory / "measures.csv")
     if not columns["time"]:
         return ""
     detached = bool(marker.detached(directory))
@@ -62,7 +62,7 @@ def _pull_off(job: Job, columns: Columns, detached: bool) -> Iterator[str]:
 def _leakage(directory: Path, columns: Columns) -> Iterator[str]:
     """Yield the last conductivities, of `leak.csv` with their errors, else of the run itself."""
     table = directory / "leak.csv"
-    columns = tables.read_columns(table) if table.is_file() else columns
+    columns = read_back.read_results(table) if table.is_file() else columns
     stops = [text for text in leak_stop.describe_leak_stop(directory) if " between " in text]
     known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
     if known:
@@ -109,7 +109,7 @@ def _size(job: Job, share: float, error: float) -> str:
 
 def _curve(directory: Path) -> str:
     """Return the highest friction of a friction curve, and where it is; '' without a point."""
-    columns = tables.read_columns(directory / "steady.csv")
+    columns = read_back.read_results(directory / "steady.csv")
     if not columns["velocity"]:
         return ""
     best = max(range(len(columns["friction"])), key=columns["friction"].__getitem__)
@@ -133,6 +133,7 @@ def _sweep(directory: Path) -> str:
 
 def _study(directory: Path) -> str:
     """Return the first sentence of a study, about its accuracy."""
+    read_back.refuse_cut(directory / "study.txt")
     return (directory / "study.txt").read_text(errors="replace").partition("\n")[0]
 
 

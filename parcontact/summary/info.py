@@ -17,7 +17,7 @@ from ..job import Job
 from ..job.resolved import RESOLVED, shown_job
 from ..parallel.slab import Slab
 from ..printed import quantity
-from ..storage import checkpoint, curve_points, fields, hdf5, marker, tables
+from ..storage import checkpoint, curve_points, fields, hdf5, marker, read_back
 from ..storage.console import meshes_of, warnings_of
 from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
@@ -147,7 +147,7 @@ def _title(directory: Path) -> str:
 
 
 def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    columns, claim = tables.read_columns(table), claims.get("run")
+    columns, claim = read_back.read_results(table), claims.get("run")
     if not columns["step"]:
         yield "  run: no step yet"
         return
@@ -179,7 +179,7 @@ def _slides(job: Job | None) -> bool:
 
 
 def _theory(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    count = f"  Persson's theory: {len(tables.read_columns(table)['time'])} rows, "
+    count = f"  Persson's theory: {len(read_back.read_results(table)['time'])} rows, "
     try:
         settings = theory_settings.read_settings(table.parent)
     except InputError:
@@ -192,7 +192,7 @@ def _theory(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
 
 
 def _curve(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    columns = tables.read_columns(table)
+    columns = read_back.read_results(table)
     if speeds := columns["velocity"]:
         best = int(np.argmax(columns["friction"]))
         place = curve_points.Wanted(speeds[best], columns["pressure"][best])
@@ -220,14 +220,14 @@ def _saved_states(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
 
 
 def _saved_maps(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    with h5py.File(path, "r") as file:
+    with hdf5.open_results(path) as file:
         layout = fields.SavedFields(file)
     saved = np.isfinite(layout.times).sum()
     yield f"  fields: {', '.join(layout.names)} at {saved} of {layout.times.size} instants"
 
 
 def _leakage(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    yield f"  leakage: {len(tables.read_columns(path)['time'])} instants in leak.csv"
+    yield f"  leakage: {len(read_back.read_results(path)['time'])} instants in leak.csv"
 
 
 def _sweep(path: Path, claims: dict[str, Claim]) -> Iterator[str]:

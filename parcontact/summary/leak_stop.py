@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..printed import quantity, span
-from ..storage import tables
+from ..storage import read_back
 
 Columns = Mapping[str, Sequence[float]]
 
@@ -20,7 +20,7 @@ def describe_leak_stop(directory: Path) -> list[str]:
     the pressure stays. Raises InputError for a table that cannot be read.
     """
     table = next((path for name in ("leak.csv", "measures.csv") if (path := directory / name).is_file()), None)
-    columns = tables.read_columns(table) if table else {}
+    columns = read_back.read_results(table) if table else {}
     found = [(axis, said) for axis in "xy" if (said := describe_axis(columns, axis))]
     if len({said for _, said in found}) == 1:
         found = [(" and ".join(axis for axis, _ in found), found[0][1])]

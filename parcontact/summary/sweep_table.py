@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..history.timeline import Timeline
 from ..job import Case, Steady
 from ..job.reading import CASES
-from ..storage import curve_points, files, marker, tables
+from ..storage import curve_points, files, marker, read_back, tables
 from . import pull_off, slide
 
 TABLE = "sweep.csv"
@@ -85,6 +85,9 @@ def read_cases(path: Path) -> list[dict[str, Any]]:
         if names[:1] != ["case"] or "state" not in names or not text.endswith("\n"):
             raise ValueError("it must name its columns, from case to state on, and end with a whole line")
         rows = [dict(zip(names, line, strict=True)) for line in lines]
+        begun = [int(one.name) for one in path.parent.glob(f"{CASES}/*") if one.name.isdecimal()]
+        if path.name == TABLE and max(begun, default=-1) > max((int(row["case"]) for row in rows), default=-1):
+            raise ValueError(f"it lacks rows: case {max(begun)} has been begun")
         return [
             {name: float(cell or "nan") if name in NUMBERS else _number(cell) for name, cell in row.items()}
             for row in rows
@@ -190,7 +193,7 @@ def _columns(path: Path) -> dict[str, list[float]]:
 def state(case: Case) -> str:
     """Return how far a case has come: done | failed | begun | -, or that its table is damaged."""
     directory = case.job.output.directory
-    if case.job.history and marker.find_lost_rows(directory):
+    if case.job.history and read_back.find_lost_rows(directory):
         return DAMAGED
     if (directory / FAILURE).is_file():
         return "failed"

@@ -56,7 +56,10 @@ def read_settings(directory: Path) -> TheorySettings | None:
     """Return the settings of the table in a directory, None if there are none; raises InputError for a damaged file."""
     path = directory / FILE
     try:
-        data = yamltext.parse(path.read_bytes(), FILE).data
+        text = path.read_bytes()
+        data = yamltext.parse(text, FILE).data
+        if not text.endswith(b"\n") or "program" not in data:
+            raise KeyError(FILE)
         return TheorySettings(float(data["gamma"]), str(data["waves"]))
     except FileNotFoundError:
         return None

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import matplotlib as mpl
+import numpy as np
 import pytest
 import short_job
 import yaml
@@ -181,3 +182,46 @@ def test_table_without_a_column(here: Path, main: Main, verb: str, column: str) 
     assert f"out/measures.csv, line 1, names no column {column}; mend it" in shown + said
     with pytest.raises(InputError, match="names no column"):
         tables.read_columns(table)[column]
+
+
+WRITERS = {  # verbs, and the files that each makes
+    ("leak", "out"): "out/leak.csv",
+    ("plot", "out"): "out/picture.png",
+    ("plot", "out", "--movie", "pressure"): "out/pressure.gif",
+    ("report", "out"): "out/report.html",
+    ("theory", "job.yaml", "--out", "out"): "out/theory.csv",
+    ("surface", "job.yaml"): "job-surface.png",
+    ("surface", "map.npy", "--job", "new.yaml", "--out", "map.png"): "map.png",
+    ("fit", "moduli.csv"): "moduli.yaml",
+    ("run", "job.yaml", "--out", "other"): "other",
+    ("study", "job.yaml", "--out", "other"): "other",
+}
+
+
+@pytest.mark.parametrize("words", WRITERS)
+def test_files_that_may_not_be_written(
+    here: Path, main: Main, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
+) -> None:
+    """One sentence that names the file, and exit code 2, whatever verb wants to write it."""
+    rough = {"shape": "rough", "hurst": 0.8, "long_wavelength": 1e-3, "short_wavelength": 1.25e-4, "rms_slope": 0.1}
+    job = {**JOB, "surface": rough, "study": {"mesh": [16, 32]}, "output": {"fields": ["pressure", "gap"]}}
+    (here / "job.yaml").write_text(yaml.safe_dump(job))
+    table = "".join(f"{f:g},{1e6 + 1e5 * f:g},{2e5 + 1e4 * f:g}\n" for f in (0.1, 0.3, 1.0, 3.0, 10.0, 30.0))
+    (here / "moduli.csv").write_text(f"f[Hz],G'[Pa],G''[Pa]\n{table}")
+    np.save(here / "map.npy", np.random.default_rng(1).normal(size=(16, 16)) * 1e-6)
+    if "out" in words and words[0] != "theory":
+        assert main("job.yaml", "--quiet", "--out", "out")[0] == DONE
+    opened = Path.open
+
+    def refuse(path: Path, mode: str = "r", *more: Any, **named: Any) -> Any:
+        if mode == "xb":
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return opened(path, mode, *more, **named)
+
+    monkeypatch.setattr(Path, "open", refuse)
+    more = ["--set", "surface.size=[1e-3,1e-3]", "--set", "surface.unit=m"] if "map.npy" in words else []
+    code, _, said = main(*words, *more)
+    assert (code, len(said.splitlines())) == (BAD_INPUT, 1), said
+    assert WRITERS[words] in said
+    assert said.rstrip().endswith("Permission denied")
+    assert ".part" not in said
