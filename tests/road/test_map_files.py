@@ -197,6 +197,8 @@ BAD = {
     "objects": ("road.npy", [[None, {}]], ("m", SIZE, None), "cannot be read"),
     "few points": ("road.npy", HEIGHTS[:3], ("m", SIZE, None), "at least 4 each way"),
     "mostly missing": ("road.npy", np.where(HEIGHTS > -1e-7, np.nan, HEIGHTS), ("m", SIZE, None), "more than half"),
+    "a word": ("road.xyz", "1 2 x\n", ("m", None, None), "cannot be read"),
+    "an unknown format": ("road.abc", "what is this", (None, None, None), "of no format that SurfaceTopography knows"),
     "ragged": ("road.txt", "1 2 3\n4 5\n", ("m", SIZE, None), "cannot be read"),
     "no bytes": ("road.npy", b"", ("m", SIZE, None), "it is empty"),
     "no values": ("road.npy", np.empty((0, 8)), ("m", SIZE, None), "an array of shape (0, 8), without values"),
