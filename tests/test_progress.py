@@ -1,8 +1,10 @@
 """How far long work has come: told on a terminal, and nowhere else."""
 
 import io
+import re
 import sys
 from pathlib import Path
+from time import sleep
 
 import pytest
 from drawing import ELASTIC, LOADS, MAPS, SLIDE, WAVE, ZENER, ran
@@ -38,7 +40,9 @@ def test_a_bar_stands_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> 
     assert next(items) == 1
     assert "maps:   0%" in terminal.getvalue()
     assert "0/3" in terminal.getvalue()
+    sleep(0.11)  # tqdm draws no more often than every tenth of a second
     assert list(items) == [2, 3]
+    assert re.search(r"1/3 \[\d\d:\d\d<\d\d:\d\d", terminal.getvalue())  # time passed and time left
 
 
 def test_steady_states(job: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
