@@ -374,3 +374,15 @@ def test_fractions_that_add_up_to_1_are_a_liquid() -> None:
 def test_mistakes(material: dict[str, Any], said: str) -> None:
     with pytest.raises(JobError, match=said):
         job_with(**material)
+
+
+@pytest.mark.parametrize(("count", "shown"), [(6, 6), (7, 3), (20, 3)])
+def test_describe_shortens_many_branches(tmp_path: Path, count: int, shown: int) -> None:
+    """The first, the last, and which are left out; the resolved job has them all."""
+    branches = ", ".join(f"{{modulus: 1.0e+6, relaxation_time: {k}.0e-3}}" for k in range(1, count + 1))
+    job = job_of(tmp_path, replaced(SMALL, material=f"{{model: zener, modulus_inf: 1.0e+6, branches: [{branches}]}}"))
+    lines = [line for line in describe_job(job).splitlines() if line.startswith("material.branches")]
+    assert len(lines) == shown
+    assert "relaxation_time 0.001 s" in lines[0]
+    assert f"relaxation_time {count / 1e3:g} s" in lines[-1]
+    assert job.resolved().count("relaxation_time") == count

@@ -13,6 +13,8 @@ from .height_arrays import HeightArray
 from .part import Part
 from .stages import Ramp
 
+MOST_BRANCHES = 6  # of a table to read: of more the first and the last
+
 
 def plain_data(value: Any) -> Any:
     """Return a value of a job as the plain data it was written as; keys without a value are left out, and those that
@@ -64,8 +66,13 @@ def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
         if isinstance(value, Part):
             yield from rows(value, f"{name}.")
         elif isinstance(value, tuple) and value and isinstance(value[0], Part):
-            for index, item in enumerate(value):
+            shown = list(enumerate(value))
+            if key == "branches" and len(value) > MOST_BRANCHES:
+                shown = [shown[0], shown[-1]]
+            for index, item in shown:
                 yield f"{name}.{index}", listed_line(item), ""
+                if index == 0 and len(shown) < len(value):
+                    yield f"{name}.1 to {len(value) - 2}", "are in job.resolved.yaml", ""
         else:
             yield name, text(value), _unit_of(value, part, key)
 
