@@ -109,9 +109,9 @@ def test_an_interface_has_the_error_of_the_area() -> None:
 
 @pytest.mark.parametrize("steady", [False, True])
 def test_the_mesh_makes_the_area_wrong(steady: bool) -> None:
-    """By 0.6 of the correction over the fourth root of the number of spots, 0.8 in steady sliding, a cell at least;
+    """By 0.5 of the correction over the fourth root of the number of spots, 0.75 in steady sliding, a cell at least;
     twice that of one spot where all are alike, four times along straight edges."""
-    judge, share = (estimate_steady, 0.8) if steady else (estimate, 0.6)
+    judge, share = (estimate_steady, 0.75) if steady else (estimate, 0.5)
     found = judge(RUN, SEEN).area.mesh
     assert found == pytest.approx(share / 19.0 / count_spots(RUN, SEEN) ** 0.25)
     for straight, times in (False, 2.0), (True, 4.0):
@@ -131,7 +131,7 @@ def test_steady_friction_has_no_error_of_time_steps() -> None:
     found = estimate_steady(RUN, SEEN)
     assert found.friction is not None
     assert (found.friction.time, found.friction.folded, found.area.time) == (0.0, 0.0, 0.0)
-    assert found.friction.mesh == pytest.approx(0.24 / 19.0 / count_spots(RUN, SEEN) ** 0.25)
+    assert found.friction.mesh == pytest.approx(0.16 / 19.0 / count_spots(RUN, SEEN) ** 0.25)
     assert estimate_steady(RUN, replace(SEEN, friction=0.0)).friction is None
 
 
@@ -194,7 +194,7 @@ def test_without_edges_or_losses() -> None:
 
 
 def test_steady_friction_has_what_edges_lose() -> None:
-    """0.8 of twice the share that is lost, of all up to half contact, and of twice what is open beyond; six times in
+    """0.7 of twice the share that is lost, of all up to half contact, and of twice what is open beyond; six times in
     free boxes; none at rest and where waves pass fast. Cells count along the sliding."""
     share, _ = lost_in_short_waves(ONE, radius_of(KNOWN, MOVES), SLOW, False)
     assert lost_at_edges(KNOWN, MOVES) == pytest.approx(2.0 * share, rel=1e-4)
@@ -203,7 +203,7 @@ def test_steady_friction_has_what_edges_lose() -> None:
     assert lost_at_edges(KNOWN, still) == 0.0
     assert lost_at_edges(KNOWN, fast) < 0.01 * share
     both = (friction_of(KNOWN, seen, steady=True).mesh for seen in (MOVES, still))
-    assert next(both) - next(both) == pytest.approx(0.8 * 2.0 * share, rel=1e-4)
+    assert next(both) - next(both) == pytest.approx(0.7 * 2.0 * share, rel=1e-4)
     seen = replace(MOVES, area=0.75, corrected=0.745)
     share, _ = lost_in_short_waves(ONE, radius_of(KNOWN, seen), SLOW, False)
     assert lost_at_edges(KNOWN, seen) == pytest.approx(2.0 * 0.5 * share, rel=1e-4)
