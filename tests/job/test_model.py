@@ -236,7 +236,7 @@ def test_a_resolved_job_reads_back_with_any_title(tmp_path: Path, title: str) ->
 def test_a_resolved_job_that_is_none(tmp_path: Path) -> None:
     path = tmp_path / "job.resolved.yaml"
     path.write_text("[1, 2")
-    with pytest.raises(InputError, match=r"job\.resolved\.yaml cannot be read"):
+    with pytest.raises(InputError, match=r"job\.resolved\.yaml is cut off: it lacks its section checkpoint"):
         shown_job(path)
 
 
