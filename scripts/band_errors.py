@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from parcontact import job as jobs
 from parcontact.accuracy.budget import Parts
 from parcontact.bands.band import Band
-from parcontact.bands.choice import choose
+from parcontact.bands.choice import cut_bands
 from parcontact.bands.road_sliding import SURE, RoadSliding
 from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding.point import Point
@@ -66,7 +66,7 @@ def case_of(number: int, seed: int, line: bool) -> tuple[dict[str, Any], int, fl
     }
     shape = [points, 1] if line else points
     of_all = jobs.load({**job, "bands": {"count": 1, "points": shape}})
-    band = Band(of_all, choose(of_all), 0, 0)
+    band = Band(of_all, cut_bands(of_all), 0, 0)
     band.slide((speed, 0.0), 1.0)
     text = f"{name:10} H {hurst:4} slope {slope:5.3f} v {speed:7.3g} points {points}"
     return {**job, "title": text}, points, speed, load * band.full_contact_rms

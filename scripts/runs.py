@@ -32,7 +32,7 @@ def begun(
 
 def marched(march: "March", note: Callable[["March"], None] | None = None) -> tuple[list["StepRow"], list[float]]:
     """All rows of a march, the initial one first, and the CPU time [s] when each was done; `note` sees each state."""
-    from parcontact.march.loop import run
+    from parcontact.march.loop import run_steps
 
     rows, clock = list["StepRow"](), list[float]()
 
@@ -42,7 +42,7 @@ def marched(march: "March", note: Callable[["March"], None] | None = None) -> tu
         if note is not None:
             note(now)
 
-    run(march, [keep])
+    run_steps(march, [keep])
     return rows, clock
 
 

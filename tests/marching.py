@@ -12,7 +12,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.job import Job, load
-from parcontact.march.loop import March, run
+from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding import start
 from parcontact.storage.row import StepRow
@@ -53,7 +53,7 @@ def marched(
 ) -> tuple[March, list[StepRow]]:
     """A march at the end of a job, and the row of every instant, the initial one first."""
     march, rows = begun(data, comm), list[StepRow]()
-    run(march, [lambda state: rows.append(state.row), *tasks])
+    run_steps(march, [lambda state: rows.append(state.row), *tasks])
     return march, rows
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from parcontact import job, scene
 from parcontact.march.loop import March
-from parcontact.march.loop import run as run_march
+from parcontact.march.loop import run_steps as run_march
 from parcontact.parallel.slab import Slab
 from parcontact.storage.row import StepRow
 

@@ -181,3 +181,17 @@ def test_classes_change_little() -> None:
     numbers = {kind.name: len(changing(kind)) for kind in kinds if isinstance(kind, ast.ClassDef)}
     assert max(numbers.values()) > 1
     assert not {name: number for name, number in numbers.items() if number > MOST_THAT_CHANGES}
+
+
+FOR_USERS = {"theory", "command", "python"}  # rooms whose names are those that users write
+
+
+def test_functions_have_a_name_of_their_own() -> None:
+    """A public function of a module has a name that no other module gives to one, but for those that users write, and
+    those of the same thing that users write."""
+    found: dict[str, list[str]] = {}
+    for module, path in MODULES.items():
+        functions = [part.name for part in ast.parse(path.read_text()).body if isinstance(part, ast.FunctionDef)]
+        for name in (name for name in functions if not name.startswith("_") and room(module) not in FOR_USERS):
+            found.setdefault(name, []).append(module)
+    assert {name: modules for name, modules in found.items() if len(modules) > 1} == {}

@@ -79,7 +79,7 @@ class Cut:
         return math.sqrt(square)
 
 
-def choose(job: Job) -> Cut:
+def cut_bands(job: Job) -> Cut:
     """Return the bands of a job. Raises InputError for a spectrum that cannot be read, and for too few points."""
     asked = Bands() if job.bands == AUTO or job.bands is None else job.bands
     assert isinstance(asked, Bands)

@@ -38,7 +38,7 @@ def band_of_map(job: Job, shortest: float, cells: float) -> MapBand | None:
     part = job.surface[0]
     if not isinstance(part, Topography):
         return None
-    whole = map_files.read(part)
+    whole = map_files.read_map(part)
     if whole.is_line:
         raise InputError(f"{part.path} is a line scan; bands take a map, or the spectrum of the scan in a table")
     size = part.copies * whole.size[0], part.copies * whole.size[1]

@@ -23,7 +23,7 @@ from ..steady_sliding.point import Point
 from .band import Rung, Vector
 from .band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
 from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
-from .choice import FEWEST, MOST, SAMPLE_SHARE, choose, describe_cut, doubts_of_bands
+from .choice import FEWEST, MOST, SAMPLE_SHARE, cut_bands, describe_cut, doubts_of_bands
 from .limits import STRAIN
 
 MOST_ROUNDS = 20  # tuning: of temperatures, more than any case has needed
@@ -81,7 +81,7 @@ class RoadSliding:
     table: tuple[str, Sequence[str]] | None = (TABLE, names_of(BANDS))
 
     def __init__(self, job: Job, slab: Slab) -> None:
-        self.job, self.slab, self.cut = job, slab, choose(job)
+        self.job, self.slab, self.cut = job, slab, cut_bands(job)
         self._cascade = Cascade(job, self.cut, slab)
         self.setup: Setup = replace(self._cascade.band(0, 0).setup, slab=slab)
         self.temperature, self._own_temperature = math.nan, temperature_of(job.material)

@@ -8,12 +8,12 @@ from ..parallel.slab import Slab
 from ..solve.interface_law import HARD
 from ..steady_sliding.curve import request
 from .cascade import Cascade, Task
-from .choice import FEWEST, choose, describe_cut
+from .choice import FEWEST, cut_bands, describe_cut
 
 
 def plan_bands(job: Job, slab: Slab) -> Iterator[str]:
     """Yield lines on the bands of a job and the time of its points; collective, all ranks must take every line."""
-    wanted, cut = request(job), choose(job)
+    wanted, cut = request(job), cut_bands(job)
     yield from describe_cut(cut, job)
     cascade = Cascade(job, cut, slab)
     fastest = max(wanted.velocities)

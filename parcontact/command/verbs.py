@@ -88,9 +88,9 @@ def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
     notes.append([])
     degrees = (job.steady.temperatures if job.steady else None) or ()
     if job.bands is not None:
-        from ..bands.choice import choose, describe_cut, doubts_of_bands
+        from ..bands.choice import cut_bands, describe_cut, doubts_of_bands
 
-        cut = choose(job)
+        cut = cut_bands(job)
         notes[-1] += describe_cut(cut, job)
         return doubts_of_bands(job, cut, degrees)
     if not job.depends_on_heights and not job.measured:
@@ -155,9 +155,9 @@ def _on_one_grid(job: Job) -> Job:
     """Return a job with one grid for all of its waves."""
     if job.bands is None:
         return job
-    from ..bands.choice import choose, on_one_grid_of_all
+    from ..bands.choice import cut_bands, on_one_grid_of_all
 
-    return on_one_grid_of_all(job, choose(job))
+    return on_one_grid_of_all(job, cut_bands(job))
 
 
 @ranks.root_alone
@@ -175,7 +175,7 @@ def fit(options: argparse.Namespace) -> int:
     law = given(options.shift, options.reference)
     of_fit = (options.error, options.weight, options.vertical)
     made = compound.fitted(options.table, options.poisson, options.reference, law, *of_fit)
-    for line in files.write(made, target, band):
+    for line in files.write_compound(made, target, band):
         print(line)
     return DONE
 
@@ -190,7 +190,7 @@ def study(options: argparse.Namespace) -> int:
         return on_root(world, lambda: _load(options, changes))
 
     job = make(())
-    return whole_study.run(job, make, Slab(world, *job.grid.points), options.quiet)
+    return whole_study.run_study(job, make, Slab(world, *job.grid.points), options.quiet)
 
 
 @ranks.root_alone
@@ -262,7 +262,7 @@ def report(options: argparse.Namespace) -> int:
     """Write one HTML file to send: what was asked, results, data, origin."""
     from ..report import page
 
-    print(f"report: {page.write(options.directories, options.out)}")
+    print(f"report: {page.write_report(options.directories, options.out)}")
     return DONE
 
 

@@ -15,7 +15,7 @@ from ..effects.contact_law import touching_of
 from ..errors import InputError
 from ..job import reading
 from ..job.resolved import RESOLVED, shown_job
-from ..leakage.flow import Flow, Leak, Map, leak, mesh_error, solve_flow
+from ..leakage.flow import Flow, Leak, Map, flow_mesh_error, leak, solve_flow
 from ..leakage.fluids import PressureDrop
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
@@ -34,7 +34,7 @@ class LeakInstant(NamedTuple):
 
     `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` these over K of the surface that just
     touches, NaN where that is not known; `constriction` [m] is the smallest gap on the widest path of the direction
-    that leaks more; `error_x` and `error_y` are by what share K differs on half the mesh (`flow.mesh_error`);
+    that leaks more; `error_x` and `error_y` are by what share K differs on half the mesh (`flow.flow_mesh_error`);
     `flow_rate` [m^3/s] and `mass_flow` [kg/s] are those of a fluid in this direction (`leakage.fluids`), NaN without
     one.
     """
@@ -122,7 +122,7 @@ class Gaps:
             shown.append(leakage.flux(gap, flow.pressure, self.size))
             flows.append(replace(flow, pressure=np.empty((0, 0))))
             of_fluid.append(self._conductivity(gap, flow, axis))
-            errors.append(mesh_error(gap, flow, self.size, axis, self._sides(axis)))
+            errors.append(flow_mesh_error(gap, flow, self.size, axis, self._sides(axis)))
         return SolvedLeak(Leak(*flows), (errors[0], errors[1]), (of_fluid[0], of_fluid[1])), shown
 
     def _sides(self, axis: str) -> bool:
@@ -182,7 +182,7 @@ def write_leakage(
     files.replace_file(table, to_csv(names_of(columns), (values_of(columns, row) for row in rows)))
     instant = PlottedRun(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
     flows = leaks[drawn].leak.along_x, leaks[drawn].leak.along_y
-    leakage.draw(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
+    leakage.draw_leakage(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
     yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
     yield from (text for axis in "xy" for text in _describe(rows, axis))
     told = max((k for k, row in enumerate(rows) if row.percolates_x + row.percolates_y), default=len(rows) - 1)

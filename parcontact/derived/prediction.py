@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import job as jobs
 from .. import scene
-from ..bands.choice import choose
+from ..bands.choice import cut_bands
 from ..columns import BANDS_THEORY, STEADY_THEORY, THEORY, Table, names_of, to_csv, values_of
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import InputError
@@ -137,7 +137,7 @@ class BandInstant(NamedTuple):
 
 def predict_bands(job: Job, wanted: Request) -> Iterator[BandInstant]:
     """Yield friction and area of each band of a job: what the theory adds where finer waves are seen, too."""
-    cut = choose(job)
+    cut = cut_bands(job)
     rows = dict[Wanted, list[SteadyInstant]]()
     for number in range(cut.count):
         shown = predict_steady(job, wanted, shortest=cut.wavelengths(number)[1])
@@ -248,7 +248,7 @@ def _on_body(job: Job, rings: Rings) -> Rings:
 def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
     """Return the spectrum between the limits of the job; the box holds no waves longer than its longer side."""
     if job.bands is not None:
-        spectrum = choose(job).spectrum.without_shorter(shortest)
+        spectrum = cut_bands(job).spectrum.without_shorter(shortest)
         phi = lambda k: np.asarray(spectrum.phi(k), float)  # noqa: E731
         return persson_rings.rings_of_spectrum(phi, *spectrum.ends, slide, spectrum.kinks)
     part = _only_rough(job)

@@ -27,7 +27,7 @@ def describe_surface(job: Job, heights: Array, told: list[str], shortest: float 
         raise InputError(f"--out must end in .{', .'.join(style.MARKED)}, got {str(picture)!r}")
     found, part, measured = statistics.surface_statistics(heights, job.grid.size), job.surface[0], None
     lines = []
-    whole = map_files.read(part) if isinstance(part, Topography) and len(job.surface) == 1 else None
+    whole = map_files.read_map(part) if isinstance(part, Topography) and len(job.surface) == 1 else None
     if isinstance(part, Topography) and whole and not whole.is_line:  # at its own points, its edges joined smoothly
         prepared = prepare(part, job.grid, whole)
         (ny, nx), (lx, ly) = prepared.cut.shape, prepared.size
@@ -39,7 +39,7 @@ def describe_surface(job: Job, heights: Array, told: list[str], shortest: float 
         lines.append(f"missing        {per_cent(float(np.isnan(prepared.cut).mean()))} of its points")
     try:
         picture.parent.mkdir(parents=True, exist_ok=True)
-        surface.draw(surface.Sketch(heights, job.grid.size, found, measured), picture)
+        surface.draw_surface(surface.Sketch(heights, job.grid.size, found, measured), picture)
     except OSError as error:
         raise InputError(f"{picture} cannot be written: {hdf5.reason(error)}") from error
     yield from (*lines, *told)

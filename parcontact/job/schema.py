@@ -26,7 +26,7 @@ from .sections.materials import Dma, Elastic, Zener
 from .sections.part import Part, kind_key, literal_words
 from .sections.quantities import AUTO_POINTS, FROM_SURFACE, LARGEST, MOST, along_x, both, bounded, countable, listed
 from .sections.stages import expand_range
-from .text.fault import choices
+from .text.fault import list_words
 
 Schema = dict[str, Any]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -164,7 +164,7 @@ def _keys(part: type[Part]) -> Iterator[Key]:
     found = part.model_json_schema(schema_generator=SchemaOfKeys)
     for word, schema in found["properties"].items():
         words = literal_words(part.model_fields[word].annotation)
-        text = schema.get("description") or (choices(words) if words else "a mapping of the keys below")
+        text = schema.get("description") or (list_words(words) if words else "a mapping of the keys below")
         units = [unit for unit in re.findall(r"\[([^\]]+)\]", text) if "," not in unit]
         needed = word in found.get("required", ()) or word == kind_key(part)
         bounds = dict(_bounds(schema))

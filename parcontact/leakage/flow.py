@@ -77,7 +77,9 @@ def _resistances(gap: Map, constriction: float, periodic_sides: bool) -> Map:
     return found
 
 
-def mesh_error(gap: Map, flow: Flow, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True) -> float:
+def flow_mesh_error(
+    gap: Map, flow: Flow, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True
+) -> float:
     """Return by what share K of a flow differs if only every second point of its gap is known, beginning with the first
     or with the second, whichever differs more; NaN where contact closes. The other arguments are those of `solve_flow`.
 

@@ -42,7 +42,7 @@ def accepts(scene: Scene, contact: Contact) -> bool:
     return scene.choices.numerics.accept_unconverged and math.isfinite(contact.certificate.worst)
 
 
-def where(scene: Scene, step: Step) -> str:
+def describe_place(scene: Scene, step: Step) -> str:
     """Return number, time and stage of a step."""
     return f"step {step.number} at t = {step.time:g} s (stage {scene.choices.timeline.history[step.stage].name!r})"
 
@@ -50,7 +50,7 @@ def where(scene: Scene, step: Step) -> str:
 def not_finite(scene: Scene, step: Step, measures: Measures) -> StepError:
     """Return the error of a step whose solve meets its conditions, and whose results are no numbers all the same."""
     wrong = ", ".join(name for name, value in asdict(measures).items() if not math.isfinite(value))
-    return StepError(f"{where(scene, step)}: {wrong} would not be finite; {FINITE}")
+    return StepError(f"{describe_place(scene, step)}: {wrong} would not be finite; {FINITE}")
 
 
 def of_solve(
@@ -62,7 +62,7 @@ def of_solve(
     `moved` is by how many cells the surface went in the step.
     """
     also = f", also with {', with '.join(tried)}" if tried else ""
-    numerics, what = scene.choices.numerics, f"{where(scene, step)}: the contact solve {failed.failure}{also}"
+    numerics, what = scene.choices.numerics, f"{describe_place(scene, step)}: the contact solve {failed.failure}{also}"
     if not np.isfinite(last.certificate.worst):
         return StepError(f"{what}; {FINITE}")
     reach = _reach(scene, last, h)
@@ -102,4 +102,4 @@ def refuse_beyond_full_contact(scene: Scene, step: Step, effective: Array) -> No
     if sanity.has_full_contact(scene.setup):
         mean = scene.slab.sum(float(effective.sum(dtype=np.float64)))[0] / scene.slab.points
         if text := sanity.beyond_full_contact(scene.setup, step.load, mean * scene.units.height):
-            raise StepError(f"{where(scene, step)}: {text}")
+            raise StepError(f"{describe_place(scene, step)}: {text}")

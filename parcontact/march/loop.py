@@ -16,7 +16,7 @@ from ..storage.row import StepRow
 from .dry_law import law_of
 from .errors import ErrorMemory
 from .failure import DetachedError
-from .state import State, entries, first_state, restored, save
+from .state import State, entries, first_state, restored, save_state
 from .step import make_step
 
 FIELDS_OF_EFFECTS = {"temperature": "a thermal section"}
@@ -91,7 +91,7 @@ class March:
 
     def save(self, path: Path, facts: Facts) -> None:
         """Write a checkpoint; collective. Raises RunError."""
-        save(path, self.scene, self.state, facts)
+        save_state(path, self.scene, self.state, facts)
 
     def field(self, name: str) -> Array:
         """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], or the rise of
@@ -145,7 +145,7 @@ def next_step(scene: Scene, state: State, timeline: Timeline, stop: int) -> Step
 Task = Callable[[March], bool | None]
 
 
-def run(march: March, tasks: Sequence[Task], steps: Iterable[Step] | None = None) -> bool:
+def run_steps(march: March, tasks: Sequence[Task], steps: Iterable[Step] | None = None) -> bool:
     """Advance, after every step doing the tasks in order, until the steps end or a task says True.
 
     Without steps they are all of the job's, and the tasks are done for the state of now too. Returns whether a task has

@@ -266,7 +266,7 @@ def entries(scene: Scene, state: State) -> dict[str, Entry]:
     return found
 
 
-def save(path: Path, scene: Scene, state: State, facts: Facts) -> None:
+def save_state(path: Path, scene: Scene, state: State, facts: Facts) -> None:
     """Write a checkpoint of a state, with the plans of its transforms; collective. Raises RunError."""
     everything = {**entries(scene, state), "plans/all": Entry(wisdom.gather(scene.slab))}
     checkpoint.write_checkpoint(path, scene.slab, replace(facts, step=state.row.step, time=state.row.time), everything)

@@ -66,7 +66,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         scene.slab.tally["operator"] - calls,
         *energies_of(scene, energy, followed),
         seconds=time.perf_counter() - began,
-        remark="; ".join(f"{failure.where(scene, step)}: {remark}" for remark in remarks if remark),
+        remark="; ".join(f"{failure.describe_place(scene, step)}: {remark}" for remark in remarks if remark),
         errors=errors.budget if states_errors else None,
         added=effect_values(scene.effects, followed),
     )

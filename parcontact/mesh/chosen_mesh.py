@@ -181,5 +181,5 @@ def _extent_of_file(part: Topography, _: int) -> tuple[int, int, tuple[float, fl
     """Return the points along y and x of a measured map, and its size (lx, ly) [m]. Raises InputError."""
     from ..road import map_files  # reads maps: jobs that name none do without
 
-    found = map_files.read(part)
+    found = map_files.read_map(part)
     return (*found.heights.shape, found.size)

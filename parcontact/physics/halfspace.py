@@ -164,7 +164,7 @@ class HalfSpace:
         @cache
         def table() -> Spectrum:
             if self.repeats_along_x:
-                images = partial(strip.coefficients, size=self.size, poisson=self.poisson)
+                images = partial(strip.strip_coefficients, size=self.size, poisson=self.poisson)
                 return tabulate(padded, self.size, images, even=True, inside=True, symmetric=False)
             return tabulate(padded, self.size, self._coefficient, self.layer is None, inside=True)
 

@@ -24,7 +24,7 @@ NEAREST = 12  # accuracy: images on either side that are summed; the rest by Eul
 GAUSS = 0.5 / np.sqrt(3.0)  # nodes of two points over a cell [cells]
 
 
-def coefficients(x: Array, y: Array, dx: float, dy: float, *, size: tuple[float, float], poisson: float) -> Array:
+def strip_coefficients(x: Array, y: Array, dx: float, dy: float, *, size: tuple[float, float], poisson: float) -> Array:
     """Displacement [length] at distance (x, y) from the centre of a `dx x dy` cell and its images, under a unit
     pressure on each of them, for G = 1; x is within half of the box of `size = (lx, ly)`."""
     total = sum(np.asarray(over_cell(x + m * size[0], y, dx, dy)) for m in range(-NEAREST, NEAREST + 1))

@@ -21,7 +21,7 @@ SHOWN = 4  # of velocities, as lines
 THIN = 1.0  # tuning: width of the lines of the theory
 
 
-def charts(directory: Path) -> list[Chart]:
+def chart_bands(directory: Path) -> list[Chart]:
     """Return panels of a table of bands: of its first pressure and temperature, where there are several."""
     if not (directory / TABLE).is_file():
         return []

@@ -34,13 +34,13 @@ def refuse_foreign(target: Path) -> None:
         raise InputError(f"{target} cannot be read: {error}") from error
 
 
-def write(compound: Compound, target: Path, job_band: tuple[float, float] | None) -> Iterator[str]:
+def write_compound(compound: Compound, target: Path, job_band: tuple[float, float] | None) -> Iterator[str]:
     """Write both files and say so, line by line; `job_band` [Hz] are the frequencies of a job. Raises InputError."""
     text, picture = compound.text(), target.with_suffix(".png")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         files.replace_file(target, text)
-        draw(compound, picture, job_band)
+        draw_compound(compound, picture, job_band)
     except OSError as error:
         raise InputError(f"{target} cannot be written: {hdf5.reason(error)}") from error
     yield from (line.removeprefix("# ") for line in text.splitlines() if line.startswith("#"))
@@ -54,7 +54,7 @@ def write(compound: Compound, target: Path, job_band: tuple[float, float] | None
                 yield f"warning: the job's frequencies reach {beyond}"
 
 
-def draw(compound: Compound, path: Path, job_band: tuple[float, float] | None = None) -> None:
+def draw_compound(compound: Compound, path: Path, job_band: tuple[float, float] | None = None) -> None:
     """Write the picture, a png, with the frequencies of a job shaded; raises OSError."""
     with style.drawing({"axes.grid": True, "grid.alpha": 0.3, "lines.markersize": 4, "legend.frameon": False}):
         figure = Figure(figsize=(8, 6), layout="constrained")
@@ -67,7 +67,7 @@ def draw(compound: Compound, path: Path, job_band: tuple[float, float] | None = 
         panels["spectrum"].loglog(compound.series.times, compound.series.moduli, "o", color="black")
         panels["spectrum"].set(xlabel="relaxation time [s]", ylabel="shear modulus of the branch [Pa]")
         _draw_shift(panels["shift"], compound)
-        style.save(figure, path, dpi=150)
+        style.save_figure(figure, path, dpi=150)
 
 
 def _reduced(compound: Compound) -> Iterator[tuple[Array, list[Array]]]:

@@ -49,7 +49,7 @@ class Abscissa:
         return [ChartLine(name, self.values, values[rows], look) for (name, values), look in drawn]
 
 
-def charts(run: PlottedRun, over: str = "") -> list[Chart]:
+def chart_histories(run: PlottedRun, over: str = "") -> list[Chart]:
     """Return panels of what was measured; none of a single solve. Raises InputError where nothing can be drawn."""
     if not run.curves:
         return []

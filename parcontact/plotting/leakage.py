@@ -20,7 +20,7 @@ KINDS = ("flow", "constriction")  # of the columns of a direction
 LONG = 100.0  # ratio of times, beyond which their axis is logarithmic
 
 
-def draw(
+def draw_leakage(
     path: Path,
     size: tuple[float, float],
     gap: Map,
@@ -44,7 +44,7 @@ def draw(
         title = f"flow through the gap, {instant}\ncontact black{circled}"
         curve = [partial(charts.draw, chart_of(rows, over))] if any(row.constriction > 0.0 for row in rows[1:]) else []
         maps = [flow_map(axis, flow, flux) for axis, flow, flux in zip("xy", flows, fluxes, strict=True)]
-        return style.save(style.figure_of(title, [maps, curve] if curve else [maps]), path)
+        return style.save_figure(style.figure_of(title, [maps, curve] if curve else [maps]), path)
 
 
 def chart_of(rows: Sequence[Any], over: str) -> charts.Chart:

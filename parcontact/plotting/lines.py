@@ -22,7 +22,7 @@ RANGE = 1.3  # that is shown over that of the contact
 Curve = tuple[str, Array, Array]  # its name, and pressures [Pa] on a line [m]
 
 
-def panels(run: PlottedRun, fields: Fields, narrow: bool) -> Iterator[style.Panel]:
+def line_panels(run: PlottedRun, fields: Fields, narrow: bool) -> Iterator[style.Panel]:
     """Yield the panel of a narrow map, or of the only shape of a surface if that is round."""
     shape = run.job.surface[0]
     if narrow:

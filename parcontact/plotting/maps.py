@@ -45,7 +45,7 @@ TICKS = 5  # intervals at most; were it left to the room there is, ticks would c
 BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile and ratio to it, above which points do not set the range of colours
 
 
-def panels(run: PlottedRun, at: str = "") -> tuple[list[style.Panel], list[style.Panel]]:
+def map_panels(run: PlottedRun, at: str = "") -> tuple[list[style.Panel], list[style.Panel]]:
     """Return panels of pressures on a line, and maps of one instant; none of what was not saved.
 
     The instant is the one that is asked for, else the last, or where the surfaces came off that of the pull-off or of
@@ -55,7 +55,7 @@ def panels(run: PlottedRun, at: str = "") -> tuple[list[style.Panel], list[style
         with hdf5.open_results(run.directory / "fields.h5") as file:
             fields = Fields(file, at, until=run.telling_step)
             narrow = min(fields.x.size, fields.y.size) <= STRIP
-            pressures = list(lines.panels(run, fields, narrow)) if fields.read("pressure") is not None else []
+            pressures = list(lines.line_panels(run, fields, narrow)) if fields.read("pressure") is not None else []
             return pressures, [] if narrow or not fields.saved else list(_panels(run, fields))
     except (OSError, KeyError):
         if at:
@@ -170,7 +170,7 @@ def _draw_line(
     return lambda values: line.set_ydata(np.nan_to_num(values[0] if lies else values[:, 0]))
 
 
-def where(file: h5py.File, name: str) -> str:
+def dataset_of(file: h5py.File, name: str) -> str:
     """Return the data set of a map in a file, '' if there is none: temperatures of states are there under two names."""
     return next((key for key in (f"{name}_map", name) if key in file and file[key].ndim > 1), "")
 
@@ -188,7 +188,7 @@ def draw_frames(
 
     def read(index: int) -> Array:
         pressure = file["pressure"][index] if name == "gap" and "pressure" in file else None
-        return mask(name, file[where(file, name)][index], pressure, job)
+        return mask(name, file[dataset_of(file, name)][index], pressure, job)
 
     ranges = [find_range(read(index)) for index in labels]
     limits = min(low for low, _ in ranges), max(high for _, high in ranges)

@@ -19,7 +19,7 @@ FASTEST, SLOWEST = 20, 2  # frames per second
 FFMPEG, KINDS = "ffmpeg", (".gif", ".mp4")
 
 
-def write(directory: Path, name: str, out: Path | None = None) -> list[Path]:
+def write_movie(directory: Path, name: str, out: Path | None = None) -> list[Path]:
     """Write all saved instants of the map `name`, with one range of colours; returns the paths of the movies.
 
     They are NAME.gif in the directory, and NAME.mp4 where ffmpeg is; or `out` alone. Raises InputError for another

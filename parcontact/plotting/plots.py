@@ -68,7 +68,7 @@ def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> l
         raise InputError("--out names one picture: give one directory, or --compare several in one")
     with style.drawing():
         if options.movie:
-            return [path for one in directories for path in movie.write(one, options.movie, options.out)]
+            return [path for one in directories for path in movie.write_movie(one, options.movie, options.out)]
         if options.compare:
             return [_save(_draw_comparison(directories, options), Path("comparison"), options)]
         return [_save(_draw_directory(directory, options), directory / "picture", options) for directory in directories]
@@ -77,7 +77,10 @@ def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> l
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv alone, beside it; returns the picture's path."""
     with style.drawing():
-        title, panels = _wrap(steady.title(table.parent)), PlotOptions().to_panels(steady.charts(table.parent))
+        title, panels = (
+            _wrap(steady.steady_title(table.parent)),
+            PlotOptions().to_panels(steady.chart_steady(table.parent)),
+        )
         return _save(style.figure_of(title, [panels], legend=True), table.with_suffix(""))
 
 
@@ -91,7 +94,7 @@ def _save(figure: Figure, stem: Path, options: PlotOptions = PlotOptions()) -> P
     if kind not in style.MARKED:
         raise InputError(f"{target}: pictures are {', '.join(style.MARKED)}; say which with --format")
     try:
-        return style.save(figure, target, kind)
+        return style.save_figure(figure, target, kind)
     except OSError as error:
         raise InputError(f"cannot write {target}: {hdf5.reason(error)}") from error
 
@@ -104,18 +107,18 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
         run = PlottedRun(directory)
         found = _wrap(run.job.title or directory.absolute().name)
         titles.append(found if run.curves else f"{found}\n{histories.describe_solve(run)}")
-        groups.append(options.to_panels(options.choose(histories.charts(run, options.over))))
+        groups.append(options.to_panels(options.choose(histories.chart_histories(run, options.over))))
     elif options.at:
         raise InputError(f"--at {options.at}: {directory} holds no run, and so no maps of one")
     if has_curve and options.wants("steady"):
-        titles.append(_wrap(steady.title(directory)))
-        groups.append(options.to_panels(steady.charts(directory, options.over)))
+        titles.append(_wrap(steady.steady_title(directory)))
+        groups.append(options.to_panels(steady.chart_steady(directory, options.over)))
     if has_run and options.wants("maps"):
-        pressures, fields = maps.panels(run, options.at or "")
+        pressures, fields = maps.map_panels(run, options.at or "")
         groups.append(pressures)
     if has_sweep:
-        titles.append(_wrap(sweep.title(directory) or directory.absolute().name))
-        groups += [options.to_panels([chart]) for chart in options.choose(sweep.charts(directory))]
+        titles.append(_wrap(sweep.sweep_title(directory) or directory.absolute().name))
+        groups += [options.to_panels([chart]) for chart in options.choose(sweep.chart_sweep(directory))]
     if not (has_run or has_curve or has_sweep):
         if not directory.exists():
             raise InputError(f"{directory} is no directory")
@@ -152,9 +155,9 @@ def compare_charts(directories: Sequence[Path], options: PlotOptions = PlotOptio
 def _find_charts(directory: Path, options: PlotOptions) -> list[Chart]:
     found: list[Chart] = []
     if (directory / MEASURES).is_file():
-        found += options.choose(histories.charts(PlottedRun(directory), options.over))
+        found += options.choose(histories.chart_histories(PlottedRun(directory), options.over))
     if (directory / steady.TABLE).is_file() and options.wants("steady"):
-        found += steady.charts(directory, options.over)
+        found += steady.chart_steady(directory, options.over)
     return found
 
 

@@ -21,7 +21,7 @@ COLD = "friction_cold"  # friction without feedback from heat
 DIGITS = 6  # in which values agree that are the same but for rounding
 
 
-def charts(directory: Path, over: str = "") -> list[Chart]:
+def chart_steady(directory: Path, over: str = "") -> list[Chart]:
     """Return panels of a table of steady states; none if it holds no state yet, or is not to be drawn over `over`."""
     columns, area = read_table(directory / TABLE, NEEDED), find_free_area(directory)
     if over in ("time", "distance") or not columns["velocity"].size:
@@ -57,10 +57,10 @@ def charts(directory: Path, over: str = "") -> list[Chart]:
             series += _make_thin(columns | {name: columns[COLD]}, along, name, by, "without feedback", "--")
         series += _make_theory(theory, along, name, by) if theory and name in theory else ()
         found.append(Chart(key, axes[along], axes[name], series, log_x=True, legend_title=title))
-    return found + (band_charts.charts(directory) if x == "velocity" else [])
+    return found + (band_charts.chart_bands(directory) if x == "velocity" else [])
 
 
-def title(directory: Path) -> str:
+def steady_title(directory: Path) -> str:
     """Return the title of the job, with the pressure or force if there is one for all points."""
     job = shown_job(directory / STEADY_RESOLVED) if (directory / STEADY_RESOLVED).is_file() else None
     axis, loads = to_load(read_table(directory / TABLE, ("pressure",))["pressure"], find_free_area(directory))

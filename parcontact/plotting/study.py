@@ -44,7 +44,7 @@ class StudyPoint:
     best: bool
 
 
-def plot(
+def plot_study(
     directory: Path,
     curves: Sequence[StudyCurve],
     points: Mapping[str, Sequence[StudyPoint]],
@@ -58,7 +58,7 @@ def plot(
     with style.drawing():
         figures = {"convergence.png": _convergence(drawn, doubts)} if drawn else {}
         figures["work_precision.png"] = _work_precision(points)
-        return [style.save(figure, directory / name) for name, figure in figures.items()]
+        return [style.save_figure(figure, directory / name) for name, figure in figures.items()]
 
 
 def _convergence(curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Figure:

@@ -75,7 +75,7 @@ def drawing(settings: Mapping[Any, Any] = RC) -> Iterator[None]:
         yield
 
 
-def save(figure: Figure, path: Path, kind: str = "png", dpi: int = DPI) -> Path:
+def save_figure(figure: Figure, path: Path, kind: str = "png", dpi: int = DPI) -> Path:
     """Write a png, pdf or svg that is known as one of this program, and may replace such a one; returns its path."""
     with files.replaced(path, files.is_marked) as file:
         figure.savefig(file, dpi=dpi, format=kind, metadata={MARKED[kind]: files.MARK})

@@ -31,13 +31,13 @@ class Sketch:
     measured: Statistics | None = None
 
 
-def draw(sketch: Sketch, path: Path) -> None:
+def draw_surface(sketch: Sketch, path: Path) -> None:
     """Write the picture, a png, pdf or svg; raises OSError."""
     with style.drawing():
         figure = Figure(figsize=(style.WIDTH, 2 * style.HEIGHT), layout="constrained")
         for axes, panel in zip(figure.subplots(2, 2).ravel(), PANELS.values(), strict=True):
             panel(axes, sketch)
-        style.save(figure, path, path.suffix[1:])
+        style.save_figure(figure, path, path.suffix[1:])
 
 
 def _draw_map(axes: Axes, sketch: Sketch) -> None:

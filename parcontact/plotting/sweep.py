@@ -47,7 +47,7 @@ SIZES = {name: f"{name}_error" for name in ("mu_max", "mu_dyn", "pull_off")}  # 
 Rows = Sequence[dict[str, Any]]
 
 
-def charts(directory: Path) -> list[Chart]:
+def chart_sweep(directory: Path) -> list[Chart]:
     """Return panels of a sweep; none if no case has a number to draw, or no key with numbers is swept."""
     table = sweep_table.results(directory)
     rows, panels = sweep_table.read_cases(table), PANELS
@@ -80,7 +80,7 @@ def charts(directory: Path) -> list[Chart]:
     return found
 
 
-def title(directory: Path) -> str:
+def sweep_title(directory: Path) -> str:
     """Return the title of the job, as its cases have it; '' if there is none."""
     jobs = sorted(directory.glob(f"cases/*/{RESOLVED}")) + sorted(directory.glob(f"cases/*/{STEADY_RESOLVED}"))
     return shown_job(jobs[0]).title if jobs else ""

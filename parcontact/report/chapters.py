@@ -34,14 +34,19 @@ def describe_directory(directory: Path) -> Chapter:
     if not there:
         raise InputError(f"{directory} holds no results: it has none of {', '.join(KINDS)}")
     sections = [KINDS[name][1](directory) for name in there]
-    found, title, cited, places = log.read(directory), "", origin.list_citations(None), [f"{directory.absolute()}/"]
+    found, title, cited, places = (
+        log.read_logs(directory),
+        "",
+        origin.list_citations(None),
+        [f"{directory.absolute()}/"],
+    )
     of_cases = (path for name in (RESOLVED, STEADY_RESOLVED) for path in sorted(directory.glob(f"cases/*/{name}")))
     jobs_there = [*(directory / name for name in JOBS), *of_cases]
     if resolved := next((path for path in jobs_there if path.is_file()), None):  # of a sweep that of its first case
         job, warnings = _read_job(resolved)
         title, places = job.title, [*_places(job), *places]
         asked = _describe_job(job, resolved.with_name(JOBS[resolved.name]))
-        of_job = [asked, material.section(job), road.section(job)]
+        of_job = [asked, material.material_section(job), road.road_section(job)]
         if there == ["sweep.csv"]:
             of_job = _name_first_case([replace(asked, sentences=[_describe_swept(directory)]), *of_job[1:]])
             sections += _describe_example(directory, resolved.parent)
@@ -52,7 +57,7 @@ def describe_directory(directory: Path) -> Chapter:
         sections.append(ReportSection("Warnings", found.warnings or warnings or ["There was no warning."]))
     data = [embed_file(directory / name) for name in (*KINDS, *MORE_TABLES) if (directory / name).is_file()]
     said = "The tables, in SI units and with all digits, are inside this file:"
-    sections += [origin.section(directory, found), cited, ReportSection("Data", [said], downloads=data)]
+    sections += [origin.origin_section(directory, found), cited, ReportSection("Data", [said], downloads=data)]
     kinds = " and ".join(KINDS[name][0] for name in there)
     shown = [one.without(sorted(places, key=len, reverse=True)) for one in sections if one]
     here, there_is = Path.cwd(), directory.absolute()
@@ -60,7 +65,7 @@ def describe_directory(directory: Path) -> Chapter:
     return Chapter(title or there_is.name, named, kinds, shown, headline.find_headline(directory))
 
 
-def compare(directories: Sequence[Path]) -> Iterator[Chapter]:
+def compare_directories(directories: Sequence[Path]) -> Iterator[Chapter]:
     """Yield what several directories have in common, in one picture each: lines of a directory have one colour."""
     if len(directories) > 1:
         found = plots.compare_charts(directories)

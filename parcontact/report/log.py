@@ -42,7 +42,7 @@ class Log:
     machine: list[str]
 
 
-def read(directory: Path) -> Log:
+def read_logs(directory: Path) -> Log:
     """Return what the logs of a directory say; nothing where there is none."""
     lines = [line for name in LOGS for line in log_lines(directory / name)]
     warnings = [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..bands.choice import choose, on_one_grid_of_all
+from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..effects.relaxation import relaxation_of
 from ..errors import InputError
 from ..job import Dma, Job, Zener
@@ -22,11 +22,11 @@ POINTS = 400  # of a line
 CAPTION = "moduli and loss tangent over frequency, at the temperature of the job"
 
 
-def section(job: Job) -> ReportSection:
+def material_section(job: Job) -> ReportSection:
     """Return the section about the material of a job at its temperature."""
     if job.bands is not None:
         with suppress(InputError):  # its files are gone
-            job = on_one_grid_of_all(job, choose(job))
+            job = on_one_grid_of_all(job, cut_bands(job))
     series = relaxation_of(job.material)
     instant = series.modulus_inf + float(np.sum(series.moduli))
     rows = [

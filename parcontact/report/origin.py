@@ -95,7 +95,7 @@ def _percent(share: float) -> str:
     return f"{100 * share:.3g} %"
 
 
-def section(directory: Path, found: log.Log) -> ReportSection:
+def origin_section(directory: Path, found: log.Log) -> ReportSection:
     """Return what the newest file in a directory that knows it says about its origin."""
     there = [directory / name for name in ("fields.h5", "steady.h5") if (directory / name).is_file()]
     there += sorted(directory.glob("checkpoint/step-*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)

@@ -13,7 +13,7 @@ from .. import progress
 from ..errors import InputError
 from ..storage import files, hdf5
 from ..storage.provenance import PROGRAM
-from .chapters import compare, describe_directory
+from .chapters import compare_directories, describe_directory
 
 NAME, TEMPLATE = "report.html", "page.html.jinja"
 LONG_WORD = re.compile(r"\S{14,}")  # does not fit a column of a phone
@@ -22,7 +22,7 @@ BREAKS = re.compile(r"(?<=[_./,=:])(?=\w)")  # where a long word may go on in th
 NUMBER = re.compile(r"(?<=\d) (?=±|%|°C|(?:[nµmkMG]?(?:Pa|N|m|s|J|Hz)|h|min|days|years)\b)|(?<=±) |(?<==) (?=[\d-])")
 
 
-def write(directories: Sequence[Path], out: Path | None = None) -> Path:
+def write_report(directories: Sequence[Path], out: Path | None = None) -> Path:
     """Write the report of these output directories; returns its path: report.html in the first, unless `out` is given.
 
     Raises InputError for a directory without results, and for a file that cannot be written.
@@ -55,7 +55,7 @@ def _refuse_links(directory: Path) -> None:
 
 def render(directories: Sequence[Path]) -> str:
     each = [describe_directory(directory) for directory in progress.with_bar(directories, "chapters", "chapter")]
-    chapters = [*compare(directories), *each]
+    chapters = [*compare_directories(directories), *each]
     loader = PackageLoader("parcontact", "report")
     shown = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     shown.filters |= {"breakable": breakable, "whole_numbers": whole_numbers}

@@ -55,7 +55,7 @@ def describe_run(directory: Path) -> ReportSection:
         *leak_stop.describe_leak_stop(directory),
         theory_settings.describe_settings(directory),
     ]
-    pictures = [draw_chart(chart) for chart in histories.charts(run)] + _leakage(directory)
+    pictures = [draw_chart(chart) for chart in histories.chart_histories(run)] + _leakage(directory)
     shown = [numbers, *_leakage_of_stages(run), *_theory(directory, run)]
     return ReportSection("Results of the run", list(filter(None, told)), shown, pictures, browse_run(run))
 
@@ -102,7 +102,7 @@ def describe_curve(directory: Path) -> ReportSection:
     units_of |= dict.fromkeys(slide.ERRORS, "relative")
     head = [f"{_to_words(name)} [{units_of[name]}]" if units_of[name] else _to_words(name) for name in names]
     table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
-    pictures = [draw_chart(chart) for chart in steady.charts(directory)]
+    pictures = [draw_chart(chart) for chart in steady.chart_steady(directory)]
     states = partial(_label_states, find_free_area(directory))
     job = find_curve_job(directory)
     browsers = _browse_file(directory / "steady.h5", states, job) if job else []
@@ -136,7 +136,7 @@ def describe_sweep(directory: Path) -> ReportSection:
     used = [name for name in (rows[0] if rows else ()) if any(format_cell(row[name]) not in ("", "–") for row in rows)]
     table = _shorten(list(map(_add_unit, used)), [[row[name] for name in used] for row in rows])
     told = list(filter(None, [theory_settings.describe_settings(directory)]))
-    return ReportSection("Sweep", told, [table], [draw_chart(chart) for chart in sweep.charts(directory)])
+    return ReportSection("Sweep", told, [table], [draw_chart(chart) for chart in sweep.chart_sweep(directory)])
 
 
 def _add_unit(name: str) -> str:
@@ -205,7 +205,7 @@ def _browse_file(
         with hdf5.open_results(path) as file, style.drawing(RC):
             labels = choose_evenly(label(file), MOST_MAPS)
             chosen = Fields(file, until=step).chosen if step is not None else max(labels, default=0)
-            names = [name for name in maps.LOOKS if maps.where(file, name) and labels]
+            names = [name for name in maps.LOOKS if maps.dataset_of(file, name) and labels]
             return [_browse_map(file, name, labels, job, chosen) for name in names]
     except hdf5.FAILURES:
         return []

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..bands.band import Band
-from ..bands.choice import Cut, choose, describe_cut
+from ..bands.choice import Cut, cut_bands, describe_cut
 from ..derived.surface_summary import NOT_SELF_AFFINE
 from ..errors import InputError
 from ..job import Cylinder, Job, Sphere
@@ -22,7 +22,7 @@ POINTS = 400  # of a line
 MOST_POINTS = 2**22  # of a surface that is made anew for a report
 
 
-def section(job: Job) -> ReportSection:
+def road_section(job: Job) -> ReportSection:
     """Describe the surface of a job, made anew; where its files are gone or it is too large, as the job says."""
     shapes = ReportTable(
         ("shape",), [(listing.listed_line(part),) for part in job.surface], "shapes, whose heights add up"
@@ -50,7 +50,7 @@ def section(job: Job) -> ReportSection:
 def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
     """Describe the bands of a job, and the surface of the coarsest one."""
     try:
-        cut = choose(job)
+        cut = cut_bands(job)
         setup = Band(job, cut, 0, 0).setup
     except InputError as error:
         return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])

@@ -51,7 +51,7 @@ class MapContents:
     unit_xy: float | None = None
 
 
-def read(part: Topography) -> Map:
+def read_map(part: Topography) -> Map:
     """Read a map. The job must give units and size for files that do not have them, and only for those. Raises
     InputError, in one sentence."""
     path = part.path

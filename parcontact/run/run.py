@@ -73,7 +73,7 @@ class Run:
         try:
             if not loop.run_tasks(self.march, [self.decide] if saved else [self.record, self.decide]):
                 steps = self.march.steps(self.timeline, self.options.until)
-                loop.run(self.march, [self.record, self.decide], steps)
+                loop.run_steps(self.march, [self.record, self.decide], steps)
         except StepError as error:
             text = f"{error}{self._leave_checkpoint()}"
             self._log_counts()

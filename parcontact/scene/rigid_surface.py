@@ -136,7 +136,7 @@ def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, told: Told) -> Sp
     heights: list[Array] = []
 
     def make() -> tuple[list[Doubt], tuple[spectrum.MeasuredSpectrum, tuple[float, float]] | None]:
-        found = map_files.read(part)
+        found = map_files.read_map(part)
         if found.is_line:
             told.notes.append(map_sentences.describe_line(part, found))
             return [], spectrum.of_line(part, found)

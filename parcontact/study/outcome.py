@@ -54,10 +54,10 @@ COUNTS = ("mesh", "steps", "operator_calls")
 
 def warm_up(job: Job, slab: Slab) -> None:
     """Make the first steps of a job, so that no case pays for compiled loops and transform plans; collective."""
-    loop.run(March(scene.build(job, slab)), [lambda state: state.row.step >= FIRST_STEPS])
+    loop.run_steps(March(scene.build(job, slab)), [lambda state: state.row.step >= FIRST_STEPS])
 
 
-def run(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome | None:
+def march_through(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome | None:
     """March through a job, writing nothing; None if `stopped` says so after a step; collective."""
     marching = start.first(job, slab)
     rows: list[StepRow] = []
@@ -67,7 +67,7 @@ def run(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome | None:
         return slab.reduce((), [float(stopped())])[0] > 0.0
 
     began, tally = time.process_time(), slab.tally.copy()
-    if loop.run(marching, [note]):
+    if loop.run_steps(marching, [note]):
         return None
     counted = Tally(slab.tally.since(tally))
     seconds = slab.sum(time.process_time() - began)[0]

@@ -20,7 +20,7 @@ DONE, AGAIN = 0, 3  # exit codes
 MakeJob = Callable[[Sequence[str]], Job]
 
 
-def run(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
+def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
     """Run a study; collective. `make` gives the job changed by some overrides; returns the exit code.
 
     All cases are read before the first is run. After a stop the same command goes on with the cases that lack.
@@ -85,7 +85,7 @@ class _Study:
             if not self.warm:
                 outcome.warm_up(job, slab)
                 self.warm = True
-            return outcome.run(job, slab, stopped)
+            return outcome.march_through(job, slab, stopped)
         except RunError as error:
             raise RunError(f"{case}: {error}") from error
 
@@ -103,7 +103,7 @@ class _Study:
         proven = {case: verdict.proven(error, reference) for case, error in errors.items()}
         doubts = {name: limit.doubt for name, limit in reference.items()}
         points = {quantity: _points(ordered, proven, quantity) for quantity in verdict.NEEDED if quantity in doubts}
-        pictures = study_plots.plot(self.path.parent, self._curves(ordered, errors), points, doubts)
+        pictures = study_plots.plot_study(self.path.parent, self._curves(ordered, errors), points, doubts)
         for line in (*lines, f"done: {self.path} and {', '.join(picture.name for picture in pictures)}"):
             self.say(line)
 

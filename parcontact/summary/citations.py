@@ -7,7 +7,7 @@ import h5py
 
 from ..errors import InputError
 from ..job.resolved import RESOLVED, STEADY_RESOLVED
-from ..job.text.yamltext import read
+from ..job.text.yamltext import read_source
 from ..storage import hdf5
 from ..storage.provenance import PROGRAM, references_of
 
@@ -20,7 +20,7 @@ def describe_citations(directory: Path) -> str:
         raise InputError(f"{directory} holds no run: it has neither {' nor '.join(names)}")
     theory = ["theory"] * any((directory / name).is_file() for name in ("theory.csv", "steady_theory.csv"))
     try:
-        cited = references_of(read(found, str(found)).data, theory)
+        cited = references_of(read_source(found, str(found)).data, theory)
     except (AttributeError, KeyError, TypeError) as error:
         raise InputError(f"{found} is damaged: not every section of a resolved job is there; run it again") from error
     lines = [f"{directory}: please cite", "", f"* {_program(directory)}", "    this program (CITATION.cff)"]

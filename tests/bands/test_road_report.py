@@ -11,7 +11,7 @@ import yaml
 
 from parcontact import job as jobs
 from parcontact.__main__ import main
-from parcontact.bands.choice import choose, doubts_of_bands, on_one_grid_of_all
+from parcontact.bands.choice import cut_bands, doubts_of_bands, on_one_grid_of_all
 from parcontact.bands.trial import plan_bands
 from parcontact.parallel.slab import Slab
 from parcontact.physics.flash import Flash
@@ -53,12 +53,14 @@ def test_frequencies_are_of_all_waves(tmp_path: Path) -> None:
     """From the slowest over the longest wave, the map, to the fastest over the shortest one of the spectrum."""
     table = spectrum(tmp_path / "s.csv", LONG, LONG / 40)
     alone = jobs.load(job_of([{"shape": "rough", "spectrum": table, "seed": 1}]))
-    low, high = excited_band(on_one_grid_of_all(alone, choose(alone))) or (0.0, 0.0)
+    low, high = excited_band(on_one_grid_of_all(alone, cut_bands(alone))) or (0.0, 0.0)
     assert low == pytest.approx(0.01 / LONG, rel=1e-3)
     assert high == pytest.approx(1.0 / (LONG / 40), rel=0.02)  # whole cells
     first = road_map(tmp_path / "road.npy", 128, 4 * LONG)
     mapped = jobs.load(job_of([first, {"shape": "rough", "spectrum": table, "seed": 1}]))
-    assert (excited_band(on_one_grid_of_all(mapped, choose(mapped))) or (0.0,))[0] == pytest.approx(0.01 / (4 * LONG))
+    assert (excited_band(on_one_grid_of_all(mapped, cut_bands(mapped))) or (0.0,))[0] == pytest.approx(
+        0.01 / (4 * LONG)
+    )
 
 
 def test_check_knows_all_temperatures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -68,7 +70,7 @@ def test_check_knows_all_temperatures(tmp_path: Path, capsys: pytest.CaptureFixt
     assert main(["check", str(tmp_path / "job.yaml")]) == 0
     said = capsys.readouterr().out
     assert "70 C is beyond the -20 to 60 C" in said
-    slope = choose(jobs.load(tmp_path / "job.yaml")).rms_slope(1, 0)
+    slope = cut_bands(jobs.load(tmp_path / "job.yaml")).rms_slope(1, 0)
     assert f"rms slope {slope:.4g}" in said
 
 
@@ -78,7 +80,7 @@ def test_a_spectrum_that_leaves_no_waves_to_the_map(tmp_path: Path) -> None:
     for longest, warns in ((2 * LONG, True), (LONG / 2, False)):
         fine = {"shape": "rough", "hurst": 0.8, "rms_slope": 0.2, "long_wavelength": longest, "short_wavelength": 2e-4}
         job = jobs.load(job_of([first, fine]))
-        found = [text for text in doubts_of_bands(job, choose(job)) if "hardly any" in str(text)]
+        found = [text for text in doubts_of_bands(job, cut_bands(job)) if "hardly any" in str(text)]
         assert bool(found) == warns
     pixel = 4 * LONG / 128
     assert all(f"long_wavelength: {8 * pixel:.2g}" in str(text) for text in found)
@@ -108,8 +110,8 @@ def test_the_report_shows_bands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert "the band that makes most of the friction" in page
     assert "with all longer waves" in page
     mapped = jobs.load(job_of([road_map(tmp_path / "road.npy", 128, 4 * LONG), table]))
-    section = road.section(mapped)
-    assert len(section.tables[1].rows) == choose(mapped).count
+    section = road.road_section(mapped)
+    assert len(section.tables[1].rows) == cut_bands(mapped).count
     assert len(section.pictures) == 5
 
 

@@ -14,7 +14,7 @@ from parcontact.__main__ import main
 from parcontact.bands.band import Band, Rung
 from parcontact.bands.band_heat import uniform, waves_along_depth
 from parcontact.bands.cascade import Cascade, mean_rungs
-from parcontact.bands.choice import choose
+from parcontact.bands.choice import cut_bands
 from parcontact.bands.ladder import PressureLadder
 from parcontact.bands.road_sliding import RoadSliding
 from parcontact.bands.wave_spectrum import spectrum_of
@@ -88,7 +88,7 @@ def test_full_contact_is_the_closed_form(count: int) -> None:
 def test_load_is_kept_from_band_to_band() -> None:
     """To rounding, also under a load of which some is beyond the ladder; bands of friction add up."""
     job = jobs.load({**JOB, "bands": {"count": 3, "samples": 1}})
-    cascade = Cascade(job, choose(job), Slab.alone(1, 1))
+    cascade = Cascade(job, cut_bands(job), Slab.alone(1, 1))
     cascade.press((0.1, 0.0), 1e6)
     rungs = cascade.climb([0])
     results = cascade.fall(lambda band, _: mean_rungs(rungs, band, [0]))

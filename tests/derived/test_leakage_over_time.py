@@ -14,7 +14,7 @@ from mpi4py import MPI
 import parcontact as pc
 from parcontact import __main__
 from parcontact.derived import leakage_over_time as leak
-from parcontact.leakage.flow import mesh_error, solve_flow
+from parcontact.leakage.flow import flow_mesh_error, solve_flow
 from parcontact.report import results
 
 POINTS = 64
@@ -68,7 +68,7 @@ def test_table_picture_and_columns_of_a_run(comm: MPI.Intracomm, shared_path: Pa
     along = {"x": pc.leak(gap, gaps.size).along_x, "y": pc.leak(gap, gaps.size).along_y}
     for axis, flow in along.items():
         assert float(rows[index][f"constriction_{axis}"]) == pytest.approx(flow.constriction, rel=1e-12)
-        error = mesh_error(gap, flow, gaps.size, axis)
+        error = flow_mesh_error(gap, flow, gaps.size, axis)
         assert float(rows[index][f"error_{axis}"]) == pytest.approx(error, rel=1e-9)
     of_run = {row["time"]: row for row in steps if row["flow_x"]}
     assert of_run
@@ -131,7 +131,7 @@ def test_a_contact_on_twice_the_points_is_within_the_error(comm: MPI.Intracomm) 
             gap, size = np.where(scene.field("pressure") > 0.0, 0.0, scene.field("gap").clip(0.0)), (1e-3, 1e-3)
             for axis in "xy" if row.step else "":
                 flow = solve_flow(gap, size, axis)
-                error = mesh_error(gap, flow, size, axis)
+                error = flow_mesh_error(gap, flow, size, axis)
                 flows.setdefault((row.step, axis), []).append((flow.conductivity, error))
     assert len(flows) == 6
     shares = [abs(coarse / fine - 1.0) / error for (coarse, error), (fine, _) in flows.values()]

@@ -206,7 +206,7 @@ def right() -> Any:
 
 @pytest.mark.parametrize("path", JOBS, ids=lambda path: path.stem)
 def test_every_job_fits(path: Path, validator: jsonschema.Draft202012Validator) -> None:
-    validator.validate(yamltext.read(path, str(path)).data)
+    validator.validate(yamltext.read_source(path, str(path)).data)
 
 
 def test_all_forms_of_values_fit(validator: jsonschema.Draft202012Validator) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from parcontact.errors import InputError
 from parcontact.leakage.elimination import Balance
-from parcontact.leakage.flow import Map, leak, mesh_error, solve_flow
+from parcontact.leakage.flow import Map, flow_mesh_error, leak, solve_flow
 from parcontact.leakage.fluids import FLUIDS, Fluid, PressureDrop
 from parcontact.leakage.paths import connected_from_end_to_end, critical_constriction
 
@@ -38,15 +38,15 @@ def test_error_by_the_mesh() -> None:
     gaps = np.random.default_rng(1).uniform(0.5, 1.5, 32)
     gap = np.broadcast_to(gaps, (8, 32))
     whole, even, odd = (len(each) / float(np.sum(each**-3.0)) for each in (gaps, gaps[::2], gaps[1::2]))
-    found = mesh_error(gap, solve_flow(gap, (2.0, 1.0)), (2.0, 1.0))
+    found = flow_mesh_error(gap, solve_flow(gap, (2.0, 1.0)), (2.0, 1.0))
     assert found == pytest.approx(max(abs(even / whole - 1.0), abs(odd / whole - 1.0)), rel=1e-12)
     assert found > 1e-3
     row = gap[:1]
-    assert mesh_error(row, solve_flow(row, (2.0, 1.0)), (2.0, 1.0)) == pytest.approx(found, rel=1e-12)
+    assert flow_mesh_error(row, solve_flow(row, (2.0, 1.0)), (2.0, 1.0)) == pytest.approx(found, rel=1e-12)
     whole, even, odd = (float(np.mean(each**3.0)) for each in (gaps, gaps[::2], gaps[1::2]))
-    beside = mesh_error(gap, solve_flow(gap, (2.0, 1.0), "y"), (2.0, 1.0), "y")
+    beside = flow_mesh_error(gap, solve_flow(gap, (2.0, 1.0), "y"), (2.0, 1.0), "y")
     assert beside == pytest.approx(max(abs(even / whole - 1.0), abs(odd / whole - 1.0)), rel=1e-12)
-    assert np.isnan(mesh_error(0.0 * gap, solve_flow(0.0 * gap, (2.0, 1.0)), (2.0, 1.0)))
+    assert np.isnan(flow_mesh_error(0.0 * gap, solve_flow(0.0 * gap, (2.0, 1.0)), (2.0, 1.0)))
 
 
 def checkerboard(points: int, second: float) -> Map:

@@ -10,11 +10,11 @@ from mpi4py import MPI
 from parcontact import job as jobs
 from parcontact.bands.band import Band
 from parcontact.bands.cascade import Cascade
-from parcontact.bands.choice import choose
+from parcontact.bands.choice import cut_bands
 from parcontact.bands.ladder import PressureLadder
 from parcontact.errors import InputError
 from parcontact.march.closing_law import ClosingLaw
-from parcontact.march.loop import March, run
+from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Array, Slab
 from parcontact.solve.interface_law import HARD, InterfaceLaw
 from parcontact.storage.row import StepRow
@@ -35,13 +35,13 @@ def in_bands(count: int, points: int, material: dict[str, Any], tolerance: float
 
 
 def heights_of(job: jobs.Job) -> Array:
-    setup = Band(job, choose(job), 0, 0).setup
+    setup = Band(job, cut_bands(job), 0, 0).setup
     return np.asarray(setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height)
 
 
 def finer(job: jobs.Job, velocity: float, pressure: float) -> tuple[Cascade, Any, InterfaceLaw]:
     """The cascade of two bands, the rungs of the finer one, and its closing."""
-    cascade = Cascade(job, choose(job), Slab.alone(1, 1))
+    cascade = Cascade(job, cut_bands(job), Slab.alone(1, 1))
     cascade.press((velocity, 0.0), pressure)
     rungs = cascade.climb([0])
     return cascade, rungs, cascade.closing_of(1, rungs[1, 0])[0]
@@ -54,7 +54,7 @@ def march_with(
     march, rows = begun(jobs.load(data), comm), list[StepRow]()
     if law is not None:
         march.scene.law = ClosingLaw(march.scene, law)
-    run(march, [lambda state: rows.append(state.row)])
+    run_steps(march, [lambda state: rows.append(state.row)])
     return march, rows
 
 
@@ -93,7 +93,7 @@ def test_a_slide_comes_to_the_steady_band() -> None:
     law: to 2 % of friction, the time steps, and 1 % of the area."""
     job = in_bands(2, 64, ZENER, 1e-3)
     *_, law = finer(job, 1.0, 1e5)
-    steady = Band(job, choose(job), 0, 0)
+    steady = Band(job, cut_bands(job), 0, 0)
     steady.slide((1.0, 0.0), 1.0)
     expected = steady.solve(1e5, law, None)
     history = [

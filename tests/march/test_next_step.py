@@ -11,7 +11,7 @@ from marching import begun, marched
 from restarting import ELASTIC, ROUGH, SLIDE, ZENER, Bench, cut, rows, same
 
 from parcontact.history.timeline import Timeline
-from parcontact.march.loop import March, run
+from parcontact.march.loop import March, run_steps
 from parcontact.storage.row import StepRow
 
 GRID: dict[str, Any] = {"points": 32, "size": 1e-3}
@@ -25,7 +25,7 @@ def job(*history: dict[str, Any], material: Any = ZENER, **changes: Any) -> dict
 def all_steps(data: dict[str, Any]) -> tuple[March, list[StepRow]]:
     """Without passing any over."""
     march, found = begun(data), list[StepRow]()
-    run(march, [lambda now: found.append(now.row)], Timeline.of(march.scene.job))
+    run_steps(march, [lambda now: found.append(now.row)], Timeline.of(march.scene.job))
     return march, found
 
 

@@ -13,7 +13,7 @@ from marching import begun, marched
 from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job.sections.listing import plain_data
-from parcontact.march.loop import March, run
+from parcontact.march.loop import March, run_steps
 from parcontact.physics.units import Units
 from parcontact.storage import checkpoint
 from parcontact.storage.checkpoint import Facts
@@ -168,7 +168,7 @@ def test_without_load_the_surface_just_touches(boundary: str, surface: dict[str,
     before, gaps, height = march.row.measures, march.field("gap"), np.ptp(march.field("height"))
     assert abs(gaps.min()) <= 1e-12 * height
     assert before.mean_gap == pytest.approx(gaps.mean(), rel=1e-12)
-    run(march, ())
+    run_steps(march, ())
     after = march.row.measures
     assert np.allclose(march.field("gap"), gaps, rtol=0.0, atol=1e-9 * height)
     assert not march.field("pressure").any()

@@ -21,7 +21,7 @@ from parcontact.history.chosen import MadeStep
 from parcontact.history.timeline import Step, Timeline
 from parcontact.job import Job
 from parcontact.march.failure import StepError
-from parcontact.march.loop import March, run
+from parcontact.march.loop import March, run_steps
 from parcontact.physics.convolution import Convolution, MirroredConvolution
 from parcontact.scene import solver_on
 from parcontact.solve.contact import Contact, ContactSolver
@@ -147,9 +147,9 @@ def test_a_failed_step_leaves_no_trace(material: dict[str, Any], boundary: str) 
             shown[:] = [now.field(name).copy() for name in ("pressure", "displacement", "gap")]
             now.scene.solver.max_iterations = 0
 
-    run(smooth, [])
+    run_steps(smooth, [])
     with pytest.raises(StepError, match=r"step 8 at t = \S+ s \(stage 'slide'\): the contact solve did not converge"):
-        run(march, [spoil])
+        run_steps(march, [spoil])
     after = remembered(march)
     assert before["contact/earlier pressure 1"].any()
     assert before.keys() == after.keys()
@@ -159,7 +159,7 @@ def test_a_failed_step_leaves_no_trace(material: dict[str, Any], boundary: str) 
         assert np.array_equal(march.field(name), old)
     march.scene.solver.max_iterations = 500
     job = march.scene.job
-    run(march, [], islice(Timeline.of(job), 7, None))
+    run_steps(march, [], islice(Timeline.of(job), 7, None))
     for name in ("pressure", "displacement", "gap"):
         assert np.array_equal(march.field(name), smooth.field(name))
     assert march.row.dissipated == smooth.row.dissipated
@@ -246,7 +246,7 @@ def test_advice_on_long_steps() -> None:
         match=r"step 2 .*; try numerics\.max_iterations above \d+, or try smaller steps: in this "
         r"one the surface moves by 2\.\d+ cells$",
     ):
-        run(march, [lambda now: setattr(now.scene.solver, "max_iterations", now.row.step == 0 and 500)])
+        run_steps(march, [lambda now: setattr(now.scene.solver, "max_iterations", now.row.step == 0 and 500)])
 
 
 def test_unconverged_is_not_retried_where_it_is_accepted() -> None:
@@ -259,7 +259,7 @@ def test_unconverged_is_not_retried_where_it_is_accepted() -> None:
     march = begun(data | {"numerics": numerics})
     march.scene.motion.at((0.0, 0.0)).base[0, 0] = np.nan
     with pytest.raises(StepError, match="not finite"):
-        run(march, [])
+        run_steps(march, [])
 
 
 @pytest.mark.parametrize(("share", "refused"), [(5e-15, False), (1e-12, True)])
@@ -268,7 +268,7 @@ def test_an_approach_to_full_contact_is_one_to_rounding(share: float, refused: b
     data = {"grid": GRID, "surface": ROUGH, "material": ELASTIC, "history": [{"approach": 0.0}]}
     height = begun(data).scene.setup.height
     with pytest.raises(InputError, match="is beyond full contact") if refused else nullcontext():
-        run(begun(data | {"history": [{"approach": share * height}]}), ())
+        run_steps(begun(data | {"history": [{"approach": share * height}]}), ())
 
 
 # -- steps that choose themselves after a jump of the velocity: short ones at first, which grow to whole --------------
@@ -375,7 +375,7 @@ def test_what_a_retry_leaves_unconverged_is_not_accepted(monkeypatch: pytest.Mon
     monkeypatch.setattr(ContactSolver, "solve", refuse)
     monkeypatch.setattr(active_set, "solve", lambda *_: made[-1])
     with pytest.raises(StepError, match="is refused"):
-        run(march, [])
+        run_steps(march, [])
 
 
 # -- loads beyond the digits of single precision: a solve that stalls is tried again in double precision --------------

@@ -210,7 +210,7 @@ def test_maps_have_one_size(tmp_path: Path, drawn: list[Figure]) -> None:
 def test_ticks_do_not_follow_the_layout(tmp_path: Path) -> None:
     """A scale of colours whose ticks follow its room has other ones after the layout, and labels beyond the edge."""
     text = WAVE.replace("1.0e-6", "5.0e-6") + ELASTIC + "history: [{pressure: 1.0e3}]\n" + MAPS
-    _, panels = maps.panels(PlottedRun(ran(tmp_path, text)))
+    _, panels = maps.map_panels(PlottedRun(ran(tmp_path, text)))
     found = []
     for size in (2.0, 9.0):
         figure = Figure(figsize=(size, size))

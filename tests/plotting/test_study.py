@@ -26,7 +26,7 @@ def points(fall: float) -> list[study.StudyPoint]:
 @pytest.mark.parametrize("fall", [0.5, 0.05, 1.0])
 def test_what_accuracy_costs(tmp_path: Path, drawn: list[Figure], fall: float) -> None:
     """Errors over two, over ten, and over no decades: the points of both integrators, a line through the best."""
-    study.plot(tmp_path, [], dict.fromkeys(QUANTITIES, points(fall)), dict.fromkeys(QUANTITIES, 0.0))
+    study.plot_study(tmp_path, [], dict.fromkeys(QUANTITIES, points(fall)), dict.fromkeys(QUANTITIES, 0.0))
     (figure,) = drawn
     assert not touching(figure)
     assert not outside(figure)
@@ -40,15 +40,15 @@ def test_what_accuracy_costs(tmp_path: Path, drawn: list[Figure], fall: float) -
 def test_quantities_without_an_error_are_left_out(tmp_path: Path, drawn: list[Figure], unknown: float) -> None:
     """As friction of a body that does not slide, and what only one case is known of."""
     nothing = [study.StudyPoint(1.0, 1.0, unknown, "exponential", False)]
-    assert study.plot(tmp_path, [], {"mu_max": nothing}, {})[0].stat().st_size > 0
-    study.plot(tmp_path, [], {"mu_max": nothing, "area_corrected": points(0.5)}, {})
+    assert study.plot_study(tmp_path, [], {"mu_max": nothing}, {})[0].stat().st_size > 0
+    study.plot_study(tmp_path, [], {"mu_max": nothing, "area_corrected": points(0.5)}, {})
     assert [axes.get_ylabel() for axes in drawn[1].axes] == ["contact area, corrected:\nerror [%]", ""]
 
 
 def test_cases_that_are_alike(tmp_path: Path, drawn: list[Figure]) -> None:
     """One error, and one case: their axes have a range all the same, without a warning."""
     alike = [replace(one, error=0.02) for one in points(1.0)]
-    study.plot(tmp_path, [], {"mu_max": alike, "mu_end": alike[:1]}, {})
+    study.plot_study(tmp_path, [], {"mu_max": alike, "mu_end": alike[:1]}, {})
     for axes in drawn[0].axes:
         low, high = axes.get_ylim()
         assert (low * high, high / low) == (pytest.approx(4.0), pytest.approx(10.0))
@@ -62,7 +62,7 @@ def test_how_errors_fall(tmp_path: Path, drawn: list[Figure]) -> None:
         for integrator in study.INTEGRATORS
         for ladder in ("mesh and time together", "mesh alone", "time alone")
     ]
-    study.plot(tmp_path, curves, {}, dict.fromkeys(QUANTITIES, 1e-4))
+    study.plot_study(tmp_path, curves, {}, dict.fromkeys(QUANTITIES, 1e-4))
     figure = drawn[0]
     assert not touching(figure)
     assert not outside(figure)

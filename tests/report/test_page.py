@@ -94,7 +94,7 @@ def test_run(tmp_path: Path) -> None:
     out = ran(
         tmp_path, f"title: <b>Rubber</b> & road\n{WAVE}{ZENER}{SLIDE}output: {{fields: [pressure, gap], every: 8}}\n"
     )
-    found = Page(page.write([out]).read_text())
+    found = Page(page.write_report([out]).read_text())
     check(found)
     assert found.headings == ["Results of the run", *COMMON]
     assert "&lt;b&gt;Rubber&lt;/b&gt; &amp; road" in found.text
@@ -107,7 +107,9 @@ def test_run(tmp_path: Path) -> None:
 
 
 def test_single_solves_and_strips(tmp_path: Path) -> None:
-    found = Page(page.write([ran(tmp_path, STRIP + ELASTIC + LOADS + "output: {fields: pressure}\n")]).read_text())
+    found = Page(
+        page.write_report([ran(tmp_path, STRIP + ELASTIC + LOADS + "output: {fields: pressure}\n")]).read_text()
+    )
     check(found)
     assert found.headings == ["Results of the run", *COMMON]
 
@@ -132,7 +134,7 @@ def test_curve_and_run_together(tmp_path: Path) -> None:
     """
     steady = solved(tmp_path, WAVE + WARM + HEAT)
     out = ran(tmp_path, WAVE + ZENER + SLIDE)
-    found = Page(page.write([steady, out], tmp_path / "both.html").read_text())
+    found = Page(page.write_report([steady, out], tmp_path / "both.html").read_text())
     check(found)
     assert found.headings == ["Friction curve", *COMMON, "Results of the run", *COMMON]
     assert "1 m/s, 1 kPa, 40 °C" in found.text
@@ -155,7 +157,7 @@ def test_the_errors_of_a_run(tmp_path: Path, total: str, told: str) -> None:
     columns["distance"] = [0.0, 1.0, 2.0, 3.0]
     (tmp_path / "job.yaml").write_text(WAVE + ZENER + SLIDE + "numerics: {accuracy: 0.01}\n")
     slide = job.load(tmp_path / "job.yaml")
-    section = origin.describe_errors(columns, log.read(tmp_path).estimates, slide, of_curve=False)
+    section = origin.describe_errors(columns, log.read_logs(tmp_path).estimates, slide, of_curve=False)
     assert section.sentences == [
         f"{said.format(total)}.",
         f"The accuracy of 1 % that was asked for friction (numerics.accuracy) {told}",
@@ -173,7 +175,7 @@ def test_a_seal(tmp_path: Path) -> None:
     section = origin.describe_errors({**columns, "distance": [0.0, 0.0]}, [], resting, of_curve=False)
     assert [row[0] for row in section.tables[0].rows] == ["contact area"]
     assert __main__.main(["leak", str(out)]) == 0
-    found = Page(page.write([out]).read_text())
+    found = Page(page.write_report([out]).read_text())
     check(found)
     assert found.downloads["leak.csv"] == (out / "leak.csv").read_bytes()
 
@@ -188,7 +190,7 @@ def test_two_curves_together(tmp_path: Path) -> None:
         )
         (tmp_path / name / "steady.csv").write_text(text)
         paths.append(tmp_path / name)
-    found = Page(page.write(paths).read_text())
+    found = Page(page.write_report(paths).read_text())
     check(found)
     assert found.headings == ["Together", *2 * ["Friction curve", "Provenance", "What to cite", "Data"]]
     assert len(found.pictures) == 2 + 2 * 2
@@ -201,7 +203,7 @@ def test_sweep_and_study(tmp_path: Path) -> None:
         csv.writer(file).writerows([head, (0, 0.1, "done", 0.25, 0.2, 0.5), (1, 1.0, "failed", "", "", "")])
     (tmp_path / "study.csv").write_text("fingerprint,mesh,integrator,mu_max\nabc,64,exponential,0.123456789\n")
     (tmp_path / "study.txt").write_text("for 1 %: mesh 64\n")
-    found = Page(page.write([tmp_path]).read_text())
+    found = Page(page.write_report([tmp_path]).read_text())
     check(found)
     assert found.headings == ["Sweep", "What accuracy costs", "Provenance", "What to cite", "Data"]
     for told in (">failed</td>", ">0.12346</td>", ">exponential</td>", "for 1 %: mesh 64"):
@@ -220,7 +222,7 @@ def test_a_sweep_shows_its_first_case_and_what_differs(tmp_path: Path, monkeypat
     text += f"{ELASTIC}history: [{{pressure: 1.0e+4}}]\nsweep: [{{surface.scale: [1.0, 2.0]}}]\n"
     (tmp_path / "job.yaml").write_text(text)
     assert __main__.main(["job.yaml", "--quiet"]) == 0
-    found = Page(page.write([tmp_path / "out" / "job", tmp_path / "out" / "job" / "cases" / "000"]).read_text())
+    found = Page(page.write_report([tmp_path / "out" / "job", tmp_path / "out" / "job" / "cases" / "000"]).read_text())
     of_first = [f"{name} of the first case" for name in ASKED]
     assert found.headings[:5] == ["Sweep", "The first case as an example", *of_first]
     assert found.headings.count("What was asked") == 1  # of the case itself, in the second chapter
@@ -274,7 +276,7 @@ def test_a_sweep_of_curves_says_what_was_asked(tmp_path: Path, monkeypatch: pyte
         f"title: Two loads\ngrid: {{points: 16, size: 1.0e-3}}\n{WAVE[WAVE.index('surface') :]}{ZENER}{curve}"
     )
     assert __main__.main(["steady", "job.yaml", "--quiet"]) == 0
-    found = Page(page.write([Path("out/job")]).read_text())
+    found = Page(page.write_report([Path("out/job")]).read_text())
     of_first = [f"{name} of the first case" for name in ASKED]
     assert found.headings[:5] == ["Sweep", "The first case as an example", *of_first]
     assert "<h1>Two loads</h1>" in found.text
@@ -290,7 +292,7 @@ def test_heights_that_are_gone(tmp_path: Path) -> None:
     )
     out = ran(tmp_path, surface + ELASTIC + LOADS)
     (tmp_path / "road.npy").unlink()
-    assert Page(page.write([out]).read_text()).headings == ["Results of the run", *COMMON]
+    assert Page(page.write_report([out]).read_text()).headings == ["Results of the run", *COMMON]
 
 
 @pytest.mark.parametrize(
@@ -299,7 +301,7 @@ def test_heights_that_are_gone(tmp_path: Path) -> None:
 )
 def test_nothing_to_report(tmp_path: Path, name: str, out: str | None, told: str) -> None:
     with pytest.raises(InputError, match=told):
-        page.write([tmp_path / name], tmp_path / out if out else None)
+        page.write_report([tmp_path / name], tmp_path / out if out else None)
     assert not list(tmp_path.iterdir())
 
 
@@ -309,4 +311,4 @@ def test_links_are_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "checkpoint").mkdir()
     (tmp_path / name).symlink_to(tmp_path / "secret")
     with pytest.raises(InputError, match=rf"{name} is a symbolic link, which a report does not read"):
-        page.write([tmp_path])
+        page.write_report([tmp_path])

@@ -387,7 +387,7 @@ def compare(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
         shutil.copy(ROAD / name, there)
     subprocess.run([sys.executable, there / "make.py"], check=True, timeout=120)
     made = compound.fitted(there / "measured" / "compound.csv", 0.5, 20.0, "wlf", 0.02)
-    list(files.write(made, there / "materials" / "compound.yaml", None))
+    list(files.write_compound(made, there / "materials" / "compound.yaml", None))
     spec = util.spec_from_file_location("compare", there / "compare.py")
     assert spec
     assert spec.loader

@@ -27,7 +27,7 @@ def read(
 ) -> map_files.Map:
     given = {"unit": unit, "size": size, "channel": channel, **more}
     part = Topography.model_construct(path=path, **{key: value for key, value in given.items() if value is not None})
-    return map_files.read(part)
+    return map_files.read_map(part)
 
 
 def write(folder: Path) -> dict[str, tuple[Path, str | None, tuple[float, float] | None]]:

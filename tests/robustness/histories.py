@@ -10,7 +10,7 @@ import numpy as np
 
 from parcontact import scene
 from parcontact.job import Job
-from parcontact.march.loop import March, run
+from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import ZenerBody
 from parcontact.storage.row import StepRow
@@ -95,7 +95,7 @@ class Drift:
 def drift(periods: int, contact: str, modulus_inf: float = 1e6) -> Drift:
     """March so many periods, more than SETTLED."""
     job, found = back_and_forth(periods, contact, modulus_inf), Periods()
-    run(March(scene.build(job, Slab.alone(POINTS, POINTS))), [found])
+    run_steps(March(scene.build(job, Slab.alone(POINTS, POINTS))), [found])
     states = np.array(found.states[SETTLED:])
     sizes = np.abs(states).max(axis=(0, 2, 3), keepdims=True)[0]
     dissipated = np.array([row.dissipated for row in found.rows])

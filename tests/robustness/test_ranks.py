@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from parcontact import job, scene
 from parcontact.march.loop import March
-from parcontact.march.loop import run as run_march
+from parcontact.march.loop import run_steps as run_march
 from parcontact.parallel.slab import Slab
 
 if TYPE_CHECKING:

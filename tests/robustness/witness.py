@@ -15,7 +15,7 @@ from parcontact.errors import RunError
 from parcontact.history import timeline as clock
 from parcontact.history.timeline import Step, Timeline
 from parcontact.march.failure import StepError
-from parcontact.march.loop import March, run
+from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Array, Slab
 from parcontact.storage.row import StepRow
 
@@ -71,7 +71,7 @@ class Witness:
         job = self.march.scene.job
         timeline = Timeline.of(job)
         try:
-            run(self.march, [lambda march: self._note(timeline, march.row)])
+            run_steps(self.march, [lambda march: self._note(timeline, march.row)])
         except RunError as error:
             self.failure, self.beyond = str(error), isinstance(error, StepError) and error.beyond_precision
         return self

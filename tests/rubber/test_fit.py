@@ -63,7 +63,7 @@ def moduli(tmp_path: Path, head: str, given: tuple[int, int], drawn: "list[Figur
     rows = zip(measured.FREQUENCIES, columns[given[0]], columns[given[1]], strict=True)
     (tmp_path / "rubber.csv").write_text("\n".join([head, *(f"{f:.9g} {a:.9g} {b:.9g}" for f, a, b in rows)]) + "\n")
     made = compound.fitted(tmp_path / "rubber.csv", 0.25, None, "wlf", 0.05)
-    pictures.draw(made, tmp_path / "rubber.png")
+    pictures.draw_compound(made, tmp_path / "rubber.png")
     axes = drawn[-1].axes[0]
     return axes.get_ylabel(), {str(one.get_label()): np.asarray(one.get_ydata()) for one in axes.get_lines()}
 

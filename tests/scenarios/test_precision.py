@@ -23,7 +23,7 @@ from parcontact import scene
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load_cases
 from parcontact.march.failure import StepError
-from parcontact.march.loop import March, run
+from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Slab
 from parcontact.physics.measures import Measures
 from parcontact.physics.probe import Probe
@@ -54,7 +54,7 @@ def test_mean_load(comm: MPI.Intracomm, precision: str, limit: float) -> None:
     surface = {**ROUGH, "short_wavelength": 3e-5}
     data = {"grid": {"points": [512, 256], "size": 1e-3}, "surface": surface, "material": RUBBER}
     found: list[float] = []
-    run(
+    run_steps(
         begun({**data, "history": [{"pressure": load} for load in loads], "numerics": {"precision": precision}}, comm),
         [lambda now: found.append(mean(now))],
     )

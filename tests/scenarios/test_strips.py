@@ -41,14 +41,14 @@ def test_coefficients_are_those_of_a_cell_and_its_images(nu: float) -> None:
     x, y = np.array([[0.0, 0.3, 0.65]]), np.array([[0.0], [0.25], [2.0], [3.9]])
     images = np.asarray(love(x + lx * np.arange(-count, count + 1)[:, None, None], y, dx, dy, nu)).sum(axis=0)
     far = (1 - nu) / np.pi * dx * dy / lx * math.log(2 * (count + 0.5) * lx / ly)
-    found = strip.coefficients(x, y, dx, dy, size=(lx, ly), poisson=nu)
+    found = strip.strip_coefficients(x, y, dx, dy, size=(lx, ly), poisson=nu)
     assert found == pytest.approx(images - far, abs=1e-10)  # the coefficients themselves are 0.06 and less
 
 
 def test_far_across_a_cell_acts_like_a_line() -> None:
     """A line has the displacement (1 - nu)/pi P' ln(Ly/|y|); what varies along x decays by exp(-2 pi |y|/Lx)."""
     (lx, ly), y = (0.1, 1.0), np.array([[0.5], [1.0], [2.0]])
-    found = strip.coefficients(np.array([[0.0, 0.05]]), y, lx / 2, ly / 1000, size=(lx, ly), poisson=0.5)
+    found = strip.strip_coefficients(np.array([[0.0, 0.05]]), y, lx / 2, ly / 1000, size=(lx, ly), poisson=0.5)
     line = 0.5 / np.pi * (lx / 2 * ly / 1000) / lx * np.log(ly / y)
     assert np.abs(found - line).max() < 1e-6 * line[0, 0]  # (dy/y)^2/24 is 2e-7
 
@@ -96,7 +96,7 @@ def test_the_operator_adds_up_coefficients(points: tuple[int, int]) -> None:
     expected = slab.zeros()
     for row, column in ((0, 3), (5, 1)):
         away = (x - column / 16 + size[0] / 2) % size[0] - size[0] / 2
-        cell = strip.coefficients(away, y - row / 16, 1 / 16, 1 / 16, size=size, poisson=0.5)
+        cell = strip.strip_coefficients(away, y - row / 16, 1 / 16, 1 / 16, size=size, poisson=0.5)
         expected += pressure[row, column] * cell
     assert np.abs(found - expected).max() < 1e-13
 

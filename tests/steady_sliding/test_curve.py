@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact.errors import InputError
-from parcontact.march.loop import run as run_march
+from parcontact.march.loop import run_steps as run_march
 from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding import start as steadystart

@@ -105,7 +105,7 @@ def test_table_theory_and_picture(tmp_path: Path, main: Main, run_parcontact: Ru
     assert parts == pytest.approx(found["friction_x"], rel=1e-12)
     share = np.array(found["contact_area_corrected"]) * 1.0e4 / 2.0e5
     assert found["friction_interface"] == pytest.approx(share, rel=1e-6)  # the pressure is met to the tolerance
-    friction, area, master = steady.charts(tmp_path / "out")
+    friction, area, master = steady.chart_steady(tmp_path / "out")
     assert [one.name for one in friction.series] == ["-5 °C", "20 °C", "60 °C", "theory", "", ""]
     assert [one.name for one in area.series] == ["-5 °C", "20 °C", "60 °C", "theory", "", ""]
     assert [one.name for one in master.series] == ["-5 °C", "20 °C", "60 °C", "theory"]

@@ -45,7 +45,7 @@ def outcomes(path: Path) -> dict[Settings, Outcome]:
     found = {}
     for case in ladders(job).combine():
         changed = load(path, overrides(job, ladders(job).own, case))
-        found[case] = outcome.run(changed, Slab.alone(*changed.grid.points), lambda: False)
+        found[case] = outcome.march_through(changed, Slab.alone(*changed.grid.points), lambda: False)
     assert None not in found.values()
     return {case: one for case, one in found.items() if one is not None}
 
@@ -100,7 +100,7 @@ def test_refining_one_of_mesh_and_time_is_wasted(tmp_path: Path, integrator: str
 
     def errors(mesh: int, cells: float, integrator: str = integrator) -> tuple[float, float]:
         case = Settings(mesh, cells, integrator)
-        found = outcome.run(load(path, overrides(job, own, case)), Slab.alone(mesh, mesh), lambda: False)
+        found = outcome.march_through(load(path, overrides(job, own, case)), Slab.alone(mesh, mesh), lambda: False)
         assert found is not None
         return found.mu_end - limit[0], found.area_corrected - limit[1]
 
@@ -180,7 +180,7 @@ def run_study(path: Path, out: Path, comm: MPI.Intracomm) -> int:
         return load(path, [f"output.directory={out}", *changes])
 
     job = make(())
-    return study.run(job, make, Slab(comm, *job.grid.points), quiet=True)
+    return study.run_study(job, make, Slab(comm, *job.grid.points), quiet=True)
 
 
 def test_goes_on_case_by_case(main: Main, tmp_path: Path) -> None:

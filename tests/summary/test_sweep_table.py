@@ -81,7 +81,7 @@ def test_points_of_curves_and_their_means_over_seeds(tmp_path: Path, monkeypatch
     assert [float(row["friction_mean"]) for row in means] == pytest.approx([0.3, 0.15], rel=1e-12)
     assert float(means[0]["friction_std"]) == pytest.approx(0.07**0.5, rel=1e-12)
     assert not Path("out/job/sweep_mean.csv").exists()
-    chart, _ = pictures.charts(Path("out/job"))
+    chart, _ = pictures.chart_sweep(Path("out/job"))
     mean, each = chart.series
     assert (chart.x.name, mean.x.tolist(), each.x.size) == ("velocity", [0.1, 1.0], 6)
     assert mean.y.tolist() == pytest.approx([0.3, 0.15], rel=1e-12)
@@ -148,7 +148,7 @@ def test_lines_of_curves_differ_in_all_that_is_no_sample(tmp_path: Path, monkeyp
         text = "\n".join(["velocity,pressure,friction,contact_area", *rows, ""])
         (case.job.output.directory / "steady.csv").write_text(text)
     sweep_table.write_sweep_tables(Path("out/job"), cases)
-    lines = [line for line in pictures.charts(Path("out/job"))[0].series if line.look.get("linestyle") != "none"]
+    lines = [line for line in pictures.chart_sweep(Path("out/job"))[0].series if line.look.get("linestyle") != "none"]
     found = {line.name: line.y.tolist() for line in lines}
     assert found == {
         f"{p:.0f} kPa, modulus inf {m:.0f} kPa": pytest.approx([mean + p / 100 + v for v in (0.1, 1.0)])

@@ -25,7 +25,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, ErrorDetails
 
-from ..text.fault import AT_KEY, AT_VALUE, Fault, choices, closest, did_you_mean, in_si, quote, refuse
+from ..text.fault import AT_KEY, AT_VALUE, Fault, closest, did_you_mean, in_si, list_words, quote, refuse
 from ..text.overrides import Included
 from .quantities import from_home
 
@@ -153,7 +153,7 @@ class Part(BaseModel):
             return Fault(f"{what}; {advice}", path, at_key=True)
         field = cls.model_fields[name]
         words = literal_words(field.annotation) if _absent(error) or kind == "literal_error" else ()
-        expected = f"must be {choices(words) if words else field.description}"
+        expected = f"must be {list_words(words) if words else field.description}"
         if _absent(error):
             return Fault(f"is missing; it {expected}", path)
         got = quote(filled[name] if kind == "missing" else value)
@@ -174,7 +174,7 @@ class Part(BaseModel):
             lacks = group in cls.one_of and not any(word in meant for word in group)
             if len(present) > 1 or (not present and lacks):
                 number = "needs exactly one of" if group in cls.one_of else "takes at most one of"
-                yield Fault(f"{number} {choices(group)}, got {' and '.join(present) or 'none'}")
+                yield Fault(f"{number} {list_words(group)}, got {' and '.join(present) or 'none'}")
 
 
 WRONG = object()  # stands for the value of a field that has mistakes
@@ -231,14 +231,14 @@ def chosen(
         if isinstance(data, tuple(kinds.values())):
             return data
         if not isinstance(data, dict):
-            refuse(Fault(f"must be a mapping with {key}: {choices(kinds)}, got {quote(data)}"))
+            refuse(Fault(f"must be a mapping with {key}: {list_words(kinds)}, got {quote(data)}"))
         word = data.get(key)
         if word is None:
-            refuse(Fault(f"is missing; it must be {choices(kinds)}", (key,)))
+            refuse(Fault(f"is missing; it must be {list_words(kinds)}", (key,)))
         if not isinstance(word, str) or word not in kinds:
             other = (called or {}).get(str(word).lower())
             advice = f"; did you mean {other}?" if other else did_you_mean(word, kinds)
-            refuse(Fault(f"must be {choices(kinds)}, got {quote(word)}{advice}", (key,)))
+            refuse(Fault(f"must be {list_words(kinds)}, got {quote(word)}{advice}", (key,)))
         return kinds[word].model_validate(data, context=info.context)
 
     return choose

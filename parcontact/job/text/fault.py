@@ -59,7 +59,7 @@ def quote(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def choices(words: Iterable[str]) -> str:
+def list_words(words: Iterable[str]) -> str:
     """Return the words to choose from."""
     return " | ".join(words)
 

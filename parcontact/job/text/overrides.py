@@ -12,7 +12,7 @@ from .fault import quote, shorten
 from .places import UNREADABLE, Key, Place, Source
 from .python_data import source_of
 from .sweep_cases import SWEEP, Setting, Sweep, refuse_overrides, take
-from .yamltext import parse, read, read_with_content
+from .yamltext import parse, read_source, read_with_content
 
 MATERIAL: Key = ("material",)
 INCLUDE: Key = ("material", "include")
@@ -45,7 +45,7 @@ def read_job(path: Path, changes: Changes, case: int = 0, given: Source | None =
 
     Data that are `given` stand for the file.
     """
-    source = given or read(path, str(path))
+    source = given or read_source(path, str(path))
     overrides = [override for change in changes if (override := _parse(change, source))]
     for override in overrides:
         if override.path[:1] == SWEEP:

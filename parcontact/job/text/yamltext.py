@@ -58,7 +58,7 @@ def dump(data: Any) -> str:
     return yaml.dump(data, Dumper=JobDumper, default_flow_style=None, sort_keys=False, allow_unicode=True, width=120)
 
 
-def read(path: Path, shown: str) -> Source:
+def read_source(path: Path, shown: str) -> Source:
     """Return the `Source` of a YAML file, called `shown` in messages; one that cannot be read is a mistake in it."""
     return read_with_content(path, shown)[1]
 
