@@ -119,7 +119,8 @@ def _read(
     stages = source.data.get("history") if isinstance(source.data, dict) else None
     count = len(stages) if isinstance(stages, list) else 0
     written = tuple(str(source.locate(("history", index, "approach")).place) for index in range(count))
-    origin = fill_grid(source, origin)._replace(approaches=written)
+    strict = str(source.locate(("numerics", "strict")).place)
+    origin = fill_grid(source, origin)._replace(approaches=written, strict=strict)
     try:
         job = Job.model_validate(source.data, context=origin)
     except ValidationError as error:

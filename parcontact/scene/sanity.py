@@ -53,7 +53,8 @@ def check_heights(setup: Setup) -> list[Doubt]:
     """Return doubts about the heights of a scene; collective. Raises InputError with `numerics.strict`."""
     found = list(_check_heights(setup))
     if found and setup.choices.numerics.strict:
-        raise InputError("\n".join(f"{doubt} ({STRICT})" for doubt in found))
+        place = f"{setup.job.origin.strict}: " if setup.job.origin.strict else ""
+        raise InputError("\n".join(f"{place}{doubt} ({STRICT})" for doubt in found))
     return found
 
 

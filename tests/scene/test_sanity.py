@@ -245,6 +245,7 @@ def test_strict_refuses_before_anything_is_written(tmp_path: Path, run_parcontac
     done = run_parcontact(["job.yaml", "--set", "numerics.strict=true"], ranks=2)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.count("tilted by") == 1
+    assert "--set numerics.strict=true: surface" in done.stderr
     assert "Traceback" not in done.stderr
     assert sorted(tmp_path.iterdir()) == before
     done = run_parcontact(["job.yaml", "--quiet", "--set", "output.fields=gap"], ranks=2)

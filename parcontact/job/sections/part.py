@@ -32,7 +32,8 @@ from .quantities import from_home
 
 class Origin(NamedTuple):
     """Origin of a job: its absolute path, and the file of its material if it includes one; `mesh` says which
-    points were chosen for it. `approaches` says of each stage where its approach was written, '' for jobs from Python.
+    points were chosen for it. `approaches` says of each stage where its approach was written, `strict` where
+    `numerics.strict` was; '' for jobs from Python.
 
     `numbers_as_texts`: PyYAML's own `safe_load` leaves texts for some numbers, 1.0e6 and 1e-3. `names_directory`: the
     job says itself where its results go.
@@ -45,6 +46,7 @@ class Origin(NamedTuple):
     names_directory: bool = False
     mesh: str = ""
     approaches: tuple[str, ...] = ()
+    strict: str = ""
 
 
 def existing_file(path: Path, info: ValidationInfo) -> Path:
