@@ -155,6 +155,15 @@ def test_a_start_from_steady_sliding_is_a_state_like_any_other(material: dict[st
     assert np.mean(np.abs(gap[pressed])) < 2.0 * limit
 
 
+def test_a_start_from_steady_sliding_knows_the_friction_of_the_body() -> None:
+    """Without that of the interface: the stress on the corrected area over the load, to rounding."""
+    march = begun(job(RUBBER, SLIDES, **STEADY, interface={"shear_stress": 1e3}))
+    measures = march.row.measures
+    own = 1e3 * measures.contact_area_corrected / measures.pressure
+    assert own > 0.0
+    assert march.state.friction == pytest.approx(measures.friction - own, rel=1e-9)
+
+
 @pytest.mark.parametrize(("boundary", "surface"), [("periodic", ROUGH), ("free", ROUGH), ("free", SPHERE)])
 def test_without_load_the_surface_just_touches(boundary: str, surface: dict[str, Any]) -> None:
     """Before the first step as after one that takes the load away: no gap is negative, the smallest is 0. The mean of
