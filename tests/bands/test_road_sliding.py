@@ -236,7 +236,7 @@ class Killed(BaseException):
 
 
 def test_a_point_that_was_killed_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Killed twice within a point with heat, whose temperatures take rounds: all numbers to the last digit, and no
+    """Killed twice within a point with heat, whose temperatures take rounds: all numbers to rounding, and no
     contact is solved twice but those of the band that was being solved."""
     monkeypatch.chdir(tmp_path)
     job = {**JOB, "material": SHIFTED, "thermal": {**THERMAL, "feedback": "mean"}, "numerics": {"tolerance": 0.2}}
@@ -266,9 +266,10 @@ def test_a_point_that_was_killed_goes_on(tmp_path: Path, monkeypatch: pytest.Mon
     assert 0 < lost <= 2 * 14  # of both runs
     assert calls[0] == whole + lost
     assert not Path("out/job/bands.part").exists()
-    assert Path("out/job/bands.csv").read_text() == Path("whole/bands.csv").read_text()
-    one, other = (tables.read_columns(Path(name) / "steady.csv") for name in ("whole", "out/job"))
-    assert [one[name] for name in one if name != "seconds"] == [other[name] for name in other if name != "seconds"]
+    for name in ("bands.csv", "steady.csv"):
+        one, other = (tables.read_columns(Path(place) / name) for place in ("whole", "out/job"))
+        for column in set(one) - {"seconds"}:
+            assert other[column] == pytest.approx(one[column], rel=1e-12, nan_ok=True)
 
 
 @pytest.mark.parametrize("pressure", [2e4, 1e5])
