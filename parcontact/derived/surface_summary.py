@@ -10,7 +10,7 @@ from ..job import Job, Topography
 from ..parallel.slab import Array
 from ..physics import surface_statistics as statistics
 from ..plotting import style, surface
-from ..printed import per_cent, quantity
+from ..printed import per_cent, quantity, with_error
 from ..road import map_files, treatment
 from ..road.prepared_map import prepare
 from ..storage import hdf5
@@ -49,7 +49,8 @@ def describe_surface(job: Job, heights: Array, told: list[str], shortest: float 
     yield f"Nayak          {found.nayak:.4g}"
     longest, two_cells = max(job.grid.size), 2.0 * max(job.grid.dx, job.grid.dy)
     yield f"spectrum       waves of {quantity(longest, 'm', 4)} to {quantity(two_cells, 'm', 4)}"
-    yield f"Hurst          {f'{found.hurst:.3g}' if found.hurst == found.hurst else NOT_SELF_AFFINE}"
+    own = measured or found  # a measured map at its own points, which no mirror has made twice as long
+    yield f"Hurst          {with_error(own.hurst, own.hurst_error) if own.hurst == own.hurst else NOT_SELF_AFFINE}"
     if shortest is not None:
         cells = shortest / max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
         yield f"shortest wave  {quantity(shortest, 'm', 4)}, {cells:.3g} cells"

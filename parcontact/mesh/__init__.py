@@ -6,9 +6,9 @@
 from functools import partial
 
 from .. import job
-from .chosen_mesh import fill_grid, points_for
+from .chosen_mesh import fill_grid, find_shortest_wave, points_for
 
 load = partial(job.load, fill_grid=fill_grid)
 load_cases = partial(job.load_cases, fill_grid=fill_grid)
 
-__all__ = ["load", "load_cases", "points_for"]
+__all__ = ["find_shortest_wave", "load", "load_cases", "points_for"]

@@ -78,6 +78,12 @@ def points_for(job: Job, accuracy: float) -> tuple[int, int]:
     return nx, ny
 
 
+def find_shortest_wave(job: Job) -> float:
+    """Return the shortest wave [m] of the surface of a job, infinite where none is known. Raises InputError."""
+    data, shapes = plain_data(job), (shape for shape in job.surface if not isinstance(shape, OnOneMesh))
+    return min((_shortest(shape, job.grid, data, job.origin) for shape in shapes), default=math.inf)
+
+
 def _choose(scenery: Scenery | Job, box: Grid, data: dict[str, Any], origin: Origin) -> tuple[list[int], str]:
     """Return points along x and y, and a sentence. Raises InputError where the surface has no shortest wave."""
     wave = min((_shortest(shape, box, data, origin) for shape in scenery.surface), default=math.inf)

@@ -17,10 +17,11 @@ from ..accuracy.shares import FRICTION, TIME_MEDIAN
 from ..accuracy.time_error import order_of_time_error
 from ..history.chosen import ChosenEnds
 from ..history.timeline import Span, Timeline
-from ..job import Job, OnOneMesh, Rough
-from ..job.checks.cells import cells_per_wave, fast_length, one_cell
+from ..job import Job, OnOneMesh
+from ..job.checks.cells import cells_per_wave, fast_length, needed, one_cell
+from ..job.sections.calculation import Accuracy
 from ..job.sections.listing import plain_data
-from ..mesh import points_for
+from ..mesh import find_shortest_wave, points_for
 from ..printed import per_cent
 from .costs import Costs
 from .report import duration_text, ranks_text, unit_of
@@ -33,10 +34,15 @@ MOST = 16.0  # times finer or coarser than the trial, at most
 SAME = 1e-9  # rounding: relative: numbers this close are the same
 
 
-def offer(costs: Costs, accuracy: float, whole: Job | None = None) -> Costs:
-    """Return the costs of the job, or of a part of the `whole` job, at another accuracy."""
+def offer(costs: Costs, accuracy: float, whole: Job | None = None, wave: float | None = None) -> Costs:
+    """Return the costs of the job, or of a part of the `whole` job, at another accuracy; `wave` is the shortest wave
+    [m] of its surface."""
     own, sample, given = costs.job, costs.sample, whole or costs.job
-    job = _on_mesh(own, accuracy, points_for(given, accuracy) if given.origin.mesh else mesh_for(own, sample, accuracy))
+    if given.origin.mesh:
+        points = points_for(given, accuracy)
+    else:
+        points = mesh_for(own, sample, accuracy, find_shortest_wave(own) if wave is None else wave)
+    job = _on_mesh(own, accuracy, points)
     calls = float(CALLS_PER_DECADE ** math.log10(own.numerics.tolerance / job.numerics.tolerance))
     spans, stages = Timeline.of(own).spans if own.history else [None] * len(sample.stages), []
     for cost, span in zip(sample.stages, spans, strict=True):
@@ -46,8 +52,9 @@ def offer(costs: Costs, accuracy: float, whole: Job | None = None) -> Costs:
     return Costs(job, replace(sample, stages=tuple(stages)), costs.write_rate)
 
 
-def mesh_for(job: Job, sample: Sample, accuracy: float) -> tuple[int, int]:
-    """Return the points along x and y with which the mesh makes its share of an accuracy."""
+def mesh_for(job: Job, sample: Sample, accuracy: float, wave: float) -> tuple[int, int]:
+    """Return the points along x and y with which the mesh makes its share of an accuracy, and the shortest `wave` [m]
+    has the cells without which a run warns."""
     grid, share = job.grid, FRICTION.mesh * accuracy
     if any(isinstance(shape, OnOneMesh) for shape in job.surface):
         return grid.points
@@ -56,8 +63,10 @@ def mesh_for(job: Job, sample: Sample, accuracy: float) -> tuple[int, int]:
         error, order = error_of(sample, "area", "mesh") or 0.0, AREA.order
     times = (error / share) ** (1.0 / order) * max(sample.job.grid.points) / max(grid.points)
     times = min(max(times, 1.0 / MOST), MOST) if error else 0.0
-    if wave := min((shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)), default=None):
-        times = max(times, cells_per_wave(share) * min(grid.dx, grid.dy) / wave)
+    asked, cells = Accuracy(friction=accuracy, area=accuracy), zip(grid.points, (grid.dx, grid.dy), strict=True)
+    wanted = [max(cells_per_wave(share), *needed(axis, job.directions, asked)) for axis in range(2)]
+    least = [count * cell / wave for count, (n, cell) in zip(wanted, cells, strict=True) if n > 1]
+    times = max(times, *least)
     nx, ny = (fast_length(n * times) if times and n > 1 else n for n in grid.points)
     return nx, ny
 
@@ -94,7 +103,8 @@ def _on_mesh(job: Job, accuracy: float, points: tuple[int, int]) -> Job:
 def table(costs: Costs, whole: Job | None = None) -> Iterator[str]:
     """Yield mesh, steps, precision, memory and time of each accuracy on these ranks, and how far to trust them."""
     sample, chosen = costs.sample, bool((whole or costs.job).origin.mesh)
-    rows = [("this job", costs), *((per_cent(accuracy), offer(costs, accuracy, whole)) for accuracy in ACCURACIES)]
+    wave = find_shortest_wave(costs.job)
+    rows = [("this job", costs), *((per_cent(a), offer(costs, a, whole, wave)) for a in ACCURACIES)]
     unit, size = unit_of(max(each.held for _, each in rows))
     slides = sample.total("friction weight") > 0.0
     both = "friction and the contact area" if chosen else "friction"

@@ -15,6 +15,7 @@ from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics import surface_statistics as statistics
 from ..plotting import style, surface, units
+from ..printed import with_error
 from ..scene import rigid_surface
 from .parts import Picture, ReportSection, ReportTable, draw_panel
 
@@ -83,12 +84,13 @@ def _draw_spectrum(axes: Axes, cut: Cut, coarsest: statistics.Statistics) -> Non
 
 
 def _tabulate(found: statistics.Statistics, where: str) -> ReportTable:
+    hurst = NOT_SELF_AFFINE if np.isnan(found.hurst) else with_error(found.hurst, found.hurst_error)
     rows = [
         ("rms height", units.quantity(found.rms_height, "m", 4)),
         ("rms slope", f"{found.rms_slope:.4g}"),
         ("rms curvature", f"{found.rms_curvature:.4g} 1/m"),
         ("Nayak's parameter", f"{found.nayak:.4g}"),
-        ("Hurst exponent", f"{found.hurst:.3g}" if found.hurst == found.hurst else NOT_SELF_AFFINE),
+        ("Hurst exponent", hurst),
     ]
     return ReportTable((where, "value"), rows)
 

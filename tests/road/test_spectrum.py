@@ -1,5 +1,6 @@
 """Surfaces with a measured spectrum: that of the surface made is the one in the table."""
 
+import math
 import re
 import warnings
 from pathlib import Path
@@ -22,7 +23,7 @@ from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics import surface_statistics as statistics
-from parcontact.road import map_files, spectrum
+from parcontact.road import map_files, spectrum, treatment
 from parcontact.road.map_files import UNITS
 from parcontact.scene import rigid_surface, sanity
 from parcontact.theory import persson_rings
@@ -369,12 +370,33 @@ def test_a_self_affine_road() -> None:
     assert one == pytest.approx(np.mean((heights - heights.mean(axis=0)) ** 2), rel=1e-6)
 
 
+@pytest.mark.parametrize("hurst", [0.5, 0.8, 0.9])
+@pytest.mark.parametrize("periodic", ["none", "smooth"])
+def test_hurst_exponent_of_a_part_of_a_surface(hurst: float, periodic: str) -> None:
+    """Cut out of a surface twice as large, so that its edges do not fit, whichever way they are joined: the mean over
+    eight surfaces within three standard errors of it, and their scatter no more than twice the error of the fits.
+    Without a window it was 0.1 too low for 0.8."""
+    n, fits = 128, []
+    k = 2 * np.pi * np.fft.fftfreq(2 * n, LENGTH / n)
+    q = np.hypot(k, k[:, None])
+    falls = np.where((q > 0) & (q < np.pi * n / LENGTH), np.maximum(q, 8 * np.pi / LENGTH) ** (-1 - hurst), 0.0)
+    for seed in range(8):
+        waves = np.fft.fft2(np.random.default_rng(seed).standard_normal((2 * n, 2 * n))) * falls
+        part = treatment.treat(np.fft.ifft2(waves).real[:n, :n], "tilt", periodic).heights
+        found = statistics.surface_statistics(part, (LENGTH, LENGTH))
+        fits.append((found.hurst, found.hurst_error))
+    values, errors = np.array(fits).T
+    error = float(errors.mean())
+    assert abs(values.mean() - hurst) < 3 * error / math.sqrt(8)
+    assert values.std() < 2 * error < 0.1
+
+
 @pytest.mark.parametrize("hurst", [-0.4, 1.6])
 def test_a_steeper_or_flatter_spectrum_is_not_self_affine(hurst: float) -> None:
     """Exponents of a power law that no self-affine surface has, 0 to 1, are not told."""
     q = np.geomspace(1.0, 1e2, 24)
-    assert np.isnan(statistics._hurst(q, q ** (-2.0 * (1.0 + hurst))))
-    assert statistics._hurst(q, q ** (-2.0 * (1.0 + 0.7))) == pytest.approx(0.7, rel=1e-9)
+    assert np.isnan(statistics._fit_hurst(q, q ** (-2.0 * (1.0 + hurst)), q)[0])
+    assert statistics._fit_hurst(q, q ** (-2.0 * (1.0 + 0.7)), q) == pytest.approx((0.7, 0.0), rel=1e-9, abs=1e-9)
 
 
 def test_white_noise_has_no_hurst_exponent() -> None:
