@@ -40,7 +40,7 @@ def _work_in_tmp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("a: 1\nb: [1,\n  2\n", ("job.yaml:4:1: cannot be read as YAML: expected ',' or ']', but got '<stream end>' "
          "(while parsing a flow sequence in line 2)")),
         ("a: b: c\n", "job.yaml:1:5: cannot be read as YAML: mapping values are not allowed here; "
-            "a text that holds a colon needs quotes"),
+            "keys of one mapping begin in the same column, and a text that holds a colon needs quotes"),
         ("a: 1\n\tb: 2\n", "job.yaml:2:1: cannot be read as YAML: found character '\\t' that "
          "cannot start any token; indent by blanks, not by tabs"),
         ("a: *b\n", "job.yaml:1:4: cannot be read as YAML: found undefined alias 'b'"),

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from parcontact.job import JobError, load
+from parcontact.job.text import yamltext
 from parcontact.job.text.overrides import read_job
 
 from .texts import SMALL, mistakes_of, with_material, with_stage, with_surface
@@ -162,3 +163,10 @@ def test_a_sweep_of_more_cases_than_a_length_can_be(tmp_path: Path) -> None:
     axes = ", ".join(f"{{history.0.a{i}: {list(range(100))}}}" for i in range(12))
     (mistake,) = mistakes_of(tmp_path, f"{SMALL}sweep: [{axes}]\n")
     assert mistake == "job.yaml:6:8: sweep has 1000000000000000000000000 cases, and 1000 is the most"
+
+
+def test_a_key_that_is_indented_more_than_the_one_before() -> None:
+    """The column is what is wrong; the brace that is open comes later."""
+    said = "".join(map(str, yamltext.parse("title: x\n grid: {points", "job.yaml").mistakes))
+    assert "job.yaml:2:6" in said
+    assert "keys of one mapping begin in the same column" in said

@@ -88,7 +88,9 @@ def _remedy(problem: str) -> str:
     """Return what to do about a frequent problem of PyYAML's, or ''."""
     if "\\t" in problem:
         return "; indent by blanks, not by tabs"
-    return "; a text that holds a colon needs quotes" if problem.startswith("mapping values") else ""
+    if problem.startswith("mapping values"):
+        return "; keys of one mapping begin in the same column, and a text that holds a colon needs quotes"
+    return ""
 
 
 def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
