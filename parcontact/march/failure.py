@@ -12,8 +12,8 @@ from ..parallel.slab import Array
 from ..physics.measures import Measures
 from ..scene import Scene, sanity
 from ..solve.contact import Contact
+from ..solve.precision import reachable_certificate
 
-ROUNDINGS = 4.0  # accuracy: times the rounding of the largest length, below which no certificate is sure to be
 FINITE = "look for heights, loads or moduli that are not finite or too far apart"
 UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
 USEFUL = 0.1  # accuracy: tolerances above it say nothing of a contact
@@ -65,7 +65,8 @@ def of_solve(
     numerics, what = scene.choices.numerics, f"{describe_place(scene, step)}: the contact solve {failed.failure}{also}"
     if not np.isfinite(last.certificate.worst):
         return StepError(f"{what}; {FINITE}")
-    reach = _reach(scene, last, h)
+    compliance = scene.setup.half_space.largest_compliance
+    reach = reachable_certificate(scene.slab, (last.u, h), last.p, compliance, last.certificate.length)
     if numerics.tolerance < reach:
         change = "try a larger numerics.tolerance" if reach <= USEFUL else FINITE
         text = f"{what}; {numerics.precision} precision reaches only about {reach:.1g} here: {change}"
@@ -84,17 +85,6 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, moved: fl
         yield "try smaller steps"
     if last.certificate.worst <= USEFUL:
         yield f"try numerics.tolerance above {last.certificate.worst:.1g}"
-
-
-def _reach(scene: Scene, last: Contact, h: Array) -> float:
-    """Return the certificate that the rounding of heights, displacements and pressures allows; collective.
-
-    A pressure p that is wrong in its last digit moves the body by that digit of `p (1 - nu) L/(2 pi)` in a wave as long
-    as the box: a load far beyond full contact has no digits left for what differs from its mean.
-    """
-    sizes = scene.slab.reduce((), [float(np.abs(field).max(initial=0.0)) for field in (last.u, h, last.p)])
-    sizes[2] *= scene.setup.half_space.largest_compliance
-    return ROUNDINGS * float(np.finfo(last.u.dtype).eps) * max(sizes) / last.certificate.length
 
 
 def refuse_beyond_full_contact(scene: Scene, step: Step, effective: Array) -> None:

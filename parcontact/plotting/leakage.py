@@ -71,7 +71,7 @@ def _draw_flow(axes: Axes, size: tuple[float, float], gap: Map, flow: Flow, flux
     look: dict[str, Any] = {"extent": (0.0, size[0], 0.0, size[1]), "origin": "lower", "interpolation": "nearest"}
     axes.imshow(np.where(gap > 0.0, gap, np.nan), cmap="Greys_r", alpha=0.5, **look)
     if flow.position is not None:
-        most = float(np.nanpercentile(flux, 99.9))
+        most = float(np.nanpercentile(flux, 99.9)) or 1.0  # fewer cells than that may carry all
         drawn = axes.imshow(flux / most, cmap="viridis", norm=LogNorm(10.0**-DECADES, 1.0), **look)
         axes.figure.colorbar(drawn, ax=axes, shrink=0.7, label="flow over its largest")
         row, column = flow.position
@@ -89,6 +89,7 @@ def flux(gap: Map, pressure: Map, size: tuple[float, float]) -> Map:
         faces = np.nan_to_num(np.diff(pressure, axis=axis)) * (pressure.shape[axis] / length)  # none into a wall
         none = np.zeros_like(np.take(pressure, [0], axis))
         slopes.append(0.5 * (np.concatenate([none, faces], axis) + np.concatenate([faces, none], axis)))
-    found = np.where(np.isfinite(pressure), gap**3 * np.hypot(*slopes), np.nan)
+    shape = gap / (np.nanmax(gap, initial=0.0) or 1.0)  # the cube of a small gap [m] is below all numbers
+    found = np.where(np.isfinite(pressure), shape**3 * np.hypot(*slopes), np.nan)
     most = np.nanmax(found, initial=0.0)
     return np.asarray(found / most if most > 0.0 else found, dtype=np.float32)

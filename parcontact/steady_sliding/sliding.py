@@ -25,6 +25,7 @@ from ..solve.local_load import LEAST_CUT
 from ..solve.nonsymmetric import proximal
 from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
+from ..solve.precision import reachable_certificate
 from ..solve.preconditioner.extension import pairs_for
 from .heating import Feedback, warm
 from .losses import branch_powers
@@ -125,10 +126,7 @@ class SteadySliding:
             if contact.converged:
                 break
         else:
-            raise RunError(
-                f"{what}: {contact.failure}. Try a velocity nearer to one that works, a finer grid, or another "
-                "numerics.tolerance."
-            )
+            raise RunError(f"{what}: {contact.failure}{self._advise(contact)}")
         self.contact, self._speed, self._pressure = contact, factor * speed, pressure
         heights = self.levels[0].heights
         touching = SteadySolver.constraint.touches(contact.p)
@@ -142,6 +140,15 @@ class SteadySliding:
         flash = self._warm(contact, by_energy, velocity, measures)
         seconds, place = time.perf_counter() - began, (velocity, pressure, self.temperature, factor)
         return Point(*place, measures, friction, errors, contact.certificate, calls, contact.sets, seconds, lost, flash)
+
+    def _advise(self, contact: SteadyContact) -> str:
+        """Return what may help a contact that was not solved; collective."""
+        compliance, length = self.setup.half_space.largest_compliance, contact.certificate.length
+        reach = reachable_certificate(self.setup.slab, [contact.u], contact.p, compliance, length)
+        if self.setup.choices.numerics.tolerance < reach:
+            what = "look for loads or moduli that are too far apart"
+            return f"; double precision reaches only about {reach:.1g} here: {what}"
+        return ". Try a velocity nearer to one that works, a finer grid, or another numerics.tolerance."
 
     def _warm(self, contact: SteadyContact, friction: float, velocity: Vector, measures: Measures) -> Flash | None:
         """Return the temperatures of the contact, if the job asks for them; collective."""

@@ -53,3 +53,10 @@ def test_what_k_is_drawn_over(rows: list[LeakInstant], over: str, name: str, exp
     assert chart.series[0].x == pytest.approx(expected, rel=1e-9)
     assert len(chart.series[0].y) == len(expected)
     assert chart.series[0].y[-1] == rows[-1].flow_x
+
+
+def test_the_flux_of_gaps_whose_cube_is_0() -> None:
+    """Uniform flow through a gap of 1e-120 m: the cube of the gap underflows."""
+    pressure = np.tile(np.linspace(1.0, 0.0, 5), (4, 1))
+    inside = leakage.flux(np.full((4, 5), 1e-120), pressure, (1.0, 1.0))[:, 1:-1]
+    np.testing.assert_array_equal(inside, np.ones((4, 3)))

@@ -270,6 +270,12 @@ def test_random_scenes_are_right_or_say_so(shared_path: Path, comm: MPI.Intracom
     assert solved >= 20
 
 
+def test_a_load_beyond_all_digits_is_named(shared_path: Path, comm: MPI.Intracomm) -> None:
+    """Full contact under 1e16 times its load: what differs from the mean is below the last digit."""
+    with pytest.raises(RunError, match="double precision reaches only about"):
+        sliding(shared_path, WAVE, comm).solve((0.02, 0.0), 1e22)
+
+
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
 def test_branches_add_up_to_the_body(shared_path: Path, comm: MPI.Intracomm, boundary: str) -> None:
     """`A p = G_inf u + sum h_k` in the steady state, to round-off: what a march that starts from it relies on."""
