@@ -17,9 +17,12 @@ from ..job.sections.geometry import Sphere, Wave
 from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
+from ..parallel.slab import Array
 from ..physics.adhesion import AdhesionLaw, cell_of, modulus_of, ramp_of, smallest_range
 from ..physics.entries import Entry, Saved
 from ..physics.units import Units
+from ..solve.adhesive.law import Law
+from ..solve.constraint import Mask
 from . import adhesive_energies
 from .adhesion_doubts import doubts_of_adhesion
 from .adhesive_energies import NO_ENERGIES, AdhesiveEnergies
@@ -95,13 +98,6 @@ def _zone_is_resolved(adhesion: Adhesion | None, grid: Any, material: Any) -> It
         yield Fault(sentence, ("adhesion", "range"))
 
 
-def _no_steady(adhesion: Adhesion | None, initial: Any, steady: Any) -> Iterator[Fault]:
-    sentence = "does not go with adhesion: slide into the steady state with a stage of the history"
-    for key, given in (("initial", initial.state == "steady"), ("steady", steady is not None)):
-        if adhesion is not None and given:
-            yield Fault(sentence, (key,))
-
-
 def _facts(job: Any) -> Iterator[str]:
     law, modulus, cell = adhesion_law(job.adhesion, job.grid, job.material), modulus_of(job.material), cell_of(job.grid)
     assert law is not None
@@ -166,11 +162,14 @@ class AdhesionColumns(Effect[AdhesionMemory]):
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("adhesion", "material"), _bodies),
         Rule(("adhesion", "grid", "material"), _zone_is_resolved),
-        Rule(("adhesion", "initial", "steady"), _no_steady),
         Rule(("adhesion", "bands"), _no_bands),
         Rule(("adhesion", "grid"), _no_strip),
     )
     lifts: ClassVar[tuple[Any, ...]] = (limits.loads_press, limits.some_load)
+
+    @staticmethod
+    def touches(job: Any, pressure: Array, gap: Array) -> Mask:
+        return Law.touches(gap)
 
     @staticmethod
     def decide(job: Any) -> Decision:

@@ -3,8 +3,8 @@
 import math
 
 from ..job import Job
+from ..job.added_sections import effects_of
 from ..parallel.slab import Array
-from ..solve.adhesive.law import Law
 from ..solve.bounded import Bounded
 from ..solve.constraint import Constraint, Mask, NonNegative
 
@@ -17,4 +17,8 @@ def constraint_of(job: Job, unit: float = 1.0, most: float = math.inf) -> Constr
 
 def touching_of(job: Job, pressure: Array, gap: Array) -> Mask:
     """Return a map that is not 0 where surfaces touch, from saved maps of the pressure [Pa] and of the gap [m]."""
-    return constraint_of(job).touches(pressure) if job.section("adhesion") is None else Law.touches(gap)
+    for effect in effects_of(type(job).model_fields).values():
+        touching = effect.touches(job, pressure, gap) if effect.decide(job).on and hasattr(effect, "touches") else None
+        if touching is not None:
+            return touching
+    return constraint_of(job).touches(pressure)

@@ -96,7 +96,13 @@ class Effect(Protocol[Memory]):
 
     section: ClassVar[type[Part]]  # what it adds to a job
     columns: ClassVar[tuple[str, ...]]  # what it adds to measures.csv
-    fields: ClassVar[tuple[str, ...]] = ()  # maps that it adds to those of output.fields
+    fields: ClassVar[tuple[str, ...]] = ()  # maps that effects of this package add to those of output.fields
+    brings_law: ClassVar[bool] = False  # true of classes with a `law` of their own; steady sliding is refused with them
+
+    def __init_subclass__(cls, **others: Any) -> None:
+        super().__init_subclass__(**others)
+        if "brings_law" not in vars(cls):
+            cls.brings_law = cls.brings_law or "law" in vars(cls)
 
     @staticmethod
     def decide(job: Any) -> Decision:
@@ -113,6 +119,14 @@ class Effect(Protocol[Memory]):
     def shear(job: Any) -> Shear | None:
         """Return the friction of the contact area that it adds, in marches and in steady sliding; None if it adds none.
         The area that touches has the forces of all effects."""
+        return None
+
+    @staticmethod
+    def touches(job: Any, pressure: Array, gap: Array) -> NDArray[Any] | None:
+        """Return a map that is not 0 where surfaces touch, from saved maps of the pressure [Pa] and of the gap [m].
+
+        None if it brings no law. Local.
+        """
         return None
 
     def __init__(self, scene: Any) -> None: ...
@@ -183,7 +197,7 @@ def guarded(section: str, effect: type[Effect[Any]]) -> type[Effect[Any]]:
 
         return call
 
-    members: dict[str, Any] = {}
+    members: dict[str, Any] = {"brings_law": getattr(effect, "brings_law", False)}
     for name in (*(name for name in dir(effect) if not name.startswith("_")), "__init__"):
         raw = getattr_static(effect, name)
         if isinstance(raw, staticmethod):

@@ -233,9 +233,10 @@ def extended_model(sections: tuple[str, ...]) -> type[Job]:
     own: Iterator[Any] = (
         _named_rule(name, rule) for name, effect in effects.items() for rule in getattr(effect, "rules", ())
     )
+    laws = (limits.refuse_steady(name) for name, effect in effects.items() if getattr(effect, "brings_law", False))
     lifted = [check for effect in effects.values() for check in getattr(effect, "lifts", ())]
     kept = (rule for rule in Job.rules if rule.check not in lifted)
-    made.rules = (*kept, *own)
+    made.rules = (*kept, *laws, *own)
     return made
 
 

@@ -56,7 +56,7 @@ class Constraint(Protocol):
         """Scale p in each cell by its share that is `kept`, which makes its sum `load`, and then to the sum `total`."""
 
     def rescale_to_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
-        """Make `total` the sum of an admissible p, which is `load`, not 0."""
+        """Make `total` the sum of an admissible p, which is `load`, not 0; p may be at its lower bound everywhere."""
 
     def clip(self, p: Array) -> float:
         """Cut p off at the bounds; returns its sum."""

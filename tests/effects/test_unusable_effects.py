@@ -6,10 +6,14 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 import short_job
 import yaml
 from conftest import WORLD, Main
+
+from parcontact.effects.contact_law import touching_of
+from parcontact.job.reading import load
 
 from .tread_wear import forget, install, shown
 
@@ -112,3 +116,23 @@ def test_maps_are_read_only(main: Main, changed: Callable[[str, str], None]) -> 
     code, _, said = main("job.yaml", "--quiet", "--out", "out")
     assert code == 1
     assert "the effect wear (tread_wear:Wear) has failed: ValueError: assignment destination is read-only" in said
+
+
+def test_steady_sliding_has_no_law_of_an_effect(main: Main, changed: Callable[[str, str], None]) -> None:
+    """Its solver has the usual one, and would leave out what the effect brings."""
+    changed("    def follow(", "    def law(self):\n        return None\n\n    def follow(")
+    code, _, said = main("check", "job.yaml", "--set", "steady={velocities: [0.1], pressures: [1e5]}")
+    assert code == BAD_INPUT
+    assert "steady does not go with wear: slide into the steady state" in said
+    assert main("check", "job.yaml")[0] == 0
+
+
+def test_a_law_of_an_effect_says_where_saved_maps_touch(
+    main: Main, changed: Callable[[str, str], None], tmp_path: Path
+) -> None:
+    """Pictures and `leak` read maps of the pressure and of the gap, without a scene."""
+    touches = "    @staticmethod\n    def touches(job, pressure, gap):\n        return pressure > 2.0\n\n"
+    changed("    def follow(", touches + "    def follow(")
+    pressure = np.array([[1.0, 2.0, 3.0]])
+    for name, expected in (("job.yaml", [False, False, True]), ("plain.yaml", [True, True, True])):
+        assert touching_of(load(tmp_path / name), pressure, 0.0 * pressure)[0].astype(bool).tolist() == expected

@@ -12,6 +12,7 @@ from ..sections.calculation import Body, Grid, Numerics, Output
 from ..sections.geometry import Flat, Rough, RoughSpectrum, Topography
 from ..sections.height_arrays import SAME_CELL, HeightArray
 from ..sections.materials import AnyMaterial, heated
+from ..sections.part import Rule
 from ..sections.stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Stage, Steady
 from ..text.fault import Fault
 from .advice import SAME_LENGTH, doubt_size
@@ -215,6 +216,19 @@ def loads_are_borne(
         if mean >= hardness:
             sentence = f"leads to a mean pressure of {mean:.4g} Pa, no less than material.hardness = {hardness:g} Pa"
             yield Fault(f"{sentence}: there is no equilibrium", ("history", index, stage.control))
+
+
+def refuse_steady(section: str) -> Rule:
+    """Return the rule that no steady sliding is asked for with a section that brings a contact law: its solver has the
+    usual one."""
+
+    def check(given: Any, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
+        for key, asked in (("initial", initial.state == "steady"), ("steady", steady is not None)):
+            if given is not None and asked:
+                sentence = f"does not go with {section}: slide into the steady state with a stage of the history"
+                yield Fault(sentence, (key,))
+
+    return Rule((section, "initial", "steady"), check)
 
 
 def steps_can_be_made(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
