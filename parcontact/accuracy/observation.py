@@ -57,8 +57,9 @@ class StepObservation:
 
     `complementarity` of the certificate; `penetrating`: points that penetrate without pressure, as a share of those in
     contact; `slope`: rms slope of the surface under the pressure; `friction`, and what an `interface` adds to it;
-    `area`, counted, and `corrected`, as shares; `views_apart`: by how much friction by the slopes of the rigid surface
-    and of the body differ; `way`: the direction of sliding, (0, 0) at rest.
+    `area`, counted, and `corrected`, as shares; `spared` was not taken off, as points on the edge have yielded;
+    `views_apart`: by how much friction by the slopes of the rigid surface and of the body differ; `way`: the direction
+    of sliding, (0, 0) at rest.
 
     Of steps also: by what the embedded pair differs, `difference`, with its `order` in the step; cells (of mean sides)
     `slid` in it, in so many `seconds`; the `angle` by which a wave turned that is as high as the surface under the
@@ -73,6 +74,7 @@ class StepObservation:
     slope: float = 0.0
     interface: float = 0.0
     penetrating: float = 0.0
+    spared: float = 0.0
     views_apart: float = 0.0
     way: Vector = (0.0, 0.0)
     difference: float = 0.0
@@ -123,7 +125,7 @@ def _ridges(shapes: Sequence[Any]) -> bool:
 def radius_of(run: RunProperties, observed: StepObservation) -> float:
     """Return the radius of round spots of contact, or of the gaps between them where these are the smaller, in cells of
     mean sides; half the width of straight ones; infinite where there are no edges."""
-    sides = (observed.area - observed.corrected) * run.points / excess_of(*run.cell, run.straight)
+    sides = (observed.area - observed.corrected + observed.spared) * run.points / excess_of(*run.cell, run.straight)
     if sides <= 0.0:
         return math.inf
     radius = ROUND * min(observed.area, 1.0 - observed.area) * run.points / sides

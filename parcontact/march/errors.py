@@ -119,6 +119,7 @@ def _observe(scene: Scene, run: RunProperties, solved: SolvedStep) -> StepObserv
         slope=pair.slope * (scene.units.height / scene.units.length),
         interface=measures.friction_interface,
         penetrating=max(certificate.members / measures.contact_area - 1.0, 0.0),
+        spared=measures.spared,
         views_apart=apart,
         way=step.velocity,
         slid=_cells_slid(run, step, (grid.dx, grid.dy)),

@@ -26,6 +26,7 @@ class Measures:
     `contact_area` counts the points with pressure; `contact_area_corrected` takes off what that counts too many along
     the edges of contact. It holds in the mean over edges in all directions that are smooth on the scale of a cell:
     spheres and rough surfaces whose shortest wave has 4 cells or more. The edge of the box is no edge of contact.
+    `spared` is the share by which less is taken off, as points on the edge have yielded.
     `at_edge` says that an isolated contact reaches it. Forces and `friction` hold what an interface adds, which is
     `force_interface`, against the sliding, and `friction_interface`. Friction is 0 where no load presses.
     """
@@ -43,6 +44,7 @@ class Measures:
     normal_force: float = 0.0
     friction_interface: float = 0.0
     force_interface: float = 0.0
+    spared: float = 0.0
 
     @property
     def finite(self) -> bool:

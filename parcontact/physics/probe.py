@@ -111,6 +111,7 @@ class Probe:
             normal_force=normal,
             friction_interface=rubbed / normal if presses else 0.0,
             force_interface=rubbed,
+            spared=(self._excess * sides - excess) / points,
         )
 
     def _measure_yielded(self, p: Array, u: Array, h: Array, highest: float) -> _Yielding:

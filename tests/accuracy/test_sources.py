@@ -39,6 +39,8 @@ def test_radius_of_a_spot() -> None:
     assert radius_of(RUN, spot) == pytest.approx(10.0)
     assert radius_of(RUN, hole) == pytest.approx(10.0)
     assert radius_of(RUN, replace(SEEN, area=1.0, corrected=1.0)) == math.inf
+    yielded = replace(spot, corrected=spot.area, spared=spot.area - spot.corrected)  # its edge is as long
+    assert radius_of(RUN, yielded) == pytest.approx(10.0)
 
 
 def test_spots_are_counted() -> None:

@@ -133,7 +133,9 @@ def test_area_and_gap_where_points_yield(nx: int, ny: int, periodic: bool, seed:
     sharp = partly & (sides > 0) & (beside == 2.0).any(axis=0)
     long = min(LX / nx, LY / ny) / max(LX / nx, LY / ny)
     excess = SIDE if 1 in (nx, ny) else SIDE * long**0.1
-    area = np.count_nonzero(whole) - (1.0 - whole[sharp] / 2.0).sum() - excess * sides[partly & ~sharp].sum()
+    taken = (1.0 - whole[sharp] / 2.0).sum() + excess * sides[partly & ~sharp].sum()
+    assert_allclose(found.spared * nx * ny, excess * sides[whole > 0.0].sum() - taken, atol=1e-5)
+    area = np.count_nonzero(whole) - taken
     area = max(area, whole.sum() / 2.0) if whole.any() else 0.0
     assert_allclose(found.contact_area_corrected, area / (nx * ny), rtol=1e-5)
     assert_allclose(found.mean_gap, gap[whole < 2.0].sum() / (nx * ny) * UNITS.height, atol=1e-13 * UNITS.height)
