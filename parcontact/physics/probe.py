@@ -80,7 +80,7 @@ class Probe:
         load, count, gaps, sides, largest, edge = self.slab.reduce(sums, [largest, edge])
         unit_pressure = alpha * units.pressure
         excess, least = self._excess * sides, 0.0
-        if self.hardness is not None and largest > 0.0:
+        if self.hardness is not None and largest * unit_pressure >= (1.0 - YIELDED) * self.hardness:
             highest = self.hardness / unit_pressure
             yielding = self._measure_yielded(p, u, h, highest)
             gaps -= yielding.gaps - yielding.points * d

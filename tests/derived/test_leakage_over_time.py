@@ -117,7 +117,8 @@ def test_a_report_has_the_leakage_of_each_stage(tmp_path: Path) -> None:
     assert "conductivity K over time" in [caption for _, caption in section.pictures]
     assert "friction" not in [row[0] for row in section.tables[0].rows]  # nothing slides
     (found,) = [one for one in section.tables if "flow x [m³]" in one.head]
-    assert found.rows == [[results.format_cell(float(row[name])) for name in names] for row in expected]
+    cells = [[results.format_cell(float(row[name])) for name in names] for row in expected]
+    assert found.rows == [[f"stage {number}", *row] for number, row in enumerate(cells, 1)]
 
 
 def test_a_contact_on_twice_the_points_is_within_the_error(comm: MPI.Intracomm) -> None:

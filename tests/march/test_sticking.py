@@ -163,7 +163,7 @@ def test_no_adhesion_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("called without an adhesion section")
 
     places = ["solve.adhesive.solver.GapSolver.__init__", "physics.halfspace.HalfSpace.gap_operators"]
-    places += ["effects.adhesive_energies.advance"]
+    places += ["effects.adhesive_energies.advance_energies"]
     places += [f"effects.adhesive_law.AdhesiveLaw.{name}" for name in ("__init__", "at_rest", "solve", "motion")]
     for place in places:
         monkeypatch.setattr(f"parcontact.{place}", refuse)

@@ -105,7 +105,8 @@ def test_theory_beside_a_run_with_an_interface(tmp_path: Path, drawn: list[Figur
 
 
 def test_run_that_goes_on(tmp_path: Path, drawn: list[Figure]) -> None:
-    """A row that is being written does not count, nor do maps that are not there yet."""
+    """A row that is being written does not count, nor do maps that are not there yet; a file of maps that was cut
+    off is refused."""
     out = ran(tmp_path, KINDS["creep"][0])
     with (out / "measures.csv").open("a") as file:
         file.write("9,0.5,0.1")
@@ -114,6 +115,9 @@ def test_run_that_goes_on(tmp_path: Path, drawn: list[Figure]) -> None:
     plots.plot([out])
     assert panels(drawn[0]) == KINDS["creep"][1]
     (out / "fields.h5").write_bytes(b"")
+    with pytest.raises(InputError, match=r"fields\.h5 cannot be read: it is no HDF5 file, or cut off"):
+        plots.plot([out])
+    (out / "fields.h5").unlink()
     plots.plot([out])
     assert panels(drawn[1]) == KINDS["creep"][1][:-3]
 

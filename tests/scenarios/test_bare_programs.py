@@ -44,8 +44,11 @@ def lasting(planned: Job) -> Counter[str]:
     slab = Slab.alone(NX, NY)
     base = scene.set_up(planned, slab)
     path = AlongX(base.surface)
-    memory = base.prony.moduli.size > 0
-    body = ZenerBody(slab, base.prony, "exponential") if memory else ElasticBody(slab, base.prony.modulus_inf)
+    body: ZenerBody | ElasticBody
+    if base.prony.moduli.size > 0:
+        body = ZenerBody(slab, base.prony, "exponential")
+    else:
+        body = ElasticBody(slab, base.prony.modulus_inf, base.choices.slides_along_x)
     held, (solver, operators) = body.at_rest(), bare_solver(base)
     probe = Probe(slab, base.surface, base.units)
     earlier, last, p = (slab.zeros() for _ in range(3))
