@@ -29,6 +29,7 @@ from ..job.text.places import UNREADABLE, Source
 from ..job.text.python_data import is_array
 from .contact_guess import guesses
 
+MOST_POINTS = 100_000  # tuning: along a side: ten times as many as have been run
 KEYS = ("points", "size")  # of a grid, which a measured map has
 Extent = tuple[tuple[int, int], tuple[float, float] | None]
 
@@ -89,6 +90,11 @@ def _choose(scenery: Scenery | Job, box: Grid, data: dict[str, Any], origin: Ori
     wave = min((_shortest(shape, box, data, origin) for shape in scenery.surface), default=math.inf)
     if not math.isfinite(wave):
         raise InputError("the surface has no shortest wave, from which cells follow; give numbers of points")
+    if (waves := max(box.size) / wave) * cells.LEAST_CELLS > MOST_POINTS:
+        raise InputError(
+            f"a side of {max(box.size):.4g} m has {waves:.3g} of the surface's shortest waves, {wave:.4g} m: more than "
+            f"{MOST_POINTS} points; make grid.size smaller, or the shortest wave longer"
+        )
     directions = cells.directions_of(scenery.history, scenery.initial, scenery.steady)
     asked, share = scenery.numerics.asked, (FRICTION if scenery.history else STEADY).mesh
     own = Accuracy(friction=share * asked.friction, area=share * asked.area)

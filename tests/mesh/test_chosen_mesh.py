@@ -144,6 +144,7 @@ def test_from_python_and_in_a_sweep(tmp_path: Path) -> None:
     [
         ("{shape: sphere, radius: 1e-2}", "1:16: grid.points: auto: the surface has no shortest wave"),
         ("{shape: file, path: job.npy}", "1:16: grid.points: auto: heights from a file or an array are given on one"),
+        (ROUGH.replace("6.25e-5", "1.25e-9"), "1:16: grid.points: auto: a side of 0.001 m has 8e+05 of the surface"),
         ("{shape: rough, hurst: 2}", "2:32: surface.hurst must be a Hurst exponent above 0 and up to 1"),
     ],
 )
