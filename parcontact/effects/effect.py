@@ -178,6 +178,25 @@ Effects = Mapping[str, Effect[Any]]
 Memories = Mapping[str, Any]
 
 
+class _NamedLaw:
+    """The contact law of an effect of others; its methods name the effect where they fail."""
+
+    def __init__(self, law: Any, section: str) -> None:
+        self._law, self._section = law, section
+
+    def __getattr__(self, name: str) -> Any:
+        member = getattr(self._law, name)
+        if not callable(member):
+            return member
+
+        @wraps(member)
+        def call(*given: Any, **named: Any) -> Any:
+            with added_sections.naming_effect(self._section):
+                return member(*given, **named)
+
+        return call
+
+
 def guarded(section: str, effect: type[Effect[Any]]) -> type[Effect[Any]]:
     """Return the class of an effect; where it is not of this package, its methods name it where they fail, and maps of
     an instant are read-only for it."""
@@ -193,7 +212,8 @@ def guarded(section: str, effect: type[Effect[Any]]) -> type[Effect[Any]]:
                     for field in (one.pressure, one.displacement, one.touching):
                         kept.callback(setattr, field.flags, "writeable", field.flags.writeable)
                         field.flags.writeable = False
-                return method(*given)
+                found = method(*given)
+            return _NamedLaw(found, section) if name == "law" and found is not None else found
 
         return call
 

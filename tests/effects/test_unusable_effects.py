@@ -136,3 +136,21 @@ def test_a_law_of_an_effect_says_where_saved_maps_touch(
     pressure = np.array([[1.0, 2.0, 3.0]])
     for name, expected in (("job.yaml", [False, False, True]), ("plain.yaml", [True, True, True])):
         assert touching_of(load(tmp_path / name), pressure, 0.0 * pressure)[0].astype(bool).tolist() == expected
+
+
+def test_a_law_that_fails_is_named(main: Main, changed: Callable[[str, str], None]) -> None:
+    law = (
+        "    def __init__(self, scene):\n"
+        "        self.slab, self.rate, self.scene = scene.slab, 1.0, scene\n\n"
+        "    def law(self):\n"
+        "        from parcontact.march.dry_law import DryLaw\n"
+        "        class Mine(DryLaw):\n"
+        "            def solve(self, *given):\n"
+        "                return {}['x']\n"
+        "        return Mine(self.scene)\n\n"
+    )
+    changed("    def follow(", law + "    def follow(")
+    code, _, said = main("job.yaml", "--quiet", "--out", "out")
+    assert code == 1
+    assert re.search(r"the effect wear \(tread_wear:Wear\) has failed: KeyError: 'x'", said), said
+    assert "Traceback" not in said
