@@ -14,15 +14,19 @@ from .tables import Columns
 
 RUN, CURVE = "measures.csv", "steady.csv"
 GROWING = (RUN, CURVE, "bands.csv", "steady_waves.csv")
+THEORY_FILE, OF_THEORY = "theory.csv", ("time", "distance", "friction", "contact_area")
 MEND = "mend it, or move it away"
 
 
 def read_results(path: Path) -> Columns:
-    """Return the columns of a table of results by name. Raises InputError where it is damaged or lacks rows."""
+    """Return the columns of a table of results by name. Raises InputError where it is damaged, of somebody else, or
+    lacks rows."""
     lasts = list(_find_ends(path))  # before the table, which grows meanwhile
     columns = tables.read_columns(path)
     if path.name not in GROWING:
         refuse_cut(path)
+    if path.name == THEORY_FILE and (without := [name for name in OF_THEORY if name not in columns]):
+        raise InputError(f"{path} has no column {', '.join(without)}: it is not of `parcontact theory`; move it away")
     for end, what in lasts:
         count = _last_step(columns) if path.name == RUN else len(columns["velocity"])
         if count < end:
