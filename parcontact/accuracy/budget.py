@@ -6,8 +6,8 @@ to nothing, of which no estimate knows.
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import astuple, dataclass, field, fields, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,7 @@ SHOWN = {source.name: source.shown or source.name for source in MARCH_SOURCES}
 SHOWN |= {"method": "coupling of bands", "scatter": "surfaces"}
 
 
-@dataclass(frozen=True)
-class Parts:
+class Parts(NamedTuple):
     """Relative errors by what makes them. Of surfaces in bands `method` is what their coupling makes, and `scatter`
     what other surfaces of the same spectrum do."""
 
@@ -46,7 +45,7 @@ class Parts:
 
     @property
     def total(self) -> float:
-        return sum(astuple(self))
+        return sum(self)
 
     @property
     def of_friction(self) -> float:
@@ -62,7 +61,7 @@ class Parts:
         return {name: getattr(self, name) for name in NAMES} | {"total": self.total}
 
 
-NAMES = tuple(each.name for each in fields(Parts))
+NAMES = Parts._fields
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ class ErrorSums:
         far, sums = weight_of(slid, seconds), self.sums.copy()
         for row, parts, weight in zip(sums, (budget.friction, budget.area), (friction, 1.0), strict=True):
             if parts is not None:
-                row += weight * far * np.array([1.0, *astuple(parts)])
+                row += weight * far * np.array([1.0, *parts])
         return ErrorSums(sums)
 
     def entries(self) -> dict[str, Entry]:

@@ -277,7 +277,7 @@ class RoadSliding:
             for k, (whole, (solver, mesh)) in enumerate(((friction or 1.0, of_bands), (area or 1.0, of_area)))
         ]
         own = self._interface_share(outcome, friction)
-        with_interface = replace(parts[0], method=parts[0].method + own * parts[1].method)
+        with_interface = parts[0]._replace(method=parts[0].method + own * parts[1].method)
         return ErrorBudget(with_interface if friction > 0.0 else None, parts[1])
 
     def _interface_share(self, outcome: BandOutcome, friction: float) -> float:

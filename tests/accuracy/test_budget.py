@@ -56,8 +56,8 @@ def test_a_rest_does_not_dilute_what_a_slide_says() -> None:
     assert summary.friction is not None
     assert summary.area is not None
     assert slide.friction is not None
-    assert astuple(summary.friction) == pytest.approx(astuple(slide.friction), rel=1e-12)
-    assert astuple(summary.area) == pytest.approx(astuple(slide.area), rel=1e-12)
+    assert summary.friction == pytest.approx(slide.friction, rel=1e-12)
+    assert summary.area == pytest.approx(slide.area, rel=1e-12)
     assert all(", mean over the distance slid" in line for line in summary.lines((0.012, 0.011)))
 
 
