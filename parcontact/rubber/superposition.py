@@ -12,7 +12,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,6 @@ from .tables import Measurement
 
 Array = NDArray[np.float64]
 Vertical = Literal["auto", "density", "free", "none"]
-VERTICAL: tuple[Vertical, ...] = get_args(Vertical)
 MOST_DECADES = 45.0  # tuning: of shift between the coldest and the warmest set
 CLOSE = 1e-4  # accuracy: relative, of constants and of the misfit, at which a search ends
 FAR = 1e3  # accuracy: residual of shifts that are out of question: no step goes there
