@@ -9,6 +9,9 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 import parcontact as pc
+from parcontact.accuracy import budget
+from parcontact.accuracy.observation import radius_of
+from parcontact.march import errors
 from parcontact.physics.layer import Layer
 from parcontact.python.row import Row
 
@@ -298,3 +301,21 @@ def test_a_hardness_above_the_whole_load_on_one_point_is_none() -> None:
     body = {"model": "elastic", "shear_modulus": 1e9}
     found = [marched({**job, "material": {**body, **more}})[1][-1] for more in ({}, {"hardness": 2e18})]
     assert found[0].measures == found[1].measures
+
+
+def test_steps_are_judged_by_the_whole_edge_of_spots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their radius is that of all sides between points in contact and others, of yielded points, too; exactly."""
+    seen: list[Any] = []
+
+    def estimate(*given: Any) -> Any:
+        seen.append(given)
+        return budget.estimate(*given)
+
+    monkeypatch.setattr(errors, "estimate", estimate)
+    job = scene(grid=GRID, surface=ROUGH, material={**ZENER, "hardness": 2e5}, history=[PRESS, SLIDE])
+    march, _ = marched(job)
+    touches, (run, observed) = march.field("pressure") > 0.0, seen[-1]
+    assert march.field("pressure").max() == pytest.approx(2e5)
+    sides = sum(np.count_nonzero(touches != np.roll(touches, 1, axis)) for axis in (0, 1))
+    area = min(touches.mean(), 1.0 - touches.mean())
+    assert radius_of(run, observed) == pytest.approx(8.0 / np.pi * area * touches.size / sides, rel=1e-9)
