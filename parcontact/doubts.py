@@ -31,8 +31,8 @@ class Doubt:
 
     @property
     def subject(self) -> tuple[str, ...]:
-        """What two doubts have in common that differ in numbers alone: kind, place, and names but `where` it was
-        seen."""
+        """Return kind, place and names, but `where` it was seen: two doubts with one subject differ in numbers
+        alone."""
         names = (value for name, value in self.numbers.items() if isinstance(value, str) and name != "where")
         return self.kind, self.place, *names
 

@@ -1,1 +1,1 @@
-"""How wrong friction and contact area are: sources of error, their sum, and what follows for tolerances and steps."""
+"""Errors of friction and contact area: their sources, their sum, and the tolerances and steps that follow."""

@@ -26,8 +26,8 @@ OF_AREA = "3.4, 1.1 to 41 (unseen: 4.3, 1.2 to 49)"
 
 AREA = Fit("area: times the correction over N^(1/4)", 0.5, 1.0, COVERAGE, OF_AREA)
 STEADY = Fit("area in steady sliding: the same", 0.75, 1.0, COVERAGE, OF_AREA)
-ALIKE = Fit("area: more where contacts are all alike", 2.0, 0.0, COVERAGE, OF_AREA)
-STEADY_ALIKE = Fit("steady friction: more where contacts are all alike", 4.0, 0.0, COVERAGE, OF_FRICTION)
+IDENTICAL = Fit("area: more where contacts are identical", 2.0, 0.0, COVERAGE, OF_AREA)
+STEADY_IDENTICAL = Fit("steady friction: more where contacts are identical", 4.0, 0.0, COVERAGE, OF_FRICTION)
 STRAIGHT = Fit("area: more along edges that follow the grid", 4.0, 0.0, COVERAGE, OF_AREA)
 VIEWS = Fit("friction of marches: times the difference of its two views", 1.1, 1.5, COVERAGE, OF_FRICTION)
 STEADY_LOST = Fit("steady friction: times what edges lose", 0.7, 1.0, COVERAGE, OF_FRICTION)

@@ -98,8 +98,8 @@ class Controller:
 
     @property
     def follows(self) -> bool:
-        """Whether the tolerance of steps follows the error budget: where `numerics.accuracy` has chosen that of the
-        job, and stages last. Contacts with adhesion are solved to that of the job."""
+        """Return whether the tolerance of steps follows the error budget: `numerics.accuracy` has chosen that of the
+        job, and stages last. Contacts with adhesion are solved to the job's tolerance."""
         return "tolerance" in self.job.numerics.chosen and self.timeline.lasts and not self.adhesive
 
     def tolerance(self, memory: StepTolerance, step: Step) -> float | None:

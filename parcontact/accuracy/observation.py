@@ -1,12 +1,12 @@
-"""What the error budget sees: properties of a run, and observations of a step or of a steady state.
+"""The error budget uses properties of a run, and observations of a step or of a steady state.
 
 Spots of contact are taken as round. With S sides of cells between points in contact and others, on n points of which a
 share A touches, their mean radius in cells is
 
     r = (8/pi) min(A, 1 - A) n/S,
 
-of the gaps between them where these are the smaller. Contacts of waves, cylinders and flats are all alike; they lie in
-the same way on the grid, so that they count as one.
+of the gaps between them where these are the smaller. Contacts of waves, cylinders and flats are identical; they lie
+in the same way on the grid, so that they count as one.
 """
 
 import math
@@ -18,7 +18,7 @@ from ..job import Cylinder, Flat, Job, Rough, Wave
 from ..physics.measures import excess_of
 from ..physics.prony import Prony
 
-REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are all alike
+REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are identical
 ROUND = 8.0 / math.pi  # physics: cells of a round spot over its sides on the edge, times this: its radius in cells
 SPOTS_POWER = 0.25  # accuracy: of the number of spots, by which errors of many are smaller
 Vector = tuple[float, float]
@@ -29,8 +29,8 @@ class RunProperties:
     """Properties of a run that are known before it begins.
 
     `points` of the grid; `cell`: its sides [m]; `cells_per_wave`: longer sides per shortest wave of a rough surface,
-    None without one; `measured`: the surface has a map, which may lack waves on a coarse grid; `straight`: edges of
-    contact follow the grid; `alike`: all contacts are, as those of waves; `free`: the box; `prony`: what relaxes, None
+    None without one; `measured`: the surface has a map, which may lack waves on a coarse grid; `edges_follow_grid`:
+    those of contact do; `identical_contacts`: as those of waves; `free`: the box; `prony`: what relaxes, None
     of an elastic body; `folded`: the bound of its folded branches; `exponential`: the integrator is.
     """
 
@@ -38,8 +38,8 @@ class RunProperties:
     cell: Vector = (1.0, 1.0)
     cells_per_wave: float | None = None
     measured: bool = False
-    straight: bool = False
-    alike: bool = False
+    edges_follow_grid: bool = False
+    identical_contacts: bool = False
     free: bool = False
     prony: Prony | None = None
     folded: float = 0.0
@@ -58,8 +58,8 @@ class StepObservation:
     `complementarity` of the certificate; `penetrating`: points that penetrate without pressure, as a share of those in
     contact; `slope`: rms slope of the surface under the pressure; `friction`, and what an `interface` adds to it;
     `area`, counted, and `corrected`, as shares; `spared` was not taken off, as points on the edge have yielded;
-    `views_apart`: by how much friction by the slopes of the rigid surface and of the body differ; `way`: the direction
-    of sliding, (0, 0) at rest.
+    `friction_mismatch`: by how much friction by the slopes of the rigid surface and of the body differ; `way`: the
+    direction of sliding, (0, 0) at rest.
 
     Of steps also: by what the embedded pair differs, `difference`, with its `order` in the step; cells (of mean sides)
     `slid` in it, in so many `seconds`; the `angle` by which a wave turned that is as high as the surface under the
@@ -75,7 +75,7 @@ class StepObservation:
     interface: float = 0.0
     penetrating: float = 0.0
     spared: float = 0.0
-    views_apart: float = 0.0
+    friction_mismatch: float = 0.0
     way: Vector = (0.0, 0.0)
     difference: float = 0.0
     order: float = 2.0
@@ -105,8 +105,8 @@ def properties_of(job: Job, shortest: float | None, folded: float = 0.0, prony: 
         cell=cell,
         cells_per_wave=min(waves) / max(cell) if waves else None,
         measured=shortest is not None,
-        straight=line or _ridges(job.surface),
-        alike=line or all(isinstance(shape, REGULAR) for shape in job.surface),
+        edges_follow_grid=line or _ridges(job.surface),
+        identical_contacts=line or all(isinstance(shape, REGULAR) for shape in job.surface),
         free=job.grid.boundary == "free",
         prony=prony,
         folded=folded,
@@ -125,18 +125,19 @@ def _ridges(shapes: Sequence[Any]) -> bool:
 def radius_of(run: RunProperties, observed: StepObservation) -> float:
     """Return the radius of round spots of contact, or of the gaps between them where these are the smaller, in cells of
     mean sides; half the width of straight ones; infinite where there are no edges."""
-    sides = (observed.area - observed.corrected + observed.spared) * run.points / excess_of(*run.cell, run.straight)
+    excess = excess_of(*run.cell, run.edges_follow_grid)
+    sides = (observed.area - observed.corrected + observed.spared) * run.points / excess
     if sides <= 0.0:
         return math.inf
     radius = ROUND * min(observed.area, 1.0 - observed.area) * run.points / sides
-    return radius / ROUND if run.straight else radius
+    return radius / ROUND if run.edges_follow_grid else radius
 
 
 def count_spots(run: RunProperties, observed: StepObservation) -> float:
-    """Return the number of spots of contact, or of the gaps between them where these are the smaller; of contacts that
-    are all alike 1, and in full contact as many as half waves of the shortest length."""
+    """Return the number of spots of contact, or of the gaps between them where these are the smaller; of identical
+    contacts 1, and in full contact as many as half waves of the shortest length."""
     radius, share = radius_of(run, observed), min(observed.area, 1.0 - observed.area)
-    if run.alike:
+    if run.identical_contacts:
         return 1.0
     if run.cells_per_wave is not None:
         share = share if radius < math.inf else observed.area

@@ -14,8 +14,9 @@ folded: the bound of the branches without a map, of the area where the gap is op
 mesh: of the area AREA c/N^(1/4), STEADY in steady sliding, a cell at least. Of friction in a march VIEWS times the
     difference of its two views, by the slopes of the rigid surface and of the body. Of steady friction, which is a sum
     of squares and does not vanish by cancellation, STEADY_LOST times what edges of contact lose in waves shorter than
-    the cells, and STEADY_AREA c/N^(1/4). Contacts that are all alike lie on the grid in the same way: their errors do
-    not average out (N = 1), and are larger by ALIKE (STEADY_ALIKE), those of the area along straight edges by STRAIGHT.
+    the cells, and STEADY_AREA c/N^(1/4). Identical contacts lie on the grid in the same way: their errors do not
+    average out (N = 1), and are larger by IDENTICAL (STEADY_IDENTICAL), those of the area along straight edges by
+    STRAIGHT.
     A map lacks waves on a grid of less than FEW_CELLS per shortest wave: friction is then wrong by WAVES (4/cells)^2.5
     as well.
 
@@ -40,17 +41,17 @@ import numpy as np
 
 from ..physics.prony import Prony, complex_modulus
 from .constants import (
-    ALIKE,
     AREA,
     FREE_LOST,
+    IDENTICAL,
     LOST,
     NOISE,
     PENETRATING,
     SOLVER,
     SOLVER_AREA,
     STEADY,
-    STEADY_ALIKE,
     STEADY_AREA,
+    STEADY_IDENTICAL,
     STEADY_LOST,
     STRAIGHT,
     VIEWS,
@@ -118,7 +119,7 @@ def folded_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 
 def mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
     """Return what the mesh makes wrong in a step of a march."""
-    friction = VIEWS.value * observed.views_apart / observed.friction if observed.friction else 0.0
+    friction = VIEWS.value * observed.friction_mismatch / observed.friction if observed.friction else 0.0
     return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(AREA, run, observed))
 
 
@@ -126,7 +127,7 @@ def steady_mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPai
     """Return the same of steady sliding."""
     correction = observed.correction * mean_over_spots(run, observed)
     friction = STEADY_LOST.value * lost_at_edges(run, observed) + STEADY_AREA.value * correction
-    friction = friction * (STEADY_ALIKE.value if run.alike else 1.0) + _lacking_waves(run)
+    friction = friction * (STEADY_IDENTICAL.value if run.identical_contacts else 1.0) + _lacking_waves(run)
     return ErrorPair(friction, _mesh_of_area(STEADY, run, observed))
 
 
@@ -139,7 +140,7 @@ def _lacking_waves(run: RunProperties) -> float:
 
 
 def _mesh_of_area(fit: Fit, run: RunProperties, observed: StepObservation) -> float:
-    larger = STRAIGHT.value if run.straight else ALIKE.value if run.alike else 1.0
+    larger = STRAIGHT.value if run.edges_follow_grid else IDENTICAL.value if run.identical_contacts else 1.0
     error = fit.value * larger * observed.correction * mean_over_spots(run, observed)
     return max(error, 1.0 / (run.points * observed.area)) if observed.area > 0.0 else error
 
@@ -151,10 +152,10 @@ def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
         return 0.0
     cell = cell_along(run, observed.way)
     size = radius_of(run, observed) * (run.mean_cell / cell)
-    share, slow = lost_in_short_waves(run.prony, size, math.hypot(*observed.way) / cell, run.straight)
+    share, slow = lost_in_short_waves(run.prony, size, math.hypot(*observed.way) / cell, run.edges_follow_grid)
     few = min(1.0, GAPS * (1.0 - observed.area))
     most = FREE_LOST.value if run.free else LOST.value
-    return min(1.0, most * few * share * slow ** (STRAIGHT_POWER if run.straight else 1.0))
+    return min(1.0, most * few * share * slow ** (STRAIGHT_POWER if run.edges_follow_grid else 1.0))
 
 
 def lost_in_short_waves(prony: Prony, radius: float, speed: float, straight: bool) -> tuple[float, float]:

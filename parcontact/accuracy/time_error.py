@@ -1,4 +1,4 @@
-"""How wrong friction is by the length of a time step, part of the error budget, from two looks at it.
+"""The length of a time step makes an error of friction, which is estimated in two ways.
 
 A linear step takes the displacement to change evenly. Of a harmonic wave, which turns by an angle theta in a step,
 the force of a branch with z = dt/tau is then wrong by theta^2/12 of its loss where the branch is slow, by theta^2/6

@@ -120,7 +120,7 @@ def _observe(scene: Scene, run: RunProperties, solved: SolvedStep) -> StepObserv
         interface=measures.friction_interface,
         penetrating=max(certificate.members / measures.contact_area - 1.0, 0.0),
         spared=measures.spared,
-        views_apart=apart,
+        friction_mismatch=apart,
         way=step.velocity,
         slid=_cells_slid(run, step, (grid.dx, grid.dy)),
         angle=pair.angle,
@@ -132,7 +132,7 @@ def _observe(scene: Scene, run: RunProperties, solved: SolvedStep) -> StepObserv
 
 def _cells_slid(run: RunProperties, step: Step, cell: tuple[float, float]) -> float:
     """Return by how many cells the surface slides in a step: of mean sides, or across straight edges of contact."""
-    dx, dy = cell if run.straight else (run.mean_cell, run.mean_cell)
+    dx, dy = cell if run.edges_follow_grid else (run.mean_cell, run.mean_cell)
     return math.hypot(step.velocity[0] / dx, step.velocity[1] / dy) * step.dt
 
 

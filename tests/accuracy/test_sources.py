@@ -32,7 +32,7 @@ def friction_of(run: RunProperties, seen: StepObservation, steady: bool = False)
 
 
 def test_radius_of_a_spot() -> None:
-    """Of a circle of ten cells: pi r^2 cells and 8 r sides; of one hole in full contact the same."""
+    """A circle of ten cells has pi r^2 cells and 8 r sides. A hole in full contact has as many."""
     points, cells, sides = 10_000, 100 * math.pi, 80
     spot = replace(SEEN, area=cells / points, corrected=(cells - SIDE * sides) / points)
     hole = replace(SEEN, area=1 - cells / points, corrected=1 - (cells + SIDE * sides) / points)
@@ -44,8 +44,8 @@ def test_radius_of_a_spot() -> None:
 
 
 def test_spots_are_counted() -> None:
-    """Four circles of ten cells, and four such holes; in full contact those of half the shortest wave; one where all
-    are alike."""
+    """Four circles of ten cells, and four such holes; in full contact those of half the shortest wave; one where they
+    are identical."""
     points, cells, sides = 10_000, 400 * math.pi, 4 * 80
     four = replace(SEEN, area=cells / points, corrected=(cells - SIDE * sides) / points)
     holes = replace(SEEN, area=1 - cells / points, corrected=1 - (cells + SIDE * sides) / points)
@@ -54,7 +54,7 @@ def test_spots_are_counted() -> None:
     assert count_spots(bare, four) == pytest.approx(4.0)
     assert count_spots(bare, holes) == pytest.approx(4.0)
     assert count_spots(RUN, full) == pytest.approx(points / (16 * math.pi))
-    assert count_spots(bare, full) == count_spots(replace(bare, alike=True), four) == 1.0
+    assert count_spots(bare, full) == count_spots(replace(bare, identical_contacts=True), four) == 1.0
 
 
 def test_spots_of_long_cells() -> None:
@@ -99,7 +99,7 @@ def test_friction_that_is_noise_is_0_within_its_error(friction: float) -> None:
 
 
 def test_an_interface_has_the_error_of_the_area() -> None:
-    """Of its part of friction, and of the body's part that of the body."""
+    """Its part of friction has the error of the area, and the body's part that of the body."""
     body = friction_of(RUN, SEEN)
     mixed, area = estimate(RUN, replace(SEEN, friction=0.08, interface=0.06)), estimate(RUN, SEEN).area
     assert mixed.friction is not None
@@ -112,19 +112,19 @@ def test_an_interface_has_the_error_of_the_area() -> None:
 @pytest.mark.parametrize("steady", [False, True])
 def test_the_mesh_makes_the_area_wrong(steady: bool) -> None:
     """By 0.5 of the correction over the fourth root of the number of spots, 0.75 in steady sliding, a cell at least;
-    twice that of one spot where all are alike, four times along straight edges."""
+    twice that of one spot where they are identical, four times along straight edges."""
     judge, share = (estimate_steady, 0.75) if steady else (estimate, 0.5)
     found = judge(RUN, SEEN).area.mesh
     assert found == pytest.approx(share / 19.0 / count_spots(RUN, SEEN) ** 0.25)
     for straight, times in (False, 2.0), (True, 4.0):
-        run = replace(RUN, alike=True, straight=straight)
+        run = replace(RUN, identical_contacts=True, edges_follow_grid=straight)
         assert judge(run, SEEN).area.mesh == pytest.approx(times * share / 19.0)
     assert judge(RUN, replace(SEEN, area=0.5, corrected=0.5)).area.mesh == pytest.approx(2e-4)
 
 
 def test_the_two_views_bound_the_mesh_of_marches() -> None:
     """Friction by slopes and by energy that are 0.004 apart, of 0.02: 1.1 of a fifth."""
-    assert friction_of(RUN, replace(SEEN, views_apart=4e-3)).mesh == pytest.approx(0.22)
+    assert friction_of(RUN, replace(SEEN, friction_mismatch=4e-3)).mesh == pytest.approx(0.22)
     assert friction_of(RUN, SEEN).mesh == 0.0
 
 

@@ -73,7 +73,7 @@ class Grid(Part):
 
     @property
     def cyclic(self) -> tuple[bool, bool]:
-        """Whether the box repeats itself along x, and along y."""
+        """Return whether the box repeats itself along x, and along y."""
         return self.boundary != "free", self.boundary == "periodic"
 
     @property
