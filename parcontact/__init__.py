@@ -17,9 +17,9 @@ from .errors import InputError, JobError, RunError
 if TYPE_CHECKING:
     from .leakage.flow import leak
     from .python.curves import steady
-    from .python.parts import material, surface
     from .python.results import open
     from .python.simulation import Simulation
+    from .python.surface_and_material import material, surface
 
 __version__ = "0.2.0"
 __all__ = ["InputError", "JobError", "RunError", "Simulation", "leak", "material", "open", "steady", "surface"]
@@ -28,8 +28,8 @@ _ROOMS = {
     "Simulation": "python.simulation",
     "steady": "python.curves",
     "open": "python.results",
-    "surface": "python.parts",
-    "material": "python.parts",
+    "surface": "python.surface_and_material",
+    "material": "python.surface_and_material",
     "leak": "leakage.flow",
 }
 

@@ -38,7 +38,7 @@ import runs
 from coverage_scenes import FINER, Json, Sketch, sketch
 from matplotlib.figure import Figure
 
-import parcontact.march.errors as of_march
+import parcontact.march.step_errors as of_march
 import parcontact.steady_sliding.sliding as of_steady
 from parcontact import scene
 from parcontact.accuracy.budget import ErrorBudget, estimate, estimate_steady, weight_of

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from runs import begun, marched
 
-from parcontact.storage.row import StepRow
+from parcontact.storage.step_row import StepRow
 from parcontact.summary import slide
 
 Json = dict[str, Any]

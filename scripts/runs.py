@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from parcontact.job import Job
     from parcontact.march.loop import March
-    from parcontact.storage.row import StepRow
+    from parcontact.storage.step_row import StepRow
 
 ROOT = Path(__file__).resolve().parents[1]
 Json = dict[str, Any]

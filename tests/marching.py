@@ -15,7 +15,7 @@ from parcontact.job import Job, load
 from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding import start
-from parcontact.storage.row import StepRow
+from parcontact.storage.step_row import StepRow
 
 # the paper's Hertz material as one Maxwell branch beside the long-term spring: modulus 2.75 MPa at once, a tenth of it
 # in the end, relaxation time 1 ms, creep time 10 ms

@@ -9,7 +9,7 @@ from parcontact import job, scene
 from parcontact.march.loop import March
 from parcontact.march.loop import run_steps as run_march
 from parcontact.parallel.slab import Slab
-from parcontact.storage.row import StepRow
+from parcontact.storage.step_row import StepRow
 
 Fields = dict[str, NDArray[Any]]
 

@@ -11,8 +11,8 @@ from drawing import ELASTIC, LOADS, MAPS, SLIDE, WAVE, ZENER, ran
 
 from parcontact import progress
 from parcontact.__main__ import main
-from parcontact.plotting.run import PlottedRun
-from parcontact.report import results
+from parcontact.plotting.plotted_run import PlottedRun
+from parcontact.report import result_sections
 
 
 class Terminal(io.StringIO):
@@ -58,7 +58,7 @@ def test_steady_states(job: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
 def test_the_maps_of_a_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = ran(tmp_path, WAVE + ELASTIC + LOADS + MAPS)
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
-    assert [len(images) for _, images, _ in results.browse_run(PlottedRun(out))] == [2, 2]
+    assert [len(images) for _, images, _ in result_sections.browse_run(PlottedRun(out))] == [2, 2]
     assert "maps of pressure:   0%" in terminal.getvalue()
     assert "0/2" in terminal.getvalue()
 

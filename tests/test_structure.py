@@ -183,6 +183,15 @@ def test_classes_change_little() -> None:
     assert not {name: number for name, number in numbers.items() if number > MOST_THAT_CHANGES}
 
 
+def test_modules_have_a_name_of_their_own() -> None:
+    """No two modules or folders of modules have one name, but a module may have that of its own folder."""
+    paths = [module.split(".") for module in MODULES]
+    folders = {tuple(path[:-1]) for path in paths if len(path) > 1}
+    names = [folder[-1] for folder in folders]
+    names += [path[-1] for path in paths if path[-1] not in ("__init__", *path[-2:-1])]
+    assert {name: names.count(name) for name in names if names.count(name) > 1} == {}
+
+
 FOR_USERS = {"theory", "command", "python"}  # rooms whose names are those that users write
 
 

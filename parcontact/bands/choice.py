@@ -15,8 +15,8 @@ from ..parallel.slab import Array
 from ..physics.roughness import EDGE
 from ..printed import quantity
 from ..scene.measured_range import doubt_band
-from .limits import doubt_steep_waves
 from .measured_band import MapBand, band_of_map
+from .steep_waves import doubt_steep_waves
 from .wave_spectrum import WaveSpectrum, spectrum_of
 
 WIDTH = 0.75  # accuracy: decades of a band, about; 0.65 to 1 are right to 4 % in friction, 0.45 to 7 %

@@ -24,7 +24,7 @@ from .band import Rung, Vector
 from .band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
 from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, cut_bands, describe_cut, doubts_of_bands
-from .limits import STRAIN
+from .steep_waves import STRAIN
 
 MOST_ROUNDS = 20  # tuning: of temperatures, more than any case has needed
 LEAST_ERROR, RELATIVE = 0.1, 0.02  # accuracy: of the rise of a band [K], and relative

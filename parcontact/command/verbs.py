@@ -126,7 +126,7 @@ def plan(options: argparse.Namespace) -> int:
         at_once = on_root(world, lambda: count_side_by_side([case.job for case in chosen], world.size))
         lines = planner.plan_sweep(chosen, Groups(world, at_once))
     elif chosen[0].job.bands is not None:
-        from ..bands.trial import plan_bands
+        from ..bands.band_plan import plan_bands
 
         lines = plan_bands(chosen[0].job, Slab(world, 1, 1))
     else:
@@ -164,7 +164,7 @@ def _on_one_grid(job: Job) -> Job:
 def fit(options: argparse.Namespace) -> int:
     """Fit a compound to measured moduli: a material file and a picture."""
     from .. import mesh
-    from ..plotting import compound as files
+    from ..plotting import compound_files as files
     from ..rubber import compound
     from ..rubber.shift import given
     from ..scene.measured_range import excited_band
@@ -271,8 +271,9 @@ def doctor(options: argparse.Namespace) -> int:
     world = ranks.start_ranks()
     from pathlib import Path
 
-    from ..doctor import checks, machine
+    from ..doctor import machine
     from ..doctor.bench import Bench
+    from ..doctor.installation_checks import CHECKS, markdown, run_check
 
     def tell(text: str) -> None:
         if world.rank == 0:
@@ -280,8 +281,8 @@ def doctor(options: argparse.Namespace) -> int:
 
     for line in machine.describe_machine(world, Path.cwd()):
         tell(line)
-    results = [(check, checks.run_check(check, Bench(world, options.precision))) for check in checks.CHECKS]
-    tell("\n" + checks.markdown(results))
+    results = [(check, run_check(check, Bench(world, options.precision))) for check in CHECKS]
+    tell("\n" + markdown(results))
     wrong = [f"{check.name}: {text}" for check, bench in results for text in bench.wrong]
     wrong += filter(None, [machine.find_broken_files(world, Path.cwd())])
     tell("\n".join(wrong) or "all is well")

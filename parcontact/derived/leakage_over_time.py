@@ -19,8 +19,8 @@ from ..leakage.flow import Flow, Leak, Map, flow_mesh_error, leak, solve_flow
 from ..leakage.fluids import PressureDrop
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
-from ..plotting import conductivity, leakage
-from ..plotting.run import Fields, PlottedRun
+from ..plotting import conductivity, leakage_charts
+from ..plotting.plotted_run import Fields, PlottedRun
 from ..printed import per_cent, quantity, stated_error
 from ..storage import files, hdf5, read_back
 from ..summary import leak_stop
@@ -119,7 +119,7 @@ class Gaps:
         of_fluid = list[float]()
         for axis in ("x", "y"):
             flow = solve_flow(gap, self.size, axis, self._sides(axis))
-            shown.append(leakage.flux(gap, flow.pressure, self.size))
+            shown.append(leakage_charts.flux(gap, flow.pressure, self.size))
             flows.append(replace(flow, pressure=np.empty((0, 0))))
             of_fluid.append(self._conductivity(gap, flow, axis))
             errors.append(flow_mesh_error(gap, flow, self.size, axis, self._sides(axis)))
@@ -182,7 +182,7 @@ def write_leakage(
     files.replace_file(table, to_csv(names_of(columns), (values_of(columns, row) for row in rows)))
     instant = PlottedRun(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
     flows = leaks[drawn].leak.along_x, leaks[drawn].leak.along_y
-    leakage.draw_leakage(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
+    leakage_charts.draw_leakage(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
     yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
     yield from (text for axis in "xy" for text in _describe(rows, axis))
     told = max((k for k, row in enumerate(rows) if row.percolates_x + row.percolates_y), default=len(rows) - 1)

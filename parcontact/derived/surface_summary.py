@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..job import Job, Topography
 from ..parallel.slab import Array
 from ..physics import surface_statistics as statistics
-from ..plotting import style, surface
+from ..plotting import style, surface_picture
 from ..printed import per_cent, quantity, with_error
 from ..road import map_files, treatment
 from ..road.prepared_map import prepare
@@ -39,7 +39,7 @@ def describe_surface(job: Job, heights: Array, told: list[str], shortest: float 
         lines.append(f"missing        {per_cent(float(np.isnan(prepared.cut).mean()))} of its points")
     try:
         picture.parent.mkdir(parents=True, exist_ok=True)
-        surface.draw_surface(surface.Sketch(heights, job.grid.size, found, measured), picture)
+        surface_picture.draw_surface(surface_picture.Sketch(heights, job.grid.size, found, measured), picture)
     except OSError as error:
         raise InputError(f"{picture} cannot be written: {hdf5.reason(error)}") from error
     yield from (*lines, *told)

@@ -13,7 +13,7 @@ from ..job import Job
 from ..march.loop import March
 from ..parallel.slab import Array, Slab
 from ..steady_sliding import start
-from ..storage.row import StepRow
+from ..storage.step_row import StepRow
 
 if TYPE_CHECKING:
     from mpi4py import MPI

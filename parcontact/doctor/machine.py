@@ -14,7 +14,7 @@ from ..job import Job, load
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..plan.costs import measure_write_rate
-from ..plan.trial import PER_POINT
+from ..plan.trial_grids import PER_POINT
 from ..run import runner
 from ..run.run import Options
 from ..storage import header

@@ -1,4 +1,4 @@
-"""Adhesion: surfaces that attract each other (`physics.adhesion`, `solve.adhesive`), and what is told of it."""
+"""Adhesion: surfaces that attract each other (`physics.attraction`, `solve.adhesive`), and what is told of it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
 from ..parallel.slab import Array
-from ..physics.adhesion import AdhesionLaw, cell_of, modulus_of, ramp_of, smallest_range
+from ..physics.attraction import AdhesionLaw, cell_of, modulus_of, ramp_of, smallest_range
 from ..physics.entries import Entry, Saved
 from ..physics.units import Units
 from ..solve.adhesive.law import Law

@@ -15,7 +15,7 @@ from ..doubts import Doubt
 from ..job.checks import meaning
 from ..job.sections.calculation import Grid
 from ..job.sections.geometry import Sphere
-from ..physics.adhesion import AdhesionLaw
+from ..physics.attraction import AdhesionLaw
 
 MOST_WORK = 1.0  # physics: surfaces of dry solids have less [J/m^2]; of rubber 0.03 to 0.1
 MOST_STRAIN = 0.5  # physics: as for slopes: the theory is linear

@@ -15,14 +15,14 @@ from ..history.timeline import Step
 from ..parallel import rows
 from ..parallel.slab import Array
 from ..physics import loops
-from ..physics.adhesion import cell_of, modulus_of
+from ..physics.attraction import cell_of, modulus_of
 from ..physics.body import Trial
 from ..physics.entries import Entry, Saved
 from ..physics.measures import SIDE, Measures
 from ..physics.motion import cells_between
 from ..physics.units import Units
-from ..solve.adhesive import kernels
-from ..solve.adhesive.iterate import GapOperators
+from ..solve.adhesive import gap_kernels
+from ..solve.adhesive.gap_iterate import GapOperators
 from ..solve.adhesive.law import DUGDALE, EXPONENTIAL, Law
 from ..solve.adhesive.solver import GapSolver
 from ..solve.adhesive.sticking import StickingSolver
@@ -145,7 +145,7 @@ class AdhesiveLaw:
             remark = "" if apart else nothing_holds(step.control, step.load)
         numbers = self._tension(law, contact.p, trial.alpha) | {"points_changed": changed}
         if self.scene.energy is not None:
-            sum_gamma = 0.0 if walk.detached else self.slab.sum(kernels.surface_energy(law, gap))[0]
+            sum_gamma = 0.0 if walk.detached else self.slab.sum(gap_kernels.surface_energy(law, gap))[0]
             numbers[SURFACES] = sum_gamma * trial.alpha * self.scene.energy.unit
             numbers[PUSHED] = walk.work * trial.alpha
             numbers[JUMPS] = float(walk.detached or path.closes_gap_first)
@@ -271,7 +271,7 @@ class AdhesiveLaw:
 
     def _tension(self, law: Law, p: Array, alpha: float) -> dict[str, float]:
         """Return the share of points under tension and the force of all tension [N]; collective."""
-        count, pull = self.slab.sum(*kernels.tension(p, LEAST_TENSION * law.strength))
+        count, pull = self.slab.sum(*gap_kernels.tension(p, LEAST_TENSION * law.strength))
         unit = alpha * self.scene.units.pressure * self.grid.lx * self.grid.ly / self.slab.points
         return {"tensile_area": count / self.slab.points, "adhesive_force": pull * unit}
 

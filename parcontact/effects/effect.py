@@ -20,7 +20,7 @@ from ..job import added_sections
 from ..job.sections.part import Part
 from ..parallel.slab import Array
 from ..physics.entries import Entry, Memory, Saved
-from ..physics.interface import Shear
+from ..physics.interface_friction import Shear
 from ..physics.measures import Measures
 from ..physics.units import Units
 from .contact_protocol import ContactLaw, SolvedContact

@@ -1,4 +1,4 @@
-"""Interface friction: a shear stress on the area in contact, beside what the body dissipates (`physics.interface`)."""
+"""Interface friction: a shear stress on the area in contact (`physics.interface_friction`)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..columns import added_by
 from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
-from ..physics.interface import InterfaceFriction
+from ..physics.interface_friction import InterfaceFriction
 from ..physics.measures import Measures
 from .effect import Changes, Decision, Effect, Instant
 from .relaxation import time_factor_of

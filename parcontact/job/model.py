@@ -16,7 +16,7 @@ from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_val
 
 from ..doubts import Doubt
 from . import added_sections
-from .checks import advice, cells, layer, limits, meaning, size
+from .checks import advice, cells, layer_warnings, limits, meaning, size
 from .sections import height_arrays, listing
 from .sections.calculation import Body, Checkpoint, Grid, Numerics, Output, Study
 from .sections.geometry import Shape
@@ -157,7 +157,7 @@ class Job(Part):
             *of_fit,
             *advice.doubts_of_resolution(self, self.directions, chosen=bool(self._origin.mesh)),
             *meaning.doubts_of_scene(self),
-            *layer.doubts_of_layer(self),
+            *layer_warnings.doubts_of_layer(self),
             *size.doubts_of_size(self),
             *of_effects,
         )

@@ -12,12 +12,12 @@ from ..parallel.slab import Array
 from ..physics.entries import Entry
 from ..scene import Scene
 from ..storage.checkpoint import Contents, Facts
-from ..storage.row import StepRow
+from ..storage.step_row import StepRow
 from .dry_law import law_of
-from .errors import ErrorMemory
 from .failure import DetachedError
 from .state import State, entries, first_state, restored, save_state
 from .step import make_step
+from .step_errors import ErrorMemory
 
 FIELDS_OF_EFFECTS = {"temperature": "a thermal section"}
 

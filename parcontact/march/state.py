@@ -24,9 +24,9 @@ from ..physics.units import Units
 from ..scene import Scene
 from ..storage import checkpoint, wisdom
 from ..storage.checkpoint import Contents, Facts
-from ..storage.row import StepRow
+from ..storage.step_row import StepRow
 from .dry_law import law_of
-from .errors import ErrorMemory, ErrorPart
+from .step_errors import ErrorMemory, ErrorPart
 
 # names of parts of every run, which no effect may have
 RESERVED = {"row", "contact", "law", "material", "errors", "energy", "steps", "tolerance", "plans"}

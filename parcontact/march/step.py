@@ -19,13 +19,13 @@ from ..physics.body import Trial, surface_of
 from ..physics.energy import EnergyMemory, Pressed
 from ..scene import Scene
 from ..solve.problem import Approach, Control, MeanPressure
-from ..storage.row import StepRow
+from ..storage.step_row import StepRow
 from . import failure
 from .dry_law import law_of
-from .errors import ErrorMemory, SolvedStep, StepErrors, estimate_errors
 from .failure import DetachedError, StepError
 from .starts import cells_moved
 from .state import State, energies_of
+from .step_errors import ErrorMemory, SolvedStep, StepErrors, estimate_errors
 
 
 @dataclass(frozen=True)

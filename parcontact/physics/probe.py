@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from . import loops
-from .interface import Shear, Vector
+from .interface_friction import Shear, Vector
 from .measures import Measures, excess_of
 from .surface import Surface
 from .units import Units

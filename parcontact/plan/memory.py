@@ -21,8 +21,8 @@ from ..physics.lowest import shape_of
 from ..physics.tiles import SIDE, Tiles
 from ..scene import Scene, build_on, choices, outline, solver_on_tiles
 from ..scene.rigid_surface import highest_waves
+from ..solve.dilute_contact import BLOCKS, LARGEST_SHARE, LEAST, SHARE
 from ..solve.fallback.cold_start import WORTHWHILE
-from ..solve.tiles import BLOCKS, LARGEST_SHARE, LEAST, SHARE
 from ..steady_sliding.sliding import SteadySliding
 
 FREE_SHARE = 0.7  # tuning: of the memory that is free, which jobs may take

@@ -16,10 +16,10 @@ from ..parallel.slab import Slab
 from ..scene import choices
 from ..steady_sliding.curve import request
 from ..storage import wisdom
-from . import price, report
+from . import price, printed_plan
 from .costs import Costs, costs_of, measure_write_rate
 from .sample import sample
-from .trial import choose_grid
+from .trial_grids import choose_grid
 
 TRIED_CASES = 3  # tuning: cases that are tried at most: the first, the last, and between them
 
@@ -36,10 +36,10 @@ class Planner:
 
     def plan(self, job: Job, slab: Slab) -> Iterator[str]:
         """Lines of the plan of a job, its run and its steady states; collective, all ranks must take every line."""
-        yield from report.effects(job)
+        yield from printed_plan.effects(job)
         yield ""
         if job.history:
-            yield from report.maps(job, self.ranks)
+            yield from printed_plan.maps(job, self.ranks)
             yield ""
             yield from self._tell(job, slab, job)
         if job.steady:
@@ -67,8 +67,8 @@ class Planner:
         others = "the others are assumed to be like them; " if len(tried) < len(cases) else ""
         yield f"{others}the longest takes {max(times) / times[0]:.3g} times the first"
         how = f"{groups.count} cases at a time" if groups.count > 1 else "one case after the other"
-        on = report.ranks_text(groups.everyone.size)
-        yield f"on {on}: {report.duration_text(whole)} in all, {how}"
+        on = printed_plan.ranks_text(groups.everyone.size)
+        yield f"on {on}: {printed_plan.duration_text(whole)} in all, {how}"
 
     def try_job(self, job: Job, slab: Slab) -> Costs | None:
         """Try a job, or the same on a grid that is coarse enough, with the transforms its run will have; collective."""
@@ -92,8 +92,8 @@ class Planner:
             yield "too large to be tried here: its time is unknown"
             return
         self.found.append(costs)
-        yield from report.steps(costs)
-        yield from report.times(costs)
+        yield from printed_plan.steps(costs)
+        yield from printed_plan.times(costs)
         yield ""
         yield from price.table(costs, whole)
 

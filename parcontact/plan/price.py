@@ -24,7 +24,7 @@ from ..job.sections.listing import plain_data
 from ..mesh import find_shortest_wave, points_for
 from ..printed import per_cent
 from .costs import Costs
-from .report import duration_text, ranks_text, unit_of
+from .printed_plan import duration_text, ranks_text, unit_of
 from .sample import Sample
 
 ACCURACIES = (0.05, 0.01, 3e-3, 1e-3)

@@ -24,7 +24,7 @@ from ..steady_sliding import start
 from ..steady_sliding.curve import request
 from ..steady_sliding.point import Point
 from ..steady_sliding.sliding import SteadySliding
-from .trial import make_tiny
+from .trial_grids import make_tiny
 
 T = TypeVar("T")
 FIRST = 2  # tuning: steps of a stage that stand for themselves alone

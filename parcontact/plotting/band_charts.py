@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..parallel.slab import Array
-from . import style, units
+from . import prefixes, style
 from .charts import Axis, Chart, ChartLine
-from .run import read_table
+from .plotted_run import read_table
 
 TABLE, THEORY = "bands.csv", "bands_theory.csv"
 NEEDED = ("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength")
@@ -44,7 +44,7 @@ def _describe_first(columns: dict[str, Array]) -> str:
     """Return the first pressure and temperature, as far as there are others."""
     firsts = [(name, columns[name][0], unit) for name, unit in (("pressure", "Pa"), ("temperature", "°C"))]
     several = [one for one in firsts if np.unique(columns[one[0]].round(9)).size > 1]
-    return ", ".join(units.quantity(float(value), unit) for _, value, unit in several)
+    return ", ".join(prefixes.quantity(float(value), unit) for _, value, unit in several)
 
 
 def _choose(columns: dict[str, Array]) -> dict[str, Array]:
@@ -64,7 +64,7 @@ def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Cha
     for band in np.unique(columns["band"]):
         rows = _sorted(columns, columns["band"] == band)
         ends = (columns[f"{end}_wavelength"][rows[0]] for end in ("long", "short"))
-        name = " to ".join(units.quantity(float(end), "m") for end in ends)
+        name = " to ".join(prefixes.quantity(float(end), "m") for end in ends)
         series.append(ChartLine(name, columns["velocity"][rows], columns["friction"][rows], style.line(int(band))))
     if theory is not None:
         speeds = np.unique(theory["velocity"])
@@ -85,7 +85,7 @@ def _over_bands(columns: dict[str, Array], theory: dict[str, Array] | None, name
             rows = np.flatnonzero(np.isclose(table["velocity"], speed, rtol=1e-6))
             rows = rows[np.argsort(table["band"][rows])]
             short = table["short_wavelength"][rows]
-            label = units.quantity(speed, "m/s") if table is columns else "theory" if number == 0 else ""
+            label = prefixes.quantity(speed, "m/s") if table is columns else "theory" if number == 0 else ""
             series.append(ChartLine(label, longest / short if area else short, table[name][rows], look))
     y = Axis("contact area /\nnominal area") if area else Axis("temperature rise", "K")
     return Chart("bands area" if area else "bands heat", x, y, series, log_x=True)

@@ -10,7 +10,7 @@ from matplotlib.textpath import TextPath
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from ..parallel.slab import Array
-from . import style, units
+from . import prefixes, style
 
 SPIKE_SHARE = 0.02  # of the abscissa, at its beginning: what stands out there only does not set the limits
 SPIKE_HEIGHT = 1.5  # over the highest of the rest: less is no spike
@@ -92,7 +92,7 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
         _set_limits(axes, chart, series, log_x)
         if chart.peak:
             _name_peak(axes, series[0], chart.x.unit)
-        units.label(axes.yaxis, chart.y.name, chart.y.unit)
+        prefixes.label(axes.yaxis, chart.y.name, chart.y.unit)
     _mark_stages(axes, chart.stages, chart.named)
     if names := len(axes.get_legend_handles_labels()[1]):
         axes.legend(title=chart.legend_title or None, **_place_legend(axes, names))
@@ -148,7 +148,7 @@ def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
     if log:
         axes.set(**{f"{which}scale": "log"})
         low, high = axis.get_view_interval()
-        if unit == "s" and units.label_log_times(axis, name):
+        if unit == "s" and prefixes.label_log_times(axis, name):
             return
         few = high < 10.0**FEW_DECADES * low
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=5))
@@ -156,7 +156,7 @@ def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
     else:
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
     if few:
-        units.label(axis, name, unit)
+        prefixes.label(axis, name, unit)
     else:  # powers of ten need no prefix
         axis.set_label_text(f"{name} [{unit}]" if unit else name)
 
@@ -177,7 +177,7 @@ def _set_limits(axes: Axes, chart: Chart, series: Sequence[ChartLine], log_x: bo
         rest = _highest(ys[late])
         if 0.0 < SPIKE_HEIGHT * rest < highest:
             axes.set_ylim(top=1.25 * rest)
-            told = f"↑ {units.quantity(highest, chart.y.unit)}"
+            told = f"↑ {prefixes.quantity(highest, chart.y.unit)}"
             axes.text(0.12, 0.97, told, transform=axes.transAxes, va="top", color=style.RED, fontsize=9)
 
 
@@ -191,7 +191,7 @@ def _name_peak(axes: Axes, one: ChartLine, unit: str) -> None:
     height = np.nan_to_num(np.abs(one.y))
     at = int(np.argmax(height))
     if 0 < at < height.size - 1 and height[at] > 1.02 * height[-1]:
-        told = f"{one.y[at]:.3g} at {units.quantity(one.x[at], unit)}"
+        told = f"{one.y[at]:.3g} at {prefixes.quantity(one.x[at], unit)}"
         axes.plot(one.x[at], one.y[at], "o", color=style.RED, label=told, scalex=False, scaley=False)
 
 

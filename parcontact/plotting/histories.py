@@ -10,9 +10,9 @@ from ..columns import UNITS
 from ..errors import InputError
 from ..parallel.slab import Array
 from ..storage import read_back
-from . import conductivity, style, units
+from . import conductivity, prefixes, style
 from .charts import Axis, Chart, ChartLine
-from .run import PlottedRun
+from .plotted_run import PlottedRun
 
 EARLY = 0.05  # of the time that is shown: as long as half of the rows lie within it, a linear axis is hardly used
 FEW_ROWS = 8
@@ -139,11 +139,11 @@ def describe_solve(run: PlottedRun) -> str:
     """Return what the last solve has found, in words."""
     axis, load = run.load
     fraction = run.columns["contact_area_corrected"][-1]
-    area = units.quantity(fraction * run.area, "m²", 4) if run.free else f"{fraction:.4g} of the nominal"
+    area = prefixes.quantity(fraction * run.area, "m²", 4) if run.free else f"{fraction:.4g} of the nominal"
     name, column = ("approach", "approach") if run.free else ("mean gap", "mean_gap")
-    length = units.quantity(run.columns[column][-1], "m", 4)
-    highest = units.quantity(run.columns["max_pressure"][-1], "Pa", 4)
-    pressed = f"{axis.name} {units.quantity(load[-1], axis.unit, 4)}"
+    length = prefixes.quantity(run.columns[column][-1], "m", 4)
+    highest = prefixes.quantity(run.columns["max_pressure"][-1], "Pa", 4)
+    pressed = f"{axis.name} {prefixes.quantity(load[-1], axis.unit, 4)}"
     return f"{pressed},  contact area {area},\n{name} {length},  highest pressure {highest}"
 
 

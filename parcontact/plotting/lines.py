@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from ..job import Cylinder, Elastic, Sphere
 from ..parallel.slab import Array
 from ..theory import hertz
-from . import style, units
-from .run import Fields, PlottedRun
+from . import prefixes, style
+from .plotted_run import Fields, PlottedRun
 
 INSTANTS = 5  # at most so many lines in one panel
 MANY_LINES: dict[str, Any] = {"fontsize": 8, "labelspacing": 0.2}  # of a legend: not to end below its panel
@@ -40,7 +40,7 @@ def _choose_instants(run: PlottedRun, fields: Fields) -> tuple[list[tuple[int, s
     names = []
     for index, step, time in instants:
         stage = style.plain(run.name_stage(step), MOST_LETTERS)
-        when = units.quantity(time, "s") if same_load else run.instant(step, time)
+        when = prefixes.quantity(time, "s") if same_load else run.instant(step, time)
         names.append((index, "\n".join(filter(None, (stage, when)))))
     return names, f", {loads.pop()}" if same_load else ""
 
@@ -60,8 +60,8 @@ def _draw_pressures(
         axes.set_ylim(bottom=0.0)
     axes.set_title(title)
     axes.locator_params(nbins=5)
-    units.label(axes.xaxis, along, "m")
-    units.label(axes.yaxis, "pressure", "Pa")
+    prefixes.label(axes.xaxis, along, "m")
+    prefixes.label(axes.yaxis, "pressure", "Pa")
     axes.legend(**style.BESIDE, **MANY_LINES)
 
 

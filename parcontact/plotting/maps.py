@@ -17,8 +17,8 @@ from ..errors import InputError
 from ..job import Job
 from ..parallel.slab import Array
 from ..storage import hdf5
-from . import lines, style, units
-from .run import Fields, PlottedRun
+from . import lines, prefixes, style
+from .plotted_run import Fields, PlottedRun
 
 Window = tuple[slice, slice]
 
@@ -146,11 +146,11 @@ def _draw_map(
     axes.set_aspect("equal")
     for axis, along in ((axes.xaxis, "x"), (axes.yaxis, "y")):
         axis.set_major_locator(MaxNLocator(TICKS, steps=[1, 2, 5, 10]))
-        units.label(axis, along, "m")
+        prefixes.label(axis, along, "m")
     if low <= high:
         ticks = [low] if low == high else MaxNLocator(TICKS, steps=[1, 2, 5, 10])
         scale = axes.figure.colorbar(mesh, ax=axes, ticks=ticks, **bar).ax.yaxis
-        units.label(scale, name, look.unit)
+        prefixes.label(scale, name, look.unit)
     return mesh.set_array
 
 
@@ -165,8 +165,8 @@ def _draw_line(
         axes.set_ylim(low, low + 1.05 * (high - low))
     else:  # a scale would be made up
         axes.set_yticks([low if high == low else 0.0])
-    units.label(axes.xaxis, "x" if lies else "y", "m")
-    units.label(axes.yaxis, name, LOOKS[name].unit)
+    prefixes.label(axes.xaxis, "x" if lies else "y", "m")
+    prefixes.label(axes.yaxis, name, LOOKS[name].unit)
     return lambda values: line.set_ydata(np.nan_to_num(values[0] if lies else values[:, 0]))
 
 

@@ -11,7 +11,7 @@ from PIL import Image
 from ..errors import InputError
 from ..storage import files, hdf5
 from . import maps
-from .run import PlottedRun, choose_evenly, label_frames
+from .plotted_run import PlottedRun, choose_evenly, label_frames
 
 FRAMES = 200  # of a movie at most: instants in between are left out
 SECONDS = 8.0  # for which a movie plays, unless its frames are too few

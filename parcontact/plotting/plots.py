@@ -18,9 +18,9 @@ from ..errors import InputError
 from ..job.reading import CASES
 from ..storage import hdf5
 from ..summary import sweep_table, theory_settings
-from . import charts, histories, maps, movie, steady, style, sweep, units
+from . import charts, curve_charts, histories, maps, movie, prefixes, style, sweep_charts
 from .charts import Chart
-from .run import PlottedRun
+from .plotted_run import PlottedRun
 
 PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy", "leakage", "steady", "maps")
 MEASURES = "measures.csv"
@@ -75,11 +75,11 @@ def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> l
 
 
 def draw_steady(table: Path) -> Path:
-    """Draw steady.csv alone, beside it; returns the picture's path."""
+    """Draw curve_charts.csv alone, beside it; returns the picture's path."""
     with style.drawing():
         title, panels = (
-            _wrap(steady.steady_title(table.parent)),
-            PlotOptions().to_panels(steady.chart_steady(table.parent)),
+            _wrap(curve_charts.steady_title(table.parent)),
+            PlotOptions().to_panels(curve_charts.chart_steady(table.parent)),
         )
         return _save(style.figure_of(title, [panels], legend=True), table.with_suffix(""))
 
@@ -100,7 +100,9 @@ def _save(figure: Figure, stem: Path, options: PlotOptions = PlotOptions()) -> P
 
 
 def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
-    has_run, has_curve, has_sweep = ((directory / name).is_file() for name in (MEASURES, steady.TABLE, sweep.TABLE))
+    has_run, has_curve, has_sweep = (
+        (directory / name).is_file() for name in (MEASURES, curve_charts.TABLE, sweep_charts.TABLE)
+    )
     groups: list[Sequence[style.Panel]] = []
     titles, fields = list[str](), list[style.Panel]()
     if has_run:
@@ -111,18 +113,18 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
     elif options.at:
         raise InputError(f"--at {options.at}: {directory} holds no run, and so no maps of one")
     if has_curve and options.wants("steady"):
-        titles.append(_wrap(steady.steady_title(directory)))
-        groups.append(options.to_panels(steady.chart_steady(directory, options.over)))
+        titles.append(_wrap(curve_charts.steady_title(directory)))
+        groups.append(options.to_panels(curve_charts.chart_steady(directory, options.over)))
     if has_run and options.wants("maps"):
         pressures, fields = maps.map_panels(run, options.at or "")
         groups.append(pressures)
     if has_sweep:
-        titles.append(_wrap(sweep.sweep_title(directory) or directory.absolute().name))
-        groups += [options.to_panels([chart]) for chart in options.choose(sweep.chart_sweep(directory))]
+        titles.append(_wrap(sweep_charts.sweep_title(directory) or directory.absolute().name))
+        groups += [options.to_panels([chart]) for chart in options.choose(sweep_charts.chart_sweep(directory))]
     if not (has_run or has_curve or has_sweep):
         if not directory.exists():
             raise InputError(f"{directory} is no directory")
-        lacking = f"it has no {MEASURES} and no {steady.TABLE}{_suggest(directory)}"
+        lacking = f"it has no {MEASURES} and no {curve_charts.TABLE}{_suggest(directory)}"
         raise InputError(f"{directory} holds no run and no friction curve: {lacking}")
     if options.panels and not any((*groups, fields)):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
@@ -134,7 +136,11 @@ def _suggest(path: Path) -> str:
     """Return which directory may have been meant: the first below it that holds something, or that of a job file."""
     if path.is_file():
         return "; give the output directory of a run, as out/job"
-    found = [table.parent for name in (MEASURES, steady.TABLE, sweep.TABLE) for table in sorted(path.glob(f"*/{name}"))]
+    found = [
+        table.parent
+        for name in (MEASURES, curve_charts.TABLE, sweep_charts.TABLE)
+        for table in sorted(path.glob(f"*/{name}"))
+    ]
     return f"; did you mean {found[0]}?" if found else ""
 
 
@@ -156,8 +162,8 @@ def _find_charts(directory: Path, options: PlotOptions) -> list[Chart]:
     found: list[Chart] = []
     if (directory / MEASURES).is_file():
         found += options.choose(histories.chart_histories(PlottedRun(directory), options.over))
-    if (directory / steady.TABLE).is_file() and options.wants("steady"):
-        found += steady.chart_steady(directory, options.over)
+    if (directory / curve_charts.TABLE).is_file() and options.wants("steady"):
+        found += curve_charts.chart_steady(directory, options.over)
     return found
 
 
@@ -174,7 +180,7 @@ def _name_directories(directories: Sequence[Path]) -> list[str]:
 def _name_cases(directories: Sequence[Path]) -> list[str]:
     """Return the keys in which cases of one sweep differ, as `velocity 1 m/s, seed 2`; nothing for others."""
     paths = [directory.absolute() for directory in directories]
-    table = paths[0].parent.parent / sweep.TABLE if paths else Path()
+    table = paths[0].parent.parent / sweep_charts.TABLE if paths else Path()
     if {path.parent for path in paths} != {table.parent / CASES} or not table.is_file():
         return []
     known = {f"{int(row['case']):03d}": row for row in sweep_table.read_cases(table)}
@@ -187,5 +193,5 @@ def _name_cases(directories: Sequence[Path]) -> list[str]:
 
 def _name_value(key: str, value: Any) -> str:
     """Return a key of a sweep and its value, as `velocity 100 mm/s`."""
-    shown = units.quantity(value, sweep.UNITS.get(key, ""), 4) if isinstance(value, float) else value
+    shown = prefixes.quantity(value, sweep_charts.UNITS.get(key, ""), 4) if isinstance(value, float) else value
     return f"{key} {shown}"

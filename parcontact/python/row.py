@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..storage import row as recorded
+from ..storage import step_row as recorded
 
 
 class Row(Mapping[str, float]):

@@ -11,14 +11,14 @@ from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..job.sections import listing
 from ..plotting import plots
 from ..summary import headline, sweep_table
-from . import log, material, origin, results, road
-from .parts import Chapter, ReportSection, ReportTable, draw_chart, embed_file
+from . import log, material, origin, result_sections, road_section
+from .page_parts import Chapter, ReportSection, ReportTable, draw_chart, embed_file
 
 KINDS = {  # by the table that each of them has
-    "measures.csv": ("run", results.describe_run),
-    "steady.csv": ("friction curve", results.describe_curve),
-    "sweep.csv": ("sweep", results.describe_sweep),
-    "study.csv": ("study", results.describe_study),
+    "measures.csv": ("run", result_sections.describe_run),
+    "steady.csv": ("friction curve", result_sections.describe_curve),
+    "sweep.csv": ("sweep", result_sections.describe_sweep),
+    "study.csv": ("study", result_sections.describe_study),
 }
 JOBS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
 MORE_TABLES = (
@@ -46,7 +46,7 @@ def describe_directory(directory: Path) -> Chapter:
         job, warnings = _read_job(resolved)
         title, places = job.title, [*_places(job), *places]
         asked = _describe_job(job, resolved.with_name(JOBS[resolved.name]))
-        of_job = [asked, material.material_section(job), road.road_section(job)]
+        of_job = [asked, material.material_section(job), road_section.road_section(job)]
         if there == ["sweep.csv"]:
             of_job = _name_first_case([replace(asked, sentences=[_describe_swept(directory)]), *of_job[1:]])
             sections += _describe_example(directory, resolved.parent)

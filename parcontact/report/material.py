@@ -13,9 +13,9 @@ from ..effects.relaxation import relaxation_of
 from ..errors import InputError
 from ..job import Dma, Job, Zener
 from ..physics.prony import complex_modulus
-from ..plotting import style, units
+from ..plotting import prefixes, style
 from ..scene.measured_range import excited_band, excited_bands
-from .parts import ReportSection, ReportTable, draw_panel
+from .page_parts import ReportSection, ReportTable, draw_panel
 
 DECADES = 1.5  # that a picture shows beyond the relaxation times
 POINTS = 400  # of a line
@@ -30,8 +30,8 @@ def material_section(job: Job) -> ReportSection:
     series = relaxation_of(job.material)
     instant = series.modulus_inf + float(np.sum(series.moduli))
     rows = [
-        ("shear modulus in the long run", units.quantity(series.modulus_inf, "Pa", 4)),
-        ("shear modulus at once", units.quantity(instant, "Pa", 4)),
+        ("shear modulus in the long run", prefixes.quantity(series.modulus_inf, "Pa", 4)),
+        ("shear modulus at once", prefixes.quantity(instant, "Pa", 4)),
         ("Poisson's ratio", f"{job.material.poisson:g}"),
         ("relaxing branches", str(series.moduli.size)),
         *_describe_temperature(job),
@@ -42,7 +42,9 @@ def material_section(job: Job) -> ReportSection:
     if not series.moduli.size:
         return ReportSection("Material", tables=tables)
     branches = zip(series.relaxation_times, series.moduli, strict=True)
-    listed = [(units.quantity(float(tau), "s"), units.quantity(float(modulus), "Pa")) for tau, modulus in branches]
+    listed = [
+        (prefixes.quantity(float(tau), "s"), prefixes.quantity(float(modulus), "Pa")) for tau, modulus in branches
+    ]
     tables.append(ReportTable(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
     if (excited := _list_bands(job)).rows:
         tables.append(excited)
@@ -79,7 +81,7 @@ def _list_bands(job: Job) -> ReportTable:
 
 
 def _write_band(band: tuple[float, float]) -> str:
-    return f"{units.quantity(band[0], 'Hz')} to {units.quantity(band[1], 'Hz')}"
+    return f"{prefixes.quantity(band[0], 'Hz')} to {prefixes.quantity(band[1], 'Hz')}"
 
 
 def _draw_moduli(axes: Axes, job: Job) -> None:

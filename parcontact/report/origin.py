@@ -13,7 +13,7 @@ from ..storage import hdf5, provenance
 from ..storage.read_back import read_results
 from ..summary.slide import ERRORS
 from . import log
-from .parts import ReportSection, ReportTable
+from .page_parts import ReportSection, ReportTable
 
 FRICTION = ERRORS[0]
 NAMES = dict(zip(ERRORS, ("friction", "contact area"), strict=True))

@@ -186,10 +186,10 @@ def fitted(
     """Read a table and fit it. `law` is wlf, arrhenius or free (constants are fitted too), or a shift that is known;
     `vertical` is the law of b_T, unless the known shift has one; `reference` [deg C] defaults to the middle one of the
     measured temperatures. Raises InputError, also for a table that no fit meets."""
-    from . import series, tables  # scipy is for fits only
+    from . import measured_moduli, series  # scipy is for fits only
     from .superposition import log_factors, superpose
 
-    measured = tables.read_moduli(path, poisson)
+    measured = measured_moduli.read_moduli(path, poisson)
     if isinstance(law, str):
         measured = measured.without_short_sets()
     temperatures = measured.temperatures

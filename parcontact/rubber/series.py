@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from .. import progress
+from .measured_moduli import Kind, Set
 from .sane import scatter
-from .tables import Kind, Set
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -20,9 +20,9 @@ from scipy.optimize import least_squares
 
 from .. import progress
 from ..errors import InputError
+from .measured_moduli import Measurement
 from .series import DENSE, ReducedData, Weigh, best_residuals, reduce_sets
 from .shift import WLF, Arrhenius, Density, Factors, Shift, log_vertical
-from .tables import Measurement
 
 Array = NDArray[np.float64]
 Vertical = Literal["auto", "density", "free", "none"]

@@ -19,7 +19,7 @@ from ..parallel.slab import Slab
 from ..physics.entries import part_of
 from ..scene import choices, sanity
 from ..steady_sliding import start as steadystart
-from ..storage import hdf5, header, heights, read_back, row, wisdom
+from ..storage import hdf5, header, heights, read_back, step_row, wisdom
 from ..storage.checkpoint import Contents, Facts
 from ..storage.directory import Directory
 from ..storage.marker import Claim
@@ -131,7 +131,7 @@ def _open_files(
     """Make the output directory ready, and the files in it; collective."""
     job, slab, added = march.scene.job, march.scene.slab, columns_of(march.scene.effects)
     timeline = march.timeline(options.until or 0.0)
-    row.columns(0, added)  # refuses names that are taken
+    step_row.columns(0, added)  # refuses names that are taken
     directory.make(job.path, job.resolved(), claim)
     heights.store(job.surface, directory.path, slab)
     if origin and origin.own:

@@ -18,8 +18,8 @@ from ..history.chosen import describe_steps
 from ..history.timeline import Timeline
 from ..job import Grid, Job, Numerics, Output, Spectral, added_sections
 from ..job.sections import listing
-from ..physics.adhesion import AdhesionLaw
-from ..physics.interface import Shear
+from ..physics.attraction import AdhesionLaw
+from ..physics.interface_friction import Shear
 from ..physics.prony import Prony
 from ..solve.precision import LOOSE, VERY_LOOSE
 from .decided import Decided, Verdict, decided

@@ -14,7 +14,7 @@ from ..effects.adhesion_doubts import doubt_range
 from ..errors import InputError, JobError, RunError
 from ..history.timeline import Timeline
 from ..job import Job, OnOneMesh
-from ..job.checks import advice, layer, meaning, size
+from ..job.checks import advice, layer_warnings, meaning, size
 from ..job.checks.limits import MOST_STEPS
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
@@ -69,7 +69,7 @@ def _check_heights(setup: Setup) -> Iterator[Doubt]:
         yield from seams
     body, span = setup.job.body, setup.heights.span
     if body is not None and setup.roughness and "high for a layer" not in known:
-        yield from layer.doubt_height(span, body.thickness)
+        yield from layer_warnings.doubt_height(span, body.thickness)
     law = setup.choices.adhesion
     if law and setup.roughness and not setup.surface.shapes:
         yield from doubt_range(law, span)

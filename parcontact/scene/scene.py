@@ -37,9 +37,9 @@ from ..physics.units import Units
 from ..printed import quantity
 from ..solve.constraint import Constraint
 from ..solve.contact import ContactSolver
+from ..solve.dilute_contact import LARGER_CELLS, SolverOnTiles
 from ..solve.preconditioner.extension import grids_for
 from ..solve.problem import Operators
-from ..solve.tiles import LARGER_CELLS, SolverOnTiles
 from ..solve.workspace import Workspace
 from .choices import Choices, choices
 from .rigid_surface import HeightRange, Told, heights_of, make_surface, outline_surface, shortest_measured

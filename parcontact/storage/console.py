@@ -13,7 +13,7 @@ from tqdm import tqdm
 from ..doubts import Doubt
 from ..streams import printable
 from . import files
-from .row import StepRow
+from .step_row import StepRow
 
 HEAD = "    step        time [s]    load [Pa] corr.area  friction   iter  residual"
 STAMP = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d[.,]\d+ ")

@@ -12,7 +12,7 @@ from .console import Console
 from .directory import Directory
 from .fields import FieldsFile
 from .provenance import Provenance
-from .row import MeasuresFile, StepRow, cut_back_table
+from .step_row import MeasuresFile, StepRow, cut_back_table
 
 
 @dataclass(frozen=True)

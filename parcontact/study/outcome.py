@@ -21,7 +21,7 @@ from ..parallel.slab import Slab
 from ..parallel.tally import Tally
 from ..steady_sliding import start
 from ..storage import files
-from ..storage.row import StepRow
+from ..storage.step_row import StepRow
 from .ladders import Settings
 
 FIRST_STEPS = 2

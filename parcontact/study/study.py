@@ -9,7 +9,7 @@ from ..job import Job
 from ..job.sections.listing import plain_job
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..plotting import study as study_plots
+from ..plotting import study_pictures as study_plots
 from ..storage import files, marker, stopfile
 from ..storage.directory import Directory
 from . import outcome, verdict

@@ -10,7 +10,7 @@ import numpy as np
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.adhesive.iterate import GapOperators, GapSolution
+from parcontact.solve.adhesive.gap_iterate import GapOperators, GapSolution
 from parcontact.solve.adhesive.law import EXPONENTIAL, Law
 from parcontact.solve.adhesive.solver import GapSolver
 from parcontact.solve.problem import Approach

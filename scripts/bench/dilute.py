@@ -13,9 +13,9 @@ from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.tile_operator import TileOperator
 from parcontact.physics.tiles import SIDE, TileConvolution, Tiles
 from parcontact.solve.contact import ContactSolver
+from parcontact.solve.dilute_contact import LARGER_CELLS
 from parcontact.solve.fallback import cold_start
 from parcontact.solve.problem import Operators
-from parcontact.solve.tiles import LARGER_CELLS
 from parcontact.solve.workspace import Workspace
 
 from .peers import ASPHER_DILUTE, Task, compare_peers

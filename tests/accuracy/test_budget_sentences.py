@@ -12,7 +12,7 @@ from parcontact.job import Job
 from parcontact.report import log
 from parcontact.steady_sliding.table import EarlierPoint, describe_missed
 from parcontact.storage.curve_points import Wanted
-from parcontact.storage.row import StepRow
+from parcontact.storage.step_row import StepRow
 
 
 def test_an_error_that_is_printed_like_its_limit_is_within_it() -> None:

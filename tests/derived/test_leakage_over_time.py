@@ -15,7 +15,7 @@ import parcontact as pc
 from parcontact import __main__
 from parcontact.derived import leakage_over_time as leak
 from parcontact.leakage.flow import flow_mesh_error, solve_flow
-from parcontact.report import results
+from parcontact.report import result_sections
 
 POINTS = 64
 PRESS = {"pressure": {"from": 1e4, "to": 8e4}, "duration": 1.0, "time_step": 0.25}
@@ -113,11 +113,11 @@ def test_a_report_has_the_leakage_of_each_stage(tmp_path: Path) -> None:
     known = [row for row in table(out / "measures.csv") if row["flow_x"]]
     expected = [[row for row in known if float(row["time"]) <= 1.0][-1], known[-1]]
     names = ("time", "pressure", "flow_x", "flow_y", "constriction")
-    section = results.describe_run(out)
+    section = result_sections.describe_run(out)
     assert "conductivity K over time" in [caption for _, caption in section.pictures]
     assert "friction" not in [row[0] for row in section.tables[0].rows]  # nothing slides
     (found,) = [one for one in section.tables if "flow x [m³]" in one.head]
-    cells = [[results.format_cell(float(row[name])) for name in names] for row in expected]
+    cells = [[result_sections.format_cell(float(row[name])) for name in names] for row in expected]
     assert found.rows == [[f"stage {number}", *row] for number, row in enumerate(cells, 1)]
 
 

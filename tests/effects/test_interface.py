@@ -10,7 +10,7 @@ from parcontact import scene
 from parcontact.errors import InputError
 from parcontact.job import Job, load
 from parcontact.parallel.slab import Slab
-from parcontact.physics.interface import InterfaceFriction
+from parcontact.physics.interface_friction import InterfaceFriction
 from parcontact.steady_sliding.sliding import SteadySliding
 
 PRESSURE, STRESS, SPEED, LENGTH = 1e5, 2e5, 0.2, 1e-3

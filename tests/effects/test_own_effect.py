@@ -168,7 +168,7 @@ def test_plan_tells_of_it(
 SHEAR = """
     @staticmethod
     def shear(job):
-        from parcontact.physics.interface import InterfaceFriction
+        from parcontact.physics.interface_friction import InterfaceFriction
 
         return InterfaceFriction(2e4)
 

@@ -17,7 +17,7 @@ from parcontact.march.closing_law import ClosingLaw
 from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Array, Slab
 from parcontact.solve.interface_law import HARD, InterfaceLaw
-from parcontact.storage.row import StepRow
+from parcontact.storage.step_row import StepRow
 
 LONG = 4e-3
 ROUGH = {

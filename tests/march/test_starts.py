@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from marching import SLS, begun, column, marched
 
-import parcontact.march.errors
+import parcontact.march.step_errors
 from parcontact.accuracy.budget import estimate
 from parcontact.history.timeline import Step, Timeline
 from parcontact.job import Job
@@ -88,7 +88,7 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
             made.append((observed.change, observed.uneven))
         return estimate(run, observed)
 
-    monkeypatch.setattr(parcontact.march.errors, "estimate", note)
+    monkeypatch.setattr(parcontact.march.step_errors, "estimate", note)
     return made
 
 

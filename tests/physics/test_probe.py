@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from parcontact.effects.interface import shares
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics.interface import InterfaceFriction
+from parcontact.physics.interface_friction import InterfaceFriction
 from parcontact.physics.measures import SIDE, Measures
 from parcontact.physics.probe import Probe
 from parcontact.physics.shapes import Round

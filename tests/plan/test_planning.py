@@ -16,11 +16,11 @@ from parcontact.job import load_cases
 from parcontact.job.sections.listing import plain_data
 from parcontact.parallel.groups import Groups
 from parcontact.parallel.slab import Slab
-from parcontact.plan import report
+from parcontact.plan import printed_plan
 from parcontact.plan.costs import SLOW_WRITE, Costs, costs_of, measure_write_rate
 from parcontact.plan.planning import Planner, case_times, cases_to_try, only_steady_states
 from parcontact.plan.sample import Sample, sample
-from parcontact.plan.trial import choose_grid
+from parcontact.plan.trial_grids import choose_grid
 
 from .planned import CELLS, SWEEP, TWO, alike, job
 
@@ -58,7 +58,7 @@ def costs_of_a_trial(share: float = 1.0) -> Costs:
 
 def test_what_other_programs_have_disturbed_is_told() -> None:
     """A trial that waited for its cores: a warning before its times."""
-    (quiet, _), (warning, *_) = report.times(costs_of_a_trial(0.95)), report.times(costs_of_a_trial(0.46))
+    (quiet, _), (warning, *_) = printed_plan.times(costs_of_a_trial(0.95)), printed_plan.times(costs_of_a_trial(0.46))
     assert "busy" not in quiet
     assert "busy with other programs" in warning
     assert "each rank of the trial had only 46 % of a core" in warning
@@ -91,7 +91,7 @@ def test_waiting_for_a_core_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_times_as_people_tell_them(seconds: float, text: str) -> None:
     """No longer than a column of a table, so that one can be told from the next."""
-    assert report.duration_text(seconds) == text
+    assert printed_plan.duration_text(seconds) == text
     assert len(text) < 11
 
 
@@ -106,8 +106,10 @@ def test_steady_states_beside_a_history() -> None:
 def test_effects_of_a_curve_alone() -> None:
     """The plan of a curve lists the effects that a steady state can have; each is one of a run, too."""
     curve = job(history=[], steady={"velocities": [1e-2], "pressures": [1e5]})
-    names = [[re.split(" {2,}", line.strip())[1] for line in list(report.effects(each))[1:]] for each in (curve, job())]
-    assert set(names[0]) == set(report.OF_STEADY_STATES) < set(names[1])
+    names = [
+        [re.split(" {2,}", line.strip())[1] for line in list(printed_plan.effects(each))[1:]] for each in (curve, job())
+    ]
+    assert set(names[0]) == set(printed_plan.OF_STEADY_STATES) < set(names[1])
 
 
 def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: Any) -> None:

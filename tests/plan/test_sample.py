@@ -12,7 +12,7 @@ from parcontact import scene
 from parcontact.history.timeline import Timeline
 from parcontact.parallel.slab import Slab
 from parcontact.plan.sample import FEWEST, Sample, StageCost, sample
-from parcontact.plan.trial import make_tiny
+from parcontact.plan.trial_grids import make_tiny
 from parcontact.scene import choices
 from parcontact.steady_sliding.sliding import SteadySliding
 

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from parcontact.derived.leakage_over_time import LeakInstant
-from parcontact.plotting import charts, conductivity, leakage
+from parcontact.plotting import charts, conductivity, leakage_charts
 
 
 def drawn(chart: charts.Chart) -> dict[str, np.ndarray]:
@@ -48,7 +48,7 @@ HOLDS = [row(1.0, 1e5, 4e-20), row(2.0, 1e5 * (1.0 + 1e-12), 3e-20), row(3.0, 2e
     ],
 )
 def test_what_k_is_drawn_over(rows: list[LeakInstant], over: str, name: str, expected: list[float]) -> None:
-    chart = leakage.chart_of(rows, over)
+    chart = leakage_charts.chart_of(rows, over)
     assert chart.x.name == name
     assert chart.series[0].x == pytest.approx(expected, rel=1e-9)
     assert len(chart.series[0].y) == len(expected)
@@ -58,5 +58,5 @@ def test_what_k_is_drawn_over(rows: list[LeakInstant], over: str, name: str, exp
 def test_the_flux_of_gaps_whose_cube_is_0() -> None:
     """Uniform flow through a gap of 1e-120 m: the cube of the gap underflows."""
     pressure = np.tile(np.linspace(1.0, 0.0, 5), (4, 1))
-    inside = leakage.flux(np.full((4, 5), 1e-120), pressure, (1.0, 1.0))[:, 1:-1]
+    inside = leakage_charts.flux(np.full((4, 5), 1e-120), pressure, (1.0, 1.0))[:, 1:-1]
     np.testing.assert_array_equal(inside, np.ones((4, 3)))

@@ -16,8 +16,8 @@ from PIL import Image
 
 from parcontact.job import Job
 from parcontact.plotting import maps, plots
-from parcontact.plotting.run import Fields, PlottedRun, label_frames
-from parcontact.report import results
+from parcontact.plotting.plotted_run import Fields, PlottedRun, label_frames
+from parcontact.report import result_sections
 
 ALL = "output: {fields: [pressure, displacement, gap, height]}\n"
 CREEP = "history: [{pressure: 1.0e3, duration: 2.0e-3, time_step: 2.0e-3}]\n"
@@ -52,7 +52,7 @@ def test_one_look(tmp_path: Path, drawn: list[Figure]) -> None:
     found = {title.split()[0]: axes for title, axes in maps_of(drawn[0]).items()}
     assert set(found) == {"pressure", "gap", "height"}
     run = PlottedRun(out)
-    assert [label for _, label in results.browse_run(run)[0][1]] == ["1 kPa (step 1)", "2 kPa (step 2)"]
+    assert [label for _, label in result_sections.browse_run(run)[0][1]] == ["1 kPa (step 1)", "2 kPa (step 2)"]
     with h5py.File(out / "fields.h5") as file:
         for name, axes in found.items():
             list(maps.draw_frames(file, name, {1: ""}, run.job))
@@ -128,7 +128,7 @@ def test_rare_colours_stay() -> None:
     colors = (255 * colormaps["viridis"](scale)[..., :3]).round().astype(np.uint8)
     colors[:200] = 255  # the paper, and grey around letters
     colors[:2] = np.arange(256)[None, :, None]
-    found = np.asarray(Image.open(io.BytesIO(results.to_small_png(Image.fromarray(colors)))).convert("RGB"))
+    found = np.asarray(Image.open(io.BytesIO(result_sections.to_small_png(Image.fromarray(colors)))).convert("RGB"))
     assert np.abs(found.astype(int) - colors).max() <= 0.02 * 255
 
 
@@ -169,7 +169,7 @@ def test_maps_show_the_contact(tmp_path: Path, drawn: list[Figure], then: str, t
     out = ran(tmp_path, SPHERE + ZENER + HELD % then + "output: {fields: [pressure, gap, height]}\n")
     plots.plot([out])
     assert {title.split("\n")[1] for title in maps_of(drawn[0])} == {told}
-    for _, images, first in results.browse_run(PlottedRun(out)):
+    for _, images, first in result_sections.browse_run(PlottedRun(out)):
         assert images[first][1].startswith(f"{told} (step ")
     (lines,) = (axes for axes in drawn[0].axes if axes.get_title().startswith("pressure on a line"))
     legend = lines.get_legend()

@@ -20,7 +20,7 @@ from parcontact import job as jobs
 from parcontact import mesh, scene
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
-from parcontact.plotting import compound as files
+from parcontact.plotting import compound_files as files
 from parcontact.rubber import compound
 from parcontact.scene import sanity
 

@@ -13,7 +13,7 @@ from parcontact.job import Job
 from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import ZenerBody
-from parcontact.storage.row import StepRow
+from parcontact.storage.step_row import StepRow
 
 Json = dict[str, Any]
 EPS = float(np.finfo(float).eps)

@@ -10,7 +10,7 @@ import numpy as np
 from parcontact.doctor.bench import Bench, Watch
 from parcontact.history.timeline import Step
 from parcontact.march.loop import March
-from parcontact.storage.row import StepRow
+from parcontact.storage.step_row import StepRow
 
 LOAD = 1e-13  # how well the mean pressure is met
 BALANCE = {"double": 1e-11, "mixed": 1e-9}  # work = stored + dissipated, over the largest of all times

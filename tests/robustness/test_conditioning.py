@@ -16,7 +16,7 @@ from parcontact.march.loop import March
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics import loops
 from parcontact.solve import kernels
-from parcontact.storage.row import StepRow
+from parcontact.storage.step_row import StepRow
 
 from . import twins
 from .scenes import Sketch

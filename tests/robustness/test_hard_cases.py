@@ -12,7 +12,7 @@ from closed_forms import step_responses
 from mpi4py import MPI
 
 from parcontact.doctor.bench import Bench
-from parcontact.doctor.checks import CHECKS, Check, run_check
+from parcontact.doctor.installation_checks import CHECKS, Check, run_check
 from parcontact.doctor.small_jobs import (
     CELL,
     CREEP,

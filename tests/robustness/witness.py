@@ -17,7 +17,7 @@ from parcontact.history.timeline import Step, Timeline
 from parcontact.march.failure import StepError
 from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Array, Slab
-from parcontact.storage.row import StepRow
+from parcontact.storage.step_row import StepRow
 
 from . import scenes, twins
 from .scenes import Sketch

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from parcontact import job as jobs
 from parcontact.errors import InputError
-from parcontact.plotting import compound as pictures
+from parcontact.plotting import compound_files as pictures
 from parcontact.rubber import compound
 from parcontact.rubber.series import PronySeries, Weigh
 from parcontact.rubber.shift import WLF, Arrhenius, Factors, given

@@ -24,7 +24,7 @@ from parcontact.errors import RunError
 from parcontact.job import Job
 from parcontact.solve import nested
 from parcontact.solve.fallback import cold_start
-from parcontact.storage.row import StepRow
+from parcontact.storage.step_row import StepRow
 from parcontact.theory import hertz, westergaard
 
 SPHERE = (0.15, 1e-2, 2.75e6)  # force [N], radius [m], shear modulus [Pa] of jobs/hertz.yaml

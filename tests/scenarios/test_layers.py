@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 import parcontact as pc
 from parcontact.accuracy import budget
 from parcontact.accuracy.observation import radius_of
-from parcontact.march import errors
+from parcontact.march import step_errors
 from parcontact.physics.layer import Layer
 from parcontact.python.row import Row
 
@@ -311,7 +311,7 @@ def test_steps_are_judged_by_the_whole_edge_of_spots(monkeypatch: pytest.MonkeyP
         seen.append(given)
         return budget.estimate(*given)
 
-    monkeypatch.setattr(errors, "estimate", estimate)
+    monkeypatch.setattr(step_errors, "estimate", estimate)
     job = scene(grid=GRID, surface=ROUGH, material={**ZENER, "hardness": 2e5}, history=[PRESS, SLIDE])
     march, _ = marched(job)
     touches, (run, observed) = march.field("pressure") > 0.0, seen[-1]

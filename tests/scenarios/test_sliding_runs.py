@@ -21,7 +21,7 @@ from parcontact.march.loop import March
 from parcontact.parallel.fft import BLOCK_BYTES
 from parcontact.physics.prony import Integrator
 from parcontact.storage import tables
-from parcontact.storage.row import StepRow
+from parcontact.storage.step_row import StepRow
 from parcontact.theory import full_contact
 
 

@@ -14,7 +14,7 @@ import parcontact.accuracy.sources
 from parcontact.march.loop import March
 from parcontact.physics.body import BodyMemory, ZenerBody, surface_of
 from parcontact.physics.energy import ElasticPressure, ZenerEnergy
-from parcontact.storage.row import StepRow
+from parcontact.storage.step_row import StepRow
 from parcontact.theory import lee_radok
 
 Json = dict[str, Any]

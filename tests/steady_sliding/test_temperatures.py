@@ -12,7 +12,7 @@ from parcontact import scene
 from parcontact.derived import prediction
 from parcontact.errors import InputError, JobError
 from parcontact.parallel.slab import Slab
-from parcontact.plotting import steady
+from parcontact.plotting import curve_charts
 from parcontact.steady_sliding.curve import request
 from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.storage.tables import read_columns
@@ -105,7 +105,7 @@ def test_table_theory_and_picture(tmp_path: Path, main: Main, run_parcontact: Ru
     assert parts == pytest.approx(found["friction_x"], rel=1e-12)
     share = np.array(found["contact_area_corrected"]) * 1.0e4 / 2.0e5
     assert found["friction_interface"] == pytest.approx(share, rel=1e-6)  # the pressure is met to the tolerance
-    friction, area, master = steady.chart_steady(tmp_path / "out")
+    friction, area, master = curve_charts.chart_steady(tmp_path / "out")
     assert [one.name for one in friction.series] == ["-5 °C", "20 °C", "60 °C", "theory", "", ""]
     assert [one.name for one in area.series] == ["-5 °C", "20 °C", "60 °C", "theory", "", ""]
     assert [one.name for one in master.series] == ["-5 °C", "20 °C", "60 °C", "theory"]
@@ -127,7 +127,7 @@ def test_theory_depends_on_the_reduced_velocity_alone(tmp_path: Path) -> None:
     [
         (["material.shift=null"], "has no effect without material.shift"),
         (["material={model: elastic, shear_modulus: 1.0e6}"], "relaxation times depend on it"),
-        (["steady.temperatures=[-40.0]"], "beyond the shift"),
+        (["curve_charts.temperatures=[-40.0]"], "beyond the shift"),
     ],
 )
 def test_temperatures_that_the_material_does_not_know(tmp_path: Path, changes: list[str], told: str) -> None:
@@ -147,7 +147,7 @@ def test_temperatures_that_the_material_does_not_know(tmp_path: Path, changes: l
 def test_temperatures_beyond_computing(tmp_path: Path, law: str, temperature: float, told: str) -> None:
     """Told in a sentence, with the limit."""
     (tmp_path / "job.yaml").write_text(WAVE)
-    changes = [f"material.shift={law}", f"steady.temperatures=[{temperature}]"]
+    changes = [f"material.shift={law}", f"curve_charts.temperatures=[{temperature}]"]
     with pytest.raises(InputError, match=told):
         request(jobs.load(tmp_path / "job.yaml", changes))
 

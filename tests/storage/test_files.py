@@ -19,7 +19,7 @@ from parcontact.storage.checkpoint import TableMark
 from parcontact.storage.curve_points import asked, lacking, of_table
 from parcontact.storage.directory import Directory
 from parcontact.storage.marker import Claim
-from parcontact.storage.row import MeasuresFile, StepRow, cut_back_table
+from parcontact.storage.step_row import MeasuresFile, StepRow, cut_back_table
 from parcontact.storage.tables import GrowingTable
 
 

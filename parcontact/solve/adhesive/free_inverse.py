@@ -11,7 +11,7 @@ import numpy as np
 
 from ...parallel.slab import Array, Slab
 from ..problem import Operator
-from .iterate import GapOperators
+from .gap_iterate import GapOperators
 
 MAX_STEPS = 100  # accuracy: a dozen do
 

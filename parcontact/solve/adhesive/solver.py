@@ -40,12 +40,12 @@ import math
 import numpy as np
 
 from ...parallel.slab import Array, Slab
-from .. import kernels as maps
+from .. import kernels
 from ..certificate import Certificate
 from ..preconditioner.cell_sums import CellSums
 from ..problem import Approach, Control, MeanPressure
-from . import kernels
-from .iterate import GapIterate, GapOperators, GapSolution, certify_gap
+from . import gap_kernels
+from .gap_iterate import GapIterate, GapOperators, GapSolution, certify_gap
 from .law import Law
 
 # tuning
@@ -114,7 +114,7 @@ class GapSolver:
     def _begin(self, law: Law, heights: Array, control: Control, gap: Array, operators: GapOperators) -> GapIterate:
         """Give the start its mean where that is given, find its pressure, and forget the last direction."""
         self._t.fill(0.0)
-        sums = self.slab.sum(maps.sum_of(heights), maps.sum_of(gap))
+        sums = self.slab.sum(kernels.sum_of(heights), kernels.sum_of(gap))
         mean_h, mean_g = (each / self.slab.points for each in sums)
         given = None
         if isinstance(control, Approach) and operators.mean == 0.0:
@@ -126,7 +126,7 @@ class GapSolver:
             mean_g = given
         np.add(gap, heights, out=self._q)
         operators.inverse.apply(self._q, self._q)
-        kernels.attract(law, gap, self._sigma)
+        gap_kernels.attract(law, gap, self._sigma)
         d = control.value if isinstance(control, Approach) else 0.0
         return GapIterate(law, heights, mean_h, control, operators, given, mean_g, d=d)
 
@@ -140,16 +140,16 @@ class GapSolver:
         """Let the pressure follow the last step, and find the working set and c on it, in the map of the way; the size
         of the set, and whether the surface has come off; collective."""
         q, sigma, before = self._q, self._sigma, it.m
-        count, total = self.slab.sum(*kernels.press(g, q, sigma, it.share, self._image))
+        count, total = self.slab.sum(*gap_kernels.press(g, q, sigma, it.share, self._image))
         if it.given is None:
             it.m = self._uniform(it, it.mean_gap)
         else:
             it.m = -total / count if count else self._least_uniform(it)
-        sums = kernels.pressure_residual(g, q, sigma, it.m, self._working, self._way)
+        sums = gap_kernels.pressure_residual(g, q, sigma, it.m, self._working, self._way)
         members, total, attracted, least = self.slab.reduce(sums[:3], sums[3:])
         if it.given is not None and members:
             it.m -= total / members
-            maps.turn(self._working, self._way, 0.0, total / members, self._way)
+            kernels.turn(self._working, self._way, 0.0, total / members, self._way)
         it.change = it.m - before
         it.lowest = -least
         if isinstance(it.control, Approach):
@@ -208,13 +208,13 @@ class GapSolver:
         """
         working = self._working
         step = it.share, self._image, self._other_sigma, it.change
-        sums = kernels.gap_products(working, self._q, it.m, self._sigma, *step, z, self._t)
+        sums = gap_kernels.gap_products(working, self._q, it.m, self._sigma, *step, z, self._t)
         sum_z, sum_t, c_z, e_z, c_t = self.slab.sum(*sums)
         beta = max(0.0, e_z / scale) if scale > 0.0 else 0.0
         if c_z + beta * c_t <= LEAST_DESCENT * c_z:
             beta = 0.0
         mean = (sum_z + beta * sum_t) / members if it.given is not None else 0.0
-        maps.turn(working, z, beta, mean, self._t)
+        kernels.turn(working, z, beta, mean, self._t)
         return c_z
 
     def _descend(self, it: GapIterate, g: Array, out: Array) -> bool:
@@ -223,7 +223,7 @@ class GapSolver:
         share = self._share(it, g)
         for _ in range(MAX_TRIES if share > 0.0 else 0):
             to = share, self._way, self._image, out, self._other_sigma
-            rise, size = self.slab.sum(*kernels.move(it.law, g, self._q, it.m, self._sigma, *to))
+            rise, size = self.slab.sum(*gap_kernels.move(it.law, g, self._q, it.m, self._sigma, *to))
             mean = it.mean_gap
             if it.given is None:
                 mean += share * it.moved
@@ -239,9 +239,9 @@ class GapSolver:
     def _share(self, it: GapIterate, g: Array) -> float:
         """Find a way along the direction; returns which share of it to go; collective."""
         for _ in range(MAX_TRIES):
-            total, cut = self.slab.sum(*kernels.lead(g, self._t, it.step, self._way))
+            total, cut = self.slab.sum(*gap_kernels.lead(g, self._t, it.step, self._way))
             if it.given is not None and cut > 0.0:
-                kernels.rescale(g, it.given * self.slab.points / total, self._way)
+                gap_kernels.rescale(g, it.given * self.slab.points / total, self._way)
             wanted, most = self._newton(it, g)
             if cut == 0.0 or wanted > 0.0:
                 break
@@ -253,7 +253,7 @@ class GapSolver:
         """The share of the way that is the step of Newton, or the majorized one, and the most that gaps allow;
         collective."""
         it.operators.inverse.apply(self._way, self._image)
-        *sums, fastest = kernels.curvature(it.law, g, self._q, it.m, self._sigma, self._way, self._image)
+        *sums, fastest = gap_kernels.curvature(it.law, g, self._q, it.m, self._sigma, self._way, self._image)
         slope, stiff, soft, total, fastest = self.slab.reduce(sums, [fastest])
         it.moved = total / self.slab.points
         own, loaded = self.slab.points * it.moved**2 / it.operators.least_mean, isinstance(it.control, MeanPressure)

@@ -21,9 +21,9 @@ from ...parallel.slab import Array
 from ..contact import Contact
 from ..problem import Approach, Control, MeanPressure, Operator
 from ..workspace import Workspace
-from . import kernels
+from . import gap_kernels
 from .free_inverse import FreeInverse
-from .iterate import SHARPER, GapSolution
+from .gap_iterate import SHARPER, GapSolution
 from .law import Law
 from .solver import GapSolver
 
@@ -154,9 +154,9 @@ class StickingSolver:
         """Say in the certificate by how much displacements have changed in a pass, but for what only changes the
         approach; returns this number too; collective."""
         certificate, slab = found.certificate, self.workspace.slab
-        load, sum_change = slab.sum(*kernels.weighted_sums(p, change))
+        load, sum_change = slab.sum(*gap_kernels.weighted_sums(p, change))
         shift = sum_change / load if isinstance(control, MeanPressure) and load > 0.0 else 0.0
-        (wrong,) = slab.sum(kernels.weigh_off(p, change, shift))
+        (wrong,) = slab.sum(gap_kernels.weigh_off(p, change, shift))
         worst = SHARPER * wrong / load / certificate.length if load > 0.0 else 0.0
         certificate = replace(certificate, complementarity=max(certificate.complementarity, worst))
         return replace(found, certificate=certificate, d=found.d + shift), worst

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 from ...parallel.slab import Array, Slab
 from ...physics.tiles import SIDE, Tiles
-from .. import nested, tiles
+from .. import dilute_contact, nested
 from ..contact import Contact, ContactSolver
+from ..dilute_contact import SolverOnTiles
 from ..problem import Operators, Problem
-from ..tiles import SolverOnTiles
 
 LOOSE = 0.03  # tuning: tolerance on the coarse grids, whose pressure is only a start
 WORTHWHILE = 256 * 256  # tuning: points: on fewer, making coarser grids takes longer than what they save
@@ -58,7 +58,7 @@ class _Descent:
         self._on_tiles, self._tally = on_tiles if problem.constraint.bounds[0] == 0.0 else None, solver.slab.tally
         self._cost, self._before = 0.0, self._tally["operator"]
         self._blocks: tuple[Slab, Operators] | None = None
-        self._below: tiles.Found | None = None
+        self._below: dilute_contact.Found | None = None
 
     def solve(self, level: nested.Level, p: Array) -> Array:
         """Solve loosely on a coarse level from p."""
@@ -69,9 +69,9 @@ class _Descent:
         coarse, operators = self._solver_on(level.slab, max(LOOSE, self._solver.tolerance))
         contact = coarse.solve(replace(self._problem, **operators._asdict(), heights=level.heights), p)
         if self._on_tiles is not None:
-            if tiles.is_block_grid(level.slab, self._solver.slab):
+            if dilute_contact.is_block_grid(level.slab, self._solver.slab):
                 self._blocks = level.slab, operators
-            self._below = tiles.Found(level.slab, contact.p, contact.d, contact.certificate.length)
+            self._below = dilute_contact.Found(level.slab, contact.p, contact.d, contact.certificate.length)
         self._add(calls, level.slab.points)
         return contact.p
 
@@ -79,7 +79,9 @@ class _Descent:
         """Solve on tiles of the finest grid from p, or leave it as it is; the contact, if it holds at all points."""
         if (chosen := self._tiles_of(level)) is None:
             return None
-        solved = self._solve_on(chosen, level, max(tiles.SHARE * self._solver.tolerance, tiles.LEAST), p)
+        solved = self._solve_on(
+            chosen, level, max(dilute_contact.SHARE * self._solver.tolerance, dilute_contact.LEAST), p
+        )
         calls = self._tally["operator"]
         contact = solved.judge(self._solver, p)
         self._add(calls, level.slab.points)
@@ -91,16 +93,16 @@ class _Descent:
 
     def _tiles_of(self, level: nested.Level) -> Tiles | None:
         """The tiles of a level that may touch, if they are few."""
-        if self._below is None or self._blocks is None or tiles.is_block_grid(level.slab, self._solver.slab):
+        if self._below is None or self._blocks is None or dilute_contact.is_block_grid(level.slab, self._solver.slab):
             return None
         below, law = (*self._blocks, self._below), self._problem.constraint
-        return tiles.choose_tiles(*below, level.slab, level.heights, law)
+        return dilute_contact.choose_tiles(*below, level.slab, level.heights, law)
 
-    def _solve_on(self, chosen: Tiles, level: nested.Level, tolerance: float, p: Array) -> tiles.OnTheseTiles:
+    def _solve_on(self, chosen: Tiles, level: nested.Level, tolerance: float, p: Array) -> dilute_contact.OnTheseTiles:
         """Solve on tiles of a level from p."""
         assert self._on_tiles is not None
         calls, there = self._tally["operator"], replace(self._problem, heights=level.heights)
-        solved = tiles.OnTheseTiles(chosen, self._on_tiles, there, level.slab, self._solver.height)
+        solved = dilute_contact.OnTheseTiles(chosen, self._on_tiles, there, level.slab, self._solver.height)
         self._below = solved.solve(tolerance, p)
         self._add(calls, chosen.count * SIDE**2)
         return solved

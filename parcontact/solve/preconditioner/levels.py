@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...parallel import pyramid
 from ...parallel.slab import Slab
-from . import cells as loops
+from . import cell_loops as loops
 
 Map = NDArray[Any]
 

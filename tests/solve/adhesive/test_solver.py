@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.adhesive import kernels, law
+from parcontact.solve.adhesive import gap_kernels, law
 from parcontact.solve.adhesive.free_inverse import FreeInverse
-from parcontact.solve.adhesive.iterate import GapOperators, GapSolution
+from parcontact.solve.adhesive.gap_iterate import GapOperators, GapSolution
 from parcontact.solve.adhesive.law import Law
 from parcontact.solve.adhesive.solver import GapSolver
 from parcontact.solve.adhesive.sticking import StickingSolver
@@ -194,13 +194,13 @@ def test_energy_and_slope_of_the_attraction(one: law.Law) -> None:
 def test_residual(one: law.Law, shape: tuple[int, int]) -> None:
     gap, q, c, image, _ = maps(shape)
     working, sigma, pressed = np.zeros(shape, bool), np.empty(shape), q.copy()
-    kernels.attract(one, gap, sigma)
+    gap_kernels.attract(one, gap, sigma)
     assert_allclose(sigma, attraction(one, gap), rtol=1e-14)
-    count, total = kernels.press(gap, pressed, sigma, 0.3, image)
+    count, total = gap_kernels.press(gap, pressed, sigma, 0.3, image)
     assert_allclose(pressed, q + 0.3 * image, rtol=1e-14, atol=1e-14)
     assert count == (gap > 0.0).sum()
     assert_allclose(total, (pressed + sigma)[gap > 0.0].sum(), rtol=1e-12)
-    count, total, attracted, least = kernels.pressure_residual(gap, q, sigma, -1.9, working, c)
+    count, total, attracted, least = gap_kernels.pressure_residual(gap, q, sigma, -1.9, working, c)
     pushed = q - 1.9 + sigma
     inside = (gap > 0.0) | (pushed < 0.0)
     assert_array_equal(working, inside)
@@ -217,11 +217,11 @@ def test_change_of_energy(one: law.Law, shape: tuple[int, int], size: float) -> 
     """Along a way that closes gaps; along a short one of the exponential law to 1e-7 of what surfaces gain."""
     gap, q, image, t, _ = maps(shape)
     way, new, sigma, sigma_new = (np.empty(shape) for _ in range(4))
-    total, cut = kernels.lead(gap, t, 0.4 * size, way)
+    total, cut = gap_kernels.lead(gap, t, 0.4 * size, way)
     assert_allclose(way, np.maximum(gap - 0.4 * size * t, 0.0) - gap, atol=1e-15)
     assert_allclose((total, cut), ((gap + way).sum(), (way + 0.4 * size * t).sum()), rtol=1e-12, atol=1e-12)
-    kernels.attract(one, gap, sigma)
-    rise, magnitude = kernels.move(one, gap, q, 0.2, sigma, 0.5, way, image, new, sigma_new)
+    gap_kernels.attract(one, gap, sigma)
+    rise, magnitude = gap_kernels.move(one, gap, q, 0.2, sigma, 0.5, way, image, new, sigma_new)
     assert_allclose(new, gap + 0.5 * way, rtol=1e-14, atol=1e-15)
     assert_allclose(sigma_new, attraction(one, new), rtol=1e-14)
     surface = gamma(one, gap) - gamma(one, new)
@@ -234,11 +234,11 @@ def test_change_of_energy(one: law.Law, shape: tuple[int, int], size: float) -> 
 def test_counts(shape: tuple[int, int]) -> None:
     _, p, other, *_ = maps(shape)
     other = np.maximum(other, 0.0)
-    count, pull = kernels.tension(p, 0.5)
+    count, pull = gap_kernels.tension(p, 0.5)
     assert count == (p < -0.5).sum()
     assert_allclose(pull, np.maximum(-p, 0.0).sum(), rtol=1e-13)
-    assert_allclose(kernels.weighted_sums(p, other), (np.abs(p).sum(), (np.abs(p) * other).sum()), rtol=1e-13)
-    assert_allclose(kernels.weigh_off(p, other, 0.2), np.abs(p * (other - 0.2)).sum(), rtol=1e-13)
+    assert_allclose(gap_kernels.weighted_sums(p, other), (np.abs(p).sum(), (np.abs(p) * other).sum()), rtol=1e-13)
+    assert_allclose(gap_kernels.weigh_off(p, other, 0.2), np.abs(p * (other - 0.2)).sum(), rtol=1e-13)
 
 
 # -- contacts that stick on a free body: the state that the energy falls to, beside that of a matrix ------------------

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from parcontact.plotting import charts, units
+from parcontact.plotting import charts, prefixes
 
 
 @pytest.mark.parametrize(("largest", "label"), [(3.2e-5, "µm"), (999.9, "m"), (1e3, "km"), (2e-12, "nm"), (0.0, "m")])
 def test_prefixes(largest: float, label: str) -> None:
-    found, size = units.prefixed("m", largest)
+    found, size = prefixes.prefixed("m", largest)
     assert found == label
     assert not largest or 1.0 <= largest / size < 1e3 or label == "nm"
 
@@ -37,7 +37,7 @@ def test_prefixes(largest: float, label: str) -> None:
     ],
 )
 def test_numbers_with_prefixes(value: float, unit: str, told: str) -> None:
-    assert units.quantity(value, unit) == told
+    assert prefixes.quantity(value, unit) == told
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_axes_have_prefixes(high: float, name: str, ticks: list[str]) -> None:
     axes = figure.subplots()
     axes.plot([0.0, 0.5 * high, high])
     axes.set(ylim=(0.0, high), yticks=[0.0, 0.5 * high, high])
-    units.label(axes.yaxis, "load", "Pa")
+    prefixes.label(axes.yaxis, "load", "Pa")
     figure.draw_without_rendering()
     assert axes.get_ylabel() == name
     assert [text.get_text() for text in axes.get_yticklabels()] == ticks
@@ -63,7 +63,7 @@ def test_axes_of_long_times(end: float, unit: str, size: float) -> None:
     figure = Figure()
     axes = figure.subplots()
     axes.plot([0.0, end], [0.0, 1.0])
-    units.label(axes.xaxis, "time", "s")
+    prefixes.label(axes.xaxis, "time", "s")
     figure.draw_without_rendering()
     assert axes.get_xlabel() == f"time [{unit}]"
     shown = [float(tick.get_text().replace("−", "-")) for tick in axes.get_xticklabels()]
@@ -99,7 +99,7 @@ def test_marks_of_long_times_do_not_touch(width: float) -> None:
     figure = Figure(figsize=(width, 2.0), layout="constrained")
     axes = figure.subplots()
     axes.set(xscale="log", xlim=(1e-3, 3.2e8))
-    assert units.label_log_times(axes.xaxis, "time")
+    assert prefixes.label_log_times(axes.xaxis, "time")
     figure.draw_without_rendering()
     boxes = [text.get_window_extent() for text in axes.get_xticklabels()]
     assert len(boxes) >= 3

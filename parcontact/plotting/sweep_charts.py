@@ -18,7 +18,7 @@ from ..parallel.slab import Array
 from ..summary import sweep_table
 from ..summary.slide import CORRECTED
 from ..summary.sweep_table import SAMPLES
-from . import style, units
+from . import prefixes, style
 from .charts import FRACTION, Axis, Chart, ChartLine
 
 TABLE = sweep_table.TABLE
@@ -127,7 +127,7 @@ def _named(key: str, value: Any) -> str:
     word = key.split(".")[-1].removesuffix("s")
     if not isinstance(value, float):
         return Path(str(value)).stem
-    text = units.quantity(value, UNITS.get(word, ""))
+    text = prefixes.quantity(value, UNITS.get(word, ""))
     return text if word in sweep_table.PLACES else f"{word.replace('_', ' ')} {text}"
 
 

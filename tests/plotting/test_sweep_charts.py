@@ -10,7 +10,7 @@ from drawing import ELASTIC, LOADS, WAVE, outside, touching
 from matplotlib.figure import Figure
 
 from parcontact import job
-from parcontact.plotting import sweep
+from parcontact.plotting import sweep_charts
 from parcontact.plotting.plots import PlotOptions, plot
 
 SIZES = (1e-3, 2e-3, 3e-3)
@@ -19,7 +19,7 @@ HEAD = ("case", "a.velocity", "b.velocity", "surface.0.seed", "grid.size", "stat
 
 
 def saved(directory: Path, *rows: tuple[Any, ...], head: tuple[str, ...] = (*HEAD, "theory_mu_max")) -> Path:
-    with (directory / "sweep.csv").open("w", newline="") as file:
+    with (directory / "sweep_charts.csv").open("w", newline="") as file:
         csv.writer(file).writerows([head, *rows])
     return directory
 
@@ -31,7 +31,7 @@ def case(velocity: float, seed: int, friction: float | str, size: float = 1.0, t
 def test_means_over_seeds_beside_cases_and_theory(tmp_path: Path) -> None:
     """Cases that are not done yet are left out; keys that move together are one."""
     rows = [case(1.0, 1, 3.0), case(1.0, 2, 5.0), case(20.0, 1, 7.0, theory=0.7), case(20.0, 2, "", theory=0.7)]
-    friction, area = sweep.chart_sweep(saved(tmp_path, *rows))
+    friction, area = sweep_charts.chart_sweep(saved(tmp_path, *rows))
     assert (friction.key, friction.x.name, friction.x.unit, friction.log_x) == ("friction", "velocity", "m/s", True)
     highest, cases, theory, *dynamic = friction.series
     assert highest.y.tolist() == [4.0, 7.0]
@@ -45,7 +45,7 @@ def test_means_over_seeds_beside_cases_and_theory(tmp_path: Path) -> None:
 def test_corrected_areas_beside_those_of_the_theory(tmp_path: Path) -> None:
     """The theory has no cells to correct for: its column is that of the contact area."""
     head = (*HEAD, "theory_contact_area")
-    _, area = sweep.chart_sweep(
+    _, area = sweep_charts.chart_sweep(
         saved(tmp_path, case(1.0, 1, 3.0, theory=0.25), case(2.0, 1, 4.0, theory=0.35), head=head)
     )
     assert {one.name: one.y.tolist() for one in area.series} == {"simulation": [0.2, 0.2], "theory": [0.25, 0.35]}
@@ -53,7 +53,7 @@ def test_corrected_areas_beside_those_of_the_theory(tmp_path: Path) -> None:
 
 def test_a_second_key_tells_lines_apart(tmp_path: Path) -> None:
     rows = [case(v, 1, 10 * v + size, size) for v in (1.0, 2.0) for size in (1e-3, 2e-3)]
-    friction, _ = sweep.chart_sweep(saved(tmp_path, *rows))
+    friction, _ = sweep_charts.chart_sweep(saved(tmp_path, *rows))
     lines = [one for one in friction.series if one.name.startswith("highest")]
     assert [(one.name, one.y.tolist()) for one in lines] == [
         ("highest, size 1 mm", [10.001, 20.001]),
@@ -72,7 +72,7 @@ def test_every_value_of_every_other_key_has_a_line(tmp_path: Path) -> None:
         for seed in (1, 3)
         for size in SIZES[:2]
     ]
-    friction, _ = sweep.chart_sweep(saved(tmp_path, *rows, head=head))
+    friction, _ = sweep_charts.chart_sweep(saved(tmp_path, *rows, head=head))
     found = {one.name: one.y.tolist() for one in friction.series if one.name.startswith("highest")}
     assert found == {
         f"highest, {compound}, size {size:.0f} mm": pytest.approx([12.0 + own + size, 22.0 + own + size])
@@ -91,7 +91,7 @@ def test_bars_of_errors(tmp_path: Path) -> None:
     rows = [(0, v, "done", "", 0.2, 0.0, 1e-3 * v, 1e-4, 0.05) for v in (1.0, 2.0)]
     shares = {
         chart.key: [one.error.tolist() for one in chart.series if one.error is not None]
-        for chart in sweep.chart_sweep(saved(tmp_path, *rows, head=head))
+        for chart in sweep_charts.chart_sweep(saved(tmp_path, *rows, head=head))
     }
     assert shares["friction"] == [pytest.approx([0.25, 0.25])]
     assert shares["pull-off"] == [pytest.approx([0.1, 0.05])]
@@ -103,7 +103,7 @@ def test_what_a_sweep_with_adhesion_is_about(tmp_path: Path) -> None:
     rows = [(0, v, "done", "", "", 0.0, 1e-3 * v, 2e-9 * v, 3e-18, 4e-18) for v in (1.0, 2.0)]
     found = {
         chart.key: [(one.name, one.y.tolist()) for one in chart.series]
-        for chart in sweep.chart_sweep(saved(tmp_path, *rows, head=head))
+        for chart in sweep_charts.chart_sweep(saved(tmp_path, *rows, head=head))
     }
     assert found == {
         "pull-off": [("pull-off", [1e-3, 2e-3])],
@@ -114,7 +114,7 @@ def test_what_a_sweep_with_adhesion_is_about(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rows", [[], [case(1.0, 1, 3.0), case(1.0, 2, 3.0)], [case(1.0, 1, ""), case(2.0, 1, "")]])
 def test_nothing_to_draw(tmp_path: Path, rows: list[tuple[Any, ...]]) -> None:
-    found = sweep.chart_sweep(saved(tmp_path, *rows))
+    found = sweep_charts.chart_sweep(saved(tmp_path, *rows))
     assert [chart.key for chart in found] in ([], ["friction", "area"])
     assert all(np.isfinite(one.y).all() for chart in found for one in chart.series)
 

@@ -14,10 +14,10 @@ from ..job.sections import listing
 from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics import surface_statistics as statistics
-from ..plotting import style, surface, units
+from ..plotting import prefixes, style, surface_picture
 from ..printed import with_error
 from ..scene import rigid_surface
-from .parts import Picture, ReportSection, ReportTable, draw_panel
+from .page_parts import Picture, ReportSection, ReportTable, draw_panel
 
 POINTS = 400  # of a line
 MOST_POINTS = 2**22  # of a surface that is made anew for a report
@@ -45,7 +45,7 @@ def road_section(job: Job) -> ReportSection:
         return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
     waves = any(not isinstance(part, Sphere | Cylinder) for part in job.surface)
     tables = [shapes, *([_tabulate(found, "on the grid of the job")] if waves else [])]
-    return ReportSection("Surface", sentences, tables, _draw(surface.Sketch(heights, job.grid.size, found)))
+    return ReportSection("Surface", sentences, tables, _draw(surface_picture.Sketch(heights, job.grid.size, found)))
 
 
 def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
@@ -57,14 +57,14 @@ def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
         return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
     rows = []
     for band in range(cut.count):
-        ends = " to ".join(units.quantity(end, "m") for end in cut.wavelengths(band))
+        ends = " to ".join(prefixes.quantity(end, "m") for end in cut.wavelengths(band))
         rows.append((ends, f"{cut.rms_slope(band):.3g}", f"{cut.rms_slope(band, 0):.3g}"))
     bands = ReportTable(("waves", "rms slope", "with all longer waves"), rows, "bands, each on a grid of its own")
     heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
     found = statistics.surface_statistics(heights, setup.grid.size)
     pictures = [
         draw_panel(partial(_draw_spectrum, cut=cut, coarsest=found), "spectrum, cut into bands at the dotted lines"),
-        *_draw(surface.Sketch(heights, setup.grid.size, found), ", coarsest band"),
+        *_draw(surface_picture.Sketch(heights, setup.grid.size, found), ", coarsest band"),
     ]
     tables = [shapes, bands, _tabulate(found, "of the coarsest band")]
     return ReportSection("Surface", [f"{text}." for text in describe_cut(cut, job)], tables, pictures)
@@ -86,7 +86,7 @@ def _draw_spectrum(axes: Axes, cut: Cut, coarsest: statistics.Statistics) -> Non
 def _tabulate(found: statistics.Statistics, where: str) -> ReportTable:
     hurst = NOT_SELF_AFFINE if np.isnan(found.hurst) else with_error(found.hurst, found.hurst_error)
     rows = [
-        ("rms height", units.quantity(found.rms_height, "m", 4)),
+        ("rms height", prefixes.quantity(found.rms_height, "m", 4)),
         ("rms slope", f"{found.rms_slope:.4g}"),
         ("rms curvature", f"{found.rms_curvature:.4g} 1/m"),
         ("Nayak's parameter", f"{found.nayak:.4g}"),
@@ -95,5 +95,7 @@ def _tabulate(found: statistics.Statistics, where: str) -> ReportTable:
     return ReportTable((where, "value"), rows)
 
 
-def _draw(sketch: surface.Sketch, of: str = "") -> list[Picture]:
-    return [draw_panel(partial(panel, sketch=sketch), f"{caption}{of}") for caption, panel in surface.PANELS.items()]
+def _draw(sketch: surface_picture.Sketch, of: str = "") -> list[Picture]:
+    return [
+        draw_panel(partial(panel, sketch=sketch), f"{caption}{of}") for caption, panel in surface_picture.PANELS.items()
+    ]

@@ -15,7 +15,7 @@ from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from ..storage import marker, read_back
 from ..summary import pull_off
-from . import units
+from . import prefixes
 from .charts import FRACTION, Axis
 
 MEASURED = (
@@ -89,7 +89,7 @@ class PlottedRun:
 
     def instant(self, step: int, time: float) -> str:
         """Return when a map was saved and what pressed then: `2.1 ms, 100 kPa`, `150 mN`, `2.1 ms, approach 20 µm`."""
-        when = units.quantity(time, "s", 4) if self.lasts else ""
+        when = prefixes.quantity(time, "s", 4) if self.lasts else ""
         return ", ".join(filter(None, (when, self.pressed(step))))
 
     def pressed(self, step: int) -> str:
@@ -98,9 +98,9 @@ class PlottedRun:
         if not rows.size:
             return ""
         if stage >= 0 and self.job.history[stage].control == "approach":
-            return f"approach {units.quantity(self._all['approach'][rows[-1]], 'm')}"
+            return f"approach {prefixes.quantity(self._all['approach'][rows[-1]], 'm')}"
         axis, loads = to_load(self._all["pressure"], self.area * self.free)
-        return units.quantity(loads[rows[-1]], axis.unit)
+        return prefixes.quantity(loads[rows[-1]], axis.unit)
 
     def name_stage(self, step: int) -> str:
         """Return the name that the job gives to the stage of a step; '' where it gives none."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..job.resolved import STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
-from . import band_charts, style, units
+from . import band_charts, prefixes, style
 from .charts import Axis, Chart, ChartLine
-from .run import find_free_area, read_table, to_contact_area, to_load
+from .plotted_run import find_free_area, read_table, to_contact_area, to_load
 
 TABLE, THEORY = "steady.csv", "steady_theory.csv"
 NEEDED = ("velocity", "pressure", "friction", "contact_area")
@@ -65,7 +65,7 @@ def steady_title(directory: Path) -> str:
     job = shown_job(directory / STEADY_RESOLVED) if (directory / STEADY_RESOLVED).is_file() else None
     axis, loads = to_load(read_table(directory / TABLE, ("pressure",))["pressure"], find_free_area(directory))
     name = (job.title if job else "") or "steady sliding"
-    return f"{name}: {units.quantity(loads[0], axis.unit)}" if _count(loads) == 1 else name
+    return f"{name}: {prefixes.quantity(loads[0], axis.unit)}" if _count(loads) == 1 else name
 
 
 def _add_derived(columns: dict[str, Array], area: float) -> None:
@@ -83,7 +83,7 @@ def _make_lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -
     for number, value in enumerate(np.unique(groups)):
         rows = np.flatnonzero(groups == value)
         rows = rows[np.argsort(columns[x][rows], kind="stable")]
-        shown = units.quantity(value, unit), columns[x][rows], columns[y][rows], style.line(number) | {"marker": "o"}
+        shown = prefixes.quantity(value, unit), columns[x][rows], columns[y][rows], style.line(number) | {"marker": "o"}
         yield ChartLine(*shown, None if error is None else error[rows])
 
 

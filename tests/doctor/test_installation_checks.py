@@ -6,9 +6,9 @@ import pytest
 from mpi4py import MPI
 
 from parcontact import __main__
-from parcontact.doctor import checks, machine
+from parcontact.doctor import installation_checks, machine
 from parcontact.doctor.bench import Bench, Finding
-from parcontact.doctor.checks import CHECKS, Check, markdown, run_check
+from parcontact.doctor.installation_checks import CHECKS, Check, markdown, run_check
 from parcontact.errors import RunError
 from parcontact.manual import texts
 from parcontact.run import runner
@@ -50,7 +50,7 @@ def test_verb(
 ) -> None:
     check = Check("a case", "an area", lambda bench: bench.expect("area", 0.5, 0.6, allowed))
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(checks, "CHECKS", (check,))
+    monkeypatch.setattr(installation_checks, "CHECKS", (check,))
     assert __main__.main(["doctor"]) == code
     assert capsys.readouterr().out.splitlines()[-1] == said
     assert list(tmp_path.iterdir()) == []

@@ -15,11 +15,19 @@ from PIL import Image
 from .. import progress
 from ..columns import STEADY, SWEEP, UNITS
 from ..job import Job
-from ..plotting import histories, maps, steady, style, sweep, units
-from ..plotting.run import Fields, PlottedRun, choose_evenly, find_curve_job, find_free_area, label_frames, to_load
+from ..plotting import curve_charts, histories, maps, prefixes, style, sweep_charts
+from ..plotting.plotted_run import (
+    Fields,
+    PlottedRun,
+    choose_evenly,
+    find_curve_job,
+    find_free_area,
+    label_frames,
+    to_load,
+)
 from ..storage import hdf5, marker, read_back
 from ..summary import leak_stop, pull_off, slide, sweep_table, theory_beside, theory_settings
-from .parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
+from .page_parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement", "work_precision.png": "error over cost"}
 INTERFACE = ("friction_viscous", "friction_interface")
@@ -96,16 +104,16 @@ def _leakage(directory: Path) -> list[tuple[str, str]]:
 
 def describe_curve(directory: Path) -> ReportSection:
     """Return the points of a friction curve, and their maps."""
-    columns = read_back.read_results(directory / "steady.csv")
+    columns = read_back.read_results(directory / "curve_charts.csv")
     names = [name for name in POINTS if name in columns]
     units_of = {column.name: column.unit for column in STEADY}
     units_of |= dict.fromkeys(slide.ERRORS, "relative")
     head = [f"{_to_words(name)} [{units_of[name]}]" if units_of[name] else _to_words(name) for name in names]
     table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
-    pictures = [draw_chart(chart) for chart in steady.chart_steady(directory)]
+    pictures = [draw_chart(chart) for chart in curve_charts.chart_steady(directory)]
     states = partial(_label_states, find_free_area(directory))
     job = find_curve_job(directory)
-    browsers = _browse_file(directory / "steady.h5", states, job) if job else []
+    browsers = _browse_file(directory / "curve_charts.h5", states, job) if job else []
     return ReportSection("Friction curve", (), [table, *_list_main_bands(directory)], pictures, browsers)
 
 
@@ -122,7 +130,7 @@ def _list_main_bands(directory: Path) -> list[ReportTable]:
     for place, rows in points.items():
         friction = [columns["friction"][row] for row in rows]
         most = rows[friction.index(max(friction))]
-        waves = " to ".join(units.quantity(columns[f"{end}_wavelength"][most], "m") for end in ("long", "short"))
+        waves = " to ".join(prefixes.quantity(columns[f"{end}_wavelength"][most], "m") for end in ("long", "short"))
         share = f"{100 * max(friction) / sum(friction):.0f} %" if sum(friction) > 0.0 else "–"
         found.append((*place, waves, share))
     head = [f"{_to_words(name)} [{unit}]" for name, unit in PLACE.items() if name in names]
@@ -136,17 +144,17 @@ def describe_sweep(directory: Path) -> ReportSection:
     used = [name for name in (rows[0] if rows else ()) if any(format_cell(row[name]) not in ("", "–") for row in rows)]
     table = _shorten(list(map(_add_unit, used)), [[row[name] for name in used] for row in rows])
     told = list(filter(None, [theory_settings.describe_settings(directory)]))
-    return ReportSection("Sweep", told, [table], [draw_chart(chart) for chart in sweep.chart_sweep(directory)])
+    return ReportSection("Sweep", told, [table], [draw_chart(chart) for chart in sweep_charts.chart_sweep(directory)])
 
 
 def _add_unit(name: str) -> str:
     """Return a column of a sweep, or a key of its job, with its unit: `pull_off [N]`, `history.0.velocity [m/s]`."""
     known = (
         {column.name: column.unit for column in (*SWEEP, *STEADY)}
-        | sweep.UNITS
+        | sweep_charts.UNITS
         | dict.fromkeys(slide.ERRORS, "relative")
     )
-    unit = known.get(name) or sweep.UNITS.get(name.split(".")[-1].removesuffix("s"), "")
+    unit = known.get(name) or sweep_charts.UNITS.get(name.split(".")[-1].removesuffix("s"), "")
     return f"{name} [{unit}]" if unit else name
 
 
@@ -232,4 +240,6 @@ def _label_states(area: float, file: h5py.File) -> dict[int, str]:
     axis, loads = to_load(file["load"][...], area)
     warm = [f", {t:g} °C" for t in file["temperature"][...]] if "temperature" in file else [""] * speeds.size
     known = np.flatnonzero(~np.isnan(speeds)).tolist()
-    return {k: f"{units.quantity(speeds[k], 'm/s')}, {units.quantity(loads[k], axis.unit)}{warm[k]}" for k in known}
+    return {
+        k: f"{prefixes.quantity(speeds[k], 'm/s')}, {prefixes.quantity(loads[k], axis.unit)}{warm[k]}" for k in known
+    }

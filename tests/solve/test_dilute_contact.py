@@ -11,7 +11,7 @@ from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.tiles import SIDE, Tiles
-from parcontact.solve import tiles as module
+from parcontact.solve import dilute_contact as module
 from parcontact.solve.constraint import NonNegative
 from parcontact.solve.contact import Contact, ContactSolver
 from parcontact.solve.fallback import cold_start

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ..parallel.slab import Array
 from ..physics.surface_statistics import Statistics
-from . import style, units
+from . import prefixes, style
 
 BINS = 60
 FEW, OUTLYING = 1e-3, 1.5  # share of the points on either side that may stick out, and how far all are drawn
@@ -48,9 +48,9 @@ def _draw_map(axes: Axes, sketch: Sketch) -> None:
     look: dict[str, Any] = {"origin": "lower", "extent": place, "cmap": "cividis", "aspect": "equal"}
     image = axes.imshow(heights, vmin=low, vmax=high, **look)
     axes.grid(False)
-    units.label(axes.figure.colorbar(image, ax=axes, shrink=min(1.0, ly / lx)).ax.yaxis, "height", "m")
-    units.label(axes.xaxis, "x", "m")
-    units.label(axes.yaxis, "y", "m")
+    prefixes.label(axes.figure.colorbar(image, ax=axes, shrink=min(1.0, ly / lx)).ax.yaxis, "height", "m")
+    prefixes.label(axes.xaxis, "x", "m")
+    prefixes.label(axes.yaxis, "y", "m")
 
 
 def _find_ends(heights: Array) -> tuple[float, float]:
@@ -64,7 +64,7 @@ def _find_ends(heights: Array) -> tuple[float, float]:
 def _draw_distribution(axes: Axes, sketch: Sketch) -> None:
     heights = sketch.heights.ravel() - sketch.heights.mean()
     ends = np.array(_find_ends(heights))
-    unit, size = units.prefixed("m", np.abs(ends).max())
+    unit, size = prefixes.prefixed("m", np.abs(ends).max())
     heights, rms, (low, high) = heights / size, sketch.heights.std() / size, ends / size
     axes.hist(np.clip(heights, low, high), bins=BINS, density=True, color=style.BLUE, alpha=0.6, label="heights")
     if rms > 0.0:

@@ -11,7 +11,7 @@ from matplotlib.colors import LogNorm
 
 from ..columns import UNITS
 from ..leakage.flow import Flow, Map
-from . import charts, conductivity, style, units
+from . import charts, conductivity, prefixes, style
 from .style import Panel
 
 DECADES = 3  # of the flow that are told apart by colour
@@ -79,7 +79,7 @@ def _draw_flow(axes: Axes, size: tuple[float, float], gap: Map, flow: Flow, flux
         axes.plot((column + 0.5) * cell[0], (row + 0.5) * cell[1], "o", mfc="none", mec="r", ms=11, mew=1.5)
     axes.grid(False)
     for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y")):
-        units.label(axis, name, "m")
+        prefixes.label(axis, name, "m")
 
 
 def flux(gap: Map, pressure: Map, size: tuple[float, float]) -> Map:
