@@ -27,11 +27,11 @@ SEEN = 0.8  # share of the changes that must be seen
 FEWEST = 8  # places to break in a part
 SLIDING = "scenarios/test_sliding_runs.py"
 OTHERS = {  # further tests that answer for a part
-    "march/step.py": f"march/test_sticking.py scenarios/test_viscoelastic.py {SLIDING}",
+    "march/step.py": f"march/test_adhesive_steps.py scenarios/test_viscoelastic.py {SLIDING}",
     "march/step_errors.py": SLIDING,
     "physics/body.py": "scenarios/test_viscoelastic.py",
     "effects/adhesion_doubts.py": "effects/test_adhesion.py",
-    "solve/adhesive/gap_kernels.py": "solve/adhesive/test_solver.py",
+    "solve/adhesive/gap_kernels.py": "solve/adhesive/test_gap_solver.py",
     **dict.fromkeys(("solve/constraint.py", "solve/kernels.py"), "solve/test_contact.py"),
     "physics/loops.py": "physics/test_material.py physics/test_probe.py physics/test_surface.py physics/test_energy.py "
     "physics/test_heat.py accuracy/test_embedded.py",

@@ -32,7 +32,7 @@ SHOWN = {source.name: source.shown or source.name for source in MARCH_SOURCES}
 SHOWN |= {"method": "coupling of bands", "scatter": "surfaces"}
 
 
-class Parts(NamedTuple):
+class ErrorParts(NamedTuple):
     """Relative errors by what makes them. Of surfaces in bands `method` is what their coupling makes, and `scatter`
     what other surfaces of the same spectrum do."""
 
@@ -61,15 +61,15 @@ class Parts(NamedTuple):
         return {name: getattr(self, name) for name in NAMES} | {"total": self.total}
 
 
-NAMES = Parts._fields
+NAMES = ErrorParts._fields
 
 
 @dataclass(frozen=True)
 class ErrorBudget:
     """Errors of one instant. Friction is None where there is none; it may be wrong by more than all of it."""
 
-    friction: Parts | None
-    area: Parts
+    friction: ErrorParts | None
+    area: ErrorParts
 
 
 def estimate(run: RunProperties, observed: StepObservation) -> ErrorBudget:
@@ -88,12 +88,12 @@ def _estimate(sources: Sequence[ErrorSource], run: RunProperties, observed: Step
     body = abs(observed.friction - observed.interface)
     pairs = {source.name: source.error(run, replace(observed, friction=body)) for source in sources}
     missing = dict.fromkeys(("solver", "time", "folded", "mesh"), 0.0)
-    area = Parts(**missing | {name: pair.area for name, pair in pairs.items()})
+    area = ErrorParts(**missing | {name: pair.area for name, pair in pairs.items()})
     if observed.friction <= 0.0:
         return ErrorBudget(None, area)
     shares = body / observed.friction, observed.interface / observed.friction
     friction = {name: shares[0] * pair.friction + shares[1] * pair.area for name, pair in pairs.items()}
-    return ErrorBudget(Parts(**missing | friction), area)
+    return ErrorBudget(ErrorParts(**missing | friction), area)
 
 
 def weight_of(slid: float, seconds: float) -> float:
@@ -132,7 +132,7 @@ class ErrorSums:
         return cls(found.reshape(own.sums.shape)) if found.size == own.sums.size else own
 
     @property
-    def friction(self) -> Parts | None:
+    def friction(self) -> ErrorParts | None:
         """The mean over the way, None where nothing has slid, or without friction."""
         return self._mean(0)
 
@@ -142,13 +142,13 @@ class ErrorSums:
         return float(self.sums[0, 1:].sum() / self.sums[1, 0]) if self.sums[1, 0] > 0.0 else math.nan
 
     @property
-    def area(self) -> Parts | None:
+    def area(self) -> ErrorParts | None:
         """The mean over the way, over time where nothing has slid; None where nothing has touched."""
         return self._mean(1)
 
-    def _mean(self, index: int) -> Parts | None:
+    def _mean(self, index: int) -> ErrorParts | None:
         weight, *sums = self.sums[index].tolist()
-        return Parts(*(value / weight for value in sums)) if weight > 0.0 else None
+        return ErrorParts(*(value / weight for value in sums)) if weight > 0.0 else None
 
     def facts(self, accuracy: Any) -> dict[str, Any]:
         """Return as plain data the accuracy that was asked for, and the relative errors by part, and in all."""
@@ -173,7 +173,7 @@ class ErrorSums:
         return lines
 
 
-def advice(parts: Parts, accuracy: float, chosen: Collection[str] = ()) -> str:
+def advice(parts: ErrorParts, accuracy: float, chosen: Collection[str] = ()) -> str:
     """Return what to change where more is wrong than `accuracy` allows, or that it is not."""
     if not exceeds(parts.total, accuracy):
         return f"; within the {100 * accuracy:g} % that numerics.accuracy asks for"
@@ -187,7 +187,7 @@ def exceeds(error: float, accuracy: float) -> bool:
     return error > ROUNDED * accuracy
 
 
-def describe(parts: Parts, name: str) -> str:
+def describe(parts: ErrorParts, name: str) -> str:
     """Return the total error of "friction", or of another quantity, in per cent, and the parts that it is made of."""
     there = [part for part in NAMES if getattr(parts, part)]
     shares = ", ".join(f"{SHOWN[part]} {per_cent(getattr(parts, part))}" for part in there)

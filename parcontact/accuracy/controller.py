@@ -36,7 +36,7 @@ from ..job.checks.cells import one_cell
 from ..physics.body import Body
 from ..physics.entries import Entry, Saved
 from ..physics.units import Units
-from .budget import ErrorBudget, Parts
+from .budget import ErrorBudget, ErrorParts
 from .shares import AREA, FRICTION, SOLVER_MEDIAN, TIME_MEDIAN
 from .time_error import order_of_time_error
 
@@ -135,7 +135,7 @@ class Controller:
         first = number == span.before + span.jumps + 1
         return self._step(chosen, span, number, self._first(chosen, span) if first else chosen.next)
 
-    def judge(
+    def decide(
         self,
         chosen: ChosenSteps,
         span: Span,
@@ -150,17 +150,17 @@ class Controller:
 
         It ends the stage at `end` [s]; `rejected` says whether a longer one was tried before. The `front` of a contact
         with adhesion has moved by so many half process zones, of which one is allowed, but where it snaps. Steps in
-        which it snaps, `begins` or ends are a share of the shortest relaxation time: what is sudden meets the body
+        which it snaps, `begins` or ends are a share of the shortest relaxation time: what is jump meets the body
         before it relaxes. Where energies are asked for, so is what each point loses as it closes: then the root of the
         accuracy is allowed.
         """
         numerics = self.job.numerics
         order = order_of_time_error(numerics.integrator, step.growth > 0.0)
         ratio = error / (FRICTION.time * TIME_MEDIAN * numerics.asked.of_steps)
-        sudden = min(SNAP_SHARE * _bounds(span).most, RELAXING * self.body.shortest_time)
-        if step.dt > sudden:
+        jump = min(SNAP_SHARE * _bounds(span).most, RELAXING * self.body.shortest_time)
+        if step.dt > jump:
             allowed = math.sqrt(numerics.asked.of_steps) if self.relaxes and self.energies else 1.0
-            at_once = (step.dt / sudden) ** order if begins and self.relaxes else 0.0
+            at_once = (step.dt / jump) ** order if begins and self.relaxes else 0.0
             ratio = max(ratio, (front / allowed) ** order, at_once)
         wanted = SAFETY * ratio ** (-1.0 / order) if ratio > 0.0 else MOST_GROWTH
         if ratio > REJECTED:
@@ -254,7 +254,7 @@ class Controller:
             span.stage.load.at(min(end / span.stage.seconds, 1.0)),
             dt / last if last > 0.0 else 0.0,
         )
-        return step._replace(judge=partial(self.judge, chosen, span, step, end, rejected))
+        return step._replace(decide=partial(self.decide, chosen, span, step, end, rejected))
 
 
 def tolerance_before(job: Job, stage: int, relaxes: bool) -> float:
@@ -280,7 +280,7 @@ def cells_per_step(most: float) -> float:
     return 1.0 / (math.ceil(count / unit) * unit)
 
 
-def _room(parts: Parts, share: float, accuracy: float) -> float:
+def _room(parts: ErrorParts, share: float, accuracy: float) -> float:
     """Return how many times the estimated error by the solver may be; infinite where it makes none."""
     allowed = share * SOLVER_MEDIAN * max(accuracy, parts.total - parts.solver)
     return allowed / parts.solver if parts.solver > 0.0 else math.inf

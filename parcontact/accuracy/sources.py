@@ -158,12 +158,12 @@ def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
     return min(1.0, most * few * share * slow ** (STRAIGHT_POWER if run.edges_follow_grid else 1.0))
 
 
-def lost_in_short_waves(prony: Prony, radius: float, speed: float, straight: bool) -> tuple[float, float]:
+def lost_in_short_waves(prony: Prony, radius: float, speed: float, edges_follow_grid: bool) -> tuple[float, float]:
     """Return s and m of the module, where spots of contact of a `radius` in cells, or `straight` ones of that half
     width, slide by so many cells in a second; both are 1 at most, and 0 where there are no edges or no losses."""
     if radius == math.inf or not prony.moduli.size:
         return 0.0, 0.0
-    first = (STRIP if straight else CIRCLE) / radius if radius > 0.0 else math.inf
+    first = (STRIP if edges_follow_grid else CIRCLE) / radius if radius > 0.0 else math.inf
     if first >= math.pi:
         return 1.0, 1.0
     share = first / math.pi

@@ -79,18 +79,18 @@ class Band:
         self._depth_waves = waves_along_depth(float(cut.edges[0]), float(cut.edges[-1]))[0]
         self.warming: Warming | None = None
         self._warmed_for: tuple[Vector, float] | None = None
-        self._take(set_up(own, slab))
+        self._set_up(set_up(own, slab))
         self._heights = self.setup.surface.heights((0.0, 0.0), slab.empty())
 
-    def _take(self, setup: Setup) -> None:
+    def _set_up(self, setup: Setup) -> None:
         self.setup = setup
         self.probe = replace(setup.probe(), shears=())
         self._known = properties_of(setup.job, setup.shortest)
         self._velocity: Vector = (math.nan, math.nan)
 
-    def heat(self, temperature: float) -> None:
+    def set_temperature(self, temperature: float) -> None:
         """Take the material at this temperature [deg C] from now on. Raises InputError where it has no shift."""
-        self._take(replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature))))
+        self._set_up(replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature))))
 
     def slide(self, velocity: Vector, seconds: float) -> None:
         """Slide at a velocity [m/s] from now on, which has lasted so long [s] where there is heat."""
@@ -128,7 +128,7 @@ class Band:
         lost = self.operator.loss(contact.p, setup.size, _unit(velocity)) / kernels.sum_of(contact.p)
         by_energy = lost * units.height / units.length
         friction, budget = judge_state(setup, self._known, contact.certificate, by_energy, velocity, measures)
-        weights, above = (np.zeros(0), 0.0) if below is None else below.weigh(contact.p * units.pressure)
+        weights, above = (np.zeros(0), 0.0) if below is None else below.weights_of_rungs(contact.p * units.pressure)
         area, along = setup.grid.lx * setup.grid.ly, _unit(velocity)
         parts = [(part.solver, part.mesh) if part else (0.0, 0.0) for part in (budget.friction, budget.area)]
         return Rung(
@@ -154,7 +154,7 @@ class Band:
         if self.warming is None:
             return np.zeros(1), np.zeros(1)
         shares = shares_of_depth(self.setup, pressure, self._velocity, self._depth_waves)
-        return self.warming.of(self.setup, pressure), shares
+        return self.warming.apply(self.setup, pressure), shares
 
     def _resolvent(self, gamma: float) -> Convolution:
         return self.operator.mapped(lambda symbol: 1.0 / (1.0 + gamma * symbol), self.setup.fft.complex)

@@ -51,7 +51,7 @@ class Warming:
 
     symbols: Array
 
-    def of(self, setup: Setup, pressure: Array) -> Array:
+    def apply(self, setup: Setup, pressure: Array) -> Array:
         """Return S_j(m), shape (m,), for a map of pressure."""
         spectrum, total = setup.fft.forward(pressure), float(pressure.sum())
         return np.asarray(self.symbols @ ((spectrum.real**2 + spectrum.imag**2) / total**2).ravel())

@@ -81,7 +81,7 @@ class Cascade:
         if (number, sample) not in self._bands:
             self._bands[number, sample] = Band(self.job, self.cut, number, sample)
             if not math.isnan(temperature := self._temperatures[number]):
-                self._bands[number, sample].heat(temperature)
+                self._bands[number, sample].set_temperature(temperature)
         found = self._bands[number, sample]
         found.slide(self.velocity, self.seconds)
         return found
@@ -92,11 +92,11 @@ class Cascade:
         section = self.job.section("thermal")
         return ((section and section.distance) or self.cut.box) / math.hypot(*self.velocity)
 
-    def heat(self, temperatures: Sequence[float]) -> None:
+    def set_temperatures(self, temperatures: Sequence[float]) -> None:
         """Take these temperatures [deg C] of the bands from now on; NaN for that of the material."""
         for (number, _), band in self._bands.items():
             if temperatures[number] != self._temperatures[number]:
-                band.heat(temperatures[number])
+                band.set_temperature(temperatures[number])
         self._temperatures = list(temperatures)
 
     def press(self, velocity: Vector, pressure: float) -> None:

@@ -40,7 +40,7 @@ class PressureLadder:
         count = max(NODES, int(np.ceil(1 + (RUNGS - 1) * np.log(top / bottom) / -np.log(LOWEST) - 1e-9)))
         return cls(np.geomspace(bottom, top, count))
 
-    def weigh(self, pressures: Array) -> tuple[Array, float]:
+    def weights_of_rungs(self, pressures: Array) -> tuple[Array, float]:
         """Return the weights of rungs for a map of pressures [Pa], and the share of the load above the last rung."""
         p, rungs = pressures[pressures > 0.0], self.rungs
         count = len(rungs)

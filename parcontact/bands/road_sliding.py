@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..accuracy.budget import ErrorBudget, Parts
+from ..accuracy.budget import ErrorBudget, ErrorParts
 from ..columns import BANDS, names_of
 from ..doubts import Doubt
 from ..effects.relaxation import feeds_back, temperature_of
@@ -65,7 +65,7 @@ class BandOutcome:
 
 
 @dataclass(frozen=True)
-class Warm:
+class BandTemperatures:
     """Search for the temperatures of bands: the number of `rounds`, and friction without them."""
 
     rounds: int = 1
@@ -105,11 +105,11 @@ class RoadSliding:
         """Remove the contacts of the last point."""
         self._cascade.store.clear()
 
-    def heat(self, temperature: float) -> None:
+    def set_temperature(self, temperature: float) -> None:
         """Solve at this temperature [deg C] from now on; raises InputError where the material has no shift."""
         if temperature != self.temperature:
             self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
-            self._cascade.heat([temperature] * self.cut.count)
+            self._cascade.set_temperatures([temperature] * self.cut.count)
             self.temperature = temperature
 
     def field(self, name: str) -> Array:
@@ -119,7 +119,7 @@ class RoadSliding:
         """Return the steady state at a velocity [m/s] under a mean pressure [Pa]; raises RunError."""
         began = time.perf_counter()
         self._cascade.press(velocity, pressure)
-        warm = self._settle() if feeds_back(self.job) else Warm()
+        search = self._solve_fixed_point() if feeds_back(self.job) else BandTemperatures()
         outcome = self._solve()
         self._results = outcome.results
         point = self._to_point(outcome, velocity, pressure, time.perf_counter() - began)
@@ -128,7 +128,7 @@ class RoadSliding:
             heats = [result.friction for result in outcome.results]
             heats[-1] += point.measures.friction_interface
             flash = flash_of_bands(self._rises, heats)
-            point = replace(point, flash=flash, rounds=warm.rounds, friction_cold=warm.friction_cold)
+            point = replace(point, flash=flash, rounds=search.rounds, friction_cold=search.friction_cold)
         self._point = point
         return point
 
@@ -158,7 +158,7 @@ class RoadSliding:
         shares, warmings = [result.depths for result in results], [result.warming for result in results]
         return rises_of(weights, whole, shares, warmings, heats, rubbing / box * speed)
 
-    def _settle(self) -> "Warm":
+    def _solve_fixed_point(self) -> "BandTemperatures":
         """Find the temperatures of bands that make themselves, with one surface of each band, and leave them in the
         cascade. Raises RunError where none are found.
 
@@ -167,7 +167,7 @@ class RoadSliding:
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
         rises, last, relax, friction_cold = np.zeros(self.cut.count), np.zeros(0), 1.0, math.nan
         for rounds in range(1, MOST_ROUNDS + 1):
-            self._warm(cold + rises)
+            self._set_temperatures(cold + rises)
             rungs = self._cascade.climb([0])
             results = self._cascade.fall(lambda band, _: rungs[band, 0])  # noqa: B023
             over = (
@@ -176,17 +176,17 @@ class RoadSliding:
             if rounds == 1:
                 friction_cold = sum(result.friction for result in results)
             if np.all(np.abs(over) <= np.maximum(LEAST_ERROR, RELATIVE * rises)):
-                return Warm(rounds, friction_cold)
+                return BandTemperatures(rounds, friction_cold)
             if last.size:
                 change = over - last
                 relax = float(np.clip(-relax * (last @ change) / (change @ change), 0.1, 1.0))
             rises, last = np.maximum(rises + relax * over, 0.0), over
         raise RunError(f"temperatures of bands did not settle in {MOST_ROUNDS} rounds. Try feedback: none")
 
-    def _warm(self, temperatures: Array) -> None:
+    def _set_temperatures(self, temperatures: Array) -> None:
         """Take these temperatures [deg C] of the bands; raises RunError where the material's shift ends."""
         try:
-            self._cascade.heat(temperatures.tolist())
+            self._cascade.set_temperatures(temperatures.tolist())
             finest = self.setup.job.at_temperature(float(temperatures[-1]))
             self.setup = replace(self.setup, choices=choices(finest))
             self._cascade.press(self._cascade.velocity, self._cascade.pressure)
@@ -273,7 +273,9 @@ class RoadSliding:
         of_area = outcome.results[-1].errors[2:]
         method, scatter = outcome.method, [SURE * error for error in outcome.scatter]
         parts = [
-            Parts(solver / whole, 0.0, 0.0, mesh / whole, method=method[k] / whole + lost, scatter=scatter[k] / whole)
+            ErrorParts(
+                solver / whole, 0.0, 0.0, mesh / whole, method=method[k] / whole + lost, scatter=scatter[k] / whole
+            )
             for k, (whole, (solver, mesh)) in enumerate(((friction or 1.0, of_bands), (area or 1.0, of_area)))
         ]
         own = self._interface_share(outcome, friction)

@@ -90,7 +90,7 @@ def _part(part: jobs.Rough | jobs.RoughSpectrum, line: bool) -> WaveSpectrum:
     if isinstance(part, jobs.RoughSpectrum):
         if line:
             raise InputError("surface: a spectrum in m^4 is of a surface, and bands.points are those of a line")
-        found, (longest, shortest) = measured_spectrum.of(part)
+        found, (longest, shortest) = measured_spectrum.read_spectrum(part)
         ends = 2.0 * np.pi / longest * EDGE, 2.0 * np.pi / shortest / EDGE
         inside = lambda k: np.where((k >= ends[0]) & (k <= ends[1]), found(k), 0.0)  # noqa: E731
         return WaveSpectrum(inside, longest, shortest, line, tuple(found.q.tolist()))

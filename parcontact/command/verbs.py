@@ -102,7 +102,7 @@ def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
     if not sanity.is_quickly_made(job):
         return [*job.doubts, *doubt_band(job, degrees)]
     setup = set_up(job, Slab.alone(*job.grid.points))
-    notes[-1] += [*setup.told.notes, *describe_roughness(setup)]
+    notes[-1] += [*setup.remarks.notes, *describe_roughness(setup)]
     sanity.refuse_approaches(setup)
     return sanity.find_doubts(setup, degrees)
 
@@ -166,13 +166,13 @@ def fit(options: argparse.Namespace) -> int:
     from .. import mesh
     from ..plotting import compound_files as files
     from ..rubber import compound
-    from ..rubber.shift import given
+    from ..rubber.shift import read_shift
     from ..scene.measured_range import excited_band
 
     target = options.out or options.table.with_suffix(".yaml")
     files.refuse_foreign(target)
     band = excited_band(_on_one_grid(mesh.load(options.job))) if options.job else None
-    law = given(options.shift, options.reference)
+    law = read_shift(options.shift, options.reference)
     of_fit = (options.error, options.weight, options.vertical)
     made = compound.fitted(options.table, options.poisson, options.reference, law, *of_fit)
     for line in files.write_compound(made, target, band):
@@ -214,7 +214,7 @@ def surface(options: argparse.Namespace) -> int:
     doubts = [doubt for doubt in job.doubts if doubt.place.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
-    told = describe_surface(job, heights, base.told.notes, base.shortest, picture)
+    told = describe_surface(job, heights, base.remarks.notes, base.shortest, picture)
     started = measured_maps.start_job(job, given, options.start) if alone else ()
     print("\n".join([*told, *(f"warning: {doubt}" for doubt in doubts), *started]))
     return DONE

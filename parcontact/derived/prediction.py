@@ -58,7 +58,7 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Pred
     not know.
     """
     _refuse_unknown(job)
-    timeline = Timeline.of(job).follow(_times_of_run(job))
+    timeline = Timeline.from_job(job).follow(_times_of_run(job))
     rings = _lattice(job, slab) if waves == "lattice" else _continuum(job, _longest_slide(timeline))
     memory = Memory(_on_body(job, rings), _material(job))
     if job.initial.state == "steady":
@@ -69,7 +69,7 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Pred
 def _times_of_run(job: Job) -> dict[int, float]:
     """Return when the steps of the job's run ended, by their numbers; none before the run."""
     path = job.output.directory / "measures.csv"
-    if not Timeline.of(job).chooses or not path.is_file():
+    if not Timeline.from_job(job).chooses or not path.is_file():
         return {}
     columns = tables.read_columns(path)
     return dict(zip(map(int, columns["step"]), columns["time"], strict=True))
@@ -276,7 +276,7 @@ def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings
     """Return a measured spectrum without waves longer than the box or shorter than two cells of the grid."""
     from ..road import spectrum
 
-    found, (long, short) = spectrum.of(part)
+    found, (long, short) = spectrum.read_spectrum(part)
     cell = max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
     ends = 2 * np.pi / min(long, max(job.grid.size)), 2 * np.pi / max(short, 2 * cell)
     if ends[0] >= EDGE * ends[1]:

@@ -82,7 +82,7 @@ class Bench:
         """A march at the end of a job, and the row of every instant, the initial one first; collective."""
         march = self.begin(data)
         job, rows = march.scene.job, [march.row]
-        for step in Timeline.of(job):
+        for step in Timeline.from_job(job):
             rows.append(march.advance(step))
             self._note(march.row)
             for watch in watches:

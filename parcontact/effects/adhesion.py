@@ -219,7 +219,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
                 energies = adhesive_energies.advance_energies(energies, instant, self._area)
             columns = (*columns[:2], energies.surfaces, energies.lost, energies.error)
         far = instant.front > SNAP_FRONT and not instant.untouched
-        chosen = instant.step.judge is not None
+        chosen = instant.step.decide is not None
         snapped = solved.snapped or (chosen and far)
         snapped |= energies.lost > memory.energies.lost and not instant.untouched
         warns = far and not (chosen or memory.front_warning_given or instant.step.jump)

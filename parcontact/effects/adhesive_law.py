@@ -22,10 +22,10 @@ from ..physics.measures import SIDE, Measures
 from ..physics.motion import cells_between
 from ..physics.units import Units
 from ..solve.adhesive import gap_kernels
+from ..solve.adhesive.adhesive_solver import AdhesiveSolver
 from ..solve.adhesive.gap_iterate import GapOperators
+from ..solve.adhesive.gap_solver import GapSolver
 from ..solve.adhesive.law import DUGDALE, EXPONENTIAL, Law
-from ..solve.adhesive.solver import GapSolver
-from ..solve.adhesive.sticking import StickingSolver
 from ..solve.certificate import Certificate
 from ..solve.contact import Contact
 from ..solve.problem import Approach, Control, MeanPressure
@@ -54,7 +54,7 @@ class PastGap(NamedTuple):
 class AdhesiveMemory:
     """Memory of a contact with adhesion: the last gaps, the newest first, a spare map and a backup of the gap.
 
-    `free_correction` is what a free body lacks (`solve.adhesive.sticking`) per pressure, for the modulus `modulus`,
+    `free_correction` is what a free body lacks (`adhesive_solver`) per pressure, for the modulus `modulus`,
     None of a periodic one. `end` is when nothing held the surfaces any more, None while they are held.
     """
 
@@ -103,7 +103,7 @@ class AdhesiveLaw:
         by_gap = GapOperators(*setup.half_space.gap_operators(setup.fft))
         gaps = GapSolver(setup.slab, by_gap, numerics.max_iterations)
         free = scene.operators.operator if scene.choices.isolated.on else None
-        self.solver = StickingSolver(gaps, scene.solver.workspace, numerics.tolerance, free)
+        self.solver = AdhesiveSolver(gaps, scene.solver.workspace, numerics.tolerance, free)
         self.scene, self.slab, self.grid = scene, setup.slab, scene.choices.grid
         self._goes_on_open = scene.job.section("adhesion").detached == "open"
 

@@ -106,7 +106,7 @@ def exponentials_of(job: Any) -> Exponentials:
     body = job.section("thermal").conductor
     longest = DECAYED / (body.diffusivity * (2.0 * np.pi / max(job.grid.size)) ** 2)
     steps, slides = [longest / 10.0], False
-    for span in Timeline.of(job).spans:
+    for span in Timeline.from_job(job).spans:
         slides = slides or span.moves
         if slides and span.count:
             steps += span.extremes
@@ -198,7 +198,7 @@ class ThermalColumns(Effect[ThermalMemory]):
         now = replace(memory, warmed=memory.warmed or begins)
         heating, now = self._heat(instant, now)
         if begins or (now.warmed and not step.dt):
-            now.heat.take(rubbed, pressure, scales)
+            now.heat.set_heating(rubbed, pressure, scales)
         if now.warmed and step.dt:
             pressed = self._setup.fft.forward(pressure)
             if any(step.velocity):

@@ -160,7 +160,7 @@ class ChosenSteps:
     next: float = 0.0
 
     @classmethod
-    def of(cls, job: Planned, saved: Mapping[str, Any] | None = None) -> "ChosenSteps":
+    def from_job(cls, job: Planned, saved: Mapping[str, Any] | None = None) -> "ChosenSteps":
         """Return those that the stages of a job had chosen when a checkpoint with these arrays was written."""
         found = cls(most_cells(job))
         if saved is not None and "ends" in saved:

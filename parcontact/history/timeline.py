@@ -38,7 +38,7 @@ class Step(NamedTuple):
     load: float
     growth: float
     passed: int = 0
-    judge: Callable[..., "Step | MadeStep"] | None = None
+    decide: Callable[..., "Step | MadeStep"] | None = None
 
     @property
     def jump(self) -> bool:
@@ -140,12 +140,12 @@ class Timeline:
         self._open, self._seen = 0, 0  # the stage that was choosing its steps, and how many had been chosen
 
     @classmethod
-    def of(cls, job: Planned, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
+    def from_job(cls, job: Planned, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
         """Return all steps of a job; its last stage goes on to `until` [s] if that is later than its end.
 
         `chosen` are the steps that stages have chosen so far; those to come are guessed.
         """
-        record = (chosen or ChosenSteps.of(job)) if job.remembers else None
+        record = (chosen or ChosenSteps.from_job(job)) if job.remembers else None
         return cls(job.history, job.grid, until, job.initial.pressure, record)
 
     @property

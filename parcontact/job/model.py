@@ -123,7 +123,7 @@ class Job(Part):
     def origin(self) -> Origin:
         return self._origin
 
-    def of(self, origin: Origin) -> Job:
+    def with_origin(self, origin: Origin) -> Job:
         """Return the same job, from elsewhere."""
         copy = self.model_copy()
         copy._origin = origin

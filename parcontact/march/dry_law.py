@@ -22,7 +22,7 @@ from . import failure
 from .starts import cells_moved, make_start
 
 
-def law_of(scene: Scene) -> ContactLaw[Any]:
+def choose_contact_law(scene: Scene) -> ContactLaw[Any]:
     """Return the contact law of a scene: that of one of its effects, or else that of its constraint."""
     return scene.law or DryLaw(scene)
 

@@ -13,7 +13,7 @@ from ..physics.entries import Entry
 from ..scene import Scene
 from ..storage.checkpoint import Contents, Facts
 from ..storage.step_row import StepRow
-from .dry_law import law_of
+from .dry_law import choose_contact_law
 from .failure import DetachedError
 from .state import State, entries, first_state, restored, save_state
 from .step import make_step
@@ -36,7 +36,7 @@ class March:
     @property
     def detached(self) -> str:
         """Return the sentence on surfaces that nothing holds under their load, with no further step; '' otherwise."""
-        row, end = self.row, law_of(self.scene).detached(self.state.law)
+        row, end = self.row, choose_contact_law(self.scene).detached(self.state.law)
         if end is None:
             return ""
         time, load = end
@@ -44,8 +44,8 @@ class March:
         return f"detached at t = {time:g} s: {lost}; {row.measures.pressure:g} Pa at t = {row.time:g} s was held"
 
     def timeline(self, until: float = 0.0) -> Timeline:
-        """Return all steps of the history, as `Timeline.of` has them, with those that have been chosen so far."""
-        return Timeline.of(self.scene.job, until, self.state.chosen)
+        """Return all steps of the history, as `Timeline.from_job` has them, with those that have been chosen so far."""
+        return Timeline.from_job(self.scene.job, until, self.state.chosen)
 
     def steps(self, timeline: Timeline | None = None, until: float | None = None) -> Iterator[Step]:
         """Yield the steps after the last one made, each decided on when it is asked for; collective.
@@ -62,7 +62,7 @@ class March:
         try:
             self.state = self._weighed(make_step(self.scene, self.state, step), self.row)
         except DetachedError as end:
-            memory = law_of(self.scene).with_end(self.state.law, Detached(end.time, end.load))
+            memory = choose_contact_law(self.scene).with_end(self.state.law, Detached(end.time, end.load))
             self.state = self.state.after(law=memory)
         return self.row
 
@@ -100,7 +100,7 @@ class March:
         `height` is that of the rigid surface where it is now, so that `gap = displacement - height - approach`.
         """
         scene, state, units = self.scene, self.state, self.scene.units
-        last, gap = state.contact.last, law_of(scene).gap(state.law)
+        last, gap = state.contact.last, choose_contact_law(scene).gap(state.law)
         for part, effect in scene.effects.items():
             if name in effect.fields:
                 return effect.field(state.memories[part], name)

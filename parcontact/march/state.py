@@ -25,8 +25,8 @@ from ..scene import Scene
 from ..storage import checkpoint, wisdom
 from ..storage.checkpoint import Contents, Facts
 from ..storage.step_row import StepRow
-from .dry_law import law_of
-from .step_errors import ErrorMemory, ErrorPart
+from .dry_law import choose_contact_law
+from .step_errors import BudgetPart, ErrorMemory
 
 # names of parts of every run, which no effect may have
 RESERVED = {"row", "contact", "law", "material", "errors", "energy", "steps", "tolerance", "plans"}
@@ -114,9 +114,9 @@ def parts_of(scene: Scene) -> dict[str, RunPart[Any]]:
     found: dict[str, RunPart[Any]] = {
         "row": _RowPart(scene),
         "contact": _ContactPart(scene),
-        "law": law_of(scene),
+        "law": choose_contact_law(scene),
         "material": scene.material,
-        "errors": ErrorPart(scene.material.branched is not None),
+        "errors": BudgetPart(scene.material.branched is not None),
     }
     if scene.energy is not None:
         found["energy"] = scene.energy
@@ -199,14 +199,14 @@ class _ChosenStepsPart:
     scene: Scene
 
     def at_rest(self) -> ChosenSteps:
-        return ChosenSteps.of(self.scene.job)
+        return ChosenSteps.from_job(self.scene.job)
 
     def entries(self, memory: ChosenSteps, units: Units) -> dict[str, Entry]:
         numbers = memory.numbers().items()
         return {name: Entry(np.array(value), 1.0, symbol, optional=True) for name, (value, symbol) in numbers}
 
     def restored(self, memory: ChosenSteps, saved: Saved) -> ChosenSteps:
-        return ChosenSteps.of(self.scene.job, saved)
+        return ChosenSteps.from_job(self.scene.job, saved)
 
 
 # -- first states -----------------------------------------------------------------------------------------------------

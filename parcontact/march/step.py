@@ -21,7 +21,7 @@ from ..scene import Scene
 from ..solve.problem import Approach, Control, MeanPressure
 from ..storage.step_row import StepRow
 from . import failure
-from .dry_law import law_of
+from .dry_law import choose_contact_law
 from .failure import DetachedError, StepError
 from .starts import cells_moved
 from .state import State, energies_of
@@ -87,22 +87,22 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
 def _accepted(scene: Scene, state: State, step: Step) -> _Made:
     """Solve a step, or the shorter one that its judge asks for; collective. Raises StepError, and DetachedError where
     nothing holds the load of the shortest step."""
-    law = law_of(scene)
+    law = choose_contact_law(scene)
     while True:
         try:
             solved = _solve(scene, state, step)
         except (DetachedError, StepError):
-            shorter = step.judge(0.0, math.inf) if step.judge is not None and law.may_shorten else None
+            shorter = step.decide(0.0, math.inf) if step.decide is not None and law.may_shorten else None
             if not isinstance(shorter, Step):
                 raise
             step = shorter
             continue
         errors = estimate_errors(scene, state.friction, solved)
         motion = law.motion(solved.of_law, state.row.measures, solved.measures)
-        if step.judge is None:
+        if step.decide is None:
             return _Made(solved, errors, motion, None)
         error = 0.0 if motion.untouched else scene.slab.agree(errors.step)
-        verdict = step.judge(error, motion.front, motion.begins)
+        verdict = step.decide(error, motion.front, motion.begins)
         if not isinstance(verdict, Step):
             return _Made(solved, errors, motion, verdict)
         step = verdict
@@ -110,7 +110,7 @@ def _accepted(scene: Scene, state: State, step: Step) -> _Made:
 
 def _solve(scene: Scene, state: State, step: Step) -> SolvedStep:
     """Solve a step, measure it and let the body go on; collective. Raises StepError and DetachedError."""
-    body, law, before = scene.material, law_of(scene), state.row.measures
+    body, law, before = scene.material, choose_contact_law(scene), state.row.measures
     trial = body.begin(state.body, step.dt, scene.motion.at(step.position), step.growth)
     control, tolerance = _control(scene, step, trial), scene.controller.tolerance(state.tolerance, step)
     of_law = law.solve(trial, step, control, state.law, state.contact, before, tolerance)

@@ -71,7 +71,7 @@ class ErrorMemory:
 
 
 @dataclass(frozen=True)
-class ErrorPart:
+class BudgetPart:
     """The errors of a run, whose body `relaxes` or not; a checkpoint may lack them."""
 
     relaxes: bool
@@ -144,7 +144,7 @@ def _compare_integrators(scene: Scene, solved: SolvedStep) -> IntegratorDifferen
         return NO_DIFFERENCE
     pair = EmbeddedPair(scene.slab, branches, scene.choices.grid.dx / scene.units.length)
     if not solved.touches:
-        return pair.compare_without_load(step.dt, trial, solved.body, step.growth) if step.judge else NO_DIFFERENCE
+        return pair.compare_without_load(step.dt, trial, solved.body, step.growth) if step.decide else NO_DIFFERENCE
     load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)
     pressure = contact.p
     if (touching := solved.of_law.touching) is not pressure:  # tension counts as pressure does

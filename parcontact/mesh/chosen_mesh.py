@@ -120,7 +120,7 @@ def _shortest(shape: Any, box: Grid, data: dict[str, Any], origin: Origin) -> fl
     if isinstance(shape, RoughSpectrum):
         from ..road import spectrum  # reads tables: jobs that name none do without
 
-        return float(spectrum.of(shape)[1][1])
+        return float(spectrum.read_spectrum(shape)[1][1])
     if isinstance(shape, OnOneMesh):
         raise InputError("heights from a file or an array are given on one mesh; give its numbers of points")
     if isinstance(shape, Topography):

@@ -87,7 +87,7 @@ class HeatMemory:
         self.rubbed = allocate(fft.shape if rubs else (0, fft.shape[1]), fft.complex, tally)
         self.mean = MeanMemory(body)
 
-    def take(self, rubbed: Array | None, pressed: Array, scales: Vector) -> None:
+    def set_heating(self, rubbed: Array | None, pressed: Array, scales: Vector) -> None:
         """Take what is rubbed and pressed now, times their scales, for that before the next step."""
         if rubbed is not None:
             np.multiply(self.fft.forward(rubbed), scales[0], out=self.rubbed)

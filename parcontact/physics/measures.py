@@ -7,7 +7,7 @@ LONG_CELLS = 0.1  # power of the ratio of the sides of a cell, by which a side h
 SIDE = (math.pi - 1.0 + math.log(2.0)) / 24.0  # physics: cells in excess per side of a cell on the edge of contact
 
 
-def excess_of(dx: float, dy: float, straight: bool = False) -> float:
+def excess_of(dx: float, dy: float, edges_follow_grid: bool = False) -> float:
     """Return how many cells are in excess per side on the edge of contact, of cells with these sides.
 
     On squares it is SIDE. Where cells are long edges of contact are rather along their longer sides, and fewer cells
@@ -16,7 +16,7 @@ def excess_of(dx: float, dy: float, straight: bool = False) -> float:
     as fine). The power LONG_CELLS of the ratio is between both. Edges that are `straight` along the grid have none of
     this.
     """
-    return SIDE if straight else SIDE * (min(dx, dy) / max(dx, dy)) ** LONG_CELLS
+    return SIDE if edges_follow_grid else SIDE * (min(dx, dy) / max(dx, dy)) ** LONG_CELLS
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,7 @@ class Surface:
         if self.waves is None:
             out.fill(0.0)
         else:
-            loops.displace(self.waves, self._rows, *self._phases(shift), self.fft.spectrum)
+            loops.displace(self.waves, self._rows, *self._shift_factors(shift), self.fft.spectrum)
             self.fft.backward(self.fft.spectrum, out)
         for shape in self.shapes:
             out += self.scale * shape.height(*self._distances(shape, shift))
@@ -84,7 +84,7 @@ class Surface:
         along_x, along_y = 0.0, 0.0
         if self.waves is not None:
             transform = self.fft.forward(pressure)
-            factors = *self._phases(shift), *self._slope_symbols, self.fft.multiplicity.ravel()
+            factors = *self._shift_factors(shift), *self._slope_symbols, self.fft.multiplicity.ravel()
             sums = loops.tangential(transform, self.waves, self._rows, *factors)
             along_x, along_y = (value / (self.fft.mx * self.fft.my) for value in sums)
         if self.shapes:
@@ -104,7 +104,7 @@ class Surface:
         assert self.waves is not None
         return rows_of(len(self.waves), self.fft.my)
 
-    def _phases(self, shift: tuple[float, float]) -> tuple[Spectrum, Spectrum]:
+    def _shift_factors(self, shift: tuple[float, float]) -> tuple[Spectrum, Spectrum]:
         """Factors along x and y that move a transform by `shift`; at the Nyquist wavenumber their real part."""
         factors = []
         for (q, nyquist), length, s in zip(self._wavenumbers, self.size, shift, strict=True):

@@ -100,7 +100,7 @@ def costs_of(job: Job, sample: Sample, write_rate: float) -> Costs:
     """Costs of a job from a sample of it, perhaps on a coarser grid, where stages may have fewer steps."""
     if job.grid == sample.job.grid or not job.history:
         return Costs(job, sample, write_rate)
-    spans = Timeline.of(job).spans
+    spans = Timeline.from_job(job).spans
     stages = (replace(stage, steps=span.jumps + span.count) for stage, span in zip(sample.stages, spans, strict=True))
     return Costs(job, replace(sample, stages=tuple(stages)), write_rate)
 

@@ -121,5 +121,5 @@ def case_times(cases: Sequence[Case], tried: dict[int, float]) -> list[float]:
 def _work(job: Job) -> float:
     """Return the work of a case, in proportion."""
     points = job.grid.nx * job.grid.ny
-    steps = Timeline.of(job).count if job.history else len(request(job).points)
+    steps = Timeline.from_job(job).count if job.history else len(request(job).points)
     return max(steps, 1) * points * math.log(points + 1)

@@ -44,7 +44,7 @@ def offer(costs: Costs, accuracy: float, whole: Job | None = None, wave: float |
         points = mesh_for(own, sample, accuracy, find_shortest_wave(own) if wave is None else wave)
     job = _on_mesh(own, accuracy, points)
     calls = float(CALLS_PER_DECADE ** math.log10(own.numerics.tolerance / job.numerics.tolerance))
-    spans, stages = Timeline.of(own).spans if own.history else [None] * len(sample.stages), []
+    spans, stages = Timeline.from_job(own).spans if own.history else [None] * len(sample.stages), []
     for cost, span in zip(sample.stages, spans, strict=True):
         first, later = ({name: value * calls for name, value in sums.items()} for sums in (cost.first, cost.later))
         steps = _steps(span, sample, job) if span and span.count else cost.steps
@@ -82,7 +82,7 @@ def _steps(span: Span, sample: Sample, job: Job) -> int:
     error = next((e for name in ("friction", "area") if (e := error_of(sample, name, "time")) is not None), 0.0)
     chosen = CHOSEN * TIME_MEDIAN if isinstance(span.ends, ChosenEnds) else 1.0
     share = FRICTION.time * chosen * job.numerics.asked.of_steps
-    tried = Timeline.of(sample.job).spans[span.index].count
+    tried = Timeline.from_job(sample.job).spans[span.index].count
     order = order_of_time_error(job.numerics.integrator, curved=True)
     count = max(tried * (error / share) ** (1.0 / order), span.count / MOST)
     if span.stage.speed and not span.stage.chooses:

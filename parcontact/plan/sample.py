@@ -155,7 +155,7 @@ def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[S
             break
         speed, pressure, temperature = states[index]
         if temperature == temperature:
-            sliding.heat(temperature)
+            sliding.set_temperature(temperature)
         point, cost = _cost(slab, partial(_solve, sliding, wanted.velocity(speed), pressure))
         stage.add(cost | (dict(_errors(point.errors, 1.0, 1.0)) if point else {}))
     return building, [stage]

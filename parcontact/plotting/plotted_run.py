@@ -63,7 +63,7 @@ class PlottedRun:
     def timeline(self) -> Timeline:
         """The stage of the job that each step is in."""
         steps, times = self._all["step"].astype(int).tolist(), self._all["time"].tolist()
-        return Timeline.of(self.job, times[-1]).follow(dict(zip(steps, times, strict=True)))
+        return Timeline.from_job(self.job, times[-1]).follow(dict(zip(steps, times, strict=True)))
 
     @property
     def telling_step(self) -> int:

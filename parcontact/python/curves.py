@@ -110,14 +110,14 @@ def steady(
         point = None
         try:
             if wanted.temperatures:
-                sliding.heat(at.temperature)
+                sliding.set_temperature(at.temperature)
             point = sliding.solve(wanted.velocity(at.speed), at.pressure)
         except RunError as error:
             failures.append(str(error))
             warn(str(error), RuntimeWarning)
         sliding.forget()
         points.append(point)
-        doubts += map(str, contacts.judge_point(point.measures, str(at)) if point else [])
+        doubts += map(str, contacts.check_point(point.measures, str(at)) if point else [])
     solved = [point for point in points if point]
     of_points = *describe_hot(solved), *describe_unmeasured(solved, found), *describe_missed(solved, found)
     for text in (*doubts, *of_points) if slab.root else ():

@@ -50,7 +50,7 @@ def read_job_here(given: Given, changes: Mapping[str, Any] | None = None, comm: 
 
 
 def _sound(job: Job) -> Job:
-    sanity.refuse_impossible(job, Timeline.of(job))
+    sanity.refuse_impossible(job, Timeline.from_job(job))
     return job
 
 

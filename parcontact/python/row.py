@@ -18,13 +18,13 @@ class Row(Mapping[str, float]):
         self._numbers = dict(numbers)
 
     @classmethod
-    def of(cls, row: recorded.StepRow, added: tuple[str, ...] = ()) -> Row:
+    def from_record(cls, row: recorded.StepRow, added: tuple[str, ...] = ()) -> Row:
         """A recorded row; `added` names the columns of effects."""
         branches = len(row.branch_dissipation)
         return cls(dict(zip(recorded.columns(branches, added), recorded.row_numbers(row, branches), strict=True)))
 
     @classmethod
-    def of_line(cls, line: str, added: tuple[str, ...] = ()) -> Row:
+    def from_line(cls, line: str, added: tuple[str, ...] = ()) -> Row:
         """A row as a line of measures.csv has it, of as many branches as there is room for."""
         cells = [int(cell) if cell.isdecimal() else float(cell or "nan") for cell in line.split(",")]
         branches = len(cells) - len(recorded.columns(0, added))

@@ -80,7 +80,7 @@ class Simulation:
             march.advance(step)
             if march.detached:
                 return
-            for doubt in self._contacts.judge(march.row.step, march.row.measures):
+            for doubt in self._contacts.check_step(march.row.step, march.row.measures):
                 self._warns(doubt)
             yield self.row
 
@@ -114,8 +114,8 @@ class Simulation:
         march, saved = self._march, self._saved
         added = columns_of(march.scene.effects)
         if saved is not None and saved.table.last and march.row.step == saved.step:
-            return Row.of_line(saved.table.last, added)
-        return Row.of(march.row, added)
+            return Row.from_line(saved.table.last, added)
+        return Row.from_record(march.row, added)
 
     @property
     def finished(self) -> bool:
@@ -188,7 +188,7 @@ class Simulation:
             on_root(world, lambda: heights.located(parse(text, str(file)).data, file, elsewhere)), set, world
         )
         if not any(key.startswith("output") for key in set or {}):  # `read` has found its keys to be words
-            job = job.of(job.origin._replace(names_directory=False))
+            job = job.with_origin(job.origin._replace(names_directory=False))
         simulation = cls(job, comm=world)
         slab = simulation._slab
         plain = on_root(world, lambda: plain_job(job))
@@ -247,4 +247,4 @@ def _in_a_file(job: Job, slab: Slab) -> Iterator[Job]:
         path = Path(directory, "job.yaml")
         if slab.root:
             path.write_text(job.resolved())
-        yield job.of(job.origin._replace(path=path))
+        yield job.with_origin(job.origin._replace(path=path))

@@ -36,10 +36,10 @@ def road_section(job: Job) -> ReportSection:
         return ReportSection("Surface", ["The surface has too many points to be made anew for a report."], [shapes])
     slab = Slab.alone(*job.grid.points)
     try:
-        made, told = rigid_surface.make_surface(job, FFT(slab))
+        made, remarks = rigid_surface.make_surface(job, FFT(slab))
     except InputError as error:
         return ReportSection("Surface", [f"The surface cannot be made anew: {error}."], [shapes])
-    heights, sentences = made.heights((0.0, 0.0), slab.empty()), [*told.notes, *map(str, told.doubts)]
+    heights, sentences = made.heights((0.0, 0.0), slab.empty()), [*remarks.notes, *map(str, remarks.doubts)]
     found = statistics.surface_statistics(heights, job.grid.size)
     if not found.rms_height:
         return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])

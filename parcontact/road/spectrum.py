@@ -57,7 +57,7 @@ class MeasuredSpectrum:
         return np.where(inside, np.exp(log), 0.0)
 
 
-def of(part: RoughSpectrum) -> tuple[MeasuredSpectrum, tuple[float, float]]:
+def read_spectrum(part: RoughSpectrum) -> tuple[MeasuredSpectrum, tuple[float, float]]:
     """The spectrum of a job's surface, and its longest and shortest wavelengths [m]. Raises InputError."""
     q, values, power = _read(part.spectrum)
     if part.normalisation == "surface_topography":

@@ -190,7 +190,7 @@ class Spectrum:
     deviations: Array
 
     @staticmethod
-    def of(data: ReducedData) -> "Spectrum":
+    def fit(data: ReducedData) -> "Spectrum":
         """Return the smooth spectrum that meets the data within their noise."""
         high, low = (-math.log10(rate) for rate in data.rates)
         inside = max(2, math.ceil((high - low) * DENSE)) + 1
@@ -253,20 +253,20 @@ def fit_series(data: ReducedData, error: float, sweeps: Sequence[tuple[Array, Ar
     deviation of the loss modulus as far as that is smaller. It has a branch per decade at least. `sweeps`, rates and
     moduli, are what the scatter is found from.
     """
-    spectrum, (low, high), (slow, fast) = Spectrum.of(data), data.band, data.rates
+    spectrum, (low, high), (slow, fast) = Spectrum.fit(data), data.band, data.rates
     decades = math.log10(fast / slow)
     within = _frequencies(slow, fast)
     omega = np.concatenate([within, _frequencies(slow / 10.0**NEAR_END, fast * 10.0**NEAR_END)])
     goal, deviation = spectrum.modulus(omega)
-    least, judge = min(max(1, math.ceil(decades)), MOST), slice(within.size)
-    allowed = np.hypot(error, np.minimum(deviation[judge], error))
+    least, measured = min(max(1, math.ceil(decades)), MOST), slice(within.size)
+    allowed = np.hypot(error, np.minimum(deviation[measured], error))
     for count in progress.with_bar(range(least, MOST + 1), "number of branches", "branch"):
         tried = [_short(omega, goal, _times(data.rates, count, spare)) for spare in ENDS]
-        judged = [_distance(omega[judge], goal[judge], allowed, *each) for each in tried]
-        found = tried[int(np.argmin(judged))]
-        if min(judged) <= 1.0:
+        distances = [_distance(omega[measured], goal[measured], allowed, *each) for each in tried]
+        found = tried[int(np.argmin(distances))]
+        if min(distances) <= 1.0:
             break
-    times, weights = _thin(omega, goal, judge, allowed, found, least)
+    times, weights = _thin(omega, goal, measured, allowed, found, least)
     omega = _frequencies(low, high)
     goal, deviation = spectrum.modulus(omega)
     missed = (complex_kernel(omega, "frequency", times) @ weights).imag / goal.imag - 1.0
@@ -328,7 +328,7 @@ def _distance(omega: Array, goal: ComplexArray, allowed: Array, times: Array, we
 
 
 def _thin(
-    omega: Array, goal: ComplexArray, judge: slice, allowed: Array, found: tuple[Array, Array], least: int
+    omega: Array, goal: ComplexArray, measured: slice, allowed: Array, found: tuple[Array, Array], least: int
 ) -> tuple[Array, Array]:
     """Return times and weights without the weakest branches, as long as the series meets the goal without them."""
     while found[0].size > least:
@@ -336,7 +336,7 @@ def _thin(
         z = times / times[:, None]
         weakest = int(np.argmin(moduli / ((z / (1.0 + z**2)) @ moduli)))
         fewer = _short(omega, goal, np.delete(times, weakest))
-        if _distance(omega[judge], goal[judge], allowed, *fewer) > 1.0:
+        if _distance(omega[measured], goal[measured], allowed, *fewer) > 1.0:
             break
         found = fewer
     return found

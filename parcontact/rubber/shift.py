@@ -122,7 +122,7 @@ def log_vertical(shift: Shift, temperature: float) -> float:
     return 0.0 if shift.vertical is None else shift.vertical.log_factor(temperature)
 
 
-def given(text: str, reference: float | None) -> str | Shift:
+def read_shift(text: str, reference: float | None) -> str | Shift:
     """Return what a text of the command line means: the name of a law whose constants are to be fitted, or a law.
 
     `wlf:8.86,101.6` and `arrhenius:1.2e5` hold constants at the reference temperature, another text is the path of a

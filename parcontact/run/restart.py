@@ -124,7 +124,7 @@ def _refuse_loss(directory: Directory, plain: Mapping[str, Any]) -> None:
     if claim is None or not found:
         return
     there = f"{directory.path} holds {', '.join(found)}"
-    if different := marker.told(marker.differences(claim.job, plain, SAME)):
+    if different := marker.list_differences(marker.differences(claim.job, plain, SAME)):
         raise InputError(f"{there} of another job: {different}; {ADVICE}")
     if claim.saved:
         how = f"a run that has finished at t = {claim.finished[1]:g} s" if claim.finished else "a run"
@@ -135,7 +135,7 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
     """Return a checkpoint without its maps, or why it will not do; root only."""
     try:
         contents = checkpoint.inspect(path)
-        if found := marker.told(marker.differences(contents.job, plain, SAME)):
+        if found := marker.list_differences(marker.differences(contents.job, plain, SAME)):
             return f"{path} belongs to another job: {found}"
         return contents
     except (InputError, OSError) as error:
@@ -147,7 +147,7 @@ def find_changed_step(contents: Contents, job: Job) -> str:
     number, until = contents.step, contents.time
     history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
     old, new = (
-        Timeline.of(each, until, ChosenSteps.of(each, contents.numbers))
+        Timeline.from_job(each, until, ChosenSteps.from_job(each, contents.numbers))
         for each in (job.model_copy(update={"history": history}), job)
     )
     count = min(number, len(old), len(new))

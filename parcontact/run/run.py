@@ -97,7 +97,7 @@ class Run:
             self.console.say(row.remark)
         self.recorder.write(row, march.field, len(self.timeline) if self.timeline.chooses else 0)
         try:
-            doubts = self.contacts.judge(row.step, row.measures)
+            doubts = self.contacts.check_step(row.step, row.measures)
         except RunError as error:
             raise RunError(f"{error}{self._leave_checkpoint()}") from error
         for doubt in doubts:
@@ -111,7 +111,7 @@ class Run:
     def decide(self, march: March) -> bool:
         """Save if it is time to; whether the run ends."""
         row = march.row
-        verdict = self.watch.judge(row.step, row.step > self.first, self.recorder.problem)
+        verdict = self.watch.decide(row.step, row.step > self.first, self.recorder.problem)
         if verdict.problem:
             raise RunError(verdict.problem + self._leave_checkpoint())
         self.stop = verdict.stop if row.step < len(self.timeline) else ""

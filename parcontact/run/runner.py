@@ -85,11 +85,13 @@ def _find_origin(
 ) -> tuple[RestartPoint | None, list[str], str]:
     """Find where to begin: a checkpoint or None, what to warn of, and why there is nothing to do, or ''; collective."""
     slab, until = directory.slab, options.until
-    timeline = Timeline.of(job, until or 0.0)
+    timeline = Timeline.from_job(job, until or 0.0)
     reason = restart.finished_before(job, plain, slab, directory, options.restart, timeline)
     origin, warnings = (None, []) if reason else restart.choose_origin(job, plain, slab, directory, options.restart)
     if origin:
-        timeline = Timeline.of(job, until or 0.0, ChosenSteps.of(job, part_of("steps", origin.contents.numbers)))
+        timeline = Timeline.from_job(
+            job, until or 0.0, ChosenSteps.from_job(job, part_of("steps", origin.contents.numbers))
+        )
     if until is not None and not reached(timeline.end, until):
         raise InputError(
             f"--until {until:g} is beyond the end of the history, t = {timeline.end:g} s, and its last stage is one "

@@ -54,7 +54,7 @@ class Watch:
     _write: float = -1.0
     _steps: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))
 
-    def judge(self, step: int, began: bool, problem: str = "") -> Verdict:
+    def decide(self, step: int, began: bool, problem: str = "") -> Verdict:
         """Decide after a step; collective. `began`: a step was made in this run; `problem`: what root could not do."""
         now = time.monotonic()
         if began:

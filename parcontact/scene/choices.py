@@ -97,7 +97,7 @@ class Choices:
         reason = "output.energy counts the energy of every branch" if self.energies.on else reason
         reason = "heat changes them" if feeds_back(self.job) else reason
         reason = reason if self.prony.moduli.size else "the body has no branch"
-        scales = time_scales(Timeline.of(self.job, self.until), self.steady_start.on)
+        scales = time_scales(Timeline.from_job(self.job, self.until), self.steady_start.on)
         return fold_branches(self.prony, scales, self.numerics.integrator, self.numerics.branch_error, reason)
 
     @decided("viscoelasticity")
@@ -139,7 +139,7 @@ class Choices:
     @cached_property
     def timeline(self) -> Timeline:
         """All steps of the job's history; those that stages choose are guessed."""
-        return Timeline.of(self.job)
+        return Timeline.from_job(self.job)
 
     @cached_property
     def slides_along_x(self) -> bool:

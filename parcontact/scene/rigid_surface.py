@@ -26,25 +26,25 @@ ROUNDING = 1e-8  # accuracy: relative, of the shortest wavelength of a table
 FLAT = 1e-14  # accuracy: a surface whose highest and lowest points differ by this, relative to their heights, is flat
 
 
-class Told(NamedTuple):
+class Remarks(NamedTuple):
     """Notes on how measured maps were prepared, sentences that root has, and doubts about them, on every rank."""
 
     notes: list[str]
     doubts: list[Doubt]
 
 
-def make_surface(job: Job, fft: FFT) -> tuple[Surface, Told]:
+def make_surface(job: Job, fft: FFT) -> tuple[Surface, Remarks]:
     """Return the rigid surface of a job, and what to say of its measured maps; collective. Raises InputError."""
-    grid, told = job.grid, Told([], [])
+    grid, remarks = job.grid, Remarks([], [])
     spectral = [part for part in job.surface if isinstance(part, jobs.Spectral)]
-    waves = reduce(add, (_waves(part, grid, fft, told) for part in spectral)) if spectral else None
+    waves = reduce(add, (_waves(part, grid, fft, remarks) for part in spectral)) if spectral else None
     shapes = [_round(part, grid) for part in job.surface if isinstance(part, jobs.Sphere | jobs.Cylinder)]
     surface = Surface(fft.slab, fft, grid.size, waves, shapes, grid.cyclic)
     surface.level()
     if surface.waves is not None:
         surface.waves = lowest(surface.waves, fft, highest_waves(job))
         fft.slab.tally.hold(surface.waves)
-    return surface, told
+    return surface, remarks
 
 
 def outline_surface(job: Job, fft: FFT) -> Surface:
@@ -108,14 +108,14 @@ def highest_waves(job: Job) -> tuple[int, int]:
     return max(x for x, _ in found), max(y for _, y in found)
 
 
-def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: Told) -> Spectrum:
-    """Return the spectrum of one part of a surface, adding to what is `told` of it; collective."""
+def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, remarks: Remarks) -> Spectrum:
+    """Return the spectrum of one part of a surface, adding to its `remarks`; collective."""
     if isinstance(part, jobs.Wave):
         return single_wave(fft, part.amplitude, part.waves, part.phase)
     if isinstance(part, jobs.RoughSpectrum):
-        return _measured_spectrum(part, grid, fft, told.notes)
+        return _measured_spectrum(part, grid, fft, remarks.notes)
     if isinstance(part, jobs.Topography):
-        return _measured_map(part, grid, fft, told)
+        return _measured_map(part, grid, fft, remarks)
     if isinstance(part, jobs.HeightFile):
         return _transform(heightfile.read_heights(part.path, part.dataset, fft.slab, part.scale), fft)
     if isinstance(part, jobs.HeightArray):
@@ -127,8 +127,8 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, told: Told) -> Spectrum:
     return Roughness(part.hurst, *limits, part.seed, random, *amplitude, stretch).spectrum(fft, grid.size)
 
 
-def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, told: Told) -> Spectrum:
-    """Return the transform of a map, or of a surface with the spectrum of a line scan, adding to what is `told` of it;
+def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, remarks: Remarks) -> Spectrum:
+    """Return the transform of a map, or of a surface with the spectrum of a line scan, adding to its `remarks`;
     collective."""
     from ..road import map_files, prepared_map, spectrum  # with much of scipy, which is slow to import
     from . import map_sentences
@@ -138,24 +138,24 @@ def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, told: Told) -> Sp
     def make() -> tuple[list[Doubt], tuple[spectrum.MeasuredSpectrum, tuple[float, float]] | None]:
         found = map_files.read_map(part)
         if found.is_line:
-            told.notes.append(map_sentences.describe_line(part, found))
+            remarks.notes.append(map_sentences.describe_line(part, found))
             return [], spectrum.of_line(part, found)
         prepared = prepared_map.prepare(part, grid, found)
         heights.append(prepared.heights)
-        told.notes.extend(map_sentences.describe_treatment(prepared))
+        remarks.notes.extend(map_sentences.describe_treatment(prepared))
         return [*map_sentences.doubt_sizes(prepared), *map_sentences.doubt_outliers(prepared)], None
 
     doubts, line = on_root(fft.slab.comm, make)
     if line is not None:
-        return _random_surface(*line, grid, fft, told.notes)
-    told.doubts.extend(doubts)
+        return _random_surface(*line, grid, fft, remarks.notes)
+    remarks.doubts.extend(doubts)
     return _transform(fft.slab.from_root(heights[0] if heights else None), fft)
 
 
 def _measured_spectrum(part: jobs.RoughSpectrum, grid: Grid, fft: FFT, notes: list[str]) -> Spectrum:
     from ..road import spectrum
 
-    found, (long, short) = on_root(fft.slab.comm, lambda: spectrum.of(part))
+    found, (long, short) = on_root(fft.slab.comm, lambda: spectrum.read_spectrum(part))
     if fft.slab.root:
         notes.append(f"spectrum: waves from {long:.4g} to {short:.4g} m of {part.spectrum.name}")
     return _random_surface(found, (long, short), grid, fft, notes, part.seed, part.amplitudes == "random")

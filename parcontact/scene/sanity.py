@@ -62,7 +62,7 @@ def _check_heights(setup: Setup) -> Iterator[Doubt]:
     known = {doubt.kind for doubt in setup.job.doubts}
     if setup.roughness and "steep" not in known:
         yield from meaning.doubt_slope(setup.roughness.rms_slope)
-    yield from setup.told.doubts
+    yield from setup.remarks.doubts
     seams: list[Doubt] = []
     if any(isinstance(shape, OnOneMesh) for shape in setup.job.surface) and setup.grid.boundary == "periodic":
         seams = list(_seams(setup, setup.surface.heights((0.0, 0.0), setup.slab.empty())))
@@ -74,7 +74,7 @@ def _check_heights(setup: Setup) -> Iterator[Doubt]:
     if law and setup.roughness and not setup.surface.shapes:
         yield from doubt_range(law, span)
     if setup.shortest is not None and not (seams or setup.job.origin.mesh):  # a seam has waves of its own
-        asked, spiky = setup.choices.numerics.asked, any(doubt.kind == "outliers" for doubt in setup.told.doubts)
+        asked, spiky = setup.choices.numerics.asked, any(doubt.kind == "outliers" for doubt in setup.remarks.doubts)
         yield from advice.doubt_measured_waves(setup.grid, setup.shortest, asked, setup.job.directions, spiky)
 
 
@@ -166,12 +166,12 @@ class ContactWatch:
     seen: set[str] = field(default_factory=set)
     more: str = "more grid.points"
 
-    def judge(self, step: int, measures: Measures) -> list[Doubt]:
+    def check_step(self, step: int, measures: Measures) -> list[Doubt]:
         """Return doubts about a step; raises RunError where they are errors."""
         ends_a_stage = 0 < step <= self.timeline.count and self.timeline.span(step).last == step
-        return self.judge_point(measures, f"step {step}", ends_a_stage)
+        return self.check_point(measures, f"step {step}", ends_a_stage)
 
-    def judge_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
+    def check_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
         """Return doubts about a contact, of its cells if it is `final`; raises RunError where they are errors."""
         found = [*doubt_edge(measures, where), *(doubt_cells(measures, where, self.more) if final else ())]
         new = [doubt for doubt in found if doubt.kind not in self.seen]

@@ -42,7 +42,7 @@ from ..solve.preconditioner.extension import grids_for
 from ..solve.problem import Operators
 from ..solve.workspace import Workspace
 from .choices import Choices, choices
-from .rigid_surface import HeightRange, Told, heights_of, make_surface, outline_surface, shortest_measured
+from .rigid_surface import HeightRange, Remarks, heights_of, make_surface, outline_surface, shortest_measured
 
 
 @dataclass
@@ -51,7 +51,7 @@ class Setup:
 
     `heights` [m] are what the surface reaches, `height` is that from its lowest to its highest point (the shorter side
     of a cell if it is flat); `shortest` [m] is the shortest wave of what is measured of it, None where nothing is;
-    `size` and `prony` are the box and the relaxation function in the run's units (and seconds); `told` is
+    `size` and `prony` are the box and the relaxation function in the run's units (and seconds); `remarks` is
     what to say of measured maps.
     """
 
@@ -63,7 +63,7 @@ class Setup:
     shortest: float | None
     heights: HeightRange
     units: Units
-    told: Told
+    remarks: Remarks
 
     @property
     def job(self) -> Job:
@@ -180,13 +180,13 @@ def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:
     """The surface of a job, to be marched to the end of its history or, if later, to `until` [s], and what it is
     measured in; collective. Raises InputError for files that do not fit."""
     chosen, fft = choices(job, until), FFT(slab)
-    surface, told = make_surface(job, fft)
+    surface, remarks = make_surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
     shortest = shortest_measured(job, surface)
     heights = heights_of(surface)
     units = Units.near(heights.span, job.grid.lx, chosen.prony.modulus_inf + float(chosen.prony.moduli.sum()))
     surface.rescale(units.height)
-    return Setup(chosen, slab, fft, surface, roughness, shortest, heights, units, told)
+    return Setup(chosen, slab, fft, surface, roughness, shortest, heights, units, remarks)
 
 
 def outline(job: Job, slab: Slab) -> Setup:
@@ -195,7 +195,7 @@ def outline(job: Job, slab: Slab) -> Setup:
     chosen, fft = choices(job), FFT(slab)
     slab.tally.purpose = "surface spectrum"
     surface, flat, units = outline_surface(job, fft), HeightRange(0.0, 0.0, 0.0), Units(1.0, 1.0, 1.0)
-    return Setup(chosen, slab, fft, surface, None, None, flat, units, Told([], []))
+    return Setup(chosen, slab, fft, surface, None, None, flat, units, Remarks([], []))
 
 
 def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
@@ -247,7 +247,7 @@ def solver_on_tiles(setup: Setup) -> SolverOnTiles | None:
 
 def describe_scene(scene: Scene) -> Iterator[str]:
     """Yield what a user should know: how maps were prepared, branches folded, steps chosen; the surface's moments."""
-    yield from scene.setup.told.notes
+    yield from scene.setup.remarks.notes
     yield from describe_folded_branches(scene.folded, scene.choices.prony, bool(scene.job.directions))
     yield from scene.job.facts
     if steps := describe_steps(scene.job):

@@ -38,13 +38,13 @@ class Bounded:
         """The surfaces touch where there is a pressure, also where one of them has yielded."""
         return p
 
-    def weigh(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
+    def contact_sums(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
         load, work, gaps, squares = kernels.pressure_sums(p, u, h, d)
-        return load, work, gaps, squares, *_weigh_free(p, u, h, d, self.highest)
+        return load, work, gaps, squares, *_sum_free(p, u, h, d, self.highest)
 
-    def mark(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
+    def mark_working_set(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
         """Points work that are free, penetrate without having yielded, or have yielded under an open gap."""
-        found: tuple[float, ...] = _mark(p, u, h, d, self.highest, working)
+        found: tuple[float, ...] = _mark_working_set(p, u, h, d, self.highest, working)
         return found
 
     def advance(self, p_old: Array, t: Array, step: float, p: Array, cells: Cells, sums: Array) -> tuple[float, float]:
@@ -82,7 +82,7 @@ class Bounded:
 
 
 @loop
-def _weigh_free(p, u, h, d, highest):
+def _sum_free(p, u, h, d, highest):
     """Sums of p and p g over free points."""
     load, gaps = 0.0, 0.0
     for j in range(p.shape[0]):
@@ -97,7 +97,7 @@ def _weigh_free(p, u, h, d, highest):
 
 
 @loop
-def _mark(p, u, h, d, highest, working):
+def _mark_working_set(p, u, h, d, highest, working):
     """Mark the working set; sums of p times what is wrong with the gap, of the set and its gaps, of points that have
     yielded and stay so; and the deepest penetration of those that have not."""
     wrong, count, gaps, held = 0.0, 0.0, 0.0, 0.0

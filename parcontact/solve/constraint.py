@@ -40,10 +40,10 @@ class Constraint(Protocol):
     def touches(self, p: Array) -> Mask:
         """Return where the surfaces touch under an admissible pressure: a map that is not 0 there, which may be p."""
 
-    def weigh(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
+    def contact_sums(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
         """Sums of p, p u, p g and p u^2; and of p and p g over the points that are free to move."""
 
-    def mark(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
+    def mark_working_set(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
         """Mark the working set: points that are free to move, or are not where they should be. Returns the sum of p
         times what is wrong with g, the number of these points and their sum of g, the number of points that are held
         under pressure, and the deepest penetration that is not allowed."""
@@ -74,13 +74,13 @@ class NonNegative:
         """The surfaces touch where there is a pressure."""
         return p
 
-    def weigh(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
+    def contact_sums(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
         load, work, gaps, squares = kernels.pressure_sums(p, u, h, d)
         return load, work, gaps, squares, load, gaps
 
-    def mark(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
+    def mark_working_set(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
         """The working set is the contact, and the points that penetrate."""
-        wrong, count, gaps, deepest = mark(p, u, h, d, working)
+        wrong, count, gaps, deepest = mark_working_set(p, u, h, d, working)
         return wrong, count, gaps, 0.0, deepest
 
     def advance(self, p_old: Array, t: Array, step: float, p: Array, cells: Cells, sums: Array) -> tuple[float, float]:
@@ -109,7 +109,7 @@ class NonNegative:
 
 
 @loop
-def mark(p, u, h, d, working):
+def mark_working_set(p, u, h, d, working):
     """Mark the working set: pressure, or penetration. With the gap `g = u - h - d`: sum of p |g|, over the working set
     the count and the sum of g, and max(-g).
 

@@ -44,7 +44,7 @@ from ..physics import loops
 from ..physics.layer import LongWaves
 from . import kernels
 from .certificate import Certificate
-from .iterate import Iterate, certify, contact_sums
+from .iterate import Iterate, certify, form_iterate
 from .local_load import LEAST_CUT, LocalLoad
 from .preconditioner.extension import ALL, ExtendedPreconditioner, Grids
 from .preconditioner.long_waves import LongWavePreconditioner
@@ -154,7 +154,7 @@ class ContactSolver:
             if cut > LARGE_CUT:
                 slope = 0.0
 
-    def judge(self, problem: Problem, p: Array, otherwise: str) -> Contact:
+    def check(self, problem: Problem, p: Array, otherwise: str) -> Contact:
         """The admissible pressure p, scaled to the load, as it is; `otherwise` is its failure unless it solves the
         problem; collective."""
         iterate = self._begin(problem, p)
@@ -174,11 +174,11 @@ class ContactSolver:
             else:
                 p.fill(problem.mean)
         problem.operator.apply(p, self.workspace.displacement)
-        return self._weigh(problem, p, 0.0 if problem.mean is not None else problem.control.value)
+        return self._form_iterate(problem, p, 0.0 if problem.mean is not None else problem.control.value)
 
-    def _weigh(self, problem: Problem, p: Array, d: float) -> Iterate:
+    def _form_iterate(self, problem: Problem, p: Array, d: float) -> Iterate:
         """A pressure in numbers, for the approach d or the one that suits it."""
-        iterate = contact_sums(self.slab, problem.constraint, p, self.workspace.displacement, problem.heights, d)
+        iterate = form_iterate(self.slab, problem.constraint, p, self.workspace.displacement, problem.heights, d)
         return iterate if problem.mean is None else iterate.settled()
 
     def _certify(self, problem: Problem, p: Array, iterate: Iterate) -> tuple[float, float, Certificate]:
@@ -244,7 +244,7 @@ class ContactSolver:
                 self._local_load.restore(constraint, p, load, mean * self.slab.points, near_by)
             problem.operator.apply(p, work.other_displacement)
             work.swap_displacements()
-            new = contact_sums(self.slab, constraint, p, work.displacement, problem.heights, old.d)
+            new = form_iterate(self.slab, constraint, p, work.displacement, problem.heights, old.d)
             if new.f - old.f <= ENERGY_ROUNDING * new.energy or halvings == MAX_HALVINGS:
                 break
             work.swap_displacements()

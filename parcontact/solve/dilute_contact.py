@@ -8,7 +8,7 @@ displacement u that this causes there, a block can touch only if its highest poi
 with L the length by which u varies within the contact (`certificate.Certificate`). Tiles with such blocks, or with
 pressure, or beside one, are stacked to a map of their own, on which `contact.ContactSolver` solves the same problem
 with operators on tiles (`physics.tile_operator`). These give the displacement at all points of the grid, too, by which
-`contact.ContactSolver.judge` sees whether the pressure holds everywhere. To less than FINEST, or if it does not, the
+`contact.ContactSolver.check` sees whether the pressure holds everywhere. To less than FINEST, or if it does not, the
 operator of the whole grid judges it, and the solve goes on from there. Root solves and tells the others.
 """
 
@@ -123,13 +123,13 @@ class OnTheseTiles:
         _unstack(slab, tiles, self._stacked, p)
         return Found(slab, p, d, length)
 
-    def judge(self, solver: ContactSolver, p: Array) -> Contact | None:
+    def check(self, solver: ContactSolver, p: Array) -> Contact | None:
         """The contact of the solution p, if it holds at all points to the solver's tolerance, None also where the
         operator of the whole grid is to judge; collective."""
         if solver.tolerance < FINEST:
             return None
         self._displace(solver.workspace.displacement)
-        contact = solver.judge(replace(self._problem, operator=_Displaced()), p, "does not hold beside the tiles")
+        contact = solver.check(replace(self._problem, operator=_Displaced()), p, "does not hold beside the tiles")
         return contact if contact.converged else None
 
     def _displace(self, u: Array) -> None:

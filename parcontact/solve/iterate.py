@@ -77,7 +77,7 @@ def certify(
 
     `mean` is the mean pressure asked for, None with a given approach; `height` is that of the surface.
     """
-    *sums, deepest = constraint.mark(p, u, h, iterate.d, working)
+    *sums, deepest = constraint.mark_working_set(p, u, h, iterate.d, working)
     wrong, members, excess, held, deepest = slab.reduce(sums, [deepest])
     length = iterate.length(height)
     complementarity = wrong / (iterate.load or 1.0) / length
@@ -86,9 +86,9 @@ def certify(
     return members, excess, Certificate(complementarity, max(deepest / length, 0.0), load, length, share)
 
 
-def contact_sums(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array, d: float) -> Iterate:
+def form_iterate(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array, d: float) -> Iterate:
     """A pressure and its image u in numbers, for an approach d; collective."""
-    load, work, gaps, squares, free_load, free_gaps = slab.sum(*constraint.weigh(p, u, h, d))
+    load, work, gaps, squares, free_load, free_gaps = slab.sum(*constraint.contact_sums(p, u, h, d))
     between = _approaches(slab, constraint, p, u, h) if free_load <= 0.0 < load else None
     return Iterate(d, load, gaps, 0.5 * work, squares, free_load, free_gaps, between)
 

@@ -100,7 +100,7 @@ class States(Protocol):
 
     def forget(self) -> None: ...
 
-    def heat(self, temperature: float) -> None: ...
+    def set_temperature(self, temperature: float) -> None: ...
 
     def solve(self, velocity: tuple[float, float], pressure: float) -> Point: ...
 
@@ -137,7 +137,7 @@ def run_curve(
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
-        sanity.refuse_impossible(job, Timeline.of(job))
+        sanity.refuse_impossible(job, Timeline.from_job(job))
         plain = _identity(job, wanted) if slab.root else {}
         directory.refuse_foreign(job.path, plain, restart == "never")
         goes_on = restart != "never" and on_root(slab.comm, lambda: _goes_on(directory, plain))
@@ -175,7 +175,7 @@ def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
     how to keep another mesh."""
     if (claim := directory.claim) is None or not directory.results():
         return False
-    if different := marker.told(marker.differences(claim.job, plain, (*SAME, "steady"))):
+    if different := marker.list_differences(marker.differences(claim.job, plain, (*SAME, "steady"))):
         kept = marker.keep_mesh(claim.job, different)
         raise InputError(f"{directory.path} holds the friction curve of another job: {different}; {kept}{ADVICE}")
     return True
@@ -253,7 +253,7 @@ class _Curve:
         velocity = self.wanted.velocity(wanted.speed)
         try:
             if not math.isnan(wanted.temperature):
-                self.sliding.heat(wanted.temperature)
+                self.sliding.set_temperature(wanted.temperature)
             point = self.sliding.solve(velocity, wanted.pressure)
         except RunError as error:
             self.failures += 1
@@ -267,7 +267,7 @@ class _Curve:
         def write() -> None:
             if table:
                 table.write(point, rows)
-                table.warn(self.watch.judge_point(point.measures, str(wanted)), self.shows)
+                table.warn(self.watch.check_point(point.measures, str(wanted)), self.shows)
 
         hdf5.write_on_root(self.slab, write, f"cannot write {self.directory.path / 'steady.csv'}")
         self.sliding.forget()

@@ -31,7 +31,7 @@ HOTTEST = 200.0  # physics: rise of the temperature [K] above which rubber decom
 Vector = tuple[float, float]
 
 
-def warm(
+def find_temperatures(
     setup: Setup,
     section: Thermal,
     pressure: Array,

@@ -27,7 +27,7 @@ from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
 from ..solve.precision import reachable_certificate
 from ..solve.preconditioner.extension import pairs_for
-from .heating import Feedback, warm
+from .heating import Feedback, find_temperatures
 from .losses import branch_powers
 from .point import Point
 from .stiffness import loses_most, soft_stripes
@@ -83,13 +83,13 @@ class SteadySliding:
             solver.hold_all()
         return p, solver, operator
 
-    def heat(self, temperature: float) -> None:
+    def set_temperature(self, temperature: float) -> None:
         """Solve at this temperature [deg C] from now on; raises InputError where the material has no shift."""
         if temperature != self.temperature:
-            self._take(temperature)
+            self._set_material(temperature)
             self.temperature = temperature
 
-    def _take(self, temperature: float) -> None:
+    def _set_material(self, temperature: float) -> None:
         """Take the material at this temperature [deg C] for the next solve."""
         self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
         self.probe = self.setup.probe()
@@ -108,7 +108,7 @@ class SteadySliding:
 
         def warmed(rise: float) -> Point:
             try:
-                self._take(cold + rise)
+                self._set_material(cold + rise)
             except InputError as error:
                 raise RunError(f"the flash temperature leaves what the material allows: {error}") from None
             return self._solve(velocity, pressure)
@@ -137,7 +137,7 @@ class SteadySliding:
         lost = () if powers is None else tuple(powers.sum(axis=1).tolist())
         judged = self._known, contact.certificate, by_energy, velocity, measures
         friction, errors = judge_state(self.setup, *judged)
-        flash = self._warm(contact, by_energy, velocity, measures)
+        flash = self._find_temperatures(contact, by_energy, velocity, measures)
         seconds, place = time.perf_counter() - began, (velocity, pressure, self.temperature, factor)
         return Point(*place, measures, friction, errors, contact.certificate, calls, contact.sets, seconds, lost, flash)
 
@@ -150,13 +150,15 @@ class SteadySliding:
             return f"; double precision reaches only about {reach:.1g} here: {what}"
         return ". Try a velocity nearer to one that works, a finer grid, or another numerics.tolerance."
 
-    def _warm(self, contact: SteadyContact, friction: float, velocity: Vector, measures: Measures) -> Flash | None:
+    def _find_temperatures(
+        self, contact: SteadyContact, friction: float, velocity: Vector, measures: Measures
+    ) -> Flash | None:
         """Return the temperatures of the contact, if the job asks for them; collective."""
         section = self.setup.job.section("thermal")
         if section is None:
             return None
         touching = SteadySolver.constraint.touches(contact.p)
-        flash, self._rise = warm(self.setup, section, contact.p, touching, measures, friction, velocity)
+        flash, self._rise = find_temperatures(self.setup, section, contact.p, touching, measures, friction, velocity)
         return flash
 
     def field(self, name: str) -> Array:

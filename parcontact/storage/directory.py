@@ -256,7 +256,7 @@ def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
 def refuse_other_jobs(directory: Path, claims: Mapping[str, Claim], data: Mapping[str, Any]) -> None:
     """Raise InputError if one of the claims of a directory is of another scene than the job `data`, as plain data."""
     for verb, claim in claims.items():
-        if found := marker.told(marker.differences(claim.job, data, SCENE)):
+        if found := marker.list_differences(marker.differences(claim.job, data, SCENE)):
             raise InputError(
                 f"the output directory {directory} holds {VERBS[verb]} of another job: {found}; "
                 f"{marker.keep_mesh(claim.job, found)}give --out for another directory"

@@ -97,7 +97,7 @@ def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence
                 yield f"{key} was {old.get(key)}, is {new.get(key)}"
 
 
-def told(differences: Iterator[str]) -> str:
+def list_differences(differences: Iterator[str]) -> str:
     """Return differences in one line: the first of them, and how many more there are."""
     first = list(islice(differences, SHOWN))
     more = sum(1 for _ in differences)

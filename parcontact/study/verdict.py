@@ -40,13 +40,13 @@ def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str
     sizes that belong to them. With steps that are chosen there is the mesh only."""
     usual = [case for case in outcomes if case.integrator == integrator]
     coarse, finest = ladders.cells[0], ladders.meshes[-1]
-    together = sorted((c for c in usual if _alike(c.cells_per_step, coarse)), key=lambda case: case.mesh)
+    together = sorted((c for c in usual if _is_same(c.cells_per_step, coarse)), key=lambda case: case.mesh)
     if coarse is None:
         return {CHOSEN: ([1.0 / c.mesh for c in together], together)} if len(together) > 1 else {}
     step = coarse / finest
     mesh = sorted((c for c in usual if math.isclose(c.time_step, step)), key=lambda case: case.mesh)
     time = sorted((c for c in usual if c.mesh == finest), key=lambda case: -case.time_step)
-    time = [case for case in time if any(_alike(case.cells_per_step, cells) for cells in ladders.cells)]
+    time = [case for case in time if any(_is_same(case.cells_per_step, cells) for cells in ladders.cells)]
     found = {
         TOGETHER: ([1.0 / c.mesh for c in together], together),
         "mesh alone": ([1.0 / c.mesh for c in mesh], mesh),
@@ -55,7 +55,7 @@ def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str
     return {name: pair for name, pair in found.items() if len(pair[1]) > 1}
 
 
-def _alike(one: float | None, other: float | None) -> bool:
+def _is_same(one: float | None, other: float | None) -> bool:
     """Tell whether cells per step are the same; None for steps that are chosen."""
     return one == other if one is None or other is None else math.isclose(one, other)
 

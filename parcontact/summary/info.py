@@ -154,9 +154,9 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     step, time = int(columns["step"][-1]), columns["time"][-1]
     ended = claim is not None and claim.finished is not None and claim.finished[0] == step
     how = "finished" if ended else "not finished"
-    came_off = claim.detached if ended and claim is not None else ""
-    if came_off:
-        yield f"  {came_off}"
+    detachment = claim.detached if ended and claim is not None else ""
+    if detachment:
+        yield f"  {detachment}"
     yield f"  run: {how} after step {step}, t = {quantity(time, 's', 4)}, {len(columns['step'])} rows"
     resolved = table.with_name(RESOLVED)
     job = shown_job(resolved) if resolved.exists() else None
@@ -168,7 +168,7 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
         box = job.grid.lx * job.grid.ly
         yield from (f"  {text}" for text in slide.describe_slide(job.history, job.initial, job.grid.dx, columns))
         yield from (
-            f"  {text}" for text in pull_off.describe_pull_off(columns, box, job.numerics.tolerance, bool(came_off))
+            f"  {text}" for text in pull_off.describe_pull_off(columns, box, job.numerics.tolerance, bool(detachment))
         )
     yield from (f"  {text}" for text in leak_stop.describe_leak_stop(table.parent))
 

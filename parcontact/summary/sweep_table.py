@@ -205,7 +205,7 @@ def state(case: Case) -> str:
     if not case.job.history:
         return "begun" if _points_lack(case.job.steady, columns) else "done"
     steps = [int(step) for step in columns["step"]]
-    timeline = Timeline.of(case.job).follow(dict(zip(steps, columns["time"], strict=True)))
+    timeline = Timeline.from_job(case.job).follow(dict(zip(steps, columns["time"], strict=True)))
     return "done" if steps and (steps[-1] >= len(timeline) or marker.detached(directory)) else "begun"
 
 

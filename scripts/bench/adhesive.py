@@ -11,8 +11,8 @@ from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve.adhesive.gap_iterate import GapOperators, GapSolution
+from parcontact.solve.adhesive.gap_solver import GapSolver
 from parcontact.solve.adhesive.law import EXPONENTIAL, Law
-from parcontact.solve.adhesive.solver import GapSolver
 from parcontact.solve.problem import Approach
 
 from .peers import ADHESION_COLD, TAMAAS_ADHESIVE, Task, compare_peers

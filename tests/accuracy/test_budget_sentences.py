@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from parcontact.accuracy.budget import ErrorBudget, ErrorSums, Parts, advice
+from parcontact.accuracy.budget import ErrorBudget, ErrorParts, ErrorSums, advice
 from parcontact.job import Job
 from parcontact.report import log
 from parcontact.steady_sliding.table import EarlierPoint, describe_missed
@@ -17,7 +17,7 @@ from parcontact.storage.step_row import StepRow
 
 def test_an_error_that_is_printed_like_its_limit_is_within_it() -> None:
     """Three digits are printed: 1.004 % of 1 % is no miss, 1.02 % is one."""
-    told = [advice(Parts(solver=error, time=0.0, folded=0.0, mesh=0.0), 0.01) for error in (0.01004, 0.0102)]
+    told = [advice(ErrorParts(solver=error, time=0.0, folded=0.0, mesh=0.0), 0.01) for error in (0.01004, 0.0102)]
     assert told[0] == "; within the 1 % that numerics.accuracy asks for"
     assert told[1] == "; more than the 1 % that numerics.accuracy asks for: try a smaller numerics.tolerance"
 
@@ -32,7 +32,7 @@ def test_a_curve_advises_the_key_that_was_given(numerics: dict[str, Any], key: s
         "steady": {"velocities": [1.0], "pressures": [1e4]},
         "numerics": {"accuracy": 0.05, **numerics},
     }
-    errors = ErrorBudget(None, Parts(solver=0.06, time=0.0, folded=0.0, mesh=0.01))
+    errors = ErrorBudget(None, ErrorParts(solver=0.06, time=0.0, folded=0.0, mesh=0.01))
     point: Any = SimpleNamespace(errors=errors, speed=1.0, pressure=1e4, temperature=math.nan)
     (told,) = describe_missed([point], Job.model_validate(data))
     assert told.endswith(f"try a smaller numerics.{key}")
@@ -49,7 +49,7 @@ def test_a_curve_that_goes_on_counts_earlier_points() -> None:
     }
     job, earlier = Job.model_validate(data), [EarlierPoint(Wanted(2.0, 1e4), (0.1, 0.2))]
     for solver, told in ((0.06, ["10 %, at 2 m/s", "7 % ("]), (0.01, ["10 %, at 2 m/s", "20 %, at 2 m/s"])):
-        errors = ErrorBudget(None, Parts(solver=solver, time=0.0, folded=0.0, mesh=0.01))
+        errors = ErrorBudget(None, ErrorParts(solver=solver, time=0.0, folded=0.0, mesh=0.01))
         point: Any = SimpleNamespace(errors=errors, speed=1.0, pressure=1e4, temperature=math.nan)
         of_friction, of_area = describe_missed([point], job, earlier)
         assert f"friction at 1 of {1 + 1} points: up to {told[0]}" in of_friction
@@ -60,7 +60,7 @@ def test_a_curve_that_goes_on_counts_earlier_points() -> None:
 def test_friction_of_which_most_may_be_error_is_unknown(mesh: float, stated: float, tmp_path: Path) -> None:
     """Of two of 120 random scenes it was six times as wrong as itself, where 0.76 was stated: 1 or more is, in tables,
     in facts and in sentences, from which reports read it; the area and the parts stay as they are."""
-    parts = Parts(solver=0.01, time=0.0, folded=0.0, mesh=mesh)
+    parts = ErrorParts(solver=0.01, time=0.0, folded=0.0, mesh=mesh)
     budget = ErrorBudget(parts, parts)
     assert StepRow(0, 0.0, 0.0, errors=budget).error_friction == pytest.approx(stated)
     assert StepRow(0, 0.0, 0.0, errors=budget).error_area == pytest.approx(0.01 + mesh)

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from sliding import rough, slide
 
 import parcontact as pc
-from parcontact.accuracy.budget import ErrorBudget, Parts
+from parcontact.accuracy.budget import ErrorBudget, ErrorParts
 from parcontact.accuracy.controller import CLOSE, FIRST, MOST, StepTolerance, tolerance_before
 from parcontact.accuracy.shares import AREA, FRICTION, SOLVER_MEDIAN
 from parcontact.history.timeline import Step
@@ -32,7 +32,7 @@ def quarter(**numerics: Any) -> dict[str, Any]:
     return {**job(**numerics), "grid": {"points": 64, "size": 5e-4}}
 
 
-def after(march: March, friction: Parts, area: Parts, so_far: StepTolerance | None = None) -> StepTolerance:
+def after(march: March, friction: ErrorParts, area: ErrorParts, so_far: StepTolerance | None = None) -> StepTolerance:
     """The memory after many steps with such errors."""
     memory = so_far or StepTolerance()
     for _ in range(60):
@@ -56,19 +56,19 @@ def test_what_friction_allows(rest: float, allowed: float) -> None:
     """A tenth of 1 %, or of the rest of the error where that is more. Errors go with the certificate."""
     march = begun(job(accuracy=1e-2))
     for error in (allowed / 11.5, allowed / 20.0, allowed / 23.0):  # at a certificate of a fifth of the tolerance
-        found = tolerance(march, after(march, Parts(error, rest, 0.0, 0.0), Parts(0.0, 0.0, 0.0, 0.0)))
+        found = tolerance(march, after(march, ErrorParts(error, rest, 0.0, 0.0), ErrorParts(0.0, 0.0, 0.0, 0.0)))
         assert found is not None
         assert abs(np.log2(found / (CERTIFICATE * allowed / error))) <= 0.2501  # the nearest power of the root of two
 
 
 def test_bounds() -> None:
     """Never smaller than the job's, nor more than so many times it, nor larger than what single steps bear."""
-    nothing, much = Parts(0.0, 0.0, 0.0, 0.0), Parts(1.0, 0.0, 0.0, 0.0)
+    nothing, much = ErrorParts(0.0, 0.0, 0.0, 0.0), ErrorParts(1.0, 0.0, 0.0, 0.0)
     for accuracy, highest in ((1e-3, MOST * 5e-4), (1e-2, MOST * 5e-3), (2e-2, 0.05), (0.5, 0.25)):
         march = begun(job(accuracy=accuracy))
         assert tolerance(march, after(march, nothing, nothing)) == pytest.approx(highest)
         assert tolerance(march, after(march, much, nothing)) == pytest.approx(0.5 * accuracy)
-        area = Parts(AREA.solver * SOLVER_MEDIAN * accuracy, 0.0, 0.0, 0.0)  # as much as allowed, with that certificate
+        area = ErrorParts(AREA.solver * SOLVER_MEDIAN * accuracy, 0.0, 0.0, 0.0)  # as much as allowed
         found = tolerance(march, after(march, nothing, area))
         assert found == pytest.approx(max(0.5 * accuracy, CERTIFICATE))
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import j1, spherical_jn
 
-from parcontact.accuracy.budget import Parts, estimate, estimate_steady
+from parcontact.accuracy.budget import ErrorParts, estimate, estimate_steady
 from parcontact.accuracy.observation import RunProperties, StepObservation, count_spots, radius_of
 from parcontact.accuracy.sources import lost_at_edges, lost_in_short_waves
 from parcontact.physics.measures import SIDE
@@ -22,7 +22,7 @@ KNOWN = replace(RUN, folded=0.0, prony=ONE, cell=(1e-6, 1e-6))
 MOVES = replace(SEEN, complementarity=1e-9, way=(1e-12, 0.0))
 
 
-def friction_of(run: RunProperties, seen: StepObservation, steady: bool = False) -> Parts:
+def friction_of(run: RunProperties, seen: StepObservation, steady: bool = False) -> ErrorParts:
     found = (estimate_steady if steady else estimate)(run, seen).friction
     assert found is not None
     return found

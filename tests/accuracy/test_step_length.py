@@ -49,8 +49,8 @@ def attempts(march: March, error: Errors, most: int = 1000) -> list[list[Step]]:
 
 def judged(step: Step, error: float) -> Step | MadeStep:
     """What its judge says of a step."""
-    assert step.judge is not None
-    return step.judge(error)
+    assert step.decide is not None
+    return step.decide(error)
 
 
 def made(march: March, error: Errors) -> list[Step]:

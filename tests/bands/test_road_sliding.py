@@ -293,7 +293,7 @@ def test_weights_of_a_ladder() -> None:
     rungs = ladder.rungs
     chance = np.random.default_rng(1)
     inside = np.asarray(rungs[0] * (rungs[-1] / rungs[0]) ** chance.random((20, 20)), np.float64)
-    weights, above = ladder.weigh(inside)
+    weights, above = ladder.weights_of_rungs(inside)
     assert above == 0.0
     assert weights @ rungs == pytest.approx(inside.mean(), rel=1e-14)
 
@@ -303,7 +303,7 @@ def test_weights_of_a_ladder() -> None:
 
     assert weights @ cubic(rungs) == pytest.approx(cubic(inside).mean(), rel=1e-12)
     beyond = np.array([[0.0, 0.1 * rungs[0], 2.0 * rungs[-1], rungs[3]]])
-    weights, above = ladder.weigh(beyond)
+    weights, above = ladder.weights_of_rungs(beyond)
     assert weights @ rungs == pytest.approx(beyond.mean(), rel=1e-14)
     level = 0.1 * cubic(rungs[:1]).sum() + 2.0 * cubic(rungs[-1:]).sum() + cubic(rungs[3:4]).sum()
     assert weights @ cubic(rungs) == pytest.approx(level / 4, rel=1e-12)

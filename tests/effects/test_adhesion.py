@@ -171,7 +171,7 @@ def ball(**changes: Any) -> Job:
     return job(**{"grid": grid, "surface": sphere, "adhesion": {"work": 0.05, "range": 5e-7}, **changes})
 
 
-def sticking(work: float, reach: float, law: str = "exponential") -> dict[str, Any]:
+def adhesive(work: float, reach: float, law: str = "exponential") -> dict[str, Any]:
     return {"adhesion": {"work": work, "range": reach, "law": law}}
 
 
@@ -181,9 +181,9 @@ TOUCHING = (2e-4) ** 2 / (2 * R)  # gap at the edge of the box [m]
 @pytest.mark.parametrize(
     ("changes", "without", "sentence"),
     [
-        (sticking(0.05, 0.505 * R), sticking(0.05, 0.495 * R), "more than its radius, 0.001 m"),
-        (sticking(0.05, TOUCHING / 4.59), sticking(0.05, TOUCHING / 4.62), "1 % of its attraction"),
-        (sticking(0.05, TOUCHING / 0.98, "dugdale"), sticking(0.05, TOUCHING / 0.995, "dugdale"), "of its attraction"),
+        (adhesive(0.05, 0.505 * R), adhesive(0.05, 0.495 * R), "more than its radius, 0.001 m"),
+        (adhesive(0.05, TOUCHING / 4.59), adhesive(0.05, TOUCHING / 4.62), "1 % of its attraction"),
+        (adhesive(0.05, TOUCHING / 0.98, "dugdale"), adhesive(0.05, TOUCHING / 0.995, "dugdale"), "of its attraction"),
     ],
 )
 def test_limits(changes: dict[str, Any], without: dict[str, Any], sentence: str) -> None:
@@ -202,7 +202,7 @@ def test_a_range_above_the_roughness() -> None:
     """From the lowest to the highest point of a wave is twice its amplitude."""
     for share, told in ((0.99, False), (1.01, True)):
         wave = {"shape": "wave", "amplitude": 1e-6, "waves": [4, 0]}
-        one = ball(surface=wave, grid={"points": 64, "size": 4e-4}, **sticking(0.05, 2e-6 * share))
+        one = ball(surface=wave, grid={"points": 64, "size": 4e-4}, **adhesive(0.05, 2e-6 * share))
         found = map(str, sanity.find_doubts(set_up(one, Slab.alone(64, 64))))
         assert any("more than the 2e-06 m from the lowest to the highest" in text for text in found) == told
 

@@ -65,7 +65,7 @@ def sliding(*history: Json, **changes: Any) -> Job:
 
 def scales_of(*history: Json, **changes: Any) -> TimeScales:
     job = sliding(*history, **changes)
-    return time_scales(Timeline.of(job), job.initial.state == "steady")
+    return time_scales(Timeline.from_job(job), job.initial.state == "steady")
 
 
 # -- from a job to its time scales -------------------------------------------------------------------------------------
@@ -201,7 +201,7 @@ def test_what_keeps_every_branch() -> None:
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_a_body_that_has_no_time_is_elastic(count: int) -> None:
-    instants = time_scales(Timeline.of(sliding(*[{"pressure": 1e5 * n} for n in range(1, count + 1)])), False)
+    instants = time_scales(Timeline.from_job(sliding(*[{"pressure": 1e5 * n} for n in range(1, count + 1)])), False)
     found = fold_branches(TYRE, instants, "exponential", 1e-3)
     assert (found.frozen, found.bound) == (tuple(range(12)), 0.0)
 
@@ -241,7 +241,7 @@ def test_bound_of_a_frozen_branch_where_contacts_keep_their_tracks(pressure: flo
     base = marches[1].scene.setup
     marches[1].scene.material = ZenerBody(base.slab, base.prony, "exponential", frozen=[1])
     marches[1].state = marches[1].state.after(material=marches[1].scene.material.at_rest())
-    timeline = list(Timeline.of(base.job))
+    timeline = list(Timeline.from_job(base.job))
     friction = [[march.advance(step).measures.friction for step in timeline] for march in marches]
     wrong = np.max(np.abs(np.diff(friction, axis=0))) / friction[0][-1]
     assert 0.01 < wrong / frozen_errors(base.prony, scales_of(slide))[1] < 1.0

@@ -301,7 +301,8 @@ def test_without_it_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("called without a thermal section")
 
     warm = marched(march_data())[0]
-    for place in ("effects.thermal.HeatMemory", "effects.thermal.depths_of", "steady_sliding.sliding.warm"):
+    places = "effects.thermal.HeatMemory", "effects.thermal.depths_of", "steady_sliding.sliding.find_temperatures"
+    for place in places:
         monkeypatch.setattr(f"parcontact.{place}", refuse)
     plain = marched(march_data(thermal=None))[0]
     assert states(job(thermal=None)).solve((SPEED, 0.0), PRESSURE).flash is None

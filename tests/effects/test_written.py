@@ -21,7 +21,7 @@ def run(tmp_path: Path) -> Callable[..., Path]:
 
     def go(name: str, **changes: Any) -> Path:
         output = {**changes.pop("output", {}), "directory": str(tmp_path / name)}
-        planned = job(history=[PRESS], output=output, **changes).of(Origin(tmp_path / "job.yaml"))
+        planned = job(history=[PRESS], output=output, **changes).with_origin(Origin(tmp_path / "job.yaml"))
         planned.path.write_text(planned.resolved())
         assert runner.run_job(planned, Slab.alone(NX, NY), Options(quiet=True)) == 0
         return tmp_path / name

@@ -44,7 +44,7 @@ def test_it_is_what_a_stage_does_that_says_nothing() -> None:
     silent, told, given = job(PRESS), job({**PRESS, "time_step": "auto"}), job({**PRESS, "time_step": 1e-3})
     assert silent == told
     assert "time_step: auto" in silent.resolved()
-    assert (Timeline.of(silent).chooses, Timeline.of(given).chooses) == (True, False)
+    assert (Timeline.from_job(silent).chooses, Timeline.from_job(given).chooses) == (True, False)
     assert job({"pressure": 1e4}).history[0].time_step is None
 
 
@@ -123,7 +123,7 @@ def test_an_elastic_body_needs_no_choice() -> None:
     assert not [name for name in march.entries() if name in ChosenSteps().numbers()]
     assert len(rows) == 1 + 1 + 11
     ramp = job({**PRESS, "pressure": {"from": 0.0, "to": 1e4}}, material={"model": "elastic", "shear_modulus": 1e6})
-    assert Timeline.of(ramp).count == 16
+    assert Timeline.from_job(ramp).count == 16
 
 
 def test_a_job_that_gives_its_steps_has_none_of_it() -> None:
@@ -131,7 +131,7 @@ def test_a_job_that_gives_its_steps_has_none_of_it() -> None:
     fixed = begun(job({**SLIDE, "cells_per_step": 1}))
     assert fixed.state.chosen is None
     for step in fixed.steps():
-        assert step.judge is None
+        assert step.decide is None
         fixed.advance(step)
     assert not any(name in fixed.entries() for name in ChosenSteps().numbers())
 
@@ -139,9 +139,9 @@ def test_a_job_that_gives_its_steps_has_none_of_it() -> None:
 def test_timeline_is_read_from_the_times_of_rows() -> None:
     march, rows = marched(data())
     times = {row.step: row.time for row in rows}
-    found = Timeline.of(job()).follow(times)
+    found = Timeline.from_job(job()).follow(times)
     assert [span.last for span in found.spans] == [span.last for span in march.timeline().spans]
-    partly = Timeline.of(job()).follow({n: t for n, t in times.items() if n < 8})
+    partly = Timeline.from_job(job()).follow({n: t for n, t in times.items() if n < 8})
     ends = partly.spans[0].ends
     assert isinstance(ends, ChosenEnds)
     assert len(ends.made) == 6
@@ -187,11 +187,11 @@ def test_creep_after_a_jump_while_hardly_sliding() -> None:
 def test_times_of_rows_long_after_the_start() -> None:
     """A stage ends where it should also where the instants have fewer digits than its steps."""
     late = job({**PRESS, "duration": 1e6}, {**SLIDE, "distance": 6 * CELL})
-    timeline = Timeline.of(late)
+    timeline = Timeline.from_job(late)
     assert timeline.chosen is not None
     timeline.chosen.ends = {0: [1e6], 1: [k * CELL / 0.1 for k in range(1, 7)]}
     times = {n: timeline[n].time for n in range(1, timeline.count + 1)}
-    found = Timeline.of(late).follow(times)
+    found = Timeline.from_job(late).follow(times)
     assert found.count == timeline.count == 8
 
 
@@ -238,7 +238,7 @@ def test_steps_do_not_depend_on_the_number_of_ranks(shared_path: Path, communica
 
 def test_going_on_beyond_the_end(tmp_path: Path) -> None:
     """The end of the history is hit, and then the instant asked for; the fields of both are there."""
-    end = Timeline.of(job()).end
+    end = Timeline.from_job(job()).end
     rows = run(tmp_path, MPI.COMM_SELF, "beyond", 1.5 * end)
     times = [float(row["time"]) for row in rows]
     assert times[-1] == pytest.approx(1.5 * end, rel=1e-12)
@@ -286,7 +286,7 @@ def test_a_timeline_of_so_many_steps(tmp_path: Path, way: str) -> None:
     text = with_stage(f"{{pressure: 1e5, {way}duration: {COUNT}.0, time_step: 1.0}}")
     job = job_of(tmp_path, text)
     began = time.process_time()
-    timeline = Timeline.of(job)
+    timeline = Timeline.from_job(job)
     assert timeline.count == COUNT + 1
     assert timeline[timeline.count].time == float(COUNT)
     assert timeline[timeline.count // 2].time == pytest.approx(COUNT / 2, rel=2e-8)
@@ -299,7 +299,7 @@ def test_the_first_step_between_cells_of_so_many(tmp_path: Path) -> None:
     """A drift of 1e-12 cells a step counts where it has come to 1e-6 cells, and not before."""
     cell = 1e-3 / 64
     stage = f"{{pressure: 1e5, velocity: {cell * (1 + 1e-12)!r}, duration: {COUNT}.0, time_step: 1.0}}"
-    timeline = Timeline.of(job_of(tmp_path, with_stage(stage)))
+    timeline = Timeline.from_job(job_of(tmp_path, with_stage(stage)))
     step = timeline.first_between_cells()
     assert step is not None
 
@@ -316,4 +316,4 @@ def test_more_steps_are_refused(tmp_path: Path) -> None:
         job_of(tmp_path, with_stage("{pressure: 1e5, duration: 2e8, time_step: 1.0}"))
     job = job_of(tmp_path, with_stage("{pressure: 1e5, velocity: 1, duration: 1e-3, time_step: 1e-6}"))
     with pytest.raises(InputError, match=r"the history would have 1e\+09 steps; it has at most 1e\+08"):
-        sanity.refuse_impossible(job, Timeline.of(job, 1e3))
+        sanity.refuse_impossible(job, Timeline.from_job(job, 1e3))

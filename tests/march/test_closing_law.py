@@ -67,7 +67,7 @@ def test_elastic_contact_with_the_closing_of_finer_waves(pressure: float) -> Non
     cascade, rungs, law = finer(coarse, 1.0, pressure)
     march, rows = march_with(law, heights_of(coarse), **press)
     assert rows[-1].certificate.worst <= 1e-3
-    weights, _ = PressureLadder(cascade.ladders[1].rungs).weigh(march.field("pressure"))
+    weights, _ = PressureLadder(cascade.ladders[1].rungs).weights_of_rungs(march.field("pressure"))
     touching = rungs[1, 0][0].approach - law.closings[1]  # of the finer waves alone
     area = float(weights @ [rung.contact_area for rung in rungs[1, 0]])
     assert area == pytest.approx(direct[-1].measures.contact_area, rel=0.04)

@@ -25,7 +25,7 @@ def job(*history: dict[str, Any], material: Any = ZENER, **changes: Any) -> dict
 def all_steps(data: dict[str, Any]) -> tuple[March, list[StepRow]]:
     """Without passing any over."""
     march, found = begun(data), list[StepRow]()
-    run_steps(march, [lambda now: found.append(now.row)], Timeline.of(march.scene.job))
+    run_steps(march, [lambda now: found.append(now.row)], Timeline.from_job(march.scene.job))
     return march, found
 
 
@@ -38,7 +38,7 @@ def test_an_elastic_body_is_solved_once() -> None:
     once, _ = marched(job(push, material=ELASTIC))
     calls = once.scene.slab.tally["operator"]
     march, found = marched(job(DWELL, {**DWELL, "pressure": 1e4}, material=ELASTIC))
-    steps = len(Timeline.of(march.scene.job))
+    steps = len(Timeline.from_job(march.scene.job))
     assert [row.step for row in found] == [0, 1, 1 + (steps - 1) // 2, steps]
     assert march.scene.slab.tally["operator"] == calls + 2
     assert [row.iterations for row in found[2:]] == [0, 0]
@@ -62,7 +62,7 @@ NEVER: list[tuple[str, dict[str, Any]]] = [
 def test_all_steps_are_made(why: str, data: dict[str, Any]) -> None:
     march, found = marched(data)
     assert [row.step for row in found] == list(range(len(found)))
-    assert len(found) == len(Timeline.of(march.scene.job)) + 1
+    assert len(found) == len(Timeline.from_job(march.scene.job)) + 1
 
 
 def test_nothing_is_asked_where_nothing_can_be_passed_over() -> None:
@@ -108,7 +108,7 @@ def test_restarts_bit_for_bit(bench: Bench) -> None:
 def test_until_stops_within_a_dwell(bench: Bench) -> None:
     """At the step that reaches it, as without passing over; then it goes on to the end."""
     data, out = dwelling(bench, output={"fields": []}), bench.where / "out"
-    timeline = Timeline.of(begun(data).scene.job)
+    timeline = Timeline.from_job(begun(data).scene.job)
     assert bench.run(data, out, until=0.06) == 0
     assert int(rows(out)[-1]["step"]) == timeline.first_reaching(0.06)
     assert bench.run(data, out) == 0
@@ -128,7 +128,7 @@ def test_a_checkpoint_is_not_passed_over(bench: Bench) -> None:
 def test_steps_are_decided_on_one_by_one() -> None:
     """When the last one was made. One that stands for others takes all their time; nothing is extrapolated to it."""
     march = begun(job(DWELL, material=ELASTIC))
-    timeline = Timeline.of(march.scene.job)
+    timeline = Timeline.from_job(march.scene.job)
     steps = march.steps(timeline)
     first = next(steps)
     assert first == timeline[1]

@@ -59,7 +59,7 @@ def test_parts_of_a_cell_start_from_a_whole_cell_ago(parts: int, ago: int) -> No
     modulus is that of the step before."""
     chosen = {"pressure": 1e4, "velocity": 0.1, "distance": 3 * CELL}
     march = begun(Job.model_validate({**SCENE, "history": [chosen]}))
-    given = Timeline.of(Job.model_validate({**SCENE, "history": [{**chosen, "cells_per_step": 1 / parts}]}))
+    given = Timeline.from_job(Job.model_validate({**SCENE, "history": [{**chosen, "cells_per_step": 1 / parts}]}))
     pressures = list[Array]()
     for step in itertools.islice(given, 8):
         start = start_of(march, step)

@@ -136,7 +136,7 @@ def test_to_save_a_run_does_not_change_it(tmp_path: Path, precision: str, integr
     for count in (1, 3):
         material = {"model": "zener", "modulus_inf": 1e6, "branches": branches[:count]}
         whole, saved = (begun(job(material, history, surface=wave, numerics=numerics)) for _ in range(2))
-        for step in Timeline.of(whole.scene.job):
+        for step in Timeline.from_job(whole.scene.job):
             whole.advance(step)
             saved.advance(step)
             written(saved, tmp_path / "step.h5")

@@ -159,7 +159,7 @@ def test_a_failed_step_leaves_no_trace(material: dict[str, Any], boundary: str) 
         assert np.array_equal(march.field(name), old)
     march.scene.solver.max_iterations = 500
     job = march.scene.job
-    run_steps(march, [], islice(Timeline.of(job), 7, None))
+    run_steps(march, [], islice(Timeline.from_job(job), 7, None))
     for name in ("pressure", "displacement", "gap"):
         assert np.array_equal(march.field(name), smooth.field(name))
     assert march.row.dissipated == smooth.row.dissipated
@@ -297,15 +297,15 @@ def test_a_step_that_is_made_anew_leaves_nothing() -> None:
     for step in itertools.islice(tried.steps(), 12):
         attempts = [step]
 
-        def judge(error: float, front: float, begins: bool) -> Step | MadeStep:
-            verdict = attempts[-1].judge(error)  # type: ignore[misc]  # noqa: B023  # it is called in this turn only
+        def decide(error: float, front: float, begins: bool) -> Step | MadeStep:
+            verdict = attempts[-1].decide(error)  # type: ignore[misc]  # noqa: B023  # it is called in this turn only
             if not isinstance(verdict, Step):
                 return verdict
             attempts.append(verdict)  # noqa: B023
-            return verdict._replace(judge=judge)
+            return verdict._replace(decide=decide)
 
-        tried.advance(step._replace(judge=judge) if step.judge else step)
-        made.append(attempts[-1]._replace(judge=None))
+        tried.advance(step._replace(decide=decide) if step.decide else step)
+        made.append(attempts[-1]._replace(decide=None))
         rejected += len(attempts) - 1
     for step in made:
         told.advance(step)

@@ -281,7 +281,7 @@ def test_heat_that_stays() -> None:
     the first steps, where what only the present makes has this error, to 1e-5 later; the mean to 1e-7."""
     made, time = memory(), 0.0
     heat, rise = wave(made), made.fft.slab.empty()
-    made.take(heat, heat, (1.0, 1.0))
+    made.set_heating(heat, heat, (1.0, 1.0))
     for number, dt in enumerate([1e-5] * 5 + [1e-3] * 5 + [1e-1] * 3):
         pressed = made.fft.forward(heat).copy()
         made.advance(dt, Heating((3.0, 3.0)), heat, pressed, (1.0, 1.0), rise)
@@ -307,7 +307,7 @@ def test_heat_that_slides_becomes_steady() -> None:
     ):
         made = memory(dt, MPI.COMM_SELF, fast)
         rise = made.fft.slab.empty()
-        made.take(wave(made), wave(made), (1.0, 1.0))
+        made.set_heating(wave(made), wave(made), (1.0, 1.0))
         for step in range(1, 2001):
             heat = wave(made, turn * step)
             made.advance(dt, heating, heat, made.fft.forward(heat).copy(), (1.0, 1.0), rise)

@@ -167,9 +167,9 @@ def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
     assert tried is not None
     assert max(tried.grid.points) <= 1024
     assert tried.grid.size == large.grid.size
-    assert len(Timeline.of(tried)) < len(Timeline.of(large))
+    assert len(Timeline.from_job(tried)) < len(Timeline.from_job(large))
     seen = Sample(tried, 1, 0.0, 1.0, 0.0, 0, (alike(9, {"seconds": 1.0}),))
-    assert costs_of(large, seen, 1e9).sample.steps == len(Timeline.of(large))
+    assert costs_of(large, seen, 1e9).sample.steps == len(Timeline.from_job(large))
     ratio = costs_of(large, seen, 1e9).step / costs_of(tried, seen, 1e9).step
     assert ratio > large.grid.nx**2 / tried.grid.nx**2
     assert choose_grid(job(), 1, 10.0) == job()

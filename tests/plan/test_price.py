@@ -43,7 +43,7 @@ def job(**changes: Any) -> Job:
 def costs(planned: Job, time: float = 0.0, mesh: float = 0.0, of: str = "friction", calls: float = 10.0) -> Costs:
     """As if a trial of all steps had seen such errors; a step takes 1 s and some calls."""
     stages = []
-    for span in Timeline.of(planned).spans:
+    for span in Timeline.from_job(planned).spans:
         n = span.jumps + span.count
         sums = {"seconds": 1.0, "operator": calls, f"{of} weight": 1.0, f"{of} time error": time}
         stages.append(alike(n, {**sums, f"{of} mesh error": mesh}))
@@ -117,7 +117,7 @@ def test_chosen_steps_make_what_they_are_chosen_for() -> None:
     chosen = {key: value for key, value in SLIDE.items() if key != "cells_per_step"}
     planned = job(grid={"points": 240, "size": 1e-3}, history=[chosen])
     seen = costs(planned, time=FRICTION.time * price.CHOSEN * TIME_MEDIAN * 0.01)
-    lasting = Timeline.of(planned).spans[0].count
+    lasting = Timeline.from_job(planned).spans[0].count
     for accuracy, times in ((0.01, 1.0), (1e-3, 10 ** (1 / PASSING.order))):
         assert price.offer(seen, accuracy).sample.steps == pytest.approx(1 + lasting * times, abs=1.0)
 

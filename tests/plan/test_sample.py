@@ -47,7 +47,7 @@ def test_rest_that_is_cut_short_is_known() -> None:
     dwell = {"pressure": 1e4, "duration": 1.0, "time_step": {"first": 1e-5, "growth": 1.2}}
     planned = job(material=material, history=[dwell, CELLS])
     _, rows = marched(planned)
-    assert len(rows) < len(Timeline.of(planned))
+    assert len(rows) < len(Timeline.from_job(planned))
     assert sample(planned, Slab.alone(*planned.grid.points), 1e6).steps == len(rows) - 1
 
 

@@ -157,7 +157,7 @@ def test_waves_that_are_taken_out_are_reported(road: Path) -> None:
     """By 50 µm of a road with waves down to 40 µm: a ring of its spectrum is missing, and the report says so."""
     (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=", short_wavelength: 50.0e-6"))
     setup = scene.set_up(jobs.load(road / "job.yaml"), Slab.alone(POINTS, POINTS))
-    assert setup.told.notes[-1] == "road: waves shorter than 50 µm were taken out (ideal low-pass)"
+    assert setup.remarks.notes[-1] == "road: waves shorter than 50 µm were taken out (ideal low-pass)"
     found = heights_of(road, MPI.COMM_SELF, more=", short_wavelength: 50.0e-6")
     q = 2 * np.pi * np.fft.fftfreq(POINTS, LENGTH / POINTS)
     power = np.abs(np.fft.fft2(found)) ** 2
@@ -184,7 +184,7 @@ def test_sizes_that_are_doubted(road: Path, more: str, doubt: str) -> None:
         "size: {size}", "size: from surface"
     )
     (road / "job.yaml").write_text(text.format(points=POINTS, more=", outliers: clip"))
-    found = scene.set_up(mesh.load(road / "job.yaml"), Slab.alone(POINTS, POINTS)).told.doubts
+    found = scene.set_up(mesh.load(road / "job.yaml"), Slab.alone(POINTS, POINTS)).remarks.doubts
     assert bool(found) == bool(doubt)
     assert not doubt or any(doubt in str(each) and str(each).startswith("surface: road.npy: ") for each in found)
 
@@ -195,8 +195,8 @@ def test_clipped_outliers_are_no_doubt(road: Path) -> None:
     np.save(road / "road.npy", heights * 1e6)
     (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=", outliers: clip"))
     setup = scene.set_up(jobs.load(road / "job.yaml"), Slab.alone(POINTS, POINTS))
-    assert setup.told.doubts == []
-    assert "road: 1 points that stuck out were set to the median of their neighbours" in setup.told.notes
+    assert setup.remarks.doubts == []
+    assert "road: 1 points that stuck out were set to the median of their neighbours" in setup.remarks.notes
 
 
 def test_bands_have_no_direction() -> None:

@@ -98,7 +98,7 @@ def test_profiles_become_directions(tmp_path: Path) -> None:
     q = np.geomspace(2e3, 1e6, 60)
     part = load(tmp_path, table("q[1/m],C1D[m^3]", q, c1(q))).surface[0]
     assert isinstance(part, jobs.RoughSpectrum)
-    found, ends = spectrum.of(part)
+    found, ends = spectrum.read_spectrum(part)
     assert found(q) / (4 * np.pi**2) == pytest.approx(c2(q), rel=0.011, abs=0.0)
     assert ends == pytest.approx((2 * np.pi / 2e3, 2 * np.pi / 1e6))
 
@@ -122,7 +122,7 @@ def test_units_are_those_of_the_columns(tmp_path: Path) -> None:
     other = load(tmp_path / "other", table("q[1/um];C2D[nm^4]", 1e-6 * Q, 1e36 * c2(Q))).surface[0]
     assert isinstance(plain, jobs.RoughSpectrum)
     assert isinstance(other, jobs.RoughSpectrum)
-    assert spectrum.of(other)[0](Q) == pytest.approx(spectrum.of(plain)[0](Q), rel=1e-12, abs=0.0)
+    assert spectrum.read_spectrum(other)[0](Q) == pytest.approx(spectrum.read_spectrum(plain)[0](Q), rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize(("kind", "factor"), [("C1D[m^3]", np.pi), ("C2D[m^4]", 4 * np.pi**2)])
@@ -131,10 +131,10 @@ def test_spectra_in_the_normalisation_of_surface_topography(tmp_path: Path, kind
     own = {"C1D[m^3]": c1, "C2D[m^4]": c2}[kind](Q)
     plain = load(tmp_path, table(f"q[1/m] {kind}", Q, own)).surface[0]
     assert isinstance(plain, jobs.RoughSpectrum)
-    expected = spectrum.of(plain)[0](Q)
+    expected = spectrum.read_spectrum(plain)[0](Q)
     theirs = load(tmp_path, table(f"q[1/m] {kind}", Q, factor * own), ", normalisation: surface_topography").surface[0]
     assert isinstance(theirs, jobs.RoughSpectrum)
-    assert spectrum.of(theirs)[0](Q) == pytest.approx(expected, rel=1e-12, abs=0.0)
+    assert spectrum.read_spectrum(theirs)[0](Q) == pytest.approx(expected, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("kind", ["C1D[m^3]", "C2D[m^4]"])
@@ -242,7 +242,7 @@ def test_theory_of_a_measured_spectrum(tmp_path: Path) -> None:
     amplitude, kx, ky = rings.waves
     power = np.abs(amplitude) ** 2 / 2
     q = np.geomspace(Q[0], Q[-1], 20001)
-    density = spectrum.of(part)[0](q) / (4 * np.pi**2)
+    density = spectrum.read_spectrum(part)[0](q) / (4 * np.pi**2)
     for weight, own in ((1.0, power), (q**2, power * (kx**2 + ky**2))):
         assert own.sum() == pytest.approx(
             np.trapezoid(2 * np.pi * q**2 * weight * density, np.log(q)), rel=1e-3, abs=0.0

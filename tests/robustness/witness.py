@@ -69,7 +69,7 @@ class Witness:
     def see(self) -> "Witness":
         """To the end; collective."""
         job = self.march.scene.job
-        timeline = Timeline.of(job)
+        timeline = Timeline.from_job(job)
         try:
             run_steps(self.march, [lambda march: self._note(timeline, march.row)])
         except RunError as error:

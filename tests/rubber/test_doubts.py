@@ -12,7 +12,7 @@ from parcontact.errors import InputError
 from parcontact.job import Flat, Job, Rough, Sphere, Wave
 from parcontact.rubber import compound, measured_moduli, sane
 from parcontact.rubber.series import Weigh
-from parcontact.rubber.shift import WLF, Factors, given
+from parcontact.rubber.shift import WLF, Factors, read_shift
 from parcontact.scene.measured_range import doubt_band, wave_numbers
 
 from . import measured
@@ -168,13 +168,13 @@ def test_tables_that_no_fit_meets(tmp_path: Path, columns: list[np.ndarray], sen
 def test_shift_factors_as_pyvisco_writes_them(tmp_path: Path) -> None:
     path = tmp_path / "factors.csv"
     path.write_text("T,log_aT\nC, -\n40,-1\n20,0\n0,2\n", encoding="utf-8-sig")
-    assert given(str(path), None) == Factors((0.0, 20.0, 40.0), (2.0, 0.0, -1.0), 20.0)
+    assert read_shift(str(path), None) == Factors((0.0, 20.0, 40.0), (2.0, 0.0, -1.0), 20.0)
 
 
 @pytest.mark.parametrize("text", ["arrhenius:1e9", "arrhenius:-5", "wlf:-8,100", "wlf:8,1e5"])
 def test_constants_that_no_rubber_has(text: str) -> None:
     with pytest.raises(InputError, match=r"must be (0.001 to 10000|1000 to 1e\+07)"):
-        given(text, 20.0)
+        read_shift(text, 20.0)
 
 
 # -- the measured range ------------------------------------------------------------------------------------------------

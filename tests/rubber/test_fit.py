@@ -13,7 +13,7 @@ from parcontact.errors import InputError
 from parcontact.plotting import compound_files as pictures
 from parcontact.rubber import compound
 from parcontact.rubber.series import PronySeries, Weigh
-from parcontact.rubber.shift import WLF, Arrhenius, Factors, given
+from parcontact.rubber.shift import WLF, Arrhenius, Factors, read_shift
 
 from . import measured
 from .bodies import BROAD, DENSE, STEEP, TEN, Body, branches, noisy, write
@@ -91,12 +91,12 @@ def test_the_picture_shows_what_was_measured(
 
 
 def test_laws_given(tmp_path: Path) -> None:
-    assert given("wlf", None) == "wlf"
-    assert given("wlf:8.86,101.6", 20.0) == WLF(8.86, 101.6, 20.0)
-    assert given("arrhenius:1.2e5", 20.0) == Arrhenius(1.2e5, 20.0)
+    assert read_shift("wlf", None) == "wlf"
+    assert read_shift("wlf:8.86,101.6", 20.0) == WLF(8.86, 101.6, 20.0)
+    assert read_shift("arrhenius:1.2e5", 20.0) == Arrhenius(1.2e5, 20.0)
     path = tmp_path / "factors.csv"
     path.write_text("T[C],log_aT\n# of a laboratory\n40,-1\n20, 0\n0,2\n")
-    assert given(str(path), None) == Factors((0.0, 20.0, 40.0), (2.0, 0.0, -1.0), 20.0)
+    assert read_shift(str(path), None) == Factors((0.0, 20.0, 40.0), (2.0, 0.0, -1.0), 20.0)
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_laws_that_will_not_do(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "factors.csv").write_text(content)
     with pytest.raises(InputError) as failure:
-        given(text, reference)
+        read_shift(text, reference)
     assert sentence in str(failure.value)
 
 

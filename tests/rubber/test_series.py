@@ -12,7 +12,7 @@ from parcontact import job as jobs
 from parcontact.errors import InputError
 from parcontact.job.checks.meaning import modulus_after
 from parcontact.rubber import compound, measured_moduli, series, superposition
-from parcontact.rubber.shift import WLF, Arrhenius, Density, Factors, given, log_vertical
+from parcontact.rubber.shift import WLF, Arrhenius, Density, Factors, log_vertical, read_shift
 
 from . import measured
 from .bodies import Array, branches, noisy, write
@@ -376,7 +376,7 @@ def test_tables_of_both_shifts(tmp_path: Path, text: str) -> None:
     path.write_text(text, encoding="latin-1")
     temperatures, vertical = (-40.0, 20.0, 60.0), (-0.1, 0.0, 0.05)
     expected = Factors(temperatures, (3.0, 0.0, -1.7), 20.0, Factors(temperatures, vertical, 20.0))
-    assert given(str(path), None) == expected
+    assert read_shift(str(path), None) == expected
 
 
 def test_a_table_of_both_shifts_in_a_fit(tmp_path: Path) -> None:
@@ -384,7 +384,7 @@ def test_a_table_of_both_shifts_in_a_fit(tmp_path: Path) -> None:
     a = [-C1 * (t - REFERENCE) / (C2 + t - REFERENCE) for t in TEMPERATURES]
     b = [np.log10(density_factor(t)) for t in TEMPERATURES]
     shifts = write(tmp_path / "shifts.txt", "T[C] log_aT log_bT", TEMPERATURES, np.array(a), np.array(b))
-    law = given(str(shifts), None)
+    law = read_shift(str(shifts), None)
     path = sweeps(tmp_path / "table.txt", "density")
     made = compound.fitted(path, 0.5, None, law, 0.02)
     assert made.shift == law

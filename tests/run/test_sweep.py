@@ -396,19 +396,19 @@ def test_a_stop_file_ends_the_case_that_runs(tmp_path: Path, monkeypatch: pytest
     """It saves, and the same command goes on with it."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "job.yaml").write_text(JOB)
-    judge = watch.Watch.judge
+    decide = watch.Watch.decide
 
     def ask(self: watch.Watch, step: int, *others: Any) -> watch.Verdict:
         if step == 4:
             Path("out/job/stop").touch()
-        return judge(self, step, *others)
+        return decide(self, step, *others)
 
     monkeypatch.setattr(watch, "LOOK_SECONDS", -1.0)
-    monkeypatch.setattr(watch.Watch, "judge", ask)
+    monkeypatch.setattr(watch.Watch, "decide", ask)
     assert main(["job.yaml", "--quiet"]) == 3
     assert [row["state"] for row in table()] == ["begun", *"-----"]
     assert Path("out/job/stop").exists()  # and stops no later program
-    monkeypatch.setattr(watch.Watch, "judge", judge)
+    monkeypatch.setattr(watch.Watch, "decide", decide)
     assert main(["job.yaml", "--quiet"]) == 0
     assert "stopped after step 4 of" in Path("out/job/cases/000/run.log").read_text()
     assert {row["state"] for row in table()} == {"done"}

@@ -5,13 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from closed_forms import adhesion, viscoelastic_adhesion
-from marching import begun, column, marched
-from mpi4py import MPI
-from numpy.testing import assert_allclose
-from numpy.typing import NDArray
-from scipy.integrate import simpson
-from sticking import (
+from adhesive_jobs import (
     ELASTIC,
     FORCE,
     LENGTH,
@@ -31,6 +25,12 @@ from sticking import (
     steps,
     zone,
 )
+from closed_forms import adhesion, viscoelastic_adhesion
+from marching import begun, column, marched
+from mpi4py import MPI
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+from scipy.integrate import simpson
 
 import parcontact as pc
 from parcontact.python.row import Row

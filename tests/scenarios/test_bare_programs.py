@@ -53,7 +53,7 @@ def lasting(planned: Job) -> Counter[str]:
     probe = Probe(slab, base.surface, base.units)
     earlier, last, p = (slab.zeros() for _ in range(3))
     moduli, cells = [0.0, 0.0], 0
-    for step in Timeline.of(planned):
+    for step in Timeline.from_job(planned):
         heights = path.at(step.position)
         trial = body.begin(held, step.dt, heights, step.growth)
         alpha = trial.alpha

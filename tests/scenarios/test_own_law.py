@@ -43,13 +43,13 @@ class InFluid:
     def touches(self, p: Array) -> Mask:
         return p > self.fluid
 
-    def weigh(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
+    def contact_sums(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
         load, gap = p - self.fluid, u - h - d
         sums = float(p.sum()), float((p * u).sum()), float((p * gap).sum()), float((p * u**2).sum())
         return *sums, float(load.sum()), float((load * gap).sum())
 
-    def mark(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
-        return self.dry.mark(p - self.fluid, u, h, d, working)
+    def mark_working_set(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
+        return self.dry.mark_working_set(p - self.fluid, u, h, d, working)
 
     def advance(self, p_old: Array, t: Array, step: float, p: Array, cells: Cells, sums: Array) -> tuple[float, float]:
         load, cut = self.dry.advance(p_old - self.fluid, t, step, p, cells, sums)

@@ -143,7 +143,7 @@ def test_no_certificate(wrong: float, place: int) -> None:
 def test_heights_that_are_not_finite(wrong: float) -> None:
     """Whatever the solver makes of them: no row, and the state is as it was."""
     march = begun(JOB)
-    first, second = islice(Timeline.of(march.scene.job), 2)
+    first, second = islice(Timeline.from_job(march.scene.job), 2)
     march.advance(first)
     before, pressure = march.row, march.field("pressure")
     motion: Any = march.scene.motion

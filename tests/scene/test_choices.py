@@ -246,7 +246,7 @@ def test_displacement_control() -> None:
     assert row(planned, "displacement control").on
     assert not row(job(), "displacement control").on
     march = begun(planned)
-    march.advance(next(iter(Timeline.of(planned))))
+    march.advance(next(iter(Timeline.from_job(planned))))
     solver, slab = march.scene.solver, march.scene.slab
     spent = slab.tally["allreduce"]
     heights = march.scene.motion.at((0.0, 0.0)).base

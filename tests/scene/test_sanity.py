@@ -262,12 +262,12 @@ def test_what_no_machine_here_can_hold_is_refused(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(size_advice, "_memory", lambda: 64e9)
     large = job_of(WAVE, [PRESS], grid={"points": 200_000, "size": 1e-3})
     with pytest.raises(InputError, match=r"need at least 2\.88e\+03 GB of memory"):
-        sanity.refuse_impossible(large, Timeline.of(large))
+        sanity.refuse_impossible(large, Timeline.from_job(large))
     monkeypatch.setenv("SLURM_JOB_NUM_NODES", "64")
-    sanity.refuse_impossible(large, Timeline.of(large))
+    sanity.refuse_impossible(large, Timeline.from_job(large))
     long = job_of(WAVE, [{**PRESS, "duration": 9e4, "time_step": 1e-3}], output={"fields": ["gap"], "every": 64})
     with pytest.raises(InputError, match=r"1\.406e\+06 instants of fields .* use every: 91 or more"):
-        sanity.refuse_impossible(long, Timeline.of(long))
+        sanity.refuse_impossible(long, Timeline.from_job(long))
 
 
 def test_approaches_beyond_full_contact_are_told_with_their_places(tmp_path: Path) -> None:

@@ -43,7 +43,7 @@ def test_nothing_hides_a_nan(dtype: type[np.floating]) -> None:
 def test_no_load_is_held_at_a_bound(dtype: type[np.floating]) -> None:
     """Any pressure above 0 may change; one of another load is that times a factor."""
     maps = Maps((5, 32), dtype)
-    assert NonNegative().mark(maps.p, maps.u, maps.h, 0.25, maps.working)[3] == 0.0
+    assert NonNegative().mark_working_set(maps.p, maps.u, maps.h, 0.25, maps.working)[3] == 0.0
     before = maps.wide("p").copy()
     NonNegative().rescale_to_load(Slab.alone(32, 5), maps.p, float(before.sum()), 3.0)
     assert maps.close(3.0, maps.wide("p"))
@@ -54,7 +54,7 @@ def test_no_load_is_held_at_a_bound(dtype: type[np.floating]) -> None:
 def test_mark(shape: tuple[int, int], dtype: type[np.floating]) -> None:
     maps = Maps(shape, dtype)
     working = np.ones(shape, dtype=np.bool_)
-    wrong, count, gaps, deepest = constraint.mark(maps.p, maps.u, maps.h, 0.25, working)
+    wrong, count, gaps, deepest = constraint.mark_working_set(maps.p, maps.u, maps.h, 0.25, working)
     p, gap = maps.wide("p"), maps.wide("u") - maps.wide("h") - 0.25
     assert np.array_equal(working, (p > 0) | (gap < 0))
     assert maps.close(wrong, p * np.abs(gap))
@@ -120,7 +120,7 @@ def test_nothing_hides_a_nan_constraint(dtype: type[np.floating]) -> None:
     for name in ("p", "u", "h"):
         maps = Maps((5, 32), dtype)
         getattr(maps, name)[2, 3] = np.nan
-        assert np.isnan(constraint.mark(maps.p, maps.u, maps.h, 0.0, maps.working)[0])
+        assert np.isnan(constraint.mark_working_set(maps.p, maps.u, maps.h, 0.0, maps.working)[0])
     maps = Maps((5, 32), dtype)
     maps.t[2, 3] = np.nan
     assert np.isnan(constraint.clip(maps.t))

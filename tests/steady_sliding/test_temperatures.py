@@ -54,7 +54,7 @@ def test_friction_of_a_wave_at_each_temperature(tmp_path: Path) -> None:
     sliding = solver(tmp_path, WAVE)
     wave = (np.array([5.0e-7]), np.array([2 * np.pi / 2.5e-4]), np.array([0.0]))
     for temperature in (-5.0, 20.0, 60.0, -5.0):
-        sliding.heat(temperature)
+        sliding.set_temperature(temperature)
         point = sliding.solve((0.03, 0.0), 2.0e5)
         law = (2.75e5, np.array([2.475e6, 1.0e6]), factor(temperature) * np.array([1.0e-3, 2.0e-2]))
         exact = float(full_contact.friction_coefficient(2.0e5, *wave, 0.03, 0.0, *law))
@@ -69,7 +69,7 @@ def test_partial_contact_depends_on_the_reduced_velocity_alone(tmp_path: Path) -
     """
     text = ROUGH + PARTS
     warm, reference = solver(tmp_path, text), solver(tmp_path, text)
-    warm.heat(24.0)
+    warm.set_temperature(24.0)
     one, other = warm.solve((0.5, 0.0), 2.0e4), reference.solve((factor(24.0) * 0.5, 0.0), 2.0e4)
     assert 0.0 < one.measures.contact_area < 1.0
     assert one.measures.friction == pytest.approx(other.measures.friction, rel=1e-10)
@@ -81,7 +81,7 @@ def test_bell_of_an_interface_is_shifted_like_the_bulk(tmp_path: Path) -> None:
     """With an interface too; what of friction is its own has columns in the table."""
     bell = ROUGH + PARTS + "interface: {shear_stress: 2.0e5, velocity: 0.1, width: 1.5}\n"
     warm, reference = solver(tmp_path, bell), solver(tmp_path, bell)
-    warm.heat(33.0)
+    warm.set_temperature(33.0)
     one, other = warm.solve((0.5, 0.0), 1.0e5), reference.solve((factor(33.0) * 0.5, 0.0), 1.0e5)
     assert one.measures.friction_interface > 0.0
     assert one.measures.friction == pytest.approx(other.measures.friction, rel=1e-10)

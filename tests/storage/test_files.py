@@ -173,7 +173,10 @@ def test_differences_of_jobs() -> None:
 def test_many_differences_are_counted() -> None:
     """Another rubber with many branches differs in many keys."""
     branches = marker.differences({"k": dict.fromkeys("abcdef", 1)}, {"k": dict.fromkeys("abcdef", 2)}, ("k",))
-    assert marker.told(branches) == "k.a was 1, is 2; k.b was 1, is 2; k.c was 1, is 2; k.d was 1, is 2; and 2 more"
+    assert (
+        marker.list_differences(branches)
+        == "k.a was 1, is 2; k.b was 1, is 2; k.c was 1, is 2; k.d was 1, is 2; and 2 more"
+    )
 
 
 # -- fFTW's wisdom is kept for runs with the same transforms, where nobody else can have put it -----------------------

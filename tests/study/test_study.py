@@ -302,10 +302,10 @@ def test_steps_of_all_kinds_change_alike(path: Path, mesh: int, cells: float, fa
     changed = load_job(path, overrides(job, found.own, case))
     assert changed.grid.points == (mesh, mesh // 2)
     assert (changed.numerics.integrator, changed.numerics.tolerance) == ("backward-euler", 5e-3)
-    before, after = ([span.count for span in Timeline.of(one).spans] for one in (job, changed))
+    before, after = ([span.count for span in Timeline.from_job(one).spans] for one in (job, changed))
     assert after[1:] == [round(count / factor) for count in before[1:]]
     assert abs(after[0] - before[0] / factor) <= 2
-    assert Timeline.of(changed).end == pytest.approx(Timeline.of(job).end, rel=1e-12)
+    assert Timeline.from_job(changed).end == pytest.approx(Timeline.from_job(job).end, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -357,7 +357,7 @@ def test_a_ladder_takes_the_place_of_chosen_steps(path: Path) -> None:
     job, found = chosen(path, "{cells_per_step: [4, 2, 1]}")
     jobs = [load_job(path, overrides(job, found.own, case)) for case in found.combine()]
     assert [case.steps for case in found.combine()] == ["4 cells per step", "2 cells per step", "1 cell per step"]
-    assert [Timeline.of(one).spans[2].count for one in jobs] == [2, 4, 8]
+    assert [Timeline.from_job(one).spans[2].count for one in jobs] == [2, 4, 8]
     assert all(one.history[0].chooses for one in jobs)
     (line,) = describe_choices(job)
     assert line == "stage 1: time steps at rest are chosen in every case, they have no cells per step"

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from .fault import quote, shorten
 from .places import UNREADABLE, Key, Place, Source
 from .python_data import source_of
-from .sweep_cases import SWEEP, Setting, Sweep, refuse_overrides, take
+from .sweep_cases import SWEEP, Setting, Sweep, refuse_overrides, take_sweep
 from .yamltext import parse, read_source, read_with_content
 
 MATERIAL: Key = ("material",)
@@ -50,7 +50,7 @@ def read_job(path: Path, changes: Changes, case: int = 0, given: Source | None =
     for override in overrides:
         if override.path[:1] == SWEEP:
             _apply(source, override)
-    sweep = take(source)
+    sweep = take_sweep(source)
     overrides = [override for override in overrides if override.path[:1] != SWEEP]
     if sweep is None:
         source.data = UNREADABLE

@@ -55,7 +55,7 @@ class Sweep:
         return tuple(itertools.chain(*moves))
 
 
-def take(source: Source) -> Sweep | None:
+def take_sweep(source: Source) -> Sweep | None:
     """Take the sweep out of a job; None if it has mistakes, which `source` then holds."""
     data = source.data if isinstance(source.data, dict) else {}
     section, place = data.get("sweep"), source.locate(SWEEP).place

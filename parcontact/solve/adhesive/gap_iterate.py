@@ -7,7 +7,7 @@ from typing import NamedTuple
 from ...parallel.slab import Array, Slab
 from ..certificate import Certificate
 from ..iterate import LEAST_SHARE
-from ..preconditioner.cell_sums import Compliance
+from ..preconditioner.multilevel_inverse import Compliance
 from ..problem import Control, Operator
 from . import gap_kernels
 from .law import Law
@@ -83,7 +83,7 @@ def certify_gap(slab: Slab, it: GapIterate, working: Array, g: Array, q: Array, 
     of the load are pressures that are not those of the law: their magnitudes, of which waves of a few points hardly
     move the gap, count twice, and their sum five times.
     """
-    *sums, spurious, net = slab.sum(*gap_kernels.judge(working, g, it.heights, q, it.m, sigma, z))
+    *sums, spurious, net = slab.sum(*gap_kernels.certificate_sums(working, g, it.heights, q, it.m, sigma, z))
     load, first, second, wrong = sums
     least = LEAST_TRACTION * it.law.strength
     spread, mean = 0.0, 0.0

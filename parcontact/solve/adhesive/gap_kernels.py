@@ -59,7 +59,7 @@ def pressure_residual(g, q, sigma, mean, working, c):
 
 
 @loop
-def judge(working, g, h, q, mean, sigma, z):
+def certificate_sums(working, g, h, q, mean, sigma, z):
     """With `p = q + mean` and `c = p + sigma` on the working set: sums of the weights `|p| + |c|`, of these times u and
     u^2, with `u = g + h`, and over the set times |z|; and over the set of |c| and of c."""
     load, first, second, wrong, spurious, net = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

@@ -32,7 +32,7 @@ def solve(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
     Iterations are those of the linear problems.
     """
     search = _Search(solver, problem, start)
-    contact, iterations = solver.judge(problem, start, ""), 0
+    contact, iterations = solver.check(problem, start, ""), 0
     search.begin(contact)
     for count in range(1, MAX_SETS + 1):
         iterations += search.solve_on_set(contact.u, GAP_SHARE * solver.tolerance * contact.certificate.length)
@@ -40,7 +40,7 @@ def solve(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
         problem.constraint.clip(start)
         limit = ITERATIONS_RATIO * solver.max_iterations
         spent = f" in {ITERATIONS_RATIO} times max_iterations = {limit}" if iterations >= limit else ""
-        contact = solver.judge(problem, start, f"found no contact among {count} sets of points{spent}")
+        contact = solver.check(problem, start, f"found no contact among {count} sets of points{spent}")
         if contact.converged or spent or not np.isfinite(contact.certificate.worst):
             break
         search.working = chosen
@@ -60,7 +60,7 @@ class _Search:
     def begin(self, contact: Contact) -> None:
         """The first set: contact and what penetrates. All points with a given approach, a problem that may have no
         solution, become those that would penetrate the undeformed body."""
-        self.problem.constraint.mark(self.x, contact.u, self.h, contact.d, self.working)
+        self.problem.constraint.mark_working_set(self.x, contact.u, self.h, contact.d, self.working)
         if self.load is None and self.slab.sum(float(np.count_nonzero(self.working)))[0] == self.slab.points:
             self.working[...] = self.h + self.d > 0.0
 

@@ -83,7 +83,7 @@ class _Descent:
             chosen, level, max(dilute_contact.SHARE * self._solver.tolerance, dilute_contact.LEAST), p
         )
         calls = self._tally["operator"]
-        contact = solved.judge(self._solver, p)
+        contact = solved.check(self._solver, p)
         self._add(calls, level.slab.points)
         return contact
 

@@ -19,7 +19,7 @@ from ..problem import Operator
 from .stripes import OnSet
 
 
-class Directions:
+class GcrBasis:
     """Up to `count` directions t and their images A t: first in `pairs` of maps that are there, then in maps of its
     own, of the type `kept`.
 

@@ -71,7 +71,7 @@ class Proximal:
             if not np.isfinite(contact.certificate.worst):
                 return contact
             projections, sets, steps = projections + contact.projections, sets + contact.sets, steps + contact.steps
-            d, certificate = self.solver.judge(self.operator, start, h, mean)
+            d, certificate = self.solver.check(self.operator, start, h, mean)
             since += 1
             if contact.failure and best < certificate.worst and share < MOST and since < MAX_STEPS_TO_HALVE:
                 share *= 2.0

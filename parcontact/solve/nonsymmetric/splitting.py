@@ -23,7 +23,7 @@ from .. import kernels
 from ..certificate import Certificate
 from ..constraint import NonNegative
 from ..interface_law import InterfaceLaw, resolve, update_split
-from ..iterate import certify, contact_sums
+from ..iterate import certify, form_iterate
 from ..problem import Approach, Control, Operator
 from .steady import SteadyContact
 
@@ -107,7 +107,7 @@ class Splitting:
         slab, constraint, given = self.slab, NonNegative(), isinstance(control, Approach)
         self.operator.apply(p, u)
         whole = u + law.closing(p)
-        iterate = contact_sums(slab, constraint, p, whole, h, control.value if given else 0.0)
+        iterate = form_iterate(slab, constraint, p, whole, h, control.value if given else 0.0)
         iterate, mean = (iterate, None) if given else (iterate.settled(), control.value)
         found = certify(slab, constraint, p, whole, h, iterate, mean, self.height, np.zeros(slab.shape, np.bool_))
         return iterate.d, found[-1]

@@ -27,11 +27,11 @@ from ...parallel.slab import Array, Slab
 from .. import kernels
 from ..certificate import Certificate
 from ..constraint import NonNegative
-from ..iterate import certify, contact_sums
+from ..iterate import certify, form_iterate
 from ..local_load import LEAST_CUT
 from ..precision import precision_of_directions
 from ..problem import Operator
-from .gcr import Directions, gaps_on
+from .gcr import GcrBasis, gaps_on
 from .projected import Projected
 from .stripes import OnSet, Plain, Stripes
 
@@ -106,7 +106,7 @@ class SteadySolver:
         on_sets: OnSet = Plain(preconditioner)
         if along is not None:
             on_sets = Stripes(slab, preconditioner, self._projected.extended, along)
-        self._linear = Directions(slab, operator, on_sets, directions, kept, self._projected.pairs)
+        self._linear = GcrBasis(slab, operator, on_sets, directions, kept, self._projected.pairs)
         self._u = slab.zeros()
         self._length = height  # of the last certificate
         self._working: NDArray[Any] = slab.zeros(np.bool_)
@@ -125,7 +125,7 @@ class SteadySolver:
             start.fill(0.0)
             return SteadyContact(start, self._u, math.nan, nothing, 0, 0, 0, "no point is left that carries load")
 
-    def judge(self, operator: Operator, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
+    def check(self, operator: Operator, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
         """The approach and the certificate of an admissible pressure, such as a solution, for another operator, whose
         image of it is then `u`. Collective."""
         operator.apply(p, self._u)
@@ -258,7 +258,7 @@ class SteadySolver:
 
     def _certify(self, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
         """The approach and the certificate of an admissible pressure, whose set is marked."""
-        iterate = contact_sums(self.slab, self.constraint, p, self._u, h, 0.0).settled()
+        iterate = form_iterate(self.slab, self.constraint, p, self._u, h, 0.0).settled()
         found = certify(self.slab, self.constraint, p, self._u, h, iterate, mean, self.height, self._working)
         certificate = found[-1]
         self._length = certificate.length

@@ -14,7 +14,7 @@ from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve.constraint import NonNegative
 from parcontact.solve.interface_law import HARD, InterfaceLaw
 from parcontact.solve.nonsymmetric import steady
-from parcontact.solve.nonsymmetric.gcr import Directions, centred_residual
+from parcontact.solve.nonsymmetric.gcr import GcrBasis, centred_residual
 from parcontact.solve.nonsymmetric.projected import Projected
 from parcontact.solve.nonsymmetric.splitting import Splitting
 from parcontact.solve.nonsymmetric.steady import SteadySolver
@@ -71,7 +71,7 @@ class Problem:
 
     def improve(self, limit: int, reduction: float = 1e-13, preconditioner: Map | None = None) -> int:
         inverse = np.eye(NX * NY) if preconditioner is None else preconditioner
-        directions = Directions(self.slab, Dense(self.A), Plain(Dense(inverse)), 13, np.float64)
+        directions = GcrBasis(self.slab, Dense(self.A), Plain(Dense(inverse)), 13, np.float64)
         return directions.improve(self.x, self.u, self.h, self.working, limit, reduction)
 
     def residual(self) -> float:

@@ -12,10 +12,10 @@ from scipy.sparse.linalg import spsolve
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.layer import Layer, LongWaves
-from parcontact.solve.preconditioner.cell_sums import CellSums
 from parcontact.solve.preconditioner.extension import FADING, FLOOR, ExtendedPreconditioner, Grids, grids_for, pairs_for
 from parcontact.solve.preconditioner.levels import cell_levels
 from parcontact.solve.preconditioner.long_waves import DECAY, LongWavePreconditioner
+from parcontact.solve.preconditioner.multilevel_inverse import MultilevelInverse
 
 Map = NDArray[np.float64]
 SINGLE = 1e-5  # relative, of sums in single precision: some hundred roundings of 6e-8
@@ -271,7 +271,7 @@ def test_sums_over_cells_of_all_lengths(ny: int, nx: int, pairs: int, seed: int)
     weights, c = random.random(count + 1).tolist(), random.normal(size=(ny, nx))
     slab = Slab(MPI.COMM_WORLD, nx, ny)
     out = slab.empty()
-    CellSums(slab, pairs, weights).apply(c[slab.rows].copy(), out)
+    MultilevelInverse(slab, pairs, weights).apply(c[slab.rows].copy(), out)
     expected = weighted(c, weights, pairs)
     np.testing.assert_allclose(out, expected[slab.rows], rtol=0, atol=SINGLE * np.abs(expected).max())
 
@@ -282,7 +282,7 @@ def test_makes_of_waves_about_what_the_operator_makes(ny: int, layer: Layer | No
     """Waves along x, y and between, from two points to the whole box, come out 0.5 to 2.5 times as large, on square
     cells and on cells of 4 : 1: the interpolation takes a wave of four points for half of what it is."""
     slab, body = Slab.alone(64, ny), HalfSpace((1.0, 1.0), poisson=0.3, layer=layer)
-    sums = CellSums.on(slab, body.size, body.compliance)
+    sums = MultilevelInverse.on(slab, body.size, body.compliance)
     assert sums is not None
     half = min(64, ny) // 2
     x, y, out = np.arange(64) / 64, np.arange(ny)[:, None] / ny, slab.zeros()
@@ -302,7 +302,7 @@ def test_makes_of_waves_about_what_the_operator_makes(ny: int, layer: Layer | No
 def test_none_where_they_are_no_good(nx: int, ny: int, layer: Layer | None) -> None:
     """On lines, on cells that are too long for pairs, and where long waves are stiff; nothing is held."""
     slab, body = Slab.alone(nx, ny), HalfSpace((1.0, 1.0), layer=layer)
-    assert CellSums.on(slab, body.size, body.compliance) is None
+    assert MultilevelInverse.on(slab, body.size, body.compliance) is None
 
 
 @pytest.mark.mpi
@@ -311,8 +311,8 @@ def test_planned_memory(nx: int, ny: int) -> None:
     """To the byte on a slab that only counts, on any ranks."""
     slab, body = Slab(MPI.COMM_WORLD, nx, ny), HalfSpace((1.0, 1.0))
     before = slab.tally["map bytes"]
-    made = CellSums.on(slab, body.size, body.compliance)
+    made = MultilevelInverse.on(slab, body.size, body.compliance)
     assert made is not None
     planned = Slab.planned(nx, ny, slab.comm.size, slab.comm.rank)
-    _counted = CellSums.on(planned, body.size, body.compliance)
+    _counted = MultilevelInverse.on(planned, body.size, body.compliance)
     assert slab.tally["map bytes"] - before == planned.tally["map bytes"]

@@ -16,7 +16,7 @@ are many: the gap of the step before is the start, E falls in every iteration, a
 so that history decides the branch. One iteration:
 
 1. the working set is what is free to move: open points (g > 0), and points in contact that are pulled (c < 0);
-2. residual `c = K (g + h) + m + sigma(g)` there, preconditioned `z = M c` (`preconditioner.cell_sums`);
+2. residual `c = K (g + h) + m + sigma(g)` there, preconditioned `z = M c` (`preconditioner.multilevel_inverse`);
 3. direction `t = z + beta t` (Polak and Ribiere), and `t = z` where that is no descent;
 4. the way `w = max(g - alpha t, 0) - g` of a step as long as the last one should have been;
 5. `g <- g + theta w` with the step of Newton, `theta = -<c, w>/(<w, K w> - <w, (-sigma') w>)`, and where that curvature
@@ -42,7 +42,7 @@ import numpy as np
 from ...parallel.slab import Array, Slab
 from .. import kernels
 from ..certificate import Certificate
-from ..preconditioner.cell_sums import CellSums
+from ..preconditioner.multilevel_inverse import MultilevelInverse
 from ..problem import Approach, Control, MeanPressure
 from . import gap_kernels
 from .gap_iterate import GapIterate, GapOperators, GapSolution, certify_gap
@@ -70,7 +70,7 @@ class GapSolver:
         self._q, self._way, self._image, self._gap, self._t = (slab.zeros() for _ in range(5))
         self._sigma, self._other_sigma = slab.zeros(), slab.zeros()
         self._working = slab.zeros(np.bool_)
-        self._cells = CellSums.on(slab, operators.size, operators.compliance)
+        self._cells = MultilevelInverse.on(slab, operators.size, operators.compliance)
 
     def solve(
         self,

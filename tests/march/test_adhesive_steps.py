@@ -33,7 +33,7 @@ SCENES: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-def sticking(bench: Bench, name: str) -> dict[str, Any]:
+def adhesive(bench: Bench, name: str) -> dict[str, Any]:
     scene, changes = SCENES[name]
     return bench.job(scene, **{"adhesion": STICK, **changes})
 
@@ -43,10 +43,10 @@ def sticking(bench: Bench, name: str) -> dict[str, Any]:
 def test_cut_in_the_middle(bench: Bench, name: str) -> None:
     """What a run makes after a restart is what it makes at once, to the last bit; also where it detaches."""
     whole = bench.where / "whole"
-    assert bench.run(sticking(bench, name), whole) == 0
+    assert bench.run(adhesive(bench, name), whole) == 0
     total = len(rows(whole)) - 1
     part = cut(bench, whole, total // 2)
-    assert bench.run(sticking(bench, name), part) == 0
+    assert bench.run(adhesive(bench, name), part) == 0
     if bench.comm.rank == 0:
         same(whole, part, total)
 
@@ -99,7 +99,7 @@ def test_a_jump_of_load_passes_no_equilibrium() -> None:
 def test_detached(bench: Bench) -> None:
     """Under a force of which no part holds the run ends, with exit code 0, and says when; going on says it too."""
     out = bench.where / "out"
-    data = sticking(bench, "off")
+    data = adhesive(bench, "off")
     assert bench.run(data, out) == 0
     last = len(rows(out)) - 1
     assert 0 < last < 10
@@ -112,7 +112,7 @@ def test_detached(bench: Bench) -> None:
 @pytest.mark.mpi(2)
 def test_detached_state_from_python(bench: Bench) -> None:
     """After a second run, and after a restore, the run is over for the same reason; it goes on with another load."""
-    data, out = sticking(bench, "off"), str(bench.where / "out")
+    data, out = adhesive(bench, "off"), str(bench.where / "out")
     first, second = (Simulation(data, {"output.directory": out}, bench.comm) for _ in range(2))
     rows = [run.run() for run in (first, second)]
     last = max(bench.where.glob("out/checkpoint/step-*.h5"))
@@ -162,7 +162,7 @@ def test_no_adhesion_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*given: Any, **named: Any) -> None:
         raise AssertionError("called without an adhesion section")
 
-    places = ["solve.adhesive.solver.GapSolver.__init__", "physics.halfspace.HalfSpace.gap_operators"]
+    places = ["solve.adhesive.gap_solver.GapSolver.__init__", "physics.halfspace.HalfSpace.gap_operators"]
     places += ["effects.adhesive_energies.advance_energies"]
     places += [f"effects.adhesive_law.AdhesiveLaw.{name}" for name in ("__init__", "at_rest", "solve", "motion")]
     for place in places:
@@ -200,7 +200,7 @@ def test_the_memory_that_a_plan_tells(bench: Bench, tmp_path: Path) -> None:
     from parcontact.plan import memory
 
     for name in ("rough", "free"):
-        planned = Job.model_validate(sticking(bench, name))
+        planned = Job.model_validate(adhesive(bench, name))
         march, _ = marched(planned)
         assert memory.total_bytes(planned) == march.scene.slab.tally["map bytes"]
         maps = [np.asarray(entry.value) for entry in march.entries().values() if entry.is_map]

@@ -25,7 +25,7 @@ SQUARE = 1.5  # tuning: longest side over the shortest, of cells that count as s
 STIFFER = 0.1  # tuning: of the softest waves: where longer ones are stiffer by more, they need another inverse
 
 
-class CellSums:
+class MultilevelInverse:
     """M on one grid; a map in single precision on each grid of larger cells, and a byte for each point or cell."""
 
     def __init__(self, slab: Slab, pairs: int, weights: list[float]) -> None:
@@ -35,7 +35,7 @@ class CellSums:
         self._known = [grid.zeros(np.bool_) for grid in [slab, *grids]]  # interpolation replaces no point
 
     @classmethod
-    def on(cls, slab: Slab, size: tuple[float, float], compliance: Compliance) -> "CellSums | None":
+    def on(cls, slab: Slab, size: tuple[float, float], compliance: Compliance) -> "MultilevelInverse | None":
         """Return M for a body of that compliance, or None where it is no good: on lines, on cells that no pairs make
         nearly square, and where long waves are stiffer than shorter ones, as on incompressible layers."""
         weights = _weights(slab.nx, slab.ny, size, compliance)

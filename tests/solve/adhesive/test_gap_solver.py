@@ -12,11 +12,11 @@ from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve.adhesive import gap_kernels, law
+from parcontact.solve.adhesive.adhesive_solver import AdhesiveSolver
 from parcontact.solve.adhesive.free_inverse import FreeInverse
 from parcontact.solve.adhesive.gap_iterate import GapOperators, GapSolution
+from parcontact.solve.adhesive.gap_solver import GapSolver
 from parcontact.solve.adhesive.law import Law
-from parcontact.solve.adhesive.solver import GapSolver
-from parcontact.solve.adhesive.sticking import StickingSolver
 from parcontact.solve.certificate import Certificate
 from parcontact.solve.problem import Approach, Control, MeanPressure, Operator
 from parcontact.solve.workspace import Workspace
@@ -123,7 +123,7 @@ def test_passes_that_begin_again_have_the_same_start_and_no_maps_of_their_own() 
     slab, operators, _ = solver(free=True)
     gaps, workspace = Failing(operators), Workspace(slab, 1e-3)
     gap, lag, out = (np.random.default_rng(k).random(slab.shape) for k in range(3))
-    sticking = StickingSolver(gaps, workspace, 1e-3, operators.operator)  # type: ignore[arg-type]
+    sticking = AdhesiveSolver(gaps, workspace, 1e-3, operators.operator)  # type: ignore[arg-type]
     h = heights(slab)
     tracemalloc.start()
     before = tracemalloc.get_traced_memory()[0]
@@ -247,13 +247,13 @@ TIGHT = 1e-6
 Map = NDArray[np.float64]
 
 
-def sticking(comm: MPI.Intracomm, points: int) -> tuple[Slab, Operator, StickingSolver]:
+def sticking(comm: MPI.Intracomm, points: int) -> tuple[Slab, Operator, AdhesiveSolver]:
     """A free box of length 1, its operator and a solver."""
     slab = Slab(comm, points, points)
     half_space = HalfSpace((1.0, 1.0), kernel="love", free=True)
     gaps = GapSolver(slab, GapOperators(*half_space.gap_operators(FFT(slab))), 500)
     free = half_space.operator(FFT(slab, (2 * points, 2 * points)))
-    return slab, free, StickingSolver(gaps, Workspace(slab, TIGHT), TIGHT, free)
+    return slab, free, AdhesiveSolver(gaps, Workspace(slab, TIGHT), TIGHT, free)
 
 
 def stiffness(points: int) -> Map:

@@ -24,8 +24,8 @@ from ..workspace import Workspace
 from . import gap_kernels
 from .free_inverse import FreeInverse
 from .gap_iterate import SHARPER, GapSolution
+from .gap_solver import GapSolver
 from .law import Law
-from .solver import GapSolver
 
 MAX_PASSES = 12  # tuning: of a free body, before its own operator is used; one to three do as a rule
 LEFT = 0.8  # accuracy: of the tolerance, for such a solve; the rest is for the inverse
@@ -35,7 +35,7 @@ LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: of a change of what is lagged
 
 
 @dataclass
-class StickingSolver:
+class AdhesiveSolver:
     """Solver of contacts that stick; `free` is the operator of a body with nothing around its box, else None."""
 
     gaps: GapSolver
@@ -68,14 +68,14 @@ class StickingSolver:
             return self._contact(found, out, found.iterations), found.detached
         start = self.workspace.pressure
         start[...] = gap
-        found, iterations = self._settle(law, heights, control, gap, free_correction, out, tolerance)
+        found, iterations = self._solve_fixed_point(law, heights, control, gap, free_correction, out, tolerance)
         if found.failure:
             gap[...] = start
             found = self._solve_free(law, heights, control, gap, free_correction, out, tolerance)
             iterations += found.iterations
         return self._contact(found, out, iterations), found.detached
 
-    def _settle(
+    def _solve_fixed_point(
         self,
         law: Law,
         heights: Array,
