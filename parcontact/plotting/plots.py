@@ -75,7 +75,7 @@ def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> l
 
 
 def draw_steady(table: Path) -> Path:
-    """Draw curve_charts.csv alone, beside it; returns the picture's path."""
+    """Draw steady.csv alone, beside it; returns the picture's path."""
     with style.drawing():
         title, panels = (
             _wrap(curve_charts.steady_title(table.parent)),

@@ -104,7 +104,7 @@ def _leakage(directory: Path) -> list[tuple[str, str]]:
 
 def describe_curve(directory: Path) -> ReportSection:
     """Return the points of a friction curve, and their maps."""
-    columns = read_back.read_results(directory / "curve_charts.csv")
+    columns = read_back.read_results(directory / "steady.csv")
     names = [name for name in POINTS if name in columns]
     units_of = {column.name: column.unit for column in STEADY}
     units_of |= dict.fromkeys(slide.ERRORS, "relative")
@@ -113,7 +113,7 @@ def describe_curve(directory: Path) -> ReportSection:
     pictures = [draw_chart(chart) for chart in curve_charts.chart_steady(directory)]
     states = partial(_label_states, find_free_area(directory))
     job = find_curve_job(directory)
-    browsers = _browse_file(directory / "curve_charts.h5", states, job) if job else []
+    browsers = _browse_file(directory / "steady.h5", states, job) if job else []
     return ReportSection("Friction curve", (), [table, *_list_main_bands(directory)], pictures, browsers)
 
 

@@ -56,7 +56,7 @@ def test_frequencies_are_of_all_waves(tmp_path: Path) -> None:
     low, high = excited_band(on_one_grid_of_all(alone, cut_bands(alone))) or (0.0, 0.0)
     assert low == pytest.approx(0.01 / LONG, rel=1e-3)
     assert high == pytest.approx(1.0 / (LONG / 40), rel=0.02)  # whole cells
-    first = road_map(tmp_path / "road_section.npy", 128, 4 * LONG)
+    first = road_map(tmp_path / "road.npy", 128, 4 * LONG)
     mapped = jobs.load(job_of([first, {"shape": "rough", "spectrum": table, "seed": 1}]))
     assert (excited_band(on_one_grid_of_all(mapped, cut_bands(mapped))) or (0.0,))[0] == pytest.approx(
         0.01 / (4 * LONG)
@@ -76,7 +76,7 @@ def test_check_knows_all_temperatures(tmp_path: Path, capsys: pytest.CaptureFixt
 
 def test_a_spectrum_that_leaves_no_waves_to_the_map(tmp_path: Path) -> None:
     """Of a map only waves longer than those of the spectrum are taken: a warning says from where to take these."""
-    first = road_map(tmp_path / "road_section.npy", 128, 4 * LONG)
+    first = road_map(tmp_path / "road.npy", 128, 4 * LONG)
     for longest, warns in ((2 * LONG, True), (LONG / 2, False)):
         fine = {"shape": "rough", "hurst": 0.8, "rms_slope": 0.2, "long_wavelength": longest, "short_wavelength": 2e-4}
         job = jobs.load(job_of([first, fine]))
@@ -109,7 +109,7 @@ def test_the_report_shows_bands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert "cannot be made anew" not in page
     assert "the band that makes most of the friction" in page
     assert "with all longer waves" in page
-    mapped = jobs.load(job_of([road_map(tmp_path / "road_section.npy", 128, 4 * LONG), table]))
+    mapped = jobs.load(job_of([road_map(tmp_path / "road.npy", 128, 4 * LONG), table]))
     section = road_section.road_section(mapped)
     assert len(section.tables[1].rows) == cut_bands(mapped).count
     assert len(section.pictures) == 5

@@ -26,11 +26,11 @@ def curve(
         for p in pressures
         for v, error in ((0.01, 0.05), (0.1, 2.0), (1.0, "nan"))
     ]
-    (directory / "curve_charts.csv").write_text(HEAD + "\n" + "".join(rows))
+    (directory / "steady.csv").write_text(HEAD + "\n" + "".join(rows))
     text = f"title: A road\n{scene}{ELASTIC}steady: {{velocities: [1.0], pressures: [1.0]}}\n"
     (directory / "job.yaml").write_text(text)
-    (directory / "curve_charts.resolved.yaml").write_text(job.load(directory / "job.yaml").resolved())
-    return directory / "curve_charts.csv"
+    (directory / "steady.resolved.yaml").write_text(job.load(directory / "job.yaml").resolved())
+    return directory / "steady.csv"
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def curve(
 def test_the_title_has_the_load_of_all_points(
     tmp_path: Path, drawn: list[Figure], scene: str, pressures: tuple[float, ...], title: str
 ) -> None:
-    """As a force where the scene is free: on 2 mm x 2 mm. In curve_charts.png and in what `plot` draws."""
+    """As a force where the scene is free: on 2 mm x 2 mm. In steady.png and in what `plot` draws."""
     table = curve(tmp_path, scene, pressures)
     plots.draw_steady(table)
     plots.plot([tmp_path])
@@ -80,7 +80,7 @@ def test_one_key_for_all_panels(tmp_path: Path, drawn: list[Figure]) -> None:
 
 def test_a_table_without_errors(tmp_path: Path) -> None:
     """Older tables have none, and no corrected area: the counted one is drawn."""
-    (tmp_path / "curve_charts.csv").write_text("velocity,pressure,friction,contact_area\n1.0,1e3,0.1,0.2\n")
+    (tmp_path / "steady.csv").write_text("velocity,pressure,friction,contact_area\n1.0,1e3,0.1,0.2\n")
     friction, area = curve_charts.chart_steady(tmp_path)
     assert area.series[0].y.tolist() == [0.2]
     assert friction.series[0].error is None

@@ -19,7 +19,7 @@ HEAD = ("case", "a.velocity", "b.velocity", "surface.0.seed", "grid.size", "stat
 
 
 def saved(directory: Path, *rows: tuple[Any, ...], head: tuple[str, ...] = (*HEAD, "theory_mu_max")) -> Path:
-    with (directory / "sweep_charts.csv").open("w", newline="") as file:
+    with (directory / "sweep.csv").open("w", newline="") as file:
         csv.writer(file).writerows([head, *rows])
     return directory
 

@@ -127,7 +127,7 @@ def test_theory_depends_on_the_reduced_velocity_alone(tmp_path: Path) -> None:
     [
         (["material.shift=null"], "has no effect without material.shift"),
         (["material={model: elastic, shear_modulus: 1.0e6}"], "relaxation times depend on it"),
-        (["curve_charts.temperatures=[-40.0]"], "beyond the shift"),
+        (["steady.temperatures=[-40.0]"], "beyond the shift"),
     ],
 )
 def test_temperatures_that_the_material_does_not_know(tmp_path: Path, changes: list[str], told: str) -> None:
@@ -147,7 +147,7 @@ def test_temperatures_that_the_material_does_not_know(tmp_path: Path, changes: l
 def test_temperatures_beyond_computing(tmp_path: Path, law: str, temperature: float, told: str) -> None:
     """Told in a sentence, with the limit."""
     (tmp_path / "job.yaml").write_text(WAVE)
-    changes = [f"material.shift={law}", f"curve_charts.temperatures=[{temperature}]"]
+    changes = [f"material.shift={law}", f"steady.temperatures=[{temperature}]"]
     with pytest.raises(InputError, match=told):
         request(jobs.load(tmp_path / "job.yaml", changes))
 
