@@ -124,7 +124,7 @@ def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert re.search(r"tried: [12] states on 1 rank in", said)
     assert re.search(r"time on 1 rank: \S+ s\*? a state, ", said)
     steady = said[said.index("parcontact steady:") :]
-    told = re.search(r"operator calls a state, errors of friction \(mesh ([\d.]+) %\) and the contact area ", steady)
+    told = re.search(r"from the errors of the trial: friction ([\d.]+) % by mesh, area ", steady)
     assert told
     found = pc.steady(planned)
     assert 0.01 * float(told[1]) == pytest.approx(found.error_friction.mean(), rel=0.2)  # the rest is the solver's
