@@ -12,6 +12,7 @@ What is named here loads when it is first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from .doubts import ParcontactWarning
 from .errors import InputError, JobError, RunError
 
 if TYPE_CHECKING:
@@ -22,7 +23,18 @@ if TYPE_CHECKING:
     from .python.surface_and_material import material, surface
 
 __version__ = "0.2.0"
-__all__ = ["InputError", "JobError", "RunError", "Simulation", "leak", "material", "open", "steady", "surface"]
+__all__ = [
+    "InputError",
+    "JobError",
+    "ParcontactWarning",
+    "RunError",
+    "Simulation",
+    "leak",
+    "material",
+    "open",
+    "steady",
+    "surface",
+]
 
 _ROOMS = {
     "Simulation": "python.simulation",

@@ -37,6 +37,41 @@ class Doubt:
         return self.kind, self.place, *names
 
 
+class ParcontactWarning(UserWarning):
+    """A warning about a job or its results.
+
+    `kind` names the problem, `place` the key of the job or `""`, and `numbers` has the values of the sentence in SI
+    units. Python's filters treat two warnings that differ in these numbers alone as the same: a line that calls this
+    package many times shows each problem once.
+    """
+
+    def __init__(self, doubt: Doubt) -> None:
+        super().__init__(doubt)
+        self.kind: str = doubt.kind
+        self.place: str = doubt.place
+        self.numbers: Mapping[str, object] = doubt.numbers
+
+    def __str__(self) -> str:
+        return _WarningText(self.args[0])
+
+
+class _WarningText(str):
+    """The sentence of a warning, equal to every other one with the same subject, as Python's filters compare texts."""
+
+    subject: tuple[str, ...]
+
+    def __new__(cls, doubt: Doubt) -> "_WarningText":
+        text = super().__new__(cls, doubt)
+        text.subject = doubt.subject
+        return text
+
+    def __eq__(self, other: object) -> bool:
+        return self.subject == other.subject if isinstance(other, _WarningText) else super().__eq__(other)
+
+    def __hash__(self) -> int:
+        return hash(self.subject)
+
+
 class _Formatter(string.Formatter):
     """Formats like `str.format`; `!p` is a share in per cent, `!m` a length in m with its unit in four digits, `!M` in
     three, `!t` how many times."""
@@ -255,6 +290,17 @@ SENTENCES = {
         "where they are no part of the surface, give outliers: clip, or nodata: NUMBER if one number marks missing "
         "points"
     ),
+    # friction curves
+    "unsolved point": "{where}",
+    "decomposes": (
+        "flash temperatures of {count} of {points} points are above {most:g} K, up to {rise:.3g} K at {speed:g} m/s: "
+        "rubber decomposes there; take a smaller thermal.distance, velocity or pressure"
+    ),
+    "flash temperatures": (
+        "with its flash temperature the rubber is beyond the {low:g} to {high:g} C of its measurement at {count} of "
+        "{points} points, up to {hottest:.3g} C at {speed:g} m/s: the shift is an extrapolation there"
+    ),
+    "inaccurate points": "estimated error of {of} {where}",
     # contacts
     "edge": (
         "{where}: the contact reaches the edge of the box and is cut off there, so its results are wrong; use a "

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..bands.road_sliding import make_states
 from ..columns import STEADY
+from ..doubts import Doubt
 from ..errors import JobError, RunError
 from ..job import log_range
 from ..job.checks.cells import more_points
@@ -84,8 +85,8 @@ def steady(
     `job` and `set` as for `Simulation`; velocities and pressures as lists or as texts `first:last:count`, equally
     spaced in the logarithm (default: those of the job's `steady` section, and the pressure of its first loaded stage);
     `temperatures` [deg C] as a list, of a material that has a shift (default: those of that section). Raises JobError,
-    and InputError where velocities or pressures lack; warns (UserWarning, on root) of what is allowed but means little.
-    Nothing is written.
+    and InputError where velocities or pressures lack; warns (ParcontactWarning, on root) of points that failed
+    and of what is allowed but means little. Nothing is written.
     """
     asked = {
         "velocities": _numbers("velocities", velocities),
@@ -99,13 +100,13 @@ def steady(
         wanted = curve.request(found, *asked.values())
     wisdom.recall(curve.transforms_of(found), slab, None)
     sliding = make_states(found, slab)
-    for text in map(str, sliding.doubts(wanted.temperatures)):
+    for doubt in sliding.doubts(wanted.temperatures):
         if slab.root:
-            warn(text)
+            warn(doubt)
     contacts = ContactWatch(found.numerics.strict, sliding.setup.choices.timeline, more=more_points(found.grid))
     points: list[Point | None] = []
     failures: list[str] = []
-    doubts: list[str] = []
+    doubts: list[Doubt] = []
     for at in wanted.points:
         point = None
         try:
@@ -114,14 +115,14 @@ def steady(
             point = sliding.solve(wanted.velocity(at.speed), at.pressure)
         except RunError as error:
             failures.append(str(error))
-            warn(str(error), RuntimeWarning)
+            doubts.append(Doubt("unsolved point", "", {"where": str(error)}))
         sliding.forget()
         points.append(point)
-        doubts += map(str, contacts.check_point(point.measures, str(at)) if point else [])
+        doubts += contacts.check_point(point.measures, str(at)) if point else []
     solved = [point for point in points if point]
     of_points = *describe_hot(solved), *describe_unmeasured(solved, found), *describe_missed(solved, found)
-    for text in (*doubts, *of_points) if slab.root else ():
-        warn(text)
+    for doubt in (*doubts, *of_points) if slab.root else ():
+        warn(doubt)
     return _curve(wanted.points, points, tuple(failures))
 
 

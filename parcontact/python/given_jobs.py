@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import mesh
+from ..doubts import Doubt, ParcontactWarning
 from ..errors import InputError, JobError
 from ..history.timeline import Timeline
 from ..job import Job
@@ -114,12 +115,12 @@ def warn_of(setup: Setup, temperatures: Sequence[float] = ()) -> None:
     """Warn, on root, of what is allowed but means little, also at temperatures [deg C]; collective."""
     for doubt in sanity.find_doubts(setup, temperatures):
         if setup.slab.root:
-            warn(str(doubt))
+            warn(doubt)
 
 
-def warn(text: str, category: type[Warning] = UserWarning) -> None:
-    """Warn, of the line of the user's script that has called this package."""
+def warn(doubt: Doubt) -> None:
+    """Warn at the line of the user's script that called this package."""
     level, frame = 1, inspect.currentframe()
     while frame is not None and frame.f_code.co_filename.startswith(PACKAGE):
         level, frame = level + 1, frame.f_back
-    warnings.warn(text, category, stacklevel=level)
+    warnings.warn(ParcontactWarning(doubt), stacklevel=level)

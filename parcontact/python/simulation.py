@@ -41,7 +41,8 @@ class Simulation:
 
     Parameters: `job`, the path of a job file or a mapping like one; `set`, values by keys like `grid.points` that
     replace those of the job; `comm`, an MPI communicator (default: all ranks). Raises JobError for a job with
-    mistakes, InputError for files that do not fit it; warns (UserWarning, on root) of what is allowed but means little.
+    mistakes, InputError for files that do not fit it; warns (ParcontactWarning, on root) of what is allowed
+    but means little.
 
     Nothing is written unless the job, or `set`, names `output.directory`, and then only by `run`. Files that a mapping
     names are looked for from the working directory.
@@ -219,7 +220,7 @@ class Simulation:
     def _warns(self, doubt: Doubt) -> bool:
         """Warn, on root, in the place of whoever would show the doubt."""
         if self._slab.root:
-            warn(str(doubt))
+            warn(doubt)
         return False
 
     def _wait_for_all(self, what: str) -> None:

@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from ..doubts import Doubt
 from ..effects.relaxation import feeds_back, temperature_of
 from ..effects.thermal import Thermal
 from ..errors import RunError
@@ -112,19 +113,17 @@ class Feedback:
         )
 
 
-def describe_hot(points: Sequence[Point]) -> Iterator[str]:
-    """Yield a sentence where rubber would become so hot that it is no rubber any more."""
+def describe_hot(points: Sequence[Point]) -> Iterator[Doubt]:
+    """Yield a doubt where rubber would become so hot that it decomposes."""
     hot = [(point.flash.mean, point.speed) for point in points if point.flash and point.flash.mean > HOTTEST]
     if hot:
         rise, speed = max(hot)
-        yield (
-            f"flash temperatures of {len(hot)} of {len(points)} points are above {HOTTEST:g} K, up to {rise:.3g} K at "
-            f"{speed:g} m/s: rubber decomposes there; take a smaller thermal.distance, velocity or pressure"
-        )
+        facts = {"count": len(hot), "points": len(points), "most": HOTTEST, "rise": rise, "speed": speed}
+        yield Doubt("decomposes", "", facts)
 
 
-def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[str]:
-    """Yield a sentence where rubber that relaxes at its flash temperature is beyond those it was measured at."""
+def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[Doubt]:
+    """Yield a doubt where rubber that relaxes at its flash temperature is beyond those it was measured at."""
     body = job.material.fitted
     if not feeds_back(job) or not isinstance(body, Zener) or body.temperatures is None:
         return
@@ -136,8 +135,5 @@ def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[str]:
     ]
     if beyond := [one for one in warm if not low <= one[0] <= high]:
         hottest, speed = max(beyond)
-        yield (
-            f"material: with its flash temperature the rubber is beyond the {low:g} to {high:g} C of its measurement "
-            f"at {len(beyond)} of {len(points)} points, up to {hottest:.3g} C at {speed:g} m/s: the shift is an "
-            "extrapolation there"
-        )
+        facts = {"low": low, "high": high, "count": len(beyond), "points": len(points)}
+        yield Doubt("flash temperatures", "material", {**facts, "hottest": hottest, "speed": speed})

@@ -145,7 +145,7 @@ class CurveTable:
             self._sort()
         hot = *describe_hot(self._points), *describe_unmeasured(self._points, self._job)
         for warning in (*hot, *describe_missed(self._points, self._job, self._earlier())):
-            self._console.warn(warning)
+            self._console.warn(str(warning))
         if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
             self.say(text)
         from ..plotting import plots  # matplotlib is slow to import, and for pictures only
@@ -181,8 +181,8 @@ class CurveTable:
             self._further.close()
 
 
-def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[str]:
-    """Yield a sentence for friction and one for the corrected area, as far as points are more wrong than the job asks
+def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[Doubt]:
+    """Yield a doubt about friction and one about the corrected area, as far as points are more wrong than the job asks
     for, also `earlier` ones, of which the parts of the error are not known."""
     chosen = ["solver"] * ("tolerance" in job.numerics.chosen) + ["mesh"] * bool(job.origin.mesh)
     friction = [(point, point.errors.friction) for point in points if point.errors.friction is not None]
@@ -197,11 +197,12 @@ def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[Earlier
             _, point, parts = max(missed, key=lambda one: one[0])
             place = Wanted(point.speed, point.pressure, point.temperature)
             told = f"{describe(parts, name)}, at {place}{advice(parts, accuracy, chosen)}"
-            yield f"estimated error of {name} {many}: up to {told}"
+            yield Doubt("inaccurate points", "", {"of": name, "where": f"{many}: up to {told}"})
         elif before:
             error, place = max(before, key=lambda one: one[0])
             asked = f"more than the {100 * accuracy:g} % that numerics.accuracy asks for"
-            yield f"estimated error of {name} {many}: up to {per_cent(error, 3)}, at {place}; {asked}"
+            where = f"{many}: up to {per_cent(error, 3)}, at {place}; {asked}"
+            yield Doubt("inaccurate points", "", {"of": name, "where": where})
 
 
 def _percent(share: float) -> str:

@@ -35,7 +35,7 @@ def test_a_curve_advises_the_key_that_was_given(numerics: dict[str, Any], key: s
     errors = ErrorBudget(None, ErrorParts(solver=0.06, time=0.0, folded=0.0, mesh=0.01))
     point: Any = SimpleNamespace(errors=errors, speed=1.0, pressure=1e4, temperature=math.nan)
     (told,) = describe_missed([point], Job.model_validate(data))
-    assert told.endswith(f"try a smaller numerics.{key}")
+    assert str(told).endswith(f"try a smaller numerics.{key}")
 
 
 def test_a_curve_that_goes_on_counts_earlier_points() -> None:
@@ -51,7 +51,7 @@ def test_a_curve_that_goes_on_counts_earlier_points() -> None:
     for solver, told in ((0.06, ["10 %, at 2 m/s", "7 % ("]), (0.01, ["10 %, at 2 m/s", "20 %, at 2 m/s"])):
         errors = ErrorBudget(None, ErrorParts(solver=solver, time=0.0, folded=0.0, mesh=0.01))
         point: Any = SimpleNamespace(errors=errors, speed=1.0, pressure=1e4, temperature=math.nan)
-        of_friction, of_area = describe_missed([point], job, earlier)
+        of_friction, of_area = map(str, describe_missed([point], job, earlier))
         assert f"friction at 1 of {1 + 1} points: up to {told[0]}" in of_friction
         assert f"area at {1 + (solver > 0.05)} of 2 points: up to {told[1]}" in of_area
 

@@ -92,7 +92,7 @@ def test_heat_beyond_the_measurement() -> None:
     for feedback in ("mean", "none"):
         job = jobs.load(job_of(surface, thermal={"conductivity": 0.2, "diffusivity": 1e-7, "feedback": feedback}))
         point: Any = SimpleNamespace(temperature=40.0, speed=1.0, flash=Flash(30.0, 50.0))
-        found = list(describe_unmeasured([point], job))
+        found = list(map(str, describe_unmeasured([point], job)))
         assert [bool(re.search("beyond the -20 to 60 C .* at 1 of 1 points, up to 70 C", text)) for text in found] == (
             [True] * (feedback == "mean")
         )

@@ -3,15 +3,18 @@
 import copy
 import pickle
 import re
+import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
 import parcontact as pc
+from parcontact.steady_sliding.sliding import SteadySliding
 
 from .test_simulation import JOB
 
@@ -154,9 +157,9 @@ def test_a_saved_state_has_the_sums_of_the_budget(comm: MPI.Intracomm, shared_pa
 def test_warnings_are_those_of_python() -> None:
     """A slope beyond linear theory: the surface is steep, as the command line says."""
     steep = {**JOB, "surface": {"shape": "wave", "amplitude": 1e-4, "waves": [2, 1]}}
-    with pytest.warns(UserWarning, match="slope") as said:
+    with pytest.warns(pc.ParcontactWarning, match="slope") as said:
         next(pc.Simulation(steep, comm=MPI.COMM_SELF).steps())
-    with pytest.warns(UserWarning, match="slope") as also:
+    with pytest.warns(pc.ParcontactWarning, match="slope") as also:
         pc.steady({**steep, "numerics": {"accuracy": 0.3}}, 0.1, 1e6, comm=MPI.COMM_SELF)
     assert {warning.filename for warning in [*said, *also]} == {__file__}
 
@@ -166,7 +169,7 @@ def test_warnings_of_a_run_with_files(tmp_path: Path, capsys: pytest.CaptureFixt
     odd = {**JOB, "grid": {**JOB["grid"], "boundary": "free"}, "surface": {"shape": "sphere", "radius": 0.1}}
     told = []
     for files in ({}, {"output.directory": str(tmp_path / "here")}):
-        with pytest.warns(UserWarning, match="the box") as said:
+        with pytest.warns(pc.ParcontactWarning, match="the box") as said:
             pc.Simulation(odd, files, MPI.COMM_SELF).run()
         told.append([str(warning.message) for warning in said])
         assert {warning.filename for warning in said} == {__file__}
@@ -175,3 +178,39 @@ def test_warnings_of_a_run_with_files(tmp_path: Path, capsys: pytest.CaptureFixt
     log = (tmp_path / "here" / "run.log").read_text()
     assert all(f"warning: {text}" in log for text in told[0])
     assert "warning" not in capsys.readouterr().err
+
+
+def test_a_line_warns_once_of_each_problem() -> None:
+    """Python shows a warning once for each line; calls in a fit differ in the numbers of their warnings alone."""
+    steep = {**JOB, "surface": {"shape": "wave", "amplitude": 1e-4, "waves": [2, 1]}}
+
+    def calls(action: Literal["default", "always", "ignore"]) -> list[pc.ParcontactWarning]:
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter(action, pc.ParcontactWarning)
+            for amplitude in (1e-4, 1.5e-4, 2e-4):
+                next(pc.Simulation(steep, {"surface.amplitude": amplitude}, MPI.COMM_SELF).steps())
+        return [one.message for one in said if isinstance(one.message, pc.ParcontactWarning)]
+
+    every = [one for one in calls("always") if one.kind == "steep"]
+    slope = 2 * np.pi * np.hypot(2 / 1e-3, 1 / 7.5e-4) / np.sqrt(2)  # rms, of a wave of unit amplitude
+    assert [one.numbers["slope"] for one in every] == pytest.approx([slope * a for a in (1e-4, 1.5e-4, 2e-4)])
+    assert [one.place for one in every] == ["surface"] * 3
+    assert len({"".join(str(one)) for one in every}) == 3
+    once = [one.kind for one in calls("default")]
+    assert len(once) == len(set(once)) > 0
+    assert calls("ignore") == []
+    again = pickle.loads(pickle.dumps(every[0]))
+    assert (str(again), again.kind, again.numbers) == (str(every[0]), "steep", every[0].numbers)
+
+
+def test_points_that_fail_warn_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The sentence is that of `failures`; it has the category of all warnings."""
+
+    def fail(sliding: SteadySliding, velocity: tuple[float, float], pressure: float) -> None:
+        raise pc.RunError(f"no solution at {velocity[0]:g} m/s")
+
+    monkeypatch.setattr(SteadySliding, "solve", fail)
+    with pytest.warns(pc.ParcontactWarning, match="no solution") as said:
+        curve = pc.steady(JOB, [0.1, 0.2], 1e3, comm=MPI.COMM_SELF)
+    assert [str(one.message) for one in said] == list(curve.failures) == [f"no solution at 0.{n} m/s" for n in (1, 2)]
+    assert np.isnan(curve.friction).all()
