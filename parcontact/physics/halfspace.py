@@ -19,7 +19,6 @@ Around an isolated contact the wake is not periodic: its influence coefficients 
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Literal
@@ -198,12 +197,10 @@ class HalfSpace:
 
     # -- of contacts that stick -------------------------------------------------------------------------------------
 
-    def gap_operators(
-        self, fft: FFT
-    ) -> tuple[Convolution, Convolution, float, float, Vector, Callable[[Array], Array]]:
-        """Pressure -> displacement, its inverse but for mean values, the displacement over a uniform pressure, what the
-        first makes of it, which is positive, the size of the box, and `compliance`; collective where the half space is
-        free.
+    def gap_operators(self, fft: FFT) -> tuple[Convolution, Convolution, float, float]:
+        """Return the operators of the gap solver: pressure -> displacement, its inverse but for mean values, the
+        displacement over a uniform pressure, and the factor by which the first operator moves mean values, which is
+        positive; collective where the half space is free.
 
         A free body is taken as one that repeats itself, whose points influence each other by the shortest way: this is
         exact within half a box.
@@ -224,7 +221,7 @@ class HalfSpace:
             return np.where(q == 0.0, 0.0, 1.0 / values) if inverted else values
 
         operator, inverse = (Convolution(fft, partial(positive, inverted=way), fft.dtype) for way in (False, True))
-        return operator, inverse, mean, least, self.size, self.compliance
+        return operator, inverse, mean, least
 
     # -- under a surface that slides steadily -------------------------------------------------------------------------
 

@@ -7,7 +7,6 @@ from typing import NamedTuple
 from ...parallel.slab import Array, Slab
 from ..certificate import Certificate
 from ..iterate import LEAST_SHARE
-from ..preconditioner.multilevel_inverse import Compliance
 from ..problem import Control, Operator
 from . import gap_kernels
 from .law import Law
@@ -21,15 +20,12 @@ LEAST_TRACTION = 1e-3  # of the strength of a point: pressures that add up to le
 class GapOperators(NamedTuple):
     """The operator of a body and its inverse K, which is 0 for mean values; `mean` is the displacement over a uniform
     pressure, 0 where there is none, and `least_mean` that by which the operator moves mean values, always positive.
-    Both are infinite where K is the inverse for mean values, too. `size` of the box and `compliance` of waves are those
-    of the body."""
+    Both are infinite where K is the inverse for mean values, too."""
 
     operator: Operator
     inverse: Operator
     mean: float
     least_mean: float
-    size: tuple[float, float]
-    compliance: Compliance
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ are many: the gap of the step before is the start, E falls in every iteration, a
 so that history decides the branch. One iteration:
 
 1. the working set is what is free to move: open points (g > 0), and points in contact that are pulled (c < 0);
-2. residual `c = K (g + h) + m + sigma(g)` there, preconditioned `z = M c` (`preconditioner.multilevel_inverse`);
+2. residual `c = K (g + h) + m + sigma(g)` there, preconditioned `z = A c`;
 3. direction `t = z + beta t` (Polak and Ribiere), and `t = z` where that is no descent;
 4. the way `w = max(g - alpha t, 0) - g` of a step as long as the last one should have been;
 5. `g <- g + theta w` with the step of Newton, `theta = -<c, w>/(<w, K w> - <w, (-sigma') w>)`, and where that curvature
@@ -26,9 +26,8 @@ so that history decides the branch. One iteration:
    raises E, a shorter one takes its place;
 6. E must not rise: else the step is halved.
 
-So there is one operator call in an iteration, `K w`: the pressure goes on with `theta K w`. As soon as the certificate
-that `M c` makes is met, that of `A c` is made, which counts. Where that is not met A takes the place of M, as it does
-throughout where cells are long, or long waves stiff.
+An iteration takes two operator calls, `A c` and `K w`: the pressure follows from `theta K w`, and the certificate
+from `A c`.
 
 Where the mean gap is given, c, z and t are centred and w leads to it. V. Rey, G. Anciaux, J.-F. Molinari, Comput.
 Mech. 60 (2017) 69 have these gradients without preconditioner; M. Bugnicourt, P. Sainsot, D. Dureisseix, C. Gauthier,
@@ -42,7 +41,6 @@ import numpy as np
 from ...parallel.slab import Array, Slab
 from .. import kernels
 from ..certificate import Certificate
-from ..preconditioner.multilevel_inverse import MultilevelInverse
 from ..problem import Approach, Control, MeanPressure
 from . import gap_kernels
 from .gap_iterate import GapIterate, GapOperators, GapSolution, certify_gap
@@ -70,7 +68,6 @@ class GapSolver:
         self._q, self._way, self._image, self._gap, self._t = (slab.zeros() for _ in range(5))
         self._sigma, self._other_sigma = slab.zeros(), slab.zeros()
         self._working = slab.zeros(np.bool_)
-        self._cells = MultilevelInverse.on(slab, operators.size, operators.compliance)
 
     def solve(
         self,
@@ -88,11 +85,9 @@ class GapSolver:
         best, scale, iteration, stuck, jumped = (math.inf, 0), 0.0, 0, False, False
         while True:
             members, lost = self._find_residual(it, g)
-            certificate, exact = self._precondition(it, g, other, tolerance)
+            certificate = self._precondition(it, g, other)
             best = min(best, (certificate.worst, iteration))
             failure = "" if lost else self._verdict(certificate.worst, tolerance, iteration, *best, stuck)
-            if failure is not None and not exact:
-                certificate, _ = self._precondition(it, g, other, math.inf)
             if failure is not None:
                 if g is not gap:
                     gap[...] = g
@@ -190,16 +185,10 @@ class GapSolver:
             return f"did not converge in max_iterations = {iteration}: the residual is {asked}"
         return None
 
-    def _precondition(self, it: GapIterate, g: Array, z: Array, near: float) -> tuple[Certificate, bool]:
-        """Put `z = M c` into a map, with c in that of the way, or `z = A c` where gaps seem to be `near`; returns the
-        certificate that z makes, and whether it is that of A c; collective."""
-        if self._cells is not None:
-            self._cells.apply(self._way, z)
-            certificate = certify_gap(self.slab, it, self._working, g, self._q, self._sigma, z)
-            if not certificate.complementarity <= near:
-                return certificate, False
+    def _precondition(self, it: GapIterate, g: Array, z: Array) -> Certificate:
+        """Put `z = A c` into a map, with c in that of the way; returns the certificate that z makes; collective."""
         it.operators.operator.apply(self._way, z)
-        return certify_gap(self.slab, it, self._working, g, self._q, self._sigma, z), True
+        return certify_gap(self.slab, it, self._working, g, self._q, self._sigma, z)
 
     def _turn(self, it: GapIterate, members: float, scale: float, z: Array) -> float:
         """Make the new direction from z; returns `<c, z>`; collective.

@@ -10,12 +10,9 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.layer import Layer, LongWaves
+from parcontact.physics.layer import LongWaves
 from parcontact.solve.preconditioner.extension import FADING, FLOOR, ExtendedPreconditioner, Grids, grids_for, pairs_for
-from parcontact.solve.preconditioner.levels import cell_levels
 from parcontact.solve.preconditioner.long_waves import DECAY, LongWavePreconditioner
-from parcontact.solve.preconditioner.multilevel_inverse import MultilevelInverse
 
 Map = NDArray[np.float64]
 SINGLE = 1e-5  # relative, of sums in single precision: some hundred roundings of 6e-8
@@ -246,73 +243,3 @@ def test_holds_what_it_says_long_waves(comm: MPI.Intracomm, shape: tuple[int, in
     less = planned.tally["map bytes"]
     _counted = LongWavePreconditioner(planned, waves(thickness), extended)
     assert slab.tally["map bytes"] - before == planned.tally["map bytes"] - less
-
-
-# -- sums over cells of all lengths against products of matrices, on any ranks, and against the operator, -------------
-
-
-def weighted(c: Map, weights: list[float], pairs: int) -> Map:
-    """`sum w_l I_l I_l' c`, from the finest grid on."""
-    if len(weights) == 1:
-        return weights[0] * c
-    down = np.eye(len(c)) if pairs > 0 else interpolating(len(c))
-    along = np.eye(c.shape[1]) if pairs < 0 else interpolating(c.shape[1])
-    coarse = weighted(down.T @ c @ along, weights[1:], fewer(pairs))
-    return np.asarray(weights[0] * c + down @ coarse @ along.T)
-
-
-@pytest.mark.mpi
-@settings(max_examples=30)
-@given(ny=st.integers(1, 34), nx=st.sampled_from([7, 14, 200]), pairs=st.integers(-2, 2), seed=st.integers(0, 99))
-def test_sums_over_cells_of_all_lengths(ny: int, nx: int, pairs: int, seed: int) -> None:
-    """`M c` is that of products of matrices, to single precision."""
-    random = np.random.default_rng([ny, nx, seed])
-    count = len(cell_levels(Slab.alone(nx, ny), pairs))
-    weights, c = random.random(count + 1).tolist(), random.normal(size=(ny, nx))
-    slab = Slab(MPI.COMM_WORLD, nx, ny)
-    out = slab.empty()
-    MultilevelInverse(slab, pairs, weights).apply(c[slab.rows].copy(), out)
-    expected = weighted(c, weights, pairs)
-    np.testing.assert_allclose(out, expected[slab.rows], rtol=0, atol=SINGLE * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("ny", [64, 16, 256])
-@pytest.mark.parametrize("layer", [None, Layer(0.1, "smooth", 0.3), Layer(0.5, "bonded", 0.3)])
-def test_makes_of_waves_about_what_the_operator_makes(ny: int, layer: Layer | None) -> None:
-    """Waves along x, y and between, from two points to the whole box, come out 0.5 to 2.5 times as large, on square
-    cells and on cells of 4 : 1: the interpolation takes a wave of four points for half of what it is."""
-    slab, body = Slab.alone(64, ny), HalfSpace((1.0, 1.0), poisson=0.3, layer=layer)
-    sums = MultilevelInverse.on(slab, body.size, body.compliance)
-    assert sums is not None
-    half = min(64, ny) // 2
-    x, y, out = np.arange(64) / 64, np.arange(ny)[:, None] / ny, slab.zeros()
-    for along_x, along_y in [(1, 0), (0, 1), (3, 2), (6, 6), (half, 0), (0, ny // 2), (half, ny // 2), (32, 0)]:
-        wave = slab.zeros()
-        wave[...] = np.cos(2 * np.pi * (along_x * x + along_y * y))
-        sums.apply(wave, out)
-        made = float((wave * out).sum() / (wave * wave).sum())
-        should = float(body.compliance(np.array(2 * np.pi * np.hypot(along_x, along_y))))
-        assert 0.5 < made / should < 2.5
-
-
-@pytest.mark.parametrize(
-    ("nx", "ny", "layer"),
-    [(64, 1, None), (1, 64, None), (16, 640, None), (640, 16, None), (64, 64, Layer(0.05, "bonded", 0.5))],
-)
-def test_none_where_they_are_no_good(nx: int, ny: int, layer: Layer | None) -> None:
-    """On lines, on cells that are too long for pairs, and where long waves are stiff; nothing is held."""
-    slab, body = Slab.alone(nx, ny), HalfSpace((1.0, 1.0), layer=layer)
-    assert MultilevelInverse.on(slab, body.size, body.compliance) is None
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize(("nx", "ny"), [(24, 20), (41, 9), (8, 2), (9, 41)])
-def test_planned_memory(nx: int, ny: int) -> None:
-    """To the byte on a slab that only counts, on any ranks."""
-    slab, body = Slab(MPI.COMM_WORLD, nx, ny), HalfSpace((1.0, 1.0))
-    before = slab.tally["map bytes"]
-    made = MultilevelInverse.on(slab, body.size, body.compliance)
-    assert made is not None
-    planned = Slab.planned(nx, ny, slab.comm.size, slab.comm.rank)
-    _counted = MultilevelInverse.on(planned, body.size, body.compliance)
-    assert slab.tally["map bytes"] - before == planned.tally["map bytes"]
