@@ -1,1 +1,1 @@
-"""Numbers only: no physics names, no files."""
+"""Solvers for contact problems. They work on arrays and import no physics and no files."""

@@ -1,13 +1,10 @@
-"""Contact with a counterbody that yields where the pressure reaches its hardness.
+"""Contact with a counterbody that yields where the pressure reaches its hardness H [unit of p].
 
-With H the highest pressure that it bears, in the unit of p,
+    0 <= p <= H,   g >= 0 where p < H,   g <= 0 where p > 0.
 
-    0 <= p <= H,   g >= 0 where p < H,   g <= 0 where p > 0:
-
-where p = H the rigid surface gives way, and the gap tells how far. Each solve starts from its full heights: it does not
-remember where it gave way before (A. Almqvist, F. Sahlin, R. Larsson, S. Glavatskih, Tribol. Int. 40 (2007) 574). The
-mean pressure must be below H. Points with `0 < p < H` are free: the approach follows from them, and they are scaled to
-the load.
+Where p = H the rigid surface yields by -g. Each solve starts from the full heights: earlier yielding is not
+remembered (A. Almqvist, F. Sahlin, R. Larsson, S. Glavatskih, Tribol. Int. 40 (2007) 574). The mean pressure must be
+below H. Points with `0 < p < H` are free: they determine the approach, and they are scaled to the load.
 """
 
 from dataclasses import dataclass
@@ -19,14 +16,14 @@ from ..parallel.slab import Array, Slab
 from . import kernels
 from .constraint import Cells, Mask, Set
 
-MAX_PASSES = 20  # accuracy: of scaling to the load, of which each takes in those that reach H; 2 or 3 do as a rule
-LOAD_ROUNDING = 1e-14  # accuracy: of the load, a smaller part of which cannot be told from none
-SNAP = 1e-12  # accuracy: of H: pressures as near to H, or to 0, are H and 0, as they were for another modulus
+MAX_PASSES = 20  # accuracy: largest number of passes that scale pressures to the load; 2 or 3 are usual
+LOAD_ROUNDING = 1e-14  # accuracy: tolerance on the load, as a share of it, set by rounding
+SNAP = 1e-12  # accuracy: pressures within this share of H of a bound are put on the bound
 
 
 @dataclass(frozen=True)
 class Bounded:
-    """Pressures from 0 to `highest`."""
+    """Constraint `0 <= p <= highest` [unit of p]."""
 
     highest: float
 
@@ -35,7 +32,7 @@ class Bounded:
         return 0.0, self.highest
 
     def touches(self, p: Array) -> Mask:
-        """The surfaces touch where there is a pressure, also where one of them has yielded."""
+        """Return p: the surfaces touch where there is pressure, also at points that have yielded."""
         return p
 
     def contact_sums(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
@@ -43,7 +40,7 @@ class Bounded:
         return load, work, gaps, squares, *_sum_free(p, u, h, d, self.highest)
 
     def mark_working_set(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
-        """Points work that are free, penetrate without having yielded, or have yielded under an open gap."""
+        """Mark points that are free, that penetrate below H, or that have yielded although the gap is open."""
         found: tuple[float, ...] = _mark_working_set(p, u, h, d, self.highest, working)
         return found
 
@@ -52,12 +49,12 @@ class Bounded:
         return float(load), float(cut)
 
     def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, cells: Cells) -> None:
-        """Free pressures give back load; those that reach H by it stay there."""
+        """Scale free pressures of each cell, at most to H, and then all to the load."""
         _scale_cells(p, self.highest, cells, kept)
         self.rescale_to_load(slab, p, load, total)
 
     def rescale_to_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
-        """Scale free pressures. If they cannot make up for the load, mix all pressures with none, or with H."""
+        """Scale free pressures. If these cannot carry the load, mix all pressures with 0 or with H."""
         factor = 1.0
         for _ in range(MAX_PASSES):
             free, held = slab.sum(*_scale_free(p, factor, self.highest))
@@ -77,7 +74,7 @@ class Bounded:
         return float(kernels.sum_of(p))
 
     def next_set(self, x: Array, gap: Array, working: Set) -> Set:
-        """Points of the set that are free, others that penetrate without having yielded or have under an open gap."""
+        """Return free points of the set, and other points that penetrate below H or have yielded under an open gap."""
         return np.where(working, (x > 0.0) & (x < self.highest), np.where(x < self.highest, gap < 0.0, gap > 0.0))
 
 
@@ -98,8 +95,8 @@ def _sum_free(p, u, h, d, highest):
 
 @loop
 def _mark_working_set(p, u, h, d, highest, working):
-    """Mark the working set; sums of p times what is wrong with the gap, of the set and its gaps, of points that have
-    yielded and stay so; and the deepest penetration of those that have not."""
+    """Mark the working set. Return the sum of p |g| except where points yield with g <= 0; the number of points of the
+    set and their sum of g; the number of points that yield with g <= 0; and the largest -g of points below H."""
     wrong, count, gaps, held = 0.0, 0.0, 0.0, 0.0
     lowest = np.full(p.shape[1], np.inf)
     for j in range(p.shape[0]):
@@ -125,8 +122,9 @@ def _mark_working_set(p, u, h, d, highest, working):
 
 @loop
 def _advance(p_old, t, step, p, highest, cells, sums):
-    """`p = p_old - step t` between 0 and H; the sums over cells of free p, and beside them of what was added less what
-    was taken off. Returns the sum of p, and of what was added or taken off."""
+    """Put `p_old - step t`, limited to 0..H, into p; put the sums of free p over cells into the first half of `sums`,
+    and those of the limited minus the unlimited values into the second. Return the sum of p and of the magnitude of
+    this difference."""
     columns = sums.shape[1] // 2
     load, cut = 0.0, 0.0
     sums[:] = 0.0
@@ -157,7 +155,7 @@ def _scale_cells(p, highest, cells, factors):
 
 @loop
 def _scale_free(p, factor, highest):
-    """Scale each free pressure, up to H; the sums of those that are free, and of the others."""
+    """Scale each free pressure, at most to H. Return the sums of free pressures and of those at H."""
     free, held = 0.0, 0.0
     for j in range(p.shape[0]):
         row_free, row_held = 0.0, 0.0

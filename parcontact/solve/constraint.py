@@ -1,7 +1,7 @@
-"""Admissible pressures, and the conditions of contact that go with them.
+"""Admissible pressures and their conditions of contact.
 
-`Constraint` is all that the solvers ask, and all that the program knows of where surfaces touch. `NonNegative` is
-contact without adhesion. Another law is another class with these methods (`bounded`).
+`Constraint` is the interface that the solvers use; it alone decides where surfaces touch. `NonNegative` is contact
+without adhesion; `bounded` adds a hardness.
 """
 
 from typing import Any, NamedTuple, Protocol
@@ -13,14 +13,14 @@ from ..compiled import loop
 from ..parallel.slab import Array, Slab
 from . import kernels
 
-CELL = 16  # tuning: points along a side of a cell of `LocalLoad`; 8 and 32 need a few iterations more
+CELL = 16  # tuning: side of a cell of `LocalLoad` [points]
 Set = NDArray[np.bool_]
-Mask = NDArray[Any]  # a map that is not 0 at the points that are meant
+Mask = NDArray[Any]  # a map that is not 0 at the selected points
 
 
 class Cells(NamedTuple):
-    """Cells of `LocalLoad` on a rank: the `rows` and `columns` of points of each, and how many rows of the first one
-    another rank `above` has."""
+    """Cells of `LocalLoad` on a rank: each has `rows` x `columns` points, and `above` rows of the first one belong to
+    another rank."""
 
     rows: int
     above: int
@@ -28,50 +28,57 @@ class Cells(NamedTuple):
 
 
 class Constraint(Protocol):
-    """Admissible pressures p, and the conditions on the gap `g = u - h - d` beneath them.
+    """Admissible pressures p and the conditions on the gap `g = u - h - d`. Maps have the shape (rows of this rank,
+    nx).
 
-    Methods work on this rank's rows and return its partial sums, but for those with a `slab`, which are collective.
+    Methods return partial sums over the rows of this rank. Those with a parameter `slab` are collective.
     """
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """The lowest and the highest admissible pressure."""
+        """The lowest and the highest admissible pressure [unit of p]."""
 
     def touches(self, p: Array) -> Mask:
-        """Return where the surfaces touch under an admissible pressure: a map that is not 0 there, which may be p."""
+        """Return a map that is not 0 where the surfaces touch under an admissible pressure; it may be p itself."""
 
     def contact_sums(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
-        """Sums of p, p u, p g and p u^2; and of p and p g over the points that are free to move."""
+        """Return the sums of p, p u, p g and p u^2, and those of p and p g over points whose pressure is between the
+        bounds."""
 
     def mark_working_set(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
-        """Mark the working set: points that are free to move, or are not where they should be. Returns the sum of p
-        times what is wrong with g, the number of these points and their sum of g, the number of points that are held
-        under pressure, and the deepest penetration that is not allowed."""
+        """Mark the working set: points between the bounds, and points at a bound that violate its condition.
+
+        Return the sum of p times the violation of g; the number of points of the set and their sum of g; the number
+        of points held at a pressure; and the largest penetration that is not admissible.
+        """
 
     def advance(self, p_old: Array, t: Array, step: float, p: Array, cells: Cells, sums: Array) -> tuple[float, float]:
-        """`p = p_old - step t`, cut off at the bounds, which may be in the place of the old one; sums over cells of
-        free p, and beside them of what cutting off added (`LocalLoad`). Returns the sum of p, and how much was cut."""
+        """Put `p_old - step t`, limited to the bounds, into p, which may be `p_old`. Put into `sums`, cell by cell, the
+        sums of free p, followed by those of the pressure that limiting has added (`LocalLoad`). Return the sum of p
+        and of the added pressure."""
 
     def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, cells: Cells) -> None:
-        """Scale p in each cell by its share that is `kept`, which makes its sum `load`, and then to the sum `total`."""
+        """Multiply p in each cell by the share `kept`, which changes its sum from `load`, and scale it to the sum
+        `total`."""
 
     def rescale_to_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
-        """Make `total` the sum of an admissible p, which is `load`, not 0; p may be at its lower bound everywhere."""
+        """Scale an admissible p from the sum `load`, not 0, to the sum `total`; p may be at its lower bound
+        everywhere."""
 
     def clip(self, p: Array) -> float:
-        """Cut p off at the bounds; returns its sum."""
+        """Limit p to the bounds. Return its sum."""
 
     def next_set(self, x: Array, gap: Array, working: Set) -> Set:
-        """Points of a set where x is admissible, and others whose gap is not."""
+        """Return points of the set whose x is admissible, and other points whose gap violates its condition."""
 
 
 class NonNegative:
-    """`p >= 0`, `g >= 0`, `p g = 0`: surfaces that do not stick, and neither of which yields."""
+    """Hard contact without adhesion: `p >= 0`, `g >= 0`, `p g = 0`."""
 
     bounds = (0.0, np.inf)
 
     def touches(self, p: Array) -> Mask:
-        """The surfaces touch where there is a pressure."""
+        """Return p: the surfaces touch where there is pressure."""
         return p
 
     def contact_sums(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
@@ -79,7 +86,7 @@ class NonNegative:
         return load, work, gaps, squares, load, gaps
 
     def mark_working_set(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
-        """The working set is the contact, and the points that penetrate."""
+        """Mark points with pressure and points that penetrate."""
         wrong, count, gaps, deepest = mark_working_set(p, u, h, d, working)
         return wrong, count, gaps, 0.0, deepest
 
@@ -101,19 +108,21 @@ class NonNegative:
         return np.where(working, x > 0.0, gap < 0.0)
 
     def choose_active(self, x: Array, u: Array, h: Array, d: float, kappa: float, working: Set) -> tuple[float, ...]:
-        """Mark the next set of a method whose x is admissible only in the end: points with `x > kappa g`. Returns the
-        sums of x > 0, of -x < 0, of |x g|, the number of these points, how many others there are than before, and
-        max(-g)."""
+        """Mark the points with `x > kappa g`, where x need not be admissible (a primal-dual active set).
+
+        Return the sums of x > 0, of -x < 0 and of |x g|, the number of marked points, the number of points whose
+        mark has changed, and max(-g).
+        """
         found: tuple[float, ...] = choose(x, u, h, d, kappa, working)
         return found
 
 
 @loop
 def mark_working_set(p, u, h, d, working):
-    """Mark the working set: pressure, or penetration. With the gap `g = u - h - d`: sum of p |g|, over the working set
-    the count and the sum of g, and max(-g).
+    """Mark points with pressure or penetration. Return, with `g = u - h - d`, the sum of p |g|, the number of marked
+    points, their sum of g, and max(-g).
 
-    The lowest gap is kept for each column: that is as fast as a sum, which a single running minimum is not.
+    The lowest gap is kept for each column: a single running minimum would not be vectorized.
     """
     wrong, count, gaps = 0.0, 0.0, 0.0
     lowest = np.full(p.shape[1], np.inf)
@@ -136,10 +145,8 @@ def mark_working_set(p, u, h, d, working):
 
 @loop
 def advance(p_old, t, step, p, cells, sums):
-    """`p = max(p_old - step t, 0)`; the sums over cells of p, and beside them of what was added.
-
-    Rows of a cell are added up first, which is as fast as no sums at all.
-    """
+    """Put `max(p_old - step t, 0)` into p; put the sums of p over cells into the first half of `sums`, and those of
+    what was added into the second. Rows of a cell are added up first, so that the loop is vectorized."""
     columns = sums.shape[1] // 2
     load, cut = np.zeros(p.shape[1]), np.zeros(p.shape[1])
     sums[:] = 0.0
@@ -161,7 +168,7 @@ def advance(p_old, t, step, p, cells, sums):
 
 @loop
 def scale_cells(p, cells, factors):
-    """Scale each pressure by the factor of its cell."""
+    """Multiply each pressure by the factor of its cell."""
     line = np.empty(p.shape[1])
     for j in range(p.shape[0]):
         if j == 0 or (j + cells.above) % cells.rows == 0:
@@ -174,7 +181,7 @@ def scale_cells(p, cells, factors):
 
 @loop
 def clip(p):
-    """`p <- max(p, 0)`; returns the sum of p."""
+    """Put `max(p, 0)` into p. Return its sum."""
     load = 0.0
     for j in range(p.shape[0]):
         row = 0.0
@@ -188,8 +195,8 @@ def clip(p):
 
 @loop
 def choose(x, u, h, d, kappa, working):
-    """Mark points with `x > kappa g`; sums of x > 0, of -x < 0, of |x g|, of marked points and of those that
-    are others than before; and max(-g)."""
+    """Mark points with `x > kappa g`. Return the sums of x > 0, of -x < 0 and of |x g|, the numbers of marked points
+    and of changed marks, and max(-g)."""
     positive, negative, wrong, count, changed, deepest = 0.0, 0.0, 0.0, 0.0, 0.0, -np.inf
     for j in range(x.shape[0]):
         row_positive, row_negative, row_wrong = 0.0, 0.0, 0.0

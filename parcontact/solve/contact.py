@@ -1,37 +1,33 @@
-"""Frictionless contact of a body with a rigid surface: projected, preconditioned conjugate gradients.
+"""Frictionless contact of a body with a rigid surface by projected, preconditioned conjugate gradients.
 
-Find the pressure p of an `ny x nx` map that the constraint admits, such that the gap `g = A p - h - d` meets its
-conditions, with A a symmetric positive operator and either mean(p) = P0 (d unknown) or d given. For p that may not be
-negative (`constraint.NonNegative`) these are
+Find the admissible pressure p, an `ny x nx` map, whose gap `g = A p - h - d` meets the conditions of the constraint.
+A is symmetric and positive; either mean(p) = P0 is given and d unknown, or d is given. For `constraint.NonNegative`:
 
     p >= 0,   g >= 0,   p g = 0.
 
-It is the minimum of `f(p) = <p, A p>/2 - <p, h + d>` over the admissible p. One iteration, with `R` = keep the values
-on the working set and put 0 elsewhere, `C` = subtract the mean over it:
+The solution minimizes `f(p) = <p, A p>/2 - <p, h + d>` over the admissible p. With `R` = restrict to the working set
+and `C` = subtract the mean over it, one iteration is:
 
-1. the working set is what is free to move: the contact (p > 0) and the points that penetrate (g < 0), which enter by
-   the search direction itself;
-2. residual `r = C R g`, preconditioned `z = C R E' K E r` with K close to the inverse of A, and E carrying r on beyond
-   the set (`preconditioner`);
-3. direction `t = C R (z + beta t)` with a beta that makes it conjugate to the last one and makes up for what the last
-   step fell short of or went too far; or `t = z` where that is much less of a descent, or where much of the last step
-   was cut off;
-4. `p <- p - alpha t`, cut off at the bounds of p, with a step alpha that is nearly exact, the load that cutting off
-   adds taken back near by if it is much (`local_load`), then scaled to the mean P0; if p is bounded by a hardness that
-   is far less than the stiffness, shorter, so that few points go from one bound to the other at once;
-5. f must not rise: else the step is halved along this path, without the former, and the direction is forgotten.
+1. The working set consists of the contact (p > 0) and of the points that penetrate (g < 0).
+2. The residual is `r = C R g`, preconditioned `z = C R E' K E r`. K is close to the inverse of A, and E extends r
+   beyond the set (`preconditioner`).
+3. The direction is `t = C R (z + beta t)`. Here beta makes t conjugate to the last direction and corrects an inexact
+   last step. t = z where the former is a much smaller descent, or where much of the last step was cut off.
+4. `p <- p - alpha t`, limited to the bounds of p. Load that this adds is removed near by if it is large
+   (`local_load`), and p is scaled to the mean P0. If the hardness is far below the stiffness, alpha is limited, so
+   that few points change from one bound to the other.
+5. f must not rise. Otherwise the step is halved, p is only scaled, and the direction is forgotten.
 
-The exact step would be `<r, t>/<t, A t>`, for one more application of the operator in each iteration. It is 0.95 within
-0.03 at 0.4 to 60 % of contact, where K E is nearly the inverse, and 1 in full contact. Afterwards `A p` is known anyway
-and `<t, A t>` with it: if the step differs from the exact one by more than a quarter (in a box with nothing around, by
-a factor of two), or steps do not help, the rest of the solve makes exact ones. On lines of points, and with cells much
-longer than wide, all are exact.
+The exact step `<r, t>/<t, A t>` needs one more application of the operator. As K E is nearly the inverse of A, a
+fixed step near 1 replaces it. `A p` of the next iterate gives `<t, A t>`: if the exact step differs by more than
+MAX_STEP_RATIO, or the certificate no longer falls, the rest of the solve makes exact steps. On lines of points and
+on cells much longer than wide, all steps are exact.
 
-With d given there is neither centring nor scaling. With P0 given, d is the mean of `A p - h` over free points, weighted
-by p, so that `<p, g> = 0`: scaling p then does not change f to first order, and cutting t off at a bound, which a small
-step does only where g points beyond it, only helps. Thus f falls for every step that is small enough (D. P. Bertsekas,
-SIAM J. Control Optim. 20 (1982) 221, for d given). The unpreconditioned ancestor is I. A. Polonsky and L. M. Keer, Wear
-231 (1999) 206; K makes the number of iterations nearly independent of the grid. Everything here is dimensionless.
+With d given, nothing is centred or scaled. With P0 given, d is the mean of `A p - h` over free points, weighted by
+p, so that `<p, g> = 0` and scaling p does not change f to first order. Thus f falls for every sufficiently small
+step (D. P. Bertsekas, SIAM J. Control Optim. 20 (1982) 221, for d given). Without K this is the method of I. A.
+Polonsky and L. M. Keer, Wear 231 (1999) 206; with K the number of iterations hardly depends on the grid. All numbers
+are dimensionless.
 """
 
 import math
@@ -52,30 +48,28 @@ from .problem import Problem
 from .workspace import Workspace
 
 # tuning
-MAX_STALLED_ITERATIONS = 60  # iterations without a better certificate after which a solve gives up
-MAX_STALLED_IN_SINGLE = 12  # the same with displacements in single precision, of which double may lead on
-MAX_HALVINGS = 12  # of a step that raises f; then it is taken as it is
-STEP = 0.95  # beside edges of contact, and 1 far from them
-MAX_STEP_RATIO = 1.25  # of the exact step over the one made, or its inverse: beyond it, steps are exact from then on
-MAX_STEP_RATIO_FREE = (
-    2.0  # the same in a box with nothing around, at whose edges K is less near to the inverse; on thin layers
-)
-ITERATIONS_UNTIL_EXACT_STEPS = 5  # without a better certificate
-LEAST_DESCENT = 0.5  # over that without the last direction: with less it is one of a set of points that is no more
-REACH = 4.0  # times the highest pressure: no step that is not cut off moves a pressure further
-LARGE_CUT = 0.003  # of the load: if more is cut off a step at the bounds, the next one takes no notice of its direction
+MAX_STALLED_ITERATIONS = 60  # limit on iterations without a smaller certificate
+MAX_STALLED_IN_SINGLE = 12  # the same with displacements in single precision; double precision is tried next
+MAX_HALVINGS = 12  # limit on halvings of a step that raises f; the last one is accepted
+STEP = 0.95  # fixed step at small contact areas; it tends to 1 in full contact
+MAX_STEP_RATIO = 1.25  # limit on exact step/step made and its inverse; beyond it all further steps are exact
+MAX_STEP_RATIO_FREE = 2.0  # the same in a free box and on layers, where K is less close to the inverse
+ITERATIONS_UNTIL_EXACT_STEPS = 5  # iterations without a smaller certificate after which steps are exact
+LEAST_DESCENT = 0.5  # least slope along t over that along z; below it the last direction is forgotten
+REACH = 4.0  # largest change of a pressure in one step, over the highest admissible pressure
+LARGE_CUT = 0.003  # share of the load; if more is cut off, the direction is forgotten
 # accuracy
-ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # of <p, A p>/2: a smaller rise of f cannot be told from none
-LEAST_LOAD = float(np.finfo(np.float64).tiny)  # a smaller one than maps can hold is none
+ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # share of <p, A p>/2 below which a rise of f is rounding
+LEAST_LOAD = float(np.finfo(np.float64).tiny)  # least mean pressure that maps can represent; less counts as none
 NOT_FINITE = "met numbers that are not finite"
 
 
 @dataclass(frozen=True)
 class Contact:
-    """A solved (or given up) contact, maps of shape (rows of this rank, nx).
+    """A contact, solved or given up. Maps have the shape (rows of this rank, nx).
 
-    `p` is the map that was given as the start, the caller's own; `u = A p` is the solver's, valid until its next solve.
-    `failure` is empty, or says what the solve did instead of reaching the tolerance.
+    `p` is the map that was given as the start. `u = A p` belongs to the solver and is valid until its next solve.
+    `failure` is empty, or states why the tolerance was not reached.
     """
 
     p: Array
@@ -91,12 +85,12 @@ class Contact:
 
 
 class ContactSolver:
-    """Loop for contacts on one grid.
+    """Solver for contacts on one grid.
 
-    Parameters: the `workspace` that it works in; `height` of the surface from its lowest to its highest point, in the
-    unit of h; `tolerance` on the certificate; `max_iterations`; `grids` of larger cells by which a residual is extended
-    (`extension.grids_for`); whether the box is `free`, with nothing around; the `long_waves` of a layer, for which K
-    is not stiff enough.
+    Parameters: `workspace`, the maps it works in; `height` of the surface, from its lowest to its highest point
+    [unit of h]; `tolerance` on the certificate; `max_iterations`; `grids` of larger cells for the extension of
+    residuals (`extension.grids_for`); `free`, True for a box with nothing around it; `long_waves` of a layer, for
+    which K is not stiff enough.
     """
 
     def __init__(
@@ -113,18 +107,18 @@ class ContactSolver:
         self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
         extended = ExtendedPreconditioner(self.slab, larger=grids)
         self._extended: ExtendedPreconditioner | LongWavePreconditioner = extended
-        self._rough_inverse = grids.most == 0 or min(self.slab.nx, self.slab.ny) == 1  # K E is only roughly the inverse
+        self._rough_inverse = grids.most == 0 or min(self.slab.nx, self.slab.ny) == 1  # K E is far from the inverse
         if long_waves is not None and not self._rough_inverse:
             self._extended = LongWavePreconditioner(self.slab, long_waves, extended)
         self._most_ratio = MAX_STEP_RATIO_FREE if free or long_waves is not None else MAX_STEP_RATIO
         self._local_load = LocalLoad(self.slab)
 
     def solve(self, problem: Problem, start: Array, tolerance: float | None = None) -> Contact:
-        """Solve from the pressure `start`, which is admissible and in whose place the solution will be; collective.
+        """Solve from the admissible pressure `start`, which is overwritten by the solution; collective.
 
-        Under load control the start is scaled to the load, or uniform where it is zero everywhere. The `tolerance`
-        is the solver's own unless it is given. A solve that does not reach it says why in `failure`; its maps are then
-        the last iterate, not a solution.
+        Under load control the start is scaled to the load, or replaced by a uniform pressure if it is 0 everywhere.
+        `tolerance` replaces that of the solver. If it is not reached, `failure` states why, and the maps hold the
+        last iterate.
         """
         mean = problem.mean
         if mean is not None and 0.0 <= mean < LEAST_LOAD:
@@ -155,8 +149,8 @@ class ContactSolver:
                 slope = 0.0
 
     def check(self, problem: Problem, p: Array, otherwise: str) -> Contact:
-        """The admissible pressure p, scaled to the load, as it is; `otherwise` is its failure unless it solves the
-        problem; collective."""
+        """Scale the admissible pressure p to the load and certify it. The contact has the failure `otherwise` unless p
+        solves the problem; collective."""
         iterate = self._begin(problem, p)
         *_, certificate = self._certify(problem, p, iterate)
         failure = "" if certificate.worst <= self.tolerance else otherwise
@@ -165,7 +159,7 @@ class ContactSolver:
     # -- the steps of a solve ------------------------------------------------------------------------------------------
 
     def _begin(self, problem: Problem, p: Array) -> Iterate:
-        """Give the start its load and forget the last solve's direction."""
+        """Scale the start to the load and forget the direction of the last solve."""
         self.workspace.direction.fill(0.0)
         if problem.mean is not None:
             load = self.slab.sum(kernels.sum_of(p))[0]
@@ -177,18 +171,18 @@ class ContactSolver:
         return self._form_iterate(problem, p, 0.0 if problem.mean is not None else problem.control.value)
 
     def _form_iterate(self, problem: Problem, p: Array, d: float) -> Iterate:
-        """A pressure in numbers, for the approach d or the one that suits it."""
+        """Return the sums of a pressure, for the approach d or, under a load, the approach that it determines."""
         iterate = form_iterate(self.slab, problem.constraint, p, self.workspace.displacement, problem.heights, d)
         return iterate if problem.mean is None else iterate.settled()
 
     def _certify(self, problem: Problem, p: Array, iterate: Iterate) -> tuple[float, float, Certificate]:
-        """Mark the working set; its size, its sum of gaps, and the certificate."""
+        """Mark the working set. Return its size, its sum of gaps, and the certificate."""
         u, working = self.workspace.displacement, self.workspace.working
         constraint, h, mean = problem.constraint, problem.heights, problem.mean
         return certify(self.slab, constraint, p, u, h, iterate, mean, self.height, working)
 
     def _verdict(self, worst: float, tolerance: float, iteration: int, best: float, best_at: int) -> str | None:
-        """None: go on; empty: solved; else what happened instead."""
+        """Return None to continue, an empty string if solved, else why the solve has failed."""
         if worst <= tolerance:
             return ""
         if not np.isfinite(worst):
@@ -203,10 +197,10 @@ class ContactSolver:
         return None
 
     def _turn(self, problem: Problem, level: float, slope: float, members: float, free: Array) -> tuple[float, float]:
-        """Make the new search direction; returns its slope `<r, t>`, and the exact step over the last one.
+        """Make the new search direction. Return its slope `<r, t>`, and the exact step over the last step made.
 
-        The residual is `u - h - level` on the working set. `slope` is that of the last direction, 0 for one to be
-        forgotten. There is a map that is `free`.
+        The residual is `u - h - level` on the working set. `slope` is that of the last direction; 0 forgets it. The
+        map `free` is overwritten.
         """
         work, h = self.workspace, problem.heights
         u, t, working = work.displacement, work.direction, work.working
@@ -217,7 +211,7 @@ class ContactSolver:
         sum_z, sum_t, sum_change, r_z, change_z, r_t = self.slab.sum(*sums)
         centred = problem.mean is not None
         mean_z, mean_t = (sum_z / members, sum_t / members) if centred else (0.0, 0.0)
-        beta, ratio, fallen = 0.0, 1.0, slope - r_t  # by how much the slope along the last direction fell in its step
+        beta, ratio, fallen = 0.0, 1.0, slope - r_t  # decrease of the slope along the last direction
         if slope > 0.0:
             ratio = slope / fallen if fallen > 0.0 else math.inf
             beta = (max(0.0, change_z - mean_z * sum_change) + r_t) / fallen if fallen > 0.0 else 0.0
@@ -229,9 +223,12 @@ class ContactSolver:
     def _descend(
         self, problem: Problem, old_p: Array, old: Iterate, usual: float | None, slope: float, p: Array
     ) -> tuple[Iterate, float]:
-        """Make the usual step from `old_p` against the direction to p, or the exact one, and keep the old displacement
-        as the other one; returns the new iterate and how much of its load was cut off at the bounds, infinity where the
-        step was halved."""
+        """Make a step of length `usual`, or the exact step if it is None, from `old_p` to p. The old displacement
+        becomes the other one.
+
+        Return the new iterate and the share of its load that was cut off at the bounds, infinite if the step was
+        halved.
+        """
         work, constraint, mean = self.workspace, problem.constraint, problem.mean
         step = usual if usual is not None else self._exact(problem, slope)
         if constraint.bounds[1] < math.inf:
@@ -252,18 +249,17 @@ class ContactSolver:
         return new if mean is None else new.settled(), cut / load if halvings == 0 and load > 0.0 else math.inf
 
     def _largest(self, t: Array) -> float:
-        """The largest size of a map; collective."""
+        """Return the largest magnitude of a map; collective."""
         return max(self.slab.reduce((), [float(t.max(initial=0.0)), -float(t.min(initial=0.0))]))
 
     def _exact(self, problem: Problem, slope: float) -> float:
-        """The step that makes f the smallest, for a slope along the direction; by one more application of the
-        operator."""
+        """Return the step that minimizes f along the direction, by one application of the operator."""
         t, image = self.workspace.direction, self.workspace.other_displacement
         curvature = self.slab.sum(loops.dot(t, problem.operator.apply(t, image)))[0]
         return slope / curvature if curvature > 0.0 else 0.0
 
     def _separate(self, problem: Problem, p: Array) -> Contact:
-        """No load: no pressure, the surface just touches the body."""
+        """Return the contact without load: no pressure, and a surface that just touches the body."""
         p.fill(0.0)
         self.workspace.displacement.fill(0.0)
         highest = self.slab.reduce((), [float(problem.heights.max(initial=-np.inf))])[0]

@@ -1,15 +1,16 @@
-"""A dilute contact in a free box, solved on the tiles that may touch: its cost follows the contact, not the box.
+"""A dilute contact in a free box, solved on the tiles that may touch: the cost follows the contact, not the box.
 
-A coarser grid has told where contact is, and about how deep: with its pressure p on a grid of blocks and the
-displacement u that this causes there, a block can touch only if its highest point is near the rigid approach,
+The contact on a coarser grid gives a pressure p on a grid of blocks, and p gives the displacement u there. A block
+can touch only if
 
     u - max(h) - d < MARGIN L,
 
-with L the length by which u varies within the contact (`certificate.Certificate`). Tiles with such blocks, or with
-pressure, or beside one, are stacked to a map of their own, on which `contact.ContactSolver` solves the same problem
-with operators on tiles (`physics.tile_operator`). These give the displacement at all points of the grid, too, by which
-`contact.ContactSolver.check` sees whether the pressure holds everywhere. To less than FINEST, or if it does not, the
-operator of the whole grid judges it, and the solve goes on from there. Root solves and tells the others.
+with L the length by which u varies within the contact (`certificate.Certificate`). Tiles that hold such blocks,
+pressure or neighbours of these are stacked to one map. There `contact.ContactSolver` solves the same problem with
+operators on tiles (`physics.tile_operator`). These also give the displacement at all points of the grid, so that
+`contact.ContactSolver.check` can check the pressure everywhere. For tolerances below FINEST, or if the check fails,
+the operator of the whole grid checks the pressure, and the solve continues on the whole grid. Root solves and sends
+the result to all ranks.
 """
 
 from collections.abc import Callable
@@ -28,21 +29,21 @@ from .contact import Contact, ContactSolver
 from .preconditioner.extension import Grids
 from .problem import Control, MeanPressure, Operators, Problem
 
-MARGIN = 0.1  # tuning: of the length, by which a block may be off
-LARGEST_SHARE = 0.25  # tuning: of the points of a grid: on more tiles, solving on all points is as fast
-BLOCKS = 256  # points along the longer side of the grid of blocks, at most, unless tiles have fewer than one
-LARGER_CELLS = Grids(2)  # tuning: of solvers on tiles; still larger cells would be those of tiles far apart
-SHARE = 0.5  # of a tolerance, to which tiles are solved: the whole grid has to agree
-LEAST = 1e-7  # accuracy: tolerance: beyond it operators on tiles have no more digits
-FINEST = 1e-5  # accuracy: tolerance: to less the operator of the whole grid judges, of which tiles are off by 2e-7
+MARGIN = 0.1  # tuning: gap up to which a block may touch, over L
+LARGEST_SHARE = 0.25  # tuning: largest share of the points of a grid that is solved on tiles
+BLOCKS = 256  # largest number of blocks along the longer side, unless there are more tiles
+LARGER_CELLS = Grids(2)  # tuning: grids of larger cells on tiles; larger cells would mix tiles far from each other
+SHARE = 0.5  # tolerance of a solve on tiles over that of the solve on the whole grid
+LEAST = 1e-7  # accuracy: least tolerance on tiles, set by the rounding of their operators
+FINEST = 1e-5  # accuracy: least tolerance that operators on tiles can check; their error is 2e-7
 
-# from tiles and a tolerance, with the body's operator and a preconditioner
+# makes a solver, the operator and a preconditioner from tiles and a tolerance
 SolverOnTiles = Callable[[Tiles, float], tuple[ContactSolver, TileOperator, TileConvolution]]
 
 
 @dataclass(frozen=True)
 class Found:
-    """A contact on a grid: pressure on the rows of this rank, approach, and how much displacements vary in it."""
+    """Contact on a grid: pressure on the rows of this rank, approach, and the length L of its certificate."""
 
     slab: Slab
     p: Array
@@ -51,7 +52,7 @@ class Found:
 
 
 def is_block_grid(slab: Slab, finest: Slab) -> bool:
-    """Return whether a grid is coarse enough to be one of blocks, but each in a single tile of the finest grid."""
+    """Return whether a grid is coarse enough for blocks, each within one tile of the finest grid."""
     longest = max(slab.nx, slab.ny)
     return longest <= max(BLOCKS, max(finest.nx, finest.ny) // SIDE)
 
@@ -59,8 +60,10 @@ def is_block_grid(slab: Slab, finest: Slab) -> bool:
 def choose_tiles(
     blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array, constraint: Constraint
 ) -> Tiles | None:
-    """Return the tiles of a grid that may touch, from the contact on the next coarser one; None where these are none,
-    or more than LARGEST_SHARE of all; collective."""
+    """Return the tiles of a grid that may touch, given the contact `below` on the next coarser grid; collective.
+
+    Return None if there are none, or if they have more than LARGEST_SHARE of the points.
+    """
     most = LARGEST_SHARE * slab.points / SIDE**2
     p = below.p if below.slab is blocks else regrid.restrict(below.slab, blocks, below.p)
     touching = constraint.touches(p) != 0.0
@@ -73,7 +76,7 @@ def choose_tiles(
 
 
 def _tiles_with(blocks: Slab, near: NDArray[np.bool_], slab: Slab) -> Tiles:
-    """The tiles of a grid with blocks that are near contact, or beside such a block; collective."""
+    """Return the tiles of a grid that hold selected blocks or their neighbours; collective."""
     whole = blocks.to_root(np.where(near, 1.0, 0.0))
     tiles = on_root(slab.comm, lambda: None if whole is None else _tiles_of(whole > 0.0, slab))
     assert tiles is not None
@@ -96,7 +99,7 @@ def _tiles_of(near: NDArray[np.bool_], slab: Slab) -> Tiles:
 
 
 class OnTheseTiles:
-    """A problem on tiles of a grid, and its solution; root has the operators."""
+    """A problem on tiles of a grid, and its solution. Only root has the operators."""
 
     def __init__(self, tiles: Tiles, solver_on: SolverOnTiles, problem: Problem, slab: Slab, height: float) -> None:
         self._tiles, self._solver_on, self._problem, self._slab = tiles, solver_on, problem, slab
@@ -105,7 +108,7 @@ class OnTheseTiles:
         self._stacked: Array = np.empty(0)
 
     def solve(self, tolerance: float, p: Array) -> Found:
-        """Solve it from the pressure p, in whose place the solution will be; collective."""
+        """Solve from the pressure p, which is overwritten by the solution; collective."""
         slab, tiles, problem = self._slab, self._tiles, self._problem
         lowest = -slab.reduce((), [-float(problem.heights.min(initial=np.inf))])[0]
         heights, start = (_stacked(slab, tiles, each) for each in (problem.heights, p))
@@ -124,16 +127,19 @@ class OnTheseTiles:
         return Found(slab, p, d, length)
 
     def check(self, solver: ContactSolver, p: Array) -> Contact | None:
-        """The contact of the solution p, if it holds at all points to the solver's tolerance, None also where the
-        operator of the whole grid is to judge; collective."""
+        """Return the contact of the solution p if it satisfies the solver's tolerance at all points, else None;
+        collective.
+
+        Below the tolerance FINEST it is None, too: the operator of the whole grid is needed to check p.
+        """
         if solver.tolerance < FINEST:
             return None
         self._displace(solver.workspace.displacement)
-        contact = solver.check(replace(self._problem, operator=_Displaced()), p, "does not hold beside the tiles")
+        contact = solver.check(replace(self._problem, operator=_Displaced()), p, "fails next to the tiles")
         return contact if contact.converged else None
 
     def _displace(self, u: Array) -> None:
-        """Put the displacement under the solution into the rows of a map; collective."""
+        """Put the displacement of the solution into u; collective."""
         comm = self._slab.comm
 
         def take(rank: int, rows: Array) -> None:
@@ -151,19 +157,19 @@ class OnTheseTiles:
 
 
 class _Displaced:
-    """The operator where the map that it is to fill has the displacement already."""
+    """Operator for a map that already holds the displacement."""
 
     def apply(self, _: Array, out: Array) -> Array:
         return out
 
 
 def _on_part(control: Control, share: float) -> Control:
-    """The same load on so many times fewer points."""
+    """Return the control for the same load on a grid with `share` times the points."""
     return MeanPressure(control.value * share) if isinstance(control, MeanPressure) else control
 
 
 def _bury(heights: Array, tiles: Tiles, deep: float) -> None:
-    """Put points of tiles beyond the end of the grid so deep that they do not touch."""
+    """Put points of tiles beyond the end of the grid at the height `deep`, so that they do not touch."""
     nx, ny = tiles.points
     places = np.arange(SIDE)
     beyond_x = tiles.columns[:, None] * SIDE + places >= nx
@@ -172,7 +178,7 @@ def _bury(heights: Array, tiles: Tiles, deep: float) -> None:
 
 
 def _parts(slab: Slab, tiles: Tiles) -> list[tuple[tuple[slice, slice], tuple[slice, slice]]]:
-    """For each tile, where this rank's part of it is in the stacked map and in that of its rows."""
+    """Return, for each tile, the slices of the rows of this rank in the stacked map and in the map of the slab."""
     parts = []
     for number, (row, column) in enumerate(zip(tiles.rows.tolist(), tiles.columns.tolist(), strict=True)):
         top, left = row * SIDE, column * SIDE
@@ -187,7 +193,7 @@ def _parts(slab: Slab, tiles: Tiles) -> list[tuple[tuple[slice, slice], tuple[sl
 
 
 def _stacked(slab: Slab, tiles: Tiles, field: Array) -> Array | None:
-    """The stacked map of tiles on root, 0 beyond the end of the grid; None on other ranks; collective."""
+    """Return the stacked map of tiles on root, 0 beyond the end of the grid, and None on other ranks; collective."""
     own = allocate(tiles.shape, np.float64, slab.tally)
     own.fill(0.0)
     for there, here in _parts(slab, tiles):
@@ -200,7 +206,7 @@ def _stacked(slab: Slab, tiles: Tiles, field: Array) -> Array | None:
 
 
 def _unstack(slab: Slab, tiles: Tiles, stacked: Array, field: Array) -> None:
-    """Put a stacked map that all ranks have into the rows of this one, 0 outside the tiles."""
+    """Copy the rows of this rank from a stacked map that all ranks have; 0 outside the tiles."""
     field.fill(0.0)
     for there, here in _parts(slab, tiles):
         field[here] = stacked[there]

@@ -1,4 +1,4 @@
-"""An iterate of the contact solver in numbers, and how wrong it is."""
+"""Sums over an iterate of the contact solver, and its errors."""
 
 import math
 from dataclasses import dataclass, replace
@@ -10,17 +10,17 @@ from ..parallel.slab import Array, Slab
 from .certificate import Certificate
 from .constraint import Constraint
 
-LEAST_SHARE = 0.1  # accuracy: of the mean displacement under pressure: gaps are never compared with less
-LEAST_HEIGHT = 1e-9  # accuracy: of the height of the surface, the same: for displacements that are only rounding
+LEAST_SHARE = 0.1  # accuracy: least length that gaps are compared with, over the mean displacement under pressure
+LEAST_HEIGHT = 1e-9  # accuracy: the same, over the height of the surface, where displacements are only rounding
 
 
 @dataclass(frozen=True)
 class Iterate:
-    """An iterate in numbers, for an approach d: the sums of p, of `p (A p)^2` and of p g, the sums of p and of p g
-    over points that are free to move, and `energy = <p, A p>/2`.
+    """Sums over an iterate at the approach d: of p, of p g, `energy = <p, A p>/2`, of `p (A p)^2`, and of p and p g
+    over free points.
 
-    Where no point is free, `between` is the lowest and the highest approach for which no point has to move, or the
-    other way round if there is none.
+    If no point is free, `between` holds the lowest and the highest approach at which no pressure changes; the first
+    is larger than the second if there is none.
     """
 
     d: float
@@ -34,14 +34,14 @@ class Iterate:
 
     @property
     def f(self) -> float:
-        """`<p, A p>/2 - <p, h + d>`, with `h + d = A p - g`: no large numbers where h has a large offset."""
+        """`<p, A p>/2 - <p, h + d>`, by `h + d = A p - g`, which avoids large numbers where h has a large offset."""
         return self.gaps - self.energy
 
     def settled(self) -> "Iterate":
-        """The same iterate, for the d at which `<p, g> = 0` over free points, but for the rounding of d.
+        """Return the iterate at the approach d for which `<p, g> = 0` over free points, to rounding.
 
-        If none is free it is the middle of `between`, or, with all pressures at one bound, the d for all points.
-        Without any pressure it stays.
+        If none is free, d is the mean of `between`, or that for all points if all pressures are at one bound.
+        Without pressure d does not change.
         """
         if self.between is not None:
             d = 0.5 * sum(self.between)
@@ -53,7 +53,7 @@ class Iterate:
         return replace(self, d=d, gaps=self.gaps - (d - self.d) * self.load, free_gaps=rest)
 
     def length(self, height: float) -> float:
-        """The length that gaps are compared with (`Certificate`), from LEAST_HEIGHT of the surface's height to all."""
+        """Return the length that gaps are compared with (`Certificate`), between LEAST_HEIGHT and 1 times `height`."""
         least = LEAST_HEIGHT * height
         if self.load <= 0.0:
             return least
@@ -73,9 +73,10 @@ def certify(
     height: float,
     working: NDArray[np.bool_],
 ) -> tuple[float, float, Certificate]:
-    """Mark the working set of a pressure and its image u; its size, its sum of gaps, and the certificate; collective.
+    """Mark the working set of a pressure p with the image u. Return its size, its sum of gaps, and the certificate;
+    collective.
 
-    `mean` is the mean pressure asked for, None with a given approach; `height` is that of the surface.
+    `mean` is the prescribed mean pressure, None with a given approach; `height` is that of the surface.
     """
     *sums, deepest = constraint.mark_working_set(p, u, h, iterate.d, working)
     wrong, members, excess, held, deepest = slab.reduce(sums, [deepest])
@@ -87,15 +88,18 @@ def certify(
 
 
 def form_iterate(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array, d: float) -> Iterate:
-    """A pressure and its image u in numbers, for an approach d; collective."""
+    """Return the sums over a pressure p and its image u at the approach d; collective."""
     load, work, gaps, squares, free_load, free_gaps = slab.sum(*constraint.contact_sums(p, u, h, d))
     between = _approaches(slab, constraint, p, u, h) if free_load <= 0.0 < load else None
     return Iterate(d, load, gaps, 0.5 * work, squares, free_load, free_gaps, between)
 
 
 def _approaches(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array) -> tuple[float, float] | None:
-    """Return `Iterate.between`: all pressures are at a bound, and the gaps of those at the upper one are at most 0, of
-    the others at least 0; None if no pressure is at one of the bounds; collective."""
+    """Return `Iterate.between` for pressures that are all at a bound; None if one of the bounds has no points;
+    collective.
+
+    Gaps of points at the upper bound must be <= 0, all others >= 0.
+    """
     level, yields = u - h, p >= constraint.bounds[1]
     lowest = float(level.max(where=yields, initial=-np.inf))
     highest = float(level.min(where=~yields, initial=np.inf))

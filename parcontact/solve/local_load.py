@@ -1,12 +1,10 @@
-"""The load that cutting off pressures at their bounds adds, taken back near by.
+"""Removal of the load that limiting pressures to their bounds adds, near the points where it was added.
 
-A step makes pressures at the edges of contact negative, and 0 in their place adds load there. If all pressures were
-scaled by one factor to take it back, every spot would be lifted or lowered by its share of waves as long as the box: by
-much more, on a large grid, than the gaps are beside an edge, so that points penetrate along all edges, enter, and are
-cut off again. So each cell of CELL x CELL points gives back what was added in it, which changes the displacement near
-by only. From a cold start on 4096 x 4096 points that makes 22 of 57 applications of the operator. Where points are
-nearer along one direction, cells have fewer points along the other and are about square: in longer ones spots give back
-what others added, and projected steps towards a steady state may cycle.
+A step makes pressures at edges of contact negative; putting them to 0 adds load. Scaling all pressures by one factor
+would remove it, but waves as long as the box would move every spot by more than the gaps at its edge, and points
+would penetrate again. So each cell of CELL x CELL points loses what was added in it, which changes the displacement
+only near by. Where points are closer along one direction, cells have fewer points along the other, so that they are
+about square: in long cells, one spot would lose what another has gained, and projected steps may cycle.
 """
 
 from itertools import pairwise
@@ -17,16 +15,16 @@ from ..parallel.regrid import fetch
 from ..parallel.slab import Array, Slab
 from .constraint import CELL, Cells, Constraint
 
-LEAST_CUT = 3e-4  # tuning, of the load: less disturbs no long wave, and is better taken from all points alike
-LEAST = 4  # tuning: points along a side of a cell; with fewer, as on cells of 16 : 1, contacts may cycle
-MOST_GIVEN_BACK = 0.5  # tuning, of the load of a cell: more is not taken from it
+LEAST_CUT = 3e-4  # tuning: share of the load; less added load is removed by one factor for all points
+LEAST = 4  # tuning: least side of a cell [points]; contacts may cycle with fewer
+MOST_GIVEN_BACK = 0.5  # tuning: largest share of its load that a cell loses
 
 
 class LocalLoad:
-    """Cells of one grid, the same on any number of ranks; it holds no maps."""
+    """Cells of one grid, the same on any number of ranks. It holds no maps."""
 
     def __init__(self, slab: Slab, pairs: int = 0) -> None:
-        """On a grid where so many `pairs` make square cells (`preconditioner.levels`)."""
+        """Make cells on a grid where `pairs` doublings make cells square (`preconditioner.levels`)."""
         self._slab = slab
         if slab.only_counts:
             return
@@ -44,14 +42,16 @@ class LocalLoad:
         self._sums = np.zeros(self._stack.shape)
 
     def advance(self, constraint: Constraint, p_old: Array, t: Array, step: float, p: Array) -> tuple[float, float]:
-        """`p = p_old - step t`, cut off at the bounds, which may be in the place of the old one; returns the sum of p
-        and how much was cut off; collective."""
+        """Put `p_old - step t`, limited to the bounds, into p, which may be `p_old`. Return the sum of p and of the
+        added pressure; collective."""
         load, cut = self._slab.sum(*constraint.advance(p_old, t, step, p, self._cells, self._sums))
         return load, cut
 
     def restore(self, constraint: Constraint, p: Array, load: float, total: float, near_by: bool) -> None:
-        """Make `total` the sum of p, which is `load` since it was advanced: what was added is first taken back
-        `near_by`, from the pressure of the same cell, but at most MOST_GIVEN_BACK of it; collective."""
+        """Scale p from the sum `load`, as `advance` returned it, to the sum `total`; collective.
+
+        If `near_by`, each cell first loses what was added in it, at most MOST_GIVEN_BACK of its load.
+        """
         loads = np.split(self._sums, 2, axis=1)[0]
         shares = np.zeros_like(loads)
         if near_by:
@@ -60,19 +60,19 @@ class LocalLoad:
         constraint.restore(self._slab, p, load, total, 1.0 - shares, self._cells)
 
     def _complete(self, own: Array) -> Array:
-        """The sums over whole cells, of those that this rank has points of."""
+        """Return sums over whole cells, for cells with points on this rank."""
         parts = fetch(self._stack, own, self._wanted)
         return np.add.reduceat(parts, self._starts, axis=0) if len(parts) else parts
 
 
 def _rows_of_cells(part: slice, rows: int) -> slice:
-    """The rows of cells, of so many rows of points, that some rows of points belong to."""
+    """Return the rows of cells that contain given rows of points, for cells of `rows` rows."""
     start = part.start // rows
     return slice(start, max(-(-part.stop // rows), start) if part.stop > part.start else start)
 
 
 def _shares(sums: Array) -> Array:
-    """The share of its load that each cell gives back, from the loads and the cuts."""
+    """Return the share of its load that each cell loses, from its load and the added pressure."""
     loads, cuts = np.split(sums, 2, axis=1)
     return np.clip(
         np.divide(cuts, loads, out=np.zeros_like(loads), where=loads > 0.0), -MOST_GIVEN_BACK, MOST_GIVEN_BACK

@@ -1,4 +1,5 @@
-"""Nested grids: a contact is solved on the coarsest grid first, and the next finer one starts from what was found."""
+"""Nested grids: a contact is solved on the coarsest grid first, and each solution is the start on the next
+finer grid."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,14 +13,14 @@ from ..parallel.slab import Array, Slab
 
 @dataclass(frozen=True)
 class Level:
-    """One grid: who owns which rows, and the heights on it."""
+    """One grid: its slab and the heights on it."""
 
     slab: Slab
     heights: Array
 
 
 def coarser_levels(slab: Slab, heights: Array) -> list[Level]:
-    """A grid and all coarser ones, the finest first; collective."""
+    """Return a grid and all coarser ones, the finest first; collective."""
     levels = [Level(slab, heights)]
     while (coarse := regrid.coarser(levels[-1].slab)) is not None:
         levels.append(Level(coarse, regrid.restrict(levels[-1].slab, coarse, levels[-1].heights)))
@@ -27,7 +28,7 @@ def coarser_levels(slab: Slab, heights: Array) -> list[Level]:
 
 
 class OnGrid(Protocol):
-    """Whatever is known of a level, at least its grid."""
+    """An object that belongs to a grid."""
 
     @property
     def slab(self) -> Slab: ...
@@ -37,9 +38,10 @@ L = TypeVar("L", bound=OnGrid)
 
 
 def descend(levels: Sequence[L], solve: Callable[[L, Array], Array], start: Array) -> None:
-    """Put a start for the finest grid into `start`: the solution on the next coarser one, 0 if there is none.
+    """Put a start for the finest grid into `start`: the solution on the next coarser grid, or 0 if there is none.
 
-    `solve(level, start)` returns the pressure on a level; the next starts from 0 if it is not finite. Collective.
+    `solve(level, start)` returns the pressure on a level. If it is not finite, the next level starts from 0.
+    Collective.
     """
     below: tuple[L, Array] | None = None
     for level in reversed(levels):

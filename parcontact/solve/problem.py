@@ -1,4 +1,4 @@
-"""A contact problem, as solvers are given it."""
+"""Contact problem, the input of solvers."""
 
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -8,13 +8,13 @@ from .constraint import Constraint
 
 
 class Operator(Protocol):
-    """A linear map from maps to maps, which may be the same one; applying it is collective."""
+    """Linear map of fields; `out` may be `field`. Applying it is collective."""
 
     def apply(self, field: Array, out: Array) -> Array: ...
 
 
 class Operators(NamedTuple):
-    """The operator A of a body on one grid, pressure to displacement, and a preconditioner K close to its inverse."""
+    """Operator A of a body on one grid, from pressure to displacement, and a preconditioner K close to its inverse."""
 
     operator: Operator
     preconditioner: Operator
@@ -22,14 +22,14 @@ class Operators(NamedTuple):
 
 @dataclass(frozen=True)
 class MeanPressure:
-    """Load control: the mean of p is given, the rigid approach d follows."""
+    """Load control: the mean of p is given, the rigid approach d is unknown."""
 
     value: float
 
 
 @dataclass(frozen=True)
 class Approach:
-    """Displacement control: the rigid approach d is given, the load follows."""
+    """Displacement control: the rigid approach d is given, the load is unknown."""
 
     value: float
 
@@ -39,10 +39,10 @@ Control = MeanPressure | Approach
 
 @dataclass(frozen=True)
 class Problem:
-    """Find a pressure p that the `constraint` admits, and whose gap `g = A p - h - d` meets its conditions.
+    """Find a pressure p that the `constraint` admits and whose gap `g = A p - h - d` meets its conditions.
 
-    `operator` is A, `preconditioner` a K close to its inverse, `heights` is the map h; `control` gives either the mean
-    of p, so that d is unknown, or d.
+    `operator` is A, `preconditioner` is K, close to its inverse, and `heights` is the map h. `control` gives the
+    mean of p or the approach d.
     """
 
     operator: Operator
@@ -53,5 +53,5 @@ class Problem:
 
     @property
     def mean(self) -> float | None:
-        """The mean pressure asked for, None with a given approach."""
+        """The prescribed mean pressure; None with a given approach."""
         return self.control.value if isinstance(self.control, MeanPressure) else None

@@ -1,4 +1,4 @@
-"""The maps of one grid that contact solves work in; between solves they serve other parts of a run."""
+"""Maps of one grid that contact solves work in. Between solves other parts of a run use them."""
 
 from typing import Any
 
@@ -10,14 +10,14 @@ from .precision import precision_of_directions
 
 
 class Workspace:
-    """A pressure, two displacements, a search direction and a byte per point.
+    """A pressure, two displacements, a search direction, and one byte per point.
 
-    The scene makes one and hands it to whoever needs a map for a moment. A solve overwrites all of them and ends with
-    `A p` in `displacement`, which stays valid until the next one. Maps may change places and be replaced by others of
-    the same type: read them as attributes at each use.
+    The scene makes one and passes it to all that need a map temporarily. A solve overwrites all maps and leaves `A
+    p` in `displacement`, valid until the next one. Read maps as attributes at each use: they may be swapped or
+    replaced.
 
-    Parameters: `kept`, the type of displacements, single precision where the operator has no more digits; the
-    `tolerance` of solves, with which a loose one keeps directions in single precision.
+    Parameters: `kept`, the type of displacements, single precision if the operator has no more digits; `tolerance`
+    of solves, which decides the precision of directions.
     """
 
     def __init__(self, slab: Slab, tolerance: float, kept: type[np.floating] = np.float64) -> None:

@@ -1,15 +1,15 @@
-"""Contacts that stick, for the body of a run: on a body that repeats itself, or on one with nothing around its box.
+"""Contact with adhesion for the body of a run, periodic or free.
 
-The solver of gaps needs the inverse of its operator. That of a free body has no symbol on its box: there the operator B
-of a body that repeats itself takes its place, by the shortest way between two points (`HalfSpace.gap_operators`), and
-what it lacks is lagged: `h - (A - B) p` of the last pass are the heights of the next. Within half a box both are the
-same, so that one pass or two do as a rule.
+The solver of gaps needs the inverse of its operator. The operator A of a free body has none that the FFT gives. The
+operator B of a periodic body, with the same Green's function up to half the box, replaces it
+(`HalfSpace.gap_operators`), and the difference is lagged: the next pass has the heights `h - (A - B) p` of the last
+p. One or two passes are usual.
 
-A contact that fills its box may be softer on B than on A, in its mean or in waves whose ends meet across the edges. An
-equilibrium that is stable on A then is none on B: passes jump over it, and go round between the two states beside it.
-So a solve whose later passes jump or come off, or are too many, begins again from its start with the operator A itself,
-whose inverse takes some iterations (`free_inverse`). Then E falls, and no equilibrium is passed over. Under a given
-mean pressure P, `p = K (g + h - P A 1) + P` with the inverse K of A on pressures whose mean is 0.
+A contact that fills its box may be softer on B than on A, in its mean or in waves that continue across the edges. A
+state that is stable on A is then unstable on B, and passes alternate between two states. So if later passes jump or
+detach, or MAX_PASSES is reached, the solve restarts with A itself, whose inverse takes some iterations
+(`free_inverse`). Then E falls monotonically. Under a given mean pressure P, `p = K (g + h - P A 1) + P` with K the
+inverse of A on pressures of mean 0.
 """
 
 import math
@@ -27,16 +27,16 @@ from .gap_iterate import SHARPER, GapSolution
 from .gap_solver import GapSolver
 from .law import Law
 
-MAX_PASSES = 12  # tuning: of a free body, before its own operator is used; one to three do as a rule
-LEFT = 0.8  # accuracy: of the tolerance, for such a solve; the rest is for the inverse
-DIGITS = 0.01  # accuracy: of the inverse, over the tolerance
+MAX_PASSES = 12  # tuning: limit on passes of a free body before A itself is used; one to three are usual
+LEFT = 0.8  # accuracy: tolerance of a solve with A, over that of the run; the rest is for the inverse
+DIGITS = 0.01  # accuracy: relative error of the inverse of A, over the tolerance
 UNSETTLED = "did not settle in a free box"
-LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: of a change of what is lagged
+LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: limits on the share of a change of the lagged part that is made
 
 
 @dataclass
 class AdhesiveSolver:
-    """Solver of contacts that stick; `free` is the operator of a body with nothing around its box, else None."""
+    """Solver of contacts with adhesion; `free` is the operator A of a free body, None for a periodic one."""
 
     gaps: GapSolver
     workspace: Workspace
@@ -53,10 +53,10 @@ class AdhesiveSolver:
         out: Array,
         loose: float = 1.0,
     ) -> tuple[Contact, bool]:
-        """Solve from a gap, in whose place the solution will be, and put the pressure into `out`; collective.
+        """Solve from `gap`, which is overwritten by the solution, and put the pressure into `out`; collective.
 
-        `free_correction` is `(A - B) p` of a free body, in whose place the new one will be. Returns the contact,
-        and whether the surfaces have detached. The tolerance is `loose` times that of the run.
+        `free_correction` is `(A - B) p` of a free body and is updated. The tolerance is `loose` times that of the
+        run. Return the contact, and whether the surfaces have detached.
         """
         tolerance = loose * self.tolerance
         if self.free is None or free_correction is None:
@@ -85,8 +85,8 @@ class AdhesiveSolver:
         out: Array,
         tolerance: float,
     ) -> tuple[GapSolution, int]:
-        """Repeat the solve of a free body until what is lagged changes no more; returns the solution, which has failed
-        where it does not settle, and the iterations of all passes; collective."""
+        """Repeat the solve of a free body until `free_correction` is constant. Return the solution, with a failure if
+        it does not settle, and the iterations of all passes; collective."""
         iterations, share, last = 0, 1.0, free_correction
         for passes in range(1, MAX_PASSES + 1):
             found = self.gaps.solve(law, heights - free_correction, control, gap, tolerance)
@@ -111,15 +111,10 @@ class AdhesiveSolver:
         out: Array,
         tolerance: float,
     ) -> GapSolution:
-        """Solve with the operator of a free body itself, and find what is lagged; collective."""
+        """Solve with the operator of the free body and update `free_correction`; collective."""
         assert self.free is not None
         work, repeated = self.workspace, self.gaps.operators
-        maps = (
-            work.pressure,
-            work.displacement,
-            work.other_displacement,
-            free_correction,
-        )  # in double precision with adhesion
+        maps = (work.pressure, work.displacement, work.other_displacement, free_correction)  # all in double precision
         inverse = FreeInverse(work.slab, self.free, repeated, DIGITS * tolerance, maps, isinstance(control, Approach))
         operators = repeated._replace(operator=self.free, inverse=inverse)
         if isinstance(control, Approach):
@@ -141,8 +136,8 @@ class AdhesiveSolver:
     def _compare(
         self, heights: Array, control: Control, gap: Array, found: GapSolution, out: Array
     ) -> tuple[GapSolution, Array, float]:
-        """Put the pressure into `out`, and return by how much it moves a free body more than the solution says, also in
-        its certificate; collective."""
+        """Put the pressure into `out`. Return the solution with this error in its certificate, the displacement of the
+        free body minus that of the solution, and its size; collective."""
         assert self.free is not None
         out[...] = found.p
         change = self.free.apply(out, self.workspace.displacement) - (heights + gap)
@@ -151,8 +146,8 @@ class AdhesiveSolver:
         return found, change, worst
 
     def _judge(self, control: Control, found: GapSolution, p: Array, change: Array) -> tuple[GapSolution, float]:
-        """Say in the certificate by how much displacements have changed in a pass, but for what only changes the
-        approach; returns this number too; collective."""
+        """Add the change of displacements in a pass to the certificate, except a change of the approach. Return the
+        solution and this error; collective."""
         certificate, slab = found.certificate, self.workspace.slab
         load, sum_change = slab.sum(*gap_kernels.weighted_sums(p, change))
         shift = sum_change / load if isinstance(control, MeanPressure) and load > 0.0 else 0.0
@@ -162,13 +157,14 @@ class AdhesiveSolver:
         return replace(found, certificate=certificate, d=found.d + shift), worst
 
     def _share(self, share: float, p: Array, change: Array, last: Array) -> float:
-        """The share of a change to make, by Aitken's extrapolation of the last two, weighted by the pressure;
+        """Return the share of a change to make: Aitken's extrapolation of the last two, weighted by the pressure;
         collective."""
-        weight, apart = np.abs(p), change - last
-        along, size = self.workspace.slab.sum(float((weight * last * apart).sum()), float((weight * apart**2).sum()))
+        weight, difference = np.abs(p), change - last
+        along = float((weight * last * difference).sum())
+        along, size = self.workspace.slab.sum(along, float((weight * difference**2).sum()))
         wanted = -share * along / size if size > 0.0 else 1.0
         return min(max(wanted, LEAST_SHARE), MOST_SHARE)
 
     def _contact(self, found: GapSolution, p: Array, iterations: int) -> Contact:
-        """The solution as a contact, whose displacement is in the workspace."""
+        """Return the solution as a contact, whose displacement is in the workspace."""
         return Contact(p, self.workspace.displacement, found.d, found.certificate, iterations, found.failure)

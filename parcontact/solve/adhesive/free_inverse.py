@@ -1,8 +1,7 @@
-"""The inverse of the operator of a free body: conjugate gradients, preconditioned with the inverse for another body.
+"""Inverse of the operator of a free body, by conjugate gradients preconditioned with the inverse for a periodic body.
 
-That is the body which repeats itself, by the shortest way between two points (`HalfSpace.gap_operators`). On 32 x 32
-points it is for all pressures between 0.48 and 2.9 times as stiff as the free one, so that a dozen steps give five
-digits. These numbers leave 1 slowly on larger grids, as potentials of lines do.
+The periodic body has the same Green's function up to half the box (`HalfSpace.gap_operators`), so that a dozen steps
+give five digits.
 """
 
 from dataclasses import dataclass
@@ -13,15 +12,15 @@ from ...parallel.slab import Array, Slab
 from ..problem import Operator
 from .gap_iterate import GapOperators
 
-MAX_STEPS = 100  # accuracy: a dozen do
+MAX_STEPS = 100  # accuracy: limit on the steps; a dozen are usual
 
 
 @dataclass(frozen=True)
 class FreeInverse:
-    """The inverse of `free`, with the operators of the body that repeats itself; the energy of what is wrong with it is
-    less than that of the whole by the square of the `tolerance`. It works in four `maps`.
+    """Inverse of `free`, with the operators of the periodic body. The energy of the error is below `tolerance^2` times
+    that of the solution. It works in four `maps`.
 
-    Without `means` it has no load, and is 0 for mean values: the inverse on pressures whose mean is 0.
+    If `means` is False, it is the inverse on pressures of mean 0 and ignores mean displacements.
     """
 
     slab: Slab
@@ -32,7 +31,7 @@ class FreeInverse:
     means: bool
 
     def apply(self, field: Array, out: Array) -> Array:
-        """Collective."""
+        """Put the pressure that causes the displacement `field` into `out`; collective."""
         r, z, t, image = self.maps
         r[...] = field
         t[...] = self._precondition(r, z)

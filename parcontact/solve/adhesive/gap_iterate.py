@@ -1,4 +1,4 @@
-"""A gap and its pressure in numbers, with what a solve is given and returns, and how wrong it is."""
+"""Data of the solver of gaps: its operators, its result, and an iterate with its errors."""
 
 import math
 from dataclasses import dataclass
@@ -12,15 +12,17 @@ from . import gap_kernels
 from .law import Law
 
 # accuracy
-SHARPER = 10.0  # times the certificate of contacts that do not stick: with it the load is as right as theirs
-SPURIOUS, NET = 2.0, 5.0  # times pressures that are not those of the law: with them loads and pressures are right
-LEAST_TRACTION = 1e-3  # of the strength of a point: pressures that add up to less are none
+SHARPER = 10.0  # factor on the complementarity; with it loads are as accurate as without adhesion
+SPURIOUS, NET = 2.0, 5.0  # factors on pressures that violate the law: on their magnitude, and on their sum
+LEAST_TRACTION = 1e-3  # load below which errors are not scaled by it, over the strength of the law at one point
 
 
 class GapOperators(NamedTuple):
-    """The operator of a body and its inverse K, which is 0 for mean values; `mean` is the displacement over a uniform
-    pressure, 0 where there is none, and `least_mean` that by which the operator moves mean values, always positive.
-    Both are infinite where K is the inverse for mean values, too."""
+    """Operator of a body and its inverse K, which is 0 for mean values.
+
+    `mean` is the displacement over a uniform pressure, 0 if there is none; `least_mean` is a positive compliance of
+    mean values. Both are infinite if K also inverts mean values.
+    """
 
     operator: Operator
     inverse: Operator
@@ -30,10 +32,10 @@ class GapOperators(NamedTuple):
 
 @dataclass(frozen=True)
 class GapSolution:
-    """Solved gap (the map that was given as the start) and pressure (the solver's map, valid until the next solve).
+    """Solved gap (the map of the start) and pressure (a map of the solver, valid until its next solve).
 
-    `failure` is empty, or says what happened instead; `detached` says that no equilibrium was left under the load,
-    `jumped` that it went through states that are not stable.
+    `failure` is empty, or states why the solve failed. `detached`: no equilibrium exists under the load. `jumped`:
+    the solve passed through unstable states.
     """
 
     gap: Array
@@ -48,11 +50,11 @@ class GapSolution:
 
 @dataclass
 class GapIterate:
-    """A gap in numbers: its mean and its lowest value, the uniform part m of the pressure, the approach; under which
-    load or mean gap; on which body.
+    """Numbers of an iterate: mean and lowest gap, uniform part m of the pressure, approach d, the control, and the
+    operators; `given` is the prescribed mean gap or None.
 
-    The last step went `share` of its way, which moves the mean gap by `moved`, and m by `change`; it was that of Newton
-    if it was `stable`. The next one is first tried with the length `step`.
+    The last step went a `share` of its way, which changes the mean gap by `moved`, and m by `change`. It was a
+    Newton step if `stable`. The next way is first tried with the length `step`.
     """
 
     law: Law
@@ -73,11 +75,11 @@ class GapIterate:
 
 
 def certify_gap(slab: Slab, it: GapIterate, working: Array, g: Array, q: Array, sigma: Array, z: Array) -> Certificate:
-    """Return how wrong the gap is: by z, weighted by the pressure, over a length; and the load; collective.
+    """Return the errors of the gap: z, weighted by the pressure, over a length, and the load; collective.
 
-    The length is by how much the body is deformed in the contact, at most the range, and at least a tenth of it. Wrong
-    of the load are pressures that are not those of the law: their magnitudes, of which waves of a few points hardly
-    move the gap, count twice, and their sum five times.
+    The length is the variation of the deformation in the contact, at most the range of the law and at least a tenth
+    of it. The error of the load consists of pressures that violate the law: their magnitudes count SPURIOUS times,
+    their sum NET times.
     """
     *sums, spurious, net = slab.sum(*gap_kernels.certificate_sums(working, g, it.heights, q, it.m, sigma, z))
     load, first, second, wrong = sums
@@ -88,5 +90,5 @@ def certify_gap(slab: Slab, it: GapIterate, working: Array, g: Array, q: Array, 
         spread = math.sqrt(max(second / load - mean**2, 0.0))
     length = min(max(spread, LEAST_SHARE * abs(mean + it.d), LEAST_SHARE * it.law.range), it.law.range)
     load = max(load, least)
-    beside = max(SPURIOUS * spurious, NET * abs(net)) / load
-    return Certificate(SHARPER * wrong / load / length, 0.0, beside, length)
+    load_error = max(SPURIOUS * spurious, NET * abs(net)) / load
+    return Certificate(SHARPER * wrong / load / length, 0.0, load_error, length)

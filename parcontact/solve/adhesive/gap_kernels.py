@@ -1,6 +1,6 @@
-"""Fused loops over this rank's rows for contacts that stick; each returns partial sums for one Allreduce.
+"""Fused loops for contact with adhesion, over the rows of this rank; each returns partial sums for one Allreduce.
 
-The attraction is that of a `Law`; q is the pressure K (g + h), to which a mean is added.
+The attraction sigma is that of a `Law`; q is the pressure K (g + h), to which a mean is added.
 """
 
 import numpy as np
@@ -8,12 +8,12 @@ import numpy as np
 from ...compiled import loop
 from .law import EXPONENTIAL, attraction, energy, softening
 
-SHORT = 1e-3  # accuracy: of a way over the range, whose energy is then right to 1e-7
+SHORT = 1e-3  # accuracy: longest way over the range for which the trapezoidal energy is used; its error is 1e-7
 
 
 @loop
 def attract(law, g, sigma):
-    """`sigma <- sigma(g)`."""
+    """Put sigma(g) into `sigma`."""
     for j in range(g.shape[0]):
         for i in range(g.shape[1]):
             sigma[j, i] = attraction(law, g[j, i])
@@ -21,7 +21,7 @@ def attract(law, g, sigma):
 
 @loop
 def press(g, q, sigma, step, image):
-    """`q <- q + step image`. Over points with an open gap: their count, and the sum of `q + sigma`."""
+    """Add `step image` to q. Return the number of open points and their sum of `q + sigma`."""
     count, total = 0.0, 0.0
     for j in range(g.shape[0]):
         row_count, row_total = 0.0, 0.0
@@ -37,8 +37,9 @@ def press(g, q, sigma, step, image):
 
 @loop
 def pressure_residual(g, q, sigma, mean, working, c):
-    """`c = q + mean + sigma` on the working set, open points and those in contact that are pulled, else 0. Returns the
-    size of the set, the sums of c over it and of sigma over all points, and the largest -g."""
+    """Mark the working set (open points, and closed points under tension) and put `q + mean + sigma` there, 0
+    elsewhere, into c. Return the size of the set, the sum of c, the sum of sigma over all points, and the largest
+    -g."""
     count, total, attracted = 0.0, 0.0, 0.0
     lowest = np.full(g.shape[1], np.inf)
     for j in range(g.shape[0]):
@@ -60,8 +61,9 @@ def pressure_residual(g, q, sigma, mean, working, c):
 
 @loop
 def certificate_sums(working, g, h, q, mean, sigma, z):
-    """With `p = q + mean` and `c = p + sigma` on the working set: sums of the weights `|p| + |c|`, of these times u and
-    u^2, with `u = g + h`, and over the set times |z|; and over the set of |c| and of c."""
+    """Return sums for `certify_gap`. With `p = q + mean`, `c = p + sigma` on the working set and 0 elsewhere, `u = g +
+    h` and the weight `|p| + |c|`: of the weight, of weight u and weight u^2, of weight |z| over the set, of |c| and
+    of c."""
     load, first, second, wrong, spurious, net = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(g.shape[0]):
         row_load, row_first, row_second, row_wrong, row_spurious, row_net = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -86,8 +88,8 @@ def certificate_sums(working, g, h, q, mean, sigma, z):
 
 @loop
 def gap_products(working, q, mean, sigma, step, image, sigma_old, shift, z, t):
-    """Over the working set, with `c = q + mean + sigma` and its change `e = step image + sigma - sigma_old + shift` in
-    the last step: sums of z, t, c z, e z and c t."""
+    """Return sums over the working set of z, t, c z, e z and c t, with `c = q + mean + sigma` and its change in the
+    last step, `e = step image + sigma - sigma_old + shift`."""
     sum_z, sum_t, c_z, e_z, c_t = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(z.shape[0]):
         row_z, row_t, row_c_z, row_e_z, row_c_t = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -110,8 +112,8 @@ def gap_products(working, q, mean, sigma, step, image, sigma_old, shift, z, t):
 
 @loop
 def lead(g, t, step, way):
-    """The way `max(g - step t, 0) - g` of a step. Returns the sum of the gaps to which it leads, and by how much
-    cutting off has raised it."""
+    """Put the way `max(g - step t, 0) - g` of a step into `way`. Return the sum of the gaps at its end, and how much
+    limiting has raised it."""
     total, cut = 0.0, 0.0
     for j in range(t.shape[0]):
         row_total, row_cut = 0.0, 0.0
@@ -128,7 +130,7 @@ def lead(g, t, step, way):
 
 @loop
 def rescale(g, factor, way):
-    """Lead the way to `factor` times the gap to which it led."""
+    """Change the way so that it leads to `factor` times the gap at its end."""
     for j in range(g.shape[0]):
         for i in range(g.shape[1]):
             way[j, i] = factor * (g[j, i] + way[j, i]) - g[j, i]
@@ -136,8 +138,8 @@ def rescale(g, factor, way):
 
 @loop
 def curvature(law, g, q, mean, sigma, way, image):
-    """Sums over a way w of `-c w`, of `w K w`, whose second factor is the image, of `w^2 (-d sigma/dg)` and of w; and
-    the largest -w/g."""
+    """Return sums over a way w of `-c w`, of `w K w` (K w is `image`), of `w^2 (-d sigma/dg)` and of w; and the largest
+    -w/g."""
     slope, stiff, soft, total = 0.0, 0.0, 0.0, 0.0
     fastest = np.zeros(g.shape[1])
     for j in range(g.shape[0]):
@@ -158,9 +160,9 @@ def curvature(law, g, q, mean, sigma, way, image):
 
 @loop
 def move(law, g, q, mean, sigma, step, way, image, g_new, sigma_new):
-    """`g_new = g + step way`, and its attraction. Returns the sums of `d (q + mean + step image/2) + gamma(g) -
-    gamma(g_new)`, with `d = g_new - g`, and of its magnitude. Energies of short ways are those of the mean attraction,
-    which rounds less."""
+    """Put `g + step way`, limited to 0, into `g_new`, and its attraction into `sigma_new`. Return the change of energy,
+    the sum of `d (q + mean + step image/2) + gamma(g) - gamma(g_new)` with `d = g_new - g`, and the sum of the
+    magnitudes of its terms. For short ways the change of gamma is d times the mean attraction, which rounds less."""
     total, size = 0.0, 0.0
     for j in range(g.shape[0]):
         row_total, row_size = 0.0, 0.0
@@ -183,7 +185,7 @@ def move(law, g, q, mean, sigma, step, way, image, g_new, sigma_new):
 
 @loop
 def weighted_sums(p, a):
-    """Sums of |p| and of |p| a."""
+    """Return the sums of |p| and of |p| a."""
     load, total = 0.0, 0.0
     for j in range(p.shape[0]):
         row_load, row_total = 0.0, 0.0
@@ -197,7 +199,7 @@ def weighted_sums(p, a):
 
 @loop
 def weigh_off(p, a, level):
-    """Sum of |p (a - level)|."""
+    """Return the sum of |p (a - level)|."""
     total = 0.0
     for j in range(p.shape[0]):
         row = 0.0
@@ -209,7 +211,7 @@ def weigh_off(p, a, level):
 
 @loop
 def surface_energy(law, g):
-    """Sum of `-gamma(g)`."""
+    """Return the sum of `-gamma(g)`."""
     total = 0.0
     for j in range(g.shape[0]):
         row = 0.0
@@ -221,7 +223,7 @@ def surface_energy(law, g):
 
 @loop
 def tension(p, least):
-    """The number of points with more tension than that, and the sum of all tension."""
+    """Return the number of points with a tension above `least`, and the sum of all tensions."""
     count, total = 0.0, 0.0
     for j in range(p.shape[0]):
         row_count, row_total = 0.0, 0.0

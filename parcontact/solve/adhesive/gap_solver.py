@@ -1,37 +1,36 @@
-"""Contact with adhesion: projected, preconditioned conjugate gradients over the gap.
+"""Contact with adhesion by projected, preconditioned conjugate gradients over the gap.
 
 Find the gap g >= 0 and the pressure p with the attraction sigma of a law, so that
 
     p = c - sigma(g),   c >= 0,   c g = 0,   A p = g + h + d,
 
-for an operator A, effective heights h, and either the approach d or the mean pressure P. With K, the inverse of A but
-for mean values, `p = K (g + h) + m`, and with a the displacement over a uniform pressure
+for an operator A, effective heights h, and the approach d or the mean pressure P. K is the inverse of A on fields of
+mean 0, a is the displacement over a uniform pressure, and `p = K (g + h) + m` with
 
     m = P                                  under a given load,
     m = (mean(g + h) + d)/a                under a given approach, a > 0,
     mean(g) = -mean(h) - d, which gives m  under a given approach, a = 0 (a periodic half space).
 
-It is a stationary point of `E = <g + h, K (g + h)>/2 - sum gamma(g)` and the energy of m, `d gamma/dg = -sigma`. There
-are many: the gap of the step before is the start, E falls in every iteration, and no barrier is jumped over on purpose,
-so that history decides the branch. One iteration:
+The solution is a stationary point of `E = <g + h, K (g + h)>/2 - sum gamma(g)` and the energy of m, with `d gamma/dg
+= -sigma`. There are many. The solve starts at the gap of the last step, E falls in every iteration, and no barrier
+is crossed deliberately, so that the history decides the branch. One iteration:
 
-1. the working set is what is free to move: open points (g > 0), and points in contact that are pulled (c < 0);
-2. residual `c = K (g + h) + m + sigma(g)` there, preconditioned `z = A c`;
-3. direction `t = z + beta t` (Polak and Ribiere), and `t = z` where that is no descent;
-4. the way `w = max(g - alpha t, 0) - g` of a step as long as the last one should have been;
-5. `g <- g + theta w` with the step of Newton, `theta = -<c, w>/(<w, K w> - <w, (-sigma') w>)`, and where that curvature
-   is not clearly positive the majorized one, `-<c, w>/<w, K w>`: as gamma is concave it lowers E. Under a load only
-   attraction holds mean values, to which K then adds what bounds the step. It is no longer than gaps allow, and a way
-   that closes gaps is gone to its end, theta = 1, if it nearly is by Newton. Where cutting off has made a way that
-   raises E, a shorter one takes its place;
-6. E must not rise: else the step is halved.
+1. The working set consists of open points (g > 0) and of points in contact under tension (c < 0).
+2. The residual is `c = K (g + h) + m + sigma(g)` there, preconditioned `z = A c`.
+3. The direction is `t = z + beta t` (Polak and Ribiere), or `t = z` where that is no descent.
+4. The way is `w = max(g - alpha t, 0) - g`, with the alpha that the last step should have had.
+5. `g <- g + theta w` with Newton's step, `theta = -<c, w>/(<w, K w> - <w, (-sigma') w>)`. Where this curvature is
+   not clearly positive, the majorized step `-<c, w>/<w, K w>` lowers E, as gamma is concave; under a load, K then
+   gets a small stiffness of mean values. theta is limited by the gaps. A way that closes gaps is gone to its end,
+   theta = 1, if Newton's step nearly does so. If limiting has made a way that raises E, a shorter one is tried.
+6. E must not rise. Otherwise the step is halved.
 
-An iteration takes two operator calls, `A c` and `K w`: the pressure follows from `theta K w`, and the certificate
-from `A c`.
+An iteration applies two operators: `A c`, which also gives the certificate, and `K w`, as the pressure changes by
+`theta K w`.
 
-Where the mean gap is given, c, z and t are centred and w leads to it. V. Rey, G. Anciaux, J.-F. Molinari, Comput.
-Mech. 60 (2017) 69 have these gradients without preconditioner; M. Bugnicourt, P. Sainsot, D. Dureisseix, C. Gauthier,
-A. A. Lubrecht, Tribol. Lett. 66 (2018) 29 the working set. Everything is dimensionless.
+Where the mean gap is given, c, z and t are centred, and w is scaled to it. V. Rey, G. Anciaux, J.-F. Molinari,
+Comput. Mech. 60 (2017) 69 have these gradients without preconditioner; M. Bugnicourt, P. Sainsot, D. Dureisseix, C.
+Gauthier, A. A. Lubrecht, Tribol. Lett. 66 (2018) 29 have the working set. All numbers are dimensionless.
 """
 
 import math
@@ -47,21 +46,21 @@ from .gap_iterate import GapIterate, GapOperators, GapSolution, certify_gap
 from .law import Law
 
 # tuning
-LEAST_CURVATURE = 0.02  # of the elastic one: with less the majorized step is made
-LOOSE = 0.01  # stiffness of mean values under a load, which has none, in majorized steps; over that under an approach
-WHOLE = 0.75  # share of a way that closes gaps, if Newton's step: from it on it is gone to its end
-SHORTER = 0.1  # length of a way over that of one that raises E
-MAX_TRIES = 12  # of ways, and of halvings of a step that raises E
-MAX_STALLED_ITERATIONS = 120  # iterations without a better certificate after which a solve gives up
-LEAST_DESCENT = 0.1  # over that without the last direction: with less it is forgotten
+LEAST_CURVATURE = 0.02  # least curvature of E over the elastic one for Newton's step
+LOOSE = 0.01  # stiffness of mean values in majorized steps under a load, over that under an approach
+WHOLE = 0.75  # least Newton step, as a share of a way that closes gaps, with which it is gone to its end
+SHORTER = 0.1  # factor on the length of a way that raises E
+MAX_TRIES = 12  # limit on shorter ways, and on halvings of a step that raises E
+MAX_STALLED_ITERATIONS = 120  # limit on iterations without a smaller certificate
+LEAST_DESCENT = 0.1  # least slope along t over that along z; below it the last direction is forgotten
 # accuracy
-ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # of the terms of a change of E
-HELD = 0.5  # of a load that pulls: all points being open, with less attraction than that nothing holds
-FAR = 4.0  # times the range, by which all points are open where nothing holds any more
+ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # share of the terms of a change of E that is rounding
+HELD = 0.5  # share of a tensile load; if all points are open and attract less, the surfaces have detached
+FAR = 4.0  # least gap over the range beyond which any missing attraction means that the surfaces have detached
 
 
 class GapSolver:
-    """Loop for contacts with adhesion on one grid."""
+    """Solver for contacts with adhesion on one grid."""
 
     def __init__(self, slab: Slab, operators: GapOperators, max_iterations: int) -> None:
         self.slab, self.operators, self.max_iterations = slab, operators, max_iterations
@@ -78,8 +77,8 @@ class GapSolver:
         tolerance: float,
         operators: GapOperators | None = None,
     ) -> GapSolution:
-        """Solve from the `gap`, in whose place the solution will be; for a body of other `operators` than its own, if
-        they are given; collective."""
+        """Solve from `gap`, which is overwritten by the solution. `operators` replace those of the solver;
+        collective."""
         it = self._begin(law, heights, control, gap, operators or self.operators)
         g, other = gap, self._gap
         best, scale, iteration, stuck, jumped = (math.inf, 0), 0.0, 0, False, False
@@ -95,10 +94,10 @@ class GapSolver:
                 return GapSolution(gap, self._q, it.d, certificate, iteration, failure, lost, jumped)
             scale = self._turn(it, members, scale, other)
             if not self._descend(it, g, other):
-                members, _ = self._find_residual(it, g)  # where z points across a bound: c does not
+                members, _ = self._find_residual(it, g)  # z may point across a bound; c does not
                 self._turn(it, members, 0.0, self._way)
                 scale, stuck = 0.0, not self._descend(it, g, other)
-            if not it.stable:  # on its way from one equilibrium to another, where certificates rise first
+            if not it.stable:  # between two equilibria certificates rise at first
                 best, jumped = (math.inf, iteration), True
             if not stuck:
                 g, other = other, g
@@ -107,7 +106,7 @@ class GapSolver:
     # -- the steps of a solve ------------------------------------------------------------------------------------------
 
     def _begin(self, law: Law, heights: Array, control: Control, gap: Array, operators: GapOperators) -> GapIterate:
-        """Give the start its mean where that is given, find its pressure, and forget the last direction."""
+        """Scale the start to a given mean gap, compute its pressure, and forget the last direction."""
         self._t.fill(0.0)
         sums = self.slab.sum(kernels.sum_of(heights), kernels.sum_of(gap))
         mean_h, mean_g = (each / self.slab.points for each in sums)
@@ -126,14 +125,14 @@ class GapSolver:
         return GapIterate(law, heights, mean_h, control, operators, given, mean_g, d=d)
 
     def _uniform(self, it: GapIterate, mean_gap: float) -> float:
-        """The uniform part m of the pressure, where it is not a multiplier."""
+        """Return the uniform part m of the pressure, unless the mean gap is given."""
         if isinstance(it.control, MeanPressure):
             return it.control.value
         return (mean_gap + it.mean_height + it.control.value) / it.operators.mean
 
     def _find_residual(self, it: GapIterate, g: Array) -> tuple[float, bool]:
-        """Let the pressure follow the last step, and find the working set and c on it, in the map of the way; the size
-        of the set, and whether the surface has come off; collective."""
+        """Update the pressure by the last step, mark the working set, and put c into the map of the way. Return the
+        size of the set, and whether the surfaces have detached; collective."""
         q, sigma, before = self._q, self._sigma, it.m
         count, total = self.slab.sum(*gap_kernels.press(g, q, sigma, it.share, self._image))
         if it.given is None:
@@ -152,26 +151,26 @@ class GapSolver:
         it.d = it.operators.mean * it.m - it.mean_gap - it.mean_height
         if it.lowest <= 0.0:
             return members, False
-        held = attracted / self.slab.points  # with all points open it only falls from here on
+        held = attracted / self.slab.points  # as all points are open, it can only fall
         return members, held < HELD * -it.m or (held < -it.m and it.lowest > FAR * it.law.range)
 
     def _find_pressure(self, it: GapIterate) -> None:
-        """Put the pressure into its map. Where nothing touches under an approach it is minus the attraction: far apart
-        that is less than what is wrong with K (g + h)."""
+        """Put the pressure into its map. If nothing touches under a given approach, the pressure is -sigma: at large
+        gaps sigma is below the error of K (g + h)."""
         if isinstance(it.control, Approach) and it.lowest > 0.0:
             np.negative(self._sigma, out=self._q)
         else:
             self._q += it.m
 
     def _least_uniform(self, it: GapIterate) -> float:
-        """The least uniform pressure that holds full contact; collective."""
+        """Return the least uniform pressure that keeps full contact; collective."""
         lowest = float((-self._q).max(initial=-np.inf))
         return self.slab.reduce((), [lowest])[0] - it.law.strength
 
     def _verdict(
         self, worst: float, tolerance: float, iteration: int, best: float, best_at: int, stuck: bool
     ) -> str | None:
-        """None: go on; empty: solved; else what happened instead."""
+        """Return None to continue, an empty string if solved, else why the solve has failed."""
         if worst <= tolerance:
             return ""
         if not np.isfinite(worst):
@@ -186,15 +185,13 @@ class GapSolver:
         return None
 
     def _precondition(self, it: GapIterate, g: Array, z: Array) -> Certificate:
-        """Put `z = A c` into a map, with c in that of the way; returns the certificate that z makes; collective."""
+        """Put `z = A c` into z, with c in the map of the way. Return the certificate that z gives; collective."""
         it.operators.operator.apply(self._way, z)
         return certify_gap(self.slab, it, self._working, g, self._q, self._sigma, z)
 
     def _turn(self, it: GapIterate, members: float, scale: float, z: Array) -> float:
-        """Make the new direction from z; returns `<c, z>`; collective.
-
-        `scale` is that of the last one, 0 for one to be forgotten.
-        """
+        """Make the new direction from z. Return `<c, z>`; `scale` is that of the last direction, 0 forgets it.
+        Collective."""
         working = self._working
         step = it.share, self._image, self._other_sigma, it.change
         sums = gap_kernels.gap_products(working, self._q, it.m, self._sigma, *step, z, self._t)
@@ -207,7 +204,7 @@ class GapSolver:
         return c_z
 
     def _descend(self, it: GapIterate, g: Array, out: Array) -> bool:
-        """Make a step along the direction to the gap `out` and its attraction; returns whether any lowers E;
+        """Make a step along the direction to the gap `out` and its attraction. Return whether E has fallen;
         collective."""
         share = self._share(it, g)
         for _ in range(MAX_TRIES if share > 0.0 else 0):
@@ -226,7 +223,7 @@ class GapSolver:
         return False
 
     def _share(self, it: GapIterate, g: Array) -> float:
-        """Find a way along the direction; returns which share of it to go; collective."""
+        """Find a way along the direction. Return the share of it to go; collective."""
         for _ in range(MAX_TRIES):
             total, cut = self.slab.sum(*gap_kernels.lead(g, self._t, it.step, self._way))
             if it.given is not None and cut > 0.0:
@@ -239,7 +236,7 @@ class GapSolver:
         return 1.0 if cut > 0.0 and wanted >= WHOLE else min(wanted, most)
 
     def _newton(self, it: GapIterate, g: Array) -> tuple[float, float]:
-        """The share of the way that is the step of Newton, or the majorized one, and the most that gaps allow;
+        """Return Newton's or the majorized step as a share of the way, and the largest share that gaps allow;
         collective."""
         it.operators.inverse.apply(self._way, self._image)
         *sums, fastest = gap_kernels.curvature(it.law, g, self._q, it.m, self._sigma, self._way, self._image)

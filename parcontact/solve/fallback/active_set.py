@@ -1,13 +1,11 @@
-"""Contact by guessing where it is: solve for the pressure there, correct the guess, again.
+"""Contact by a primal-dual active set: solve for the pressure on a guessed contact, correct the guess, repeat.
 
-On a guessed set of points contact is a linear problem, `A x = h + d` with x = 0 elsewhere, solved by preconditioned
-conjugate gradients that live on the set. Then points with x < 0 leave the set and points that penetrate enter it:
-Newton's method for the contact conditions (M. Hintermueller, K. Ito and K. Kunisch, SIAM J. Optim. 13 (2003) 865). A
-handful of sets is usual, but nothing excludes that one comes back.
+On a set of points contact is a linear problem, `A x = h + d` with x = 0 elsewhere, solved by preconditioned
+conjugate gradients. Then points with x < 0 leave the set and points that penetrate enter it (M. Hintermueller, K.
+Ito and K. Kunisch, SIAM J. Optim. 13 (2003) 865). A few sets are usual, but sets may cycle.
 
-The projected method (`contact`) needs less where it works. It changes its set in every step and so never builds up
-conjugate directions; where the preconditioner is far from an inverse on parts of the box, as with cells much longer
-than wide, it crawls. There this one is the way out.
+The projected method (`contact`) is cheaper where it works. It changes its set in every step and never accumulates
+conjugate directions; it is slow where the preconditioner is far from an inverse, as on cells much longer than wide.
 """
 
 from dataclasses import replace
@@ -21,15 +19,15 @@ from .. import kernels
 from ..contact import Contact, ContactSolver
 from ..problem import Problem
 
-MAX_SETS = 40  # tuning: guesses after which to give up
-ITERATIONS_RATIO = 4  # tuning: times max_iterations, for all sets together: nothing is left to be tried after this
-GAP_SHARE = 0.1  # tuning: of the tolerance: the largest gap on a set to which its linear problem is solved
+MAX_SETS = 40  # tuning: limit on the number of sets
+ITERATIONS_RATIO = 4  # tuning: limit on iterations of all sets, over max_iterations
+GAP_SHARE = 0.1  # tuning: largest gap on a set to which its linear problem is solved, over the tolerance
 
 
 def solve(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
     """Solve as `ContactSolver.solve`, for a load that is not 0; collective.
 
-    Iterations are those of the linear problems.
+    `iterations` of the contact counts those of the linear problems.
     """
     search = _Search(solver, problem, start)
     contact, iterations = solver.check(problem, start, ""), 0
@@ -48,7 +46,7 @@ def solve(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
 
 
 class _Search:
-    """The pressure x on the set `working`; the direction, the residual and images are in maps of the workspace."""
+    """Pressure x on the set `working`. The direction, the residual and images are in maps of the workspace."""
 
     def __init__(self, solver: ContactSolver, problem: Problem, x: Array) -> None:
         self.solver, self.problem, self.h, self.slab, self.x = solver, problem, problem.heights, solver.slab, x
@@ -58,15 +56,15 @@ class _Search:
         self.members = 0.0
 
     def begin(self, contact: Contact) -> None:
-        """The first set: contact and what penetrates. All points with a given approach, a problem that may have no
-        solution, become those that would penetrate the undeformed body."""
+        """Mark the first set: contact and points that penetrate. If these are all points under a given approach, which
+        may have no solution, mark those that would penetrate the undeformed body."""
         self.problem.constraint.mark_working_set(self.x, contact.u, self.h, contact.d, self.working)
         if self.load is None and self.slab.sum(float(np.count_nonzero(self.working)))[0] == self.slab.points:
             self.working[...] = self.h + self.d > 0.0
 
     def solve_on_set(self, u: Array, goal: float) -> int:
-        """Conjugate gradients on the set, from the last x, to no gap larger than `goal`, with `u = A x` in the end;
-        returns their number."""
+        """Make conjugate gradient steps on the set until no gap exceeds `goal`; update `u = A x`. Return the number of
+        steps."""
         problem, maps, slab, x, working = self.problem, self.solver.workspace, self.slab, self.x, self.working
         w, r, t = maps.pressure, maps.other_displacement, maps.direction
         product = 0.0
@@ -83,20 +81,20 @@ class _Search:
             slope, curvature = slab.sum(loops.dot(r, t), loops.dot(t, change))
             if not (slope > 0.0 and curvature > 0.0):
                 break
-            step = np.float64(slope / curvature)  # whose products with t are not rounded to its precision
+            step = np.float64(slope / curvature)  # a double, so that products with t are not rounded
             x -= step * t
             u -= step * change
             iterations += 1
         return iterations
 
     def next_set(self, u: Array) -> NDArray[np.bool_]:
-        """Points of the set that are pressed, others that are penetrated."""
+        """Return points of the set with pressure, and other points that penetrate."""
         return self.problem.constraint.next_set(self.x, u - self.h - self.d, self.working)
 
     # -- parts ---------------------------------------------------------------------------------------------------------
 
     def _restrict(self, u: Array) -> None:
-        """x at a bound outside the set, and the load, if it is given, made up for on it; `u = A x`."""
+        """Put x to a bound outside the set, and make up for a given load on the set; update `u = A x`."""
         x, working = self.x, self.working
         lower, upper = self.problem.constraint.bounds
         x[...] = np.where(working, x, np.where(x < upper, lower, upper))
@@ -106,7 +104,8 @@ class _Search:
         self.problem.operator.apply(x, u)
 
     def _residual(self, u: Array, r: Array) -> float:
-        """Put the gap on the set into r, for the d at which its mean is 0 unless that is given; its largest size."""
+        """Put the gap on the set into r, with the d at which its mean is 0 unless d is given. Return its largest
+        magnitude."""
         if self.load is not None and self.members:
             self.d = self.slab.sum(float(np.sum((u - self.h) * self.working)))[0] / self.members
         kernels.gap_residual(self.working, u, self.h, self.d, r)

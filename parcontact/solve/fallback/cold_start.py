@@ -1,8 +1,6 @@
-"""A start from nothing: the contact is found loosely on coarser grids first.
+"""A start without a guess: the contact is solved loosely on coarser grids first.
 
-Their pressure is the same in all fine cells of a coarse one, so that no point far from contact gets any. On the finest
-grid that saves a third of the iterations to a gap of 1e-4 of the height, and all coarser grids together cost less than
-three applications of the operator there.
+The coarse pressure is the same in all fine cells of a coarse one, so that no point far from contact gets pressure.
 """
 
 from collections.abc import Callable
@@ -15,20 +13,20 @@ from ..contact import Contact, ContactSolver
 from ..dilute_contact import SolverOnTiles
 from ..problem import Operators, Problem
 
-LOOSE = 0.03  # tuning: tolerance on the coarse grids, whose pressure is only a start
-WORTHWHILE = 256 * 256  # tuning: points: on fewer, making coarser grids takes longer than what they save
+LOOSE = 0.03  # tuning: tolerance on coarse grids, whose pressure is only a start
+WORTHWHILE = 256 * 256  # tuning: least number of points for which coarser grids are worth their cost
 
-SolverOn = Callable[[Slab, float], tuple[ContactSolver, Operators]]  # of the same body on a grid, with a tolerance
+SolverOn = Callable[[Slab, float], tuple[ContactSolver, Operators]]  # makes a solver on a slab with a tolerance
 
 
 def prepare_start(
     solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: SolverOnTiles | None = None
 ) -> Contact | None:
-    """On a large grid put a start into `start`, which is 0, for a body that nothing has been pressed into; collective.
+    """Put a start into `start`, which is 0, on a grid of at least WORTHWHILE points; collective.
 
-    Operator calls of solvers on other grids, or on tiles, are counted by their share of the points. With operators
-    `on_tiles` a dilute contact is solved on these, to the solver's tolerance on the finest grid. It is returned if it
-    holds at all points. Pressures beside the tiles are 0, which the constraint must admit.
+    Operator calls on other grids and on tiles are counted by their share of the points. With operators `on_tiles` a
+    dilute contact is solved on these, to the solver's tolerance on the finest grid, and returned if it satisfies the
+    tolerance at all points. The constraint must then admit a pressure of 0.
     """
     if solver.slab.points < WORTHWHILE:
         return None
@@ -38,8 +36,10 @@ def prepare_start(
 def start_on_coarse_grids(
     solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: SolverOnTiles | None = None
 ) -> tuple[int, Contact | None]:
-    """Solve loosely on coarser grids and put the start that follows into `start`, 0 if there is none; returns how many
-    grids there are, and the contact if it was solved on tiles and holds at all points; collective."""
+    """Solve loosely on coarser grids and put the resulting start into `start`, 0 if there is none; collective.
+
+    Return the number of grids, and the contact if it was solved on tiles and satisfies the tolerance at all points.
+    """
     levels = nested.coarser_levels(solver.slab, problem.heights)
     descent = _Descent(solver, problem, solver_on, on_tiles)
     nested.descend(levels, descent.solve, start)
@@ -49,7 +49,7 @@ def start_on_coarse_grids(
 
 
 class _Descent:
-    """From coarse grids to finer ones, on tiles of a grid as long as these are few."""
+    """Descent from coarse grids to finer ones, on tiles of a grid as long as these are few."""
 
     def __init__(
         self, solver: ContactSolver, problem: Problem, solver_on: SolverOn, on_tiles: SolverOnTiles | None
@@ -61,7 +61,7 @@ class _Descent:
         self._below: dilute_contact.Found | None = None
 
     def solve(self, level: nested.Level, p: Array) -> Array:
-        """Solve loosely on a coarse level from p."""
+        """Solve loosely on a coarse level, starting from p."""
         if (chosen := self._tiles_of(level)) is not None:
             self._solve_on(chosen, level, max(LOOSE, self._solver.tolerance), p)
             return p
@@ -76,7 +76,8 @@ class _Descent:
         return contact.p
 
     def solve_finest(self, level: nested.Level, p: Array) -> Contact | None:
-        """Solve on tiles of the finest grid from p, or leave it as it is; the contact, if it holds at all points."""
+        """Solve on tiles of the finest grid, starting from p, if these are few. Return the contact if it satisfies the
+        tolerance at all points."""
         if (chosen := self._tiles_of(level)) is None:
             return None
         solved = self._solve_on(
@@ -88,18 +89,18 @@ class _Descent:
         return contact
 
     def count(self) -> None:
-        """Count the operator calls of all levels by their share of points."""
+        """Count the operator calls of all levels by their share of the points."""
         self._tally["operator"] = self._before + round(self._cost)
 
     def _tiles_of(self, level: nested.Level) -> Tiles | None:
-        """The tiles of a level that may touch, if they are few."""
+        """Return the tiles of a level that may touch, if they are few."""
         if self._below is None or self._blocks is None or dilute_contact.is_block_grid(level.slab, self._solver.slab):
             return None
         below, law = (*self._blocks, self._below), self._problem.constraint
         return dilute_contact.choose_tiles(*below, level.slab, level.heights, law)
 
     def _solve_on(self, chosen: Tiles, level: nested.Level, tolerance: float, p: Array) -> dilute_contact.OnTheseTiles:
-        """Solve on tiles of a level from p."""
+        """Solve on tiles of a level, starting from p."""
         assert self._on_tiles is not None
         calls, there = self._tally["operator"], replace(self._problem, heights=level.heights)
         solved = dilute_contact.OnTheseTiles(chosen, self._on_tiles, there, level.slab, self._solver.height)
@@ -108,5 +109,5 @@ class _Descent:
         return solved
 
     def _add(self, calls: int, points: int) -> None:
-        """Add the calls since so many by their share of points."""
+        """Add the operator calls since the count `calls`, by their share of the points."""
         self._cost += (self._tally["operator"] - calls) * points / self._solver.slab.points

@@ -1,8 +1,8 @@
-"""Further attempts when a contact solve has failed: an operator in double precision, if it was not, a cold start on
-nested grids, and guesses of where contact is.
+"""Further attempts after a failed contact solve: an operator in double precision, a cold start on nested grids, and an
+active set.
 
-Nothing here is made or called for a solve that succeeds. What is tried depends on the failed solve alone, so that all
-ranks try the same, and a run that is repeated tries it again.
+A solve that succeeds neither calls nor allocates anything here. The attempts depend on the failed solve alone, so
+that all ranks make the same ones, and a repeated run repeats them.
 """
 
 from collections.abc import Callable, Iterator
@@ -25,11 +25,12 @@ def retry_solve(
     in_double: Callable[[], tuple[ContactSolver, Operators]] | None = None,
     most: int | None = None,
 ) -> tuple[Contact, list[str]]:
-    """Try a failed solve again until it succeeds or nothing is left to try; the last contact, and what was tried.
+    """Repeat a failed solve in other ways until one succeeds; collective. Return the last contact and the names of the
+    attempts.
 
-    `solver_on(slab, tolerance)` makes a solver of the same body on another grid, and its operators; `in_double()` those
-    in double precision, where those of the problem are not; there are at most so many attempts. Every attempt is
-    counted as `retry`; iterations are those of all attempts. Collective.
+    `solver_on(slab, tolerance)` makes a solver and operators of the body on another grid; `in_double()` makes those
+    in double precision, and is None if the problem has them. `most` limits the number of attempts. Each is counted
+    as `retry`; `iterations` includes all attempts.
     """
     contact, tried, iterations = failed, list[str](), failed.iterations
     for name, contact in islice(_attempts(solver, problem, failed, solver_on, in_double), most):
@@ -48,7 +49,7 @@ def _attempts(
     solver_on: SolverOn,
     in_double: Callable[[], tuple[ContactSolver, Operators]] | None,
 ) -> Iterator[tuple[str, Contact]]:
-    """One attempt after the other, each made when it is asked for, all in the map of the failed one."""
+    """Yield the name and the contact of each attempt, made on demand, in the map of the failed one."""
     p, contact = failed.p, failed
     if in_double is not None:
         if not np.isfinite(failed.certificate.worst):

@@ -1,9 +1,9 @@
-"""Generalized conjugate residuals on a set of points, under a given sum.
+"""Generalized conjugate residuals on a set of points with a fixed sum.
 
-Improve x on a set c, keeping its sum over c, so that `A x - h` becomes as constant on c as it can: each step adds the
-direction `t = C R K r` (R: values on c, C: subtract the mean over c) made orthogonal, in `C R A t`, to the earlier
-ones, and goes as far as makes the sum of squares of `r = C R (A x - h)` smallest. A need not be symmetric.
-(S. C. Eisenstat, H. C. Elman, M. H. Schultz, SIAM J. Numer. Anal. 20 (1983) 345.)
+Improve x on a set c, keeping its sum over c, so that `A x - h` tends to a constant on c. With R = restrict to c and
+C = subtract the mean over c, each step makes the direction `t = C R K r` orthogonal, in `C R A t`, to the earlier
+ones, and minimizes the sum of squares of `r = C R (A x - h)` along it. A need not be symmetric. (S. C. Eisenstat, H.
+C. Elman, M. H. Schultz, SIAM J. Numer. Anal. 20 (1983) 345.)
 """
 
 import math
@@ -20,10 +20,9 @@ from .stripes import OnSet
 
 
 class GcrBasis:
-    """Up to `count` directions t and their images A t: first in `pairs` of maps that are there, then in maps of its
-    own, of the type `kept`.
+    """Up to `count` directions t and their images A t, first in the maps `pairs`, then in new maps of the type `kept`.
 
-    These, and that of the residual, are made when they are needed for the first time.
+    New maps and the residual are allocated at their first use.
     """
 
     def __init__(
@@ -40,7 +39,7 @@ class GcrBasis:
         self._r: Array | None = None
 
     def hold_all(self) -> None:
-        """Make all maps that a solve can need."""
+        """Allocate all maps that a solve may need."""
         self._residual()
         for number in range(self.count):
             self._pair(number)
@@ -56,7 +55,8 @@ class GcrBasis:
         return self._pairs[number]
 
     def improve(self, x: Array, u: Array, h: Array, working: NDArray[np.bool_], limit: int, reduction: float) -> int:
-        """Up to `limit` steps on `working`, until the residual has fallen by `reduction`; u stays A x. Collective."""
+        """Make up to `limit` steps on `working` until the residual has fallen by the factor `reduction`; update u = A
+        x. Return the number of steps; collective."""
         members, total = self.slab.sum(*gaps_on(working, u, h))
         if members == 0.0:
             return 0
@@ -86,7 +86,7 @@ class GcrBasis:
     def _orthogonalize(
         self, working: NDArray[np.bool_], members: float, norms: list[float], means: list[float]
     ) -> None:
-        """Take from the newest direction what its image has in common with the earlier images, on the set."""
+        """Make the image of the newest direction orthogonal to the earlier images on the set."""
         last = len(norms)
         if last == 0:
             return
@@ -102,7 +102,7 @@ class GcrBasis:
 
 @loop
 def gaps_on(working, u, h):
-    """Points of the set, and the sum of `u - h` over it."""
+    """Return the number of points of the set, and the sum of `u - h` over it."""
     count, total = 0.0, 0.0
     for j in range(u.shape[0]):
         row_count, row_total = 0.0, 0.0
@@ -117,7 +117,7 @@ def gaps_on(working, u, h):
 
 @loop
 def centred_residual(working, u, h, mean, r):
-    """`r = u - h - mean` on the set, 0 elsewhere; returns its sum of squares."""
+    """Put `u - h - mean` on the set, 0 elsewhere, into r. Return its sum of squares."""
     size = 0.0
     for j in range(u.shape[0]):
         row = 0.0
@@ -153,7 +153,7 @@ def _common(working, a, b):
 
 @loop
 def _products(working, w, r):
-    """Over the set: sums of w, of w^2 and of w r."""
+    """Return sums over the set of w, of w^2 and of w r."""
     total, square, product = 0.0, 0.0, 0.0
     for j in range(w.shape[0]):
         row_total, row_square, row_product = 0.0, 0.0, 0.0
@@ -170,7 +170,7 @@ def _products(working, w, r):
 
 @loop
 def _subtract(beta, a, b):
-    """`b <- b - beta a`."""
+    """Subtract `beta a` from b."""
     for j in range(b.shape[0]):
         for i in range(b.shape[1]):
             b[j, i] -= beta * a[j, i]
@@ -178,7 +178,7 @@ def _subtract(beta, a, b):
 
 @loop
 def _step(working, alpha, t, w, mean, x, u, r):
-    """Advance x, u and r along t; returns the sum of squares of r."""
+    """Move x, u and r along t. Return the sum of squares of r."""
     size = 0.0
     for j in range(x.shape[0]):
         row = 0.0

@@ -1,11 +1,11 @@
-"""Steps of smallest residual, projected onto the admissible pressures in each step.
+"""Minimal residual steps, each projected onto the admissible pressures.
 
-On the working set c (pressure, or penetration) of an admissible pressure x, a step goes along the preconditioned
-residual t and the last two changes of x, as far along each as makes the sum of squares of `C R (A x - h)` smallest (R:
-values on c, C: subtract the mean over c). Then what has become negative is put to 0, the load is restored, near by
-first (`local_load`), and A is applied anew, so that the changes that are kept have exact images. A need not be
-symmetric. Nothing is guaranteed: where a residual has nothing in common with the image of its own t, steps no longer
-help, and the caller has to notice. Restoring the load from all points alike may then lead on, but is slower as a rule.
+On the working set c (pressure or penetration) of an admissible pressure x, a step combines the preconditioned
+residual t and the last two changes of x so that the sum of squares of `C R (A x - h)` is smallest (R: restrict to c,
+C: subtract the mean over c). Then negative pressures are put to 0, the load is restored, near by first
+(`local_load`), and A is applied to x, so that the stored changes have exact images. A need not be symmetric.
+Convergence is not guaranteed; the caller must detect steps that no longer help. Restoring the load from all points
+by one factor may then help, but is usually slower.
 """
 
 import numpy as np
@@ -21,26 +21,26 @@ from ..problem import Operator
 from .gcr import centred_residual, gaps_on, sum_on
 
 Set = NDArray[np.bool_]
-DIRECTIONS = 3  # the residual's, and the last two changes
-SQUARES, WIDE, NARROW = 5, 0.5, (Grids(4), 1.0)  # tuning: grids of squares and floor of `ExtendedPreconditioner`; the
-# last take a fifth more calls, but where a body is far stiffer at once, as on a line of points, larger cells or a
-# smaller floor may make sets of points come and go
-WITH_PAIRS = 0.3  # tuning: the floor with pairs: a higher one takes a tenth more calls
+DIRECTIONS = 3  # the residual and the last two changes
+SQUARES, WIDE = 5, 0.5  # tuning: grids of squares and floor of `ExtendedPreconditioner`
+NARROW = Grids(4), 1.0  # tuning: the same on lines; larger cells or a smaller floor may make sets cycle there
+WITH_PAIRS = 0.3  # tuning: floor of `ExtendedPreconditioner` with pairs
 
 
 def extension_on(nx: int, ny: int, pairs: int) -> tuple[Grids, float]:
-    """The grids and the floor of `ExtendedPreconditioner` on so many points, where so many `pairs` make square
-    cells."""
+    """Return grids and floor of `ExtendedPreconditioner` on nx x ny points, where `pairs` doublings make
+    cells square."""
     if 1 in (nx, ny):
         return NARROW
     return Grids(SQUARES + abs(pairs), pairs), WITH_PAIRS if pairs else WIDE
 
 
 class Projected:
-    """Holds DIRECTIONS maps t and as many of their images w, and those of `ExtendedPreconditioner`.
+    """Projected steps on one grid. It holds DIRECTIONS maps t, their images w, and the maps of
+    `ExtendedPreconditioner`.
 
-    With `pairs` that make square cells, cells of `LocalLoad` are smaller: so is the least cut they give back,
-    `least_cut` of the load on squares.
+    `pairs` doublings make cells square. `least_cut` is that of `LocalLoad` on squares, as a share of the load; the
+    smaller cells of `pairs` reduce it.
     """
 
     def __init__(
@@ -60,17 +60,18 @@ class Projected:
 
     @property
     def pairs(self) -> list[tuple[Array, Array]]:
-        """The maps of directions and their images, of no use to it before the next `begin`."""
+        """The maps of directions and of their images; others may use them until the next `begin`."""
         return list(zip(self.t, self.w, strict=True))
 
     def begin(self, near_by: bool = True) -> None:
-        """Forget earlier changes. From now on the load is restored `near_by` first, or from all points alike."""
+        """Forget earlier changes. Restore the load in the next steps `near_by` first, or from all points by
+        one factor."""
         self.near_by = near_by
         for field in (*self.t, *self.w):
             field.fill(0.0)
 
     def step(self, x: Array, u: Array, h: Array, working: Set, load: float) -> None:
-        """Move x, which is then admissible and has the sum `load`, and its image u with it; collective."""
+        """Move x to an admissible pressure with the sum `load`, and update its image u; collective."""
         members, total = self.slab.sum(*gaps_on(working, u, h))
         level, t = total / members, self.t[0]
         centred_residual(working, u, h, level, t)
@@ -83,7 +84,7 @@ class Projected:
         _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
         self.w[2][...] = u
         now, cut = self.local_load.advance(self.constraint, x, x, 0.0, x)
-        if not now > 0.0:  # changes made on earlier sets took all load off this one; the first direction leaves its sum
+        if not now > 0.0:  # earlier changes took all load off this set; t alone leaves it
             np.multiply(self.t[0], sums[3] / (sums[6] - sums[0] ** 2 / members), out=x, where=working)
             np.subtract(self.t[2], x, out=x, where=working)
             now, cut = self.local_load.advance(self.constraint, x, x, 0.0, x)
@@ -92,14 +93,14 @@ class Projected:
         self._keep_change(x, u)
 
     def _keep_change(self, x: Array, u: Array) -> None:
-        """Keep the change of x and of its image, whose old values are in the last maps of t and w."""
+        """Store the change of x and of its image; the last maps of t and w hold the old values."""
         for kept, new in ((self.t, x), (self.w, u)):
             np.subtract(new, kept[2], out=kept[2])
             kept[1], kept[2] = kept[2], kept[1]
 
 
 def _smallest(sums: Array, members: float) -> list[float]:
-    """How far to go along each direction, from the sums of `_gram`; 0 along what is 0 or has been left out."""
+    """Return the length along each direction from the sums of `_gram`; 0 along directions that are 0 or left out."""
     totals, against, pairs = sums[:3], sums[3:6], sums[6:]
     gram = np.empty((3, 3))
     gram[np.triu_indices(3)] = pairs
@@ -114,7 +115,8 @@ def _smallest(sums: Array, members: float) -> list[float]:
 
 @loop
 def _gram(working, u, h, level, a, b, c):
-    """Over the set: sums of a, b and c, of their products with `u - h - level`, and of aa, ab, ac, bb, bc and cc."""
+    """Return sums over the set of a, b and c, of their products with `u - h - level`, and of aa, ab, ac,
+    bb, bc and cc."""
     total = np.zeros(12)
     for j in range(u.shape[0]):
         s_a, s_b, s_c, r_a, r_b, r_c = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -140,7 +142,7 @@ def _gram(working, u, h, level, a, b, c):
 
 @loop
 def _move(working, along_a, along_b, along_c, a, b, c, x):
-    """Move x on the set, put 0 elsewhere; the old x is left in c."""
+    """Move x on the set, put 0 elsewhere, and leave the old x in c."""
     for j in range(x.shape[0]):
         for i in range(x.shape[1]):
             old = x[j, i]

@@ -1,15 +1,14 @@
-"""Steady contacts of a body that loses nearly all work: each is approached by those of one that loses less.
+"""Steady contact of a body with a very large loss tangent, by a sequence of contacts with less loss.
 
-A solves for contact where a body stores work; where it loses far more than it stores (tan(delta) far above 3, as with a
-body a thousand times as stiff at once as in the end) A is nearly skew, and sets of points come and go without an end.
-With S symmetric and positive, the contact p' of the operator `A + S` for heights `h + S p` is
+If the body loses far more energy than it stores (tan(delta) far above 3), A is nearly skew, and sets of points
+cycle. With S symmetric and positive, the contact p' of the operator `A + S` for heights `h + S p` satisfies
 
     A p' - h - d = S (p - p') where there is pressure,
 
-that is solved for A and h once p' = p. As A is positive, p comes nearer to the solution in every step, measured by S,
-also where p' is only good to a share of the change (proximal points: R. T. Rockafellar, SIAM J. Control Optim. 14
-(1976) 877). S is as small as makes the loss tangent of `A + S` 1 at most: `|Im A| - Re A` of each wave whose own is
-larger, and 0 of the others. In full contact the error of a wave then falls to 2^(-1/2) of it or less.
+which is the contact for A and h when p' = p. As A is positive, each step reduces the error of p, measured by S, also
+if p' is only accurate to a share of the change (proximal points: R. T. Rockafellar, SIAM J. Control Optim. 14 (1976)
+877). S is the smallest that limits the loss tangent of `A + S` to 1: `|Im A| - Re A` for waves whose tangent is
+larger, 0 for the others. In full contact each step multiplies the error of a wave by at most 2^(-1/2).
 """
 
 import numpy as np
@@ -20,38 +19,33 @@ from ..problem import Operator
 from .steady import SteadyContact, SteadySolver
 
 Symbol = NDArray[np.inexact]
-LEAST_CUT = 1.5e-5  # tuning, of the load, as in `local_load`: with more, contacts take up to three times the calls here
-SHARE, MOST = 0.3, 0.5  # tuning: of the certificate, as the tolerance of the next contact; up to MOST where that fails
-# and is tried again
-LEAST = 0.3  # tuning: of the tolerance asked for, the same: more digits are not needed
-MAX_STEPS_TO_HALVE = 20  # tuning: in which the certificate must halve
-STEPS_TO_HALVE = 12  # tuning: the same of the projected steps of a contact
-MOST_STEPS = 3  # tuning: times the steps that one contact may take, in all
+LEAST_CUT = 1.5e-5  # tuning: as in `local_load`, share of the load
+SHARE, MOST = 0.3, 0.5  # tuning: tolerance of the next contact over the last certificate; up to MOST after a failure
+LEAST = 0.3  # tuning: least tolerance of a contact, over the tolerance of the solve
+MAX_STEPS_TO_HALVE = 20  # tuning: limit on contacts in which the certificate must halve
+STEPS_TO_HALVE = 12  # tuning: limit on projected steps of a contact in which its certificate must halve
+MOST_STEPS = 3  # tuning: limit on linear steps of all contacts, over that of one
 
 
 def pull(symbol: Symbol) -> Symbol:
-    """The symbol of S, of that of A."""
+    """Return the symbol of S from that of A."""
     return np.maximum(np.abs(symbol.imag) - symbol.real, 0.0)
 
 
 def nearer(symbol: Symbol) -> Symbol:
-    """The symbol of `A + S`, of that of A."""
+    """Return the symbol of `A + S` from that of A."""
     return symbol + pull(symbol)
 
 
 def nearer_inverse(symbol: Symbol) -> Symbol:
-    """The symbol of the inverse of `A + S`, of that of the inverse of A: 0 where that is 0."""
+    """Return the symbol of the inverse of `A + S` from that of the inverse of A; 0 where that is 0."""
     square = np.abs(symbol) ** 2
     own = np.divide(pull(symbol), square, out=np.zeros_like(square), where=square > 0.0)
     return symbol / (1.0 + own * symbol)
 
 
 class Proximal:
-    """A `solver` for the operator `A + S` and the tolerance asked for, A itself, S, and two maps: heights of a contact,
-    and the pressure before it.
-
-    It solves as a `SteadySolver` of A does.
-    """
+    """Solver for A with the interface of `SteadySolver`. It has a `solver` for `A + S`, A, S, and two maps."""
 
     def __init__(self, solver: SteadySolver, operator: Operator, pull: Operator) -> None:
         self.solver, self.operator, self.pull = solver, operator, pull
@@ -59,7 +53,7 @@ class Proximal:
         self._h, self._kept = solver.slab.empty(), solver.slab.empty()
 
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
-        """As `SteadySolver.solve`; its numbers of steps are those of all contacts. Collective."""
+        """Solve as `SteadySolver.solve`; the numbers of steps are sums over all contacts. Collective."""
         worst, best, since, share = 1.0, np.inf, 0, SHARE
         projections, sets, steps = 0, 0, 0
         while True:

@@ -1,15 +1,15 @@
-"""Contact with a law of the interface, in steady sliding or at rest, by Douglas and Rachford's splitting.
+"""Contact with a law of the interface, in steady sliding or at rest, by Douglas-Rachford splitting.
 
-Find p >= 0 with mean P0, or of a given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`solve.interface_law`). A is a
-multiplication in Fourier space, and c acts point by point, so that each of them alone is inverted exactly. With
-J_A = (1 + gamma A)^-1 under the mean P0, or of what it is given and gamma d, J_c the pressure of
-`interface_law.resolve`, and a map s,
+Find p >= 0 with given mean P0 or given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`solve.interface_law`). A is
+diagonal in Fourier space and c in real space, so that each is inverted exactly. With J_A = (1 + gamma A)^-1 under
+the mean P0, or applied to its argument plus gamma d, with J_c the pressure of `interface_law.resolve`, and with a
+map s,
 
     p = J_c(s),    y = J_A(2 p - s),    s <- s + y - p
 
 (J. Douglas, H. H. Rachford, Trans. Amer. Math. Soc. 82 (1956) 421; P.-L. Lions, B. Mercier, SIAM J. Numer. Anal. 16
-(1979) 964). It converges for every gamma > 0 and every A whose real part is not negative, also where the body loses
-nearly all work. Only the certificate of an admissible pressure ends it, with `A p + c(p)` as its displacement.
+(1979) 964). It converges for every gamma > 0 and every A with a real part >= 0, also for very large loss tangents.
+It ends when the certificate of an admissible pressure, with the displacement `A p + c(p)`, meets the tolerance.
 """
 
 import math
@@ -27,21 +27,23 @@ from ..iterate import certify, form_iterate
 from ..problem import Approach, Control, Operator
 from .steady import SteadyContact
 
-LEAST_STEPS, LATER = 10, 0.1  # tuning: steps before a certificate, and the share of all steps before the next one
-SLOWEST, FASTEST, AT_UNIT = 0.35, 16.0, 8.0  # tuning: of `step_for`, found on bands of six decades at 1 mm/s to 10 m/s
+LEAST_STEPS, LATER = 10, 0.1  # tuning: steps between certificates: at least, and as a share of all steps
+SLOWEST, FASTEST, AT_UNIT = 0.35, 16.0, 8.0  # tuning: least, largest and unit value of gamma in `step_for`
 
 
 def step_for(stiffest: float, softest: float, ratio: float) -> float:
-    """Return gamma for an operator whose symbol is between `stiffest` and `softest` in size, and a mean pressure that
-    is `ratio` times the rms pressure of full contact."""
+    """Return gamma for an operator with magnitudes of its symbol between `stiffest` and `softest`, and a mean pressure
+    of `ratio` times the rms pressure in full contact."""
     return min(max(AT_UNIT * math.sqrt(ratio), SLOWEST), FASTEST) / math.sqrt(stiffest * softest)
 
 
 @dataclass(frozen=True)
 class Splitting:
-    """Solver on one grid: `operator` A, which moves nothing in the mean, `resolvent` that makes J_A (without the mean)
-    for a gamma, the `height` of the surface, the `tolerance` on the certificate, and `most` steps. A law and pressures
-    are in the units of A."""
+    """Solver on one grid.
+
+    `operator` is A, 0 for the mean; `resolvent(gamma)` makes J_A without the mean; `height` of the surface;
+    `tolerance` on the certificate; `most` limits the steps. Laws and pressures are in the units of A.
+    """
 
     slab: Slab
     operator: Operator
@@ -53,10 +55,10 @@ class Splitting:
     def solve(
         self, h: Array, control: Control, law: InterfaceLaw, gamma: float, start: tuple[Array, float] | None = None
     ) -> SteadyContact:
-        """Solve for heights h, from the pressure and the approach `start`, or from a uniform pressure; collective.
+        """Solve for heights h, from the pressure and approach `start` or from a uniform pressure; collective.
 
-        The contact has the pressure in the map of its start, and its displacement `u = A p`, without the closing of the
-        law, in a new one. A mean pressure must be positive.
+        The solution overwrites the pressure of the start; its displacement `u = A p`, without the closing, is a new
+        map. A prescribed mean pressure must be positive.
         """
         slab, inverse, sums = self.slab, self.resolvent(gamma), law.pressures + gamma * law.closings
         p = slab.empty() if start is None else start[0]
@@ -80,8 +82,8 @@ class Splitting:
         return SteadyContact(p, u, d, certificate, 0, 0, steps, f"has not converged in {steps} steps: {reached}")
 
     def _begin(self, h: Array, control: Control, gamma: float, start: tuple[Array, float] | None, s: Array) -> None:
-        """Put the map from which the iteration starts into s: with `p = J_c(s)` and `p = J_A(2 p - s)` it is
-        `p - gamma (A p - d)`."""
+        """Put the first map of the iteration into s: `p - gamma (A p - d)`, for which `p = J_c(s)` and `p = J_A(2 p -
+        s)`."""
         if start is not None:
             p, d = start
             self.operator.apply(p, s)
@@ -92,7 +94,7 @@ class Splitting:
             np.subtract(control.value, gamma * h, out=s)
 
     def _loads(self, p: Array, control: Control) -> bool:
-        """Scale a pressure to its mean where that is given and nearly reached; returns whether it is; collective."""
+        """Scale a pressure to a given mean that it nearly has. Return False if it is too far from it; collective."""
         if isinstance(control, Approach):
             return True
         (load,) = self.slab.sum(kernels.sum_of(p))
@@ -103,7 +105,7 @@ class Splitting:
         return True
 
     def _certify(self, h: Array, control: Control, law: InterfaceLaw, p: Array, u: Array) -> tuple[float, Certificate]:
-        """Return the approach and the certificate of an admissible pressure, and leave its displacement in u."""
+        """Return the approach and the certificate of an admissible pressure, and put its displacement into u."""
         slab, constraint, given = self.slab, NonNegative(), isinstance(control, Approach)
         self.operator.apply(p, u)
         whole = u + law.closing(p)

@@ -1,19 +1,20 @@
-"""Contact with an operator that is not symmetric: steady sliding, seen from the rigid surface.
+"""Contact with an operator that is not symmetric: steady sliding in the frame of the rigid surface.
 
-Find p >= 0 with mean P0 and `g = A p - h - d >= 0`, `p g = 0`, where A is positive but, for a lossy body sliding at a
-constant velocity, not symmetric: there is no energy to minimize. Projected steps (`projected`) come first: they are
-cheap, three applications of A or K each, and reach most solutions. Where they no longer help, an active set with an
-inexact linear solve goes on:
+Find p >= 0 with mean P0 and `g = A p - h - d >= 0`, `p g = 0`. For a lossy body sliding at constant velocity, A is
+positive but not symmetric, and there is no energy to minimize. Projected steps (`projected`) come first: each takes
+three applications of A or K, and they reach most solutions. If they no longer help, an active set with inexact
+linear solves continues:
 
-1. on the set c, with x = 0 elsewhere, generalized conjugate residuals towards `A x - h = d` under the load, where the
-   body is soft along stripes with the preconditioner of `stripes`;
-2. the new set: points with `x > kappa g`, that is x > 0 where the gap is closed, and g < 0 where there is no pressure;
-3. when x and its gap look solved, the admissible pressure `p = max(x, 0)`, scaled to the load, is certified with a new
+1. On the set c, with x = 0 elsewhere, generalized conjugate residuals approach `A x - h = d` under the load. Where
+   the body is soft along stripes they use the preconditioner of `stripes`.
+2. The new set has the points with `x > kappa g`: x > 0 where the gap is closed, and g < 0 where there is no
+   pressure.
+3. When x and its gap seem solved, the admissible pressure `max(x, 0)`, scaled to the load, is certified with a new
    application of A.
 
-In both only the certificate of an admissible pressure counts: an iteration that cycles may look finished. A start from
-coarser grids makes it cheap; with stripes, sets shrink on the coarsest from full contact. From far away it may cycle,
-and then it says so.
+Only the certificate of an admissible pressure ends a solve, as an iteration that cycles may seem converged. A start
+from coarser grids makes solves cheap; with stripes, sets on the coarsest grid shrink from full contact. From a poor
+start the sets may cycle; then the solve fails.
 """
 
 import math
@@ -35,26 +36,24 @@ from .gcr import GcrBasis, gaps_on
 from .projected import Projected
 from .stripes import OnSet, Plain, Stripes
 
-MAX_STEPS_TO_HALVE, STRIPED_STEPS_TO_HALVE = 20, 8  # tuning: projected steps in which the certificate must halve; the
-# latter where the body is soft along stripes
-REDUCTION, LEAST_REDUCTION = 0.05, 1e-3  # tuning: what linear steps on a set reduce its residual to, at first and at
-# least
-SETTLING = 0.7  # tuning: sets settle while each has at most so many times the new points of the last one
-ROUNDS = 3  # tuning: of linear steps on a set
-MAX_DIRECTIONS = 10  # tuning: of the linear steps on a set
-LOST = 1.0 / float(np.finfo(np.float64).eps)  # accuracy: a guess with which no digit of the load is left
-LOOSE = 1.5e-3  # accuracy: tolerance with which directions beyond the projected steps' are in single precision: with a
-# smaller one rounded directions took up to half as many steps more where a body is a thousand times as stiff at once
-KAPPA = 0.1  # tuning: times the stiffness of a point
-MAX_STALLED_SETS = 25  # tuning: changes of the set without coming nearer to a solution after which sets have stalled
+MAX_STEPS_TO_HALVE = 20  # tuning: limit on projected steps in which the certificate must halve
+STRIPED_STEPS_TO_HALVE = 8  # tuning: the same where the body is soft along stripes
+REDUCTION, LEAST_REDUCTION = 0.05, 1e-3  # tuning: factor on the residual of a linear solve, at first and at least
+SETTLING = 0.7  # tuning: changed points of a set over those of the last one, above which linear solves go further
+ROUNDS = 3  # tuning: limit on restarts of the linear solve on a set
+MAX_DIRECTIONS = 10  # tuning: number of directions of a linear solve
+LOST = 1.0 / float(np.finfo(np.float64).eps)  # accuracy: estimated error above which the load is only rounding
+LOOSE = 1.5e-3  # accuracy: least tolerance with which directions beyond the projected ones are in single precision
+KAPPA = 0.1  # tuning: kappa over the stiffness of a point
+MAX_STALLED_SETS = 25  # tuning: limit on sets without a smaller estimated error
 
 
 @dataclass(frozen=True)
 class SteadyContact:
-    """A solved (or given up) steady contact; p is the map of its start, `u = A p` the solver's, valid until it solves
-    again.
+    """A steady contact, solved or given up. p is the map of the start; `u = A p` belongs to the solver and is valid
+    until its next solve.
 
-    It took so many projected steps and, where these did not do, so many contact sets with so many linear steps in all.
+    `projections`, `sets` and `steps` count projected steps, contact sets, and linear steps on all sets.
     """
 
     p: Array
@@ -72,17 +71,17 @@ class SteadyContact:
 
 
 class SteadySolver:
-    """Loop on one grid, and the maps that it works in: seven, a byte per point, and those of its preconditioner; where
-    the active set goes on, one more and two for each linear step on a set beyond the third, in single precision where
-    the tolerance is loose.
+    """Solver on one grid. It holds seven maps, a byte per point, and the maps of its preconditioner. If the active set
+    is used, it holds one map more, and two for each direction beyond the third, in single precision for tolerances
+    >= LOOSE.
 
-    Parameters: `operator` A and `preconditioner` K near its inverse; `height` of the surface; `tolerance` on the
-    certificate; `max_steps` of the linear solves in all; `directions` kept in each; the axis `along` which the surface
-    slides where the body is far softer along stripes (`stripes`), else None; `pairs` that make square cells
-    (`extension.pairs_for`); `least_cut` of the load, which is taken back near by (`local_load`).
+    Parameters: `operator` A; `preconditioner` K near its inverse; `height` of the surface; `tolerance` on the
+    certificate; `max_steps`, a limit on linear steps; `directions` of each linear solve; `along`, the axis of
+    sliding where the body is far softer along stripes (`stripes`), else None; `pairs` of doublings that make cells
+    square (`extension.pairs_for`); `least_cut` (`local_load`).
     """
 
-    constraint = NonNegative()  # the only law that there is
+    constraint = NonNegative()  # steady sliding has no other constraint
 
     def __init__(
         self,
@@ -112,22 +111,24 @@ class SteadySolver:
         self._working: NDArray[Any] = slab.zeros(np.bool_)
 
     def hold_all(self) -> None:
-        """Make all maps that are needed where the active set changes, as otherwise the first of these solves does."""
+        """Allocate all maps that the active set may need."""
         self._linear.hold_all()
 
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
-        """Solve for heights h under the mean pressure, starting from the pressure `start`, in whose place the solution
-        will be; from a uniform one where it is zero everywhere. Collective."""
+        """Solve for heights h under the mean pressure `mean`; collective.
+
+        The solution overwrites the pressure `start`. A start that is 0 everywhere is replaced by a uniform pressure.
+        """
         try:
             return self._solve(h, mean, start)
-        except ZeroDivisionError:  # by the load or the points of a set, sums which all ranks have
+        except ZeroDivisionError:  # no load or no points in a set; all ranks have the same sums
             nothing = Certificate(math.nan, math.nan, math.nan)
             start.fill(0.0)
             return SteadyContact(start, self._u, math.nan, nothing, 0, 0, 0, "no point is left that carries load")
 
     def check(self, operator: Operator, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
-        """The approach and the certificate of an admissible pressure, such as a solution, for another operator, whose
-        image of it is then `u`. Collective."""
+        """Return the approach and the certificate of an admissible pressure for another operator, and put its image
+        into `u`; collective."""
         operator.apply(p, self._u)
         return self._certify(p, h, mean)
 
@@ -144,7 +145,8 @@ class SteadySolver:
         return self._change_sets(start, h, mean, projections)
 
     def _project(self, p: Array, h: Array, mean: float) -> tuple[float, Certificate, int]:
-        """Projected steps as long as they help: in one way and, but where the active set is as good, in the other."""
+        """Make projected steps as long as they help, first with the load restored near by and then, except with
+        stripes, from all points."""
         self._admit(p, mean)
         d, certificate = self._certify(p, h, mean)
         steps = 0
@@ -160,14 +162,14 @@ class SteadySolver:
         return d, certificate, steps
 
     def _change_sets(self, x: Array, h: Array, mean: float, projections: int) -> SteadyContact:
-        """The active set, from the marked one, under the pressure x.
+        """Iterate active sets, from the marked one and the pressure x.
 
-        What a linear solve leaves of its residual makes wrong points of the next set. So where the sets do not settle,
-        linear solves go further. Sets may stall still, as single points are left out that should be in contact and make
-        the linear solves slow. Then all points as near as the solution seems to be wrong are taken in, once. The set of
-        a certified pressure that is no solution is no better than the one marked: that one goes on.
+        The residual of a linear solve makes wrong points of the next set. So if the sets do not settle, linear
+        solves go further. Sets may stall because single missing points make linear solves slow; then all points
+        whose gap is within the estimated error are added, once. If a certified pressure is not a solution, the
+        iteration continues with the set before it.
         """
-        marked = self._projected.t[0]  # is free between linear steps
+        marked = self._projected.t[0]  # unused between linear steps
         kappa, reduction = KAPPA * self._stiffness(), REDUCTION
         best, since, sets, steps, before, taken_in = np.inf, 0, 0, 0, np.inf, False
         while True:
@@ -194,8 +196,10 @@ class SteadySolver:
                 np.not_equal(marked, 0.0, out=self._working)
 
     def _load(self, x: Array, mean: float) -> None:
-        """Make x 0 outside the set, and its sum that of the load: by the same on all points of the set, or in
-        proportion where waves as long as the box are far softer than others; and u its image."""
+        """Put x to 0 outside the set, scale its sum to the load, and update its image u.
+
+        The load is made up for by the same pressure on all points of the set, or with stripes in proportion to x.
+        """
         slab, working = self.slab, self._working
         np.copyto(x, 0.0, where=~working)
         total, members = slab.sum(kernels.sum_of(x), float(np.count_nonzero(working)))
@@ -206,7 +210,7 @@ class SteadySolver:
         self.operator.apply(x, self._u)
 
     def _solve_on_set(self, x: Array, h: Array, reduction: float) -> int:
-        """Linear steps on the set, and how many."""
+        """Make linear steps on the set. Return their number."""
         linear, steps = self._linear, 0
         for _ in range(ROUNDS):
             made = linear.improve(x, self._u, h, self._working, linear.count, reduction)
@@ -216,7 +220,7 @@ class SteadySolver:
         return steps
 
     def _stiffness(self) -> float:
-        """Pressure on one point over the displacement it causes there; collective."""
+        """Return the pressure on one point over the displacement it causes there; collective."""
         impulse, answer = self._projected.pairs[0]
         impulse.fill(0.0)
         owner = self.slab.rows.start == 0 < self.slab.rows.stop
@@ -224,7 +228,7 @@ class SteadySolver:
             impulse[0, 0] = 1.0
         self.operator.apply(impulse, answer)
         displacement = self.slab.sum(float(answer[0, 0]) if owner else 0.0)[0]
-        return 1.0 / displacement if displacement else 0.0  # one point, whose mean displacement is not counted
+        return 1.0 / displacement if displacement else 0.0  # 0 on a grid of one point
 
     def _failure(self, certificate: Certificate, since: int, steps: int) -> str:
         if certificate.worst <= self.tolerance:
@@ -237,7 +241,7 @@ class SteadySolver:
         return f"{reason}: the residual is {certificate.worst:.3g} where {self.tolerance:.3g} was asked for"
 
     def _next_set(self, x: Array, h: Array, kappa: float) -> tuple[float, float]:
-        """Mark the next set; returns how far from a solution x seems to be, and how many points came or went."""
+        """Mark the next set. Return the estimated error of x, and the number of changed points."""
         count, gaps = self.slab.sum(*gaps_on(self._working, self._u, h))
         *sums, deepest = self.constraint.choose_active(x, self._u, h, gaps / count, kappa, self._working)
         positive, negative, wrong, members, changed, deepest = self.slab.reduce(sums, [deepest])
@@ -246,18 +250,18 @@ class SteadySolver:
         return max(wrong / positive / self._length, deepest / self._length, negative / positive), changed
 
     def _take_in(self, h: Array, gap: float) -> None:
-        """Add the points to the set that are at most this far from the surface."""
+        """Add all points to the set whose gap is at most `gap`."""
         count, gaps = self.slab.sum(*gaps_on(self._working, self._u, h))
         self._working |= self._u - h <= gaps / count + gap
 
     def _admit(self, x: Array, mean: float) -> None:
-        """Make x admissible: not negative, under the load; and u its image."""
+        """Limit x to x >= 0, scale it to the load, and update its image u."""
         load = self.slab.sum(self.constraint.clip(x))[0]
         self.constraint.rescale_to_load(self.slab, x, load, mean * self.slab.points)
         self.operator.apply(x, self._u)
 
     def _certify(self, p: Array, h: Array, mean: float) -> tuple[float, Certificate]:
-        """The approach and the certificate of an admissible pressure, whose set is marked."""
+        """Mark the working set of an admissible pressure. Return its approach and certificate."""
         iterate = form_iterate(self.slab, self.constraint, p, self._u, h, 0.0).settled()
         found = certify(self.slab, self.constraint, p, self._u, h, iterate, mean, self.height, self._working)
         certificate = found[-1]

@@ -1,1 +1,1 @@
-"""An extension of residuals beyond the contact, which makes a preconditioner of an operator without a contact."""
+"""Extension of residuals beyond the contact, which turns an inverse without contact into a preconditioner."""

@@ -1,5 +1,8 @@
-"""Loops between points and cells of `wide` by `tall` points, each 1 or 2: sums over cells, interpolation between them,
-and the transposes of both. The interpolation takes 3/4 of a point's own cell and 1/4 of the nearest other one."""
+"""Loops between points and cells of `wide` by `tall` points, each 1 or 2.
+
+They take sums over cells, interpolate between cells, and apply the transposes of both. Interpolation takes 3/4 of
+the own cell of a point and 1/4 of the nearest other one.
+"""
 
 import numpy as np
 
@@ -7,20 +10,21 @@ from ...compiled import loop
 
 
 @loop
-def row_of(own, beside, j):
-    """Row j, counted from the first of `own`; of those beside, the ones above are the last."""
+def row_of(own, neighbours, j):
+    """Return row j, counted from the first of `own`; `neighbours` holds rows below `own` first and rows
+    above it last."""
     if j < 0:
-        return beside[beside.shape[0] + j]
-    return own[j] if j < own.shape[0] else beside[j - own.shape[0]]
+        return neighbours[neighbours.shape[0] + j]
+    return own[j] if j < own.shape[0] else neighbours[j - own.shape[0]]
 
 
 @loop
-def add_up(points, beside, above, wide, tall, cells):
-    """The sums over cells."""
+def add_up(points, neighbours, above, wide, tall, cells):
+    """Put the sums over cells into `cells`."""
     second = np.float32(tall - 1)
     pairs = points.shape[1] // 2
     for j in range(cells.shape[0]):
-        a, b = row_of(points, beside, tall * j - above), row_of(points, beside, tall * j - above + tall - 1)
+        a, b = row_of(points, neighbours, tall * j - above), row_of(points, neighbours, tall * j - above + tall - 1)
         out = cells[j]
         if wide == 1:
             for i in range(out.size):
@@ -33,11 +37,11 @@ def add_up(points, beside, above, wide, tall, cells):
 
 
 @loop
-def add_up_back(cells, beside, above, wide, tall, points):
+def add_up_back(cells, neighbours, above, wide, tall, points):
     """Add the value of each cell to its points."""
     pairs = points.shape[1] // 2
     for j in range(points.shape[0]):
-        cell, out = row_of(cells, beside, (j + above) // tall), points[j]
+        cell, out = row_of(cells, neighbours, (j + above) // tall), points[j]
         if wide == 1:
             for i in range(out.size):
                 out[i] += cell[i]
@@ -50,15 +54,15 @@ def add_up_back(cells, beside, above, wide, tall, points):
 
 
 @loop
-def interpolate_cells(cells, beside, above, wide, tall, known, points):
-    """Add `1 - known` times what is interpolated between cells."""
+def interpolate_cells(cells, neighbours, above, wide, tall, known, points):
+    """Add to each point `1 - known` times the interpolation between cells."""
     pairs, columns = points.shape[1] // 2, cells.shape[1]
     line = np.empty(columns + 2, cells.dtype)
     own, others = (np.float32(0.75), np.float32(0.25)) if tall == 2 else (np.float32(1.0), np.float32(0.0))
     for j in range(points.shape[0]):
         near = (j + above) // tall
         other = near if tall == 1 else near + 1 if (j + above) % 2 else near - 1
-        a, b = row_of(cells, beside, near), row_of(cells, beside, other)
+        a, b = row_of(cells, neighbours, near), row_of(cells, neighbours, other)
         for i in range(columns):
             line[i + 1] = own * a[i] + others * b[i]
         out, weight = points[j], known[j]
@@ -76,20 +80,20 @@ def interpolate_cells(cells, beside, above, wide, tall, known, points):
 
 
 @loop
-def gather_cells(known, known_beside, points, beside, above, wide, tall, cells):
-    """Put points into cells: `1 - known` times their values, by the weights of the interpolation."""
+def gather_cells(known, known_neighbours, points, neighbours, above, wide, tall, cells):
+    """Add up `1 - known` times the values of points in cells, by the weights of the interpolation."""
     count, columns = points.shape[1], cells.shape[1]
     line = np.zeros(wide * columns + 2, cells.dtype)
     for j in range(cells.shape[0]):
         first = tall * j - above
-        a, w_a = row_of(points, beside, first), row_of(known, known_beside, first)
+        a, w_a = row_of(points, neighbours, first), row_of(known, known_neighbours, first)
         if tall == 1:
             for i in range(count):
                 line[i + 1] = (1.0 - w_a[i]) * a[i]
         else:
-            b, w_b = row_of(points, beside, first + 1), row_of(known, known_beside, first + 1)
-            over, w_over = row_of(points, beside, first - 1), row_of(known, known_beside, first - 1)
-            under, w_under = row_of(points, beside, first + 2), row_of(known, known_beside, first + 2)
+            b, w_b = row_of(points, neighbours, first + 1), row_of(known, known_neighbours, first + 1)
+            over, w_over = row_of(points, neighbours, first - 1), row_of(known, known_neighbours, first - 1)
+            under, w_under = row_of(points, neighbours, first + 2), row_of(known, known_neighbours, first + 2)
             for i in range(count):
                 outer = (1.0 - w_over[i]) * over[i] + (1.0 - w_under[i]) * under[i]
                 inner = (1.0 - w_a[i]) * a[i] + (1.0 - w_b[i]) * b[i]

@@ -1,17 +1,16 @@
-"""A residual carried on beyond the set of points it is known on, and what it causes there brought back.
+"""Extension of a residual beyond its set of points, and the transpose of the extension.
 
-A preconditioner K, the inverse of A without a contact set, makes of a residual r on a set c the correction `R K R r`
-(R: values on c). That takes r as 0 outside c, where it really goes on: the correction that is wanted moves the surface
-outside c, too. With an extension E of r to all points, `R E' K E R` is symmetric and positive, as K is; with the one
-that makes the energy `<e, K e>` the smallest it is the inverse of `R A R`. That e varies, at any distance from c, over
-lengths of about this distance. So does the mean over cells of all sizes that is taken here. With s the sum of r over a
-cell, w the number of its points that are in c, and I the linear interpolation between cells of twice the length,
+A preconditioner K, the inverse of A without a contact set, turns a residual r on a set c into the correction `R K R
+r` (R: restrict to c). This takes r as 0 outside c, whereas the wanted correction moves the surface outside c, too.
+With an extension E of r to all points, `R E' K E R` is symmetric and positive, as K is. It is the inverse of `R A R`
+if e = E r minimizes `<e, K e>`. At any distance from c this e varies over lengths of about the distance. So does the
+mean over cells of all sizes used here. With s the sum of r over a cell, w the number of its points in c, and I the
+linear interpolation between cells of twice the length,
 
     e = (s + f I e_above)/(w + f),   f = FLOOR times the points of a cell,
 
-from the largest cell, beyond which e is 0, down to single points, for which f = 0: a cell tells what it knows, and asks
-the larger one about the rest. The number of iterations then hardly grows with the grid. The grid is taken to repeat for
-ever, which does no harm where it does not. Maps of cells are in single precision: enough for a preconditioner.
+from the largest cell, above which e is 0, down to single points, with f = 0. The number of iterations then hardly
+grows with the grid. The grid is taken as periodic, also for free boxes. Maps of cells are in single precision.
 """
 
 import math
@@ -25,15 +24,15 @@ from ...parallel.slab import Array, Slab
 from ..problem import Operator
 from .levels import cell_levels, interpolate, interpolate_back
 
-FLOOR = 0.3  # tuning: of the points of a cell: so many count as having the value of the larger cell
-LONG = 16.0  # tuning: times its width: with points further apart along one direction, square cells are worse than none
-FADING = 2.7  # tuning: power of the reach of a layer with which the floor of cells longer than that grows
-Maps = list[NDArray[Any]]  # of points, and of cells on each larger grid
+FLOOR = 0.3  # tuning: weight of the larger cell, as a share of the points of a cell
+LONG = 16.0  # tuning: largest ratio of distances of points for which larger cells are used
+FADING = 2.7  # tuning: power with which the floor of cells longer than the reach of a layer grows
+Maps = list[NDArray[Any]]  # a map of points, followed by maps of cells on each larger grid
 
 
 class Grids(NamedTuple):
-    """Grids of larger cells: how many at most, None for all that there are, of which the first are of so many `pairs`
-    (`levels`); the floor of the `last` one over that of the others."""
+    """Grids of larger cells: at most `most`, None for all; the first of them double cells along one side, `pairs` times
+    (`levels`); the floor of the last one is `last` times that of the others."""
 
     most: int | None = None
     pairs: int = 0
@@ -44,20 +43,19 @@ ALL = Grids()
 
 
 def pairs_for(dx: float, dy: float) -> int:
-    """Return how often points at distances dx and dy have to be joined to pairs along x until cells are about square,
-    below 0 along y; 0 where they are too far from square."""
+    """Return how many doublings along x make points at distances dx and dy about square; negative for doublings along
+    y; 0 if the ratio exceeds LONG."""
     if max(dx, dy) > LONG * min(dx, dy):
         return 0
     return round(math.log2(dy / dx))
 
 
 def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
-    """Return the grids of larger cells to use with distances dx and dy of points.
+    """Return the grids of larger cells for points at distances dx and dy.
 
-    Where points are nearer along one direction, pairs along it are made first, until cells are about square: a step of
-    a slide takes as many iterations as on squares then, and up to a half more without. Points further apart than the
-    `reach` do not act on each other: no square cell is longer than about that. There are two sizes of these at least;
-    if the larger one is longer than the reach, it counts for less, as its floor is higher.
+    Where points are closer along one direction, cells are doubled along it first, until they are about square.
+    Points further away than `reach` do not act on each other: square cells have at most about this length. There are
+    at least two sizes of these; if the larger one exceeds the reach, its floor is raised.
     """
     if max(dx, dy) > LONG * min(dx, dy):
         return Grids(0)
@@ -69,13 +67,13 @@ def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
 
 
 class ExtendedPreconditioner:
-    """K on a set, extended as above; two maps in single precision on each grid of larger cells.
+    """K on a set with the extension E. It holds two maps in single precision on each grid of larger cells.
 
-    `known` is `w/(w + f)` of each cell, for points the set itself.
+    `known` is `w/(w + f)` of each cell; for points it is the set.
     """
 
     def __init__(self, slab: Slab, floor: float = FLOOR, larger: Grids = ALL) -> None:
-        """With another floor, or other grids of `larger` cells than all."""
+        """Use the grids `larger` with this floor."""
         most, pairs, last = larger
         down, across = max(pairs, 0), max(-pairs, 0)
         self._levels = cell_levels(slab, pairs)[:most]
@@ -90,8 +88,7 @@ class ExtendedPreconditioner:
         self._known, self._cells = ([grid.empty(np.float32) for grid in grids] for _ in range(2))
 
     def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:
-        """Put z in the place of the residual r, which is 0 outside the set; only on the set does z mean something.
-        Collective."""
+        """Replace the residual r, which is 0 outside the set, by z; z is valid on the set only. Collective."""
         known: Maps = [working, *self._known]
         maps: Maps = [r, *self._cells]
         self._add_up(known)
@@ -122,14 +119,14 @@ class ExtendedPreconditioner:
 
 
 def lengths(points: int, level: int) -> NDArray[np.float32]:
-    """How many points there are of each cell along one direction: fewer in the last one."""
+    """Return the number of points of each cell along one direction; the last cell may have fewer."""
     length = 1 << max(level, 0)
     return np.diff(np.minimum(np.arange(0, points + length, length), points)).astype(np.float32)
 
 
 @loop
 def _compare(floors, lengths, weights):
-    """`w/(w + f)`, with f the product of a floor of each row and a length of each column."""
+    """Divide weights w by `w + f`; f is a floor for each row times a length for each column."""
     for j in range(weights.shape[0]):
         for i in range(weights.shape[1]):
             weights[j, i] /= weights[j, i] + floors[j] * lengths[i]

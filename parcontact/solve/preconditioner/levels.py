@@ -1,7 +1,7 @@
-"""Between points and the larger cells of `extension`: squares of two by two, or pairs where cells are long.
+"""Grids of cells for `extension`: each cell joins two by two cells of the next finer grid, or a pair of them.
 
-Pairs are made first, until points are about as far apart along x as along y: what is smooth over square cells is not
-over long ones. A number of pairs is that of pairs along x, and below 0 of pairs along y.
+Pairs come first, until points are about as far from each other along x as along y, as fields that are smooth over
+square cells are not smooth over long ones. A positive number of pairs joins along x, a negative one along y.
 """
 
 from dataclasses import dataclass
@@ -18,9 +18,11 @@ Map = NDArray[Any]
 
 @dataclass(frozen=True)
 class CellLevel:
-    """Sums over cells of a step of `pyramid`, interpolation between them, and the transposes of both, each added to its
-    second map but for sums. `known` are the points of which interpolation knows the values; maps of the rows of this
-    rank. Collective."""
+    """Sums over cells, interpolation between them, and the transposes of both, for one step of `pyramid`.
+
+    Maps hold the rows of this rank. `known` marks points that interpolation leaves unchanged. All but `add_up` add
+    to their last map. Collective.
+    """
 
     step: pyramid.PyramidStep
 
@@ -52,17 +54,17 @@ class CellLevel:
 
 
 def cell_levels(slab: Slab, pairs: int = 0) -> list[CellLevel]:
-    """All levels of a grid up to a single cell, the finest first, of which so many are of pairs."""
+    """Return all levels of a grid up to a single cell, the finest first; the first `pairs` levels join pairs."""
     return [CellLevel(step) for step in pyramid.pyramid_steps(slab, pairs)]
 
 
 def interpolate(levels: list[CellLevel], known: list[Map], maps: list[Map]) -> None:
-    """Interpolate from the largest cells down to points, each grid added to the next finer one; collective."""
+    """Interpolate from the largest cells down to points, adding each grid to the next finer one; collective."""
     for k, level in reversed(list(enumerate(levels))):
         level.interpolate(maps[k + 1], known[k], maps[k])
 
 
 def interpolate_back(levels: list[CellLevel], known: list[Map], maps: list[Map]) -> None:
-    """The transpose of `interpolate`, from points to the largest cells; collective."""
+    """Apply the transpose of `interpolate`, from points to the largest cells; collective."""
     for k, level in enumerate(levels):
         level.interpolate_back(known[k], maps[k], maps[k + 1])

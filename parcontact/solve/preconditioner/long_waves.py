@@ -1,17 +1,17 @@
-"""Waves of pressure that are long against the thickness of a layer, within contact: what they add to a preconditioner.
+"""Part of a preconditioner for pressure waves that are long compared with the thickness of a layer, within the contact.
 
-Such waves displace a layer by `u = c0 p - c2 laplace p`: a bonded incompressible one has c0 = 0, it is pushed along its
-base as a film of a viscous fluid is. The long waves are thus far stiffer than the softest wave, as stiff as which a
-preconditioner K of the whole box may count them: p vanishes outside contact, so that patches of contact further apart
-than the layer is thick do not act on each other. What is missing is the inverse of that equation on the contact,
+Such waves displace a layer by `u = c0 p - c2 laplace p`; a bonded incompressible layer, which flows along its base
+like a viscous film, has c0 = 0. There long waves are far stiffer than the softest wave. A preconditioner K of the
+whole box must limit their stiffness to that of the softest wave, because p vanishes outside contact, and patches of
+contact further from each other than the thickness do not interact. The missing part is the inverse of the equation
+above on the contact,
 
     c0 z - c2 laplace z + c2 (1 - c)/l^2 z = r,
 
 with c = 1 in contact and 0 outside, where z decays over the length l, twice the thickness. One V-cycle over cells of
-two by two cells is near enough to it. It begins with cells of half the thickness, below which K does all, and smooths
-by damped Jacobi steps, once on the way to the larger cells and once on the way back, so that it is symmetric. Calls of
-the operator to solve a contact on an incompressible layer of a fortieth of the longest wave: 40 to 90 without it, 15 to
-19 with it, and 15 on a half space. Maps are in single precision: enough for a preconditioner.
+two by two cells approximates it. It starts with cells of half the thickness, as K inverts shorter waves, and makes a
+damped Jacobi step on the way to larger cells and another one on the way back, so that it is symmetric. Maps are in
+single precision.
 """
 
 import math
@@ -27,15 +27,16 @@ from ..problem import Operator
 from .extension import ExtendedPreconditioner, lengths
 from .levels import cell_levels
 
-DAMPING = np.float32(0.8)  # tuning: of the Jacobi steps
-DECAY = 2.0  # tuning: thicknesses over which z decays outside contact
-FINEST = 0.5  # tuning: thicknesses: no shorter cells are smoothed
-MAPS = 4  # on each grid
-SAME = 1e-9  # accuracy: lengths that differ by less are the same, whatever their unit
+DAMPING = np.float32(0.8)  # tuning: factor on the Jacobi steps
+DECAY = 2.0  # tuning: decay length of z outside contact, over the thickness
+FINEST = 0.5  # tuning: least length of cells that are smoothed, over the thickness
+MAPS = 4  # maps on each grid
+SAME = 1e-9  # accuracy: relative difference below which two lengths are equal
 
 
 class LongWavePreconditioner:
-    """An extended preconditioner and what long waves add; four maps in single precision on each grid of cells."""
+    """An extended preconditioner plus the part for long waves. It holds four maps in single precision on each grid of
+    cells."""
 
     def __init__(self, slab: Slab, waves: LongWaves, extended: ExtendedPreconditioner) -> None:
         self._extended, self._levels = extended, cell_levels(slab)
@@ -49,15 +50,14 @@ class LongWavePreconditioner:
         dx, dy = waves.size[0] / slab.nx, waves.size[1] / slab.ny
         self._faces = np.float32(dy / dx), np.float32(dx / dy)
         self._scale = dx * dy / waves.c2
-        stiffness = waves.c0 / waves.c2 + 1.0 / max(waves.size) ** 2  # the latter: no wave is longer than the box
+        stiffness = waves.c0 / waves.c2 + 1.0 / max(waves.size) ** 2  # 2nd term: no wave is longer than the box
         self._inside, self._outside = dx * dy * stiffness, dx * dy / (DECAY * waves.thickness) ** 2
         self._cell_lengths = [
             (lengths(slab.ny, level)[grid.rows], lengths(slab.nx, level)) for level, grid in enumerate(grids)
         ]
 
     def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:
-        """Put z in the place of the residual r, which is 0 outside the set; only on the set does z mean something.
-        Collective."""
+        """Replace the residual r, which is 0 outside the set, by z; z is valid on the set only. Collective."""
         self._weigh(working)
         if not self._first:
             self._given[0][...] = r
@@ -71,7 +71,7 @@ class LongWavePreconditioner:
             r += self._z[0]
 
     def _weigh(self, working: NDArray[Any]) -> None:
-        """Find the diagonals of all grids, from how many points of each cell are in the set."""
+        """Compute the diagonals on all grids from the number of points of each cell in the set."""
         counts = [working, *self._diagonal[1:]]
         for k, cells in enumerate(self._levels):
             cells.add_up(*counts[k : k + 2])
@@ -81,9 +81,9 @@ class LongWavePreconditioner:
                 _find_diagonal(counts[level], *lines, self._inside, self._outside, faces, diagonal)
 
     def _cycle(self, level: int, r: Array) -> None:
-        """Put z of a grid for what is given there into its map."""
+        """Solve for z on a grid with the right side stored there."""
         given, z, left, diagonal = (maps[level] for maps in (self._given, self._z, self._left, self._diagonal))
-        if level == len(self._levels):  # a single cell, whose neighbour is itself
+        if level == len(self._levels):  # a single cell, its own neighbour
             z[...] = given / (diagonal - 2.0 * sum(self._faces))
         elif level < self._first:
             self._add_up(level, given if level else r)
@@ -103,11 +103,11 @@ class LongWavePreconditioner:
 
     def _find_rest(self, level: int) -> None:
         z = self._z[level]
-        beside = self._levels[level].step.points_beside(z, 0, -1)
-        _rest(z, beside, self._given[level], self._diagonal[level], *self._faces, self._left[level])
+        neighbours = self._levels[level].step.points_beside(z, 0, -1)
+        _rest(z, neighbours, self._given[level], self._diagonal[level], *self._faces, self._left[level])
 
     def _add_up(self, level: int, points: NDArray[Any]) -> None:
-        """Give the next grid the sums over its cells."""
+        """Put the sums over the cells of the next grid into its right side."""
         self._levels[level].add_up(points, self._given[level + 1])
 
     def _add_up_back(self, level: int, points: NDArray[Any]) -> None:
@@ -116,14 +116,14 @@ class LongWavePreconditioner:
 
 
 def _first_grid(nx: int, ny: int, waves: LongWaves) -> int:
-    """How many times cells are doubled before they are smoothed."""
+    """Return how many times cells are doubled before the first smoothing."""
     cell = max(waves.size[0] / nx, waves.size[1] / ny)
     return max(math.floor(math.log2(FINEST * waves.thickness / cell * (1.0 + SAME))), 0)
 
 
 @loop
 def _find_diagonal(count, rows, columns, inside, outside, faces, out):
-    """`faces` and what points make of it: `inside` each, and `outside` those that are not among the `count`."""
+    """Put `faces + inside points + outside (points - count)` into `out`, with the points of each cell."""
     for j in range(out.shape[0]):
         for i in range(out.shape[1]):
             points = rows[j] * columns[i]
@@ -131,12 +131,12 @@ def _find_diagonal(count, rows, columns, inside, outside, faces, out):
 
 
 @loop
-def _rest(z, beside, given, diagonal, along_x, along_y, out):
-    """What is given without what z makes: `given - diagonal z`, and z of the neighbours times their faces."""
+def _rest(z, neighbours, given, diagonal, along_x, along_y, out):
+    """Put the residual of the equation into `out`: `given - diagonal z` plus z of the neighbours times their faces."""
     rows, columns = z.shape
     for j in range(rows):
-        below = z[j + 1] if j + 1 < rows else beside[0]
-        above = z[j - 1] if j > 0 else beside[1]
+        below = z[j + 1] if j + 1 < rows else neighbours[0]
+        above = z[j - 1] if j > 0 else neighbours[1]
         for i in range(columns):
             left = z[j, i - 1] if i > 0 else z[j, columns - 1]
             right = z[j, i + 1] if i + 1 < columns else z[j, 0]
