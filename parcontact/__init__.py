@@ -16,42 +16,39 @@ from .doubts import ParcontactWarning
 from .errors import InputError, JobError, RunError
 
 if TYPE_CHECKING:
-    from .leakage.flow import leak
-    from .python.curves import steady
+    from .leakage.flow import Flow, Leak, leak
+    from .python.curves import Curve, steady
     from .python.results import open
+    from .python.row import Row
     from .python.simulation import Simulation
-    from .python.surface_and_material import material, surface
+    from .python.surface_and_material import Material, material, surface
 
 __version__ = "0.2.0"
-__all__ = [
-    "InputError",
-    "JobError",
-    "ParcontactWarning",
-    "RunError",
-    "Simulation",
-    "leak",
-    "material",
-    "open",
-    "steady",
-    "surface",
-]
+__all__ = ["Curve", "Flow", "InputError", "JobError", "Leak", "Material", "ParcontactWarning", "Row", "RunError"]
+__all__ += ["Simulation", "leak", "material", "open", "steady", "surface"]
 
 _ROOMS = {
     "Simulation": "python.simulation",
+    "Row": "python.row",
     "steady": "python.curves",
+    "Curve": "python.curves",
     "open": "python.results",
     "surface": "python.surface_and_material",
     "material": "python.surface_and_material",
+    "Material": "python.surface_and_material",
     "leak": "leakage.flow",
+    "Leak": "leakage.flow",
+    "Flow": "leakage.flow",
 }
 
+if not TYPE_CHECKING:  # else any misspelt name would have a type
 
-def __getattr__(name: str) -> Any:
-    if name not in _ROOMS:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = getattr(import_module(f"{__name__}.{_ROOMS[name]}"), name)
-    globals()[name] = found
-    return found
+    def __getattr__(name: str) -> Any:
+        if name not in _ROOMS:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        found = getattr(import_module(f"{__name__}.{_ROOMS[name]}"), name)
+        globals()[name] = found
+        return found
 
 
 def __dir__() -> list[str]:

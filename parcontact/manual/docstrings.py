@@ -38,9 +38,8 @@ def _entries(block: str) -> Iterator[str]:
 
 
 def _short(name: str) -> str:
-    """Return a name as a program writes it: `pc.steady`; that of a result, which nobody makes, alone."""
-    package, _, last = name.rpartition(".")
-    return f"pc.{last}" if package == "parcontact" else last
+    """Return a name as a program writes it: `pc.steady`."""
+    return name.replace("parcontact.", "pc.", 1)
 
 
 def _first_sentence(name: str) -> str:

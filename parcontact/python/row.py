@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..storage import step_row as recorded
 
@@ -11,8 +11,47 @@ from ..storage import step_row as recorded
 class Row(Mapping[str, float]):
     """One instant of a run: `row.friction` and `row["friction"]` are a column of measures.csv, in the same units.
 
-    Energies [J] that the job does not ask for (`output.energy`) are NaN. `dict(row)` is a mapping of all.
+    Energies [J] that the job does not ask for (`output.energy`) are NaN. `dict(row)` is a mapping of all. Type checkers
+    know every column of the page `outputs` as an attribute; columns of branches and of other effects are
+    `row["dissipated_0"]`. A column that the job does not have raises AttributeError.
     """
+
+    step: int
+    time: float
+    distance: float
+    pressure: float
+    force_x: float
+    force_y: float
+    friction: float
+    contact_area: float
+    approach: float
+    mean_gap: float
+    max_pressure: float
+    iterations: int
+    residual: float
+    penetration: float
+    operator_calls: int
+    work: float
+    stored: float
+    dissipated: float
+    seconds: float
+    friction_x: float
+    contact_area_corrected: float
+    error_friction: float
+    error_area: float
+    friction_viscous: float
+    friction_interface: float
+    tensile_area: float
+    adhesive_force: float
+    surface_energy: float
+    snap_loss: float
+    error_energy: float
+    flow_x: float
+    flow_y: float
+    constriction: float
+    flash_temperature: float
+    max_temperature: float
+    error_flash: float
 
     def __init__(self, numbers: Mapping[str, float]) -> None:
         self._numbers = dict(numbers)
@@ -33,11 +72,13 @@ class Row(Mapping[str, float]):
     def __getitem__(self, name: str) -> float:
         return self._numbers[name]
 
-    def __getattr__(self, name: str) -> Any:
-        known: dict[str, float] = self.__dict__.get("_numbers", {})
-        if name not in known:
-            raise AttributeError(f"measures have no {name!r}; there are {', '.join(known)}")
-        return known[name]
+    if not TYPE_CHECKING:  # else any misspelt column would have a type
+
+        def __getattr__(self, name: str) -> Any:
+            known = self.__dict__.get("_numbers", {})
+            if name not in known:
+                raise AttributeError(f"measures have no {name!r}; there are {', '.join(known)}")
+            return known[name]
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self._numbers]

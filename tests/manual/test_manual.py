@@ -88,7 +88,7 @@ def test_the_page_on_python_is_text() -> None:
     assert re.search(r"^pc\.Simulation +A job, run from Python on the ranks", text, re.MULTILINE)  # in a list of names
     for method in ("steps()", "run(restart='auto', quiet=True)", "row", "restore(path, set=None, comm=None)"):
         assert f"\n### {method}\n\n" in text
-    assert re.findall(r"^### (.*)", text.partition("## Material")[2], re.MULTILINE) == [
+    assert re.findall(r"^### (.*)", text.partition("## pc.Material")[2], re.MULTILINE) == [
         *("complex_modulus(omega)", "relaxation(t)", "creep(t)")
     ]
     assert "{eval-rst}" not in text

@@ -16,6 +16,7 @@ from short_job import STEPS
 
 import parcontact as pc
 from parcontact.__main__ import main
+from parcontact.columns import MEASURES, PER_BRANCH
 from parcontact.printed import per_cent
 
 ROOT = Path(__file__).parents[2]
@@ -346,3 +347,22 @@ def test_material() -> None:
     assert pc.material({"model": "elastic", "shear_modulus": 2e6}).complex_modulus(1.0) == 2e6
     with pytest.raises(pc.JobError, match=r"material\.model must be"):
         pc.material({"model": "rubber"})
+
+
+# -- types that a user's checker sees ---------------------------------------------------------------------------------
+
+
+def test_rows_are_annotated_with_every_column() -> None:
+    """In the order of the registry; numbers of steps and counts are whole numbers."""
+    columns = [column.name for column in MEASURES if column.name != PER_BRANCH]
+    assert list(pc.Row.__annotations__) == columns
+    row = next(pc.Simulation(JOB, comm=MPI.COMM_SELF).steps())
+    whole = {name for name, kind in pc.Row.__annotations__.items() if kind == "int"}
+    assert whole == {name for name in columns if name in row and isinstance(row[name], int)}
+    with pytest.raises(AttributeError, match="measures have no 'frictionn'"):
+        _ = row.frictionn  # type: ignore[attr-defined]
+
+
+def test_names_are_those_that_are_exported() -> None:
+    assert all(getattr(pc, name).__module__.startswith("parcontact.") for name in pc.__all__)
+    assert set(pc._ROOMS) | {"InputError", "JobError", "RunError", "ParcontactWarning"} == set(pc.__all__)

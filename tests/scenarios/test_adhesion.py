@@ -241,7 +241,8 @@ def test_work_is_force_times_path() -> None:
         job = sphere(32, 4, 1, {"approach": 0.0}, ramp(0.0, 2 * LENGTH, count), output={"energy": True})
         rows = [row for row in steps(job) if row.pressure != 0]
         force = np.array([row.pressure for row in rows]) * nominal_area(job)
-        errors.append(abs(rows[-1].work - rows[0].work - np.trapezoid(force, [row.approach for row in rows])))
+        done = float(np.trapezoid(force, [row.approach for row in rows]))
+        errors.append(abs(rows[-1].work - rows[0].work - done))
     print(errors, SCALE)
     assert errors[1] < 0.35 * errors[0]
     assert errors[2] < 3e-4 * SCALE
