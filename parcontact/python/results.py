@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from ..columns import UNITS
+from ..columns import MEASURES, PER_BRANCH
 from ..errors import InputError
 from ..storage import fields, hdf5, read_back
 from .given_jobs import path_of
@@ -17,6 +17,7 @@ from .given_jobs import path_of
 if TYPE_CHECKING:
     import xarray
 
+UNITS = {column.name: column.unit or "1" for column in MEASURES}
 NO_XARRAY = "parcontact.open needs xarray, which is not installed: pip install xarray (see parcontact manual install)"
 
 
@@ -25,8 +26,8 @@ def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
 
     The columns of measures.csv by their names, along `step` and with the coordinate `time` [s]; each map of fields.h5
     as `pressure_map`, `gap_map`, ..., of shape (t, y, x), read from the file where and when it is used, with the
-    coordinates `t` [s] and `map_step`: `friction.sel(step=map_step)` is that of each map. Variables have their `units`;
-    what was not asked for is NaN. Raises InputError for a directory without results, ImportError where
+    coordinates `t` [s] and `map_step`: `friction.sel(step=map_step)` is that of each map. Variables have their `units`,
+    `1` for ratios and counts; columns of effects of others have none. What was not asked for is NaN. Raises InputError for a directory without results, ImportError where
     xarray is not installed.
     """
     try:
@@ -40,15 +41,15 @@ def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
     steps, times = np.array(columns["step"], dtype=int), columns["time"]
     found: dict[str, Any] = {name: ("step", values, _units(name)) for name, values in columns.items()}
     del found["step"], found["time"]
-    coordinates: dict[str, Any] = {"step": steps, "time": ("step", times, _units("time"))}
+    coordinates: dict[str, Any] = {"step": ("step", steps, _units("step")), "time": ("step", times, _units("time"))}
     if (path / "fields.h5").is_file():
         _add_maps(path / "fields.h5", found, coordinates)
     return xarray.Dataset(found, coordinates)
 
 
 def _units(name: str) -> dict[str, str]:
-    kind = UNITS.get("dissipated" if name.startswith("dissipated_") else name)
-    return {"units": kind} if kind else {}
+    unit = UNITS.get(PER_BRANCH if name.startswith("dissipated_") else name)
+    return {"units": unit} if unit else {}
 
 
 def _add_maps(path: Path, found: dict[str, Any], coordinates: dict[str, Any]) -> None:
@@ -61,7 +62,7 @@ def _add_maps(path: Path, found: dict[str, Any], coordinates: dict[str, Any]) ->
             layout = fields.SavedFields(file)
             saved = np.flatnonzero(~np.isnan(layout.times))
             coordinates["t"] = ("t", layout.times[saved], {"units": "s"})
-            coordinates["map_step"] = ("t", file["step"][...][saved])
+            coordinates["map_step"] = ("t", file["step"][...][saved], _units("step"))
             coordinates |= {name: (name, file[name][...], {"units": "m"}) for name in ("y", "x")}
             maps = {name: SavedMap(path, name, file[name].shape, file[name].dtype, saved) for name in layout.names}
     except hdf5.FAILURES as error:

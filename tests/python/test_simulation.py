@@ -218,9 +218,8 @@ def test_xarray_opens_the_maps(nowhere: Path) -> None:
 def test_open(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Measures and maps with units; no map is read before it is used, and the file is not kept open."""
     xarray = pytest.importorskip("xarray")
-    run = pc.Simulation(
-        JOB, {"output": {"directory": "here", "fields": ["pressure", "gap"], "every": 4}}, MPI.COMM_SELF
-    )
+    output = {"directory": "here", "fields": ["pressure", "gap"], "every": 4, "energy": True}
+    run = pc.Simulation(JOB, {"output": {**output, "branch_dissipation": True}}, MPI.COMM_SELF)
     run.run()
     data = pc.open("here")
     assert isinstance(data, xarray.Dataset)
@@ -235,6 +234,9 @@ def test_open(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert of_maps[-1] == run.row.friction
     assert of_maps.time.values.tolist() == data.t.values.tolist()
     assert float(data.pressure_map.isel(t=-1).mean()) == pytest.approx(1e4)
+    assert [name for name, variable in data.variables.items() if not variable.attrs.get("units")] == []
+    expected = {"friction": "1", "step": "1", "map_step": "1", "dissipated_0": "J", "approach": "m", "x": "m", "t": "s"}
+    assert {name: data[name].attrs["units"] for name in expected} == expected
     (nowhere / "here" / "fields.h5").rename("elsewhere.h5")
     with pytest.raises(FileNotFoundError):
         pc.open("here") and data.pressure_map.isel(t=0).load()
