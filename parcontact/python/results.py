@@ -27,8 +27,8 @@ def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
     The columns of measures.csv by their names, along `step` and with the coordinate `time` [s]; each map of fields.h5
     as `pressure_map`, `gap_map`, ..., of shape (t, y, x), read from the file where and when it is used, with the
     coordinates `t` [s] and `map_step`: `friction.sel(step=map_step)` is that of each map. Variables have their `units`,
-    `1` for ratios and counts; columns of effects of others have none. What was not asked for is NaN. Raises InputError for a directory without results, ImportError where
-    xarray is not installed.
+    `1` for ratios and counts; columns of effects of others have none. What was not asked for is NaN. Raises InputError
+    for a directory without results, ImportError where xarray is not installed.
     """
     try:
         import xarray
