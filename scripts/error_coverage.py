@@ -60,7 +60,7 @@ FITTED = 600  # scenes below served to find constants
 ROUNDING = 1e-10  # relative: errors below it are none
 QUANTITIES = ("friction", "area", "energy", "flash temperature", "pull-off")
 CLASSES = ("history", "surface", "body", "boundary", "effect")
-HEAD = "kept or warned | warned | error within the estimate | estimate/error: median | 5 to 95 %"
+HEAD = "kept or warned | warned | within | estimate/error: median | 5 to 95 %"
 SEEN: list[tuple[RunProperties, StepObservation]] = []  # by the last step
 
 
@@ -294,16 +294,26 @@ def tables(found: pandas.DataFrame) -> Iterator[str]:
         for name in QUANTITIES:
             if len(own := some[some.quantity == name]):
                 yield f"| {title}: {len(own)} | {name} | {_row(own)} |"
-    for name in QUANTITIES[:2]:
-        yield f"\n### {name.capitalize()}, by class\n\n| class | scenes | {HEAD} |\n|{7 * '---|'}"
-        for key in CLASSES:
-            for group, some in found[found.quantity == name].groupby(key):
-                yield f"| {key}: {group} | {len(some)} | {_row(some)} |"
+    heads = " | ".join(f"{name}: scenes | within | estimate/error" for name in QUANTITIES[:2])
+    yield f"\n| class | {heads} |\n|{7 * '---|'}"
+    for key in CLASSES:
+        for group, some in found.groupby(key):
+            cells = " | ".join(_short_row(some[some.quantity == name]) for name in QUANTITIES[:2])
+            yield f"| {key}: {group} | {cells} |"
     yield "\n### Misses\n\n| scene | of | asked | true error | estimate | class |\n|---|---|---|---|---|---|"
     for each in found[~(found.kept & found.within)].itertuples():
         about = ", ".join(str(getattr(each, key)) for key in CLASSES)
         numbers = f"{100 * each.asked:.2g} % | {100 * each.error:.2g} % | {100 * each.estimate:.2g} %"
         yield f"| {each.scene} | {each.quantity} | {numbers} | {about}, {each.cells:g} cells |"
+
+
+def _short_row(some: pandas.DataFrame) -> str:
+    """Return the number of scenes, the share with an error within the estimate, and the median of estimate over
+    error."""
+    if not len(some):
+        return " | | "
+    ratio = (some.estimate / some.error)[some.error > ROUNDING].median()
+    return f"{len(some)} | {100 * some.within.mean():.1f} % | {ratio:.2g}"
 
 
 def _row(some: pandas.DataFrame) -> str:
