@@ -48,8 +48,8 @@ def describe_directory(directory: Path) -> Chapter:
         asked = _describe_job(job, resolved.with_name(JOBS[resolved.name]))
         of_job = [asked, material.material_section(job), road_section.road_section(job)]
         if there == ["sweep.csv"]:
-            of_job = _name_first_case([replace(asked, sentences=[_describe_swept(directory)]), *of_job[1:]])
-            sections += _describe_example(directory, resolved.parent)
+            of_job[0] = replace(asked, sentences=[_describe_swept(directory)])
+            of_job = [replace(one, title=f"{one.title} of the first case") for one in of_job]
         sections += of_job
         if there[0] in ("measures.csv", "steady.csv"):
             sections += origin.costs(directory / there[0], found, job)
@@ -89,20 +89,6 @@ def _places(job: Job) -> list[str]:
     """Return the directories of this machine that a job names: who reads a report has others."""
     parts = [value for part in (*job.surface, job.material) for _, value in listing.items(part)]
     return [f"{path.parent}/" for path in (job.path, *parts) if isinstance(path, Path) and path.is_absolute()]
-
-
-def _name_first_case(sections: Sequence[ReportSection]) -> list[ReportSection]:
-    """Return sections that say whose they are."""
-    return [replace(one, title=f"{one.title} of the first case") for one in sections]
-
-
-def _describe_example(directory: Path, case: Path) -> list[ReportSection]:
-    """Return the results of the first case of a sweep as an example, where it is done."""
-    first = sweep_table.read_cases(directory / "sweep.csv")[0]
-    kinds = [describe for table, (_, describe) in KINDS.items() if (case / table).is_file()]
-    if first["state"] != "done" or not kinds:
-        return []
-    return [replace(kinds[0](case), title="The first case as an example")]
 
 
 def _describe_swept(directory: Path) -> str:

@@ -31,14 +31,16 @@ from .page_parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement", "work_precision.png": "error over cost"}
 INTERFACE = ("friction_viscous", "friction_interface")
-SHOWN = ("friction", "contact_area", "approach", "mean_gap", "max_pressure", *INTERFACE)
+SHOWN = (
+    *("friction", "contact_area", "approach", "mean_gap", "max_pressure", *INTERFACE),
+    *("flow_x", "flow_y", "constriction"),
+)
 POINTS = (
     *("velocity", "temperature", "pressure", "friction", "error_friction", *INTERFACE),
     *("contact_area_corrected", "error_area", "mean_gap", "max_pressure"),
 )
 PLACE = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C"}  # of a point of a curve in bands
 DIGITS = 5
-LEAKAGE = ("time", "pressure", "flow_x", "flow_y", "constriction")
 MOST_ROWS = 200  # of a table: the whole is in the data
 MOST_MAPS = 24  # pictures of one map: instants in between are left out
 MAP_DPI = 100
@@ -61,37 +63,11 @@ def describe_run(directory: Path) -> ReportSection:
         *slide.describe_slide(run.job.history, run.job.initial, run.job.grid.dx, columns),
         *pull_off.describe_pull_off(columns, box, run.job.numerics.tolerance, bool(marker.detached(directory))),
         *leak_stop.describe_leak_stop(directory),
+        *theory_beside.describe_theory(directory, run.job.history, run.job.grid.dx),
         theory_settings.describe_settings(directory),
     ]
     pictures = [draw_chart(chart) for chart in histories.chart_histories(run)] + _leakage(directory)
-    shown = [numbers, *_leakage_of_stages(run), *_theory(directory, run)]
-    return ReportSection("Results of the run", list(filter(None, told)), shown, pictures, browse_run(run))
-
-
-def _theory(directory: Path, run: PlottedRun) -> list[ReportTable]:
-    """Return the results of Persson's theory beside those of the run, where there is a theory."""
-    rows = [
-        (one.name, *map(format_cell, (one.run or math.nan, one.theory)), f"{one.theory / one.run - 1:+.0%}")
-        for one in theory_beside.compare_with_theory(directory, run.job.history, run.job.grid.dx)
-        if one.run
-    ]
-    head = ("result", "run", "Persson's theory", "difference of the theory")
-    return [ReportTable(head, rows, "beside Persson's theory; the area of the run as corrected for its edges")] * bool(
-        rows
-    )
-
-
-def _leakage_of_stages(run: PlottedRun) -> list[ReportTable]:
-    """Return the conductivities at the end of each stage, where the run has calculated them: the last row that has."""
-    if "flow_x" not in run.columns:
-        return []
-    rows = []
-    for stage, its_rows in run.rows_of_stages.items():
-        if known := [row for row in its_rows if run.columns["flow_x"][row] >= 0.0]:
-            cells = [format_cell(float(run.columns[name][known[-1]])) for name in LEAKAGE]
-            rows.append([run.job.history[stage].name, *cells])
-    head = ["stage", *(f"{_to_words(name)} [{UNITS[name]}]" for name in LEAKAGE)]
-    return [ReportTable(head, rows, "leakage at the end of each stage")] * bool(rows)
+    return ReportSection("Results of the run", list(filter(None, told)), [numbers], pictures, browse_run(run))
 
 
 def _leakage(directory: Path) -> list[tuple[str, str]]:

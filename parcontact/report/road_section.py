@@ -3,10 +3,9 @@
 from functools import partial
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from ..bands.band import Band
-from ..bands.choice import Cut, cut_bands, describe_cut
+from ..bands.choice import cut_bands, describe_cut
 from ..derived.surface_summary import NOT_SELF_AFFINE
 from ..errors import InputError
 from ..job import Cylinder, Job, Sphere
@@ -14,12 +13,11 @@ from ..job.sections import listing
 from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics import surface_statistics as statistics
-from ..plotting import prefixes, style, surface_picture
+from ..plotting import prefixes, surface_picture
 from ..printed import with_error
 from ..scene import rigid_surface
 from .page_parts import Picture, ReportSection, ReportTable, draw_panel
 
-POINTS = 400  # of a line
 MOST_POINTS = 2**22  # of a surface that is made anew for a report
 
 
@@ -62,25 +60,9 @@ def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
     bands = ReportTable(("waves", "rms slope", "with all longer waves"), rows, "bands, each on a grid of its own")
     heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
     found = statistics.surface_statistics(heights, setup.grid.size)
-    pictures = [
-        draw_panel(partial(_draw_spectrum, cut=cut, coarsest=found), "spectrum, cut into bands at the dotted lines"),
-        *_draw(surface_picture.Sketch(heights, setup.grid.size, found), ", coarsest band"),
-    ]
+    pictures = _draw(surface_picture.Sketch(heights, setup.grid.size, found), ", coarsest band")
     tables = [shapes, bands, _tabulate(found, "of the coarsest band")]
     return ReportSection("Surface", [f"{text}." for text in describe_cut(cut, job)], tables, pictures)
-
-
-def _draw_spectrum(axes: Axes, cut: Cut, coarsest: statistics.Statistics) -> None:
-    """Draw the spectrum of the job and that of the coarsest band over wavenumbers, and where bands begin and end."""
-    low, high = cut.spectrum.ends
-    q = np.geomspace(low, high, POINTS)
-    axes.loglog(q, cut.spectrum.phi(q) / (4.0 * np.pi**2), label="spectrum of the job", **style.line(0))
-    there = (coarsest.q >= cut.edges[0]) & (coarsest.q <= cut.edges[1])
-    axes.loglog(coarsest.q[there], coarsest.psd_2d[there], label="coarsest band", **style.line(1))
-    axes.legend(loc="lower left")
-    for edge in cut.edges:
-        axes.axvline(edge, color=style.GREY, ls=":")
-    axes.set(xlabel="wavenumber [1/m]", ylabel="PSD over directions [m⁴]")
 
 
 def _tabulate(found: statistics.Statistics, where: str) -> ReportTable:

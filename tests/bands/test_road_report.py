@@ -112,7 +112,7 @@ def test_the_report_shows_bands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     mapped = jobs.load(job_of([road_map(tmp_path / "road.npy", 128, 4 * LONG), table]))
     section = road_section.road_section(mapped)
     assert len(section.tables[1].rows) == cut_bands(mapped).count
-    assert len(section.pictures) == 5
+    assert len(section.pictures) == 4
 
 
 def test_plan_says_bands_and_contacts(tmp_path: Path) -> None:
