@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 HEADER_BYTES = 1_000_000
 TEXTS = (".txt", ".xyz", ".csv", ".dat", ".asc")
-OWN_FORMATS = (".npy", ".gsf", *TEXTS)  # of maps; others are read by SurfaceTopography
+OWN_FORMATS = (".npy", *TEXTS)  # of maps; others are read by SurfaceTopography
 LOWEST, HIGHEST = 1e-70, 1e70  # accuracy: of the largest height [m], whose fourth power is still a number
 LARGEST_TEXT = 50_000_000  # bytes
 

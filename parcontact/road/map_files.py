@@ -1,4 +1,4 @@
-"""Read measured maps and line scans: .npy, tables of text, .gsf; all other formats by SurfaceTopography, if installed.
+"""Read measured maps and line scans: `.npy` and tables of text; all other formats by SurfaceTopography, if installed.
 
 Heights point up, out of the road: the highest points touch first.
 """
@@ -22,9 +22,8 @@ TO_GIVE = "m | mm | um | nm"  # as a job writes them; files may have the others
 OF_NUMPY = ("npy", "npz")  # which SurfaceTopography reads with the first direction along x
 LARGEST_FILE = 4_000_000_000  # tuning: bytes
 LONGEST_HEAD = 200  # tuning: lines before the first number of a text
-IRREGULAR = 0.1  # accuracy: of a step: positions further from a grid than this are on none; others are rounded
+IRREGULAR = 0.1  # accuracy: largest difference between steps over a step, of positions that are rounded
 FEWEST = 4  # tuning: points along a direction
-MOST_MISSING = 2  # tuning: times as many points of the grid as of the file
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ def read_map(part: Topography) -> Map:
         if path.stat().st_size > LARGEST_FILE:
             raise InputError(f"{path} has more than {LARGEST_FILE / 1e9:g} GB; crop the map first")
         ending = path.suffix.lower()
-        readers = {".npy": _array, ".gsf": _simple_field, **dict.fromkeys(datafiles.TEXTS, _text)}
+        readers = {".npy": _array, **dict.fromkeys(datafiles.TEXTS, _text)}
         found = _in_metres(part, readers.get(ending, _instrument)(part))
     except InputError:
         raise
@@ -146,51 +145,18 @@ def _numbers(line: str) -> list[float]:
 
 
 def _positions(path: Path, table: Array, unit_xy: float | None, unit: float | None) -> MapContents:
-    """Return a map from rows of x, y, z, or a line from rows of x, z, in any order; points that are not there are
-    missing."""
-    if (wrong := np.flatnonzero(~np.isfinite(table[:, :-1]).all(axis=1))).size:
-        raise InputError(f"{path}: its point {wrong[0] + 1} is at {_place(table, wrong[0])}, which is no position")
-    lowest, steps = zip(*(_steps(path, *pair) for pair in zip("xy", table.T[:-1], strict=False)), strict=True)
-    index = np.round((table[:, :-1] - lowest) / steps)
-    if np.prod(counts := index.max(axis=0) + 1.0) > MOST_MISSING * len(table):
-        far = int(np.abs(index - np.median(index, axis=0)).max(axis=1).argmax())
-        raise InputError(
-            f"{path}: its {len(table)} points reach over a grid of {' x '.join(f'{n:.6g}' for n in counts)}, of which "
-            f"more than half would be missing; is point {far + 1}, at {_place(table, far)}, one of them?"
-        )
-    heights = np.full(counts[::-1].astype(int), np.nan)
-    heights[tuple(index.T[::-1].astype(int))] = table[:, -1]
-    return MapContents(heights, unit, tuple(counts * steps), unit_xy)
-
-
-def _place(table: Array, row: int) -> str:
-    return ", ".join(f"{name} = {value:g}" for name, value in zip("xy", table[row, :-1], strict=False))
-
-
-def _steps(path: Path, name: str, values: Array) -> tuple[float, float]:
-    """Return the lowest and the step of positions on a regular grid, which may be rounded to fixed digits."""
-    distinct = np.unique(values)
-    if distinct.size < FEWEST:
-        raise InputError(f"{path} has {distinct.size} positions along {name}; at least {FEWEST} were expected")
-    gaps = np.diff(distinct)
-    step = float((distinct[-1] - distinct[0]) / np.round(gaps / np.median(gaps)).sum())  # columns may be missing
-    index = (distinct - distinct[0]) / step
-    if np.abs(index - np.round(index)).max() > IRREGULAR:
-        raise InputError(f"{path}: its positions along {name} are not equally spaced")
-    return float(distinct[0]), step
-
-
-def _simple_field(part: Topography) -> MapContents:
-    """Read a Gwyddion simple field: a head of `key = value`, one to four zero bytes, and rows of single precision."""
-    data = part.path.read_bytes()
-    head = data.partition(b"\0")[0]
-    said = dict(re.findall(r"^(\w+) *= *(.*?)\s*$", head.decode("utf-8"), re.MULTILINE))
-    if not said.keys() >= {"XRes", "YRes"}:
-        raise InputError(f"{part.path} cannot be read: it is no simple field of Gwyddion")
-    nx, ny = int(said["XRes"]), int(said["YRes"])
-    units = [_scale(part.path, said[key]) if said.get(key) else None for key in ("ZUnits", "XYUnits")]
-    values = np.frombuffer(data, "<f4", nx * ny, 4 * (len(head) // 4 + 1)).reshape(ny, nx)
-    return MapContents(values, units[0], (float(said.get("XReal", 1.0)), float(said.get("YReal", 1.0))), units[1])
+    """Return a map from rows of x, y, z, or a line from rows of x, z, in any order; positions without a row are
+    missing. They are equally spaced, to the digits to which they are rounded."""
+    axes = [np.unique(column, return_inverse=True) for column in table.T[:-1]]
+    for name, (places, _) in zip("xy", axes, strict=False):
+        if places.size < FEWEST:
+            raise InputError(f"{path} has {places.size} positions along {name}; at least {FEWEST} were expected")
+        if not np.ptp(gaps := np.diff(places)) <= IRREGULAR * np.mean(gaps):
+            raise InputError(f"{path}: its positions along {name} are not equally spaced")
+    heights = np.full([places.size for places, _ in axes[::-1]], np.nan)
+    heights[tuple(index for _, index in axes[::-1])] = table[:, -1]
+    size = tuple(float(np.ptp(places)) * places.size / (places.size - 1) for places, _ in axes)
+    return MapContents(heights, unit, size, unit_xy)
 
 
 def _instrument(part: Topography) -> MapContents:

@@ -83,7 +83,7 @@ def of_line(part: Topography, line: Map) -> tuple[MeasuredSpectrum, tuple[float,
     heights, length = line.heights, line.size[0]
     if heights.size < FEWEST_OF_LINE or np.nanmin(heights) == np.nanmax(heights):
         raise InputError(f"{part.path}: a line scan of at least {FEWEST_OF_LINE} points that is not flat was expected")
-    level = treatment.remove_trend(heights, np.isfinite(heights), part.detrend)[0][0]
+    level = treatment.remove_trend(heights, np.isfinite(heights), part.detrend)[0]
     known = np.isfinite(level)
     places = np.arange(level.size)
     level = np.interp(places, places[known], level[known])

@@ -15,46 +15,34 @@ TERMS = {"none": 0, "mean": 1, "tilt": 3, "curvature": 6}  # of 1, x, y, x^2, x 
 
 @dataclass(frozen=True)
 class Treated:
-    """A map without missing points; how many were `missing`, which were `outliers`, and the coefficients of the `trend`
-    that was taken off."""
+    """A map without missing points, how many were `missing`, and which are `outliers`."""
 
     heights: Array
     missing: int
     outliers: NDArray[np.bool_]
-    trend: tuple[float, ...]
 
 
 def treat(heights: Array, detrend: str, periodic: str, clip: bool = False) -> Treated:
     """Level, fill, on request clip outliers, and make periodic: `smooth`, `mirror` (the map becomes twice as long along
     both directions) or `none`."""
     known = np.isfinite(heights)
-    level, trend = remove_trend(heights, known, detrend)
-    filled = fill(level, known)
+    filled = fill(remove_trend(heights, known, detrend), known)
     odd, around = find_outliers(filled)
     if clip and odd.any():
-        filled, more = remove_trend(np.where(odd, around, filled), np.ones_like(known), detrend)
-        trend = trend + more
+        filled = remove_trend(np.where(odd, around, filled), np.ones_like(known), detrend)
     if periodic == "smooth":
         filled = make_periodic(filled)
     elif periodic == "mirror":
         filled = np.pad(filled, [(0, count if count > 1 else 0) for count in filled.shape], mode="symmetric")
-    return Treated(filled, int((~known).sum()), odd, tuple(map(float, trend)))
+    return Treated(filled, int((~known).sum()), odd)
 
 
-def rms_slope(heights: Array, size: tuple[float, float]) -> float:
-    """Return the rms of the gradient of a periodic map on a box of `size` = (lx, ly) [m], by its Fourier series."""
-    qy, qx = (2 * np.pi * fft.fftfreq(n, length / n) for n, length in zip(heights.shape, size[::-1], strict=True))
-    power = np.abs(fft.fft2(heights) / heights.size) ** 2
-    return float(np.sqrt(np.sum(power * (qy[:, None] ** 2 + qx**2))))
-
-
-def remove_trend(heights: Array, known: NDArray[np.bool_], detrend: str) -> tuple[Array, Array]:
-    """Return a map without its mean, plane or paraboloid, by least squares over known points, and the coefficients over
-    the box from -1 to 1."""
+def remove_trend(heights: Array, known: NDArray[np.bool_], detrend: str) -> Array:
+    """Return a map without its mean, plane or paraboloid, by least squares over known points."""
     y, x = np.meshgrid(*(np.linspace(-1.0, 1.0, n) if n > 1 else np.zeros(1) for n in heights.shape), indexing="ij")
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y])[: TERMS[detrend]]
     trend = np.linalg.lstsq(terms[:, known].T, heights[known], rcond=None)[0]
-    return heights - np.tensordot(trend, terms, 1), trend
+    return heights - np.tensordot(trend, terms, 1)
 
 
 def fill(heights: Array, known: NDArray[np.bool_]) -> Array:

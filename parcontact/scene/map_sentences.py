@@ -6,6 +6,7 @@ import numpy as np
 
 from ..doubts import Doubt
 from ..job import Topography
+from ..physics.surface_statistics import surface_statistics
 from ..printed import per_cent, quantity
 from ..road import treatment
 from ..road.map_files import Map
@@ -25,9 +26,6 @@ def describe_treatment(prepared: Prepared) -> list[str]:
         lines.append(f"road: {done.missing} missing points ({per_cent(done.missing / cut.size)}) were filled")
     if odd and part.outliers == "clip":
         lines.append(f"road: {odd} points that stuck out were set to the median of their neighbours")
-    if len(done.trend) > 1:
-        tilt = [2.0 * slope / length for slope, length in zip(done.trend[1:3], size, strict=True)]
-        lines.append(f"road: a tilt of {tilt[0]:.3g} along x and {tilt[1]:.3g} along y was taken off")
     if part.short_wavelength:
         lines.append(
             f"road: waves shorter than {quantity(part.short_wavelength, 'm', 4)} were taken out (ideal low-pass)"
@@ -66,7 +64,7 @@ def doubt_outliers(prepared: Prepared) -> Iterator[Doubt]:
     if not odd.any() or prepared.part.outliers == "clip":
         return
     slope, without = (
-        treatment.rms_slope(treatment.treat(heights, "tilt", "smooth").heights, prepared.size)
+        surface_statistics(treatment.treat(heights, "tilt", "smooth").heights, prepared.size).rms_slope
         for heights in (cut, np.where(odd, np.nan, cut))
     )
     furthest = cut[odd][np.argmax(np.abs(cut[odd] - np.nanmedian(cut)))]

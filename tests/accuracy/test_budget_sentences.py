@@ -70,6 +70,4 @@ def test_friction_of_which_most_may_be_error_is_unknown(mesh: float, stated: flo
     assert (" or more (solver 1 %, mesh" in friction) == bool(further) == (stated >= 1.0)
     assert "or more" not in area
     (tmp_path / "run.log").write_text(f"{friction}\n{area}\n")
-    found = {one.name: one.total for one in log.read_logs(tmp_path).estimates}
-    assert found["friction"] == pytest.approx(100 * stated, rel=0.01)
-    assert found["contact area"] == pytest.approx(100 * (0.01 + mesh), rel=0.01)
+    assert log.read_logs(tmp_path).estimates == [friction, area]

