@@ -1,4 +1,7 @@
-"""Fused loops over this rank's rows for the body and the surface. Heights come as a map and a cyclic offset along x."""
+"""Fused loops over this rank's rows for the body and the surface. Heights come as a map and a cyclic offset along x.
+
+Rows are copied point by point: an assignment to a slice makes numba compile its messages too, for seconds.
+"""
 
 import numpy as np
 
@@ -6,13 +9,20 @@ from ..compiled import loop
 
 
 @loop
+def copy_shifted(row, start, out):
+    """`out(i) = row(i - start)`, cyclic; `start` is at least 0 and below the length."""
+    rest = row.size - start
+    for i in range(rest):
+        out[start + i] = row[i]
+    for i in range(start):
+        out[i] = row[rest + i]
+
+
+@loop
 def roll(source, offset, target):
     """`target(i) = source(i - offset)` along x, cyclic."""
-    nx = source.shape[1]
-    start = offset % nx
     for j in range(source.shape[0]):
-        target[j, start:] = source[j, : nx - start]
-        target[j, :start] = source[j, nx - start :]
+        copy_shifted(source[j], offset % source.shape[1], target[j])
 
 
 @loop
@@ -26,8 +36,7 @@ def begin(branches, decay, gain, back, du, buffer, weight, weight_u, weight_du, 
     start = offset % nx
     effective = np.empty(nx)
     for j in range(ny):
-        effective[start:] = heights[j, : nx - start]
-        effective[:start] = heights[j, nx - start :]
+        copy_shifted(heights[j], start, effective)
         change, before = du[j], buffer[j]
         for i in range(nx):
             effective[i] += weight_du * change[i] - weight_u * u[j, i]
@@ -39,7 +48,8 @@ def begin(branches, decay, gain, back, du, buffer, weight, weight_u, weight_du, 
             for i in range(nx):
                 branches[k, j, i] += b * change[i] + e * before[i] - a * branches[k, j, i]
                 effective[i] += c * branches[k, j, i]
-        before[:] = effective
+        for i in range(nx):
+            before[i] = effective[i]
 
 
 @loop
@@ -211,12 +221,10 @@ def travel(p, p_old, factor, factor_old, shift, lower, upper, out):
     start = shift % nx
     moved = np.empty(nx, p.dtype)
     for j in range(ny):
-        moved[start:] = p_old[j, : nx - start]
-        moved[:start] = p_old[j, nx - start :]
+        copy_shifted(p_old[j], start, moved)
         for i in range(nx):
             moved[i] = min(max(factor * p[j, i] - factor_old * moved[i], lower), upper)
-        out[j, start:] = moved[: nx - start]
-        out[j, :start] = moved[nx - start :]
+        copy_shifted(moved, start, out[j])
 
 
 @loop

@@ -56,7 +56,8 @@ def _sums(p, u, above, below, along_x, along_y, cyclic):
             row_load += p[j, i]
         if row_load == 0.0:
             continue
-        line[WIDTH : nx + WIDTH] = u[j]
+        for i in range(nx):
+            line[WIDTH + i] = u[j, i]
         for k in range(WIDTH):
             line[WIDTH - 1 - k] = u[j, (-1 - k) % nx] if cyclic else u[j, 0]
             line[nx + WIDTH + k] = u[j, k % nx] if cyclic else u[j, nx - 1]
