@@ -5,9 +5,10 @@ is kept in a private directory, so that only a first run waits for the compiler;
 """
 
 import hashlib
+import sys
 from collections.abc import Callable
 from contextlib import suppress
-from functools import partial
+from functools import cache, partial
 from glob import escape
 from importlib import import_module
 from importlib.util import find_spec
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import event
 
 from . import private
 
@@ -103,4 +105,24 @@ def _find_scipy() -> None:
         raise ImportError("there is no scipy")
 
 
+@cache
+def say_that_it_compiles() -> None:
+    """Tell whoever waits, once and on root, why nothing happens yet; not in files and pipes."""
+    mpi = sys.modules.get("mpi4py.MPI")
+    watched = sys.stderr.isatty() or "ipykernel" in sys.modules
+    if watched and (mpi is None or mpi.COMM_WORLD.rank == 0):
+        kept = "once on this machine" if private.directory("compiled") else "in each run, as they cannot be kept"
+        text = f"compiling loops, some ten seconds, {kept}; `parcontact doctor` compiles them beforehand"
+        print(f"parcontact: {text}", file=sys.stderr, flush=True)
+
+
+class _CompileListener(event.Listener):
+    def on_start(self, event: Any) -> None:
+        say_that_it_compiles()
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+event.register("numba:compile", _CompileListener())
 _import_numba_arrays()

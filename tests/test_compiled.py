@@ -1,11 +1,13 @@
-"""Compiled loops: no place to keep them, two processes that keep them at once, and what of numba they import."""
+"""Compiled loops: where they are kept, two processes that keep them at once, who is told, what of numba is imported."""
 
+import io
 import subprocess
 import sys
 from pathlib import Path
 
 import numba.core.caching
 import pytest
+from mpi4py import MPI
 
 from parcontact import compiled
 
@@ -91,3 +93,31 @@ def sum_to(n: int) -> int:
     for i in range(n):
         total += i
     return total
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(("stream", "lines"), [(Terminal, 1), (io.StringIO, 0)])
+def test_who_waits_is_told_that_loops_compile(
+    stream: type[io.StringIO], lines: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once for all loops, on a terminal alone."""
+    monkeypatch.setattr(sys, "stderr", stream())
+    compiled.say_that_it_compiles.cache_clear()
+    assert numba.njit(lambda x: x + 1)(1) == numba.njit(lambda x: x + 1)(1) == 2
+    assert isinstance(sys.stderr, io.StringIO)
+    said = sys.stderr.getvalue()
+    assert said.count("\n") == said.count("parcontact: compiling loops") == lines
+    assert ("parcontact doctor" in said) == bool(lines)
+
+
+@pytest.mark.mpi(2)
+def test_root_alone_says_that_loops_compile(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    compiled.say_that_it_compiles.cache_clear()
+    assert numba.njit(lambda x: x + 1)(1) == 2
+    assert isinstance(sys.stderr, io.StringIO)
+    assert ("compiling" in sys.stderr.getvalue()) == (comm.rank == 0)

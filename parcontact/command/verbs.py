@@ -283,6 +283,7 @@ def doctor(options: argparse.Namespace) -> int:
         tell(line)
     results = [(check, run_check(check, Bench(world, options.precision))) for check in CHECKS]
     tell("\n" + markdown(results))
+    tell("\n" + machine.prepare_loops(world))
     wrong = [f"{check.name}: {text}" for check, bench in results for text in bench.wrong]
     wrong += filter(None, [machine.find_broken_files(world, Path.cwd())])
     tell("\n".join(wrong) or "all is well")

@@ -3,6 +3,7 @@
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +11,9 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 
+from .. import private
 from ..job import Job, load
+from ..leakage.flow import leak
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..plan.costs import measure_write_rate
@@ -19,7 +22,7 @@ from ..run import runner
 from ..run.run import Options
 from ..storage import header
 from .bench import Bench
-from .small_jobs import GLASSY, crossed, zener
+from .small_jobs import GLASSY, Json, crossed, sphere, zener
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -50,6 +53,31 @@ def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:
     yield f"files: {rate / 1e6:.3g} MB/s in {where}"
     if rate < SLOW_DISK:
         yield "warning: that is slow; save fewer fields and checkpoints, or write to another disk"
+
+
+def prepare_loops(comm: "MPI.Intracomm") -> str:
+    """Run small jobs so that the loops that checks do not need are compiled too; return a line. Collective.
+
+    The jobs slide steadily, slide in mixed precision, adhere in both boundaries, and leak.
+    """
+    began = time.perf_counter()
+    touch = {"pressure": 3e4, "duration": 1e-3, "time_step": 5e-4}
+    slide = {"pressure": 3e4, "velocity": 0.03, "distance": 3e-5, "cells_per_step": 1}
+    road = {"shape": "rough", "hurst": 0.9, "rms_slope": 0.02, "seed": 1}  # whose steady sliding needs every solver
+    road |= {"long_wavelength": 2.5e-4, "short_wavelength": 6.25e-5}
+    rough: Json = {"grid": {"points": 32, "size": 1e-3}, "surface": road, "numerics": {"tolerance": 5e-3}}
+    steady, energy = {"state": "steady", "velocity": 0.03, "pressure": 3e4}, {"energy": True}
+    Bench(comm).march(crossed([slide], **rough, initial=steady))
+    Bench(comm).march(crossed([touch, slide], **rough, output=energy))
+    Bench(comm, "mixed").march(crossed([touch, slide], **rough))
+    sticking: Json = {"adhesion": {"work": 1e-3, "range": 1e-6}}
+    for adhesion in ({}, sticking):
+        Bench(comm).march(crossed([touch], **adhesion, output=energy, numerics=rough["numerics"]))
+        Bench(comm).march(sphere([touch], **adhesion, output=energy, numerics=rough["numerics"]))
+    leak(np.random.default_rng(1).random((16, 16)), (1.0, 1.0))
+    place = private.directory("compiled")
+    kept = f"kept in {place}" if place else "not kept, as there is no private cache directory"
+    return f"compiled loops: ready after {time.perf_counter() - began:.2g} s, {kept}"
 
 
 def find_broken_files(comm: "MPI.Intracomm", where: Path) -> str:

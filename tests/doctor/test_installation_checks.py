@@ -1,8 +1,12 @@
 """The doctor's verb, and what it says of checks that go wrong; that they are right is tested with all hard cases."""
 
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from marching import JOBS
 from mpi4py import MPI
 
 from parcontact import __main__
@@ -77,3 +81,39 @@ def test_files_that_do_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(runner, "run_job", lambda job, slab, options: run(job, slab, Options(until=0.5e-3)))
     assert "fields.h5" in machine.find_broken_files(MPI.COMM_SELF, tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+PREPARED = """
+import sys
+from parcontact.__main__ import main
+
+def loops():
+    parts = [vars(module).items() for name, module in list(sys.modules.items()) if name.startswith("parcontact")]
+    found = {one for part in parts for _, one in part if hasattr(one, "py_func") and hasattr(one, "signatures")}
+    return {(loop.py_func.__qualname__, str(types)) for loop in found for types in loop.signatures}
+
+assert main(["doctor"]) == 0
+ready = loops()
+for words in {jobs}:
+    assert main(words.split()) == 0
+print("more:", sorted(loops() - ready), len(ready))
+"""
+SMALL = "--quiet --set grid.points=64 --set numerics.accuracy=0.5"
+PREPARED_FOR = [
+    f"{JOBS}/slide.yaml {SMALL} --set output.energy=true",
+    f"steady {JOBS}/slide.yaml {SMALL} --velocities 0.1 --out steady",
+    f"{JOBS}/slide.yaml {SMALL} --set numerics.precision=mixed --out mixed",
+    f"{JOBS}/creep.yaml {SMALL}",
+    f"{JOBS}/adhesion/sphere.yaml {SMALL} --case 0 --until 1e-6",
+    f"{JOBS}/seal/load.yaml {SMALL} --out seal",
+    "leak seal",
+]
+
+
+def test_loops_are_prepared(tmp_path: Path, outside_mpi: dict[str, str]) -> None:
+    """After the doctor, common jobs compile no loop: those that they call have been called with the same types."""
+    words = [sys.executable, "-c", PREPARED.replace("{jobs}", repr(PREPARED_FOR))]
+    done = subprocess.run(words, cwd=tmp_path, env=outside_mpi, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (more,) = (line for line in done.stdout.splitlines() if line.startswith("more: "))
+    assert re.fullmatch(r"more: \[\] [4-9]\d", more)
