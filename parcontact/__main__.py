@@ -15,7 +15,7 @@ from types import FrameType
 from typing import NoReturn
 
 from .command import ranks
-from .command.arguments import parse_arguments
+from .command.arguments import parse_arguments, without_restart
 from .command.verbs import BAD_INPUT, DONE, FAILED
 from .errors import InputError, JobError, RunError
 from .parallel.signals import STOP
@@ -78,7 +78,7 @@ def _run(words: list[str]) -> int:
         _refuse_lost_directory()
         options = parse_arguments(words)
         code = int(options.act(options))
-        return _leave_code(code if options.verb in LEAVE_FILES else code or _judge_output())
+        return _leave_code(code if options.verb in LEAVE_FILES else code or _judge_output(), words)
     except SystemExit as asked:  # of --help and --version
         if asked.code or _judge_output() == DONE:
             raise
@@ -110,11 +110,15 @@ def _judge_output() -> int:
     return BAD_INPUT if reason else DONE
 
 
-def _leave_code(code: int) -> int:
-    """Root leaves the exit code in the file that PARCONTACT_EXIT_FILE names, for launchers that end with their own."""
+def _leave_code(code: int, words: Sequence[str] = ()) -> int:
+    """Write the exit code, on root, to the file that PARCONTACT_EXIT_FILE names: launchers may end with their own.
+
+    The `words` of the command that goes on follow, a line each, if there is one.
+    """
     if ranks.is_root() and (path := os.environ.get("PARCONTACT_EXIT_FILE")):
+        more = without_restart(words) if code == AGAIN else []
         with suppress(OSError):
-            Path(path).write_text(f"{code}\n")
+            Path(path).write_text("".join(f"{line}\n" for line in (code, *more)))
     return code
 
 

@@ -56,24 +56,14 @@ else   # PBS does not tell a job when it will end: now, and the time it may last
     if [ -f "$JOB" ]; then words=("$JOB"); else mapfile -t words < <(xargs -n 1 printf '%s\n' <<<"${JOB//%a/$index}"); fi
 fi
 
-# The next job goes on where this one ends, wherever this one was told to begin; so does one that Slurm has requeued.
-next=() skip=''
-for word in "${words[@]}"; do
-    case $skip$word in
-        --r|--re|--res|--rest|--resta|--restar|--restart) skip=' ' ;;
-        --r=*|--re=*|--res=*|--rest=*|--resta=*|--restar=*|--restart=*) ;;
-        ' '*) skip='' ;;
-        *) next+=("$word") ;;
-    esac
-done
-[ "${SLURM_RESTART_COUNT:-0}" = 0 ] || words=("${next[@]}")
-
-# Launchers may end with a code of their own: parcontact leaves its code in a file too.
+# Launchers may end with a code of their own: parcontact leaves its code in a file, and the words of the command that goes
+# on, a line each.
 export PARCONTACT_EXIT_FILE=$there/.parcontact-exit-${slurm:-$PBS_JOBID}
 # shellcheck disable=SC2086  # a launcher may have options
 ${PARCONTACT_LAUNCHER:-"$launcher"} -n "$ranks" "$bin/parcontact" "${words[@]}"
 status=$?
-[ -s "$PARCONTACT_EXIT_FILE" ] && status=$(<"$PARCONTACT_EXIT_FILE")
+next=()
+[ -s "$PARCONTACT_EXIT_FILE" ] && mapfile -t next <"$PARCONTACT_EXIT_FILE" && status=${next[0]} next=("${next[@]:1}")
 rm -f "$PARCONTACT_EXIT_FILE"
 [ "$status" = 3 ] || exit "$status"   # 3: stopped early with a good checkpoint
 if [ "$slurm" ]; then

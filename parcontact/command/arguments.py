@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import difflib
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
@@ -194,7 +195,15 @@ def parse_arguments(words: Sequence[str]) -> argparse.Namespace:
     elif first not in (*NAMES, "-h", "--help", "--version", COMPLETION):
         _refuse_misspelt(first)
         words = ["run", *words]
-    return make_parser().parse_args(words)
+    requeued = os.environ.get("SLURM_RESTART_COUNT", "") not in ("", "0")  # such a job began before, and goes on
+    return make_parser().parse_args(without_restart(words) if requeued else words)
+
+
+def without_restart(words: Sequence[str]) -> list[str]:
+    """Return the words of the command that goes on where this one has ended."""
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--restart")
+    return parser.parse_known_args(words)[1]
 
 
 def _refuse_misspelt(word: str) -> None:

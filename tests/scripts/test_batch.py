@@ -9,6 +9,7 @@ from typing import NamedTuple
 import pytest
 
 from parcontact.__main__ import main
+from parcontact.command.arguments import parse_arguments, without_restart
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 NOTE = "{{ printf '%s|' {0} \"$@\"; echo; }} >> said"
@@ -21,7 +22,8 @@ STUBS = {
     "parcontact": "exit 99",
     **{
         name: f'{NOTE.format(name)}; echo "${{SLURM_JOB_END_TIME:-}}${{PARCONTACT_END_TIME:-}}" > end\n'
-        '[ -z "$LEFT" ] || echo "$LEFT" > "$PARCONTACT_EXIT_FILE"\nexit $CODE'
+        'while [ "${1##*/}" != parcontact ]; do shift; done\nshift\n'
+        '[ -z "$LEFT" ] || printf "%s\\n" "$LEFT" "$@" > "$PARCONTACT_EXIT_FILE"\nexit $CODE'
         for name in ("mpirun", "srun")
     },
 }
@@ -54,9 +56,9 @@ def batch(tmp_path: Path) -> Batch:
     pbs = {"PBS_JOBID": "7.host", "PBS_O_WORKDIR": there, "PBS_NODEFILE": f"{there}/nodes"}
 
     def run(system: str, words: Sequence[str], job: str = "", **variables: object) -> Link:
-        env = {"PATH": f"{there}:/usr/bin:/bin", "PARCONTACT_BIN": there, "CODE": "0", "LEFT": ""}
+        env = {"PATH": f"{there}:/usr/bin:/bin", "PARCONTACT_BIN": there, "CODE": "0"}
         env |= slurm if system == "slurm" else {**pbs, "JOB": job or shlex.join(words)}
-        env |= {name: str(value) for name, value in variables.items()}
+        env |= {name: str(value) for name, value in {"LEFT": variables.get("CODE", "0"), **variables}.items()}
         command = ["bash", str(SCRIPTS / "batch.sh"), *(words if system == "slurm" else ())]
         done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
         assert done.stderr == ""
@@ -86,22 +88,30 @@ def test_next_job(batch: Batch, tmp_path: Path, system: str, code: int) -> None:
 
 
 @BOTH
-@pytest.mark.parametrize("how", [["--restart", "never"], ["--restart=never"], ["--rest", "out/a b/step-9.h5"]])
-def test_next_job_goes_on(batch: Batch, system: str, how: list[str]) -> None:
-    """Whoever starts afresh, or from one checkpoint, does so once: else the chain never ends."""
-    link = batch(system, ["job.yaml", *how, "--until", "never"], CODE=3)
-    assert link.given == ["job.yaml", *how, "--until", "never"]
-    assert link.next == ["job.yaml", "--until", "never"]
+def test_next_job_has_the_words_that_the_program_leaves(batch: Batch, system: str) -> None:
+    """A line each; here the stand-in adds one to those that it was given."""
+    assert batch(system, ["job.yaml", "--quiet"], CODE=3, LEFT="3\na b").next == ["a b", "job.yaml", "--quiet"]
+
+
+@pytest.mark.parametrize("how", [["--restart", "never"], ["--restart=never"], ["--rest", "out/a b/step-9.h5"], []])
+def test_the_command_that_goes_on(how: list[str]) -> None:
+    """It has no --restart: a chain of jobs that each start afresh, or from one checkpoint, never ends."""
+    words = ["my job.yaml", "--set", "a=[1, 2]", *how, "--until", "1.5", "--out=x", "--quiet"]
+    assert without_restart(words) == [word for word in words if word not in how]
+
+
+def test_requeued_job_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Slurm repeats the command of a job that it has requeued, and says so."""
+    words = ["job.yaml", "--restart", "never"]
+    for count, restart in (("", "never"), ("0", "never"), ("1", "auto")):
+        monkeypatch.setenv("SLURM_RESTART_COUNT", count)
+        assert parse_arguments(words).restart == restart
 
 
 def test_jobs_of_an_array_write_files_of_their_own(batch: Batch, tmp_path: Path) -> None:
     """All would append to the file of the first of them."""
     batch("slurm", ["job.yaml"], SLURM_ARRAY_TASK_ID=4, SLURM_JOB_NAME="road", CODE=1)
     assert (tmp_path / "slurm-road-4.out").is_file()
-
-
-def test_requeued_job_goes_on(batch: Batch) -> None:
-    assert batch("slurm", ["job.yaml", "--restart", "never"], SLURM_RESTART_COUNT=1).given == ["job.yaml"]
 
 
 @BOTH
@@ -174,5 +184,5 @@ def test_exit_code_in_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, wo
     assert (tmp_path / "code").read_text() == f"{code}\n"
     if words[:1] == ["--until"]:
         (tmp_path / "out/job/stop").touch()
-        assert main(["job.yaml", "--quiet"]) == 3
-        assert (tmp_path / "code").read_text() == "3\n"
+        assert main(["job.yaml", "--quiet", "--restart", "auto", "--out", "out/job"]) == 3
+        assert (tmp_path / "code").read_text() == "3\njob.yaml\n--quiet\n--out\nout/job\n"
