@@ -29,6 +29,8 @@ FREE_SHARE = 0.7  # tuning: of the memory that is free, which jobs may take
 MEMINFO = Path("/proc/meminfo")
 MOST_POINTS = 2**20  # tuning: of a small case, which gains little from several ranks
 SPARE = 2.0  # tuning: times the maps of steps: what a first contact or steady state on nested grids may hold besides
+NESTED = 2.5  # accuracy: maps that a first solve on coarser grids holds besides those of steps, at most
+FAILED_SETS = 1.25  # accuracy: times the maps of a steady state with sets, at most, after these have failed
 SPECTRUM = "surface spectrum"
 
 
@@ -73,6 +75,14 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
     bytes_held = slab.tally["map bytes"]
     del held
     return bytes_held
+
+
+def most_bytes(job: Job, ranks: int) -> int:
+    """Return the bytes that rank 0 holds at most in maps at once: those of steps, of a first solve on coarser grids and
+    of saved fields, or those of the steady state from which a run starts."""
+    (nx, ny), one_map = job.grid.points, 8 * job.grid.nx * job.grid.ny / ranks
+    steps = total_bytes(job, ranks) + len(job.output.fields) * one_map + NESTED * one_map * (nx * ny >= WORTHWHILE)
+    return int(max(steps, FAILED_SETS * steady_start(job, ranks, sets=True))) + on_tiles(job)
 
 
 def on_tiles(job: Job) -> int:

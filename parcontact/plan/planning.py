@@ -18,7 +18,7 @@ from ..steady_sliding.curve import request
 from ..storage import wisdom
 from . import price, printed_plan
 from .costs import Costs, costs_of, measure_write_rate
-from .sample import sample
+from .sample import measure_program, sample
 from .trial_grids import choose_grid
 
 TRIED_CASES = 3  # tuning: cases that are tried at most: the first, the last, and between them
@@ -39,7 +39,7 @@ class Planner:
         yield from printed_plan.effects(job)
         yield ""
         if job.history:
-            yield from printed_plan.maps(job, self.ranks)
+            yield from printed_plan.maps(job, self.ranks, measure_program(job, slab))
             yield ""
             yield from self._tell(job, slab, job)
         if job.steady:

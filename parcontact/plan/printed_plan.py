@@ -18,6 +18,7 @@ OF_STEADY_STATES = (
     *("interface", "thermal"),
 )
 ON_TILES = "more on rank 0 (tiles), at most"
+TO_ASK_FOR = "to ask a batch system for"
 STEADY_STARTS = (("steady start, before", False), ("steady start, with sets", True))  # and whether by sets of points
 
 
@@ -30,12 +31,12 @@ def effects(job: Job) -> Iterator[str]:
         yield f"  {'on' if effect.on else 'off':3}  {effect.name:{width}}  {effect.why}"
 
 
-def maps(job: Job, ranks: Sequence[int]) -> Iterator[str]:
-    """Bytes that a rank holds, for what."""
+def maps(job: Job, ranks: Sequence[int], program: int) -> Iterator[str]:
+    """Yield a table of the bytes that a rank holds by their purpose; the `program` without maps has so many."""
     columns = [memory.holdings(job, count) for count in ranks]
     before = STEADY_STARTS if choices(job).steady_start.on else ()
     tiles = memory.on_tiles(job)
-    width = max(map(len, (*columns[0], *(what for what, _ in before), *[ON_TILES] * bool(tiles))))
+    width = max(map(len, (*columns[0], *(what for what, _ in before), *[ON_TILES] * bool(tiles), TO_ASK_FOR)))
     totals = [sum(column.values()) for column in columns]
     unit, size = unit_of(max(totals))
     yield f"{f'memory per rank [{unit}]':{width + 2}}" + "".join(f" {ranks_text(count):>12}" for count in ranks)
@@ -47,6 +48,9 @@ def maps(job: Job, ranks: Sequence[int]) -> Iterator[str]:
         yield f"  {what:{width}}" + "".join(f"{number:13.4g}" for number in held)
     if tiles:
         yield f"  {ON_TILES:{width}}" + f"{tiles / size:13.4g}" * len(ranks)
+    yield f"  {'program without maps':{width}}" + f"{program / size:13.4g}" * len(ranks)
+    asked = ((program + memory.most_bytes(job, count)) / size for count in ranks)
+    yield f"  {TO_ASK_FOR:{width}}" + "".join(f"{number:13.4g}" for number in asked)
     yield f"a checkpoint has {_bytes(memory.saved(job))}"
 
 

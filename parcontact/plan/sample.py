@@ -117,6 +117,15 @@ def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sampl
     )
 
 
+def measure_program(job: Job, slab: Slab) -> int:
+    """Return the bytes that a rank of the program takes without its maps: libraries, and the loops of the job.
+
+    Collective.
+    """
+    _warm_up(job, slab)
+    return int(slab.reduce((), [float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * KILO)])[0])
+
+
 def _warm_up(job: Job, slab: Slab) -> None:
     """Make the first steps, or the first steady state, of a tiny scene: compiling is no part of what a job costs."""
     small = make_tiny(job)

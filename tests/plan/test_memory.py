@@ -70,7 +70,7 @@ def test_solvers_on_tiles_hold_what_is_planned(points: tuple[int, int], monkeypa
     made = on_tiles(Tiles(points, np.array([0, 1, 2]), np.array([0, 1, 1])), 2.5e-3)
     assert tally["map bytes"] - before + 2 * 3 * 8 * SIDE**2 == memory.on_tiles(planned)
     del made
-    assert any("tiles" in line for line in printed_plan.maps(planned, [1, 64]))
+    assert any("tiles" in line for line in printed_plan.maps(planned, [1, 64], 0))
 
 
 @pytest.mark.parametrize(

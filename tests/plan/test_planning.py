@@ -1,6 +1,8 @@
 """The plan of a job as a user reads it: of runs, steady states and sweeps, also on a busy machine."""
 
 import re
+import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -173,3 +175,30 @@ def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
     ratio = costs_of(large, seen, 1e9).step / costs_of(tried, seen, 1e9).step
     assert ratio > large.grid.nx**2 / tried.grid.nx**2
     assert choose_grid(job(), 1, 10.0) == job()
+
+
+PEAK = "import resource, sys; from parcontact.__main__ import main; code = main(sys.argv[1:]); "
+PEAK += "print('peak', resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024); sys.exit(code)"
+
+
+def test_memory_to_ask_a_batch_system_for(tmp_path: Path, outside_mpi: dict[str, str]) -> None:
+    """A run takes no more than the plan says, and no less than 0.7 of it: maps of a first solve on coarser grids and
+    libraries are counted at their most. The maps are a quarter of it or more."""
+    (tmp_path / "job.yaml").write_text(job(grid={"points": 1024}, material=TWO).resolved())
+
+    def said(*words: str) -> str:
+        done = subprocess.run(
+            [sys.executable, "-c", PEAK, *words], cwd=tmp_path, env=outside_mpi, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    said("job.yaml", "--quiet", "--set", "grid.points=256", "--out", "small")  # the compiler would take memory, too
+    text = said("plan", "job.yaml", "--ranks", "1", "--seconds", "0.1")
+    program, asked = (
+        1e6 * float(re.findall(rf"{what} +(\S+)$", text, re.M)[0])
+        for what in ("program without maps", "to ask a batch system for")
+    )
+    assert asked > 1.3 * program
+    (peak,) = re.findall(r"peak (\d+)", said("job.yaml", "--quiet"))
+    assert 0.7 * asked < float(peak) < asked

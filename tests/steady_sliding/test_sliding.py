@@ -494,11 +494,11 @@ def test_no_rank_has_more_than_is_planned(name: str) -> None:
 def test_plan_tells_both() -> None:
     """In rows of their own, where there is a steady start."""
     planned = job(*SCENES["along x"])
-    rows = {text[2:26].rstrip(): text[26:].split() for text in printed_plan.maps(planned, [1, 2])}
+    rows = {text[2:26].rstrip(): text[26:].split() for text in printed_plan.maps(planned, [1, 2], 0)}
     for what, sets in (("steady start, before", False), ("steady start, with sets", True)):
         assert rows[what] == [f"{memory.steady_start(planned, ranks, sets=sets) / 1e6:.4g}" for ranks in (1, 2)]
     virgin = planned.model_copy(update={"initial": type(planned.initial)()})
-    assert not any("steady" in text for text in printed_plan.maps(virgin, [1]))
+    assert not any("steady" in text for text in printed_plan.maps(virgin, [1], 0))
     assert memory.steady_start(virgin) == 0
 
 
