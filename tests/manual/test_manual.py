@@ -4,6 +4,7 @@ import hashlib
 import json
 import re
 import shlex
+import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -16,8 +17,10 @@ import pytest
 import yaml
 from csv_rows import rows
 from marching import JOBS, ROOT
+from mpi4py import MPI
 from pydantic import TypeAdapter
 
+import parcontact as pc
 from manual.printed import compare_lines
 from parcontact import __main__, mesh
 from parcontact.columns import TABLES
@@ -44,6 +47,7 @@ def blocks(language: str, name: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", texts.page(name, WRITERS), re.MULTILINE | re.DOTALL)
 
 
+OWN_TESTS = {"effects", "many_runs"}  # pages whose Python is run elsewhere
 WRITERS = {"verbs": lambda: ""}
 BLOCKS = [
     (language, name, index)
@@ -178,7 +182,7 @@ def parse_command(line: str) -> None:
         parse_arguments(asked[1:])
 
 
-@pytest.mark.parametrize("name", [name for name in PAGES if blocks("python", name) and name != "effects"])
+@pytest.mark.parametrize("name", [name for name in PAGES if blocks("python", name) and name not in OWN_TESTS])
 def test_the_python_of_a_page(name: str, elsewhere: Path) -> None:
     """All blocks of a page, one after the other."""
     run_code(blocks("python", name))
@@ -192,6 +196,26 @@ def test_a_notebook(notebook: Path, elsewhere: Path) -> None:
     assert not any(cell.get("outputs") for cell in cells)
     code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
     run_code([re.sub(r"POINTS = 128", "POINTS = 64", cell) for cell in code])
+
+
+def test_the_scripts_of_the_page_on_many_runs(elsewhere: Path, outside_mpi: dict[str, str]) -> None:
+    """In two processes of a pool, and on two ranks: the areas of runs in this process."""
+    processes, ranks, _ = blocks("python", "many_runs")
+    expected = areas_of(processes)
+    mpirun = [str(Path(sys.executable).with_name("mpirun")), "-n", "2"]
+    for launcher, text in (([], processes), (mpirun, ranks)):
+        Path("script.py").write_text(text)
+        words = [*launcher, sys.executable, "-W", "error", "script.py"]
+        done = subprocess.run(words, env=outside_mpi, capture_output=True, text=True, timeout=120)
+        assert (done.stdout, done.stderr) == (expected, "")
+
+
+def areas_of(script: str) -> str:
+    """What a script prints, by its job and loads alone."""
+    space: dict[str, Any] = {"__name__": "read"}
+    exec(compile(script, "block", "exec"), space)
+    runs = {load: pc.Simulation(space["JOB"], {"history.0.pressure": load}, MPI.COMM_SELF) for load in space["LOADS"]}
+    return "".join(f"{load:.0f} Pa: {run.run().contact_area:.4f}\n" for load, run in runs.items())
 
 
 def run_code(pieces: list[str]) -> None:
