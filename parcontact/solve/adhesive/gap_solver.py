@@ -81,12 +81,12 @@ class GapSolver:
         collective."""
         it = self._begin(law, heights, control, gap, operators or self.operators)
         g, other = gap, self._gap
-        best, scale, iteration, stuck, jumped = (math.inf, 0), 0.0, 0, False, False
+        best, scale, iteration, no_descent, jumped = (math.inf, 0), 0.0, 0, False, False
         while True:
             members, lost = self._find_residual(it, g)
             certificate = self._precondition(it, g, other)
             best = min(best, (certificate.worst, iteration))
-            failure = "" if lost else self._verdict(certificate.worst, tolerance, iteration, *best, stuck)
+            failure = "" if lost else self._verdict(certificate.worst, tolerance, iteration, *best, no_descent)
             if failure is not None:
                 if g is not gap:
                     gap[...] = g
@@ -96,10 +96,10 @@ class GapSolver:
             if not self._descend(it, g, other):
                 members, _ = self._find_residual(it, g)  # z may point across a bound; c does not
                 self._turn(it, members, 0.0, self._way)
-                scale, stuck = 0.0, not self._descend(it, g, other)
+                scale, no_descent = 0.0, not self._descend(it, g, other)
             if not it.stable:  # between two equilibria certificates rise at first
                 best, jumped = (math.inf, iteration), True
-            if not stuck:
+            if not no_descent:
                 g, other = other, g
             iteration += 1
 
@@ -168,14 +168,14 @@ class GapSolver:
         return self.slab.reduce((), [lowest])[0] - it.law.strength
 
     def _verdict(
-        self, worst: float, tolerance: float, iteration: int, best: float, best_at: int, stuck: bool
+        self, worst: float, tolerance: float, iteration: int, best: float, best_at: int, no_descent: bool
     ) -> str | None:
         """Return None to continue, an empty string if solved, else why the solve has failed."""
         if worst <= tolerance:
             return ""
         if not np.isfinite(worst):
             return "met numbers that are not finite"
-        if stuck:
+        if no_descent:
             return f"stalled: no step lowers the energy, at a residual of {worst:.3g}"
         asked = f"{worst:.3g} where {tolerance:.3g} was asked for"
         if iteration - best_at >= MAX_STALLED_ITERATIONS:
