@@ -317,7 +317,7 @@ def _refuse_lost_branches(scene: Scene, contents: Contents) -> None:
     for k in scene.folded.kept:
         if f"material/branch {k}" in contents.maps or contents.numbers["material/frozen"][k]:
             continue
-        error, allowed = scene.folded.memoryless_errors[k], contents.job["numerics"].get("branch_error", 0.0)
+        error, allowed = scene.folded.memoryless_errors[k], contents.job["numerics"]["branch_error"]
         if error > allowed:
             time = scene.setup.prony.relaxation_times[k]
             raise InputError(

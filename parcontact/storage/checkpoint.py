@@ -59,10 +59,6 @@ class Contents:
     maps: dict[str, np.dtype[Any]]
     sums: dict[str, NDArray[np.uint32]]
 
-    @property
-    def ranks(self) -> int:
-        return self.chain[-1].ranks
-
 
 @dataclass(frozen=True)
 class Facts:

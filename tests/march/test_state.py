@@ -14,6 +14,7 @@ from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job.sections.listing import plain_data
 from parcontact.march.loop import March, run_steps
+from parcontact.march.state import parts_of
 from parcontact.physics.units import Units
 from parcontact.storage import checkpoint
 from parcontact.storage.checkpoint import Facts
@@ -82,6 +83,20 @@ def test_further_pressures_are_named_by_their_age() -> None:
     march = begun(job(RUBBER, CHOSEN))
     further = [name for name in march.entries() if name.startswith("contact/earlier pressure")]
     assert further == [f"contact/earlier pressure {ago}" for ago in (1, 2, 3)]
+
+
+def test_a_checkpoint_may_lack_all_pressures_but_the_last() -> None:
+    """Those that it lacks are not known: they have a modulus of 0, and no position."""
+    march = begun(job(RUBBER, CHOSEN))
+    part, contact = parts_of(march.scene)["contact"], march.state.contact
+    entries = part.entries(contact, march.scene.units)
+    needed = {name: entry for name, entry in entries.items() if not entry.optional}
+    assert needed.keys() == {"approach", "pressure", "modulus", "position"}
+    saved = {name: np.asarray(entry.value) for name, entry in needed.items()}
+    saved |= {"modulus": np.array(2.0), "position": np.array([3.0, 4.0])}
+    last, *others = part.restored(contact, saved).pressures
+    assert last[1:] == (2.0, (3.0, 4.0))
+    assert [past[1:] for past in others] == [(0.0, (0.0, 0.0))] * 3
 
 
 def test_ways_in_a_checkpoint_are_in_metres(tmp_path: Path) -> None:
