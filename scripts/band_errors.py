@@ -18,7 +18,7 @@ from campaign import numbers, parser
 from numpy.typing import NDArray
 
 from parcontact import job as jobs
-from parcontact.accuracy.budget import Parts
+from parcontact.accuracy.budget import ErrorParts
 from parcontact.bands.band import Band
 from parcontact.bands.choice import cut_bands
 from parcontact.bands.road_sliding import SURE, RoadSliding
@@ -98,7 +98,7 @@ def solve(job: dict[str, Any], count: int, points: int, samples: int, line: bool
 def compare(whole: Point, found: Point, text: str) -> list[float]:
     """Print how bands differ from one grid; return the differences of friction and area, the stated errors, and the
     standard errors of the means over surfaces."""
-    parts = [part or Parts(0.0, 0.0, 0.0, 0.0) for part in (found.errors.friction, found.errors.area)]
+    parts = [part or ErrorParts(0.0, 0.0, 0.0, 0.0) for part in (found.errors.friction, found.errors.area)]
     errors = [found.friction / whole.friction - 1, found.measures.contact_area / whole.measures.contact_area - 1]
     told = [
         f"{name} {100 * error:+5.1f} % (method {100 * part.method:.1f}, surfaces {100 * part.scatter:.1f})"

