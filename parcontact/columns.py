@@ -207,6 +207,17 @@ MEASURES: Table = (
         when="interface",
     ),
     Column(
+        *("stick_area", ""),
+        "share of the box that touches and does not slip (with `interface.stick`)",
+        when="interface.stick",
+    ),
+    Column(
+        *("slip_loss", "J"),
+        "energy lost in slip since the start (with `interface.stick` and `output.energy`); "
+        "`work` is `stored`, `dissipated` and this",
+        when="interface.stick",
+    ),
+    Column(
         *("tensile_area", ""),
         "share of all points that are pulled by more than 1 % of the largest attraction (with `adhesion`)",
         when="adhesion",
@@ -245,6 +256,8 @@ FIELDS: Table = (
     Column("gap", "m", "between body and rigid surface, 0 in contact"),
     Column("height", "m", "the rigid surface where it is at that instant"),
     Column("temperature", "K", "rise of the temperature of the body's surface (with `thermal`, {doc}`heat`)"),
+    Column("traction_x", "Pa", "traction on the body along x (with `interface.stick`)"),
+    Column("traction_y", "Pa", "traction on the body along y"),
     Column("t", "s", "times of the maps"),
     Column("y", "m", "positions of the points along y"),
     Column("x", "m", "positions of the points along x"),

@@ -96,6 +96,18 @@ def _estimate(sources: Sequence[ErrorSource], run: RunProperties, observed: Step
     return ErrorBudget(ErrorParts(**missing | friction), area)
 
 
+def add_shear(budget: ErrorBudget, body: float, shear: float, whole: float, solver: float, share: float) -> ErrorBudget:
+    """Return the budget of a friction `whole` of what the `body` makes, for which a budget is known, and of `shear` by
+    tractions that were solved for. These have the relative error `solver` of their solve, and a `share` of them that of
+    the area."""
+    if whole <= 0.0:
+        return replace(budget, friction=None)
+    of_body = budget.friction or ErrorParts(*(0.0 for _ in NAMES))
+    parts = {name: body * one + shear * share * two for name, one, two in zip(NAMES, of_body, budget.area, strict=True)}
+    parts["solver"] += shear * solver
+    return replace(budget, friction=ErrorParts(**{name: part / whole for name, part in parts.items()}))
+
+
 def weight_of(slid: float, seconds: float) -> float:
     """Return what a step counts in a mean: as far as the surface slid [m], less by far how long it lasted."""
     return slid or seconds * AT_REST or AT_ONCE

@@ -10,7 +10,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import wraps
 from inspect import getattr_static, isfunction
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar
 
 from numpy.typing import DTypeLike, NDArray
 
@@ -20,10 +20,13 @@ from ..job import added_sections
 from ..job.sections.part import Part
 from ..parallel.slab import Array
 from ..physics.entries import Entry, Memory, Saved
-from ..physics.interface_friction import Shear
+from ..physics.interface_friction import Shear, Vector
 from ..physics.measures import Measures
 from ..physics.units import Units
 from .contact_protocol import ContactLaw, SolvedContact
+
+if TYPE_CHECKING:  # what computes is not loaded to check a job
+    from ..physics.energy import EnergyMemory
 
 Remembered = TypeVar("Remembered", covariant=True)
 
@@ -38,6 +41,19 @@ class Decision:
 
 
 @dataclass(frozen=True)
+class Sheared:
+    """What tractions along the surface make of a step: its measures with them, their force [N] on the rigid surface,
+    and the energy that slip has lost in it [J]. They are wrong by the relative `error` of their solve, and a `share` of
+    them by as much as the area is."""
+
+    measures: Measures
+    force: Vector
+    lost: float
+    error: float = 0.0
+    share: float = 0.0
+
+
+@dataclass(frozen=True)
 class Instant:
     """A step just made, in the run's units unless others are given; maps are valid until the next step begins.
 
@@ -46,7 +62,8 @@ class Instant:
     of this one. The surface moved by `moved` [m] in the step, in which the energy of the body, stored and dissipated,
     changed by `gained` [J], NaN where none is asked for. Edges of a contact with adhesion moved by `front` half process
     zones; `untouched` says that nothing touched, and nothing was pulled, before and after the step. `error_friction` is
-    the estimated relative error of friction, infinite where there is none.
+    the estimated relative error of friction, infinite where there is none. `sheared` is what an effect before this one
+    has made of the step; `measures` are those without.
     """
 
     step: Step
@@ -60,6 +77,7 @@ class Instant:
     front: float
     untouched: bool
     error_friction: float = math.inf
+    sheared: Sheared | None = None
 
     @property
     def pressure(self) -> Array:
@@ -77,12 +95,13 @@ class Instant:
 
 @dataclass(frozen=True)
 class Changes(Generic[Remembered]):
-    """Changes that an effect makes in a step: its memory, a sentence for run.log or '', and whether errors can be
-    stated across the step."""
+    """Changes that an effect makes in a step: its memory, a sentence for run.log or '', whether errors can be stated
+    across the step, and what tractions along the surface make of it, if the effect has any."""
 
     memory: Remembered
     remark: str = ""
     states_errors: bool = True
+    sheared: Sheared | None = None
 
 
 class Effect(Protocol[Memory]):
@@ -160,6 +179,11 @@ class Effect(Protocol[Memory]):
 
     def work(self, memory: Memory) -> float | None:
         """Return the work of the load since the start [J], None where it is that on the body."""
+        return None
+
+    def further_energies(self, memory: Memory) -> "tuple[EnergyMemory, float] | None":
+        """Return energies of the body, in the unit of the scene, that join those under pressures, and what else the
+        work has been lost in [J]; None where there are none."""
         return None
 
     def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:

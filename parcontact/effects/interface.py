@@ -3,47 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from pydantic import Field
-
 from ..columns import added_by
-from ..job.sections.part import Part, Rule
-from ..job.sections.quantities import Positive
-from ..job.text.fault import Fault
 from ..physics.interface_friction import InterfaceFriction
 from ..physics.measures import Measures
-from .effect import Changes, Decision, Effect, Instant
+from .effect import Changes, Instant
+from .interface_section import Interface, InterfaceEffect
 from .relaxation import time_factor_of
-
-LEAST_POISSON = 0.49  # physics: below it shear moves the surface, and the solve would have to be coupled
-
-
-def _whole_bell(velocity: float | None, width: float | None) -> Iterator[Fault]:
-    if (velocity is None) != (width is None):
-        missing, given = ("velocity", "width") if velocity is None else ("width", "velocity")
-        yield Fault(f"is missing; a bell over the velocity needs it beside {given}", (missing,))
-
-
-def _incompressible(interface: Any, material: Any) -> Iterator[Fault]:
-    if interface is not None and material.poisson < LEAST_POISSON:
-        yield Fault(
-            f"needs material.poisson of at least {LEAST_POISSON:g}, got {material.poisson:g}: shear on a compressible "
-            "body moves its surface, which is not solved for (see parcontact manual limits)",
-            ("interface",),
-        )
-
-
-class Interface(Part):
-    """The `interface` section: a constant shear stress, or a bell over the logarithm of the velocity."""
-
-    label: ClassVar[str] = "interface"
-    shear_stress: Positive = Field(description="a positive shear stress on the area in contact [Pa]")
-    velocity: Positive | None = Field(default=None, description="a positive velocity [m/s], where the bell is highest")
-    width: Positive | None = Field(default=None, description="a positive number of decades, the width of the bell [-]")
-
-    rules = (Rule(("velocity", "width"), _whole_bell),)
 
 
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
@@ -56,23 +24,25 @@ def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, fl
     return measures.friction - own, own
 
 
-class InterfaceColumns(Effect[tuple[float, float]]):
+class InterfaceColumns(InterfaceEffect[tuple[float, float]]):
     """Columns of the parts of friction that the body and the interface make, which add up to it."""
 
-    section: ClassVar[type[Part]] = Interface
     columns: ClassVar[tuple[str, ...]] = added_by("interface")
-    rules: ClassVar[tuple[Rule, ...]] = (Rule(("interface", "material"), _incompressible),)
+
+    def __new__(cls, scene: Any) -> Any:
+        """Return the effect of a job: with `stick` that of tractions (`effects.stick_slip`)."""
+        if not scene.job.section("interface").stick:
+            return super().__new__(cls)
+        from .stick_slip import StickSlip  # what solves is not loaded to check a job
+
+        return StickSlip(scene)
 
     @staticmethod
-    def decide(job: Any) -> Decision:
-        law: Interface | None = job.section("interface")
-        why = "there is no interface section" if law is None else f"a shear stress of {law.shear_stress:g} Pa at most"
-        return Decision("interface", law is not None, why)
-
-    @staticmethod
-    def shear(job: Any) -> InterfaceFriction:
-        """Return the stress of the section, shifted to the temperature of the material."""
+    def shear(job: Any) -> InterfaceFriction | None:
+        """Return the stress of the section, shifted to the temperature of the material; None with `stick`."""
         law: Interface = job.section("interface")
+        if law.stick or law.shear_stress is None:
+            return None
         return InterfaceFriction(law.shear_stress, law.velocity, law.width or 1.0, time_factor_of(job.material))
 
     def __init__(self, scene: Any) -> None: ...

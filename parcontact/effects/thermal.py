@@ -26,6 +26,7 @@ from ..physics.entries import Entry, Saved
 from ..physics.exponentials import Exponentials, fit_exponentials
 from ..physics.heat import Conductor, Depths, depths_of
 from ..physics.heat_memory import Heating, HeatMemory
+from ..physics.interface_friction import Shear
 from ..physics.prony import Prony
 from ..physics.units import Units
 from .effect import Changes, Decision, Effect, Instant
@@ -134,6 +135,12 @@ class ThermalMemory:
     error: float = math.inf
 
 
+def _rubs(job: Any, shears: Sequence[Shear]) -> bool:
+    """Return whether the contact area itself makes heat."""
+    interface = job.section("interface")
+    return bool(shears) or (interface is not None and interface.stick)
+
+
 class ThermalColumns(Effect[ThermalMemory]):
     """The mean temperature rise of the contact, weighted by heat, and the highest one of the surface [K].
 
@@ -177,7 +184,7 @@ class ThermalColumns(Effect[ThermalMemory]):
     def __init__(self, scene: Any) -> None:
         self._setup, self._slab, self._job = scene.setup, scene.slab, scene.job
         self._feeds_back = feeds_back(scene.job)
-        self._rubs, self._pulled = bool(scene.choices.shears), scene.job.section("adhesion") is not None
+        self._rubs, self._pulled = _rubs(scene.job, scene.choices.shears), scene.job.section("adhesion") is not None
 
     def at_rest(self) -> ThermalMemory:
         job, fft = self._job, self._setup.fft
@@ -230,7 +237,7 @@ class ThermalColumns(Effect[ThermalMemory]):
 
     def _heat(self, instant: Instant, memory: ThermalMemory) -> tuple[Heating, ThermalMemory]:
         """Return the heat of a step, by the forces at both of its ends, and the memory of those of its end."""
-        measures, velocity = instant.measures, instant.step.velocity
+        measures, velocity, sheared = instant.measures, instant.step.velocity, instant.sheared
         speed, box = math.hypot(*velocity), self._setup.grid.lx * self._setup.grid.ly
         own = measures.force_interface
         along = tuple(own * each / (speed or 1.0) for each in velocity)
@@ -238,6 +245,9 @@ class ThermalColumns(Effect[ThermalMemory]):
         pressed = tuple(max(0.0, -float(np.dot(each, velocity))) / box for each in (memory.force, force))
         share = memory.area / measures.contact_area if measures.contact_area > 0.0 else 0.0
         rubbed = own * speed / box * (share if memory.warmed else 1.0), own * speed / box
+        if sheared is not None:
+            mean = sheared.lost / (box * instant.step.dt) if instant.step.dt else 0.0
+            rubbed = mean, mean
         return Heating(rubbed, pressed), replace(memory, force=force, area=measures.contact_area)
 
     def values(self, memory: ThermalMemory) -> Sequence[float]:

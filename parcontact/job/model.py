@@ -77,6 +77,7 @@ class Job(Part):
         Rule(("material", "steady"), limits.temperatures_are_reached),
         Rule(("grid", "history"), limits.steps_can_be_made),
         Rule(("output",), limits.no_temperature),
+        Rule(("output",), limits.no_traction),
         Rule(("bands", "surface", "steady", "output"), limits.bands_fit),
         *BAND_RULES,
     )

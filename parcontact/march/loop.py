@@ -19,7 +19,10 @@ from .state import State, entries, first_state, restored, save_state
 from .step import make_step
 from .step_errors import ErrorMemory
 
-FIELDS_OF_EFFECTS = {"temperature": "a thermal section"}
+FIELDS_OF_EFFECTS = {
+    "temperature": "a thermal section",
+    **dict.fromkeys(("traction_x", "traction_y"), "interface.stick"),
+}
 
 
 class March:

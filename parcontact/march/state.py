@@ -244,15 +244,20 @@ def energies_of(
 ) -> tuple[float, float, float, tuple[float, ...]]:
     """Return work, stored and dissipated energy [J], and the dissipation of each branch; NaN if not asked for.
 
-    The work is that on the body, unless an effect counts that of the load.
+    The work is that on the body, unless an effect counts that of the load, and what effects add to it.
     """
     if scene.energy is None or memory is None:
         return math.nan, math.nan, math.nan, ()
-    unit = scene.energy.unit
-    lost = tuple(float(value) * unit for value in memory.dissipated)
+    unit, dissipated = scene.energy.unit, memory.dissipated
     counted = (effect.work(of_effects[name]) for name, effect in scene.effects.items())
-    work = next((work for work in counted if work is not None), memory.work * unit)
-    return work, memory.stored * unit, math.fsum(lost), lost
+    work, stored = next((work for work in counted if work is not None), memory.work * unit), memory.stored * unit
+    for name, effect in scene.effects.items():
+        if (further := effect.further_energies(of_effects[name])) is not None:
+            energy, outside = further
+            work, stored = work + energy.work * unit + outside, stored + energy.stored * unit
+            dissipated = dissipated + energy.dissipated
+    lost = tuple(float(value) * unit for value in dissipated)
+    return work, stored, math.fsum(lost), lost
 
 
 # -- checkpoints ------------------------------------------------------------------------------------------------------

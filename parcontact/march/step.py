@@ -8,11 +8,12 @@ place when the step has been made. What works in place comes last, when nothing 
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from ..accuracy.budget import ErrorBudget, add_shear
 from ..effects.contact_protocol import EdgeMotion, PreviousContacts, PreviousPressure
-from ..effects.effect import Changes, Instant, effect_values
+from ..effects.effect import Changes, Instant, Sheared, effect_values
 from ..history.chosen import MadeStep
 from ..history.timeline import Step
 from ..physics.body import Trial, surface_of
@@ -47,27 +48,28 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
     made = _accepted(scene, state, step)
     solved, errors, contact = made.solved, made.errors, made.solved.contact
     energy = _advance_energy(scene, state, solved)
-    changes = _follow(scene, state, made, energy)
+    changes, sheared = _follow(scene, state, made, energy)
     if state.chosen is not None and made.verdict is not None:
         state.chosen.add(made.verdict)
     if solved.body.displacement is scene.solver.workspace.pressure:
         scene.solver.workspace.pressure = surface_of(state.body)
     step, last = solved.step, state.contact.last
     followed = {name: each.memory for name, each in changes.items()}
-    states_errors = all(each.states_errors for each in changes.values()) and not solved.measures.at_edge
+    measures = solved.measures if sheared is None else sheared.measures
+    states_errors = all(each.states_errors for each in changes.values()) and not measures.at_edge
     remarks = (solved.of_law.remark, *(each.remark for each in changes.values()), _describe_passed(step))
     row = StepRow(
         step.number,
         step.time,
         state.row.distance + math.dist(step.position, last.position),
-        solved.measures,
+        measures,
         contact.iterations,
         contact.certificate,
         scene.slab.tally["operator"] - calls,
         *energies_of(scene, energy, followed),
         seconds=time.perf_counter() - began,
         remark="; ".join(f"{failure.describe_place(scene, step)}: {remark}" for remark in remarks if remark),
-        errors=errors.budget if states_errors else None,
+        errors=_budget_of(made, sheared) if states_errors else None,
         added=effect_values(scene.effects, followed),
     )
     pressure = PreviousPressure(contact.p, solved.trial.alpha, step.position)
@@ -149,8 +151,11 @@ def _advance_energy(scene: Scene, state: State, solved: SolvedStep) -> EnergyMem
     return energy.without_work(state.energy) if solved.of_law.end == "open" else energy
 
 
-def _follow(scene: Scene, state: State, made: _Made, energy: EnergyMemory | None) -> dict[str, Changes[Any]]:
-    """Return the changes that effects make in a step, and let the body relax as they say; collective."""
+def _follow(
+    scene: Scene, state: State, made: _Made, energy: EnergyMemory | None
+) -> tuple[dict[str, Changes[Any]], Sheared | None]:
+    """Return the changes that effects make in a step, and what tractions along the surface make of it, and let the body
+    relax as effects say; collective."""
     solved, u, gained = made.solved, made.solved.body.displacement, math.nan
     assert u is not None
     if energy is not None and state.energy is not None and scene.energy is not None:
@@ -170,9 +175,21 @@ def _follow(scene: Scene, state: State, made: _Made, energy: EnergyMemory | None
         made.motion.untouched,
         made.errors.of_friction,
     )
-    changes = {name: effect.follow(instant, state.memories[name]) for name, effect in scene.effects.items()}
+    changes = dict[str, Changes[Any]]()
+    for name, effect in scene.effects.items():
+        changes[name] = effect.follow(instant, state.memories[name])
+        instant = replace(instant, sheared=changes[name].sheared or instant.sheared)
     scene.relax({name: each.memory for name, each in changes.items()})
-    return changes
+    return changes, instant.sheared
+
+
+def _budget_of(made: _Made, sheared: Sheared | None) -> ErrorBudget | None:
+    """Return the error budget of a step, with that of tractions along the surface; None where nothing touches."""
+    budget = made.errors.budget
+    if budget is None or sheared is None:
+        return budget
+    body, now = made.solved.measures.friction, sheared.measures
+    return add_shear(budget, body, now.friction_interface, now.friction, sheared.error, sheared.share)
 
 
 def _describe_passed(step: Step) -> str:

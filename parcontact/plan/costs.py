@@ -98,7 +98,7 @@ class Costs:
 
     @property
     def instant_bytes(self) -> int:
-        return len(self.job.output.fields) * _points(self.job) * 8
+        return len(self.job.output.maps) * _points(self.job) * 8
 
 
 def costs_of(job: Job, sample: Sample, write_rate: float) -> Costs:

@@ -144,7 +144,7 @@ def _open_files(
         total=len(timeline),
         branches=len(march.row.branch_dissipation) if march.scene.choices.branch_dissipation.on else 0,
         added=added,
-        maps=job.output.fields,
+        maps=job.output.maps,
         size=job.grid.size,
         every=job.output.every,
         open_ended=timeline.chooses,

@@ -118,6 +118,7 @@ class Scene:
     law: ContactLaw[Any] | None = None
     effects: dict[str, Effect[Any]] = field(default_factory=dict)
     time_factor: float = 1.0
+    further_bodies: list[ZenerBody] = field(default_factory=list)
 
     @property
     def choices(self) -> Choices:
@@ -142,11 +143,27 @@ class Scene:
         if factor == self.time_factor:
             return
         self.time_factor = factor
-        for body in (self.material.branched, *(() if self.energy is None else self.energy.bodies)):
+        of_energy = () if self.energy is None else self.energy.bodies
+        for body in (self.material.branched, *of_energy, *self.further_bodies):
             if body is not None:
                 body.set_time_factor(factor)
         if shears := self.choices.shears:
             self.probe = replace(self.probe, shears=[shear.shifted(factor) for shear in shears])
+
+    def body_for_shear(self, slab: Slab) -> tuple[ZenerBody, ElasticEnergy | ZenerEnergy | None]:
+        """Make the same body again for displacements along the surface, on the slab of these, and their energies if the
+        job asks for them. It relaxes as this one from now on."""
+        chosen, folded, prony = self.choices, self.folded, self.setup.prony
+        integrator = chosen.numerics.integrator
+        body = ZenerBody(slab, prony, integrator, folded.memoryless, folded.frozen)
+        self.further_bodies.append(body)
+        if self.energy is None:
+            return body, None
+        if not chosen.viscoelasticity.on:
+            return body, ElasticEnergy(slab, self.energy.unit)
+        inverse = ElasticPressure(slab, prony, integrator)
+        self.further_bodies.extend(inverse.bodies)
+        return body, ZenerEnergy(slab, body, inverse, self.energy.unit)
 
     @cached_property
     def controller(self) -> Controller:

@@ -19,7 +19,7 @@ from ..parallel.slab import Array, Slab
 from . import files, hdf5
 from .provenance import Provenance
 
-MAPS = ("pressure", "displacement", "gap", "height", "temperature")
+MAPS = ("pressure", "displacement", "gap", "height", "temperature", "traction_x", "traction_y")
 UNITS = {column.name: column.unit for column in FIELDS if column.name in MAPS}
 KIND = "parcontact fields"
 XDMF_SECONDS = 10.0  # tuning: at least between two versions of fields.xdmf, which grows with every instant

@@ -146,10 +146,16 @@ def test_it_costs_nothing() -> None:
     ("more", "sentence"),
     [
         ("interface: {shear_stress: -1}", "interface.shear_stress must be a positive shear stress"),
-        ("interface: {}", "interface.shear_stress is missing"),
+        ("interface: {}", "interface needs exactly one of shear_stress | coefficient, got none"),
         ("interface: {shear_stress: 1.0e5, velocity: 0.1}", "interface.width is missing"),
         ("interface: {shear_stress: 1.0e5, width: 1.0}", "interface.velocity is missing"),
         ("interface: {shear_stress: 1.0e5, speed: 1.0}", "interface.speed is not a key of interface"),
+        ("interface: {coefficient: 0.5}", "interface.coefficient needs stick: true beside it"),
+        (
+            "interface: {coefficient: 0.5, stick: true, velocity: 1.0, width: 1.0}",
+            "interface.velocity goes with shear_stress",
+        ),
+        ("interface: {coefficient: 0.5, stick: true}", "interface.stick needs material.poisson of 0.5, got 0.3"),
         ("interface: {shear_stress: 1.0e5}", "interface needs material.poisson of at least 0.49, got 0.3"),
     ],
 )

@@ -221,7 +221,7 @@ OTHERS = {
         "'backward_euler'; did you mean backward-euler?"
     ),
     "output: {fields: [gap, presure]}": (
-        "5:24: output.fields.1 must be pressure | displacement | gap | height | temperature, got 'presure'; "
+        "5:24: output.fields.1 must be pressure | displacement | gap | height | temperature | traction, got 'presure'; "
         "did you mean pressure?"
     ),
     "output: {fields: [gap, gap]}": "5:24: output.fields.1 names gap a second time",

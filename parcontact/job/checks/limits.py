@@ -126,6 +126,12 @@ def no_temperature(output: Output) -> Iterator[Fault]:
         yield Fault("has temperature, which needs a thermal section", ("output", "fields"))
 
 
+def no_traction(output: Output) -> Iterator[Fault]:
+    """Refuse the map of tractions in a job without `interface`; with it this rule does not hold."""
+    if "traction" in output.fields:
+        yield Fault("has traction, which needs interface: {stick: true}", ("output", "fields"))
+
+
 def some_history(history: tuple[Any, ...], steady: Steady | None) -> Iterator[Fault]:
     if not history and steady is None:
         yield Fault("needs at least one stage, unless there is a steady section", ("history",))

@@ -25,7 +25,7 @@ def doubts_of_size(job: Sections) -> Iterator[Doubt]:
     if output.fields:
         count = count_steps(grid, job.history)
         saved = -(-count // output.every)
-        needed, free = float(saved) * len(output.fields) * grid.nx * grid.ny * 8, _free(output.directory)
+        needed, free = float(saved) * len(output.maps) * grid.nx * grid.ny * 8, _free(output.directory)
         if needed > free:
             disk = {"needed": needed / GIGA, "free": free / GIGA, "directory": str(output.directory)}
             yield Doubt("disk", "output.fields", {"instants": saved, "every": output.every, **disk})

@@ -28,7 +28,7 @@ from .quantities import (
 Integrator = Literal["exponential", "exponential-linear", "backward-euler"]
 Kernel = Literal["spectral", "love"]
 Precision = Literal["double", "mixed"]
-FieldName = Literal["pressure", "displacement", "gap", "height", "temperature"]
+FieldName = Literal["pressure", "displacement", "gap", "height", "temperature", "traction"]
 
 
 def _different(name: str) -> Rule:
@@ -208,6 +208,12 @@ class Output(Part):
 
     foreign = MappingProxyType({"mesh_check": Instead(MEASURE_MESH)})
     rules = (Rule(("branch_dissipation", "energy"), _needs_energy), _different("fields"))
+
+    @property
+    def maps(self) -> tuple[str, ...]:
+        """The names of the maps that the fields have: one for each component."""
+        both = {"traction": ("traction_x", "traction_y")}
+        return tuple(name for field in self.fields for name in both.get(field, (field,)))
 
 
 class Checkpoint(Part):

@@ -1,0 +1,254 @@
+"""Stick and slip of the contact area: how a body is sheared before it slides, and while parts of it slide.
+
+The rigid surface moves by D along itself, the points of the body by u under tractions t that are bounded,
+
+    |t| <= f,    f = mu p (Coulomb) or a shear strength on all that touches.
+
+A point that touches slips by `s = D - u`: its slip grows along t where `|t| = f`, and not at all where `|t| < f`. In an
+incompressible half space tractions and pressures move the surface independently of each other
+(`physics.shear_operator`), so that the tractions of a step follow once its pressures are known. The body obeys the law
+of `physics.body` in both components,
+
+    A t = G_inf u + sum_k h_k,
+
+and so a step to the tractions `alpha t` is the problem of `solve.tangential`: a point that sticks ends at its `target`
+g, where it was before plus what D has grown by, and
+
+    e = g + r/alpha,    w = e - A t = g - u.
+
+Points of the body stay where they are on the grid, as in the normal march: u, t and the branches belong to them, and
+nothing is shifted. The surface moves over them; it carries the bounds f, which follow from the pressure of each step. A
+point that is not touched has g = u, so that its slip counts from the step in which it is touched. Targets of points
+that stick are not renewed from u: the residual of a solve does not add up to a creep over many steps.
+
+With output.energy the work of the tractions on the body joins that of the pressures, and what slip loses is
+
+    sum (t_old + t)/2 (s - s_old),
+
+so that work = stored + dissipated + slip_loss.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from ..columns import added_by
+from ..parallel.slab import Array
+from ..physics import loops
+from ..physics.body import BodyMemory, MovedHeights, surface_of
+from ..physics.energy import EnergyMemory, Pressed
+from ..physics.entries import Entry, Saved
+from ..physics.interface_friction import Vector
+from ..physics.measures import Measures
+from ..physics.shear_operator import ShearOperator, components, stacked
+from ..physics.units import Units
+from ..solve.preconditioner.extension import grids_for
+from ..solve.tangential import discs
+from ..solve.tangential.solver import TangentialSolver
+from .effect import Changes, Instant, Sheared
+from .interface_section import InterfaceEffect
+
+
+class BoundedTraction(NamedTuple):
+    """Tractions `alpha traction`, stacked, and what bounds them, `alpha bound`."""
+
+    traction: Array
+    bound: Array
+
+
+@dataclass(frozen=True)
+class StickMemory:
+    """Memory of stick and slip; maps in the run's units, of two components stacked but for bounds.
+
+    `body` is that of the displacements along the surface, `last` the tractions of the last step, with the modulus
+    `alpha`; `spare` has room for the next ones. `target` is where points end that stick. `share` is the mean traction
+    over the mean bound. `energy` is that of the body, None where none is asked for, `lost` what slip has lost [J].
+    `columns` are those of the last row but `slip_loss`.
+    """
+
+    body: BodyMemory
+    last: BoundedTraction
+    spare: BoundedTraction
+    target: Array
+    alpha: float = 0.0
+    share: Vector = (0.0, 0.0)
+    energy: EnergyMemory | None = None
+    lost: float = 0.0
+    columns: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+
+class StickSlip(InterfaceEffect[StickMemory]):
+    """The tractions of a contact that sticks and slips, and the columns that follow from them."""
+
+    columns: ClassVar[tuple[str, ...]] = (*added_by("interface"), *added_by("interface.stick"))
+    fields: ClassVar[tuple[str, ...]] = ("traction_x", "traction_y")
+
+    def __init__(self, scene: Any) -> None:
+        setup, slab, grid, numerics = scene.setup, scene.slab, scene.choices.grid, scene.choices.numerics
+        self._scene, self._slab, self._law = scene, slab, scene.job.section("interface")
+        self._both = stacked(slab)
+        self._body, self._energy = scene.body_for_shear(self._both)
+        self._cell_force = grid.dx * grid.dy * scene.units.pressure
+        operator = ShearOperator(setup.fft, setup.size, scene.job.material.poisson, setup.half_space.free)
+        grids = grids_for(setup.size[0] / slab.nx, setup.size[1] / slab.ny)
+        limits = numerics.tolerance, numerics.max_iterations
+        self._solver = TangentialSolver(slab, operator, scene.operators.preconditioner, grids, *limits)
+
+    def at_rest(self) -> StickMemory:
+        last, spare = (BoundedTraction(self._both.zeros(), self._slab.zeros()) for _ in range(2))
+        energy = None if self._energy is None else self._energy.at_rest()
+        return StickMemory(self._body.at_rest(), last, spare, self._both.zeros(), energy=energy)
+
+    def follow(self, instant: Instant, memory: StickMemory) -> Changes[StickMemory]:
+        """Return the tractions after a step, in the maps of a memory; collective."""
+        step, alpha, target = instant.step, instant.modulus, memory.target
+        for part, moved in zip(components(target), instant.moved, strict=True):
+            part += moved / self._scene.units.height
+        trial = self._body.begin(memory.body, step.dt, MovedHeights(target), step.growth)
+        new = self._start(instant, memory)
+        solved = self._solver.solve(new.bound, trial.effective, self._stiffness(instant), new.traction)
+        body = self._body.commit(memory.body, trial, solved.displacement, surface_of(memory.body))
+        now, before = Pressed(new.traction, alpha), Pressed(memory.last.traction, memory.alpha)
+        energy = memory.energy
+        if self._energy is not None and energy is not None:
+            energy = self._energy.advance(energy, step.dt, now, before, solved.displacement, body, step.growth)
+        sheared, share = self._settle(instant, now, before, new.bound, surface_of(body), target)
+        sheared = replace(sheared, error=solved.certificate, share=self._share_of_area(instant, solved.stuck))
+        columns = *parts_of_friction(sheared), solved.stuck / self._slab.points
+        lost = memory.lost + sheared.lost
+        after = StickMemory(body, new, memory.last, target, alpha, share, energy, lost, columns)
+        return Changes(after, solved.failure, sheared=sheared)
+
+    def _start(self, instant: Instant, memory: StickMemory) -> BoundedTraction:
+        """Return the bounds of a step and tractions to start from, in the spare maps; local."""
+        (t, bound), last = memory.spare, memory.last
+        t[...] = last.traction
+        self._fill_bound(instant, bound)
+        discs.carry_over(*components(t), last.bound, memory.alpha / instant.modulus, bound, *memory.share)
+        return memory.spare
+
+    def _fill_bound(self, instant: Instant, bound: Array) -> None:
+        """Put `f/alpha` into a map. A shear strength acts on the corrected contact area, as without stick."""
+        if self._law.coefficient is not None:
+            np.multiply(instant.pressure, self._law.coefficient, out=bound)
+            bound[instant.touching == 0] = 0.0
+            return
+        measures = instant.measures
+        share = measures.contact_area_corrected / measures.contact_area if measures.contact_area > 0.0 else 0.0
+        strength = self._law.shear_stress * share / (instant.modulus * self._scene.units.pressure)
+        np.multiply(instant.touching != 0, strength, out=bound)
+
+    def _stiffness(self, instant: Instant) -> float:
+        """Return pressure over displacement of the contact as a whole, `<p, p>/<p, A p>`; collective."""
+        p, u = instant.pressure, instant.solved.contact.u
+        square, work = self._slab.sum(loops.dot(p, p), loops.dot(p, u))
+        return square / work if work > 0.0 else 1.0
+
+    def _settle(
+        self, instant: Instant, now: Pressed, before: Pressed, bound: Array, u: Array, target: Array
+    ) -> tuple[Sheared, Vector]:
+        """Return what the tractions add to the measures of a step, and their mean share of the bounds, and renew the
+        targets of points that slip or are not touched; collective."""
+        sums = list[float]()
+        for each in range(2):
+            t, old, aim, place = (components(one)[each] for one in (now.p, before.p, target, u))
+            sums += discs.settle(self._solver.free, t, now.modulus, old, before.modulus, place, aim)
+        lost_x, total_x, lost_y, total_y, most = self._slab.sum(*sums, float(bound.sum(dtype=np.float64)))
+        unit = self._cell_force * now.modulus
+        force = 0.0 - unit * total_x, 0.0 - unit * total_y
+        lost = (lost_x + lost_y) * self._cell_force * self._scene.units.height
+        share = (total_x / most, total_y / most) if most > 0.0 else (0.0, 0.0)
+        return Sheared(_with_force(instant, force), force, lost), share
+
+    def _share_of_area(self, instant: Instant, stuck: int) -> float:
+        """Return the share of the tractions that is wrong as the area is: all of those by a shear strength; by a
+        coefficient where points stick, as those that slip add up to a share of the load."""
+        touching = instant.measures.contact_area * self._slab.points
+        return stuck / touching if self._law.coefficient is not None and touching > 0.0 else 1.0
+
+    def values(self, memory: StickMemory) -> Sequence[float]:
+        """Return the parts of friction, the share of the box that sticks, and what slip has lost [J], NaN where no
+        energies are asked for."""
+        return *memory.columns, math.nan if memory.energy is None else memory.lost
+
+    def field(self, memory: StickMemory, name: str) -> Array:
+        """Return this rank's rows of a component of the tractions on the body [Pa]."""
+        traction = components(memory.last.traction)[self.fields.index(name)]
+        return traction * (memory.alpha * self._scene.units.pressure)
+
+    def further_energies(self, memory: StickMemory) -> tuple[EnergyMemory, float] | None:
+        return None if memory.energy is None else (memory.energy, memory.lost)
+
+    # -- checkpoints --------------------------------------------------------------------------------------------------
+
+    def entries(self, memory: StickMemory, units: Units) -> dict[str, Entry]:
+        """Return the maps of both components, and the sums that the energies go on from."""
+        pressure = units.height / units.length
+        both = {
+            "traction": Entry(memory.last.traction, pressure),
+            "target": Entry(memory.target, units.height, "m"),
+            **self._body.memory_entries(memory.body, units.height, "m", units.modulus * units.height, "Pa m"),
+        }
+        if self._energy is not None and memory.energy is not None:
+            energies = self._energy.entries(memory.energy, units)
+            both |= {f"energy {name}": entry for name, entry in energies.items()}
+            both["lost"] = Entry(memory.lost, 1.0, "J")
+        found = {"bound": Entry(memory.last.bound, pressure), "modulus": Entry(memory.alpha, units.modulus, "Pa")}
+        found |= {"share": Entry(np.array(memory.share)), "columns": Entry(np.array(memory.columns))}
+        for name, entry in both.items():
+            found |= _split(name, entry) if entry.is_map else {name: entry}
+        return found
+
+    def restored(self, memory: StickMemory, saved: Saved) -> StickMemory:
+        """Return the memory of a checkpoint, whose maps have been read into those of this one."""
+        joined = {name.removesuffix(" x"): value for name, value in saved.items()}
+        energy = memory.energy
+        if self._energy is not None and energy is not None:
+            of_energy = {name.removeprefix("energy "): value for name, value in joined.items()}
+            energy = self._energy.restored(energy, of_energy)
+        x, y = saved["share"].tolist()
+        return replace(
+            memory,
+            body=self._body.restored(memory.body, joined),
+            alpha=float(saved["modulus"]),
+            share=(x, y),
+            energy=energy,
+            lost=float(saved.get("lost", 0.0)),
+            columns=tuple(saved["columns"].tolist()),
+        )
+
+
+def _split(name: str, entry: Entry) -> dict[str, Entry]:
+    """Return the entries of both components of a stacked map."""
+    parts = zip("xy", components(np.asarray(entry.value)), strict=True)
+    return {f"{name} {axis}": replace(entry, value=part) for axis, part in parts}
+
+
+def _with_force(instant: Instant, force: Vector) -> Measures:
+    """Return the measures of a step with a force of the interface [N]."""
+    measures, own = instant.measures, math.hypot(*force)
+    x, y, normal = measures.force_x + force[0], measures.force_y + force[1], measures.normal_force
+    presses = normal > instant.solved.least_load and measures.contact_area > 0.0
+    return replace(
+        measures,
+        force_x=x,
+        force_y=y,
+        friction=math.hypot(x, y) / normal if presses else 0.0,
+        friction_interface=own / normal if presses else 0.0,
+        force_interface=own,
+    )
+
+
+def parts_of_friction(sheared: Sheared) -> tuple[float, float]:
+    """Return what the body and the interface make of friction: their forces in the direction of both together, over
+    the normal force."""
+    measures, (x, y) = sheared.measures, sheared.force
+    whole = math.hypot(measures.force_x, measures.force_y)
+    along = x * measures.force_x + y * measures.force_y
+    own = along / (whole * measures.normal_force) if measures.friction > 0.0 else 0.0
+    return measures.friction - own, own

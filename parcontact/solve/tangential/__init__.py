@@ -1,0 +1,1 @@
+"""Tractions of a contact that sticks and slips."""
