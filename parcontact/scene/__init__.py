@@ -1,4 +1,4 @@
-"""From a job to what is calculated with: the choices that follow from it, the rigid surface, the body, the solver."""
+"""The parts of a calculation on a job: its choices, the rigid surface, the body and the solver."""
 
 from .choices import Choices, choices
 from .scene import (

@@ -1,7 +1,7 @@
-"""The choices that follow from a job alone, each made once: which effects are on and why, and what they need.
+"""Choices that follow from a job alone, each made once: which effects are on, why, and what they need.
 
-`scene.py` makes what is decided here, `parcontact plan` prints it, and rooms below never see the job. An effect that is
-off allocates nothing, calls nothing and writes nothing.
+`scene.py` makes what is decided here, and `parcontact plan` prints it; rooms below do not see the job. An effect
+that is off allocates nothing, calls nothing and writes nothing.
 """
 
 from dataclasses import dataclass
@@ -26,15 +26,15 @@ from .decided import Decided, Verdict, decided
 
 
 def choices(job: Job, until: float = 0.0) -> "Choices":
-    """Return what a job calls for, if its last stage goes on to `until` [s]."""
+    """Return the choices for a job whose last stage continues to `until` [s]."""
     return Choices(job, job.grid, job.numerics, job.output, until)
 
 
 @dataclass(frozen=True)
 class Choices:
-    """Everything that follows from a job alone: a `Decision` for each effect, then what it is made with.
+    """Choices that follow from a job alone: a `Decision` for each effect, and its parameters.
 
-    `job` itself is for rooms above `scene`, and for effects of other packages, which have sections of their own.
+    Only rooms above `scene`, and effects of other packages, read `job`.
     """
 
     job: Job
@@ -45,19 +45,19 @@ class Choices:
 
     @property
     def decisions(self) -> list[Decision]:
-        """Every effect that there is, on or off, and why."""
+        """The decision of every effect, on or off, with its reason."""
         own = [getattr(self, name) for name, part in vars(Choices).items() if isinstance(part, Decided)]
         return own + [self._decide(section, effect) for section, effect in added_sections.find_effects().items()]
 
     def _decide(self, section: str, effect: type[Effect[Any]]) -> Decision:
-        """Return the decision of an effect; one of somebody else is not asked about a job without its section."""
+        """Return the decision of an effect. Effects of other packages are only called for jobs with their section."""
         if self.job.section(section) is None and not added_sections.is_ours(section):
             return Decision(section, False, f"there is no {section} section")
         return guarded(section, effect).decide(self.job)
 
     @cached_property
     def effects(self) -> dict[str, type[Effect[Any]]]:
-        """The effects that the job's further sections ask for, by their names in checkpoints."""
+        """The effects of the job's further sections, by their names in checkpoints."""
         known = added_sections.effects_of(type(self.job).model_fields)
         found = [guarded(section, effect) for section, effect in known.items()]
         return {effect.decide(self.job).name: effect for effect in found if effect.decide(self.job).on}
@@ -66,33 +66,33 @@ class Choices:
 
     @cached_property
     def prony(self) -> Prony:
-        """The relaxation function of the material [Pa, s]."""
+        """Relaxation function of the material [Pa, s]."""
         return relaxation_of(self.job.material)
 
     @cached_property
     def time_factor(self) -> float:
-        """The relaxation times over those at the reference temperature, a_T [-]."""
+        """Shift factor a_T [-]: relaxation times over those at the reference temperature."""
         return time_factor_of(self.job.material)
 
     @property
     def hardness(self) -> float | None:
-        """The bound on the pressure [Pa]; None if there is none."""
+        """Bound on the pressure [Pa]; None without one."""
         return self.job.material.hardness
 
     @cached_property
     def adhesion(self) -> AdhesionLaw | None:
-        """The law of adhesion; None if the surfaces do not stick."""
+        """Law of adhesion; None without adhesion."""
         return adhesion_law(self.job.section("adhesion"), self.grid, self.job.material)
 
     @cached_property
     def shears(self) -> tuple[Shear, ...]:
-        """The friction of the contact area itself, of each effect that adds some."""
+        """Friction of the contact area itself, of each effect that adds some."""
         found = [effect.shear(self.job) for effect in self.effects.values()]
         return tuple(shear for shear in found if shear is not None)
 
     @cached_property
     def folded(self) -> FoldedBranches:
-        """The branches of the material that need a map, and those that do not (`effects.folded_branches`)."""
+        """Which branches of the material have maps (`effects.folded_branches`)."""
         reason = "" if self.numerics.branch_error else "numerics.branch_error is 0"
         reason = "output.energy counts the energy of every branch" if self.energies.on else reason
         reason = "heat changes them" if feeds_back(self.job) else reason
@@ -102,17 +102,17 @@ class Choices:
 
     @decided("viscoelasticity")
     def viscoelasticity(self) -> Verdict:
-        """One map per branch that relaxes, and the last displacement."""
+        """One map per relaxing branch, and the last displacement."""
         count = self.prony.moduli.size
         what = "a branch relaxes" if count == 1 else f"{count} branches relax"
         return count > 0, what if count else "the body has one modulus and no memory"
 
     @decided("folded branches")
     def folded_branches(self) -> Verdict:
-        """Branches far faster or slower than all that happens have no map."""
+        """Branches far faster or slower than the history have no map."""
         found = self.folded
         if not found.folded:
-            return False, found.reason or "no branch is far faster or slower than all that happens"
+            return False, found.reason or "no branch is far faster or slower than the history"
         folded = f"{found.folded} of {self.prony.moduli.size} are too fast or too slow to need a map"
         return True, f"{folded}; {bounded_error(found, bool(self.job.directions))}"
 
@@ -124,13 +124,13 @@ class Choices:
 
     @decided("layer")
     def layer(self) -> Verdict:
-        """A layer on a rigid base in place of the half space: another symbol of the operator, at the same cost."""
+        """A layer on a rigid base instead of the half space: another symbol of the operator, at the same cost."""
         body = self.job.body
         return bool(body), f"{body.thickness:g} m, on a {body.base} base" if body else "no body section: a half space"
 
     @decided("yielding counterbody")
     def yielding(self) -> Verdict:
-        """Pressures bounded by the hardness, by another constraint of the solver."""
+        """Pressures bounded by the hardness: another constraint of the solver."""
         bound = self.hardness
         return bound is not None, "material.hardness is not set" if bound is None else f"at a pressure of {bound:g} Pa"
 
@@ -138,24 +138,24 @@ class Choices:
 
     @cached_property
     def timeline(self) -> Timeline:
-        """All steps of the job's history; those that stages choose are guessed."""
+        """All steps of the job's history; steps that stages choose are estimated."""
         return Timeline.from_job(self.job)
 
     @cached_property
     def slides_along_x(self) -> bool:
-        """True if the surface slides along x on a periodic box, where whole cells are an index offset."""
+        """True if the surface slides along x on a periodic box; whole cells are then an index offset."""
         across = [span.stage.velocity[1] for span in self.timeline.spans if span.moves]
         return bool(across) and not self.isolated.on and not any(across)
 
     @decided("sliding")
     def sliding(self) -> Verdict:
-        """A surface that moves."""
+        """Motion of the surface."""
         moves = self.timeline.moves
         return moves, "the surface moves" if moves else "the surface does not move in any stage"
 
     @decided("sub-cell or oblique sliding")
     def part_cells(self) -> Verdict:
-        """Heights made anew when the surface has moved, but for whole cells along x on a periodic box."""
+        """Heights computed again after each motion, except by whole cells along x on a periodic box."""
         if not self.sliding.on:
             return False, "the surface does not move"
         if self.isolated.on:
@@ -168,32 +168,33 @@ class Choices:
 
     @decided("extrapolated starts")
     def extrapolated_starts(self) -> Verdict:
-        """The last pressure but one, from which the next one is extrapolated."""
+        """The pressure before the last one, for extrapolation to the next step."""
         if self.adhesion is not None:
             return False, "contacts with adhesion start from the last gaps"
         return (on := self.timeline.lasts), "stages have steps" if on else "every stage is a single solve"
 
     @decided("starts from a whole cell earlier")
     def further_starts(self) -> Verdict:
-        """The two pressures before that: with thirds and quarters of a cell a step starts from a whole cell ago."""
+        """Two earlier pressures: steps of a third or a quarter of a cell start from the pressure one whole cell
+        earlier."""
         moves = any(span.moves and span.stage.chooses for span in self.timeline.spans)
         on = self.extrapolated_starts.on and self.timeline.chooses and moves
         return on, f"the surface slides in {'' if on else 'no '}chosen steps"
 
     @decided("chosen time steps")
     def chosen_steps(self) -> Verdict:
-        """Time steps that follow the error of the last one (`accuracy.controller`)."""
+        """Time steps chosen from the error of the last step (`accuracy.controller`)."""
         why = describe_steps(self.job)
         return bool(why) and self.job.remembers, why or "every stage gives its steps"
 
     @decided("rest cut short")
     def short_rest(self) -> Verdict:
-        """One step that ends a stage at rest of a body without memory, where nothing changes any more."""
+        """One step to the end of a stage at rest of a body without memory, when nothing changes any more."""
         if self.prony.moduli.size:
             return False, "the body relaxes"
         if (span := next((span for span in self.timeline.spans if span.rests), None)) is None:
-            return False, "no stage stands under a constant load with growing time steps"
-        return True, f"stage {span.stage.name!r} stands under a constant load"
+            return False, "no stage holds a constant load with growing time steps"
+        return True, f"stage {span.stage.name!r} holds a constant load"
 
     @decided("steady start")
     def steady_start(self) -> Verdict:
@@ -202,7 +203,7 @@ class Choices:
 
     @decided("displacement control")
     def approach(self) -> Verdict:
-        """The approach is given and the load follows."""
+        """The approach is given and the load is unknown."""
         stage = next((stage.name for stage in self.job.history if stage.control == "approach"), None)
         return bool(stage), f"stage {stage!r} prescribes the approach" if stage else "every stage prescribes its load"
 
@@ -210,7 +211,7 @@ class Choices:
 
     @decided("preconditioner in single precision")
     def mixed_precision(self) -> Verdict:
-        """A preconditioner in single precision, with transforms of its own, which costs no iteration."""
+        """A preconditioner in single precision with its own transforms; it needs no further iterations."""
         if self.adhesion is not None:
             return False, "contacts with adhesion are solved in double precision"
         if self.numerics.precision != "double":
@@ -218,12 +219,12 @@ class Choices:
         if self.numerics.tolerance < LOOSE:
             return False, f"numerics.tolerance is below {LOOSE:g}"
         if self._relaxing_energies and self._inverse_is_known:
-            return False, "energies take the preconditioner for the inverse of the operator"
+            return False, "energies use the preconditioner as the inverse of the operator"
         return True, f"a solve to a tolerance of {LOOSE:g} or more takes as many iterations with it"
 
     @decided("operator in single precision")
     def single_operator(self) -> Verdict:
-        """The operator in single precision, too, on the transforms of the preconditioner."""
+        """The operator in single precision, too, with the transforms of the preconditioner."""
         if self.adhesion is not None:
             return False, "contacts with adhesion are solved in double precision"
         if self.numerics.precision != "mixed":
@@ -231,23 +232,23 @@ class Choices:
         if self.numerics.tolerance < VERY_LOOSE:
             return False, f"numerics.tolerance is below {VERY_LOOSE:g}"
         if self.energies.on:
-            return False, "energies are balanced to more digits"
+            return False, "the energy balance needs more digits"
         return True, f"a solve to a tolerance of {VERY_LOOSE:g} or more does not need more digits"
 
     @property
     def operator_type(self) -> type[np.floating]:
-        """The precision of the operator and of the displacements that it makes."""
+        """Precision of the operator and of displacements."""
         return np.float32 if self.single_operator.on else np.float64
 
     @decided("surface spectrum")
     def spectrum(self) -> Verdict:
-        """The waves of the surface: their transform is kept, moments are taken once, and forces are spectral sums."""
+        """Waves of the surface: their transform is stored, moments are computed once, and forces are spectral sums."""
         on = any(isinstance(shape, Spectral) for shape in self.job.surface)
         return on, "the surface has waves or heights from a file" if on else "all its shapes are in closed form"
 
     @property
     def transforms(self) -> list[Any]:
-        """The facts that decide, beside the number of ranks, which transforms a run has."""
+        """Facts that, with the number of ranks, determine the transforms of a run."""
         kinds = self.grid.points, self.grid.boundary, self.numerics.kernel, self.numerics.precision
         single, steady = [self.mixed_precision.on, self.single_operator.on], self.job.steady is not None
         return [*kinds, single, [self.job.initial.state, steady]]
@@ -256,13 +257,14 @@ class Choices:
 
     @decided("energies")
     def energies(self) -> Verdict:
-        """Work, stored and dissipated energy: one reduction a step, in a viscoelastic body an operator application."""
+        """Work, stored and dissipated energy: one reduction per step, and one operator application in a viscoelastic
+        body."""
         asked = self.output.energy
         return asked, "output.energy asks for them" if asked else "output.energy is not set"
 
     @decided("energy memory")
     def energy_memory(self) -> Verdict:
-        """Branch maps of `A^-1 u`, where the operator's inverse is not at hand."""
+        """Branch maps of `A^-1 u`, if the inverse of the operator is not available."""
         if not self._relaxing_energies:
             return False, "no energies of a viscoelastic body are asked for"
         known = self._inverse_is_known and self.numerics.precision == "double"
@@ -274,7 +276,7 @@ class Choices:
 
     @property
     def _inverse_is_known(self) -> bool:
-        """True if the preconditioner is the inverse of the operator, but for its precision."""
+        """True if the preconditioner is the inverse of the operator, up to its precision."""
         return not self.isolated.on and self.numerics.kernel == "spectral" and not self.layer.on
 
     @decided("dissipation per branch")
@@ -294,7 +296,7 @@ class Choices:
 
     @decided("checkpoints")
     def checkpoints(self) -> Verdict:
-        """Files to go on from; one at the end is always written."""
+        """Files to restart from; one at the end is always written."""
         rules = self.job.checkpoint
         when = f"every {rules.every} steps" if rules.every is not None else f"every {rules.minutes:g} minutes"
         return True, f"{when} and at the end; {rules.keep} are kept"

@@ -1,4 +1,4 @@
-"""Decisions that follow from a job: methods of `choices.Choices` that give a verdict, each asked once."""
+"""Decisions that follow from a job: methods of `choices.Choices` that return a verdict, each called once."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -6,13 +6,13 @@ from typing import Any
 
 from ..effects.effect import Decision
 
-Verdict = tuple[bool, str]  # whether an effect is on, and why
+Verdict = tuple[bool, str]  # True if an effect is on, and the reason
 
 
 class Decided(cached_property[Decision]):
-    """A decision, made when it is first asked for; `parcontact plan` prints all of them in the order of their code."""
+    """A decision, made at its first use. `parcontact plan` prints all decisions in the order of their code."""
 
 
 def decided(name: str) -> Callable[[Callable[[Any], Verdict]], Decided]:
-    """Make a decision with a name out of a method that gives a verdict."""
+    """Turn a method that returns a verdict into a decision with this name."""
     return lambda method: Decided(lambda choices: Decision(name, *method(choices)))

@@ -1,4 +1,4 @@
-"""Sentences about measured maps: what was done to them, and what is doubted."""
+"""Sentences about measured maps: how they were prepared, and warnings."""
 
 from collections.abc import Iterator
 
@@ -12,29 +12,29 @@ from ..road import treatment
 from ..road.map_files import Map
 from ..road.prepared_map import Prepared
 
-LARGEST, SMALLEST = 1.0, 5e-11  # m: a longer map is doubted, and points that are nearer than atoms
-FLATTEST = 1e-5  # physics: range of heights over the shorter side; a polished wafer has some 1e-5
-OBLONG = 1.5  # of the sides of a pixel: instruments have squares, with few exceptions
+LARGEST, SMALLEST = 1.0, 5e-11  # m: largest side of a map, and least distance of its points, without a warning
+FLATTEST = 1e-5  # physics: least range of heights over the shorter side without a warning, that of a polished wafer
+OBLONG = 1.5  # largest ratio of the sides of a pixel without a warning; most instruments have squares
 
 
 def describe_treatment(prepared: Prepared) -> list[str]:
-    """Return sentences on what was done to a prepared."""
+    """Return sentences on how a map was prepared."""
     part, cut, done, size = prepared.part, prepared.cut, prepared.treated, prepared.size
     (ny, nx), (lx, ly), odd = cut.shape, (quantity(length, "m", 4) for length in size), int(done.outliers.sum())
     lines = [f"road: {nx} x {ny} points of the map, {lx} x {ly}, are used"]
     if done.missing:
         lines.append(f"road: {done.missing} missing points ({per_cent(done.missing / cut.size)}) were filled")
     if odd and part.outliers == "clip":
-        lines.append(f"road: {odd} points that stuck out were set to the median of their neighbours")
+        lines.append(f"road: outliers set to the median of their neighbours: {odd}")
     if part.short_wavelength:
         lines.append(
-            f"road: waves shorter than {quantity(part.short_wavelength, 'm', 4)} were taken out (ideal low-pass)"
+            f"road: waves shorter than {quantity(part.short_wavelength, 'm', 4)} were removed (ideal low-pass)"
         )
     return lines
 
 
 def describe_line(part: Topography, line: Map) -> str:
-    """Return a sentence on the surface that a line scan stands for."""
+    """Return a sentence on the random surface that is made from a line scan."""
     length = quantity(line.size[0], "m", 4)
     return (
         f"road: {part.path.name} is a line scan of {line.heights.size} points over {length}; the surface is a random "
@@ -43,7 +43,7 @@ def describe_line(part: Topography, line: Map) -> str:
 
 
 def doubt_sizes(prepared: Prepared) -> Iterator[Doubt]:
-    """Yield doubts about the size of a map, in which units may be confused."""
+    """Yield warnings about the size of a map whose units may be confused."""
     found, name = prepared.whole, prepared.part.path.name
     (ny, nx), (lx, ly) = found.heights.shape, found.size
     dx, dy = lx / nx, ly / ny
@@ -59,7 +59,7 @@ def doubt_sizes(prepared: Prepared) -> Iterator[Doubt]:
 
 
 def doubt_outliers(prepared: Prepared) -> Iterator[Doubt]:
-    """Yield a doubt about points that stick out of their neighbours, if there are any and they are kept."""
+    """Yield a warning about outliers, if there are any and they are kept."""
     odd, cut = prepared.treated.outliers, prepared.cut
     if not odd.any() or prepared.part.outliers == "clip":
         return

@@ -1,4 +1,4 @@
-"""Warnings for jobs that leave the frequencies and temperatures at which their rubber was measured."""
+"""Warnings for jobs outside the frequencies and temperatures at which their rubber was measured."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -8,12 +8,14 @@ from ..doubts import Doubt
 from ..effects.relaxation import time_factor_of
 from ..job import Flat, Grid, Job, Rough, Wave, Zener
 
-NEAR = 0.5  # accuracy: decades beyond the measured band that pass, as a surface has little of its last waves
+NEAR = 0.5  # accuracy: decades beyond the measured band without a warning
 
 
 class ExcitedBand(NamedTuple):
-    """Frequencies [Hz] that a job excites at a temperature [deg C], None where moduli do not depend on it, with the
-    shift factor a_T there."""
+    """Frequencies [Hz] that a job excites at a temperature [deg C], and the shift factor a_T there.
+
+    The temperature is None if moduli do not depend on it.
+    """
 
     temperature: float | None
     factor: float
@@ -21,13 +23,13 @@ class ExcitedBand(NamedTuple):
 
     @property
     def reduced(self) -> tuple[float, float]:
-        """The frequencies [Hz] at the reference temperature at which moduli are the same."""
+        """Frequencies [Hz] with the same moduli at the reference temperature."""
         return self.band[0] * self.factor, self.band[1] * self.factor
 
 
 def excited_band(job: Job) -> tuple[float, float] | None:
-    """Return the frequencies [Hz] with which the waves of a job's surface pass a point of the body, over all stages and
-    steady velocities; None for a surface that stands."""
+    """Return the range of frequencies [Hz] at which the waves of a job's surface load a point of the body, over all
+    stages and steady velocities; None if the surface does not move."""
     velocities = [*(stage.velocity for stage in job.history), job.initial.velocity]
     speeds = [*(math.hypot(*velocity) for velocity in velocities), *(job.steady.velocities if job.steady else ())]
     moving, waves = (
@@ -41,7 +43,7 @@ def excited_band(job: Job) -> tuple[float, float] | None:
 
 
 def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
-    """Return the wave numbers of a shape's waves [rad/m], or the lowest and the highest one; none of a flat surface.
+    """Return the wavenumbers [rad/m] of a shape, or the lowest and the highest one; none for a flat surface.
 
     Round shapes and files may have every wave from the box to two cells.
     """
@@ -59,8 +61,8 @@ def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
 
 
 def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedBand]:
-    """Return what a job excites at each temperature of a friction curve, or else at that of the material; nothing where
-    the surface stands."""
+    """Return the frequencies that a job excites at each temperature of a friction curve, or at that of the material;
+    none if the surface does not move."""
     if (band := excited_band(job)) is None:
         return []
     body = _body(job)
@@ -72,9 +74,9 @@ def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedB
 
 
 def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
-    """Yield a doubt for frequencies and one for temperatures that the material of a job was not measured at.
+    """Yield warnings about frequencies and temperatures at which the material was not measured.
 
-    `temperatures` [deg C] are those of a friction curve; without any, that of the material.
+    `temperatures` [deg C] are those of a friction curve; without them that of the material counts.
     """
     if (body := _body(job)) is None:
         return
@@ -95,5 +97,5 @@ def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
 
 
 def _body(job: Job) -> Zener | None:
-    """Return the material as springs and branches; None of an elastic one."""
+    """Return the material as springs and branches; None if it is elastic."""
     return job.material.fitted if isinstance(job.material.fitted, Zener) else None

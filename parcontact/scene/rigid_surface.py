@@ -1,4 +1,4 @@
-"""The rigid surface of a job: shapes, waves, roughness, and maps from files, added up."""
+"""The rigid surface of a job: the sum of shapes, waves, roughness and maps from files."""
 
 import math
 from collections.abc import Callable
@@ -22,19 +22,19 @@ from ..physics.roughness import Roughness, shortest_wave
 from ..physics.shapes import Round
 from ..physics.surface import Surface, single_wave
 
-ROUNDING = 1e-8  # accuracy: relative, of the shortest wavelength of a table
-FLAT = 1e-14  # accuracy: a surface whose highest and lowest points differ by this, relative to their heights, is flat
+ROUNDING = 1e-8  # accuracy: relative, by which the shortest wavelength of a table is reduced so that it is included
+FLAT = 1e-14  # accuracy: range of heights over their magnitude, up to which a surface is flat
 
 
 class Remarks(NamedTuple):
-    """Notes on how measured maps were prepared, sentences that root has, and doubts about them, on every rank."""
+    """Remarks on measured maps: sentences on how they were prepared (on root), and warnings (on every rank)."""
 
     notes: list[str]
     doubts: list[Doubt]
 
 
 def make_surface(job: Job, fft: FFT) -> tuple[Surface, Remarks]:
-    """Return the rigid surface of a job, and what to say of its measured maps; collective. Raises InputError."""
+    """Return the rigid surface of a job, and remarks on its measured maps; collective. Raises InputError."""
     grid, remarks = job.grid, Remarks([], [])
     spectral = [part for part in job.surface if isinstance(part, jobs.Spectral)]
     waves = reduce(add, (_waves(part, grid, fft, remarks) for part in spectral)) if spectral else None
@@ -48,7 +48,7 @@ def make_surface(job: Job, fft: FFT) -> tuple[Surface, Remarks]:
 
 
 def outline_surface(job: Job, fft: FFT) -> Surface:
-    """Return the surface of a job for a calculation that is only planned: its waves have no values."""
+    """Return the surface of a job for planning: its waves have no values."""
     waves = None
     if any(isinstance(part, jobs.Spectral) for part in job.surface):
         waves = allocate(shape_of(highest_waves(job), (fft.mx, fft.my), fft.columns), fft.complex, fft.slab.tally)
@@ -63,17 +63,17 @@ def _round(part: jobs.Sphere | jobs.Cylinder, grid: Grid) -> Round:
 
 
 def shortest_measured(job: Job, surface: Surface) -> float | None:
-    """Return the shortest wave [m] of a surface that is measured, by its spectrum on the grid; None of one whose waves
-    the job gives, or without slopes. Collective.
+    """Return the shortest wave [m] of a measured surface, from its spectrum on the grid; collective.
 
-    A map that does not go on across its edges is looked at through a window, as a jump or a crease has waves of any
-    length. The window adds up to a wave to the shortest, of which half is taken off again.
+    It is None for a surface whose waves the job gives, or without slopes. A map that is not periodic is multiplied
+    by a window, as a jump or a crease at its edges has waves of any length. The window adds up to one wave to the
+    shortest, of which half is subtracted.
     """
     if surface.waves is None or not any(isinstance(part, meaning.READ) for part in job.surface):
         return None
     spectrum = surface.waves
     maps = [part for part in job.surface if isinstance(part, jobs.Topography)]
-    windows = 2 if any(part.periodic == "mirror" for part in maps) else 1  # side by side
+    windows = 2 if any(part.periodic == "mirror" for part in maps) else 1  # next to each other
     windowed = not all(job.grid.cyclic) or bool(maps)
     if windowed:
         heights = replace(surface, shapes=()).heights((0.0, 0.0), surface.slab.empty())
@@ -89,14 +89,13 @@ def shortest_measured(job: Job, surface: Surface) -> float | None:
 
 
 def shortest_of(job: Job) -> float | None:
-    """Return the shortest wave [m] of the measured surface of a job on its grid, as `shortest_measured`; on this rank
-    alone."""
+    """Return `shortest_measured` of a job on its grid, on this rank alone."""
     slab = Slab.alone(*job.grid.points)
     return shortest_measured(job, make_surface(job, FFT(slab, measured=False))[0])
 
 
 def highest_waves(job: Job) -> tuple[int, int]:
-    """Return the most waves in the box, along x and y, of what a job's surface gives by waves."""
+    """Return the largest numbers of waves in the box, along x and y, of the parts that are given by waves."""
     grid, found = job.grid, [(0, 0)]
     for part in job.surface:
         if isinstance(part, jobs.Wave):
@@ -171,7 +170,7 @@ def _random_surface(
     random: bool = True,
 ) -> Spectrum:
     """Return the transform of a random surface with a measured spectrum between its longest and shortest wavelengths
-    [m], adding to the notes on root; collective."""
+    [m], and add to the notes on root; collective."""
     (long, short), cell = ends, max(length / n for length, n in zip(grid.size, grid.points, strict=True) if n > 1)
     if fft.slab.root:
         if short < 2 * cell:
@@ -183,7 +182,7 @@ def _random_surface(
 
 
 def _transform(heights: Array, fft: FFT) -> Spectrum:
-    """Return the transform of heights, their mean apart: there may be no digits for both; collective."""
+    """Return the transform of heights. Their mean is added in Fourier space, to keep digits; collective."""
     mean = fft.slab.sum(float(heights.sum()))[0] / fft.slab.points
     spectrum = fft.forward(heights - mean)
     if fft.columns.start == 0 < fft.columns.stop:
@@ -192,8 +191,8 @@ def _transform(heights: Array, fft: FFT) -> Spectrum:
 
 
 class HeightRange(NamedTuple):
-    """Heights [m] of a surface: from the lowest to the highest point, Sz of the standards on roughness, 0 if that is
-    rounding; the highest point and the mean, over the surface's datum."""
+    """Heights [m] of a surface: from the lowest to the highest point (Sz, 0 if that is rounding), and the highest point
+    and the mean, relative to the datum of the surface."""
 
     span: float
     highest: float
@@ -201,7 +200,7 @@ class HeightRange(NamedTuple):
 
 
 def heights_of(surface: Surface) -> HeightRange:
-    """Return the heights that a surface reaches; collective."""
+    """Return the range of heights of a surface; collective."""
     heights = surface.heights((0.0, 0.0), surface.slab.empty())
     extremes = [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]
     total, top, bottom = surface.slab.reduce([float(heights.sum(dtype=np.float64))], extremes)

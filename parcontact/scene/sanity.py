@@ -1,6 +1,7 @@
-"""Doubts about what a scene means, from its heights before a run and from its contacts during it.
+"""Warnings about a scene, from its heights before a run and from its contacts during it.
 
-What a job alone tells is in `job/checks/meaning.py`. All is judged from sums over all points: every rank says the same.
+Warnings that follow from a job alone are in `job/checks/meaning.py`. Sums over all points decide, so that all ranks
+agree.
 """
 
 import math
@@ -22,15 +23,15 @@ from ..physics.measures import Measures
 from .measured_range import doubt_band
 from .scene import Setup
 
-SEAM = 2.0  # accuracy: the jump across the edge over the largest increment inside: 1 if nothing is special
-FEW_CELLS = 0.15  # accuracy: of the area, too large if counted in cells: contacts of three cells, a circle of four
-FEW_POINTS = 2**22  # tuning: heights that are made in seconds
+SEAM = 2.0  # accuracy: least jump across the edge, over the largest increment inside, for a warning
+FEW_CELLS = 0.15  # accuracy: least excess of the counted area, as a share of it, for a warning; circles of four cells
+FEW_POINTS = 2**22  # tuning: largest number of points whose heights are computed for a check; this takes seconds
 STRICT = "an error with numerics.strict"
-FULL_CONTACT_ROUNDING = 1e-14  # rounding: relative to lengths whose sum is compared with 0
+FULL_CONTACT_ROUNDING = 1e-14  # rounding: of a sum of lengths, relative to these
 
 
 def refuse_impossible(job: Job, timeline: Timeline) -> None:
-    """Raise InputError for a run that cannot begin here: too many points for the memory, or too many instants."""
+    """Raise InputError for a run with too many points for the memory, or with too many instants."""
     count = timeline.count
     endless = f"the history would have {count:.3g} steps; it has at most {MOST_STEPS:.0e}" if count > MOST_STEPS else ""
     for text in (*map(str, size.doubt_memory(job.grid)), size.beyond_file(count, job.output), endless):
@@ -39,18 +40,18 @@ def refuse_impossible(job: Job, timeline: Timeline) -> None:
 
 
 def is_quickly_made(job: Job) -> bool:
-    """Return whether the heights of a job say more than the job does, and are few enough to be made to look at them."""
+    """Return whether the heights of a job decide about warnings, and are few enough to be computed for these."""
     return job.depends_on_heights and job.grid.nx * job.grid.ny <= FEW_POINTS
 
 
 def find_doubts(setup: Setup, temperatures: Sequence[float] = ()) -> list[Doubt]:
-    """Return doubts about a job at some temperatures [deg C] and about its heights; collective. Raises InputError with
+    """Return warnings about a job at temperatures [deg C] and about its heights; collective. Raises InputError with
     `numerics.strict`."""
     return [*setup.job.doubts, *doubt_band(setup.job, temperatures), *check_heights(setup)]
 
 
 def check_heights(setup: Setup) -> list[Doubt]:
-    """Return doubts about the heights of a scene; collective. Raises InputError with `numerics.strict`."""
+    """Return warnings about the heights of a scene; collective. Raises InputError with `numerics.strict`."""
     found = list(_check_heights(setup))
     if found and setup.choices.numerics.strict:
         place = f"{setup.job.origin.strict}: " if setup.job.origin.strict else ""
@@ -73,7 +74,7 @@ def _check_heights(setup: Setup) -> Iterator[Doubt]:
     law = setup.choices.adhesion
     if law and setup.roughness and not setup.surface.shapes:
         yield from doubt_range(law, span)
-    if setup.shortest is not None and not (seams or setup.job.origin.mesh):  # a seam has waves of its own
+    if setup.shortest is not None and not (seams or setup.job.origin.mesh):  # a seam has further waves
         asked, spiky = setup.choices.numerics.asked, any(doubt.kind == "outliers" for doubt in setup.remarks.doubts)
         yield from advice.doubt_measured_waves(setup.grid, setup.shortest, asked, setup.job.directions, spiky)
 
@@ -82,14 +83,14 @@ def _check_heights(setup: Setup) -> Iterator[Doubt]:
 
 
 def has_full_contact(setup: Setup) -> bool:
-    """Return whether there is a largest approach: a periodic half space keeps the level of its mean, and an
-    incompressible layer does. Where the rigid surface yields there is none."""
+    """Return whether there is a largest approach: on a periodic half space and on an incompressible layer, whose mean
+    level is fixed, unless the rigid surface yields."""
     return not setup.half_space.moves_in_the_mean and setup.choices.hardness is None
 
 
 def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
-    """Return what to say of an approach [m] beyond full contact, or ''; `mean` [m] is that of the heights over the
-    datum of the surface."""
+    """Return a sentence on an approach [m] beyond full contact, or ''; `mean` [m] is the mean height relative to the
+    datum."""
     closed = -mean - setup.surface.datum
     rounding = FULL_CONTACT_ROUNDING * (abs(approach) + abs(setup.surface.datum) + setup.height)
     if approach - closed <= rounding:
@@ -101,7 +102,7 @@ def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
 
 
 def refuse_approaches(setup: Setup) -> None:
-    """Raise JobError for stages whose approach goes beyond the full contact of the surface where it begins."""
+    """Raise JobError for stages whose approach exceeds that of full contact."""
     mistakes = []
     for index, stage in enumerate(setup.job.history if has_full_contact(setup) else ()):
         most = max(stage.load.start, stage.load.end)
@@ -116,7 +117,7 @@ def refuse_approaches(setup: Setup) -> None:
 
 
 def _seams(setup: Setup, heights: Array) -> Iterator[Doubt]:
-    """Yield doubts where the first and the last points of a periodic box do not fit together."""
+    """Yield warnings if opposite edges of a periodic box do not fit together."""
     unit, grid = setup.units.height, setup.grid
     for name, (jump, inside, rise), length in (
         ("x", _along_x(setup.slab, heights), grid.lx),
@@ -130,7 +131,7 @@ def _seams(setup: Setup, heights: Array) -> Iterator[Doubt]:
 
 
 def _along_x(slab: Slab, heights: Array) -> tuple[float, float, float]:
-    """The rms jump across the edge, the largest rms increment inside, the mean rise from one side to the other."""
+    """Return the rms jump across the edge, the largest rms increment inside, and the mean rise across the box."""
     if slab.nx < 3:
         return 0.0, 0.0, 0.0
     steps = np.roll(heights, -1, axis=1) - heights
@@ -141,7 +142,7 @@ def _along_x(slab: Slab, heights: Array) -> tuple[float, float, float]:
 
 
 def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
-    """The rms jump, the largest rms increment and the mean rise from row to row."""
+    """Return the same from row to row: the rms jump, the largest rms increment and the mean rise."""
     before = rows.before_first(slab, heights, True)
     if slab.ny < 3:
         return 0.0, 0.0, 0.0
@@ -159,7 +160,7 @@ def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
 
 @dataclass
 class ContactWatch:
-    """Check of what each step of a run has measured, which tells each kind of nonsense once."""
+    """Checks of the contact of each step; each kind of warning is given once."""
 
     strict: bool
     timeline: Timeline
@@ -167,12 +168,12 @@ class ContactWatch:
     more: str = "more grid.points"
 
     def check_step(self, step: int, measures: Measures) -> list[Doubt]:
-        """Return doubts about a step; raises RunError where they are errors."""
+        """Return warnings about a step; raises RunError if these are errors."""
         ends_a_stage = 0 < step <= self.timeline.count and self.timeline.span(step).last == step
         return self.check_point(measures, f"step {step}", ends_a_stage)
 
     def check_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
-        """Return doubts about a contact, of its cells if it is `final`; raises RunError where they are errors."""
+        """Return warnings about a contact, about its cells if it is `final`; raises RunError if these are errors."""
         found = [*doubt_edge(measures, where), *(doubt_cells(measures, where, self.more) if final else ())]
         new = [doubt for doubt in found if doubt.kind not in self.seen]
         self.seen |= {doubt.kind for doubt in new}
@@ -182,13 +183,13 @@ class ContactWatch:
 
 
 def doubt_edge(measures: Measures, where: str) -> Iterator[Doubt]:
-    """Yield a doubt about a contact that leaves its box."""
+    """Yield a warning about a contact that reaches the edge of its box."""
     if measures.at_edge:
         yield Doubt("edge", "", {"where": where})
 
 
 def doubt_cells(measures: Measures, where: str, more: str) -> Iterator[Doubt]:
-    """Yield a doubt about contacts that consist of their own edges; `more` points are where they pay."""
+    """Yield a warning about contacts that consist mainly of edge cells; `more` states how to refine them."""
     area = measures.contact_area
     excess = 1.0 - measures.contact_area_corrected / area if area > 0.0 else 0.0
     if excess > FEW_CELLS:

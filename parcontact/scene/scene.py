@@ -1,7 +1,6 @@
-"""From a job to what steps are made of: bodies, solver, energies, probe and effects are made here and nowhere else.
+"""Makes the bodies, solvers, energies, probes and effects of steps from a job, as `choices.py` decides.
 
-What is made follows from the job alone, as `choices.py` decides; what a job does not call for is never made.
-Steady sliding takes the setup from here and brings a solver of its own.
+Steady sliding takes the setup from here and has its own solver.
 """
 
 import math
@@ -47,12 +46,11 @@ from .rigid_surface import HeightRange, Remarks, heights_of, make_surface, outli
 
 @dataclass
 class Setup:
-    """The parts that every calculation on a job shares: its choices, rows of ranks, surface, units and body.
+    """Parts that every calculation on a job shares: its choices, slab, surface, units and body.
 
-    `heights` [m] are what the surface reaches, `height` is that from its lowest to its highest point (the shorter side
-    of a cell if it is flat); `shortest` [m] is the shortest wave of what is measured of it, None where nothing is;
-    `size` and `prony` are the box and the relaxation function in the run's units (and seconds); `remarks` is
-    what to say of measured maps.
+    `heights` [m] is the range of the surface, `height` its span (the shorter side of a cell if it is flat);
+    `shortest` [m] is the shortest measured wave, or None; `size` and `prony` are the box and the relaxation function
+    in the run's units (and seconds); `remarks` are those on measured maps.
     """
 
     choices: Choices
@@ -88,7 +86,7 @@ class Setup:
 
     @property
     def half_space(self) -> HalfSpace:
-        """The body's, of shear modulus 1, in the run's units."""
+        """The body with shear modulus 1, in the run's units."""
         poisson, kernel = self.job.material.poisson, self.choices.numerics.kernel
         body = self.job.body
         layer = None if body is None else Layer(body.thickness / self.units.length, body.base, poisson)
@@ -99,13 +97,13 @@ class Setup:
         return velocity[0] / self.units.length, velocity[1] / self.units.length
 
     def probe(self) -> Probe:
-        """Make a new probe, with the shear that effects add, and the hardness if the job has one."""
+        """Make a probe with the shear that effects add, and the hardness if the job has one."""
         return Probe(self.slab, self.surface, self.units, self.choices.shears, self.choices.hardness)
 
 
 @dataclass
 class Scene:
-    """Everything a march needs. `law` is the contact law of an effect, None for that of the constraint."""
+    """Everything a march needs. `law` is the contact law of an effect, or None for that of the constraint."""
 
     setup: Setup
     motion: Motion
@@ -137,8 +135,8 @@ class Scene:
         return self.setup.units
 
     def relax(self, memories: Memories) -> None:
-        """Let the body, its energies and its interface relax from now on as effects say, with their memories: with so
-        many times the relaxation times of the job's temperature. Raises RunError."""
+        """Multiply the relaxation times of the body, its energies and its interface at the job's temperature by the
+        product of the factors of the effects, which follow from their memories. Raises RunError."""
         factor = math.prod(effect.time_factor(memories[name]) for name, effect in self.effects.items())
         if factor == self.time_factor:
             return
@@ -167,35 +165,36 @@ class Scene:
 
     @cached_property
     def controller(self) -> Controller:
-        """The controller of the tolerance of solves and of the length of steps."""
+        """Controller of the tolerance of solves and of the length of steps."""
         choices = self.choices
         energies, adhesive = self.energy is not None, choices.adhesion is not None
         return Controller(self.job, choices.timeline, self.material, energies, adhesive)
 
     @cached_property
     def in_double(self) -> tuple[ContactSolver, Operators]:
-        """A solver with an operator in double precision and its operators, made when they are first asked for, and
-        kept; asking first is collective."""
+        """A solver and operators in double precision, made at the first use and kept; the first use is collective."""
         return solver_on(self.setup, self.slab, self.choices.numerics.tolerance, np.float64)
 
     def heights(self, position: Vector) -> Array:
-        """Return the heights of the surface at a position, of this rank's rows, in the run's units, as a new array."""
+        """Return the heights at a position, on the rows of this rank, in the run's units, as a new array."""
         base, offset = self.motion.at(position).parts
         return np.roll(base, offset, axis=1)
 
     def gap(self, displacement: Array, position: Vector, approach: float) -> Array:
-        """Return the gap [m] of this rank's rows to a surface at a position; the others in the run's units."""
+        """Return the gap [m] on the rows of this rank for a surface at a position; displacement and approach are in the
+        run's units."""
         return (displacement - self.heights(position) - approach) * self.units.height
 
     def constraint(self, alpha: float, most: float = math.inf) -> Constraint:
-        """Return which pressures p are admissible in a step with the modulus alpha: `alpha p` is the pressure. None is
-        above `most`, such as the whole load on one point."""
+        """Return the constraint on p in a step of modulus alpha, in which the pressure is `alpha p`, at most `most`."""
         return contact_law.constraint_of(self.job, alpha * self.units.pressure, most)
 
 
 def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:
-    """The surface of a job, to be marched to the end of its history or, if later, to `until` [s], and what it is
-    measured in; collective. Raises InputError for files that do not fit."""
+    """Return the setup of a job for a march to the end of its history or, if later, to `until` [s]; collective.
+
+    Raises InputError for files that do not fit.
+    """
     chosen, fft = choices(job, until), FFT(slab)
     surface, remarks = make_surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
@@ -207,7 +206,7 @@ def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:
 
 
 def outline(job: Job, slab: Slab) -> Setup:
-    """Return the setup of a job on a slab that only counts: its surface has waves, but no heights, and units are 1."""
+    """Return the setup of a job on a slab that only counts: the surface has waves but no heights, and units are 1."""
     slab.tally.purpose = "transforms"
     chosen, fft = choices(job), FFT(slab)
     slab.tally.purpose = "surface spectrum"
@@ -216,7 +215,7 @@ def outline(job: Job, slab: Slab) -> Setup:
 
 
 def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
-    """Make a job's scene on the ranks of `slab`, as `set_up` and `build_on` do."""
+    """Make the scene of a job on the ranks of `slab`, by `set_up` and `build_on`."""
     return build_on(set_up(job, slab, until))
 
 
@@ -242,15 +241,15 @@ def solver_on(
 ) -> tuple[ContactSolver, Operators]:
     """Make a solver and the operators of the body of a setup on another grid, for a start or a retry; collective.
 
-    Their transforms are not measured: which are the fastest may turn out otherwise after a restart, and others give
-    other last digits.
+    Their transforms are planned without measurement, so that a restarted run has the same rounding.
     """
     on_slab = replace(setup, slab=slab, fft=FFT(slab, measured=False))
     return _solver(on_slab, tolerance, operator_type or setup.choices.operator_type)
 
 
 def solver_on_tiles(setup: Setup) -> SolverOnTiles | None:
-    """Return what makes a solver and operators on tiles of a grid, on one rank; None if the body has none."""
+    """Return a function that makes a solver and operators on tiles of a grid, on one rank; None if the body
+    has none."""
     body, tally, limit = setup.half_space, setup.slab.tally, setup.choices.numerics.max_iterations
     height = setup.height / setup.units.height
 
@@ -263,7 +262,7 @@ def solver_on_tiles(setup: Setup) -> SolverOnTiles | None:
 
 
 def describe_scene(scene: Scene) -> Iterator[str]:
-    """Yield what a user should know: how maps were prepared, branches folded, steps chosen; the surface's moments."""
+    """Yield sentences on prepared maps, folded branches, chosen steps and the moments of the surface."""
     yield from scene.setup.remarks.notes
     yield from describe_folded_branches(scene.folded, scene.choices.prony, bool(scene.job.directions))
     yield from scene.job.facts
@@ -273,7 +272,7 @@ def describe_scene(scene: Scene) -> Iterator[str]:
 
 
 def describe_roughness(setup: Setup) -> Iterator[str]:
-    """Yield a sentence on the moments of a surface that has waves."""
+    """Yield a sentence on the moments of a surface with waves."""
     if (found := setup.roughness) and found.m0:
         yield (
             f"surface: rms height {quantity(found.rms_height, 'm', 4)}, rms slope {found.rms_slope:.4g}, Nayak's "
@@ -304,7 +303,7 @@ def _solver(setup: Setup, tolerance: float, operator_type: type[np.floating]) ->
 
 
 def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:
-    """The operator of the half space, and its preconditioner."""
+    """Return the operator of the half space and its preconditioner."""
     body = setup.half_space
     if not setup.choices.mixed_precision.on:
         return Operators(body.operator(setup.fft), body.inverse(setup.fft))
@@ -315,7 +314,7 @@ def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:
 def _body_and_energy(
     setup: Setup, folded: FoldedBranches, inverse: AppliedInverse
 ) -> tuple[Body, ElasticEnergy | ZenerEnergy | None]:
-    """Make the body, and its energies if the job asks for them, with the `inverse` of the operator if it is at hand."""
+    """Make the body, and its energies if the job asks for them; `inverse` is used if it is that of the operator."""
     chosen, slab, integrator = setup.choices, setup.slab, setup.choices.numerics.integrator
     unit = setup.units.pressure * setup.units.height * setup.grid.dx * setup.grid.dy
     if not chosen.viscoelasticity.on:

@@ -157,7 +157,7 @@ def test_waves_that_are_taken_out_are_reported(road: Path) -> None:
     """By 50 µm of a road with waves down to 40 µm: a ring of its spectrum is missing, and the report says so."""
     (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=", short_wavelength: 50.0e-6"))
     setup = scene.set_up(jobs.load(road / "job.yaml"), Slab.alone(POINTS, POINTS))
-    assert setup.remarks.notes[-1] == "road: waves shorter than 50 µm were taken out (ideal low-pass)"
+    assert setup.remarks.notes[-1] == "road: waves shorter than 50 µm were removed (ideal low-pass)"
     found = heights_of(road, MPI.COMM_SELF, more=", short_wavelength: 50.0e-6")
     q = 2 * np.pi * np.fft.fftfreq(POINTS, LENGTH / POINTS)
     power = np.abs(np.fft.fft2(found)) ** 2
@@ -196,7 +196,7 @@ def test_clipped_outliers_are_no_doubt(road: Path) -> None:
     (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=", outliers: clip"))
     setup = scene.set_up(jobs.load(road / "job.yaml"), Slab.alone(POINTS, POINTS))
     assert setup.remarks.doubts == []
-    assert "road: 1 points that stuck out were set to the median of their neighbours" in setup.remarks.notes
+    assert "road: outliers set to the median of their neighbours: 1" in setup.remarks.notes
 
 
 def test_bands_have_no_direction() -> None:
