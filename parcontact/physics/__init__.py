@@ -1,1 +1,1 @@
-"""The physics of the contact. Nothing here sees a communicator."""
+"""The physics of the contact. No module here uses a communicator."""

@@ -1,21 +1,21 @@
-"""Laws of adhesion: the attraction of two surfaces over the gap between them, and the lengths that go with it.
+"""Laws of adhesion: the attraction of two surfaces as a function of their gap, and its length scales.
 
 With the work of adhesion w [J/m^2], the range rho [m] and the gap g,
 
     exponential  sigma(g) = (w/rho) exp(-g/rho),          gamma(g) = w exp(-g/rho),
     dugdale      sigma(g) = w/rho for g < rho, else 0,    gamma(g) = w max(1 - g/rho, 0).
 
-A node that crosses the end of Dugdale's law would snap, which makes an error in proportion to the side h of the cells.
-So the law that is solved ends over a ramp in the gap, centred at rho: it is the mean of the law over a cell at the end
-of the process zone, where the gap rises by some 2 rho h/l in a cell.
+A node that crosses the end of Dugdale's law would snap, with an error proportional to the side h of the cells. So
+the computed law ends over a ramp in the gap, centred at rho: it is the mean of the law over a cell at the end of the
+process zone, where the gap rises by about 2 rho h/l in a cell.
 
-The traction at the edge of a contact rises over the process zone `l = E* rho^2/w`, with E* = 2 G/(1 - nu). The numbers
-of Tabor and Johnson say of which kind an adhesive contact is,
+The traction at the edge of a contact rises over the process zone `l = E* rho^2/w`, with E* = 2 G/(1 - nu). Tabor's
+and Johnson's parameters classify adhesive contacts,
 
     mu = (R w^2/(E*^2 rho^3))^(1/3),        alpha^2 = 2 w lambda/(pi^2 E* h^2),
 
-of a sphere of radius R (D. Tabor, J. Colloid Interface Sci. 58 (1977) 2), and of a wave of length lambda whose crests
-are 2 h above its troughs (K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423).
+of a sphere of radius R (D. Tabor, J. Colloid Interface Sci. 58 (1977) 2), and of a wave of length lambda whose
+crests are 2 h above its troughs (K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423).
 """
 
 import math
@@ -29,7 +29,7 @@ KINDS = ("exponential", "dugdale")
 
 @dataclass(frozen=True)
 class AdhesionLaw:
-    """A law of adhesion: work [J/m^2], range [m], kind; of Dugdale's law the ramp [m]."""
+    """Law of adhesion: work [J/m^2], range [m], kind, and the ramp [m] of Dugdale's law."""
 
     work: float
     range: float
@@ -38,7 +38,7 @@ class AdhesionLaw:
 
     @property
     def strength(self) -> float:
-        """The largest attraction [Pa]."""
+        """Largest attraction [Pa]."""
         return self.work / self.range
 
     def process_zone(self, modulus: float) -> float:
@@ -60,7 +60,8 @@ def ramp_of(law: AdhesionLaw, modulus: float, cell: float) -> float:
 
 
 def smallest_range(work: float, modulus: float, cell: float, cells: float) -> float:
-    """Return the range [m] whose process zone is so many cells long, for E* [Pa] and the side of a cell [m]."""
+    """Return the range [m] whose process zone has the length of `cells` cells, for E* [Pa] and the side of
+    a cell [m]."""
     return math.sqrt(cells * cell * work / modulus)
 
 
@@ -70,5 +71,5 @@ def modulus_of(material: Any) -> float:
 
 
 def cell_of(grid: Grid) -> float:
-    """Return the longer side of a cell [m], along directions that have several points."""
+    """Return the longer side of a cell [m] among the directions with several points."""
     return max((step for step, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1), default=grid.dx)

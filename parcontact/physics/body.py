@@ -1,11 +1,12 @@
-"""The body: elastic, or with relaxing branches, and its memory as data.
+"""The body, elastic or with relaxing branches, and its memory.
 
-With `G(t) = G_inf + sum_k G_k exp(-t/tau_k)` and the elastic operator A of shear modulus 1, the total pressure obeys
+With `G(t) = G_inf + sum_k G_k exp(-t/tau_k)` and the elastic operator A of shear modulus 1, the total pressure
+satisfies
 
     A p = G_inf u + sum_k h_k,     dh_k/dt = G_k du/dt - h_k/tau_k,     h_k the part of branch k [Pa m].
 
-A step advances `h_k <- decay_k h_k + gain_k du + back_k du_before` with the increments of u in this step and in the one
-before, and for z = dt/tau_k, phi(z) = (1 - exp(-z))/z,
+A step advances `h_k <- decay_k h_k + gain_k du + back_k du_before` with the increments of u in this step and in the
+step before it. For z = dt/tau_k and phi(z) = (1 - exp(-z))/z,
 
     exponential          decay = exp(-z),     gain = G_k (phi + kappa q),   back = -G_k kappa q r,
     exponential-linear   decay = exp(-z),     gain = G_k phi,               back = 0,
@@ -16,18 +17,17 @@ The first is exact for u quadratic in time, through its last two values and the 
     u(s) = u + s du + s (s - 1) kappa/2 (du - r du_before),   kappa = 2 r/(1 + r),   0 <= s <= 1,
     q(z) = (1 + exp(-z))/(2 z) - (1 - exp(-z))/z^2.
 
-After a jump and in the first step of a stage kappa is 0. The second is exact for u linear in time, the last is that of
-the paper's Eqs. (7)-(9), in another form. So `A p = alpha u_new + r`, with `alpha = G_inf + sum gain_k` and
-`r = sum decay_k h_k - (sum gain_k) u + (sum back_k) du_before`. The contact problem of a step is then that of an
-elastic body of modulus alpha under the effective heights `h + r/alpha` (paper, Eq. 9). Displacements are those of
-points of the body, however the surface moves.
+After a jump and in the first step of a stage, kappa is 0. The second is exact for u linear in time. The third is
+equivalent to Eqs. (7)-(9) of the paper. With `alpha = G_inf + sum gain_k` and `r = sum decay_k h_k - (sum gain_k) u
++ (sum back_k) du_before`, it follows that `A p = alpha u_new + r`: the contact problem of a step is that of an
+elastic body of modulus alpha under the effective heights `h + r/alpha` (paper, Eq. 9). Displacements belong to
+points of the body, not of the moving surface.
 
-A body is what has `begin` and `commit`. What it remembers from one step to the next is a `BodyMemory`, which these take
-and return: a step that is dropped leaves the memory from which it began.
+A body has the methods `begin` and `commit`, which take and return a `BodyMemory`; after a dropped step, the memory
+from which it began is still valid.
 
-Two kinds of branches have no map (`effects.folded_branches` says which and what it costs): of a memoryless one
-`gain du + back du_before` is all there is, its decay being 0 to the error allowed; a frozen one is the spring
-`h_k = G_k u`.
+Two kinds of branches have no map (`effects.folded_branches` selects them and bounds the error): memoryless ones, for
+which `h_k = gain du + back du_before`, and frozen ones, which are springs `h_k = G_k u`.
 """
 
 import math
@@ -45,7 +45,7 @@ from .units import Units
 
 @dataclass(frozen=True)
 class MovedHeights:
-    """Heights of the rigid surface: the map `base` moved by `offset` cells along x (cyclic)."""
+    """Heights of the rigid surface: the map `base`, shifted by `offset` cells along x (cyclic)."""
 
     base: Array
     offset: int = 0
@@ -57,14 +57,14 @@ class MovedHeights:
 
 @dataclass
 class BodyMemory:
-    """Memory of a body between two steps: the displacement of its surface, its `increment` in the last step, and this
-    rank's rows of its branch maps.
+    """Memory of a body between two steps, on the rows of this rank: displacement of its surface, its `increment` in the
+    last step, and the branch maps.
 
-    `displacement` is None where it follows from the pressure and is not at hand. The advance of the branches over the
-    last step is `pending`: the pass that begins the next step makes it, with the increment of the displacement in that
-    step and the one `before`, and forms the effective heights in the map of the latter. This changes how the memory is
-    written, not what it means, so that a step may begin from the same memory again. The memories before and after a
-    step share all maps but the displacement: the former is no more once a step has begun from the latter.
+    `displacement` is None if it must be computed from the pressure. `pending` is the advance of the branches over
+    the last step. The next `begin` makes it, with the increment in that step and the one `before`, and puts the
+    effective heights into the map `before`. This leaves the meaning of the memory unchanged, so that another step
+    may begin from it. Memories before and after a step share all maps but the displacement: the former is invalid
+    once a step has begun from the latter.
     """
 
     displacement: Array | None
@@ -76,10 +76,10 @@ class BodyMemory:
 
 @dataclass(frozen=True)
 class Trial:
-    """A step of a body that has begun, and is nothing if it is dropped.
+    """A step of a body that has begun; it is dropped without further calls.
 
-    The contact problem of the step is that of an elastic body of modulus `alpha` under the `effective` heights, a map
-    that is valid until the next step begins; `advance` is what the branches will have done by the end of the step.
+    Its contact problem is that of an elastic body of modulus `alpha` under the `effective` heights, a map that is
+    valid until the next step begins. `advance` has the coefficients of the branches over the step.
     """
 
     alpha: float
@@ -93,18 +93,18 @@ NO_MAP = np.zeros((0, 0))
 
 
 class ElasticBody:
-    """A body of one modulus: remembers nothing and allocates at most the moved heights."""
+    """A body with one modulus. It has no memory and allocates at most the moved heights."""
 
     branched: "ZenerBody | None" = None
     shortest_time = math.inf
 
     def __init__(self, slab: Slab, modulus: float, moves: bool = True) -> None:
-        """Make a body under heights that move by an offset, or never do."""
+        """Make a body; `moves` is False if the heights never move by an offset."""
         self.slab, self.modulus = slab, modulus
         self._moved = slab.empty() if moves else None
 
     def at_rest(self) -> BodyMemory:
-        """Return the memory of a body into which nothing has been pressed."""
+        """Return the memory of a body at rest."""
         return BodyMemory(None, np.zeros((0, *self.slab.shape)), NO_MAP, NO_MAP, NO_BRANCHES)
 
     def start_from(self, memory: BodyMemory, displacement: Array, branches: Iterable[Array]) -> None:
@@ -113,7 +113,7 @@ class ElasticBody:
     def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
         """Begin a step under the heights themselves; local to this rank.
 
-        The displacement is that in a map of the solver, which the solve of the step overwrites.
+        The displacement of `memory` is in a map of the solver, which the next solve overwrites, and is dropped.
         """
         memory.displacement = None
         if heights.offset == 0:
@@ -123,12 +123,12 @@ class ElasticBody:
         return Trial(self.modulus, self._moved, heights, NO_BRANCHES)
 
     def commit(self, memory: BodyMemory, trial: Trial, displacement: Array, out: Array) -> BodyMemory:
-        """Return a memory with the displacement, until the next step begins."""
+        """Return a memory with the displacement; it is valid until the next step begins."""
         return replace(memory, displacement=displacement)
 
     def displacement(self, memory: BodyMemory, of_pressure: Callable[[], Array], alpha: float) -> Array:
-        """Return the displacement, found anew from that of the map of p for the pressure `alpha p` if it is not at
-        hand; collective."""
+        """Return the displacement; if it was dropped, compute it from `of_pressure()`, the displacement under p, for
+        the pressure `alpha p`; collective."""
         if memory.displacement is None:
             memory.displacement = of_pressure()
             memory.displacement *= alpha / self.modulus  # 1 after a step of this body
@@ -143,8 +143,8 @@ class ElasticBody:
 
 @dataclass(frozen=True)
 class _Coefficients:
-    """Coefficients of a step dt: its modulus, how the kept branches advance, and the weights of these, of u and of the
-    last increment in the heights."""
+    """Coefficients of a step dt: its modulus, the advance of the kept branches, and the weights of these, of u and of
+    the last increment in the effective heights."""
 
     dt: float
     growth: float
@@ -154,10 +154,10 @@ class _Coefficients:
 
 
 class ZenerBody:
-    """A body with relaxing branches, which are known by their number in `prony`.
+    """A body with relaxing branches, which have their numbers in `prony`.
 
-    Those of `kept` have a map each, in that order in the memory; the `memoryless` and `frozen` ones have none. All but
-    the frozen ones are `moving`. `shortest_time` [s] is the shortest relaxation time of those kept.
+    Branches of `kept` have one map each, in this order; `memoryless` and `frozen` ones have none. All but the frozen
+    ones are `moving`. `shortest_time` [s] is the shortest relaxation time of `kept`.
     """
 
     def __init__(
@@ -179,7 +179,7 @@ class ZenerBody:
         return self
 
     def set_time_factor(self, factor: float) -> None:
-        """Relax from now on with so many times the relaxation times that it was made with."""
+        """Multiply the original relaxation times by `factor` in all further steps."""
         self.prony = self.prony._replace(relaxation_times=self._cold * factor)
         self._coefficients = None
 
@@ -188,16 +188,16 @@ class ZenerBody:
         return elapsed(self.prony, dt)
 
     def coefficients(self, dt: float, growth: float = 0.0) -> Advance:
-        """Return how each branch advances over a step dt, which is `growth` times as long as the one before."""
+        """Return the advance of each branch over a step dt, `growth` times as long as the step before it."""
         return coefficients(self.prony, self.integrator, dt, growth)
 
     def at_rest(self) -> BodyMemory:
-        """Return the memory of a body into which nothing has been pressed, in new maps."""
+        """Return the memory of a body at rest, in new maps."""
         branches = self.slab.zero_maps(len(self.kept))
         return BodyMemory(self.slab.zeros(), branches, self.slab.zeros(), self.slab.zeros(), self._still)
 
     def start_from(self, memory: BodyMemory, displacement: Array, branches: Iterable[Array]) -> None:
-        """Put a displacement and the map of each branch of `prony`, in order, into the maps of a memory."""
+        """Put a displacement and the map of each branch of `prony`, in order, into a memory."""
         surface_of(memory)[...] = displacement
         for k, branch in enumerate(branches):
             if k in self.kept:
@@ -205,10 +205,10 @@ class ZenerBody:
         memory.pending = self._still
 
     def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
-        """Begin a step of modulus alpha under the effective heights `h + r/alpha`, in place of one that has begun from
-        the same memory; local to this rank.
+        """Begin a step of modulus alpha under the effective heights `h + r/alpha`; local to this rank. It replaces a
+        step that has begun from the same memory.
 
-        The step is `growth` times as long as the one before; 0 after a jump and where a stage begins.
+        `growth` is dt over the length of the step before; 0 after a jump and in the first step of a stage.
         """
         if self._coefficients is None or (self._coefficients.dt, self._coefficients.growth) != (dt, growth):
             self._coefficients = self._coefficients_of(dt, growth)
@@ -228,7 +228,7 @@ class ZenerBody:
     def commit(self, memory: BodyMemory, trial: Trial, displacement: Array, out: Array) -> BodyMemory:
         """Return the memory after a step, with its displacement in the map `out`; local to this rank.
 
-        `displacement` is `A p/alpha`, which under the effective heights stands for that of the surface.
+        `displacement` is `A p/alpha`, the displacement relative to the effective heights.
         """
         loops.commit(displacement, trial.effective, surface_of(memory), *trial.heights.parts, out)
         return BodyMemory(out, memory.branches, trial.effective, memory.increment, trial.advance)
@@ -237,7 +237,7 @@ class ZenerBody:
         return surface_of(memory)
 
     def advance_branches(self, memory: BodyMemory) -> None:
-        """Advance the branch maps now, for somebody who reads them; the run goes on to the same digits."""
+        """Make the pending advance of the branch maps for a reader. The results of the run do not change."""
         if self.slab.only_counts:
             return
         u = surface_of(memory)
@@ -246,7 +246,7 @@ class ZenerBody:
         memory.pending = self._still
 
     def entries(self, memory: BodyMemory, units: Units) -> dict[str, Entry]:
-        """Return the entries of the memory, and the branches, which a checkpoint must agree with."""
+        """Return the entries of the memory, and the moduli and relaxation times, which a checkpoint must match."""
         return {
             **self.memory_entries(memory, units.height, "m", units.modulus * units.height, "Pa m"),
             "moduli": Entry(self.prony.moduli, units.modulus, "Pa", given=True),
@@ -256,10 +256,10 @@ class ZenerBody:
     def memory_entries(
         self, memory: BodyMemory, unit: float, symbol: str, branch_unit: float, branch_symbol: str
     ) -> dict[str, Entry]:
-        """Return the displacement and its last increment, the branch maps and which branches are frozen, with the units
-        of both kinds of maps.
+        """Return entries of the displacement, its last increment, the branch maps and the frozen branches, with the
+        units of displacements and of branch maps.
 
-        Maps of branches that had none when a checkpoint was written are restored without.
+        Branch maps are optional, as a branch may have had no map when a checkpoint was written.
         """
         self.advance_branches(memory)
         frozen = np.array([float(k not in self.moving) for k in range(len(self.prony.moduli))])
@@ -270,9 +270,9 @@ class ZenerBody:
         return {**surface, "frozen": Entry(frozen), **branches}
 
     def restored(self, memory: BodyMemory, saved: Saved) -> BodyMemory:
-        """Return the memory that a checkpoint has, whose maps have been read into those of this one.
+        """Return the memory of a checkpoint, whose maps have been read into those of `memory`.
 
-        A branch without a map in `saved` begins: one that was frozen then as `G_k u`, else as 0.
+        A branch without a map in `saved` starts as `G_k u` if it was frozen, else as 0.
         """
         for k, branch in zip(self.kept, memory.branches, strict=True):
             if f"branch {k}" not in saved:
@@ -281,7 +281,7 @@ class ZenerBody:
 
 
 def surface_of(memory: BodyMemory) -> Array:
-    """Return the displacement of a body that remembers it."""
+    """Return the displacement of a body that stores it."""
     assert memory.displacement is not None
     return memory.displacement
 

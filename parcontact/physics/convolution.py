@@ -1,4 +1,4 @@
-"""Convolutions on a grid: a symbol on the wavenumbers of a transform, given as such or by coefficients in space."""
+"""Convolutions on a grid, by a symbol on the wavenumbers of a transform or by coefficients in space."""
 
 from collections.abc import Callable
 from functools import cached_property, partial
@@ -15,15 +15,15 @@ from ..parallel.slab import Array, allocate, deal
 Symbols = list[NDArray[Any]]  # one for each block of columns
 Make = Callable[[], Symbols]
 ALL = slice(None)
-PARTS = 16  # tuning: of a spectrum, for which something is calculated at once: what it takes is small beside the whole
+PARTS = 16  # tuning: parts of a spectrum that are computed one after the other, to save memory
 
 
 class Convolution:
     """A linear operator given by its symbol on the wavenumbers of a transform.
 
-    `part(rows)` is the symbol on these rows of the spectrum, `dtype` what it is kept in, times the scale of the
-    transforms, in `symbols` for each block of columns. Of one that is `even` in q_y only the rows of q_y >= 0 are made
-    and kept; one made `later` has them from when it is first applied.
+    `part(rows)` returns the symbol on these rows of the spectrum. It is stored as `dtype`, times the scale of the
+    transforms, in `symbols` for each block of columns. If it is `even` in q_y, only rows of q_y >= 0 are made; with
+    `later` they are made at the first use.
     """
 
     def __init__(
@@ -44,13 +44,13 @@ class Convolution:
         return self._made()
 
     def _made(self) -> Symbols:
-        """Make the symbols, once."""
+        """Make the symbols; called once."""
         assert self._make is not None
         symbols, self._make = self._make(), None
         return symbols
 
     def mapped(self, function: Callable[[NDArray[np.inexact]], NDArray[np.inexact]], dtype: DTypeLike) -> "Convolution":
-        """The operator whose symbol is a function of this one's."""
+        """Return the operator whose symbol is `function` of this one's."""
         scale = self.fft.mx * self.fft.my
 
         def part(rows: slice) -> NDArray[np.inexact]:
@@ -60,16 +60,16 @@ class Convolution:
         return Convolution(self.fft, part, dtype, self.even)
 
     def apply(self, field: Array, out: Array) -> Array:
-        """Collective."""
+        """Put the convolution of `field` into `out`; collective."""
         self.fft.slab.tally["operator"] += 1
         return self.fft.convolve(field, self.symbols, out)
 
     def loss(self, field: Array, size: tuple[float, float], direction: tuple[float, float]) -> float:
-        """Return `-sum p du/ds`, with the slope along a unit `direction` of what a field p makes, u; collective.
+        """Return `-sum p du/ds` for a field p and its image u, with the slope along a unit `direction`; collective.
 
-        In Fourier space that is `sum |p^|^2 (q s) Im A(q)/(mx my)` over all waves of a box of `size` (padded, where the
-        transform is): for a pressure under a surface that slides along s at the speed v, the power that the body
-        dissipates over v. It is 0 for an operator with a real symbol, as that of an elastic body is.
+        In Fourier space this is `sum |p^|^2 (q s) Im A(q)/(mx my)` over all waves of a box of `size`, or of the
+        padded box. For a pressure under a surface that slides along s at the speed v, it is the dissipated power
+        over v. It is 0 for a real symbol, as that of an elastic body.
         """
         total, spectrum = 0.0, self.fft.forward(field)
         lengths = size[0] * self.fft.mx / self.fft.slab.nx, size[1] * self.fft.my / self.fft.slab.ny
@@ -85,9 +85,10 @@ class Convolution:
 
 
 class MirroredConvolution:
-    """A linear operator on maps as they go on mirrored at their edges, by its real symbol on `cosines`.
+    """A linear operator on maps that continue mirrored at their edges, by its real symbol on `cosines`.
 
-    `part(rows)` is that of the real parts of the spectrum, as its real part, and of the imaginary ones.
+    `part(rows)` returns the symbol of the real parts of the spectrum as its real part, and that of the imaginary
+    parts.
     """
 
     def __init__(self, cosines: Cosines, part: Callable[[slice], NDArray[np.complexfloating]]) -> None:
@@ -95,11 +96,11 @@ class MirroredConvolution:
 
     @cached_property
     def symbols(self) -> Symbols:
-        """They are made when it is first applied."""
+        """The symbols, made at the first use."""
         return _in_blocks(self.fft, self._part, self.fft.fft.complex, self.fft.my)
 
     def apply(self, field: Array, out: Array) -> Array:
-        """Collective."""
+        """Put the result for `field` into `out`; collective."""
         self.fft.slab.tally["operator"] += 1
         return self.fft.convolve(field, self.symbols, out)
 
@@ -107,7 +108,7 @@ class MirroredConvolution:
 def _in_blocks(
     fft: FFT | Cosines, part: Callable[[slice], NDArray[np.inexact]], dtype: DTypeLike, count: int
 ) -> Symbols:
-    """The first `count` rows of a symbol, times the scale of the transforms, for each block of columns."""
+    """Return the first `count` rows of a symbol, times the scale of the transforms, for each block of columns."""
     widths = [columns.stop - columns.start for columns in fft.column_blocks]
     symbols: Symbols = [allocate((count, width), dtype, fft.slab.tally) for width in widths]
     if fft.slab.only_counts:
@@ -120,21 +121,22 @@ def _in_blocks(
 
 
 def wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple[Array, Array]:
-    """Angular wavenumbers `(qx, qy)` of a spectrum of a box of `size = (lx, ly)`; they broadcast to the shape of these
-    rows of it."""
+    """Return the angular wavenumbers `(qx, qy)` of a spectrum of a box of `size = (lx, ly)`; they broadcast to the
+    shape of its `rows`."""
     along_x, along_y = fft.modes
     return 2 * np.pi / size[0] * along_x, 2 * np.pi / size[1] * along_y[rows]
 
 
 def travelling_wavenumbers(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> tuple[Array, Array]:
-    """Return `wavenumbers`, but 0 for that of Nyquist, whose wave has two signs: its slope vanishes on the grid."""
+    """Return `wavenumbers` with 0 for those of Nyquist, which have two signs: the slope of such a wave is 0 on the
+    grid."""
     qx, qy = wavenumbers(fft, size, rows)
     along_x, along_y = fft.modes
     return np.where(2 * np.abs(along_x) == fft.mx, 0.0, qx), np.where(2 * np.abs(along_y[rows]) == fft.my, 0.0, qy)
 
 
 def padded_lengths(nx: int, ny: int) -> tuple[int, int]:
-    """Lengths of the transforms of a free half space: fast ones of at least twice the box."""
+    """Return lengths of fast transforms of a free half space, at least twice those of the box."""
     return pyfftw.next_fast_len(2 * nx), pyfftw.next_fast_len(2 * ny)
 
 
@@ -146,10 +148,12 @@ def tabulate(
     inside: bool = False,
     symmetric: bool = True,
 ) -> NDArray[np.complexfloating]:
-    """Symbol on the padded transform `fft` of `coefficient(x, y, dx, dy)`, the displacement at distance (x, y) [length]
-    that a unit pressure on one cell causes; collective, and no rank holds the whole table. One that is `even` in x and
-    in y is calculated for each distance once, for half of them if it is `symmetric` in both on square cells. One made
-    `inside` the memory of the transform is lost at its next call.
+    """Return the symbol on the padded transform `fft` of `coefficient(x, y, dx, dy)`, the displacement at the distance
+    (x, y) [length] from a cell under unit pressure; collective. No rank holds the whole table.
+
+    A coefficient that is `even` in x and y is computed once per distance, and for half of these if it is `symmetric`
+    in x and y on square cells. With `inside`, the symbol uses the memory of the transform and is lost at its next
+    call.
     """
     transform = table_transform(fft, inside)
     if fft.slab.only_counts:
@@ -168,13 +172,13 @@ def tabulate(
 
 
 def table_transform(fft: FFT, inside: bool) -> FFT:
-    """The transform of a table of coefficients on the lengths of another one; collective."""
+    """Return the transform of a table of coefficients with the lengths of `fft`; collective."""
     sharing = fft if inside and fft.dtype == np.float64 else None
     return FFT(fft.slab.resized(fft.mx, fft.my), measured=fft.measured, sharing=sharing)
 
 
 def _symmetric(coefficient: Callable[..., Array], distances: NDArray[np.int64], step: float) -> Array:
-    """Coefficients of square cells, which do not tell x from y: those of x >= y, and what they are for the others."""
+    """Return coefficients of square cells: those of x >= y, copied to the others."""
     count = len(distances)
     quadrant = np.empty((count, count))
     for rows in deal(count, PARTS):

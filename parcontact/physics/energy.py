@@ -1,19 +1,19 @@
-"""Energy balance of the body: work done on it, energy stored in it, energy dissipated by its branches.
+"""Energy balance of the body: work done on it, energy stored in it, and energy dissipated by its branches.
 
-With `<a, b>` the sum over points, branch k stores `<h_k, A^-1 h_k>/(2 G_k)` and dissipates
-`<h_k, A^-1 h_k>/(G_k tau_k)` per time; the parallel spring stores `G_inf <u, A^-1 u>/2`. All of them follow from
-`w = A^-1 du` of each step by products with the maps that are there anyway.
+With `<a, b>` the sum over points, branch k stores `<h_k, A^-1 h_k>/(2 G_k)` and dissipates `<h_k, A^-1 h_k>/(G_k
+tau_k)` per time; the parallel spring stores `G_inf <u, A^-1 u>/2`. All follow from products of `w = A^-1 du` of each
+step with existing maps.
 
-The exponential integrators move a body whose u is linear or quadratic in time within a step (`physics.body`): work and
-dissipation are the exact integrals over that motion, and the balance closes but for rounding. With `0 <= s <= 1`,
-`z = dt/tau` and the bend `c = kappa/2 (du - r du_before)`,
+The exponential integrators take u as linear or quadratic in time within a step (`physics.body`): work and
+dissipation are the exact integrals over this motion, and the balance closes up to rounding. With `0 <= s <= 1`, `z =
+dt/tau` and the bend `c = kappa/2 (du - r du_before)`,
 
     u' = du + (2 s - 1) c,     h = exp(-z s) h_0 + G a du + G b c,                                                (1)
     a = (1 - exp(-z s))/z,     b = int_0^s exp(-z (s - x)) (2 x - 1) dx.
 
-How well the motion itself is resolved shows in the work against that of the forces on the surface, the integral of
-`W dd - F ds`. Backward Euler knows no motion within a step: its work is that of the trapezoidal rule, its dissipation
-that of the end of the step, and the balance closes to first order in the time step.
+The error of the motion itself appears in the difference of this work to that of the forces on the surface, the
+integral of `W dd - F ds`. Backward Euler defines no motion within a step: its work is that of the trapezoidal rule,
+its dissipation that at the end of the step, and the balance closes to first order in the time step.
 """
 
 from collections.abc import Callable
@@ -29,17 +29,17 @@ from .entries import Entry, Saved
 from .prony import Prony, bend
 from .units import Units
 
-SMALL = 1.0  # rounding: z below which integrals over a step are sums of Gauss's rule, to fifteen digits
+SMALL = 1.0  # rounding: z below which integrals over a step are computed by Gauss's rule, to fifteen digits
 NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.legendre.leggauss(10), (1, 0), strict=True))
 
 
 @dataclass(frozen=True)
 class EnergyMemory:
-    """Memory of the energies of a body: sums since the start, in the unit of the scene, `dissipated` by branch.
+    """Memory of the energies of a body: sums since the start, in the unit of the scene; `dissipated` by branch.
 
-    A body with branches goes on from `spring`, `<u, A^-1 u>`, `branches`, `<h_k, A^-1 h_k>`, and from what the last
-    increment of u makes: `increment`, `<du, A^-1 du>`, and `crossed`, `<h_k, A^-1 du>`. `elastic` is the memory of
-    `ElasticPressure` where there is one.
+    A body with branches also needs `spring`, `<u, A^-1 u>`; `branches`, `<h_k, A^-1 h_k>`; and from the last
+    increment of u `increment`, `<du, A^-1 du>`, and `crossed`, `<h_k, A^-1 du>`. `elastic` is the memory of
+    `ElasticPressure`, if used.
     """
 
     work: float = 0.0
@@ -52,8 +52,8 @@ class EnergyMemory:
     elastic: BodyMemory | None = None
 
     def without_work(self, before: "EnergyMemory") -> "EnergyMemory":
-        """Return the energies after a step in which nothing has acted on the body: its branches have dissipated what it
-        stores less, in the shares that the integrator tells."""
+        """Return the energies after a step without external work: the branches have dissipated the decrease of the
+        stored energy, in the shares that the integrator gives."""
         lost = self.dissipated - before.dissipated
         whole = float(lost.sum())
         share = (before.stored - self.stored) / whole if whole > 0.0 else 0.0
@@ -61,22 +61,21 @@ class EnergyMemory:
 
 
 class Pressed(NamedTuple):
-    """The pressure `modulus p` at an instant, with its map p."""
+    """Pressure `modulus p` at an instant, with its map p."""
 
     p: Array
     modulus: float
 
 
 class Inverse(Protocol):
-    """Displacement -> pressure of an elastic body of modulus 1; collective."""
+    """Operator from displacement to pressure of an elastic body of modulus 1; collective."""
 
     def apply(self, field: Array, out: Array) -> Array: ...
 
 
 class StepProducts(NamedTuple):
-    """Products of a branch and of the motion (1) in a step: `S = <h_0, A^-1 h_0>/G`, `X = <h_0, A^-1 du>`,
-    `D = G <du, A^-1 du>`, `Y = <h_0, A^-1 c>`, `E = G <du, A^-1 c>` and `F = G <c, A^-1 c>`; or their weights in a sum.
-    """
+    """Products of a branch and of the motion (1) in a step, or their weights in a sum: `S = <h_0, A^-1 h_0>/G`, `X =
+    <h_0, A^-1 du>`, `D = G <du, A^-1 du>`, `Y = <h_0, A^-1 c>`, `E = G <du, A^-1 c>`, `F = G <c, A^-1 c>`."""
 
     s: Array
     x: Array
@@ -90,7 +89,8 @@ class StepProducts(NamedTuple):
 
 
 def dissipation_weights(z: Array) -> StepProducts:
-    """Return the weights in the dissipation over a step `z = dt/tau`, the integral of `<h, A^-1 h>/(G tau)`."""
+    """Return the weights of `StepProducts` in the dissipation over a step `z = dt/tau`, the integral of `<h, A^-1 h>/(G
+    tau)`."""
     z = np.asarray(z, np.float64)
     safe, small = np.maximum(z, SMALL), np.minimum(z, SMALL)
     lost, q = -np.expm1(-safe), bend(safe)
@@ -112,8 +112,8 @@ def dissipation_weights(z: Array) -> StepProducts:
 
 
 def bend_weights(z: Array) -> StepProducts:
-    """Return the weights in what the work over a step `z = dt/tau` exceeds that of the trapezoidal rule by: the
-    integral of `<h, A^-1 u'>` less the mean of `<h, A^-1 du>` at both ends."""
+    """Return the weights of `StepProducts` in the difference of the work over a step `z = dt/tau` to that of the
+    trapezoidal rule: the integral of `<h, A^-1 u'>` minus the mean of `<h, A^-1 du>` at both ends."""
     z = np.asarray(z, np.float64)
     safe, small = np.maximum(z, SMALL), np.minimum(z, SMALL)
     q = bend(z)
@@ -123,7 +123,7 @@ def bend_weights(z: Array) -> StepProducts:
 
 
 def motion_at_nodes(z: Array) -> tuple[Array, Array, Array]:
-    """Return `exp(-z s)`, a and b of (1) at NODES, along a further axis, for z up to SMALL."""
+    """Return `exp(-z s)`, a and b of (1) at NODES, along an additional axis, for z up to SMALL."""
     x = z[..., None] * NODES
     change = NODES * (np.exp(-x[..., None] * NODES) @ WEIGHTS)
     later = 2.0 * NODES[:, None] * (1.0 - NODES) - 1.0  # 2 x - 1 at x = s - s y
@@ -131,7 +131,7 @@ def motion_at_nodes(z: Array) -> tuple[Array, Array, Array]:
 
 
 class ElasticEnergy:
-    """Energies of a body without memory: all work is stored. `unit` [J] is that of all energies here."""
+    """Energies of a body without memory, which stores all work. `unit` [J] is that of all energies."""
 
     bodies: tuple[ZenerBody, ...] = ()  # that relax
 
@@ -139,7 +139,7 @@ class ElasticEnergy:
         self.slab, self.unit = slab, unit
 
     def at_rest(self) -> EnergyMemory:
-        """Return the energies of a body into which nothing has been pressed."""
+        """Return the energies of a body at rest."""
         return EnergyMemory()
 
     def advance(
@@ -157,17 +157,18 @@ class ElasticEnergy:
         return EnergyMemory(work=stored, stored=stored)
 
     def entries(self, memory: EnergyMemory, units: Units) -> dict[str, Entry]:
-        """Return what is stored; it follows anew from each contact, so that a run can go on without."""
+        """Return the stored energy. It is optional, as it follows from each contact."""
         return {"stored": Entry(memory.stored, self.unit, "J", optional=True)}
 
     def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
-        """Return what is stored in a checkpoint, which is the work."""
+        """Return the energies of a checkpoint; the work is the stored energy."""
         stored = float(saved.get("stored", 0.0))
         return EnergyMemory(work=stored, stored=stored)
 
 
 class AppliedInverse:
-    """`A^-1 du` by an operator K that is the inverse of A; `scratch()` is a map that is free until the next solve."""
+    """`A^-1 du` by an operator K that is the inverse of A; `scratch()` returns a map that is free until the
+    next solve."""
 
     bodies: tuple[ZenerBody, ...] = ()  # that relax
 
@@ -190,14 +191,15 @@ class AppliedInverse:
 
 
 class ElasticPressure:
-    """`v = A^-1 u` where the inverse of A is not at hand: the pressure that held u on an elastic body of modulus 1.
+    """`v = A^-1 u` if the inverse of A is not available: the pressure that holds u on an elastic body of modulus 1.
 
-    A acts on points and the relaxation on times, so that they commute: with `h_k = A m_k` the law of the body,
+    A acts on space and relaxation on time, so that they commute: with `h_k = A m_k` the law of the body,
 
         A p = G_inf u + sum_k h_k,     dh_k/dt = G_k du/dt - h_k/tau_k,     becomes at every point
           p = G_inf v + sum_k m_k,     dm_k/dt = G_k dv/dt - m_k/tau_k.
 
-    So v is the displacement of a second `ZenerBody`, whose every point obeys on its own to the pressure there.
+    So v is the displacement of a second `ZenerBody`, each point of which responds to the pressure at this point
+    only.
     """
 
     def __init__(self, slab: Slab, prony: Prony, integrator: str) -> None:
@@ -210,7 +212,7 @@ class ElasticPressure:
     def advance(
         self, memory: BodyMemory | None, dt: float, p: Array, du: Array, growth: float
     ) -> tuple[Array, BodyMemory]:
-        """Return what v has grown by in a step to the pressure `alpha p`, which is `A^-1 du`, and the memory after it,
+        """Return the increment of v in a step to the pressure `alpha p`, which is `A^-1 du`, and the memory after it,
         in the maps of the one before; local to this rank."""
         assert memory is not None
         v = surface_of(memory)
@@ -218,19 +220,19 @@ class ElasticPressure:
         return now.increment, now
 
     def entries(self, memory: BodyMemory | None, units: Units) -> dict[str, Entry]:
-        """Return the entries of a body with strains in place of displacements."""
+        """Return the entries of the body, with strains instead of displacements."""
         assert memory is not None
         strain = units.height / units.length
         return self.body.memory_entries(memory, strain, "1", units.modulus * strain, "Pa")
 
     def restored(self, memory: BodyMemory | None, saved: Saved) -> BodyMemory:
-        """Return the memory that a checkpoint has, whose maps have been read into those of this one."""
+        """Return the memory of a checkpoint, whose maps have been read into those of `memory`."""
         assert memory is not None
         return self.body.restored(memory, saved)
 
 
 class ZenerEnergy:
-    """Energies of a `ZenerBody`; `unit` [J] is that of all energies here."""
+    """Energies of a `ZenerBody`; `unit` [J] is that of all energies."""
 
     def __init__(
         self, slab: Slab, material: ZenerBody, inverse: AppliedInverse | ElasticPressure, unit: float = 1.0
@@ -239,7 +241,7 @@ class ZenerEnergy:
         self.bodies = inverse.bodies
 
     def at_rest(self) -> EnergyMemory:
-        """Return the energies of a body into which nothing has been pressed."""
+        """Return the energies of a body at rest."""
         count = len(self.material.prony.moduli)
         none = np.zeros(count)
         return EnergyMemory(dissipated=none, branches=none, crossed=none, elastic=self.inverse.at_rest())
@@ -254,9 +256,12 @@ class ZenerEnergy:
         body: BodyMemory,
         growth: float = 0.0,
     ) -> EnergyMemory:
-        """Return the energies after a step to the pressure `now` from `before`, with the memory of the body after it;
-        one reduction; collective. The step is `growth` times as long as the one before (`physics.body`). The maps of an
-        `elastic` memory are those of the one before."""
+        """Return the energies after a step from the pressure `before` to `now`; `body` is the memory of the body after
+        it. One reduction; collective.
+
+        `growth` is dt over the length of the step before (`physics.body`). The maps of an `elastic` memory are
+        reused.
+        """
         material, du, moduli = self.material, body.increment, self.material.prony.moduli
         w, elastic = self.inverse.advance(memory.elastic, dt, now.p, du, growth)
         sums = [loops.dot(branch, w) for branch in body.branches]
@@ -269,7 +274,7 @@ class ZenerEnergy:
         spring = memory.spring + (2 * total - own)
         stored = 0.5 * (material.prony.modulus_inf * spring + float(np.sum(branches / moduli)))
         z, dissipated = material.elapsed(dt), memory.dissipated
-        if dt == 0.0:  # a jump is elastic: nothing is lost in it
+        if dt == 0.0:  # a jump is elastic
             work = stored - memory.stored
         elif material.integrator == "backward-euler":
             dissipated = dissipated + z * branches / moduli
@@ -285,7 +290,7 @@ class ZenerEnergy:
         return EnergyMemory(memory.work + work, stored, dissipated, spring, branches, own, crossed, elastic)
 
     def entries(self, memory: EnergyMemory, units: Units) -> dict[str, Entry]:
-        """Return the energies, the sums over maps that they go on from, and the memory of `ElasticPressure`."""
+        """Return the energies, the sums needed to continue them, and the memory of `ElasticPressure`."""
         spring = units.height**2 / units.length
         return {
             "work": Entry(memory.work, self.unit, "J"),
@@ -299,7 +304,7 @@ class ZenerEnergy:
         }
 
     def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
-        """Return the energies of a checkpoint, whose maps have been read into those of this memory."""
+        """Return the energies of a checkpoint, whose maps have been read into those of `memory`."""
         work, stored, spring, increment = (float(saved[name]) for name in ("work", "stored", "spring", "increment"))
         names = "dissipated", "branches", "crossed"
         dissipated, branches, crossed = (np.array(saved[name], dtype=np.float64) for name in names)

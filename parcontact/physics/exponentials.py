@@ -1,15 +1,16 @@
-"""The memory of heat as a sum of exponentials: each wave of heat on the surface decays as branches of a body do.
+"""Memory of heat as a sum of exponentials: each wave of heat on the surface decays like the branches of a body.
 
-Heat of the wavenumber k that was on the surface a time t ago has left the temperature `exp(-D k^2 t)/(e sqrt(pi t))`,
-in the Laplace domain `1/(e sqrt(s + D k^2))` with the effusivity e. With
+Heat of the wavenumber k on the surface, released a time t ago, leaves the temperature `exp(-D k^2 t)/(e sqrt(pi
+t))`, in the Laplace domain `1/(e sqrt(s + D k^2))`, with the effusivity e. With
 
     1/sqrt(pi t) = 2/pi int_0^inf exp(-m^2 t) dm ~ sum_j w_j exp(-m_j^2 t),   m_j = m_0 exp(j h),  w_j = 2/pi h m_j  (1)
 
-the memory is a map for each j, which decays at the rate `m_j^2 + D k^2`. An m is a wave along the depth, of wavenumber
-m/sqrt(D): heat at depth makes a part of it that is the cosine transform of its distribution. The trapezoidal rule (1)
-in ln m has the relative error `2 sum_n 1/sqrt(cosh(pi^2 n/h))` at every t, as the Fourier transform of the integrand is
-a gamma function (G. Beylkin, L. Monzon, Appl. Comput. Harmon. Anal. 28 (2010) 131). All waves below m_0 become one of
-their mean rate, right to the second order of `m_0^2 t`; above the last one `erfc(m sqrt(t))` is left out.
+the memory has one map for each j, which decays at the rate `m_j^2 + D k^2`. Each m belongs to a wave along the
+depth, of wavenumber m/sqrt(D), and heat at depth enters it with the cosine transform of its distribution. The
+trapezoidal rule (1) in ln m has the relative error `2 sum_n 1/sqrt(cosh(pi^2 n/h))` at every t, as the Fourier
+transform of the integrand is a gamma function (G. Beylkin, L. Monzon, Appl. Comput. Harmon. Anal. 28 (2010) 131).
+All waves below m_0 are combined to one with their mean rate, correct to second order in `m_0^2 t`; above the last
+wave `erfc(m sqrt(t))` is left out.
 """
 
 from dataclasses import dataclass
@@ -18,16 +19,15 @@ import numpy as np
 
 from ..parallel.slab import Array
 
-INSTANT = 30.0  # accuracy: times 1/sqrt(the shortest time): of waves above, only what the present heat makes is left
+INSTANT = 30.0  # accuracy: m above which a wave has no memory, over 1/sqrt(shortest time)
 
 
 @dataclass(frozen=True)
 class Exponentials:
-    """The sum (1) for times from `shortest` to `longest` [s], relative error at most `bound`.
+    """The sum (1) for times from `shortest` to `longest` [s], with a relative error of at most `bound`.
 
-    `rates` m^2 [1/s] and `weights` [s^(-1/2)] are of all waves. Only the first `kept` have a memory: the others have
-    forgotten all but the present after the shortest time. What is above `end` [s^(-1/2)] is in none of them. `first`
-    and `spacing` are m_0 and h.
+    `rates` m^2 [1/s] and `weights` [s^(-1/2)] are those of all waves. Only the first `kept` have a memory; the
+    others follow the present heat. Waves above `end` [s^(-1/2)] are left out. `first` and `spacing` are m_0 and h.
     """
 
     rates: Array
@@ -58,7 +58,7 @@ def fit_exponentials(shortest: float, longest: float, error: float) -> Exponenti
 
 
 def shares_of_step(x: Array) -> tuple[Array, Array]:
-    """Return the weights of the heat before and after a step `x = rate dt` over which it is linear, over dt."""
+    """Return the weights of the heat before and after a step `x = rate dt`, over dt, for heat linear in time."""
     small = np.minimum(x, 1e-3)
     safe = np.maximum(x, 1e-3)
     mean = np.where(x < 1e-3, 1.0 - small / 2 + small**2 / 6 - small**3 / 24, -np.expm1(-safe) / safe)

@@ -1,7 +1,7 @@
-"""Temperatures of a contact: where its heat is made, and what the map of the temperature rise is like over the contact.
+"""Temperatures of a contact: where its heat is released, and the distribution of the temperature rise over the contact.
 
-The heat of the interface is its shear stress times the sliding speed, on all that is in contact. The heat of the body
-is what its branches dissipate. It is deposited where the contact works: in proportion to the pressure.
+The heat of the interface is its shear stress times the sliding speed, on all points in contact. The heat of the
+body, dissipated by its branches, is distributed in proportion to the pressure.
 """
 
 import math
@@ -12,13 +12,13 @@ import numpy as np
 
 from ..parallel.slab import Array, Slab
 
-BINS = 512  # accuracy: of the histogram from which the quartiles are taken, within a 512th of the range
+BINS = 512  # accuracy: bins of the histogram for quartiles, whose error is 1/512 of the range
 
 
 @dataclass(frozen=True)
 class Flash:
-    """Temperature rises [K] of a contact, weighted by heat where it is made, on the surface and in the body: their mean
-    (the flash temperature), the highest one of the surface, and the lower and upper quartile."""
+    """Temperature rises [K] of a contact, weighted by the heat where it is released, on the surface and in the body:
+    their mean (the flash temperature), the highest on the surface, and the lower and upper quartile."""
 
     mean: float = 0.0
     highest: float = 0.0
@@ -27,17 +27,18 @@ class Flash:
 
 
 def spread_over(slab: Slab, weights: Array, total: float) -> Array:
-    """Return `total` [W/m^2, mean over the box] in proportion to a map of weights, 0 where all are; collective."""
+    """Return `total` [W/m^2, mean over the box] distributed in proportion to a map of weights; 0 if all weights are 0.
+    Collective."""
     whole = slab.sum(float(weights.sum(dtype=np.float64)))[0]
     return weights * (total * slab.points / whole if whole > 0.0 else 0.0)
 
 
 def share_of(slab: Slab, rubbed: Array, own: Array, other: Array, counterbody: Array) -> float:
-    """Return the share of the heat of the interface that goes into the rubber: both surfaces are then equally warm in
-    the mean over the contact (H. Blok, Proc. Inst. Mech. Engrs. 2 (1937) 222); collective.
+    """Return the share of the heat of the interface that goes into the rubber, so that both surfaces have the same mean
+    temperature over the contact (H. Blok, Proc. Inst. Mech. Engrs. 2 (1937) 222); collective.
 
-    `own` and `counterbody` are the rises [K] that all of this heat would make on either side, `other` is that of the
-    rubber by other heat; the mean is weighted by what is `rubbed`.
+    `own` and `counterbody` are the rises [K] that all of this heat would cause on either side, `other` is the rise
+    of the rubber by other heat. The mean is weighted by `rubbed`.
     """
     sums = slab.sum(*(float((rise * rubbed).sum()) for rise in (own, other, counterbody)))
     whole = sums[0] + sums[2]
@@ -45,8 +46,8 @@ def share_of(slab: Slab, rubbed: Array, own: Array, other: Array, counterbody: A
 
 
 def flash_of(slab: Slab, surface: Array, pairs: Sequence[tuple[Array, Array]]) -> Flash:
-    """Return the temperatures of a contact, whose surface has these rises [K], from pairs of maps: a rise [K] and the
-    heat that is made there; collective."""
+    """Return the temperatures of a contact; collective. `surface` has the rises [K] of the surface; `pairs` are maps of
+    a rise [K] and of the heat released there."""
     sums = [(float((rise * heat).sum()), float(heat.sum())) for rise, heat in pairs]
     warmed, whole = slab.sum(*(math.fsum(each) for each in zip(*sums, strict=True))) if sums else (0.0, 0.0)
     highest = float(surface.max(initial=-math.inf))

@@ -1,21 +1,21 @@
-"""The half space, or a layer: pressure -> normal displacement of its surface and back, at rest and in sliding.
+"""The half space, or a layer: operators between pressure and normal displacement of the surface, at rest and in
+sliding.
 
 An elastic half space of shear modulus 1 under the pressure p moves by the Boussinesq integral (paper, Eq. 1)
 
     u(x) = (1 - nu)/(2 pi) int p(x') / |x - x'| d2x',       in Fourier space   u^(q) = (1 - nu)/|q| p^(q).
 
-With a modulus G divide by G. Lengths may be in any unit: the result is in that unit times the pressure over the
-modulus. The kernel `spectral` takes this symbol as it is; `love` takes the pressure as constant on each cell
-(`physics.love`) and the displacement at cell centres. The mean displacement of a periodic half space is arbitrary and
-set to 0. A layer on a rigid base (`physics.layer`) multiplies the symbol by its compliance ratio.
+For a modulus G divide by G. Lengths have any unit: displacements are in this unit times pressure over modulus. The
+kernel `spectral` uses this symbol; `love` takes the pressure as constant on each cell (`physics.love`) and the
+displacement at cell centres. The mean displacement of a periodic half space is arbitrary and set to 0. A layer on a
+rigid base (`physics.layer`) multiplies the symbol by its compliance ratio.
 
-A wave `exp(i q x)` of pressure that moves with the surface at the velocity v loads a point of a viscoelastic body at
-the angular frequency `-q v`, so that seen from the surface
+A pressure wave `exp(i q x)` that moves with the surface at the velocity v loads a point of a viscoelastic body at
+the angular frequency `-q v`, so that in the frame of the surface
 
     u^(q) = (1 - nu)/(|q| G*(-q v)) p^(q).
 
-Around an isolated contact the wake is not periodic: its influence coefficients are integrals along it
-(`physics.wake`).
+The wake of an isolated contact is not periodic: its influence coefficients are integrals along it (`physics.wake`).
 """
 
 import math
@@ -50,19 +50,18 @@ from .tiles import LONGEST_CELL, TileConvolution, Tiles, tile_inverse
 from .wake import wake
 
 Vector = tuple[float, float]
-LEAST_SYMBOL = 1e-6  # accuracy: of that of a half space, where a table has less
-UNIFORM = 2.113  # tuning: wavenumber, times the side of a square, whose waves are as stiff as the square is on average
+LEAST_SYMBOL = 1e-6  # accuracy: least compliance of a wave in a table, over that of a half space
+UNIFORM = 2.113  # tuning: wavenumber times side of a square whose waves are as stiff as the square on average
 
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """A half space of shear modulus 1 that is loaded inside a box of `size = (lx, ly)` [any unit of length].
+    """A half space of shear modulus 1, loaded inside a box of `size = (lx, ly)` [any unit of length].
 
-    `free`: there is nothing around the box, and the coefficients are Love's; with `repeats_along_x` the box repeats
-    along x, and there is nothing beside it along y (`physics.strip`). Else the box repeats for ever, with the
-    `kernel`. Transforms are handed in: `fft` is one of the maps' own size, in whose precision operators calculate;
-    symbols have its shape, or that of the rows that are asked for. A free half space makes a padded transform for each
-    of its operators, which nobody outside sees.
+    With `free`, nothing surrounds the box, and the coefficients are Love's; with `repeats_along_x` the box is
+    periodic along x only (`physics.strip`). Otherwise the box is periodic, with the `kernel`. `fft` parameters of
+    methods are transforms of maps; operators compute in their precision, and symbols have their shape or that of the
+    requested rows. A free half space makes its own padded transform for each operator.
     """
 
     size: Vector
@@ -74,27 +73,29 @@ class HalfSpace:
 
     @property
     def moves_in_the_mean(self) -> bool:
-        """Whether a uniform pressure moves the surface: not that of a periodic half space, nor an incompressible
-        layer."""
+        """True if a uniform pressure moves the surface: not on a periodic half space, nor on an
+        incompressible layer."""
         return self.free or (self.layer is not None and self.layer.mean_compliance > 0.0)
 
     @property
     def reach(self) -> float:
-        """Distance beyond which points hardly act on each other: the thickness of a layer, half of it where that hardly
-        yields to long waves."""
+        """Distance beyond which points hardly interact: the thickness of a layer, or half of it if the layer is nearly
+        rigid to long waves."""
         if self.layer is None:
             return math.inf
         return self.layer.thickness * (1.0 if self.long_waves is None else 0.5)
 
     @property
     def long_waves(self) -> LongWaves | None:
-        """What waves longer than a layer's softest one need of a preconditioner, if there are any."""
+        """Compliance of waves longer than the softest wave of a layer, for a preconditioner; None without
+        such waves."""
         return None if self.layer is None else self.layer.long_waves(self.size)
 
     # -- elastic ------------------------------------------------------------------------------------------------------
 
     def symbol(self, fft: FFT, rows: slice = ALL) -> Array:
-        """Displacement over pressure of each wave of a periodic body, `(1 - nu)/|q|`; a mean moves a layer only."""
+        """Return displacement over pressure of each wave of a periodic body, `(1 - nu)/|q|`. A mean pressure moves
+        layers only."""
         q = np.hypot(*wavenumbers(fft, self.size, rows))
         symbol = self.compliance(q)
         if self.layer is not None:
@@ -102,26 +103,25 @@ class HalfSpace:
         return symbol * cell_factor(fft, self.size, rows) if self.kernel == "love" else symbol
 
     def compliance(self, q: Array) -> Array:
-        """Displacement over pressure of waves on a body that repeats itself, 0 for q = 0, whatever the kernel."""
+        """Return displacement over pressure of waves on a periodic body, without the kernel; 0 for q = 0."""
         with np.errstate(divide="ignore"):
             found = np.where(q > 0.0, (1.0 - self.poisson) / q, 0.0)
         return found if self.layer is None else found * self.layer.compliance_ratio(q)
 
     def inverse_symbol(self, fft: FFT, rows: slice = ALL) -> Array:
-        """Pressure over displacement of each wave, `|q|/(1 - nu)`, whatever the kernel.
+        """Return pressure over displacement of each wave, `|q|/(1 - nu)`, without the kernel.
 
-        At q = 0, where a periodic half space has no inverse, the value of the smallest wavenumber keeps it positive; it
-        acts on mean values only. Waves on a layer that are longer than its softest one count as stiff as that: contact
-        is in patches, which such waves would join. What they are stiffer within patches is left to
-        `solve.preconditioner.long_waves`.
+        At q = 0, where a periodic half space has no inverse, it is that of the smallest wavenumber, which keeps it
+        positive. Waves on a layer that are longer than its softest one get the stiffness of this one: they would
+        join patches of contact. Their higher stiffness within patches is left to `solve.preconditioner.long_waves`.
         """
         q = np.hypot(*wavenumbers(fft, self.size, rows))
         q[q == 0.0] = 2 * np.pi / max(self.size)
         return self._stiffness(q)
 
     def _mirrored_inverse_symbol(self, cosines: Cosines, rows: slice) -> Spectrum:
-        """Pressure over displacement of each half wave of a box with nothing around, `(|q| + UNIFORM/L)/(1 - nu)`:
-        right for a uniform pressure on a square, which moves it by `(1 - nu) L/UNIFORM` in the mean."""
+        """Return pressure over displacement of each half wave of a free box, `(|q| + UNIFORM/L)/(1 - nu)`. This is
+        exact for a uniform pressure on a square, whose mean displacement is `(1 - nu) L/UNIFORM`."""
         symbol = np.empty((len(range(cosines.my)[rows]), cosines.fft.shape[1]), np.complex128)
         for (along_x, along_y), place in zip(cosines.modes, (symbol.real, symbol.imag), strict=True):
             q = np.pi * np.hypot(along_x / self.size[0], along_y[rows] / self.size[1])
@@ -129,7 +129,7 @@ class HalfSpace:
         return symbol
 
     def _stiffness(self, q: Array) -> Array:
-        """Pressure over displacement of waves."""
+        """Return pressure over displacement of waves."""
         symbol = np.asarray(q / (1.0 - self.poisson))
         if self.layer is not None:
             softest, stiffness = self.layer.softest_wave
@@ -142,18 +142,18 @@ class HalfSpace:
         return (1.0 - self.poisson) * max(self.size) / (2 * np.pi)
 
     def own_lengths(self, points: tuple[int, int]) -> tuple[int, int] | None:
-        """Lengths of the transform of an operator of its own on so many points; None where it uses that of the maps."""
+        """Return the lengths of the padded transform of an operator on `points`; None if it uses that of the maps."""
         if not self.free:
             return None
         lengths = padded_lengths(*points)
         return (points[0], lengths[1]) if self.repeats_along_x else lengths
 
     def operator(self, fft: FFT) -> Convolution:
-        """Pressure -> displacement; collective where the half space is free.
+        """Return the operator from pressure to displacement; collective where the half space is free.
 
-        There the box is padded to twice its size with zeros, which makes the cyclic convolution with Love's
-        coefficients a linear one (paper, reference [12]). They are calculated when it is first applied: a contact that
-        is solved on tiles needs none. Transforms are planned at once.
+        A free box is padded with zeros to twice its size, which makes the cyclic convolution with Love's
+        coefficients a linear one (paper, reference [12]). The coefficients are computed at the first use, the
+        transforms are planned at once.
         """
         if not self.free:
             return Convolution(fft, partial(self.symbol, fft), fft.dtype)
@@ -170,40 +170,42 @@ class HalfSpace:
         return Convolution(padded, lambda rows: table()[rows].real, fft.dtype, later=True)
 
     def _coefficient(self, x: Array, y: Array, dx: float, dy: float) -> Array:
-        """Displacement at distance (x, y) under a unit pressure on one cell of a body around which there is nothing."""
+        """Return the displacement of a free body at the distance (x, y) from a cell under unit pressure."""
         of_half_space = love(x, y, dx, dy, self.poisson)
         return of_half_space if self.layer is None else self.layer.coefficients(x, y, dx, dy, of_half_space)
 
     def inverse(self, fft: FFT) -> Convolution | MirroredConvolution:
-        """Displacement -> pressure: exact for the periodic half space with the spectral kernel, but for the mean; else
-        (a layer included) a preconditioner. That of a box with nothing around takes displacements to go on mirrored at
-        its edges: so they have no jump there, as they would have if the box were repeated."""
+        """Return the operator from displacement to pressure.
+
+        It is exact for the periodic half space with the spectral kernel, except for the mean; otherwise, and for a
+        layer, it is a preconditioner. That of a free box continues displacements mirrored at its edges, so that they
+        have no jump there.
+        """
         if self.free and not self.repeats_along_x:
             cosines = Cosines(fft)
             return MirroredConvolution(cosines, partial(self._mirrored_inverse_symbol, cosines))
         return Convolution(fft, partial(self.inverse_symbol, fft), fft.dtype)
 
     def works_on_tiles(self, nx: int, ny: int) -> bool:
-        """Return whether tiles have operators: on a half space in a free box, on cells that are not long."""
+        """Return whether there are operators on tiles: on a half space in a free box with cells that are not long."""
         dx, dy = self.size[0] / nx, self.size[1] / ny
         return (
             self.free and not self.repeats_along_x and self.layer is None and max(dx, dy) <= LONGEST_CELL * min(dx, dy)
         )
 
     def on_tiles(self, tiles: Tiles, tally: Tally) -> tuple[TileOperator, TileConvolution]:
-        """The operator of a free half space on tiles of its grid, and a preconditioner."""
+        """Return the operator of a free half space on tiles of its grid, and a preconditioner."""
         operator = free_operator(tiles, self.size, self.poisson, self._coefficient, tally)
         return operator, tile_inverse(tiles, self.size, self.poisson, tally)
 
     # -- of contacts that stick -------------------------------------------------------------------------------------
 
     def gap_operators(self, fft: FFT) -> tuple[Convolution, Convolution, float, float]:
-        """Return the operators of the gap solver: pressure -> displacement, its inverse but for mean values, the
-        displacement over a uniform pressure, and the factor by which the first operator moves mean values, which is
-        positive; collective where the half space is free.
+        """Return the operators of the gap solver; collective where the half space is free.
 
-        A free body is taken as one that repeats itself, whose points influence each other by the shortest way: this is
-        exact within half a box.
+        These are pressure to displacement; its inverse, 0 for mean values; the displacement over a uniform pressure;
+        and the factor, always positive, by which the first operator multiplies mean values. A free body is replaced
+        by a periodic one with the same influence coefficients up to half the box.
         """
         if self.free:
             table = tabulate(fft, self.size, self._coefficient, self.layer is None).real
@@ -226,17 +228,18 @@ class HalfSpace:
     # -- under a surface that slides steadily -------------------------------------------------------------------------
 
     def frequencies(self, fft: FFT, velocity: Vector, rows: slice = ALL) -> Array:
-        """Angular frequency `q v` of each wave under a surface of that velocity [length/s]; shape `fft.shape`.
+        """Return the angular frequency `q v` of each wave under a surface of this velocity [length/s]; shape
+        `fft.shape`.
 
-        A wave at a Nyquist wavenumber stands along it.
+        A Nyquist wavenumber counts as 0.
         """
         qx, qy = travelling_wavenumbers(fft, self.size, rows)
         return np.asarray(qx * velocity[0] + qy * velocity[1])
 
     def sliding_modulus(self, fft: FFT, velocity: Vector, prony: Prony, rows: slice = ALL) -> Spectrum:
-        """G*(-q v) of each wave; at a Nyquist wavenumber, which has two signs, the mean of both.
+        """Return G*(-q v) of each wave; at a Nyquist wavenumber, which has two signs, the mean of both.
 
-        It broadcasts to the shape of these rows of a spectrum: under a surface that slides along x all are the same.
+        The result broadcasts to the rows of a spectrum: if the surface slides along x, all rows are equal.
         """
         rows = rows if velocity[1] else slice(0, 1)
         qx, qy = wavenumbers(fft, self.size, rows)
@@ -248,9 +251,10 @@ class HalfSpace:
         return result
 
     def sliding_operator(self, fft: FFT, velocity: Vector, prony: Prony) -> Convolution:
-        """Pressure -> displacement of a viscoelastic body; collective where the half space is free.
+        """Return the operator from pressure to displacement of a viscoelastic body; collective where the half space is
+        free.
 
-        Raises InputError for an unbounded body that flows: its wake never ends.
+        Raises InputError for a free body that flows, as its wake never ends.
         """
         if self.free:
             return self._along_wake(fft, velocity, _creep(prony), fft.dtype)
@@ -262,7 +266,7 @@ class HalfSpace:
         return Convolution(fft, part, fft.complex, even=not velocity[1])
 
     def sliding_inverse(self, fft: FFT, velocity: Vector, prony: Prony) -> Convolution:
-        """Displacement -> pressure, as `inverse`."""
+        """Return the operator from displacement to pressure, as `inverse`."""
 
         def part(rows: slice) -> Spectrum:
             return np.asarray(self.inverse_symbol(fft, rows) * self.sliding_modulus(fft, velocity, prony, rows))
@@ -270,16 +274,16 @@ class HalfSpace:
         return Convolution(fft, part, fft.complex, even=not velocity[1])
 
     def branch_operator(self, fft: FFT, velocity: Vector, prony: Prony, k: int) -> Convolution:
-        """Pressure -> map h_k of branch k of an unbounded body; collective.
+        """Return the operator from pressure to the map h_k of branch k of a free body; collective.
 
-        In the Laplace domain `h_k = G_k s tau_k/(1 + s tau_k) u`, which has no other poles than the creep function:
-        each of its terms is weighted by what the branch makes, at that term's rate -1/l_i, of a displacement.
+        In the Laplace domain `h_k = G_k s tau_k/(1 + s tau_k) u`, which has the poles of the creep function only:
+        each of its terms is weighted by the response of the branch at the rate -1/l_i of this term.
         """
         creep, modulus, tau = _creep(prony), float(prony.moduli[k]), float(prony.relaxation_times[k])
         ratio = -tau / creep.retardation_times
         shares = creep.compliances * modulus * ratio
-        apart = ratio != -1.0  # but to rounding, where a branch is far too soft to make anything
-        shares = np.divide(shares, 1.0 + ratio, out=np.zeros_like(shares), where=apart)
+        distinct = ratio != -1.0  # equal to rounding only for a branch of negligible modulus
+        shares = np.divide(shares, 1.0 + ratio, out=np.zeros_like(shares), where=distinct)
         own = CreepSpectrum(modulus * creep.glass, shares, creep.retardation_times, 0.0)
         return self._along_wake(fft, velocity, own, np.float64)
 
@@ -294,7 +298,7 @@ class HalfSpace:
 
 
 def _padded(fft: FFT, dtype: DTypeLike, measured: bool = True) -> FFT:
-    """A transform of at least twice the box of another one."""
+    """Return a transform of at least twice the box of another one."""
     return FFT(fft.slab, padded_lengths(fft.slab.nx, fft.slab.ny), dtype, measured)
 
 
