@@ -1,27 +1,28 @@
-"""Heat of sliding: by how much the surface of a conducting half space is warmed by heat that moves over it.
+"""Heat of sliding: temperature rise of the surface of a conducting half space under moving heat.
 
 Heat q [W/m^2] on the surface of a body of conductivity kappa and diffusivity D, below a contact that slides at the
-velocity v, warms it in the steady state, seen from the contact, by
+velocity v, causes the steady temperature rise, in the frame of the contact,
 
     T^(k) = q^(k)/(kappa beta),     beta(k) = sqrt(k^2 - i k.v/D),     Re beta > 0                                (1)
 
-(H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.7). No heat leaves through the surface
-elsewhere. Heat from the depth z arrives with the factor exp(-beta z). A wave of the wavenumber q on an incompressible
-half space has strains whose squares add up to `(q z)^2 exp(-2 q z)` times a constant, the same under crests and
-troughs, so that its heat, `4 q (q z)^2 exp(-2 q z) dz` of the whole, lies `3/(2 q)` deep in the mean and arrives with
+(H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.7). The rest of the surface is
+insulated. Heat from the depth z arrives with the factor exp(-beta z). A wave of the wavenumber q on an
+incompressible half space has strains whose squares add up to a constant times `(q z)^2 exp(-2 q z)`, the same under
+crests and troughs. So its heat has the distribution `4 q (q z)^2 exp(-2 q z) dz`, the mean depth `3/(2 q)`, and
+arrives with
 
     int 4 q^3 z^2 exp(-(2 q + beta) z) dz = (1 + beta/(2 q))^-3.                                                  (2)
 
-The rubber that dissipates lies there too, and feels the mean temperature over these depths. With waves cos(m z) along
-the depth, of which this distribution has the share
+The rubber that dissipates lies at these depths, too, and has their mean temperature. With waves cos(m z) along the
+depth, of which this distribution has the share
 
     g(m) = int 4 q^3 z^2 exp(-2 q z) cos(m z) dz = Re (1 - i m/(2 q))^-3,                                         (3)
 
-heat of the body warms the depths where it is made by `2/(pi kappa) int g^2/(beta^2 + m^2) dm` in place of (1).
+heat of the body warms the depths where it is released by `2/(pi kappa) int g^2/(beta^2 + m^2) dm` instead of (1).
 
-A uniform heat has no steady state: after a sliding time t it has warmed a body that was cold by `2 q sqrt(t/pi)/e`,
-with the effusivity `e = kappa/sqrt(D)`, and each wave by `erf(beta sqrt(D t))` times (1). Without an end of time,
-temperatures in a periodic box are relative to its mean.
+A uniform heat has no steady state: after a sliding time t it has warmed a cold body by `2 q sqrt(t/pi)/e`, with the
+effusivity `e = kappa/sqrt(D)`, and each wave by `erf(beta sqrt(D t))` times (1). For an infinite time, temperatures
+in a periodic box are relative to its mean.
 """
 
 from dataclasses import dataclass
@@ -35,9 +36,9 @@ from .halfspace import HalfSpace
 from .prony import Prony, complex_modulus
 
 Vector = tuple[float, float]
-SPACING, LOWEST, HIGHEST = 0.3, 1e-5, 30.0  # accuracy: of waves along the depth, in ln m, and over wavenumbers
-BINS = 16  # accuracy: of wavenumbers in an octave: flash temperatures differ by 1e-4 from those of all waves
-LAYER_DEPTH = 3.0  # physics: wavenumber times thickness from which on heat lies half a thickness deep
+SPACING, LOWEST, HIGHEST = 0.3, 1e-5, 30.0  # accuracy: waves m along the depth: spacing of ln m; limits over q
+BINS = 16  # accuracy: bins of wavenumbers per octave; the error of flash temperatures is 1e-4
+LAYER_DEPTH = 3.0  # physics: least wavenumber times thickness of a layer: heat lies at most half a thickness deep
 
 
 @dataclass(frozen=True)
@@ -55,22 +56,22 @@ class Conductor:
 
 @dataclass(frozen=True)
 class Depths:
-    """How deep the heat of the body lies: the share that waves of each of the wavenumbers [1/m] dissipate.
+    """Depths of the heat of the body: the share of it that waves of each wavenumber [1/m] dissipate.
 
-    Integrals over waves along the depth stand for (2): they go with a finite time and with both depths alike.
+    Integrals over waves along the depth replace (2), as they also hold for a finite time and for heat felt at depth.
     """
 
     wavenumbers: Array
     shares: Array
 
     def cosines(self, m: Array) -> Array:
-        """Return the shares (3) of waves [1/m] along the depth, in the mean over the waves."""
+        """Return the shares (3) of waves m [1/m] along the depth, averaged over the waves."""
         square = (0.5 * m / self.wavenumbers[:, None]) ** 2
         return np.asarray(self.shares @ ((1.0 - 3.0 * square) / (1.0 + square) ** 3))
 
     def warmed(self, beta: Spectrum, felt: bool, reach: float = np.inf) -> Spectrum:
-        """Return the temperature over heat and 1/kappa [m] after diffusion over `reach = D t` [m^2]: that of the
-        surface or, if `felt`, that in the depths where heat is made; to 1e-5."""
+        """Return the temperature over heat, times kappa [m], after diffusion over `reach = D t` [m^2]: that of the
+        surface or, if `felt`, that at the depths where heat is released; to 1e-5."""
         total = np.zeros_like(beta)
         for m, weight in zip(*self._waves(felt), strict=True):
             square = beta**2 + m**2
@@ -78,7 +79,7 @@ class Depths:
         return total
 
     def staying(self, tau: Array) -> Array:
-        """Return what is left after diffusion over `tau = D t` [m^2], `2/pi int g^2 exp(-m^2 tau) dm` [1/m]."""
+        """Return the rest after diffusion over `tau = D t` [m^2], `2/pi int g^2 exp(-m^2 tau) dm` [1/m]."""
         total = np.zeros_like(tau)
         for m, weight in zip(*self._waves(True), strict=True):
             total += weight * np.exp(-(m**2) * tau)
@@ -91,7 +92,7 @@ class Depths:
         low, high = np.log(LOWEST * self.wavenumbers.min()), np.log(HIGHEST * self.wavenumbers.max())
         m = np.exp(np.linspace(low, high, 1 + int((high - low) / SPACING)))
         weights = 2.0 / np.pi * np.log(m[1] / m[0]) * m * self.cosines(m) ** (2 if felt else 1)
-        weights[0] /= -np.expm1(-np.log(m[1] / m[0]))  # with all below
+        weights[0] /= -np.expm1(-np.log(m[1] / m[0]))  # includes all waves below
         m[0] = 0.0
         return m, weights
 
@@ -105,11 +106,11 @@ def sliding_heat(
     felt: bool = False,
     time: float = np.inf,
 ) -> Convolution:
-    """Return heat [W/m^2] -> temperature rise [K] in a periodic box of `size` [m] below a contact that has slid
-    steadily at `velocity` [m/s] for a `time` [s], with the heat on the surface or at `depths`; exact for each wave but
-    those of Nyquist.
+    """Return the operator from heat [W/m^2] to temperature rise [K] in a periodic box of `size` [m] below a contact
+    that has slid steadily at `velocity` [m/s] for a `time` [s].
 
-    The temperature is that of the surface, or, if `felt`, that in the depths where the heat is made.
+    The heat is on the surface or at `depths`. The temperature is that of the surface or, if `felt`, that at the
+    depths where the heat is released. It is exact for each wave except those of Nyquist.
     """
     reach = body.diffusivity * time
 
@@ -132,18 +133,19 @@ def _on_surface(beta: Spectrum, reach: float) -> Spectrum:
 
 
 def _beta(fft: FFT, size: Vector, body: Conductor, velocity: Vector, rows: slice = ALL) -> Spectrum:
-    """Return beta of these rows of a spectrum [1/m]; its root with a positive real part."""
+    """Return beta [1/m] for these rows of a spectrum, the root with a positive real part."""
     square = np.hypot(*wavenumbers(fft, size, rows)) ** 2
     along_x, along_y = travelling_wavenumbers(fft, size, rows)
     return np.sqrt(square - 1j * (along_x * velocity[0] + along_y * velocity[1]) / body.diffusivity)
 
 
 def depths_of(spectrum: Spectrum, fft: FFT, body: HalfSpace, unit: float, velocity: Vector, prony: Prony) -> Depths:
-    """Return how deep a body dissipates under a pressure of this spectrum that slides at `velocity` [m/s]; collective.
+    """Return the depths at which a body dissipates under a pressure of this spectrum, sliding at `velocity` [m/s];
+    collective.
 
-    `unit` [m] is that of the size of the body. A wave loses `|p^|^2 A w Im(-1/G*(w))` with A its compliance and w its
-    frequency; one that does not move loses nothing. Waves are put together that differ by less than a part of an
-    octave (BINS), each with its mean wavenumber; on a layer the heat lies half its thickness deep at most.
+    `unit` [m] is the length unit of the body. A wave loses `|p^|^2 A w Im(-1/G*(w))` with its compliance A and
+    frequency w. Waves are combined in BINS per octave, each with its mean wavenumber. On a layer the heat lies at
+    most half its thickness deep.
     """
     longest = max(body.size)
     bins = 1 + int(BINS * (1.0 + np.log2(np.hypot(fft.mx, fft.my))))

@@ -1,14 +1,16 @@
-"""Temperature of the surface of a conducting half space under heat that changes with time: a march of `physics.heat`.
+"""Temperature of the surface of a conducting half space under heat that changes with time: `physics.heat` in time
+steps.
 
-Each wave (j, k) of the sum of exponentials (`physics.exponentials`), along the depth and along the surface, obeys
+Each wave (j, k) of the sum of exponentials (`physics.exponentials`), along the depth and along the surface,
+satisfies
 
     dc/dt = -(m_j^2 + D k^2) c + q^(k, t) g_j,     T^(k) = sum_j w_j c_j/e,                                       (1)
 
-with the effusivity e; q changes linearly with time in a step, over which (1) is solved exactly. For heat on the surface
-g = 1; for heat of the body it is the share of the wave m_j/sqrt(D) along the depth in the distribution of heat over
-depth (`physics.heat`, (3)). The temperature in the depths where this heat is made is `sum_j w_j g_j c_j/e`.
+with the effusivity e. q is linear in time within a step, over which (1) is solved exactly. For heat on the surface g
+= 1; for heat of the body it is the share (3) of `physics.heat` of the wave m_j/sqrt(D) along the depth. The
+temperature at the depths where this heat is released is `sum_j w_j g_j c_j/e`.
 
-The mean of the box (k = 0) has a sum of its own, of numbers, exact to 1e-9 at any time: so all heat is accounted for.
+The mean of the box (k = 0) has its own sum, of numbers, exact to 1e-9 at any time, so that no heat is lost.
 """
 
 from dataclasses import dataclass
@@ -22,13 +24,16 @@ from .convolution import wavenumbers
 from .exponentials import Exponentials, fit_exponentials, shares_of_step
 from .heat import Conductor, Depths, Vector
 
-MEAN_TIMES, MEAN_ERROR = (1e-12, 1e12), 1e-9  # accuracy: of the mean of the box
+MEAN_TIMES, MEAN_ERROR = (
+    (1e-12, 1e12),
+    1e-9,
+)  # accuracy: times [s] and relative error of the sum for the mean of the box
 
 
 @dataclass(frozen=True)
 class Heating:
-    """Heat of one step [W/m^2, mean over the box], at its beginning and at its end: on what is `rubbed`, and in the
-    body in proportion to the pressure, at `depths`."""
+    """Heat in one step [W/m^2, mean over the box], at its beginning and end: on `rubbed` points, and in the body in
+    proportion to the pressure, at `depths`."""
 
     rubbed: tuple[float, float] = (0.0, 0.0)
     pressed: tuple[float, float] = (0.0, 0.0)
@@ -36,17 +41,17 @@ class Heating:
 
     @property
     def whole(self) -> tuple[float, float]:
-        """All of it."""
+        """The sum of both."""
         return self.rubbed[0] + self.pressed[0], self.rubbed[1] + self.pressed[1]
 
 
 def along_depth(rates: Array, body: Conductor, depths: Depths | None) -> Array:
-    """Return g of (1) for waves along the depth, in the mean over the waves that dissipate; 1 without."""
+    """Return g of (1) for waves along the depth, averaged over the dissipating waves; 1 without depths."""
     return np.ones_like(rates) if depths is None else depths.cosines(np.sqrt(rates / body.diffusivity))
 
 
 class MeanMemory:
-    """The mean temperature of a box [K] and its `waves` along the depth; the same on every rank."""
+    """Mean temperature of a box [K], as `waves` along the depth; the same on every rank."""
 
     def __init__(self, body: Conductor) -> None:
         self.body, self.sum = body, fit_exponentials(*MEAN_TIMES, MEAN_ERROR)
@@ -54,11 +59,12 @@ class MeanMemory:
 
     @property
     def stored(self) -> float:
-        """The heat in the body [J/m^2], mean over the box: the longest wave along the depth, which never decays."""
+        """Heat in the body [J/m^2, mean over the box]: the longest wave along the depth, which never decays."""
         return float(self.waves[0])
 
     def advance(self, dt: float, heating: Heating) -> tuple[float, float]:
-        """Go on by a step [s]; returns the mean temperature rise [K], of the surface and where the body makes heat."""
+        """Advance by a step dt [s]. Return the mean temperature rises [K] of the surface and where the body releases
+        heat."""
         known, deep = self.sum, along_depth(self.sum.rates, self.body, heating.depths)
         before, after = shares_of_step(known.rates * dt)
         start, end = (one + deep * other for one, other in zip(heating.rubbed, heating.pressed, strict=True))
@@ -69,10 +75,10 @@ class MeanMemory:
 
 
 class HeatMemory:
-    """The waves (1) of a box of `size` [m], and the spectra of what was rubbed and pressed at the end of the last step.
+    """The waves (1) of a box of `size` [m], and the spectra of rubbing and pressure at the end of the last step.
 
-    Parameters: a transform of the maps' own size, on whose wavenumbers it is; `rubs`: whether there is heat on the
-    surface beside that in the body. Making and calling it are collective.
+    Parameters: `fft`, a transform of the size of maps; `rubs`, True if there is heat on the surface in addition to
+    that of the body. The constructor and the methods are collective.
     """
 
     def __init__(self, fft: FFT, size: Vector, body: Conductor, known: Exponentials, rubs: bool) -> None:
@@ -88,7 +94,7 @@ class HeatMemory:
         self.mean = MeanMemory(body)
 
     def set_heating(self, rubbed: Array | None, pressed: Array, scales: Vector) -> None:
-        """Take what is rubbed and pressed now, times their scales, for that before the next step."""
+        """Set the maps of rubbing and pressure before the next step, times their scales."""
         if rubbed is not None:
             np.multiply(self.fft.forward(rubbed), scales[0], out=self.rubbed)
         np.multiply(self.fft.forward(pressed), scales[1], out=self.pressed)
@@ -96,10 +102,10 @@ class HeatMemory:
     def advance(
         self, dt: float, heating: Heating, rubbed: Array | None, pressed: Spectrum, scales: Vector, out: Array
     ) -> float:
-        """Go on by a step [s] at whose end these are rubbed and pressed; the temperature rise of the surface [K] is
-        then in `out`. Returns the mean rise [K] in the depths where the body makes heat, weighted by this heat.
+        """Advance by a step dt [s] to these maps of rubbing and pressure, and put the temperature rise of the surface
+        [K] into `out`. Return the mean rise [K] at the depths where the body releases heat, weighted by this heat.
 
-        `pressed` is a spectrum, that of the transform itself or a copy; `scales` make both maps of the mean 1.
+        `pressed` is a spectrum, that of the transform or a copy; `scales` give both maps the mean 1.
         """
         known, fft = self.sum, self.fft
         now, fresh = pressed, np.zeros((0, fft.shape[1]), fft.complex)

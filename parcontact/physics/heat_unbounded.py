@@ -1,18 +1,18 @@
-"""Heat that slides over a half space around whose box there is nothing: influence coefficients for `physics.heat`.
+"""Heat that slides over a free half space: influence coefficients for `physics.heat`.
 
-A uniform heat on one cell of `dx x dy` that was at the same place for ever, the body passing below with the velocity
--v, warms the distance (x, y) from the cell by the heat of all earlier times t,
+A uniform heat on one cell of `dx x dy`, while the body passes below it with the velocity -v, warms the distance (x,
+y) from the cell by the heat of all earlier times t,
 
     K(x, y) = 1/e int_0^inf W(t) P(x + v_x t, dx, t) P(y + v_y t, dy, t) dt/sqrt(pi t),                           (1)
     P(x, dx, t) = (erf((x + dx/2)/sqrt(4 D t)) - erf((x - dx/2)/sqrt(4 D t)))/2,
 
-with the effusivity e (H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.4). W is 1 for heat
-on the surface; for heat that waves of the wavenumber q dissipate it is, with tau = D t and s = 2 q sqrt(tau),
+with the effusivity e (H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.4). W is 1 for
+heat on the surface. For heat that waves of the wavenumber q dissipate it is, with tau = D t and s = 2 q sqrt(tau),
 
     W(t) = sqrt(pi) s^3 erfcx''(s)/2,     erfcx''(s) = (2 + 4 s^2) erfcx(s) - 4 s/sqrt(pi),                  (2)
 
-which tends to 1 - 3/s^2. For the temperature in the depths where heat is made it is `sqrt(pi tau)` times
-`Depths.staying`. The integral is over panels that resolve how long a cell takes to pass, and how the heat spreads.
+which tends to 1 - 3/s^2. For the temperature at the depths where heat is released it is `sqrt(pi tau)` times
+`Depths.staying`. Panels of the integral resolve the passage of a cell and the spreading of heat.
 """
 
 import numpy as np
@@ -23,10 +23,10 @@ from .convolution import Convolution, padded_lengths, tabulate
 from .heat import Conductor, Depths, Vector
 
 GAUSS = np.polynomial.legendre.leggauss(4)
-FIRST = 1e-4  # accuracy: of the shortest time that matters, the first panel; in sqrt(t) all earlier ones are smooth
-GROWTH, PASSING = 1.3, 0.5  # accuracy: of panels; of the time to pass what the heat has spread to, one panel at most
-SPREAD = 6.5  # accuracy: roots of 2 D t away there is no heat to rounding
-LAST = 1e8  # accuracy: times that to spread over the box, after which nothing more comes, where nothing moves
+FIRST = 1e-4  # accuracy: end of the first panel over the shortest time scale; the integrand is smooth in sqrt(t) before
+GROWTH, PASSING = 1.3, 0.5  # accuracy: largest ratio of panel ends; largest panel over the time to pass the warm zone
+SPREAD = 6.5  # accuracy: distance over sqrt(2 D t) beyond which heat is below rounding
+LAST = 1e8  # accuracy: end of the integral over the time to spread over the box, at rest
 ASYMPTOTIC = 100.0  # accuracy: s beyond which W is 1 - 3/s^2 to 1e-7
 
 
@@ -39,9 +39,9 @@ def sliding_heat_unbounded(
     felt: bool = False,
     time: float = np.inf,
 ) -> Convolution:
-    """Return heat [W/m^2] -> temperature rise [K] below a contact that has slid steadily at `velocity` [m/s] for a
-    `time` [s] and fits into a box of `size` [m], with the heat on the surface or at `depths`; of the surface or, if
-    `felt`, in the depths where the heat is made; collective."""
+    """Return the operator from heat [W/m^2] to temperature rise [K] below a contact that has slid steadily at
+    `velocity` [m/s] for a `time` [s] and fits into a free box of `size` [m]; collective. Other parameters are those
+    of `sliding_heat`."""
     slab = fft.slab
     padded = FFT(slab, padded_lengths(slab.nx, slab.ny), np.float64, measured=False)
 
@@ -71,7 +71,7 @@ def _times(size: Vector, cell: Vector, body: Conductor, velocity: Vector, time: 
     speed, smallest, longest = float(np.hypot(*velocity)), min(cell), 2.0 * float(np.hypot(*size))
     start = FIRST * smallest / max(speed, body.diffusivity / smallest)
     end = LAST * longest**2 / body.diffusivity
-    if speed:  # the body that was warmed has left when v t > longest + SPREAD sqrt(2 D t)
+    if speed:  # the warmed body has left when v t > longest + SPREAD sqrt(2 D t)
         wide = SPREAD * np.sqrt(2.0 * body.diffusivity) / speed
         end = min(end, ((wide + np.sqrt(wide**2 + 4.0 * longest / speed)) / 2.0) ** 2)
     end = min(end, time)
@@ -86,7 +86,7 @@ def _times(size: Vector, cell: Vector, body: Conductor, velocity: Vector, time: 
 
 
 def _reaching(times: Array, body: Conductor, depths: Depths) -> Array:
-    """Return W of (2) at these times, in the mean over the waves."""
+    """Return W of (2) at these times, averaged over the waves."""
     from scipy.special import erfcx
 
     total = np.zeros_like(times)

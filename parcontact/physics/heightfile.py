@@ -12,13 +12,13 @@ from .. import datafiles
 from ..errors import InputError
 from ..parallel.slab import Array, Slab
 
-Values = NDArray[Any]  # as they stand in the file
+Values = NDArray[Any]  # of any type, as in the file
 
 
 def read_heights(path: Path, dataset: str, slab: Slab, scale: float = 1.0) -> Array:
-    """This rank's rows of the map of shape (ny, nx) in a .npy, .h5 or text file, times `scale`; collective.
+    """Return the rows of this rank of a map of shape (ny, nx) in a .npy, .h5 or text file, times `scale`; collective.
 
-    Raises InputError on every rank when a rank cannot read its rows, the shape is another one, or a value is no finite
+    Raises InputError on every rank if a rank cannot read its rows, the shape differs, or a value is not a finite
     real number.
     """
     rows, problem = _attempt(path, dataset, slab)
@@ -37,13 +37,13 @@ def read_heights(path: Path, dataset: str, slab: Slab, scale: float = 1.0) -> Ar
 
 
 def _attempt(path: Path, dataset: str, slab: Slab) -> tuple[Values, str]:
-    """This rank's rows, and a sentence on what is wrong with them."""
+    """Return the rows of this rank, or a sentence on an error."""
     try:
         rows = _rows(path, dataset, slab)
         datafiles.refuse_no_numbers(path, rows.dtype)
     except InputError as error:
         return np.empty(0), str(error)
-    except Exception as error:  # numpy reads a header as Python; every rank must learn of it, whatever it is
+    except Exception as error:  # numpy evaluates headers; every rank must report any error
         number = getattr(error, "errno", None)
         reason = os.strerror(number) if number else str(error).partition("\n")[0]
         return np.empty(0), f"{path} cannot be read: {reason}"
@@ -66,7 +66,7 @@ def _rows(path: Path, dataset: str, slab: Slab) -> Values:
 
 
 def _text(path: Path, slab: Slab) -> Values:
-    """A line is a row, its numbers separated by blanks; what follows a # does not count."""
+    """Read a text file: one row per line, numbers separated by blanks; text after # is ignored."""
     mine, count = np.empty(slab.shape), 0
     with path.open() as lines:
         for number, line in enumerate(lines, 1):

@@ -1,10 +1,11 @@
-"""Friction of the contact area itself: a shear stress that opposes sliding on all that is in contact.
+"""Friction of the contact area itself: a shear stress that opposes sliding on all points in contact.
 
     F = -tau A v/|v|,    tau constant, or    tau(v) = tau_0 exp(-(log10(a_T |v|/v_0)/w)^2),
 
-a bell over the logarithm of the velocity, largest at v_0, that is shifted with temperature like the bulk (B. Lorenz, Y.
-R. Oh, S. K. Nam, S. H. Jeon, B. N. J. Persson, J. Chem. Phys. 142 (2015) 194701, with c = 1/w^2). An incompressible
-half space does not move along its normal under shear (nu = 1/2): this adds to friction without a coupled solve.
+a bell in the logarithm of the velocity with its maximum at v_0, which shifts with temperature like the bulk (B.
+Lorenz, Y. R. Oh, S. K. Nam, S. H. Jeon, B. N. J. Persson, J. Chem. Phys. 142 (2015) 194701, with c = 1/w^2). Shear
+does not move an incompressible half space along its normal (nu = 1/2), so that this friction is added without a
+coupled solve.
 """
 
 import math
@@ -15,19 +16,19 @@ Vector = tuple[float, float]
 
 
 class Shear(Protocol):
-    """Friction of the contact area itself, which adds to that of the body."""
+    """Friction of the contact area itself, in addition to that of the body."""
 
     def force(self, area: float, velocity: Vector) -> Vector:
         """Return the force [N] on the rigid surface that slides with `velocity` [m/s] on an area in contact [m^2]."""
 
     def shifted(self, factor: float) -> "Shear":
-        """Return the friction at a temperature at which the body relaxes with so many times the relaxation times."""
+        """Return the friction at a temperature that multiplies the relaxation times of the body by `factor`."""
 
 
 @dataclass(frozen=True)
 class InterfaceFriction:
-    """`shear_stress` [Pa], the largest one; of a bell its `velocity` [m/s] and `width` [decades], with the shift factor
-    a_T of the temperature."""
+    """`shear_stress` [Pa], the largest one; of a bell its `velocity` [m/s] and `width` [decades], and the shift factor
+    a_T."""
 
     shear_stress: float
     velocity: float | None = None
@@ -35,7 +36,7 @@ class InterfaceFriction:
     shift: float = 1.0
 
     def stress(self, speed: float) -> float:
-        """Shear stress [Pa] at a sliding speed [m/s]; none at rest."""
+        """Return the shear stress [Pa] at a sliding speed [m/s]; 0 at rest."""
         if speed <= 0.0:
             return 0.0
         if self.velocity is None:
@@ -44,11 +45,11 @@ class InterfaceFriction:
         return self.shear_stress * math.exp(-((decades / self.width) ** 2))
 
     def shifted(self, factor: float) -> "InterfaceFriction":
-        """Return the bell shifted like the bulk, whose relaxation times are so many times as long."""
+        """Return the friction with the bell shifted by the factor a_T of the bulk."""
         return replace(self, shift=self.shift * factor)
 
     def force(self, area: float, velocity: Vector) -> Vector:
-        """Return the force of the stress; `Shear.force`."""
+        """See `Shear.force`."""
         speed = math.hypot(*velocity)
         size = self.stress(speed) * area / (speed or 1.0)
         return 0.0 - size * velocity[0], 0.0 - size * velocity[1]

@@ -1,10 +1,10 @@
-"""A layer on a rigid base: how much less its surface moves than that of a half space.
+"""A layer on a rigid base: the ratio of the displacement of its surface to that of a half space.
 
-A layer of shear modulus 1, Poisson's ratio nu and thickness d moves under a wave of pressure of the wavenumber q by
+A layer of shear modulus 1, Poisson's ratio nu and thickness d moves under a pressure wave of the wavenumber q by
 
     u^(q) = (1 - nu)/q S(q d) p^(q).
 
-On a base to which it is bonded, with kappa = 3 - 4 nu,
+If it is bonded to the base, with kappa = 3 - 4 nu,
 
     S(x) = (kappa sinh 2x - 2x) / (kappa cosh 2x + 2x^2 + 5 - 12 nu + 8 nu^2),
 
@@ -12,9 +12,9 @@ and on a smooth base, along which it slides freely,
 
     S(x) = (cosh 2x - 1) / (sinh 2x + 2x).
 
-A uniform pressure p strains it in one direction only, and moves it by `p d (1 - 2 nu)/(2 (1 - nu))`: an incompressible
-layer does not move at all. S tends to 1 for a thick layer. Sources: I. N. Sneddon, Fourier Transforms (1951); for the
-bonded layer G. Carbone and L. Mangialardi, J. Mech. Phys. Solids 56 (2008) 684.
+A uniform pressure p strains it in one direction only, and moves it by `p d (1 - 2 nu)/(2 (1 - nu))`: an
+incompressible layer does not move. S tends to 1 for a thick layer. Sources: I. N. Sneddon, Fourier Transforms
+(1951); for the bonded layer G. Carbone and L. Mangialardi, J. Mech. Phys. Solids 56 (2008) 684.
 """
 
 from collections.abc import Callable
@@ -27,19 +27,19 @@ import numpy as np
 from ..parallel.slab import Array
 
 Base = Literal["bonded", "smooth"]
-THICK = 22.0  # accuracy: S(x) - 1 is below rounding for larger x
-FAR = 50.0  # accuracy: thicknesses; farther away a unit pressure moves the layer by less than rounding
-KNOTS_PER_THICKNESS = 16  # accuracy: of the spline through the correction, whose error is below 1e-6 of it then
-NODES = 900  # accuracy: of the integral over wavenumbers: 5 for each oscillation of the Bessel function
-SOFTEST_BETWEEN, SOFTEST_TRIED = (1e-3, 1e2), 2000  # tuning: wavenumbers times thickness, of a preconditioner
-HARDLY_STIFFER = 0.8  # tuning: stiffness of the softest wave over that of the longest ones
-SERIES_BELOW = 1.0  # accuracy: sinh(y) - y by its series, whose twelve terms are exact to rounding
+THICK = 22.0  # accuracy: x above which S(x) - 1 is below rounding
+FAR = 50.0  # accuracy: distance over thickness beyond which displacements are below rounding
+KNOTS_PER_THICKNESS = 16  # accuracy: knots of the spline through the correction; its error is below 1e-6
+NODES = 900  # accuracy: nodes of the integral over wavenumbers, 5 per oscillation of the Bessel function
+SOFTEST_BETWEEN, SOFTEST_TRIED = (1e-3, 1e2), 2000  # tuning: range and number of q d that are searched
+HARDLY_STIFFER = 0.8  # tuning: stiffness ratio of softest to longest waves above which LongWaves are not used
+SERIES_BELOW = 1.0  # accuracy: y below which sinh(y) - y is a series, exact to rounding
 
 
 @dataclass(frozen=True)
 class LongWaves:
-    """Compliance `c0 + c2 q^2` by which waves longer than a layer's softest one are stiffer than that, in a box of a
-    `size`; all in one unit of length."""
+    """Compliance `c0 + c2 q^2` that long waves on a layer lack compared with the softest wave, in a box of `size`;
+    lengths have one unit."""
 
     c0: float
     c2: float
@@ -49,16 +49,16 @@ class LongWaves:
 
 @dataclass(frozen=True)
 class Layer:
-    """A layer of a `thickness` [any unit of length] on a rigid base, of shear modulus 1."""
+    """A layer of shear modulus 1 and `thickness` [any unit of length] on a rigid base."""
 
     thickness: float
     base: Base = "bonded"
     poisson: float = 0.5
 
     def compliance_ratio(self, q: Array) -> Array:
-        """Return S(q d): the displacement over that of a half space, for wavenumbers q > 0; 0 for q = 0."""
+        """Return S(q d) for wavenumbers q > 0; 0 for q = 0."""
         x = np.asarray(q * self.thickness, dtype=float)
-        y, decay = 2.0 * x, np.exp(-2.0 * x)  # all is multiplied by 2 exp(-y), so that nothing overflows
+        y, decay = 2.0 * x, np.exp(-2.0 * x)  # both are multiplied by 2 exp(-y) against overflow
         sinh, cosh = -np.expm1(-2.0 * y), 1.0 + decay**2
         if self.base == "smooth":
             ratio = np.divide(np.expm1(-y) ** 2, sinh + 2.0 * y * decay, out=np.zeros_like(y), where=y > 0.0)
@@ -78,10 +78,10 @@ class Layer:
 
     @cached_property
     def softest_wave(self) -> tuple[float, float]:
-        """Return the wavenumber at which the layer is softest, and its pressure over displacement there.
+        """Wavenumber at which the layer is softest, and pressure over displacement there.
 
-        A compressible layer is softest for the longest waves; an incompressible bonded one for waves some four times
-        as long as it is thick, since longer ones have to push it along its base.
+        A compressible layer is softest for the longest waves; an incompressible bonded one for waves about four
+        times as long as its thickness, as longer ones must push it along its base.
         """
         q = np.geomspace(*SOFTEST_BETWEEN, SOFTEST_TRIED) / self.thickness
         stiffness = q / ((1.0 - self.poisson) * self.compliance_ratio(q))
@@ -89,11 +89,11 @@ class Layer:
         return float(q[softest]), float(stiffness[softest])
 
     def long_waves(self, size: tuple[float, float]) -> LongWaves | None:
-        """Return what makes waves in a box stiffer than the softest one that are longer; None where they are hardly
-        stiffer, or there are none.
+        """Return the compliance by which longer waves in a box are stiffer than the softest one; None if they are
+        hardly stiffer, or do not exist.
 
-        The compliance of long waves on a bonded layer is `mean_compliance` plus, of order q^2,
-        `d^3 ((3 - 4 nu)/(6 (1 - nu)) - (1 - 2 nu)/(2 (1 - nu)^2))`, which is d^3/3 for an incompressible one.
+        The compliance of long waves on a bonded layer is `mean_compliance` plus, to second order in q, `d^3 ((3 - 4
+        nu)/(6 (1 - nu)) - (1 - 2 nu)/(2 (1 - nu)^2))`, which is d^3/3 for an incompressible one.
         """
         nu, softest, stiffness = self.poisson, *self.softest_wave
         least = stiffness * self.mean_compliance
@@ -106,9 +106,9 @@ class Layer:
     def coefficients(self, x: Array, y: Array, dx: float, dy: float, of_half_space: Array) -> Array:
         """Return the displacements at distances (x, y) from a `dx x dy` cell under unit pressure.
 
-        `of_half_space` are those of a half space (Love's). The layer's differ by a function that is smooth over
-        distances as short as the thickness: `(1 - nu)/(2 pi) int (S(q d) - 1) J0(q r) dq`, in the mean over the cell,
-        by Simpson's rule. Far away nothing moves.
+        `of_half_space` are those of a half space (Love's). The difference is smooth on the scale of the thickness:
+        `(1 - nu)/(2 pi) int (S(q d) - 1) J0(q r) dq`, averaged over the cell by Simpson's rule. Beyond FAR it is cut
+        off.
         """
         correction = self._correction()
         mean = np.zeros(np.broadcast_shapes(x.shape, y.shape))
@@ -120,7 +120,8 @@ class Layer:
         return np.where(far, 0.0, of_half_space + dx * dy * mean)
 
     def _correction(self) -> Callable[[Array], Array]:
-        """Return the difference to the displacement of a half space, at any distance, under a unit force."""
+        """Return the difference to the displacement of a half space under a unit force, as a function of
+        the distance."""
         from scipy.interpolate import make_interp_spline  # slow to import, and for isolated layers only
         from scipy.special import j0
 

@@ -1,7 +1,5 @@
-"""Fused loops over this rank's rows for the body and the surface. Heights come as a map and a cyclic offset along x.
-
-Rows are copied point by point: an assignment to a slice makes numba compile its messages too, for seconds.
-"""
+"""Fused loops over the rows of this rank, for the body and the surface. Heights are a map and a cyclic
+offset along x."""
 
 import numpy as np
 
@@ -20,17 +18,17 @@ def copy_shifted(row, start, out):
 
 @loop
 def roll(source, offset, target):
-    """`target(i) = source(i - offset)` along x, cyclic."""
+    """Put `source(i - offset)` into `target`, cyclic along x."""
     for j in range(source.shape[0]):
         copy_shifted(source[j], offset % source.shape[1], target[j])
 
 
 @loop
 def begin(branches, decay, gain, back, du, buffer, weight, weight_u, weight_du, u, heights, offset):
-    """Advance the branches, `h_k <- decay_k h_k + gain_k du + back_k buffer`, and form the next effective heights in
+    """Advance the branches, `h_k <- decay_k h_k + gain_k du + back_k buffer`, and put the next effective heights into
     `buffer`: `heights(i - offset) + sum weight_k h_k - weight_u u + weight_du du`.
 
-    Four branches at once keep more of the memory's channels busy than one after the other.
+    Four branches at once use the memory bandwidth better than one after the other.
     """
     count, ny, nx = branches.shape
     start = offset % nx
@@ -54,7 +52,7 @@ def begin(branches, decay, gain, back, du, buffer, weight, weight_u, weight_du, 
 
 @loop
 def _advance_four(a, b, c, d, decay, gain, back, weight, change, before, effective):
-    """The same of four branches in one row."""
+    """Do the same for four branches in one row."""
     fall_a, fall_b, fall_c, fall_d = 1.0 - decay[0], 1.0 - decay[1], 1.0 - decay[2], 1.0 - decay[3]
     rise_a, rise_b, rise_c, rise_d = gain[0], gain[1], gain[2], gain[3]
     back_a, back_b, back_c, back_d = back[0], back[1], back[2], back[3]
@@ -69,10 +67,8 @@ def _advance_four(a, b, c, d, decay, gain, back, weight, change, before, effecti
 
 @loop
 def commit(displacement, buffer, u, heights, offset, out):
-    """`u_new = displacement - buffer + heights(i - offset)`: put `u_new - u` into `buffer`, `u_new` into `out`.
-
-    The latter may be `u`.
-    """
+    """Put `u_new = displacement - buffer + heights(i - offset)` into `out`, which may be u, and `u_new - u` into
+    `buffer`."""
     nx = u.shape[1]
     start = offset % nx
     for j in range(u.shape[0]):
@@ -85,11 +81,11 @@ def commit(displacement, buffer, u, heights, offset, out):
 
 @loop
 def sum_measures(p, u, h, mask, above, cyclic):
-    """Over this rank's points: sum of p, points in contact, where `mask` is not 0, sum of `u - h`; how many cell sides
-    separate a point in contact from one that is not, along x and y, each counted once; largest p.
+    """Return, over the points of this rank: the sum of p; the number of points in contact, where `mask` is not 0; the
+    sum of `u - h`; the number of cell sides between a point in contact and one that is not; and the largest p.
 
-    `above` is the row of the mask before the first; the first point of a row has the last one before it if `cyclic`.
-    The largest pressure is kept for each column: that is as fast as a sum, which a single running maximum is not.
+    `above` is the row of the mask before the first. With `cyclic`, the last point of a row is the neighbour of the
+    first. The largest pressure is kept for each column, so that the loop is vectorized.
     """
     load, count, gaps, sides = 0.0, 0.0, 0.0, 0.0
     largest = np.zeros(p.shape[1], p.dtype)
@@ -115,11 +111,13 @@ def sum_measures(p, u, h, mask, above, cyclic):
 
 @loop
 def measure_yielded(p, u, h, above, below, cyclic, highest):
-    """Over this rank's points: sums for a contact whose pressures end at `highest`, where points have yielded.
+    """Return sums over the points of this rank for a contact whose pressures end at `highest`, where points have
+    yielded.
 
-    Returns the cells in excess on sharp edges, `sum 1 - p/highest` of points that lie between one that has yielded and
-    one without pressure; the sides between other points that have not yielded and points without pressure; the number
-    of points that have yielded, and their sum of `u - h`. `above` and `below` are the rows of p around these.
+    They are the excess cells on sharp edges, `sum 1 - p/highest` over points between one that has yielded and one
+    without pressure; the sides between other points below `highest` and points without pressure; the number of
+    points that have yielded, and their sum of `u - h`. `above` and `below` are the rows of p around those of this
+    rank.
     """
     ny, nx = p.shape
     sharp, sides, count, gaps = 0.0, 0.0, 0.0, 0.0
@@ -133,8 +131,8 @@ def measure_yielded(p, u, h, above, below, cyclic, highest):
                 left = p[j, i - 1] if i > 0 or cyclic else p[j, i]
                 right = p[j, i + 1] if i < nx - 1 else (p[j, 0] if cyclic else p[j, i])
                 open_sides = 0.0
-                for beside in (left, right, before[i], after[i]):
-                    open_sides += 0.0 if beside > 0.0 else 1.0
+                for neighbour in (left, right, before[i], after[i]):
+                    open_sides += 0.0 if neighbour > 0.0 else 1.0
                 if open_sides > 0.0 and max(left, right, before[i], after[i]) >= highest:
                     sharp += 1.0 - p[j, i] / highest
                 else:
@@ -144,14 +142,14 @@ def measure_yielded(p, u, h, above, below, cyclic, highest):
 
 @loop
 def embedded(branches, decay, increment, gain, before, past, p, u, heights, offset, first, stride):
-    """Over every so many rows: sums of p, of p e^2 with `e = sum decay_k h_k + gain increment + past before`, of p u^2,
-    of p times the squared difference of the heights h on both sides, those of `heights(i - offset)`, cyclic, of p h, of
-    p h^2 and of p increment^2.
+    """Return sums over every `stride`-th row, from `first` on: of p, of p e^2 with `e = sum decay_k h_k + gain
+    increment + past before`, of p u^2, of p times the squared difference of the heights h = `heights(i - offset)` on
+    both sides, of p h, of p h^2 and of p increment^2.
 
-    Points without pressure are passed over: each run of those with pressure is looked at for itself.
+    Points without pressure are skipped; each run of points with pressure is summed on its own.
     """
     count, ny, nx = branches.shape
-    load, apart, size, slope, height, square, turned = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    load, bent, size, slope, height, square, turned = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     back = (-1 - offset) % nx
     e = np.empty(nx, p.dtype)
     for j in range(first, ny, stride):
@@ -172,7 +170,7 @@ def embedded(branches, decay, increment, gain, before, past, p, u, heights, offs
                     run[i] += decay[k] * branch[i]
             for i in range(here.size):
                 load += here[i]
-                apart += here[i] * run[i] * run[i]
+                bent += here[i] * run[i] * run[i]
                 size += here[i] * flat[i] * flat[i]
                 turned += here[i] * moved[i] * moved[i]
             for i in range(start, end):
@@ -183,12 +181,12 @@ def embedded(branches, decay, increment, gain, before, past, p, u, heights, offs
                 middle = heights[j, left + 1 if left + 1 < nx else 0]
                 height += p[j, i] * middle
                 square += p[j, i] * middle * middle
-    return load, apart, size, slope, height, square, turned
+    return load, bent, size, slope, height, square, turned
 
 
 @loop
 def dot(a, b):
-    """Sum of a b."""
+    """Return the sum of a b."""
     total = 0.0
     for j in range(a.shape[0]):
         row = 0.0
@@ -200,7 +198,7 @@ def dot(a, b):
 
 @loop
 def work(p, alpha, p_old, alpha_old, du):
-    """Sum of `(alpha p + alpha_old p_old)/2 du`: the work of a pressure that changes linearly with u."""
+    """Return the sum of `(alpha p + alpha_old p_old)/2 du`: the work of a pressure that changes linearly with u."""
     total = 0.0
     for j in range(p.shape[0]):
         row = 0.0
@@ -212,10 +210,11 @@ def work(p, alpha, p_old, alpha_old, du):
 
 @loop
 def travel(p, p_old, factor, factor_old, shift, lower, upper, out):
-    """Extrapolate a pressure that moves with the surface: `out = S (factor p - factor_old S p_old)`, within bounds.
+    """Extrapolate a pressure that moves with the surface: put `S (factor p - factor_old S p_old)`, within bounds, into
+    `out`.
 
-    S moves by `shift` cells along x (cyclic); `out` may be `p_old`. Whole cells keep the contact sharp: interpolated
-    between cells it would spread, which costs a solver more than being off by half a cell.
+    S shifts by `shift` cells along x (cyclic); `out` may be `p_old`. Whole cells keep the contact sharp.
+    Interpolation between cells would spread it, which costs more iterations than an error of half a cell.
     """
     ny, nx = p.shape
     start = shift % nx
@@ -229,11 +228,11 @@ def travel(p, p_old, factor, factor_old, shift, lower, upper, out):
 
 @loop
 def tangential(p, h, rows, phase_x, phase_y, along_x, along_y, weight):
-    """Tangential forces of a pressure on a surface from their spectra: `sum weight Re(conj(p) i along h)`.
+    """Return the tangential forces of a pressure along x and y from spectra: `sum weight Re(conj(p) i along h)`.
 
-    Of h there are only these rows and the first columns; it is moved by `phase_x phase_y`. Along x and y: `along_x`,
-    `along_y` are the slope symbols (the wavenumber for the exact slope), `weight` the multiplicity of a column of the
-    half spectrum.
+    h has the given `rows` and the first columns only, and is moved by `phase_x phase_y`. `along_x` and `along_y` are
+    the slope symbols (the wavenumber for the exact slope), `weight` is the multiplicity of a column of the half
+    spectrum.
     """
     force_x, force_y = 0.0, 0.0
     for k in range(h.shape[0]):
@@ -251,8 +250,8 @@ def tangential(p, h, rows, phase_x, phase_y, along_x, along_y, weight):
 
 @loop
 def displace(h, rows, along_x, along_y, out):
-    """Spectrum of moved heights, of which h has these rows and the first columns: `out = along_x along_y h` there, the
-    phases of the shift, 0 elsewhere."""
+    """Put the spectrum of moved heights into `out`: `along_x along_y h` with the phases of the shift on the `rows` and
+    first columns of h, 0 elsewhere."""
     out[:] = 0.0
     for k in range(h.shape[0]):
         j = rows[k]
@@ -262,13 +261,13 @@ def displace(h, rows, along_x, along_y, out):
 
 @loop
 def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
-    """Advance all waves of heat, form the spectrum of the temperature in `out`, and keep the present sources; return
-    the sum of the temperature at depth times what is pressed (`physics.heat_memory`).
+    """Advance all waves of heat, put the spectrum of the temperature into `out`, and store the present sources. Return
+    the sum of the temperature at depth times the pressure (`physics.heat_memory`), without the mean.
 
-    `known` are rates, weights, shares of heat at depth, decays and the end of the sum; `spread` the squares of the
-    wavenumbers times the diffusivity, and the multiplicity of columns; `sources` the spectra of what is rubbed and
-    pressed, each before the step and after. `out` may be one of the latter; without any rubbing these spectra have no
-    row. `heats` has the heat of both at the two ends of the step. The mean is left out of the sum.
+    `known` has rates, weights, shares of heat at depth, decays and the end of the sum; `spread` the squared
+    wavenumbers times the diffusivity, and the multiplicity of columns; `sources` the spectra of rubbing and
+    pressure, each before and after the step. `out` may be one of the latter; spectra without rubbing have no row.
+    `heats` has the heat of both at the two ends of the step.
     """
     rates, weights, deep, fall, end = known
     spread_x, spread_y, multiplicity = spread

@@ -1,4 +1,4 @@
-"""Love's coefficients: the displacement that a pressure constant on one cell causes, anywhere on the half space.
+"""Love's coefficients: the displacement of the half space under a pressure that is constant on one cell.
 
 For a shear modulus of 1 (A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377; paper, Eq. 2)
 
@@ -14,24 +14,24 @@ from ..parallel.fft import FFT
 from ..parallel.slab import Array
 from .convolution import ALL, wavenumbers
 
-NEAR = 4.0  # accuracy: cells: within this distance Love's primitive keeps all digits, beyond it six Gauss points do
+NEAR = 4.0  # accuracy: distance [cells] up to which Love's primitive is used; beyond it six Gauss points
 GAUSS_NODES, GAUSS_WEIGHTS = (tuple(values / 2) for values in np.polynomial.legendre.leggauss(6))
 
 
 def love(x: Array, y: Array, dx: float, dy: float, poisson: float = 0.5) -> Array:
-    """Displacement [length] at distance (x, y) from the centre of a `dx x dy` cell under unit pressure, for G = 1.
+    """Return the displacement [length] at (x, y) from the centre of a `dx x dy` cell under unit pressure, for G = 1.
 
-    Love (1929): `(1 - nu)/(2 pi)` times the integral of 1/r over the cell; relative error below 2e-14 at any distance.
+    The relative error is below 2e-14 at any distance.
     """
     return np.asarray(over_cell(x, y, dx, dy)) * (1.0 - poisson) / (2 * np.pi)
 
 
 @pointwise
 def over_cell(x, y, dx, dy):  # type: ignore[no-untyped-def]  # numba finds the types itself
-    """Integral of 1/r over a `dx x dy` cell at distance (x, y).
+    """Return the integral of 1/r over a `dx x dy` cell at distance (x, y).
 
-    Near by, the differences of the primitive `x asinh(y/|x|) + y asinh(x/|y|)` at the four corners. They cancel far
-    away: there each line of the cell across the farther direction is integrated in closed form, and then over lines.
+    Near the cell, these are differences of the primitive `x asinh(y/|x|) + y asinh(x/|y|)` at the four corners. Far
+    away they cancel: there the integral is in closed form along the nearer direction and numerical along the other.
     """
     x, y = abs(x), abs(y)
     if x * dy < y * dx:
@@ -59,12 +59,11 @@ def over_cell(x, y, dx, dy):  # type: ignore[no-untyped-def]  # numba finds the 
 
 
 def cell_factor(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> Array:
-    """Compliance of cell-constant pressure over that of a sampled wave, for each wavenumber; to 14 digits.
+    """Return the compliance of cell-constant pressure over that of a sampled wave, for each wavenumber; to 14 digits.
 
-    On these rows of a spectrum; `size` is that of the box.
-
-    A wave of pressures constant on cells contains all aliases of its wavenumber, each with the cell's form factor:
-    `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) / |q+Q|` over the reciprocal lattice Q of the grid. With
+    `size` is that of the box, `rows` are those of a spectrum. A wave of cell-constant pressures contains all aliases
+    of its wavenumber, each with the form factor of the cell: `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) /
+    |q+Q|` over the reciprocal lattice Q of the grid. With
 
         1/|q| = 2/sqrt(pi) int_0^inf exp(-q^2 t^2) dt
 
@@ -83,9 +82,10 @@ def cell_factor(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> Array
 
 
 def _blurred_cell(b: Array, width: Array) -> Array:
-    """`sum_n sinc(b_n) exp(-(2 b_n width)^2)`, b_n = b + pi n: the sampled wave of a cell blurred by `width` [cells].
+    """Return `sum_n sinc(b_n) exp(-(2 b_n width)^2)`, b_n = b + pi n: the sampled wave of a cell blurred by `width`
+    [cells].
 
-    Shape (width, b). The sum over aliases converges fast for wide blurs; for narrow ones that over cells, with
+    Shape (width, b). The sum over aliases converges fast for wide blurs. Narrow ones use the sum over cells, with
     the share of the blurred cell in each (Poisson's summation).
     """
     from scipy.special import erf  # slow to import, and of use to few

@@ -1,34 +1,31 @@
-"""Measures of one instant of a contact; the module loads nothing, so that tables are read at once."""
+"""Measures of one instant of a contact. This module imports no other, so that tables are read quickly."""
 
 import math
 from dataclasses import astuple, dataclass
 
-LONG_CELLS = 0.1  # power of the ratio of the sides of a cell, by which a side has less in excess: see `excess_of`
+LONG_CELLS = 0.1  # fitted: power of the ratio of sides in `excess_of`
 SIDE = (math.pi - 1.0 + math.log(2.0)) / 24.0  # physics: cells in excess per side of a cell on the edge of contact
 
 
 def excess_of(dx: float, dy: float, edges_follow_grid: bool = False) -> float:
-    """Return how many cells are in excess per side on the edge of contact, of cells with these sides.
+    """Return the excess of the counted contact area, in cells, per cell side on its edge, for cells of sides dx and dy.
 
-    On squares it is SIDE. Where cells are long edges of contact are rather along their longer sides, and fewer cells
-    are in excess: with sides of 4 : 1 0.80 of it where the surface slides along the shorter ones, 0.91 of elastic
-    bodies at rest; with 8 : 1 0.70 and 0.86 (14 rough surfaces of 2 to 91 % contact, against meshes up to eight times
-    as fine). The power LONG_CELLS of the ratio is between both. Edges that are `straight` along the grid have none of
-    this.
+    On squares it is SIDE. On long cells it is smaller, as edges of contact run rather along the longer sides: SIDE
+    times the ratio of sides to the power LONG_CELLS. It is SIDE if `edges_follow_grid`.
     """
     return SIDE if edges_follow_grid else SIDE * (min(dx, dy) / max(dx, dy)) ** LONG_CELLS
 
 
 @dataclass(frozen=True)
 class Measures:
-    """One instant: pressures [Pa], forces [N] on the rigid surface, lengths [m]; area as a share of the nominal.
+    """One instant: pressures [Pa], forces [N] on the rigid surface, lengths [m]; areas are shares of the nominal area.
 
-    `contact_area` counts the points with pressure; `contact_area_corrected` takes off what that counts too many along
-    the edges of contact. It holds in the mean over edges in all directions that are smooth on the scale of a cell:
-    spheres and rough surfaces whose shortest wave has 4 cells or more. The edge of the box is no edge of contact.
-    `spared` is the share by which less is taken off, as points on the edge have yielded.
-    `at_edge` says that an isolated contact reaches it. Forces and `friction` hold what an interface adds, which is
-    `force_interface`, against the sliding, and `friction_interface`. Friction is 0 where no load presses.
+    `contact_area` counts the points with pressure. `contact_area_corrected` subtracts the excess along edges of
+    contact. It holds on average over edges in all directions that are smooth on the scale of a cell: spheres, and
+    rough surfaces whose shortest wave has at least 4 cells. The edge of the box is not an edge of contact. `spared`
+    is the share that is not subtracted because points on the edge have yielded. `at_edge`: an isolated contact
+    reaches the edge of the box. Forces and `friction` include the interface, whose part is `force_interface` and
+    `friction_interface`. Friction is 0 without a compressive load.
     """
 
     pressure: float = 0.0
@@ -52,9 +49,7 @@ class Measures:
 
     @property
     def friction_x(self) -> float:
-        """Tangential over normal force along x, positive where it opposes motion along +x: `-force_x/normal force`.
-
-        Unlike `friction` it changes its sign with the direction of sliding; 0 at zero load.
-        """
+        """Tangential over normal force along x, `-force_x/normal force`, positive where it opposes motion along +x; 0
+        at zero load."""
         force = math.hypot(self.force_x, self.force_y)
         return 0.0 - self.friction * (self.force_x / force) if force > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""Where the rigid surface is: `h(x, t) = h0(x - s(t))`, with s its displacement [m]."""
+"""Position of the rigid surface: `h(x, t) = h0(x - s(t))`, with s its displacement [m]."""
 
 from typing import Protocol
 
@@ -7,27 +7,27 @@ from .body import MovedHeights
 from .surface import Surface
 
 Vector = tuple[float, float]
-PARTS = 10**9  # accuracy: of a cell: nearer positions are the same but for rounding, as those whole cells apart
+PARTS = 10**9  # accuracy: positions are rounded to this fraction of a cell
 
 
 def cells_between(old: Vector, new: Vector, cell: Vector) -> Vector:
-    """By how many cells, along x and y, the surface moves from one displacement [m] to another."""
+    """Return by how many cells, along x and y, the surface moves from one displacement [m] to another."""
     return (new[0] - old[0]) / cell[0], (new[1] - old[1]) / cell[1]
 
 
 def are_whole(cells: Vector) -> bool:
-    """True for a displacement of whole cells."""
+    """Return True for a displacement of whole cells."""
     return all(abs(moved - round(moved)) <= SAME_PLACE for moved in cells)
 
 
 class Motion(Protocol):
-    """Heights of the surface at a displacement; collective."""
+    """Heights of the surface at a displacement [m]; collective."""
 
     def at(self, displacement: tuple[float, float]) -> MovedHeights: ...
 
 
 class AnyFraction:
-    """Any fraction of a cell in any direction: the heights are made anew when the surface has moved."""
+    """Motion by any fraction of a cell in any direction: the heights are computed again after each motion."""
 
     def __init__(self, surface: Surface) -> None:
         self._surface = surface
@@ -43,8 +43,10 @@ class AnyFraction:
 
 
 class AlongX:
-    """Sliding along x on a periodic box, by whole cells or (PARTS) by parts of a cell: one map, made anew when the part
-    of a cell beside the whole ones has changed, and an index offset for these."""
+    """Motion along x on a periodic box, by whole cells or (PARTS) by parts of a cell.
+
+    Whole cells are an index offset; the map is computed again when the fraction of a cell has changed.
+    """
 
     def __init__(self, surface: Surface, parts: int = 1) -> None:
         self._surface, self._parts, self._part = surface, parts, 0

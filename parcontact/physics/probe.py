@@ -1,14 +1,14 @@
-"""Measures of a step, in SI: load, tangential force, contact area, gaps, energies.
+"""Measures of a step, in SI units: load, tangential force, contact area, gaps.
 
-Contact counted in cells is too large: a cell counts as a whole when the edge of contact goes through it. With the
-length S of all edges of contact, measured along the sides of cells of length dx, the area is in the mean
-`A - (pi - 1 + ln 2)/24 S dx` (V. A. Yastrebov, G. Anciaux, J.-F. Molinari, Tribology International 114 (2017) 161,
-arXiv:1701.02727). In cells that is `SIDE` for each side between a point in contact and one that is not. Where cells are
-longer than wide it is less (`measures.excess_of`).
+Counted in cells, the contact area is too large, as a cell on the edge of contact counts as a whole. With the length
+S of all edges of contact along the sides of cells of length dx, the area is on average `A - (pi - 1 + ln 2)/24 S dx`
+(V. A. Yastrebov, G. Anciaux, J.-F. Molinari, Tribology International 114 (2017) 161, arXiv:1701.02727). In cells
+this is `SIDE` for each side between a point in contact and one that is not, and less on long cells
+(`measures.excess_of`).
 
-That takes it that the pressure goes to 0 at the edge. Where a counterbody yields it ends at the hardness H there, and a
-point on the edge bears the share p/H of it on which there is contact: `1 - p/H` of a cell is in excess, and nothing at
-points that have yielded. Where the pressure falls from H to 0 over several cells the edge is as without yielding.
+This holds if the pressure falls to 0 at the edge. Where a counterbody yields, it ends at the hardness H, and a point
+on the edge carries the share p/H of it: the excess is `1 - p/H` of a cell, and 0 at points that have yielded. Where
+the pressure falls from H to 0 over several cells, the edge is as without yielding.
 """
 
 import math
@@ -26,12 +26,12 @@ from .measures import Measures, excess_of
 from .surface import Surface
 from .units import Units
 
-YIELDED = 1e-6  # accuracy: relative: of pressures as near to the hardness as this a point has yielded
+YIELDED = 1e-6  # accuracy: relative distance of a pressure to the hardness up to which a point counts as yielded
 
 
 class _Yielding(NamedTuple):
-    """Sums over all points of a contact that may yield: cells in excess on its edge, points that have yielded, and
-    their gaps, which are negative."""
+    """Sums over all points of a contact that may yield: excess cells on its edge, points that have yielded, and their
+    gaps, which are negative."""
 
     excess: float
     points: float
@@ -40,7 +40,7 @@ class _Yielding(NamedTuple):
 
 @dataclass(frozen=True)
 class Probe:
-    """Probe that turns the maps of a solved step into measures; pressures are bounded by the `hardness` [Pa]."""
+    """Computes measures from the maps of a solved step; pressures are bounded by the `hardness` [Pa]."""
 
     slab: Slab
     surface: Surface
@@ -50,7 +50,7 @@ class Probe:
 
     @property
     def _excess(self) -> float:
-        """Cells in excess per side on the edge of contact."""
+        """Excess cells per side on the edge of contact."""
         (lx, ly), slab = self.surface.size, self.slab
         return excess_of(lx / slab.nx, ly / slab.ny, 1 in (slab.nx, slab.ny))
 
@@ -66,12 +66,12 @@ class Probe:
         velocity: Vector = (0.0, 0.0),
         least_load: float = 0.0,
     ) -> Measures:
-        """Measure the pressure `alpha p`, with `u - h - d` the gap, the surface moved by `displacement` [m] and moving
-        with `velocity` [m/s]; collective.
+        """Return the measures of the pressure `alpha p` with the gap `u - h - d`; collective.
 
-        `touching` is a map that is not 0 where the surfaces touch. Friction is 0 where no load presses: none, tension,
-        or one up to `least_load` [N], as rounding leaves it of two forces that balance. Where nothing touches all
-        pressure is tension, and a load above 0 is an error of the solve.
+        The surface has moved by `displacement` [m] and moves with `velocity` [m/s]. `touching` is a map that is not
+        0 where the surfaces touch. Friction is 0 without a compressive load above `least_load` [N], the rounding of
+        two forces that balance. If nothing touches, all pressure is tension, and a load above 0 is an error of the
+        solve.
         """
         units, points = self.units, self.slab.points
         along_x, along_y = self.surface.periodic
@@ -115,7 +115,7 @@ class Probe:
         )
 
     def _measure_yielded(self, p: Array, u: Array, h: Array, highest: float) -> _Yielding:
-        """Measure a contact whose pressures end at `highest`, in the unit of p; collective."""
+        """Return the sums for a contact whose pressures end at `highest`, in the unit of p; collective."""
         along_x, along_y = self.surface.periodic
         above, below = rows.around(self.slab, p, 1, along_y)
         found = loops.measure_yielded(p, u, h, above[0], below[0], along_x, (1.0 - YIELDED) * highest)
@@ -124,8 +124,7 @@ class Probe:
 
 
 def _touches_edge(slab: Slab, touching: NDArray[Any], periodic: tuple[bool, bool]) -> float:
-    """Return 1 if the surfaces touch on this rank at a free edge of the box, across which there is more than one
-    point."""
+    """Return 1 if the surfaces touch on this rank at a free edge of the box, in a direction with several points."""
     sides = [touching[:, 0], touching[:, -1]] if slab.nx > 1 and not periodic[0] else []
     if slab.ny > 1 and len(touching) and not periodic[1]:
         sides += [touching[0]] * (slab.rows.start == 0) + [touching[-1]] * (slab.rows.stop == slab.ny)

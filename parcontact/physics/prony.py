@@ -3,8 +3,8 @@
     G(t) = G_inf + sum_j G_j exp(-t/tau_j)
 
 Source: J. D. Ferry, Viscoelastic Properties of Polymers (1980), chapters 1 and 3; the Zener branch is Eq. (4) of the
-paper "Transient frictionless contact of a rough rigid surface on a viscoelastic half-space". A term may have relaxation
-time 0 (no stress after the first instant) or infinity (a spring).
+paper "Transient frictionless contact of a rough rigid surface on a viscoelastic half-space". Relaxation times may be
+0 (no stress after the first instant) or infinite (a spring).
 """
 
 import math
@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-BEND_SERIES = 1.0  # rounding: z below which q is summed as a series, to sixteen digits
+BEND_SERIES = 1.0  # rounding: z below which q is a series, to sixteen digits
 BEND_TERMS = [0.5 * n / math.factorial(n + 2) for n in range(1, 18)]
 Integrator = Literal["exponential", "exponential-linear", "backward-euler"]
-Moduli = tuple[float, ArrayLike, ArrayLike]  # long-term modulus (Pa), moduli (Pa), relaxation times (s); a Prony is one
+Moduli = tuple[float, ArrayLike, ArrayLike]  # long-term modulus (Pa), moduli (Pa), relaxation times (s), as in Prony
 
 
 class Prony(NamedTuple):
-    """A relaxation function: long-term shear modulus (Pa), then moduli (Pa) and relaxation times (s) of its terms."""
+    """Relaxation function: long-term shear modulus [Pa], and moduli [Pa] and relaxation times [s] of its terms."""
 
     modulus_inf: float
     moduli: Array
@@ -38,13 +38,13 @@ class CreepSpectrum(NamedTuple):
     fluidity: float
 
     def compliance(self, t: ArrayLike) -> Array:
-        """J(t) in 1/Pa for times t >= 0 (s, any shape)."""
+        """Return J(t) [1/Pa] for times t >= 0 [s], any shape."""
         t = np.asarray(t, float)
         delayed = -np.expm1(-t[..., None] / self.retardation_times) @ self.compliances
         return np.asarray(self.glass + delayed + self.fluidity * t)
 
     def time(self, compliance: float) -> float:
-        """The time t at which J(t) = `compliance`, in s: 0 if it is so from the start, inf if it never is."""
+        """Return the time t [s] at which J(t) = `compliance`: 0 if J(0) is larger, inf if J never reaches it."""
         from scipy.optimize import brentq  # slow to import, and of use to few
 
         growth = compliance - self.glass
@@ -62,9 +62,9 @@ class CreepSpectrum(NamedTuple):
 
 
 def normal_form(modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Prony:
-    """The same series with ascending, distinct, positive and finite relaxation times and positive moduli.
+    """Return the same series with ascending, distinct, positive and finite relaxation times and positive moduli.
 
-    Raises ValueError for numbers that are no relaxation function.
+    Raises ValueError for numbers that do not define a relaxation function.
     """
     terms, times = np.atleast_1d(np.asarray(moduli, float)), np.atleast_1d(np.asarray(relaxation_times, float))
     if terms.shape != times.shape or terms.ndim != 1:
@@ -82,12 +82,12 @@ def normal_form(modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLi
 def zener_to_prony(
     series_modulus: ArrayLike, kelvin_modulus: ArrayLike, kelvin_viscosity: ArrayLike, modulus_inf: float = 0.0
 ) -> Prony:
-    """The Prony series of Zener branches in parallel with a spring `modulus_inf`.
+    """Return the Prony series of Zener branches in parallel with a spring `modulus_inf`.
 
-    A branch is a spring G0 (`series_modulus`, Pa) in series with a spring G1 (`kelvin_modulus`, Pa) and a dashpot eta1
-    (`kelvin_viscosity`, Pa s) that are parallel. It adds G0 G1/(G0 + G1) to the long-term modulus and one term with
-    modulus G0^2/(G0 + G1) and relaxation time eta1/(G0 + G1). G1 = 0 is a Maxwell branch; eta1 = 0 leaves the two
-    springs (relaxation time 0), eta1 = inf leaves G0 (relaxation time inf).
+    A branch is a spring G0 (`series_modulus`, Pa) in series with a spring G1 (`kelvin_modulus`, Pa) and a dashpot
+    eta1 (`kelvin_viscosity`, Pa s) that are parallel. It adds G0 G1/(G0 + G1) to the long-term modulus and one term
+    with modulus G0^2/(G0 + G1) and relaxation time eta1/(G0 + G1). G1 = 0 is a Maxwell branch; eta1 = 0 leaves the
+    two springs (relaxation time 0), eta1 = inf leaves G0 (relaxation time inf).
     """
     g0, g1, eta1 = (
         np.atleast_1d(np.asarray(value, float)) for value in (series_modulus, kelvin_modulus, kelvin_viscosity)
@@ -99,22 +99,24 @@ def zener_to_prony(
 
 
 def relaxation(t: ArrayLike, *material: *Moduli) -> Array:
-    """G(t) in Pa for times t >= 0 (s, any shape); t = 0 is the instant after the step."""
+    """Return G(t) [Pa] for times t >= 0 [s], any shape; t = 0 is the instant after the step."""
     spring, terms, times = normal_form(*material)
     return np.asarray(spring + np.exp(-np.asarray(t, float)[..., None] / times) @ terms)
 
 
 def relaxation_integral(t: ArrayLike, *material: *Moduli) -> Array:
-    """The integral of G from 0 to t, in Pa s: the stress after time t (s, any shape) of straining at unit rate."""
+    """Return the integral of G from 0 to t [Pa s], the stress after straining at unit rate for the time t [s], any
+    shape."""
     spring, terms, times = normal_form(*material)
     t = np.asarray(t, float)
     return np.asarray(spring * t - np.expm1(-t[..., None] / times) @ (terms * times))
 
 
 def complex_modulus(omega: ArrayLike, *material: *Moduli) -> ComplexArray:
-    """G* = G' + i G'' in Pa at angular frequencies omega (rad/s, any shape and sign), for strains exp(+i omega t).
+    """Return G* = G' + i G'' [Pa] at angular frequencies omega [rad/s], any shape and sign, for strains exp(+i omega
+    t).
 
-    G*(omega) = G_inf + sum_j G_j i omega tau_j / (1 + i omega tau_j)
+        G*(omega) = G_inf + sum_j G_j i omega tau_j / (1 + i omega tau_j)
     """
     spring, terms, times = normal_form(*material)
     phase = 1j * np.asarray(omega, float)[..., None] * times
@@ -124,14 +126,14 @@ def complex_modulus(omega: ArrayLike, *material: *Moduli) -> ComplexArray:
 def discrete_modulus(
     omega: ArrayLike, dt: ArrayLike, *material: *Moduli, integrator: Integrator = "exponential"
 ) -> ComplexArray:
-    """The complex modulus (Pa) that time steps dt > 0 (s) give to a displacement sampled from exp(i omega t).
+    """Return the complex modulus [Pa] of time steps dt > 0 [s] for a displacement sampled from exp(i omega t).
 
     With z = exp(i omega dt) the terms of G_inf + sum_j H_j are
         backward Euler:      H_j = G_j (1 - 1/z) / (1 + dt/tau_j - 1/z)
         exponential-linear:  H_j = G_j phi_j (1 - 1/z) / (1 - exp(-dt/tau_j)/z)
         exponential:         H_j = G_j (phi_j + q_j (1 - 1/z)) (1 - 1/z) / (1 - exp(-dt/tau_j)/z)
-    (z-transforms of the recursions that `coefficients` has, for steps of one length.)
-    N steps per period is dt = 2 pi/(N omega). omega and dt broadcast.
+    (z-transforms of the recursions of `coefficients` for steps of one length.) N steps per period correspond to dt =
+    2 pi/(N omega). omega and dt broadcast.
     """
     spring, terms, times = normal_form(*material)
     omega, dt = (np.asarray(value, float)[..., None] for value in (omega, dt))
@@ -148,7 +150,7 @@ def discrete_modulus(
 
 
 def elapsed(prony: Prony, dt: float) -> Array:
-    """`z = dt/tau` of each branch, at most 1e100 so that nothing overflows."""
+    """Return `z = dt/tau` of each branch, at most 1e100 against overflow."""
     return np.asarray(dt / np.maximum(prony.relaxation_times, 1e-100 * dt))
 
 
@@ -162,10 +164,10 @@ class Advance(NamedTuple):
 
 
 def coefficients(prony: Prony, integrator: str, dt: float, growth: float = 0.0) -> Advance:
-    """Return how each branch advances over a step dt; dt = 0 is a jump, in which nothing relaxes.
+    """Return the coefficients of each branch over a step dt; dt = 0 is a jump, in which nothing relaxes.
 
-    `growth` is dt over the length of the step before, 0 where the displacement was not smooth: with it the exponential
-    integrator takes u to be quadratic in time (`physics.body`), else linear.
+    `growth` is dt over the length of the step before, 0 if the displacement was not smooth: with it the exponential
+    integrator takes u as quadratic in time (`physics.body`), else as linear.
     """
     z = elapsed(prony, dt)
     if integrator == "backward-euler":
@@ -176,8 +178,8 @@ def coefficients(prony: Prony, integrator: str, dt: float, growth: float = 0.0) 
 
 
 def bend(z: ArrayLike) -> Array:
-    """Return `q(z) = int_0^1 exp(-z x) (1/2 - x) dx`, `(1 + exp(-z))/(2 z) - (1 - exp(-z))/z^2`: what a branch keeps of
-    a bend of the displacement within a step `z = dt/tau`."""
+    """Return `q(z) = int_0^1 exp(-z x) (1/2 - x) dx = (1 + exp(-z))/(2 z) - (1 - exp(-z))/z^2`, the response of a
+    branch to a bend of the displacement within a step `z = dt/tau`."""
     z = np.asarray(z, float)
     safe = np.maximum(z, BEND_SERIES)
     lost = np.expm1(-safe)
@@ -187,12 +189,12 @@ def bend(z: ArrayLike) -> Array:
 
 
 def creep_spectrum(*material: *Moduli) -> CreepSpectrum:
-    """The creep compliance that belongs to a relaxation function, by partial fractions of 1/Gbar.
+    """Return the creep compliance of a relaxation function, by partial fractions of 1/Gbar.
 
     Gbar(s) = G_inf + sum_j G_j s tau_j/(1 + s tau_j) is zero at s = -1/lambda_i, one lambda_i above every relaxation
-    time (the last one is infinite, a flow, where G_inf = 0), and J_i = -1/(s Gbar'(s)) there. Each zero is found as the
-    logarithm of its distance to the nearer pole, so that no digits are lost however close they are or however many
-    decades the times span.
+    time (the last one is infinite, a flow, if G_inf = 0), and J_i = -1/(s Gbar'(s)) there. The unknown of each zero
+    is the logarithm of its distance to the nearer pole, so that no digits are lost, however close or far the times
+    are.
     """
     series = normal_form(*material)
     spring, terms, times = series
@@ -204,12 +206,14 @@ def creep_spectrum(*material: *Moduli) -> CreepSpectrum:
 
 
 def creep(t: ArrayLike, *material: *Moduli) -> Array:
-    """The creep compliance J(t) in 1/Pa for times t >= 0 (s, any shape): the strain after a unit step of stress."""
+    """Return the creep compliance J(t) [1/Pa] for times t >= 0 [s], any shape: the strain after a unit step
+    of stress."""
     return creep_spectrum(*material).compliance(t)
 
 
 def _zero_above(index: int, series: Prony) -> tuple[float, Array]:
-    """The zero lambda of f = G_inf + sum_k G_k tau_k/(tau_k - lambda) above tau[index], and every tau_k - lambda."""
+    """Return the zero lambda of f = G_inf + sum_k G_k tau_k/(tau_k - lambda) above tau[index], and all
+    tau_k - lambda."""
     from scipy.optimize import brentq
 
     pole, sign, room = _nearer_pole(index, series)
@@ -223,7 +227,8 @@ def _zero_above(index: int, series: Prony) -> tuple[float, Array]:
 
 
 def _nearer_pole(index: int, series: Prony) -> tuple[int, int, float]:
-    """The pole nearer to the zero above tau[index], the side of it (+1 above) and the largest possible distance."""
+    """Return the pole nearer to the zero above tau[index], the side of it (+1 above) and the largest
+    possible distance."""
     spring, terms, times = series
     if index == times.size - 1:
         return index, 1, times[index] * terms.sum() / spring
@@ -232,7 +237,7 @@ def _nearer_pole(index: int, series: Prony) -> tuple[int, int, float]:
 
 
 def _split(pole: int, offset: float, series: Prony) -> tuple[float, float]:
-    """f at lambda = tau[pole] + offset, as the term of that pole and the rest."""
+    """Return f at lambda = tau[pole] + offset as the term of that pole and the rest."""
     spring, terms, times = series
     others = np.arange(times.size) != pole
     distances = times[others] - times[pole] - offset

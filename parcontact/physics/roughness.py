@@ -3,8 +3,8 @@
     Phi(k) = C                             long-wavelength end <= k < roll-off
              C (k/k_r)^(-2 (1 + hurst))    roll-off <= k < short-wavelength end
 
-with `|FFT(h)|^2 = Phi (nx ny)^2 / area`. Each wave has its own random numbers, drawn from a stream that belongs to its
-x-wavenumber: the same seed gives the same waves on every grid and every number of ranks, and no rank holds the whole.
+with `|FFT(h)|^2 = Phi (nx ny)^2 / area`. The random numbers of a wave come from a stream that depends on the seed
+and its x-wavenumber: a seed gives the same waves on every grid and any number of ranks, and no rank holds the whole.
 """
 
 from collections.abc import Callable
@@ -18,17 +18,17 @@ from ..parallel.slab import Array
 from .convolution import wavenumbers
 from .lowest import rows_of
 
-BEYOND = 0.01  # accuracy: of the mean square slope, to which friction is proportional: shorter waves do not count
-BIN = 0.01  # accuracy: of the logarithm of a wavenumber: a shortest wave is known to half of that
-EDGE = 1.0 - 1e-9  # accuracy: wavenumbers equal to a limit up to round-off are taken as equal to it
+BEYOND = 0.01  # accuracy: share of the mean square slope in waves that `shortest_wave` ignores
+BIN = 0.01  # accuracy: bins of log wavenumber; the error of a shortest wave is half of it
+EDGE = 1.0 - 1e-9  # accuracy: factor on limits of wavenumbers, against rounding
 
 
 @dataclass(frozen=True)
 class Roughness:
-    """Parameters of one random surface; lengths in m. One of rms slope, rms height and spectral constant is given.
+    """Parameters of a random surface; lengths in m. One of rms slope, rms height and spectral constant is given.
 
-    `stretch` is a ratio and an angle [rad]: Phi depends on the length of (ratio k_along, k_across), so that waves along
-    the angle are longer by that ratio than waves across it.
+    `stretch` is a ratio and an angle [rad]: Phi depends on the length of (ratio k_along, k_across), so that waves
+    along the angle are longer by this ratio than waves across it.
     """
 
     hurst: float
@@ -44,7 +44,7 @@ class Roughness:
     measured: Callable[[Array], Array] | None = None  # Phi/C at k instead of the power law
 
     def density(self, k: Array) -> Array:
-        """Phi(k)/C at wavenumbers k [rad/m]."""
+        """Return Phi(k)/C at wavenumbers k [rad/m]."""
         k_long, k_rolloff, k_short = (
             2 * np.pi / length for length in (self.long_wavelength, self.rolloff_wavelength, self.short_wavelength)
         )
@@ -54,9 +54,9 @@ class Roughness:
         return np.where(inside, np.maximum(k / k_rolloff, 1.0) ** (-2.0 * (1.0 + self.hurst)), 0.0)
 
     def spectrum(self, fft: FFT, size: tuple[float, float]) -> Spectrum:
-        """This rank's part of the transform of the heights [m] on a box of `size` [m]; collective.
+        """Return this rank's part of the transform of the heights [m] on a box of `size` [m]; collective.
 
-        Raises InputError when no wave of the box lies within the limits.
+        Raises InputError if no wave of the box lies within the limits.
         """
         kx, ky = wavenumbers(fft, size)
         k, (ratio, angle) = np.hypot(kx, ky), self.stretch
@@ -70,7 +70,7 @@ class Roughness:
         return np.asarray(waves * (self._amplitude(square_height, square_slope, size) * fft.mx * fft.my))
 
     def _amplitude(self, square_height: float, square_slope: float, size: tuple[float, float]) -> float:
-        """The factor of a surface of C = area 1 m^4 with the given mean squares."""
+        """Return the factor for a surface of C = area 1 m^4 with the given mean squares."""
         if self.rms_slope is not None:
             return float(self.rms_slope / np.sqrt(square_slope))
         if self.rms_height is not None:
@@ -80,13 +80,13 @@ class Roughness:
         raise ValueError("one of rms_slope, rms_height and psd_constant is needed")
 
     def _key(self, index_x: int) -> list[int]:
-        """Seed of the waves with one wavenumber along x; a seed of more than 64 bits is hashed with it."""
+        """Return the seed of the waves with one wavenumber along x; seeds of more than 64 bits are hashed."""
         if self.seed < 2**64:
             return [self.seed, index_x]
         return np.random.SeedSequence([self.seed, index_x]).generate_state(2, np.uint64).tolist()
 
     def _random(self, fft: FFT, size: tuple[float, float]) -> Spectrum:
-        """Complex random amplitudes of mean square 1 (modulus 1 if they are fixed) for the waves within the limits."""
+        """Return random complex amplitudes of mean square 1 (modulus 1 if fixed) for the waves within the limits."""
         waves = np.zeros(fft.shape, dtype=np.complex128)
         last_x, last_y = (int(length / self.short_wavelength) for length in size)
         index_y = _alternating(min(last_y, (fft.my - 1) // 2))
@@ -105,7 +105,7 @@ class Roughness:
 
 
 def _alternating(last: int) -> Array:
-    """0, 1, -1, 2, -2, ..., last, -last: more waves never change the numbers of the first ones."""
+    """Return 0, 1, -1, 2, -2, ..., last, -last, so that further waves do not change the numbers of the first ones."""
     count = np.arange(1, last + 1)
     return np.concatenate([[0], np.stack([count, -count], axis=1).ravel()])
 
@@ -124,7 +124,7 @@ class Moments:
 
     @property
     def rms_slope(self) -> float:
-        """The rms of the gradient's length, both directions together."""
+        """Rms length of the gradient."""
         return float(np.sqrt(2.0 * self.m2))
 
     @property
@@ -134,8 +134,8 @@ class Moments:
 
 
 def moments(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> Moments:
-    """m0 = <h^2>, m2 = <|grad h|^2>/2, m4 = (3/8) <(laplace h)^2> of a map given by its transform, or by the lowest
-    waves of it if there are no others; collective."""
+    """Return m0 = <h^2>, m2 = <|grad h|^2>/2 and m4 = (3/8) <(laplace h)^2> of a map given by its transform or, if
+    there are no others, by its lowest waves; collective."""
     q, power = _powers(spectrum, fft, size)
     q2 = q**2
     m0, m2, m4 = fft.slab.sum(*(float(np.sum(power * weight)) for weight in (1.0, q2 / 2, 3 * q2**2 / 8)))
@@ -143,11 +143,8 @@ def moments(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> Moments:
 
 
 def shortest_wave(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> float:
-    """Return the length [m] of which waves that are shorter make BEYOND of the mean square slope at most, of a map that
-    is given as for `moments`; infinite of a flat one. Collective.
-
-    Of a rough surface it is the shortest wavelength or 3 % more, as the outermost ring of its waves has more than that.
-    """
+    """Return the wavelength [m] below which waves contribute at most BEYOND of the mean square slope, of a map given as
+    for `moments`; infinite for a flat map. Collective."""
     q, power = _powers(spectrum, fft, size)
     low = 2 * np.pi / max(size)
     highest = np.pi * np.hypot(fft.mx / size[0], fft.my / size[1])
@@ -161,7 +158,7 @@ def shortest_wave(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> fl
 
 
 def _powers(spectrum: Spectrum, fft: FFT, size: tuple[float, float]) -> tuple[Array, Array]:
-    """Return this rank's wavenumbers, and the mean square height of each wave; that of the mean is 0."""
+    """Return this rank's wavenumbers, and the mean square height of each wave; 0 for the mean."""
     rows, columns = rows_of(len(spectrum), fft.my), slice(spectrum.shape[1])
     qx, qy = wavenumbers(fft, size)
     q = np.hypot(qx[:, columns], qy[rows])

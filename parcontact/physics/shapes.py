@@ -1,4 +1,4 @@
-"""Smooth shapes known in closed form: they are evaluated where the surface is, at any fraction of a cell."""
+"""Smooth shapes in closed form, evaluated at any position of the surface."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -9,7 +9,7 @@ from ..parallel.slab import Array
 
 
 class Shape(Protocol):
-    """Heights and slopes at distances (x, y) from the shape's centre; any unit, the same for all lengths."""
+    """Heights and slopes at distances (x, y) from the centre of the shape; all lengths have one unit."""
 
     @property
     def centre(self) -> tuple[float, float]: ...
@@ -24,7 +24,7 @@ def _paraboloid(r2: Array, radius: float) -> tuple[Array, Array]:
 
 
 def _circle(r2: Array, radius: float) -> tuple[Array, Array]:
-    """Beyond the radius the body of the shape has ended: the height stays at its equator."""
+    """Return height and slope factor of a circle; beyond the radius the height stays at that of the equator."""
     inside = np.minimum(r2, radius**2)
     rest = np.sqrt(radius**2 - inside)
     inverse = np.divide(-1.0, rest, out=np.zeros_like(rest), where=rest > 0.0)
@@ -33,7 +33,8 @@ def _circle(r2: Array, radius: float) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Round:
-    """A sphere, or a cylinder along x or y, with its highest point (0) in the centre; parabolic or exact profile."""
+    """A sphere, or a cylinder along x or y, with its highest point (0) at the centre; the profile is parabolic or
+    exact."""
 
     radius: float
     centre: tuple[float, float]

@@ -1,16 +1,15 @@
-"""The tangential force of a pressure on the body's own surface, `-<p, du/ds>`, the second view of friction.
+"""Tangential force of a pressure on the surface of the body, `-<p, du/ds>`, the second estimate of friction.
 
-In the continuum it equals the force on the rigid surface, `-<p, dh/ds>` (paper, Eq. 10): the gap and its slope vanish
-where there is pressure. On a mesh the two differ, and their difference shows how wrong friction is by the mesh. On an
-elastic body the second is exactly 0, as the operator A is symmetric and any antisymmetric difference along s commutes
-with it.
+In the continuum it equals the force on the rigid surface, `-<p, dh/ds>` (paper, Eq. 10), as the gap and its slope
+vanish under pressure. On a mesh the difference of the two measures the mesh error of friction. On an elastic body
+the second is exactly 0, as the operator A is symmetric and any antisymmetric difference along s commutes with it.
 
 Slopes are differences of the eighth order,
 
     du/dx = sum_k c_k (u(x + k dx) - u(x - k dx))/dx,      c = 4/5, -1/5, 4/105, -1/280,
 
-which are within 0.03 % of those of a wave of 8 cells, and within 3 % of those of a wave of 4. Unlike the slope of a
-Fourier series they need only points near the contact, in periodic and in free boxes alike.
+with an error of 0.03 % for a wave of 8 cells and 3 % for a wave of 4. Unlike the slope of a Fourier series they need
+only points near the contact, in periodic and in free boxes.
 """
 
 import math
@@ -21,7 +20,7 @@ from ..compiled import loop
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 
-WIDTH = 4  # accuracy: points on each side of a difference
+WIDTH = 4  # accuracy: number of points on each side in a difference
 WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 
 
@@ -30,8 +29,8 @@ def friction_by_energy(
 ) -> float:
     """Return `-<p, du/ds>/<p, 1>` for the slope along a unit `direction`; collective.
 
-    `u` and `cell = (dx, dy)` are in units of their own: the result is in that of u over that of the cells. A box that
-    is not `cyclic` along x or y ends with columns or rows like its last ones.
+    The result is in the unit of `u` over that of `cell = (dx, dy)`. Where a box is not `cyclic`, its last columns or
+    rows continue beyond the edge.
     """
     along_x, along_y = direction[0] / cell[0], direction[1] / cell[1]
     if along_y == 0.0:
@@ -45,8 +44,8 @@ def friction_by_energy(
 
 @loop
 def _sums(p, u, above, below, along_x, along_y, cyclic):
-    """Sums of p and of p times the slope of u; `above` and `below` are the rows next to those of this rank, the nearest
-    first."""
+    """Return the sums of p and of p times the slope of u; `above` and `below` are the rows next to those of this rank,
+    the nearest first."""
     ny, nx = p.shape
     load, force = 0.0, 0.0
     line, slope = np.empty(nx + 2 * WIDTH), np.empty(nx)

@@ -1,8 +1,8 @@
-"""Heights of the rigid surface, wherever it has moved to, and the tangential force of a pressure on it.
+"""Heights of the rigid surface at any position, and the tangential force of a pressure on it.
 
-What is periodic and given by its waves (roughness, single waves, files) is kept as one transform and moved by a phase
-`exp(-i q s)`: exact for any fraction of a cell in any direction as long as there is nothing at the Nyquist wavenumber,
-which is taken as a standing wave. Shapes in closed form are evaluated anew. Every move starts from the original.
+Periodic parts given by waves (roughness, single waves, files) are stored as one transform and moved by a phase
+`exp(-i q s)`. This is exact for any fraction of a cell in any direction, except at the Nyquist wavenumber, which is
+taken as a standing wave. Shapes in closed form are evaluated at each position. Every move starts from the original.
 """
 
 import math
@@ -27,9 +27,9 @@ Indices = NDArray[np.intp]
 class Surface:
     """A sum of waves and shapes on a box of `size = (lx, ly)` [m].
 
-    `waves` is this rank's part of the transform of the periodic heights, or of its lowest waves (`lowest`) if there are
-    no others, or None; `periodic` wraps the shapes around the box along x and y; `scale` turns m into the unit of
-    heights; `datum` [m] is the height from which heights are counted.
+    `waves` is this rank's part of the transform of the periodic heights, or of its lowest waves (`lowest`), or None.
+    `periodic` wraps the shapes around the box along x and y; `scale` converts m to the unit of heights; heights are
+    relative to `datum` [m].
     """
 
     slab: Slab
@@ -46,16 +46,13 @@ class Surface:
         return self.size[0] / self.slab.nx, self.size[1] / self.slab.ny
 
     def rescale(self, unit: float) -> None:
-        """Give heights in this unit [m] from now on."""
+        """Change the unit of heights to `unit` [m]."""
         if self.waves is not None:
             self.waves *= 1.0 / unit / self.scale
         self.scale = 1.0 / unit
 
     def level(self) -> None:
-        """Count heights from the mean of the waves from now on; collective.
-
-        Contact does not depend on it, but the digits that a large constant costs do.
-        """
+        """Make heights relative to the mean of the waves, as a large constant costs digits; collective."""
         if self.waves is not None:
             owner = self.fft.columns.start == 0 < self.fft.columns.stop
             mean = self.slab.sum(float(self.waves[0, 0].real) if owner else 0.0)[0] / (self.fft.mx * self.fft.my)
@@ -64,7 +61,7 @@ class Surface:
                 self.waves[0, 0] = 0.0
 
     def heights(self, shift: tuple[float, float], out: Array) -> Array:
-        """Heights of the surface moved by `shift` [m], this rank's rows; collective."""
+        """Return the heights of the surface moved by `shift` [m], on the rows of this rank; collective."""
         if self.slab.only_counts:
             return out
         if self.waves is None:
@@ -77,9 +74,9 @@ class Surface:
         return out
 
     def forces(self, pressure: Array, shift: tuple[float, float]) -> list[float]:
-        """Sums over all points of pressure times slope along x and y; collective.
+        """Return the sums over all points of pressure times slope along x and y; collective.
 
-        That is the paper's Eq. 10 over the area of a cell; slopes are in the unit of heights over m.
+        This is Eq. 10 of the paper over the area of a cell; slopes are in the unit of heights over m.
         """
         along_x, along_y = 0.0, 0.0
         if self.waves is not None:
@@ -100,12 +97,13 @@ class Surface:
 
     @cached_property
     def _rows(self) -> NDArray[np.int64]:
-        """Which rows of a spectrum those of the waves are."""
+        """Rows of a spectrum that the waves have."""
         assert self.waves is not None
         return rows_of(len(self.waves), self.fft.my)
 
     def _shift_factors(self, shift: tuple[float, float]) -> tuple[Spectrum, Spectrum]:
-        """Factors along x and y that move a transform by `shift`; at the Nyquist wavenumber their real part."""
+        """Return the factors along x and y that move a transform by `shift`; at the Nyquist wavenumber
+        their real part."""
         factors = []
         for (q, nyquist), length, s in zip(self._wavenumbers, self.size, shift, strict=True):
             phase = np.exp(-1j * q * math.fmod(s, length))
@@ -115,7 +113,7 @@ class Surface:
 
     @cached_property
     def _wavenumbers(self) -> list[tuple[Array, Indices]]:
-        """Along x and y: this rank's wavenumbers, and where that of Nyquist is among them."""
+        """Wavenumbers of this rank along x and y, and the indices of the Nyquist wavenumber."""
         counts = self.fft.mx, self.fft.my
         return [
             (q.ravel(), np.flatnonzero(2 * np.abs(mode) == count))
@@ -124,7 +122,7 @@ class Surface:
 
     @cached_property
     def _slope_symbols(self) -> tuple[Array, Array]:
-        """Symbols in place of the wavenumber in a slope; 0 at that of Nyquist, whose slope vanishes on the grid."""
+        """Symbols of the slope: the wavenumber, and 0 at that of Nyquist, whose slope vanishes on the grid."""
         symbols = []
         for q, nyquist in self._wavenumbers:
             symbol = q.copy()
@@ -135,7 +133,8 @@ class Surface:
     # -- shapes -------------------------------------------------------------------------------------------------------
 
     def _distances(self, shape: Shape, shift: tuple[float, float]) -> tuple[Array, Array]:
-        """Distances from the moved centre of a shape, (1, nx) and (ny_loc, 1); the nearest image if periodic."""
+        """Return the distances from the moved centre of a shape, (1, nx) and (ny_loc, 1); from the nearest image if
+        periodic."""
         rows = self.slab.rows
         x = np.arange(self.slab.nx) * self.cell[0] - shape.centre[0] - shift[0]
         y = np.arange(rows.start, rows.stop) * self.cell[1] - shape.centre[1] - shift[1]
@@ -144,13 +143,13 @@ class Surface:
         return x[None, :], y[:, None]
 
     def _slopes(self, shape: Shape, shift: tuple[float, float], rows: Indices, columns: Indices) -> tuple[Array, Array]:
-        """Slopes of a shape at some of this rank's points."""
+        """Return the slopes of a shape at given points of this rank."""
         x, y = self._distances(shape, shift)
         return shape.slope(x[0, columns], y[rows, 0])
 
 
 def single_wave(fft: FFT, amplitude: float, waves: tuple[int, int], phase: float) -> Spectrum:
-    """This rank's part of the transform of `amplitude cos(2 pi (wx x/lx + wy y/ly) + phase)`."""
+    """Return this rank's part of the transform of `amplitude cos(2 pi (wx x/lx + wy y/ly) + phase)`."""
     spectrum = np.zeros(fft.shape, dtype=np.complex128)
     half = 0.5 * amplitude * fft.mx * fft.my * np.exp(1j * phase)
     for sign, value in ((1, half), (-1, half.conjugate())):

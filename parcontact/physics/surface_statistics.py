@@ -15,20 +15,22 @@ from scipy import fft
 
 from ..parallel.slab import Array
 
-BINS = 12  # tuning: per decade of wavenumbers
-FEWEST = 5  # accuracy: bins that a Hurst exponent is fitted to
-WHOLE = 0.99  # accuracy: share of the square slope up to which waves belong to a surface
-NARROWEST = math.log(3.0)  # of a range of wavenumbers
-STEADY = 0.3  # accuracy: rms of the logarithm around a power law above which a range is not self-affine
-FLAT, STEEP = -2.0, -4.2  # physics: slopes of Hurst exponents 0, and 1 with scatter; beyond, nothing is self-affine
+BINS = 12  # tuning: bins per decade of wavenumbers
+FEWEST = 5  # accuracy: least number of bins for a Hurst exponent
+WHOLE = 0.99  # accuracy: share of the mean square slope in waves used for a Hurst exponent
+NARROWEST = math.log(3.0)  # least range of log wavenumber for a Hurst exponent
+STEADY = 0.3  # accuracy: largest rms deviation of log C2 from a power law
+FLAT, STEEP = -2.0, -4.2  # physics: slopes of log C2 for Hurst exponents 0, and 1 with scatter
 
 
 @dataclass(frozen=True)
 class Statistics:
-    """Statistics of a periodic map of (ny, nx) points on (lx, ly) [m]: rms height [m], slope [-], and curvature [1/m],
-    half of the Laplacian; Nayak's parameter; `q`, shape (n,) [1/m], with `psd_2d` [m^4] and the spectra along x
-    and y, `psd_x`, `psd_y` [m^3] at `qx`, `qy`; `hurst`, with the standard error `hurst_error` of its fit, is NaN where
-    no power law holds."""
+    """Statistics of a periodic map of (ny, nx) points on (lx, ly) [m].
+
+    Rms height [m], slope [-], and curvature [1/m], half of the Laplacian; Nayak's parameter; `q`, shape (n,) [1/m],
+    with `psd_2d` [m^4]; spectra along x and y, `psd_x`, `psd_y` [m^3] at `qx`, `qy`. `hurst` with the standard error
+    `hurst_error` is NaN if no power law fits.
+    """
 
     rms_height: float
     rms_slope: float
@@ -60,15 +62,16 @@ def surface_statistics(heights: Array, size: tuple[float, float]) -> Statistics:
 
 
 def _under_window(heights: Array) -> Array:
-    """Return a map under a Hann window, without its mean there: what joins its edges, a jump or a smooth part that was
-    taken off, has no share in its spectrum."""
+    """Return a map under a Hann window, without its windowed mean. The window removes jumps at the edges and smooth
+    parts that were subtracted."""
     along = [np.hanning(n + 1)[:-1] if n > 1 else np.ones(1) for n in heights.shape]
     window = along[0][:, None] * along[1]
     return np.asarray((heights - (window * heights).sum() / window.sum()) * window / math.sqrt((window**2).mean()))
 
 
 def _over_directions(q: Array, power: Array, size: tuple[float, float]) -> tuple[Array, Array, Array]:
-    """Means over rings of wavenumbers, and the number of waves in each, which have an area 4 pi^2/(Lx Ly)."""
+    """Return means over rings of wavenumbers, and the number of waves in each ring; a wave has the area 4
+    pi^2/(Lx Ly)."""
     cell = 4 * np.pi**2 / (size[0] * size[1])
     known = q > 0.0
     if not known.any():
@@ -84,17 +87,18 @@ def _over_directions(q: Array, power: Array, size: tuple[float, float]) -> tuple
 
 
 def _along(power: Array, length: float) -> tuple[Array, Array]:
-    """Wavenumbers above 0 and the one-sided spectrum along one direction."""
+    """Return the wavenumbers above 0 and the one-sided spectrum along one direction."""
     highest = (power.size - 1) // 2
     both = power[1 : highest + 1] + power[-1 : -highest - 1 : -1]
     return 2 * np.pi / length * np.arange(1, highest + 1), both * length / (2 * np.pi)
 
 
 def _fit_hurst(q: Array, psd: Array, number: Array) -> tuple[float, float]:
-    """Return the exponent from the slope of log C2 over log q, -2 (1 + H), in the widest range that is a power law, and
-    its standard error. Rings count by their `number` of waves, as the mean over n waves scatters by n^-1/2.
+    """Return the Hurst exponent H from the slope -2 (1 + H) of log C2 over log q in the widest range with a power law,
+    and its standard error. Rings are weighted by their `number` of waves, as the mean over n waves scatters by
+    n^-1/2.
 
-    Waves beyond those that make up the slopes are what an instrument, a filter or an edge has left.
+    Waves that hardly contribute to slopes are excluded: they depend on instruments, filters and edges.
     """
     slopes = np.cumsum(psd * q**4)  # of rings as wide as their wavenumbers, as these are spaced
     used = (psd > 0.0) & (slopes <= WHOLE * slopes[-1:].sum())
@@ -112,8 +116,8 @@ def _fit_hurst(q: Array, psd: Array, number: Array) -> tuple[float, float]:
 
 
 def _fit_line(x: Array, y: Array, weights: Array) -> tuple[float, float, float]:
-    """Return the slope of a weighted straight line, its standard error from what is left (H. White, Econometrica 48
-    (1980) 817), and the rms of that."""
+    """Return the slope of a weighted line, its standard error from the residuals (H. White, Econometrica 48 (1980)
+    817), and their rms."""
     x, y = x - np.average(x, weights=weights), y - np.average(y, weights=weights)
     moment = float((weights * x * x).sum())
     slope = float((weights * x * y).sum()) / moment

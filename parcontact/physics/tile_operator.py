@@ -1,15 +1,15 @@
-"""Operators on tiles, and from tiles to the whole grid: they cost what the tiles have of points, not what the box has.
+"""Operators on tiles, and from tiles to the whole grid: their cost follows the points of tiles, not of the box.
 
-The coefficients between two tiles depend on their offset only, and are taken apart (P. P. Ewald, Ann. Phys. 369 (1921)
-253) with s a length and r the distance:
+The coefficients between two tiles depend on their offset only, and are split (P. P. Ewald, Ann. Phys. 369 (1921)
+253) with a length s and the distance r:
 
     1/r = (1 - erf(r/s))/r + erf(r/s)/r.
 
-The first part vanishes beyond `REACH s`: it is a cyclic convolution between tiles that are near each other, of twice
-their side. The second one varies over s: loads of points are given to the nodes of a regular grid, at distances of
-`s/FINENESS`, by the transposed interpolation of degree `ORDER - 1`; displacements of nodes are interpolated (A. Brandt
-and A. A. Lubrecht, J. Comput. Phys. 90 (1990) 348). Love's coefficients of both parts are means over a cell. What the
-two lengths leave out is below 1e-6 of the displacement.
+The first part vanishes beyond `REACH s`: it is a cyclic convolution between near tiles, of twice their side. The
+second part varies over s: loads of points are transferred to the nodes of a regular grid, at distances of
+`s/FINENESS`, by the transposed interpolation of degree `ORDER - 1`; displacements of nodes are interpolated (A.
+Brandt and A. A. Lubrecht, J. Comput. Phys. 90 (1990) 348). Love's coefficients of both parts are means over a cell.
+The error is below 1e-6 of the displacement.
 """
 
 import math
@@ -25,18 +25,21 @@ from ..parallel.tally import Tally
 from .convolution import Convolution, padded_lengths, tabulate
 from .tiles import SIDE, TileConvolution, Tiles, tiles_along
 
-ORDER = 8  # accuracy: nodes of an interpolation along each direction
-FINENESS = 6.0  # accuracy: distances of nodes in the length s
-REACH = 4.0  # accuracy: lengths s beyond which the first part is left out, which is 1.5e-8 there
-NODES = 256  # tuning: along the longer side of a box, at most, where a tile has enough of them
-FEWEST_NODES = 2  # along a tile
-FAR = 6.0  # lengths s beyond which erf is 1 in double precision
-GAUSS = 0.5 / math.sqrt(3.0)  # of a cell: places of two points whose mean is that over the cell, to third degree
+ORDER = 8  # accuracy: nodes per interpolation along each direction
+FINENESS = 6.0  # accuracy: s over the distance of nodes
+REACH = 4.0  # accuracy: distance over s beyond which the first part, then 1.5e-8, is left out
+NODES = 256  # tuning: largest number of nodes along the longer side of a box
+FEWEST_NODES = 2  # least number of nodes along a tile
+FAR = 6.0  # r/s beyond which erf is 1 in double precision
+GAUSS = 0.5 / math.sqrt(3.0)  # two-point Gauss rule over a cell
 
 
 class TileOperator:
-    """Pressure -> displacement on tiles: `near` are the coefficients of the first part at distances from 0 on along y
-    and x, and `nodes` do the second one."""
+    """Operator from pressure to displacement on tiles.
+
+    `near` has the coefficients of the first part at distances from 0 on along y and x; `nodes` computes the second
+    part.
+    """
 
     def __init__(self, tiles: Tiles, near: Array, nodes: "FreeNodes", tally: Tally) -> None:
         self._tiles, self._tally = tiles, tally
@@ -51,7 +54,7 @@ class TileOperator:
         self._nodes = nodes
 
     def apply(self, field: Array, out: Array) -> Array:
-        """Apply it to a stacked map, not in its place."""
+        """Put the displacement under a stacked map into `out`, another map."""
         self._near.apply(field, out)
         nodes, weights = self._displace_nodes(field), self._weights
         patches = np.stack([nodes[place] for place in self._places])
@@ -59,7 +62,7 @@ class TileOperator:
         return out
 
     def _displace_nodes(self, field: Array) -> Array:
-        """The second part's displacement of all nodes under a stacked map."""
+        """Return the second part of the displacement of all nodes under a stacked map."""
         nodes, weights = self._nodes.map, self._weights
         nodes.fill(0.0)
         patches = np.matmul(np.matmul(weights.T, field.reshape(-1, SIDE, SIDE)), weights)
@@ -69,8 +72,8 @@ class TileOperator:
         return nodes
 
     def displace(self, field: Array, parts: list[slice], take: Callable[[int, Array], None]) -> None:
-        """Hand the displacement of the whole grid under a stacked map on, for each part of its rows: `take(number of
-        the part, map of its rows)`, in their order."""
+        """Compute the displacement of the whole grid under a stacked map, and call `take(number, map)` for each part of
+        its rows, in their order."""
         nodes = self._displace_nodes(field)
         self._near.transform(field)
         nx, _ = self._tiles.points
@@ -90,7 +93,7 @@ class TileOperator:
             take(number, whole)
 
     def _interpolate_row(self, nodes: Array, row: int, across: int) -> Array:
-        """The displacement of nodes at the points of a row of tiles."""
+        """Return the displacement of nodes at the points of a row of tiles."""
         wide = self._per_tile + ORDER
         along_y = self._weights @ nodes[row * self._per_tile : row * self._per_tile + wide]
         windows = np.lib.stride_tricks.sliding_window_view(along_y, wide, axis=1)[:, :: self._per_tile]
@@ -98,7 +101,7 @@ class TileOperator:
 
 
 class FreeNodes:
-    """Nodes of tiles of a box with nothing around; `smooth(x, y)` is what one does at a distance."""
+    """Nodes of tiles of a free box; `smooth(x, y)` is the influence coefficient of a node."""
 
     def __init__(
         self, tiles: Tiles, size: tuple[float, float], smooth: Callable[[Array, Array], Array], tally: Tally
@@ -114,7 +117,7 @@ class FreeNodes:
         self._far = Convolution(padded, lambda rows: table[rows].real, np.float64)
 
     def displace(self) -> None:
-        """From loads to displacements, in their place."""
+        """Replace the loads in `map` by displacements."""
         self._far.apply(self.map, self.map)
 
 
@@ -125,8 +128,10 @@ def free_operator(
     coefficient: Callable[[Array, Array, float, float], Array],
     tally: Tally,
 ) -> TileOperator:
-    """Pressure -> displacement on tiles of a box of `size` with nothing around; `coefficient(x, y, dx, dy)` is the
-    displacement at a distance from a cell under a unit pressure, `poisson` of the half space."""
+    """Return the operator from pressure to displacement on tiles of a free box of `size`.
+
+    `coefficient(x, y, dx, dy)` is the displacement at a distance from a cell under unit pressure.
+    """
     dx, dy, length, count = _lengths(tiles, size)
     factor = (1.0 - poisson) / (2.0 * np.pi) * dx * dy
 
@@ -138,14 +143,14 @@ def free_operator(
 
 
 def _lengths(tiles: Tiles, size: tuple[float, float]) -> tuple[float, float, float, int]:
-    """Sides of a cell, the length s, and points up to where the first part ends, in whole tiles."""
+    """Return the sides of a cell, the length s, and the points of the first part, in whole tiles."""
     dx, dy = size[0] / tiles.points[0], size[1] / tiles.points[1]
     length = FINENESS * step_of_nodes(tiles) * max(dx, dy)
     return dx, dy, length, SIDE * (math.ceil(REACH * length / min(dx, dy) / SIDE) + 1)
 
 
 def step_of_nodes(tiles: Tiles) -> int:
-    """Points from one node to the next, a divisor of SIDE."""
+    """Return the distance of nodes in points, a divisor of SIDE."""
     step = 4
     while step * NODES < max(tiles.points) and step < SIDE // FEWEST_NODES:
         step *= 2
@@ -153,7 +158,7 @@ def step_of_nodes(tiles: Tiles) -> int:
 
 
 def _interpolation(step: int) -> NDArray[np.float64]:
-    """Weights of nodes for the points of a tile, shape (SIDE, nodes); ORDER/2 nodes are before the tile."""
+    """Return the weights of nodes for the points of a tile, shape (SIDE, nodes); ORDER/2 nodes precede the tile."""
     weights = np.zeros((SIDE, SIDE // step + ORDER))
     places = (np.arange(SIDE) + 0.5) / step - 0.5 + ORDER // 2
     for point, place in enumerate(places):
@@ -167,7 +172,7 @@ def _interpolation(step: int) -> NDArray[np.float64]:
 
 @pointwise
 def _mean_smooth(x, y, a, b, length):  # type: ignore[no-untyped-def]  # numba finds the types itself
-    """Mean of erf(r/length)/r over a cell."""
+    """Return the mean of erf(r/length)/r over a cell."""
     total, beyond = 0.0, FAR * length
     for i in (-1.0, 1.0):
         for j in (-1.0, 1.0):

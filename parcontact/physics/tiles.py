@@ -1,7 +1,7 @@
-"""Tiles of a grid, and convolutions between tiles that are near each other.
+"""Tiles of a grid, and convolutions between near tiles.
 
-Maps of T tiles of SIDE x SIDE points are stacked to one of `T SIDE` rows. The coefficients between two tiles depend on
-their offset only: the transforms of tiles, of twice their side, are multiplied and summed.
+Maps of T tiles of SIDE x SIDE points are stacked to one of `T SIDE` rows. The coefficients between two tiles depend
+on their offset only: the transforms of tiles, of twice their side, are multiplied and summed.
 """
 
 from collections.abc import Iterator
@@ -16,15 +16,15 @@ from ..parallel.fftw import pyfftw
 from ..parallel.slab import Array, allocate
 from ..parallel.tally import Tally
 
-SIDE = 32  # tuning: points of a tile; twice as many in its transforms
-REACH_OF_INVERSE = 1  # tuning: tiles
-LONGEST_CELL = 2.0  # tuning: times its width: beyond it too many tiles are near each other
+SIDE = 32  # tuning: side of a tile [points]; transforms have twice as many
+REACH_OF_INVERSE = 1  # tuning: reach of `tile_inverse` [tiles]
+LONGEST_CELL = 2.0  # tuning: largest ratio of sides of a cell for which tiles are used
 
 
 @dataclass(frozen=True)
 class Tiles:
-    """Tiles of a grid of `points = (nx, ny)`: their rows and columns among all tiles; the last ones may be cut off by
-    the end of the grid."""
+    """Tiles of a grid of `points = (nx, ny)`, given by their rows and columns among all tiles. The end of the grid may
+    cut the last ones."""
 
     points: tuple[int, int]
     rows: NDArray[np.intp]
@@ -41,7 +41,7 @@ class Tiles:
 
     @cached_property
     def numbers(self) -> NDArray[np.intp]:
-        """The number of each tile of the grid, -1 for those that are not there."""
+        """Number of each tile of the grid, -1 for absent tiles."""
         across, down = tiles_along(self.points)
         numbers = np.full((down, across), -1)
         numbers[self.rows, self.columns] = np.arange(self.count)
@@ -54,9 +54,9 @@ def tiles_along(points: tuple[int, int]) -> tuple[int, int]:
 
 
 class TileConvolution:
-    """A convolution between tiles that are at most `reach` tiles apart along x and y.
+    """A convolution between tiles with an offset of at most `reach` tiles along x and y.
 
-    `quadrant` are its coefficients at distances from 0 to `SIDE (reach + 1) - 1` points along y and x.
+    `quadrant` has the coefficients at distances from 0 to `SIDE (reach + 1) - 1` points along y and x.
     """
 
     def __init__(self, tiles: Tiles, reach: int, quadrant: Array, tally: Tally) -> None:
@@ -74,7 +74,7 @@ class TileConvolution:
         self._backward_of_one = make(self._sums[:1], self._padded[:1], direction="FFTW_BACKWARD")
 
     def apply(self, field: Array, out: Array) -> Array:
-        """Apply it to a stacked map; both may be the same."""
+        """Put the convolution of a stacked map into `out`, which may be the same map."""
         self.tally["operator"] += 1
         self.transform(field)
         self._add_up(self.tiles.rows, self.tiles.columns, self._sums)
@@ -90,7 +90,7 @@ class TileConvolution:
         self._forward.execute()
 
     def at(self, row: int, columns: NDArray[np.intp]) -> Iterator[Array]:
-        """Yield what the transformed map causes at any tiles of a row of them, each valid until the next one."""
+        """Yield the result of the transformed map on tiles of a row of tiles, each valid until the next one."""
         own, rows = self._sums[:1], np.array([row])
         for place in range(len(columns)):
             self._add_up(rows, columns[place : place + 1], own)
@@ -98,12 +98,12 @@ class TileConvolution:
             yield self._padded[0, :SIDE, :SIDE]
 
     def _add_up(self, rows: NDArray[np.intp], columns: NDArray[np.intp], sums: NDArray[np.complex128]) -> None:
-        """Sums of products at some tiles of the grid."""
+        """Sum products at given tiles of the grid."""
         tiles = self.tiles
         _add_products(tiles.numbers, rows, columns, self._symbols, self._waves, sums)
 
     def reached(self) -> NDArray[np.bool_]:
-        """Which tiles of the grid are near one of these."""
+        """Return which tiles of the grid are near one of these."""
         reached = np.zeros(self.tiles.numbers.shape, np.bool_)
         for row, column in zip(self.tiles.rows.tolist(), self.tiles.columns.tolist(), strict=True):
             rows, columns = (slice(max(place - self._reach, 0), place + self._reach + 1) for place in (row, column))
@@ -112,14 +112,14 @@ class TileConvolution:
 
 
 def _symbols(quadrant: Array, reach: int, tally: Tally) -> NDArray[np.complex128]:
-    """Transforms of the coefficients for each offset of tiles, from -reach to reach along y and x."""
+    """Return transforms of the coefficients for each offset of tiles, from -reach to reach along y and x."""
     count, length = 2 * reach + 1, 2 * SIDE
     steps = (np.arange(length) + SIDE) % length - SIDE
     places = np.abs(SIDE * np.arange(-reach, reach + 1)[:, None] + steps[None, :])
     symbols = allocate((count, count, length, SIDE + 1), np.complex128, tally)
     if tally.only_counts:
         return symbols
-    places[places >= len(quadrant)] = 0  # half a period off: multiplies zeros alone
+    places[places >= len(quadrant)] = 0  # half a period away: multiplies zeros only
     for row in range(count):
         kernels = quadrant[places[row][None, :, None], places[:, None, :]]
         symbols[row] = np.fft.rfft2(kernels) / length**2
@@ -127,8 +127,8 @@ def _symbols(quadrant: Array, reach: int, tally: Tally) -> NDArray[np.complex128
 
 
 def tile_inverse(tiles: Tiles, size: tuple[float, float], poisson: float, tally: Tally) -> TileConvolution:
-    """Displacement -> pressure between tiles beside each other, a preconditioner: the symbol `|q|/(1 - nu)`, whose
-    coefficients fall with the third power of the distance."""
+    """Return an operator from displacement to pressure between adjacent tiles, a preconditioner: the symbol `|q|/(1 -
+    nu)`, whose coefficients fall with the third power of the distance."""
     length = 8 * SIDE
     qx, qy = (
         2.0 * np.pi * np.fft.fftfreq(length, each / count) for each, count in zip(size, tiles.points, strict=True)
@@ -146,7 +146,7 @@ def _add_products(
     waves: NDArray[np.complex128],
     sums: NDArray[np.complex128],
 ) -> None:
-    """The transform of each tile's result: the sum over those near it of symbols times transforms."""
+    """Put the transform of the result on each tile into `sums`: the sum over near tiles of symbols times transforms."""
     reach = symbols.shape[0] // 2
     down, across = numbers.shape
     for own in range(sums.shape[0]):

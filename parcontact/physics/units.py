@@ -1,6 +1,6 @@
-"""Units in which everything inside a run is dimensionless, so that nanometres and kilometres behave alike.
+"""Units of a run, in which all its numbers are dimensionless, for any scale of lengths.
 
-All are powers of two: changing to them and back loses no digit, and a checkpoint in SI restarts bit for bit.
+All are powers of two: conversion is exact, and a checkpoint in SI units restarts bit for bit.
 """
 
 import math
@@ -21,10 +21,11 @@ class Units:
 
     @classmethod
     def near(cls, height: float, length: float, modulus: float) -> "Units":
-        """The powers of two nearest to typical values; a flat surface (height 0) is measured in `length`."""
+        """Return the powers of two nearest to typical values; for a flat surface (height 0) the unit of heights is
+        `length`."""
         return cls(_power_of_two(height or length), _power_of_two(length), _power_of_two(modulus))
 
     @property
     def pressure(self) -> float:
-        """Unit of pressures [Pa]: one that moves the half space by `height` over `length`."""
+        """Unit of pressures [Pa], which moves the half space by `height` over `length`."""
         return self.modulus * self.height / self.length

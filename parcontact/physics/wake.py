@@ -1,10 +1,10 @@
-"""Influence coefficients of an isolated sliding contact: the body still remembers what the surface has left.
+"""Influence coefficients of an isolated sliding contact, including the wake of the surface in the body.
 
 At the velocity v a body point that is now at x was at `x + v t` a time t ago. With the creep function
 
     J(t) = J_g + sum J_i (1 - exp(-t/l_i)),
 
-the influence coefficients are Love's A(x) plus, for each term, those along the wake (all with G = 1):
+the influence coefficients are Love's A(x) plus, for each term, an integral along the wake (for G = 1):
 
     K(x) = J_g A(x) + sum J_i int_0^inf exp(-t/l_i)/l_i A(x + v t) dt.
 """
@@ -20,14 +20,14 @@ from .prony import CreepSpectrum
 
 Vector = tuple[float, float]
 GAUSS = np.polynomial.legendre.leggauss(6)
-LOCAL = 1e-4  # accuracy: a creep length below this share of a cell is 0: the body has crept before it has moved
-NEAR = 2.0  # accuracy: cells: closer than this the edge of the loaded cell is felt
-FAR = 16.0  # accuracy: cells: from here on two terms of the expansion in the size of the cell are good to 1e-7
-DECAYED = 40.0  # accuracy: creep lengths after which the memory is over, exp(-40)
+LOCAL = 1e-4  # accuracy: creep length over a cell below which creep is instantaneous
+NEAR = 2.0  # accuracy: distance [cells] below which panels resolve the edge of the loaded cell
+FAR = 16.0  # accuracy: distance [cells] beyond which two terms of the expansion of A are used; error 1e-7
+DECAYED = 40.0  # accuracy: distance over creep length at which integrals end, exp(-40)
 
 
 def wake(x: Array, y: Array, dx: float, dy: float, velocity: Vector, creep: CreepSpectrum) -> Array:
-    """K(x, y) of the module's text for a `dx x dy` cell under unit pressure, nu = 1/2; shapes broadcast."""
+    """Return K(x, y) above for a `dx x dy` cell under unit pressure, nu = 1/2; shapes broadcast."""
     speed = float(np.hypot(*velocity))
     lengths = speed * creep.retardation_times
     short = lengths <= LOCAL * min(dx, dy)
@@ -55,11 +55,11 @@ def _over_memory(x: Array, y: Array, dx: float, dy: float, direction: Vector, we
 
 
 def _sweep(x: Array, y: Array, dx: float, dy: float, weights: Array, lengths: Array) -> Array:
-    """The integrals along +x for rising x, dx apart, and all y, from the farthest cell back to the first:
+    """Return the integrals along +x for rising x at distances dx and for all y, from the last cell back to the first:
 
-        K(x) = int_0^dx exp(-s/l)/l A(x + s) ds + exp(-dx/l) K(x + dx),
+        K(x) = int_0^dx exp(-s/l)/l A(x + s) ds + exp(-dx/l) K(x + dx).
 
-    which takes A at a few points per cell where an integral of its own for each cell takes hundreds.
+    This evaluates A at a few points per cell; separate integrals would need hundreds.
     """
     shortest = float(lengths.min())
     near, near_shares = _within_cell(dx, shortest, edge=True)
@@ -78,8 +78,8 @@ def _sweep(x: Array, y: Array, dx: float, dy: float, weights: Array, lengths: Ar
 
 
 def _within_cell(dx: float, shortest: float, edge: bool) -> tuple[Array, Array]:
-    """Gauss points and shares on (0, dx), in panels that grow from the shortest memory and, with `edge`, shrink towards
-    dx/2: there a point that comes from the centre of the loaded cell leaves it, and A has a logarithm in its slope."""
+    """Return Gauss points and weights on (0, dx). Panels grow from the shortest memory and, with `edge`, shrink towards
+    dx/2, where the slope of A has a logarithm at the edge of the loaded cell."""
     ends = shortest * 2.0 ** np.arange(max(math.ceil(math.log2(dx / shortest)), 0))
     if edge:
         steps = 0.5 * dx * 4.0 ** -np.arange(4.0)
@@ -91,7 +91,7 @@ def _within_cell(dx: float, shortest: float, edge: bool) -> tuple[Array, Array]:
 
 @loop
 def _recur(x, y, dx, dy, near, far, near_memory, far_memory, decay, ends, out):  # type: ignore[no-untyped-def]
-    """The recursion of `_sweep`, from the values at the last x; `near` are the nodes close to the loaded cell."""
+    """Make the recursion of `_sweep` from the values at the last x; `near` are the nodes close to the loaded cell."""
     for j in range(y.size):
         kept = ends[:, j].copy()
         out[j, -1] = kept.sum()
@@ -108,10 +108,10 @@ def _recur(x, y, dx, dy, near, far, near_memory, far_memory, decay, ends, out): 
 
 @loop
 def _integrate(x, y, dx, dy, direction, weights, lengths, nodes, shares, out):  # type: ignore[no-untyped-def]
-    """Integral over s > 0 of `sum weights/lengths exp(-s/lengths) A(x + s direction)`, nu = 1/2.
+    """Put the integral over s > 0 of `sum weights/lengths exp(-s/lengths) A(x + s direction)`, nu = 1/2, into `out`.
 
-    Gauss panels no longer than what changes there: the memory at its shortest length, and later at s itself; the
-    displacement at half the distance from the cell, and at its edge.
+    Gauss panels are no longer than the scale of the integrand: the shortest memory length, later s itself; and half
+    the distance from the cell, or its edge.
     """
     cell = min(dx, dy)
     shortest, end = lengths.min(), DECAYED * lengths.max()
@@ -134,7 +134,8 @@ def _integrate(x, y, dx, dy, direction, weights, lengths, nodes, shares, out):  
 
 @loop
 def _love(x, y, dx, dy):  # type: ignore[no-untyped-def]
-    """Love's displacement for nu = 1/2; far away the first two terms of its expansion in the size of the cell."""
+    """Return Love's displacement for nu = 1/2; far away the first two terms of its expansion in the size of
+    the cell."""
     r2 = x * x + y * y
     if r2 > FAR**2 * max(dx, dy) ** 2:
         r = np.sqrt(r2)
