@@ -1,1 +1,1 @@
-"""One step of a history and the loop over steps; rest made in one step; what to say of a step that failed."""
+"""One step of a history, the loop over steps, rest made in one step, and errors of failed steps."""

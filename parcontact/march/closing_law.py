@@ -1,13 +1,13 @@
-"""The contact law of a surface whose finer roughness is a law of its interface (`solve.interface_law`).
+"""Contact law of a surface whose finer roughness is a law of its interface (`solve.interface_law`).
 
-Where the surfaces touch, the mean planes of the finer roughness come closer by c of the pressure. With the modulus
-alpha of a step, at which the pressure is `alpha p`,
+Under pressure the mean planes of the finer roughness approach by the closing c. With the modulus alpha of a step, in
+which the pressure is `alpha p`,
 
     p >= 0,    w = A p + c(alpha p) - h - d >= 0,    p w = 0.
 
-The gap `u - h - d` is that to the highest points of the finer roughness: where the surfaces touch it is `-c`, and below
-0. An effect brings this law (`effects.effect.Effect.law`); it is solved by splitting (`solve.nonsymmetric.splitting`).
-The work of the load on the finer roughness is in no energy of the run.
+The gap `u - h - d` is measured to the highest points of the finer roughness, so that it is `-c` in contact. An
+effect provides this law (`effects.effect.Effect.law`); it is solved by splitting (`solve.nonsymmetric.splitting`).
+Energies of the run do not include the work on the finer roughness.
 """
 
 import math
@@ -30,12 +30,14 @@ from ..solve.problem import Control, MeanPressure
 from .dry_law import DryLaw
 from .starts import make_start
 
-MOST_STEPS = 20000  # tuning: of one contact, more than any has needed
+MOST_STEPS = 20000  # tuning: limit on the steps of the splitting for one contact
 
 
 class ClosingLaw(DryLaw):
-    """The law of a scene with the closing c [m] over the pressure [Pa] of its finer roughness. It remembers nothing but
-    the last pressures. Raises InputError for a body that moves in the mean, and for a hardness."""
+    """Law of a scene with the closing c [m] as a function of the pressure [Pa]. It has no memory of its own.
+
+    Raises InputError for a body that moves in the mean, and for a hardness.
+    """
 
     def __init__(self, scene: Scene, law: InterfaceLaw) -> None:
         super().__init__(scene)
@@ -56,7 +58,7 @@ class ClosingLaw(DryLaw):
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[None]:
-        """Solve a step; `effects.contact_protocol.ContactLaw.solve`."""
+        """Solve a step; see `effects.contact_protocol.ContactLaw.solve`."""
         if isinstance(control, MeanPressure) and control.value == 0.0:
             return super().solve(trial, step, control, memory, past, before, tolerance)
         scene, h, p, start = self.scene, trial.effective, past.spare, None
@@ -76,8 +78,8 @@ class ClosingLaw(DryLaw):
         return self._operator.mapped(lambda symbol: 1.0 / (1.0 + gamma * symbol), np.float64)
 
     def _step_for(self, control: Control, h: Array, before: Measures, alpha: float) -> float:
-        """Return the step of the splitting, by the mean pressure, or the last one, over the rms of full contact;
-        collective."""
+        """Return the step gamma of the splitting from the given or last mean pressure over the rms pressure of full
+        contact; collective."""
         slab = self.scene.slab
         (total,) = slab.sum(float(h.sum(dtype=np.float64)))
         full = self._inverse.apply(h - total / slab.points, slab.empty())

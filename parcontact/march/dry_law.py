@@ -1,4 +1,4 @@
-"""The contact law without adhesion: a constraint on pressures (`solve.constraint`), solved from the last pressures."""
+"""Contact law without adhesion: a constraint on pressures (`solve.constraint`), solved from the last pressures."""
 
 import math
 from dataclasses import dataclass
@@ -23,13 +23,13 @@ from .starts import cells_moved, make_start
 
 
 def choose_contact_law(scene: Scene) -> ContactLaw[Any]:
-    """Return the contact law of a scene: that of one of its effects, or else that of its constraint."""
+    """Return the contact law that an effect of the scene provides, or the law of its constraint."""
     return scene.law or DryLaw(scene)
 
 
 @dataclass(frozen=True)
 class DryLaw:
-    """The law of a scene's constraint, which remembers nothing but the last pressures."""
+    """Law of a scene's constraint. It has no memory of its own."""
 
     scene: Scene
     may_shorten = False
@@ -44,7 +44,7 @@ class DryLaw:
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[None]:
-        """Solve a step; `effects.contact_protocol.ContactLaw.solve`. Raises StepError."""
+        """Solve a step; see `effects.contact_protocol.ContactLaw.solve`. Raises StepError."""
         scene, contact, remark = self.scene, None, ""
         most = control.value * scene.slab.points if isinstance(control, MeanPressure) else math.inf
         problem = Problem(*scene.operators, trial.effective, scene.constraint(trial.alpha, most), control)
@@ -58,9 +58,10 @@ class DryLaw:
         return SolvedContact(contact, None, problem.constraint.touches(contact.p), remark=remark)
 
     def _retry(self, step: Step, past: PreviousContacts, problem: Problem, failed: Contact) -> tuple[Contact, str]:
-        """Retry a solve that failed, unless the job takes it as it is: then only in double precision.
+        """Retry a failed solve; only in double precision if the job accepts unconverged solves. Raises StepError if all
+        attempts fail.
 
-        Returns the contact, and a sentence on what helped; collective. Raises StepError when nothing helps.
+        Return the contact, and a sentence on the attempt that succeeded; collective.
         """
         scene, would_do = self.scene, failure.accepts(self.scene, failed)
         in_double = (lambda: scene.in_double) if failed.u.dtype == np.float32 else None
@@ -76,22 +77,22 @@ class DryLaw:
         return contact, f"the contact solve {failed.failure}; solved when retried with {', with '.join(tried)}"
 
     def motion(self, solved: SolvedContact[None], before: Measures, now: Measures) -> EdgeMotion:
-        """Return no motion: edges may move by any way in a step."""
+        """Return no motion: the motion of edges in a step is not limited."""
         return EdgeMotion()
 
     def gap(self, memory: None) -> Array | None:
-        """Return None: pressures are solved for."""
+        """Return None: the pressure is the unknown."""
         return None
 
     def detached(self, memory: None) -> Detached | None:
-        """Return None: a load that presses is always held."""
+        """Return None: a compressive load is always carried."""
         return None
 
     def with_end(self, memory: None, end: Detached) -> None:
-        """Return the memory as it is."""
+        """Return None, the memory."""
 
     def at_rest(self) -> None:
-        """Return None: there is nothing to remember."""
+        """Return None, the memory."""
 
     def entries(self, memory: None, units: Units) -> dict[str, Entry]:
         """Return no entries."""

@@ -1,4 +1,4 @@
-"""Errors of steps that failed: what happened, where, and what to change."""
+"""Errors of failed steps: their place, their cause, and possible remedies."""
 
 import math
 from collections.abc import Iterator
@@ -14,15 +14,15 @@ from ..scene import Scene, sanity
 from ..solve.contact import Contact
 from ..solve.precision import reachable_certificate
 
-FINITE = "look for heights, loads or moduli that are not finite or too far apart"
+FINITE = "look for heights, loads or moduli that are not finite or of very different magnitude"
 UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
-USEFUL = 0.1  # accuracy: tolerances above it say nothing of a contact
-MANY_CELLS = 1.5  # tuning: by which a surface moves in a long step
+USEFUL = 0.1  # accuracy: largest certificate of a useful contact
+MANY_CELLS = 1.5  # tuning: least motion of the surface in a step [cells] for the advice on smaller steps
 
 
 class StepError(RunError):
-    """A step that could not be made; the run is as it was before it. `beyond_precision` says whether its tolerance asks
-    for more digits than numbers of its precision have."""
+    """A step that failed; the run keeps the state before it. `beyond_precision` is True if its tolerance needs more
+    digits than numbers of its precision have."""
 
     def __init__(self, text: str, beyond_precision: bool = False) -> None:
         super().__init__(text)
@@ -30,7 +30,8 @@ class StepError(RunError):
 
 
 class DetachedError(Exception):
-    """The surfaces have come off in a step that ends at `time` [s] under a `load`; the run is as it was before it."""
+    """The surfaces have detached in a step that ends at `time` [s] under a `load`; the run keeps the state
+    before it."""
 
     def __init__(self, time: float, load: float) -> None:
         super().__init__(time, load)
@@ -38,7 +39,7 @@ class DetachedError(Exception):
 
 
 def accepts(scene: Scene, contact: Contact) -> bool:
-    """Return whether the job takes a solve that did not reach the tolerance."""
+    """Return whether the job accepts a solve that did not reach the tolerance."""
     return scene.choices.numerics.accept_unconverged and math.isfinite(contact.certificate.worst)
 
 
@@ -48,7 +49,7 @@ def describe_place(scene: Scene, step: Step) -> str:
 
 
 def not_finite(scene: Scene, step: Step, measures: Measures) -> StepError:
-    """Return the error of a step whose solve meets its conditions, and whose results are no numbers all the same."""
+    """Return the error of a converged step whose measures are not finite."""
     wrong = ", ".join(name for name, value in asdict(measures).items() if not math.isfinite(value))
     return StepError(f"{describe_place(scene, step)}: {wrong} would not be finite; {FINITE}")
 
@@ -56,11 +57,8 @@ def not_finite(scene: Scene, step: Step, measures: Measures) -> StepError:
 def of_solve(
     scene: Scene, step: Step, failed: Contact, last: Contact, tried: list[str], h: Array, moved: float
 ) -> StepError:
-    """Return the error of a contact solve for heights h that has `failed`, also when `tried` in other ways, up to the
-    `last`; collective.
-
-    `moved` is by how many cells the surface went in the step.
-    """
+    """Return the error of a contact solve for heights h that has `failed`, and of the attempts `tried`, which end with
+    `last`; collective. In the step the surface moves by `moved` cells."""
     also = f", also with {', with '.join(tried)}" if tried else ""
     numerics, what = scene.choices.numerics, f"{describe_place(scene, step)}: the contact solve {failed.failure}{also}"
     if not np.isfinite(last.certificate.worst):
@@ -75,7 +73,7 @@ def of_solve(
 
 
 def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, moved: float) -> Iterator[str]:
-    """Yield what may help, the likeliest first."""
+    """Yield possible remedies, the likeliest first."""
     numerics = scene.choices.numerics
     if "max_iterations" in failed.failure:
         yield f"try numerics.max_iterations above {numerics.max_iterations}"
@@ -88,7 +86,7 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, moved: fl
 
 
 def refuse_beyond_full_contact(scene: Scene, step: Step, effective: Array) -> None:
-    """Raise StepError where a periodic body cannot follow the approach of a step; collective."""
+    """Raise StepError if a step prescribes an approach beyond full contact; collective."""
     if sanity.has_full_contact(scene.setup):
         mean = scene.slab.sum(float(effective.sum(dtype=np.float64)))[0] / scene.slab.points
         if text := sanity.beyond_full_contact(scene.setup, step.load, mean * scene.units.height):

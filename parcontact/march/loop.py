@@ -1,4 +1,4 @@
-"""A march: a scene, its state, and the loop over the steps of a timeline with the tasks that a caller has."""
+"""A march: a scene, its state, and the loop over the steps of a timeline with the tasks of a caller."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -38,7 +38,7 @@ class March:
 
     @property
     def detached(self) -> str:
-        """Return the sentence on surfaces that nothing holds under their load, with no further step; '' otherwise."""
+        """A sentence, if the surfaces have detached and no step follows; '' otherwise."""
         row, end = self.row, choose_contact_law(self.scene).detached(self.state.law)
         if end is None:
             return ""
@@ -47,13 +47,13 @@ class March:
         return f"detached at t = {time:g} s: {lost}; {row.measures.pressure:g} Pa at t = {row.time:g} s was held"
 
     def timeline(self, until: float = 0.0) -> Timeline:
-        """Return all steps of the history, as `Timeline.from_job` has them, with those that have been chosen so far."""
+        """Return all steps of the history (`Timeline.from_job`), with those chosen so far."""
         return Timeline.from_job(self.scene.job, until, self.state.chosen)
 
     def steps(self, timeline: Timeline | None = None, until: float | None = None) -> Iterator[Step]:
-        """Yield the steps after the last one made, each decided on when it is asked for; collective.
+        """Yield the steps after the last one made, each decided on demand; collective.
 
-        A step that stands for several does not pass the first that reaches `until` [s].
+        A step that replaces several ends at the latest with the first step that reaches `until` [s].
         """
         timeline = self.timeline() if timeline is None else timeline
         stop = len(timeline) if until is None else timeline.first_reaching(until)
@@ -61,7 +61,7 @@ class March:
             yield next_step(self.scene, self.state, timeline, stop)
 
     def advance(self, step: Step) -> StepRow:
-        """Make the next state; collective. Raises StepError, and stays where it is, when that cannot be."""
+        """Make the next state; collective. Raises StepError and keeps the state if that fails."""
         try:
             self.state = self._weighed(make_step(self.scene, self.state, step), self.row)
         except DetachedError as end:
@@ -70,7 +70,7 @@ class March:
         return self.row
 
     def _weighed(self, state: State, since: StepRow | None = None) -> State:
-        """Return the state with its errors added to the sums; a first state begins the sums."""
+        """Return the state with its errors added to the sums; the sums begin with a first state."""
         row = state.row
         if row.errors is None:
             return state
@@ -85,11 +85,11 @@ class March:
         return state.after(errors=ErrorMemory(state.friction, sums))
 
     def restore(self, contents: Contents) -> None:
-        """Go on from a checkpoint; collective. Raises InputError for one that does not fit."""
+        """Restore the state of a checkpoint; collective. Raises InputError for a checkpoint that does not fit."""
         self.state = restored(self.scene, self.state, contents)
 
     def entries(self) -> dict[str, Entry]:
-        """Return everything that is remembered, by its names in a checkpoint; maps are the run's own, not copies."""
+        """Return all entries of a checkpoint by their names; maps are not copied."""
         return entries(self.scene, self.state)
 
     def save(self, path: Path, facts: Facts) -> None:
@@ -97,10 +97,11 @@ class March:
         save_state(path, self.scene, self.state, facts)
 
     def field(self, name: str) -> Array:
-        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], or the rise of
-        `temperature` [K], a new array; collective. Raises InputError for a temperature that is not calculated.
+        """Return the rows of this rank of `pressure` [Pa], `displacement`, `gap` or `height` [m], or of the rise of
+        `temperature` [K], as a new array; collective. Raises InputError for a temperature that is not computed.
 
-        `height` is that of the rigid surface where it is now, so that `gap = displacement - height - approach`.
+        `height` is that of the rigid surface at its present position, so that `gap = displacement - height -
+        approach`.
         """
         scene, state, units = self.scene, self.state, self.scene.units
         last, gap = state.contact.last, choose_contact_law(scene).gap(state.law)
@@ -120,7 +121,7 @@ class March:
         return scene.gap(self._displacement(), last.position, state.contact.approach)
 
     def _displacement(self) -> Array:
-        """Return the displacement of the body, from the pressure where it is not at hand; collective."""
+        """Return the displacement of the body, computed from the pressure if needed; collective."""
         scene, last = self.scene, self.state.contact.last
         image, apply = scene.solver.workspace.displacement, scene.operators.operator.apply
         return scene.material.displacement(self.state.body, lambda: apply(last.pressure, image), last.alpha)
@@ -129,9 +130,9 @@ class March:
 def next_step(scene: Scene, state: State, timeline: Timeline, stop: int) -> Step:
     """Return the step after the last one made.
 
-    At rest under a constant load nothing changes in a body without memory, where one step takes the place of all others
-    of a stage whose time steps grow. It does not pass a step after which fields are due, nor the step number `stop`.
-    What is decided follows from the state, and so is the same after a restart.
+    At rest under a constant load a body without memory does not change: one step then replaces all further steps of
+    a stage whose time steps grow. It ends at the next step after which fields are due, or at the step number `stop`.
+    The decision follows from the state, so that it is the same after a restart.
     """
     number = state.row.step + 1
     span = timeline.span(number)
@@ -149,10 +150,10 @@ Task = Callable[[March], bool | None]
 
 
 def run_steps(march: March, tasks: Sequence[Task], steps: Iterable[Step] | None = None) -> bool:
-    """Advance, after every step doing the tasks in order, until the steps end or a task says True.
+    """Advance and do the tasks in order after each step, until the steps end or a task returns True.
 
-    Without steps they are all of the job's, and the tasks are done for the state of now too. Returns whether a task has
-    ended the march.
+    Without `steps` they are all steps of the job, and the tasks are also done before the first one. Return whether a
+    task has ended the march.
     """
     if steps is None:
         if run_tasks(march, tasks):
@@ -168,5 +169,5 @@ def run_steps(march: March, tasks: Sequence[Task], steps: Iterable[Step] | None 
 
 
 def run_tasks(march: March, tasks: Sequence[Task]) -> bool:
-    """Do all tasks; whether one of them ends the march."""
-    return any([task(march) for task in tasks])  # noqa: C419  # not one less when one ends it
+    """Do all tasks. Return whether one of them ends the march."""
+    return any([task(march) for task in tasks])  # noqa: C419  # all tasks run, also when one ends the march

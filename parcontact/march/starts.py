@@ -1,12 +1,11 @@
-"""From which pressure the solve of a step starts.
+"""Start of the solve of a step.
 
-Pressures change with time t and move with the surface. Where it has moved by whole cells since one of the last steps,
-that pressure is moved as well, without rounding: it is the solution itself where nothing else has changed, as in steady
-sliding, and a solve needs no iteration. With steps of a whole cell that is the last pressure, extrapolated with the one
-before it; with halves the one before it, with thirds and quarters those before that, which are kept in slides that
-choose their own steps.
+Pressures change with time and move with the surface. If the surface has moved by whole cells since one of the last
+steps, the pressure of that step is moved by as many cells, without rounding: in steady sliding it is already the
+solution. With steps of a whole cell it is the last pressure, extrapolated with the one before it; with steps of half
+a cell it is the one before; with thirds and quarters it is an earlier one, which slides with chosen steps keep.
 
-Where no such pressure is known, the last two are extrapolated in the body's frame.
+Otherwise the last two pressures are extrapolated in the body's frame.
 """
 
 from collections.abc import Sequence
@@ -21,10 +20,8 @@ from ..scene import Scene
 
 
 def make_start(scene: Scene, pasts: Sequence[PreviousPressure], step: Step, alpha: float, out: Array) -> None:
-    """Put the start of a step, a map of p for the modulus `alpha`, into `out`.
-
-    `pasts` are the last pressures, the newest first.
-    """
+    """Put the start of a step, a map of p for the modulus `alpha`, into `out`. `pasts` are the last pressures, the
+    newest first."""
     if len(pasts) == 1:
         out[...] = pasts[0].pressure
         return
@@ -37,7 +34,7 @@ def make_start(scene: Scene, pasts: Sequence[PreviousPressure], step: Step, alph
 
 
 def cells_moved(scene: Scene, step: Step, since: tuple[float, float]) -> tuple[float, float]:
-    """Return by how many cells the surface moves from a position [m] to the end of a step, along x and y."""
+    """Return by how many cells, along x and y, the surface moves from the position `since` [m] to the end of a step."""
     grid = scene.choices.grid
     return cells_between(since, step.position, (grid.dx, grid.dy))
 
@@ -54,10 +51,10 @@ def _whole_cells_ago(scene: Scene, pasts: Sequence[PreviousPressure], step: Step
 def _travel(
     scene: Scene, step: Step, now: PreviousPressure, before: PreviousPressure, growth: float, alpha: float, out: Array
 ) -> None:
-    """Form `out = (1 + growth) now - growth before`, moved with the surface by whole cells."""
+    """Put `(1 + growth) now - growth before`, moved with the surface by whole cells, into `out`."""
     slab, points = scene.slab, scene.choices.grid.points
     along_x, along_y = (
-        round(moved) % count  # a step may pass more boxes than a machine's whole numbers reach
+        round(moved) % count  # against overflow in long steps
         for moved, count in zip(cells_moved(scene, step, now.position), points, strict=True)
     )
     older, share = before.pressure, growth * before.alpha / alpha

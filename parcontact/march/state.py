@@ -1,4 +1,4 @@
-"""The state of a run: all that one step hands to the next. A checkpoint is one loop over its parts."""
+"""The state of a run: all that one step passes to the next. A checkpoint is one loop over its parts."""
 
 import math
 from collections.abc import Mapping
@@ -28,30 +28,29 @@ from ..storage.step_row import StepRow
 from .dry_law import choose_contact_law
 from .step_errors import BudgetPart, ErrorMemory
 
-# names of parts of every run, which no effect may have
+# names of parts of every run; effects need other names
 RESERVED = {"row", "contact", "law", "material", "errors", "energy", "steps", "tolerance", "plans"}
-FURTHER = 2  # tuning: pressures before the earlier one that are kept for starts, of three and of four steps ago
+FURTHER = 2  # tuning: number of pressures kept for starts, from three and four steps ago
 
 
 @dataclass(frozen=True)
 class State:
-    """A run after a step. `make_step` returns another one and leaves this one as it was.
+    """A run after a step. `make_step` returns a new one and leaves this one unchanged.
 
-    `memories` are those of the parts of the run, by name (`parts_of`), those of effects among them.
-
-    Two states share most maps, and the oldest ones of a state are spare in the next: a state can be used until a step
-    begins from the one after it. Maps are in the run's units.
+    `memories` are those of the parts of the run, by name (`parts_of`). Two states share most maps, and the oldest
+    maps of a state are reused in the next but one: a state is valid until a step begins from its successor. Maps are
+    in the run's units.
     """
 
     memories: Memories
 
     def after(self, **changes: Any) -> "State":
-        """Return the state with other memories of some parts."""
+        """Return the state with new memories of some parts."""
         return State({**self.memories, **changes})
 
     @property
     def row(self) -> StepRow:
-        """The record of the last step."""
+        """Record of the last step."""
         row: StepRow = self.memories["row"]
         return row
 
@@ -73,29 +72,29 @@ class State:
 
     @property
     def energy(self) -> EnergyMemory | None:
-        """The energies of the body, None where none are asked for."""
+        """Energies of the body; None if the job does not ask for them."""
         return self.memories.get("energy")
 
     @property
     def friction(self) -> float:
-        """The friction of the body in the last step, infinite where that was a jump."""
+        """Friction of the body in the last step; infinite after a jump."""
         memory: ErrorMemory = self.memories["errors"]
         return memory.friction
 
     @property
     def errors(self) -> ErrorSums:
-        """The sums of the error budget."""
+        """Sums of the error budget."""
         memory: ErrorMemory = self.memories["errors"]
         return memory.sums
 
     @property
     def chosen(self) -> ChosenSteps | None:
-        """The record of the steps that stages have chosen, which grows; None where none does."""
+        """Record of the steps that stages have chosen so far; None if no stage chooses."""
         return self.memories.get("steps")
 
     @property
     def tolerance(self) -> StepTolerance:
-        """The memory of the tolerance that solves may have."""
+        """Memory of the tolerance of solves."""
         return self.memories.get("tolerance") or StepTolerance()
 
 
@@ -103,8 +102,8 @@ class State:
 
 
 def parts_of(scene: Scene) -> dict[str, RunPart[Any]]:
-    """Return all that a run of a scene remembers, by the names of its parts in checkpoints. Raises InputError where an
-    effect has the name of another part."""
+    """Return all parts of a run with a memory, by their names in checkpoints. Raises InputError if an effect has the
+    name of another part."""
     choices = scene.choices
     if taken := sorted(RESERVED & choices.effects.keys()):
         raise InputError(
@@ -129,12 +128,12 @@ def parts_of(scene: Scene) -> dict[str, RunPart[Any]]:
 
 @dataclass(frozen=True)
 class _RowPart:
-    """The record of the last step: distance and measures; step and time a checkpoint says itself."""
+    """Record of the last step: distance and measures. Checkpoints have step and time on their own."""
 
     scene: Scene
 
     def at_rest(self) -> StepRow:
-        """Return the record of the initial state: at no load the surface just touches the body."""
+        """Return the record of the initial state: without load the surface just touches the body."""
         setup = self.scene.setup
         highest = setup.heights.highest
         return StepRow(
@@ -153,7 +152,7 @@ class _RowPart:
 
 @dataclass(frozen=True)
 class _ContactPart:
-    """The last pressures, where the surface was, and the last approach."""
+    """The last pressures, the positions of the surface, and the last approach."""
 
     scene: Scene
 
@@ -164,8 +163,8 @@ class _ContactPart:
         return PreviousContacts(pressures, slab.zeros(), -setup.heights.highest / setup.units.height)
 
     def entries(self, memory: PreviousContacts, units: Units) -> dict[str, Entry]:
-        """Return the pressures with their moduli and positions, by how many steps ago they were: a checkpoint may lack
-        all but the last one."""
+        """Return the pressures with their moduli and positions, numbered by steps ago. All but the last are
+        optional."""
         found = {"approach": Entry(memory.approach, units.height, "m")}
         for ago, past in enumerate(memory.pressures):
             of_past = {
@@ -177,7 +176,7 @@ class _ContactPart:
         return found
 
     def restored(self, memory: PreviousContacts, saved: Saved) -> PreviousContacts:
-        """Return the pressures of a checkpoint, whose maps have been read; those that it lacks are not known."""
+        """Return the pressures of a checkpoint, whose maps have been read; missing ones are unknown."""
         pasts = []
         for ago, past in enumerate(memory.pressures):
             known = all(_name(name, ago) in saved for name in ("pressure", "modulus", "position"))
@@ -188,7 +187,7 @@ class _ContactPart:
 
 
 def _name(what: str, ago: int) -> str:
-    """Return the name in a checkpoint of what was some steps before the last one."""
+    """Return the name in a checkpoint of a quantity some steps before the last one."""
     return f"earlier {what} {ago}" if ago else what
 
 
@@ -213,15 +212,14 @@ class _ChosenStepsPart:
 
 
 def first_state(scene: Scene, body: BodyMemory | None = None) -> State:
-    """Return the state before the first step, in new maps but those of a `body`."""
+    """Return the state before the first step; all maps are new, except those of a given `body`."""
     parts = parts_of(scene)
     given = {} if body is None else {"material": body}
     return completed(scene, State({name: part.at_rest() for name, part in parts.items() if name not in given} | given))
 
 
 def pressed_state(scene: Scene, state: State, row: StepRow, pressure: Array, approach: float) -> State:
-    """Return a first state under a pressure, which is copied into its maps, and that had been there before, with the
-    friction of a row."""
+    """Return a first state under a constant `pressure`, which is copied, with the friction of `row`."""
     newest, others = state.contact.pressures[:2], state.contact.pressures[2:]
     for past in newest:
         past.pressure[...] = pressure
@@ -232,7 +230,7 @@ def pressed_state(scene: Scene, state: State, row: StepRow, pressure: Array, app
 
 
 def completed(scene: Scene, state: State) -> State:
-    """Return the state with the energies [J] and the columns of effects in its row."""
+    """Return the state with energies [J] and the columns of effects in its row."""
     work, stored, lost, split = energies_of(scene, state.energy, state.memories)
     added = effect_values(scene.effects, state.memories)
     row = replace(state.row, work=work, stored=stored, dissipated=lost, branch_dissipation=split, added=added)
@@ -242,9 +240,9 @@ def completed(scene: Scene, state: State) -> State:
 def energies_of(
     scene: Scene, memory: EnergyMemory | None, of_effects: Memories
 ) -> tuple[float, float, float, tuple[float, ...]]:
-    """Return work, stored and dissipated energy [J], and the dissipation of each branch; NaN if not asked for.
+    """Return work, stored and dissipated energy [J], and the dissipation of each branch; NaN without energies.
 
-    The work is that on the body, unless an effect counts that of the load, and what effects add to it.
+    The work is that on the body, unless an effect computes that of the load.
     """
     if scene.energy is None or memory is None:
         return math.nan, math.nan, math.nan, ()
@@ -264,7 +262,7 @@ def energies_of(
 
 
 def entries(scene: Scene, state: State) -> dict[str, Entry]:
-    """Return everything that a run remembers, by the names `part/name` that checkpoints have; maps are no copies."""
+    """Return all entries of a run by their names `part/name` in checkpoints; maps are not copied."""
     found: dict[str, Entry] = {}
     for name, part in parts_of(scene).items():
         found |= with_part(name, part.entries(state.memories[name], scene.units))
@@ -278,9 +276,9 @@ def save_state(path: Path, scene: Scene, state: State, facts: Facts) -> None:
 
 
 def restored(scene: Scene, state: State, contents: Contents) -> State:
-    """Return the state of a checkpoint, in the maps of another one; collective.
+    """Return the state of a checkpoint, in the maps of `state`; collective.
 
-    Raises InputError for a checkpoint that lacks something, or is of another body.
+    Raises InputError for a checkpoint that lacks an entry or belongs to another body.
     """
     _refuse_lost_branches(scene, contents)
     declared = entries(scene, state)
@@ -315,8 +313,8 @@ def _compare(contents: Contents, wanted: dict[str, Entry]) -> None:
 
 
 def _refuse_lost_branches(scene: Scene, contents: Contents) -> None:
-    """Raise InputError where a branch had no map in the run that wrote the checkpoint, as it relaxed too fast, and
-    needs one now that steps are shorter: what it remembered is lost."""
+    """Raise InputError if a branch had no map when the checkpoint was written, because it relaxed too fast, and needs
+    one for shorter steps: its memory is lost."""
     if "material/frozen" not in contents.numbers:
         return
     for k in scene.folded.kept:

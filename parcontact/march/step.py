@@ -1,9 +1,9 @@
-"""One step: `make_step` returns the next state of a scene and leaves the state from which it begins as it was.
+"""One step: `make_step` returns the next state of a scene and leaves the state before it unchanged.
 
-A step is: begin the body, solve the contact, measure, commit the body, judge the errors, follow. A step that its judge
-rejects, or that fails, is dropped; nothing has to be taken back. No map is copied for that: the new pressure is in the
-spare map of the state, the new displacement in one of the solver's workspace, which has the map of the old one in its
-place when the step has been made. What works in place comes last, when nothing can fail.
+A step begins the body, solves the contact, measures, commits the body, estimates errors, and updates effects. A step
+that is rejected or fails is dropped; nothing has to be undone. No map is copied for this: the new pressure is in the
+spare map of the state, and the new displacement in one of the solver's workspace, which gets the map of the old
+displacement in exchange. Operations in place come last, when nothing can fail.
 """
 
 import math
@@ -31,7 +31,7 @@ from .step_errors import ErrorMemory, SolvedStep, StepErrors, estimate_errors
 
 @dataclass(frozen=True)
 class _Made:
-    """A step that is accepted: how it was solved, its errors, its motion, and how it is noted if it was chosen."""
+    """An accepted step: its solution, errors and motion, and its record if it was chosen."""
 
     solved: SolvedStep
     errors: StepErrors
@@ -40,10 +40,8 @@ class _Made:
 
 
 def make_step(scene: Scene, state: State, step: Step) -> State:
-    """Return the state after a step, or after a shorter one if its judge asks for that; collective.
-
-    Raises StepError when that cannot be.
-    """
+    """Return the state after a step, or after a shorter one if its errors are too large; collective. Raises
+    StepError."""
     began, calls = time.perf_counter(), scene.slab.tally["operator"]
     made = _accepted(scene, state, step)
     solved, errors, contact = made.solved, made.errors, made.solved.contact
@@ -87,8 +85,8 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
 
 
 def _accepted(scene: Scene, state: State, step: Step) -> _Made:
-    """Solve a step, or the shorter one that its judge asks for; collective. Raises StepError, and DetachedError where
-    nothing holds the load of the shortest step."""
+    """Solve a step, or a shorter one if its errors are too large; collective. Raises StepError, and DetachedError if
+    the surfaces detach even in the shortest step."""
     law = choose_contact_law(scene)
     while True:
         try:
@@ -111,7 +109,7 @@ def _accepted(scene: Scene, state: State, step: Step) -> _Made:
 
 
 def _solve(scene: Scene, state: State, step: Step) -> SolvedStep:
-    """Solve a step, measure it and let the body go on; collective. Raises StepError and DetachedError."""
+    """Solve a step, measure it and commit the body; collective. Raises StepError and DetachedError."""
     body, law, before = scene.material, choose_contact_law(scene), state.row.measures
     trial = body.begin(state.body, step.dt, scene.motion.at(step.position), step.growth)
     control, tolerance = _control(scene, step, trial), scene.controller.tolerance(state.tolerance, step)
@@ -131,7 +129,7 @@ def _solve(scene: Scene, state: State, step: Step) -> SolvedStep:
 
 
 def _control(scene: Scene, step: Step, trial: Trial) -> Control:
-    """Return what the load of a step prescribes, in the run's units; collective. Raises StepError."""
+    """Return the prescribed load of a step in the run's units; collective. Raises StepError."""
     grid = scene.choices.grid
     if step.control == "approach":
         failure.refuse_beyond_full_contact(scene, step, trial.effective)
@@ -141,7 +139,7 @@ def _control(scene: Scene, step: Step, trial: Trial) -> Control:
 
 
 def _advance_energy(scene: Scene, state: State, solved: SolvedStep) -> EnergyMemory | None:
-    """Return the energies of the body after a step, None where none are asked for; collective."""
+    """Return the energies of the body after a step; None without energies; collective."""
     if scene.energy is None or state.energy is None:
         return None
     last = state.contact.last
@@ -154,8 +152,7 @@ def _advance_energy(scene: Scene, state: State, solved: SolvedStep) -> EnergyMem
 def _follow(
     scene: Scene, state: State, made: _Made, energy: EnergyMemory | None
 ) -> tuple[dict[str, Changes[Any]], Sheared | None]:
-    """Return the changes that effects make in a step, and what tractions along the surface make of it, and let the body
-    relax as effects say; collective."""
+    """Return the changes by effects in a step, and update the relaxation of the body; collective."""
     solved, u, gained = made.solved, made.solved.body.displacement, math.nan
     assert u is not None
     if energy is not None and state.energy is not None and scene.energy is not None:
@@ -193,7 +190,7 @@ def _budget_of(made: _Made, sheared: Sheared | None) -> ErrorBudget | None:
 
 
 def _describe_passed(step: Step) -> str:
-    """Return the sentence on a step that stands for several; '' for another one."""
+    """Return a sentence on a step that replaces several; '' for other steps."""
     if not step.passed:
         return ""
-    return f"takes the place of {step.passed} steps more: at rest, under a constant load, nothing changes"
+    return f"replaces {step.passed} further steps: at rest, under a constant load, nothing changes"

@@ -1,4 +1,4 @@
-"""The error budget of a step: what the step shows, with what is known of the run."""
+"""Error budget of a step, from the step and from properties of the run."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -25,10 +25,12 @@ NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
 
 @dataclass(frozen=True)
 class StepErrors:
-    """Errors of a step: its budget, None where nothing touches, and the error of its length alone, by which steps
-    that are chosen are judged; with the friction of the body, from which a change in the next step is known, infinite
-    after a jump. `lasting` is the budget without the error of a rise of friction, which passes: the tolerance of the
-    next solves does not follow it."""
+    """Errors of a step.
+
+    `budget` is None if nothing touches. `step` is the error of the step's length alone, which decides about chosen
+    steps. `friction` is that of the body, infinite after a jump; its change in the next step is an error source.
+    `lasting` is the budget without the temporary error of rising friction; it sets the tolerance of the next solves.
+    """
 
     budget: ErrorBudget | None
     step: float
@@ -37,13 +39,13 @@ class StepErrors:
 
     @property
     def of_friction(self) -> float:
-        """The relative error of friction, infinite where there is none."""
+        """Relative error of friction; infinite without friction."""
         return math.inf if self.budget is None or self.budget.friction is None else self.budget.friction.of_friction
 
 
 @dataclass(frozen=True)
 class SolvedStep:
-    """A step that has been solved: the contact by its law, its measures, and the memory of the body after it."""
+    """A solved step: the contact by its law, its measures, and the memory of the body after it."""
 
     step: Step
     trial: Trial
@@ -57,14 +59,14 @@ class SolvedStep:
 
     @property
     def touches(self) -> bool:
-        """Return whether the surfaces touch, and there is pressure or tension."""
+        """True if the surfaces touch, and there is pressure or tension."""
         return self.of_law.loaded and self.measures.contact_area > 0.0
 
 
 @dataclass(frozen=True)
 class ErrorMemory:
-    """Memory of errors: the friction of the body in the last step, infinite where that was a jump, and the sums of the
-    budget."""
+    """Memory of errors: the friction of the body in the last step, infinite after a jump, and the sums of
+    the budget."""
 
     friction: float = math.inf
     sums: ErrorSums = field(default_factory=ErrorSums)
@@ -72,7 +74,7 @@ class ErrorMemory:
 
 @dataclass(frozen=True)
 class BudgetPart:
-    """The errors of a run, whose body `relaxes` or not; a checkpoint may lack them."""
+    """The errors of a run; `relaxes` is True for a viscoelastic body. Its entries are optional."""
 
     relaxes: bool
 
@@ -88,8 +90,8 @@ class BudgetPart:
 
 
 def estimate_errors(scene: Scene, friction: float, solved: SolvedStep) -> StepErrors:
-    """Return how wrong a step is, with the `friction` of the body in the step before, infinite where that is not known
-    or was a jump; collective."""
+    """Return the errors of a step; `friction` is that of the body in the step before, infinite if unknown or after a
+    jump. Collective."""
     step, measures = solved.step, solved.measures
     branches = scene.material.branched
     prony = None if branches is None else branches.prony
@@ -104,9 +106,9 @@ def estimate_errors(scene: Scene, friction: float, solved: SolvedStep) -> StepEr
 
 
 def _observe(scene: Scene, run: RunProperties, solved: SolvedStep) -> StepObservation:
-    """Return what a step shows; collective."""
+    """Return the observation of a step; collective."""
     step, measures, certificate = solved.step, solved.measures, solved.contact.certificate
-    pair, apart, grid = _compare_integrators(scene, solved), _compare_views(scene, solved), scene.choices.grid
+    pair, mismatch, grid = _compare_integrators(scene, solved), _compare_views(scene, solved), scene.choices.grid
     curved = scene.choices.numerics.integrator == "exponential" and step.growth > 0.0
     of_steps: dict[str, Any] = {"difference": pair.difference, "order": pair.order, "seconds": step.dt}
     if not solved.touches:
@@ -120,7 +122,7 @@ def _observe(scene: Scene, run: RunProperties, solved: SolvedStep) -> StepObserv
         interface=measures.friction_interface,
         penetrating=max(certificate.members / measures.contact_area - 1.0, 0.0),
         spared=measures.spared,
-        friction_mismatch=apart,
+        friction_mismatch=mismatch,
         way=step.velocity,
         slid=_cells_slid(run, step, (grid.dx, grid.dy)),
         angle=pair.angle,
@@ -137,7 +139,7 @@ def _cells_slid(run: RunProperties, step: Step, cell: tuple[float, float]) -> fl
 
 
 def _compare_integrators(scene: Scene, solved: SolvedStep) -> IntegratorDifference:
-    """Return what the embedded pair shows of a step; collective."""
+    """Return the differences that the embedded pair of integrators gives for a step; collective."""
     step, trial, contact, measures = solved.step, solved.trial, solved.contact, solved.measures
     branches = scene.material.branched
     if branches is None:
@@ -155,9 +157,9 @@ def _compare_integrators(scene: Scene, solved: SolvedStep) -> IntegratorDifferen
 
 
 def _compare_views(scene: Scene, solved: SolvedStep) -> float:
-    """Return by how much friction by the slopes of the rigid surface and of the body differ; collective.
+    """Return the difference of friction by the slopes of the rigid surface and of the body; collective.
 
-    Of an elastic body the latter is 0.
+    For an elastic body the latter is 0.
     """
     step, measures, grid = solved.step, solved.measures, scene.choices.grid
     if scene.material.branched is None or measures.friction == 0.0:
@@ -169,8 +171,11 @@ def _compare_views(scene: Scene, solved: SolvedStep) -> float:
 
 
 def _viscous(velocity: tuple[float, float], measures: Measures) -> tuple[tuple[float, float], float]:
-    """Return a unit direction, and friction along it without the interface's: that of sliding, or that against the
-    force at rest and where the force is rather across, as of ridges that slide along themselves."""
+    """Return a unit direction, and friction along it without that of the interface.
+
+    The direction is that of sliding, or opposite to the force at rest and if the force is mainly across, as for
+    ridges that slide along themselves.
+    """
     (x, y), (force_x, force_y) = velocity, (measures.force_x, measures.force_y)
     if abs(force_x * y - force_y * x) >= abs(force_x * x + force_y * y):
         x, y = -force_x, -force_y

@@ -42,7 +42,7 @@ def test_an_elastic_body_is_solved_once() -> None:
     assert [row.step for row in found] == [0, 1, 1 + (steps - 1) // 2, steps]
     assert march.scene.slab.tally["operator"] == calls + 2
     assert [row.iterations for row in found[2:]] == [0, 0]
-    assert "takes the place of 29 steps more" in found[-1].remark
+    assert "replaces 29 further steps" in found[-1].remark
     every, found = marched(job({**DWELL, "time_step": 1e-2}, material=ELASTIC))
     assert [row.step for row in found] == list(range(12))
     assert every.scene.slab.tally["operator"] == calls + 10
@@ -98,7 +98,7 @@ def test_restarts_bit_for_bit(bench: Bench) -> None:
             same(whole, part, made[-1])
     if bench.comm.rank == 0:
         assert re.search(
-            rf"step {after} at .* takes the place of {after - before - 1} steps more", (whole / "run.log").read_text()
+            rf"step {after} at .* replaces {after - before - 1} further steps", (whole / "run.log").read_text()
         )
         with h5py.File(whole / "fields.h5") as file:
             assert not np.isnan(file["t"][...]).any()
