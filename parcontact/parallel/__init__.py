@@ -1,1 +1,1 @@
-"""Who owns which rows, and how data moves between ranks. MPI lives here (files excepted)."""
+"""Distribution of rows over ranks, and communication between ranks. Only this room, and files, use MPI."""

@@ -1,14 +1,14 @@
-"""Products of a symbol with the cosine series of a map: a convolution of the map as it goes on mirrored at its edges.
+"""Products of a symbol with the cosine series of a map: a convolution of the map continued mirrored at its edges.
 
-The series `C(k, l) = 4 sum h(i, j) cos(pi (i + 1/2) k/nx) cos(pi (j + 1/2) l/ny)` takes a transform of the map's own
-size along each direction (J. Makhoul, IEEE Trans. Acoust. Speech Signal Process. 28 (1980) 27): with the even points
-first and the odd ones backwards after them, and V the transform of these n points,
+The series `C(k, l) = 4 sum h(i, j) cos(pi (i + 1/2) k/nx) cos(pi (j + 1/2) l/ny)` takes a transform of the size of
+the map along each direction (J. Makhoul, IEEE Trans. Acoust. Speech Signal Process. 28 (1980) 27). With the even
+points first, followed by the odd ones backwards, and V the transform of these n points,
 
     C(k) = exp(-i theta) V(k) + exp(i theta) V(n - k),        theta = pi k/(2 n),
     V(k) = (exp(i theta)/2) (C(k) - i C(n - k)),              C(n) = 0.
 
-Of a row, whose points are real, that is `C(k) - i C(n - k) = 2 exp(-i theta) V(k)`: the half spectrum has each wave k
-as its real part, and n - k as its imaginary one. So messages, blocks and memory are those of the transform.
+For a row, whose points are real, `C(k) - i C(n - k) = 2 exp(-i theta) V(k)`: the half spectrum has the wave k as its
+real part and n - k as its imaginary part. So messages, blocks and memory are those of the transform.
 """
 
 import numpy as np
@@ -22,8 +22,8 @@ Waves = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 class Cosines:
-    """The series of maps of the size of a transform `fft`, in its precision and in the memory of its spectrum; beside
-    that it holds a narrow block of columns. Making and calling one are collective."""
+    """Series of maps of the size of a transform `fft`, in its precision and in the memory of its spectrum, plus a
+    narrow block of columns. The constructor and the methods are collective."""
 
     def __init__(self, fft: FFT) -> None:
         self.fft, self.slab, self.mx, self.my = fft, fft.slab, fft.mx, fft.my
@@ -41,16 +41,16 @@ class Cosines:
 
     @property
     def modes(self) -> tuple[Waves, Waves]:
-        """Half waves along x and y of the real parts of a spectrum, and of the imaginary ones."""
+        """Half waves along x and y of the real parts of a spectrum, and of the imaginary parts."""
         columns, along_y = self.fft.columns, np.arange(self.my)[:, None]
         along_x = np.arange(columns.start, columns.stop)[None, :]
         return (along_x, along_y), (self.mx - along_x, along_y)
 
     def convolve(self, field: Array, symbols: list[NDArray[np.complexfloating]], out: Array) -> Array:
-        """`out = (nx ny) series^-1(symbol * series(field))`; collective.
+        """Put `(nx ny) series^-1(symbol * series(field))` into `out`; collective.
 
-        Each of the `column_blocks` has its part of the symbol: factors of real parts of the spectrum are its real part,
-        those of imaginary ones its imaginary part.
+        Each of the `column_blocks` has its part of the symbol: its real part multiplies real parts of the spectrum,
+        its imaginary part multiplies imaginary parts.
         """
         self.fft.along_x(field, self._transform_rows)
         for columns, symbol in zip(self.column_blocks, symbols, strict=True):
@@ -76,7 +76,7 @@ class Cosines:
 
 
 def _fold(points: NDArray[np.inexact], folded: NDArray[np.inexact]) -> None:
-    """Put the even points of each row first, then the odd ones backwards."""
+    """Put the even points of each row first, followed by the odd ones backwards."""
     half = (points.shape[1] + 1) // 2
     folded[:, :half] = points[:, ::2]
     folded[:, half:] = points[:, 1::2][:, ::-1]
@@ -100,7 +100,8 @@ def _turn(waves: NDArray[np.complexfloating], factors: NDArray[np.complexfloatin
 def _weigh(
     block: NDArray[np.complexfloating], turn: NDArray[np.complexfloating], symbol: NDArray[np.complexfloating]
 ) -> None:
-    """From transforms along y to series, times the symbol, and back: waves l and my - l make each other."""
+    """Transform from transforms along y to series, multiply by the symbol, and transform back; waves l and my - l are
+    coupled."""
     count, half = block.shape[0], block.dtype.type(0.5)
     for low in range(count // 2 + 1):
         high = (count - low) % count

@@ -1,15 +1,14 @@
 """Distributed two-dimensional real FFT: a local pass along x, a transpose between ranks, a local pass along y.
 
-A map of this rank's rows `(ny_loc, nx)` becomes a spectrum of this rank's x-wavenumbers `(ny, nkx_loc)`: all of y is
-local there, so the second pass needs no further message. With lengths larger than the map (zero padding) only the rows
-of the map are transformed along x, and only they are sent.
+A map of this rank's rows `(ny_loc, nx)` becomes a spectrum of this rank's x-wavenumbers `(ny, nkx_loc)`, in which y
+is local. With lengths larger than the map (zero padding) only the rows of the map are transformed along x and sent.
 
-The pass along x works through blocks of rows that stay in cache: what belongs to another rank is copied out of a block
-while it is hot, what stays goes straight to its place in the spectrum. Maps that FFTW cannot take as they are (padded
-along x, of another precision, not aligned) pass through a block too. The pass along y works through blocks of columns
-where they are, if there are many: of a convolution there, times the symbol, and back, while they are in cache. Besides
-its blocks of rows a transform holds one map, and on several ranks what it sends, which is less than another one. In
-single precision rows of x-wavenumbers begin at cache lines, without which FFTW takes up to half as long again.
+The pass along x works on blocks of rows that stay in cache: data of other ranks are copied from a block to messages,
+own data directly to the spectrum. Maps that FFTW cannot transform in place (padded along x, of another precision,
+not aligned) pass through a block, too. The pass along y works on blocks of columns if there are many; a convolution
+transforms a block, multiplies it by the symbol and transforms it back while it is in cache. In addition to its
+blocks a transform holds one map, and on several ranks its messages, which are less than a map. In single precision
+rows of x-wavenumbers begin at cache lines.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,26 +23,25 @@ from .slab import Array, Slab, allocate, deal, dealt_to, reused, without_memory
 from .transpose import Leg, count_legs, legs_of, wire_points
 
 Spectrum = NDArray[np.complexfloating]
-BLOCK_BYTES = 1 << 19  # tuning: of one block of transformed rows, or columns, at most: fits a usual second-level cache
+BLOCK_BYTES = 1 << 19  # tuning: largest block of transformed rows or columns, for a second-level cache
 LINE = 8  # tuning: wavenumbers in single precision in a cache line
-NARROWEST = 16  # tuning: columns in a block, which takes more than that where columns are very long
-LEAST_BYTES = 4 << 20  # tuning: of a spectrum worth blocks of columns; a usual last-level cache keeps a smaller one
+NARROWEST = 16  # tuning: least number of columns in a block
+LEAST_BYTES = 4 << 20  # tuning: least spectrum with blocks of columns, for a last-level cache
 
 
 def transform_name(lengths: tuple[int, int], dtype: DTypeLike) -> str:
-    """The name under which transforms of this size are counted."""
+    """Return the name under which transforms of this size are counted."""
     return f"fft {lengths[0]}x{lengths[1]} {np.dtype(dtype).name}"
 
 
 def _pitch(waves: int, itemsize: int) -> int:
-    """Wavenumbers from one row to the next: in single precision whole cache lines, unless rows are short."""
+    """Return the wavenumbers from one row to the next: in single precision whole cache lines, unless rows are short."""
     return waves if itemsize > 8 or waves < LINE else -(-waves // LINE) * LINE
 
 
 def _block_height(rows: int, row_bytes: int, my: int, ranks: int) -> int:
-    """Rows in a block. On several ranks the blocks are more memory than one rank needs: an eighth of a map, unless that
-    is tiny. By eights each block is aligned, whatever the length of a row.
-    """
+    """Return the number of rows of a block, a multiple of eight for alignment. On several ranks blocks are limited to
+    an eighth of a map, unless that is tiny."""
     most = BLOCK_BYTES
     if ranks > 1:
         most = min(max(my * row_bytes // ranks // 8, BLOCK_BYTES // 8), BLOCK_BYTES)
@@ -51,7 +49,7 @@ def _block_height(rows: int, row_bytes: int, my: int, ranks: int) -> int:
 
 
 def _column_blocks(count: int, column_bytes: int) -> list[slice]:
-    """Blocks of columns, all of a multiple of NARROWEST, which keeps them aligned; the last one has what is left."""
+    """Return blocks of columns. Their widths are multiples of NARROWEST for alignment; the last one has the rest."""
     width = max(NARROWEST, BLOCK_BYTES // column_bytes // NARROWEST * NARROWEST)
     blocks = max(1, count // width) if count * column_bytes > LEAST_BYTES else 1
     starts = [width * number for number in range(blocks)]
@@ -59,13 +57,13 @@ def _column_blocks(count: int, column_bytes: int) -> list[slice]:
 
 
 class FFT:
-    """Transforms of one size and their buffers, made once.
+    """Transforms of one size and their buffers.
 
-    Parameters: the `slab` of the maps; `lengths = (mx, my)` of the transforms, at least `(nx, ny)` (default: equal to
-    it); `dtype` float64 or float32, in which is calculated and sent: maps may be of either; `measured`: FFTW tries
-    which way is the fastest, else it guesses, the same every time; `sharing`, another one of these lengths in double
-    precision, in the memory of whose spectrum one in single precision is to have its own. Making and calling one
-    are collective.
+    Parameters: the `slab` of the maps; `lengths = (mx, my)` of the transforms, at least `(nx, ny)`, the default;
+    `dtype` float64 or float32 of calculations and messages, for maps of either type; `measured`: FFTW measures which
+    algorithm is fastest, otherwise it estimates, reproducibly; `sharing`: another transform of these lengths in
+    double precision, in whose spectrum one in single precision stores its own. The constructor and the methods are
+    collective.
     """
 
     def __init__(
@@ -100,19 +98,19 @@ class FFT:
 
     @cached_property
     def multiplicity(self) -> Array:
-        """How often each x-wavenumber of this half spectrum stands in the full one (1 or 2), shape (1, nkx_loc)."""
+        """Multiplicity (1 or 2) of each x-wavenumber of the half spectrum in the full one, shape (1, nkx_loc)."""
         along_x = self.modes[0]
         return np.where((along_x == 0) | (2 * along_x == self.mx), 1.0, 2.0)
 
     def forward(self, field: Array) -> Spectrum:
-        """Spectrum `sum h exp(-i q x)` of a map; collective. It is this object's buffer: valid until the next call."""
+        """Return the spectrum `sum h exp(-i q x)` of a map; collective. It is a buffer, valid until the next call."""
         self.along_x(field)
         for columns in self.column_blocks:
             self._along_y(self._y_forward, columns)
         return self.spectrum
 
     def backward(self, spectrum: Spectrum, out: Array) -> Array:
-        """Map of a spectrum, so that `backward(forward(h), out)` equals h; collective."""
+        """Put the map of a spectrum into `out`, so that `backward(forward(h), out)` equals h; collective."""
         if spectrum is not self.spectrum:
             self.spectrum[...] = spectrum
         for columns in self.column_blocks:
@@ -120,10 +118,10 @@ class FFT:
         return self.back_along_x(out, 1.0 / (self.mx * self.my))
 
     def convolve(self, field: Array, symbols: Sequence[NDArray[np.inexact]], out: Array) -> Array:
-        """`out = (mx my) backward(symbol * forward(field))`: the symbol carries the scaling; collective.
+        """Put `(mx my) backward(symbol * forward(field))` into `out`; the symbol includes the scaling. Collective.
 
-        There is a part of it for each of the `column_blocks`, in one piece each, or else its rows would be fetched from
-        all over memory. One that is even in q_y may have only the rows of q_y >= 0, the first `my // 2 + 1`.
+        Each of the `column_blocks` has its part of the symbol, contiguous in memory. A symbol that is even in q_y
+        may have only the rows of q_y >= 0, the first `my // 2 + 1`.
         """
         self.along_x(field)
         for columns, symbol in zip(self.column_blocks, symbols, strict=True):
@@ -132,7 +130,7 @@ class FFT:
         return self.back_along_x(out, 1.0)
 
     def _along_y(self, transforms: dict[int, pyfftw.FFTW], columns: slice) -> Spectrum:
-        """Transform a block of columns in its place."""
+        """Transform a block of columns in place."""
         part = self.spectrum[:, columns]
         transform = transforms[part.shape[1]]
         transform.update_arrays(part, part)
@@ -142,7 +140,8 @@ class FFT:
     # -- the pass along x ---------------------------------------------------------------------------------------------
 
     def along_x(self, field: Array, transform: Callable[[Array, Spectrum], None] | None = None) -> None:
-        """From rows to columns of the spectrum; another `transform` of blocks of rows may take them; collective."""
+        """Transform from rows to columns of the spectrum; `transform` replaces the transform of blocks of rows;
+        collective."""
         self._count()
         transform = transform or self._transform_rows
         for leg, blocks in self._legs:
@@ -154,7 +153,7 @@ class FFT:
             if leg:
                 leg.to_columns()
         for height, plan in self._x_forward.items():
-            plan.update_arrays(self.row_block[:height], self._waves(slice(0, height)))  # lets go of the map
+            plan.update_arrays(self.row_block[:height], self._waves(slice(0, height)))  # releases the map
         self.spectrum[self.slab.ny :] = 0.0
 
     def _transform_rows(self, source: Array, waves: Spectrum) -> None:
@@ -166,7 +165,7 @@ class FFT:
         self.execute_rows(source, waves)
 
     def execute_rows(self, rows: Array, waves: Spectrum) -> None:
-        """Transform rows that it can take as they are, such as those of the `row_block`."""
+        """Transform rows in place, such as those of the `row_block`."""
         plan = self._x_forward[len(waves)]
         plan.update_arrays(rows, waves)
         plan.execute()
@@ -174,7 +173,7 @@ class FFT:
     def back_along_x(
         self, out: Array, scale: float, transform: Callable[[Spectrum, Array], None] | None = None
     ) -> Array:
-        """The reverse of `along_x`, with a factor; collective."""
+        """Reverse `along_x`, and multiply by `scale`; collective."""
         self._count()
         transform = transform or self._transform_waves
         for leg, blocks in self._legs:
@@ -199,17 +198,17 @@ class FFT:
             target[...] = result[:, : self.slab.nx]
 
     def execute_waves(self, waves: Spectrum, rows: Array) -> None:
-        """The reverse of `execute_rows`; the waves are lost."""
+        """Reverse `execute_rows`; the waves are overwritten."""
         plan = self._x_backward[len(waves)]
         plan.update_arrays(waves, rows)
         plan.execute()
 
     def _waves(self, rows: slice) -> Spectrum:
-        """Where the transform along x of these rows is: on one rank at once in its place."""
+        """Return the place of the transform along x of these rows; on one rank it is in the spectrum."""
         return self._wave_block[: rows.stop - rows.start] if self._wave_block.size else self.spectrum[rows]
 
     def _direct(self, rows: Array, alignment: int) -> bool:
-        """True if a transform can take these rows of a map as they are."""
+        """Return True if FFTW can transform these rows of a map in place."""
         fits = rows.shape[1] == self.mx and rows.dtype == self.dtype and rows.flags.c_contiguous
         return fits and pyfftw.is_byte_aligned(rows, alignment)
 
@@ -231,14 +230,14 @@ class FFT:
         return reused(sharing.spectrum, shape, self.complex)[:, :columns]
 
     def _legs_of(self, part: slice) -> tuple[int, list[slice]]:
-        """The height of the blocks of a rank that has these rows, and its rows in each leg of the exchange."""
+        """Return the height of the blocks of a rank with these rows, and its rows in each leg of the exchange."""
         ranks, row_bytes = self.slab.comm.size, (self.mx // 2 + 1) * self.complex.itemsize
         rows = part.stop - part.start
         height = _block_height(rows, row_bytes, self.my, ranks)
         return height, legs_of(rows, height, count_legs(self.my * row_bytes, ranks))
 
     def _make_blocks(self) -> Spectrum:
-        """Make blocks of rows and of columns; return what is sent in one leg of the exchange."""
+        """Make blocks of rows and of columns. Return the buffer of messages in one leg of the exchange."""
         slab, waves, (height, legs) = self.slab, self.mx // 2 + 1, self._legs_of(self.slab.rows)
         self.row_block = allocate((height, self.mx), self.dtype, slab.tally)
         block = (height if slab.comm.size > 1 else 0, _pitch(waves, self.complex.itemsize))
@@ -247,7 +246,7 @@ class FFT:
         return allocate((wire_points(legs, waves - self.shape[1]),), self.complex, slab.tally)
 
     def _make_legs(self) -> None:
-        """The legs of the exchange, each with this rank's blocks of rows."""
+        """Make the legs of the exchange, each with this rank's blocks of rows."""
         slab, ranks, everyone = self.slab, self.slab.comm.size, [self._legs_of(part) for part in self.slab.dealt]
         dealt, (height, own) = deal(self.mx // 2 + 1, ranks), everyone[slab.comm.rank]
         self._legs: list[tuple[Leg | None, list[slice]]] = []
@@ -278,8 +277,8 @@ class FFT:
 
 @loop
 def _multiply(spectrum: NDArray[np.complexfloating], symbol: NDArray[np.inexact]) -> None:
-    """`spectrum <- symbol spectrum`: faster than numpy, which makes a real symbol complex first. Rows that the symbol
-    does not have are those of -q_y."""
+    """Multiply a spectrum by a symbol, faster than numpy, which would convert a real symbol to complex numbers. Rows
+    that the symbol lacks are those of -q_y."""
     count = spectrum.shape[0]
     for j in range(count):
         factors = symbol[j] if j < symbol.shape[0] else symbol[count - j]

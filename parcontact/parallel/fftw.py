@@ -1,6 +1,6 @@
-"""pyfftw without its copies of scipy's interfaces, until somebody asks for them; and what FFTW has learnt.
+"""pyfftw without its copies of scipy's interfaces, which are imported on demand; and FFTW's wisdom.
 
-For the interfaces it imports half of scipy. That takes a fifth of a second, of which every short run had a share.
+These interfaces import half of scipy, which takes a fifth of a second.
 """
 
 import importlib
@@ -8,11 +8,11 @@ import sys
 from types import ModuleType
 
 INTERFACES = "pyfftw.interfaces"
-SEPARATOR = b"\x1e"  # of the wisdom of each precision, which is text
+SEPARATOR = b"\x1e"  # separates the wisdom of each precision
 
 
 def _interfaces(name: str) -> ModuleType:
-    """Import the interfaces, which `pyfftw` does not find."""
+    """Import the interfaces on demand."""
     if name == "interfaces":
         return importlib.import_module(INTERFACES)
     raise AttributeError(f"module 'pyfftw' has no attribute {name!r}")
@@ -21,7 +21,7 @@ def _interfaces(name: str) -> ModuleType:
 if "pyfftw" in sys.modules:
     import pyfftw
 else:
-    sys.modules[INTERFACES] = ModuleType(INTERFACES)  # stands there while pyfftw is imported
+    sys.modules[INTERFACES] = ModuleType(INTERFACES)  # a placeholder while pyfftw is imported
     try:
         import pyfftw
     finally:
@@ -33,12 +33,13 @@ __all__ = ["export_wisdom", "import_wisdom", "pyfftw"]
 
 
 def export_wisdom() -> bytes:
-    """Which transforms FFTW found the fastest in this process; another may choose others, whose last bits differ."""
+    """Return the algorithms that FFTW has chosen in this process; another process may choose others, with other
+    rounding."""
     return SEPARATOR.join(pyfftw.export_wisdom())
 
 
 def import_wisdom(wisdom: bytes) -> bool:
-    """From now on make the transforms of the process that exported this; False if that cannot be (another FFTW)."""
+    """Use the algorithms of the process that exported this wisdom. Return False if FFTW does not accept it."""
     pyfftw.forget_wisdom()
     precisions = tuple(wisdom.split(SEPARATOR))
     return len(precisions) == 3 and all(pyfftw.import_wisdom(precisions))

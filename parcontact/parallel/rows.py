@@ -1,4 +1,4 @@
-"""Moving whole rows of a map, from one rank to another where they have to."""
+"""Exchange of whole rows of a map between ranks."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from .slab import Array, Slab
 
 
 def roll_rows(slab: Slab, field: Array, count: int, out: Array) -> Array:
-    """`out(j) = field(j - count)` along y, cyclic, for this rank's rows; not in place; collective."""
+    """Put `field(j - count)`, cyclic along y, into `out` for this rank's rows; not in place; collective."""
     count %= slab.ny
     for low, high, shift in ((0, count, slab.ny - count), (count, slab.ny, -count)):
         wanted = [slice(min(max(part.start, low), high), min(max(part.stop, low), high)) for part in slab.dealt]
@@ -22,26 +22,26 @@ def roll_rows(slab: Slab, field: Array, count: int, out: Array) -> Array:
 
 
 def before_first(slab: Slab, field: Array, cyclic: bool) -> Array:
-    """The row of a map that comes before this rank's first one, shape (nx,); collective.
+    """Return the row of a map before this rank's first one, shape (nx,); collective.
 
-    The first row of a map has the last one before it if the map is `cyclic`, otherwise itself. A rank without rows gets
-    zeros.
+    The row before the first of the map is the last if the map is `cyclic`, otherwise the first itself. Ranks without
+    rows get zeros.
     """
     return _beside(slab, field, [-1], [], cyclic)[0]
 
 
 def around(slab: Slab, field: Array, count: int, cyclic: bool) -> tuple[Array, Array]:
-    """The rows of a map before this rank's first one and after its last, shape (count, nx), the nearest first;
+    """Return the rows of a map before this rank's first one and after its last, shape (count, nx), the nearest first;
     collective.
 
-    A map that is not `cyclic` goes on with rows like its first and its last. A rank without rows gets zeros.
+    A map that is not `cyclic` continues with its first and last row. Ranks without rows get zeros.
     """
     found = _beside(slab, field, range(-1, -1 - count, -1), range(count), cyclic)
     return found[:count], found[count:]
 
 
 def _beside(slab: Slab, field: Array, above: Sequence[int], below: Sequence[int], cyclic: bool) -> Array:
-    """Rows counted from this rank's first one, and from the one after its last."""
+    """Return rows counted from this rank's first one, and from the one after its last."""
 
     def wanted(part: slice) -> list[int]:
         numbers = [part.start + k for k in above] + [part.stop + k for k in below]
@@ -53,9 +53,9 @@ def _beside(slab: Slab, field: Array, above: Sequence[int], below: Sequence[int]
 
 
 class RowsBeside:
-    """Rows of a map that ranks want of each other, in one message; one that the map does not have is of zeros.
+    """Exchange of rows of a map between ranks, in one message; rows outside the map are zeros.
 
-    `wanted` are the numbers of those rows, of each rank; a map that every rank has is that of a rank alone.
+    `wanted` has the row numbers for each rank. A map that every rank has is on a slab of one rank.
     """
 
     def __init__(self, slab: Slab, wanted: list[list[int]], rank: int) -> None:
@@ -70,7 +70,7 @@ class RowsBeside:
         self._got = [len(places) for places in coming]
 
     def fetch(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Collective."""
+        """Return the wanted rows of this rank; collective."""
         slab, leaving = self._slab, values[self._leaving]
         out = np.zeros((self._count, slab.nx), values.dtype)
         if slab.comm.size == 1:

@@ -1,4 +1,4 @@
-"""Signals that ask a program to stop, or to save, noted until all ranks have agreed on what to do."""
+"""Signals to stop or save, stored until all ranks have agreed."""
 
 import signal
 import threading
@@ -7,11 +7,11 @@ from contextlib import contextmanager
 from types import FrameType
 
 STOP = (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-SAVE = signal.SIGCONT  # the first that mpirun sends when it was told to end, long before SIGTERM and SIGKILL
+SAVE = signal.SIGCONT  # the first signal of mpirun when it ends a job, long before SIGTERM and SIGKILL
 
 
 class Signals:
-    """Notes that a signal has come to this rank; a second Ctrl-C ends the process at once."""
+    """Record of the signals of this rank; a second Ctrl-C ends the process at once."""
 
     def __init__(self) -> None:
         self.stop = self.save = False
@@ -26,10 +26,9 @@ class Signals:
 
     @contextmanager
     def noted(self) -> Iterator["Signals"]:
-        """Note signals meanwhile; before and after, they end the process at once, as there is nothing to save.
+        """Record signals within this context; outside it, they end the process at once.
 
-        Where another one notes them already, as that of a sweep around its cases, it is the one to ask. In a thread
-        beside the main one none can be noted.
+        An outer context, such as that of a sweep, keeps recording. Signals are recorded in the main thread only.
         """
         outer = getattr(signal.getsignal(SAVE), "__self__", None)
         if isinstance(outer, Signals) or threading.current_thread() is not threading.main_thread():

@@ -1,7 +1,7 @@
-"""Who owns which rows of a map, and sums over all of them.
+"""Distribution of the rows of a map over ranks, and sums over all of them.
 
-A map has `ny` rows of `nx` points. Rows are dealt out evenly and in order; x is contiguous and local. Rank counts that
-do not divide `ny`, and ranks without rows, are normal.
+A map has `ny` rows of `nx` points. Rows are distributed evenly and in order; x is contiguous and local. Numbers of
+ranks that do not divide `ny`, and ranks without rows, are allowed.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,12 +25,12 @@ def deal(count: int, ranks: int) -> list[slice]:
 
 
 def dealt_to(count: int, ranks: int, rank: int) -> slice:
-    """The part of one rank, as `deal` has it; however many ranks there are."""
+    """Return the part of one rank, as `deal` returns it."""
     return slice(count * rank // ranks, count * (rank + 1) // ranks)
 
 
 class PlannedRank:
-    """One of several ranks of a calculation that is only planned, in place of their communicator: it is alone."""
+    """Replaces the communicator of one of several ranks in a plan; it communicates with nobody."""
 
     def __init__(self, size: int, rank: int) -> None:
         self.size, self.rank = size, rank
@@ -45,8 +45,8 @@ class PlannedRank:
 class Slab:
     """This rank's rows of `ny x nx` maps, and the collective operations on them.
 
-    Every method whose docstring says "collective" must be called by all ranks of `comm`. `rows_of(rank)` are the rows
-    of a rank, by default as `deal` has them.
+    Every method whose docstring says "collective" must be called by all ranks of `comm`. `rows_of(rank)` returns the
+    rows of a rank, by default those of `deal`.
     """
 
     def __init__(
@@ -65,17 +65,16 @@ class Slab:
 
     @staticmethod
     def alone(nx: int, ny: int, tally: Tally | None = None) -> "Slab":
-        """The slab of a map that this rank has for itself."""
+        """Return the slab of a map on this rank alone."""
         return Slab(MPI.COMM_SELF, nx, ny, tally)
 
     def resized(self, nx: int, ny: int) -> "Slab":
-        """The slab of a map of another size on the same ranks."""
+        """Return the slab of a map of another size on the same ranks."""
         return Slab(self.comm, nx, ny, self.tally)
 
     @staticmethod
     def planned(nx: int, ny: int, ranks: int, rank: int) -> "Slab":
-        """The slab of one of several ranks of a calculation that is only planned: nothing is allocated on it, and there
-        is nobody to exchange anything with."""
+        """Return the slab of one of several ranks in a plan: it allocates nothing and exchanges nothing."""
         comm: Any = PlannedRank(ranks, rank)
         return Slab(comm, nx, ny, Ledger())
 
@@ -86,7 +85,7 @@ class Slab:
 
     @property
     def only_counts(self) -> bool:
-        """True on a slab that is `planned`."""
+        """True on a `planned` slab."""
         return self.tally.only_counts
 
     @property
@@ -98,14 +97,14 @@ class Slab:
         return self.nx * self.ny
 
     def empty(self, dtype: DTypeLike = np.float64) -> Array:
-        """An uninitialised map: this rank's rows, aligned for the transforms, counted."""
+        """Return an uninitialised map of this rank's rows, aligned for transforms and counted."""
         return allocate(self.shape, dtype, self.tally)
 
     def zeros(self, dtype: DTypeLike = np.float64) -> Array:
         return self._zeros(self.shape, dtype)
 
     def zero_maps(self, count: int) -> Array:
-        """Maps of zeros in one piece, shape (count, rows, nx)."""
+        """Return contiguous maps of zeros, shape (count, rows, nx)."""
         return self._zeros((count, *self.shape), np.float64)
 
     def _zeros(self, shape: tuple[int, ...], dtype: DTypeLike) -> Array:
@@ -115,15 +114,15 @@ class Slab:
         return fields
 
     def sum(self, *values: float) -> list[float]:
-        """Collective. Sums over all ranks of several numbers, in one message."""
+        """Return the sums of several numbers over all ranks, in one message; collective."""
         return self.reduce(values, ())
 
     def reduce(self, sums: Sequence[float], maxima: Sequence[float]) -> list[float]:
-        """Collective. Sums and maxima over all ranks, sums first, in one message; a NaN anywhere stays one.
+        """Return sums and maxima over all ranks, sums first, in one message; NaN propagates. Collective.
 
-        Every rank receives the numbers of all and adds them in the order of ranks. So all ranks get the same bits, and
-        get them again when the run is repeated; an Allreduce would leave both to the MPI library, and a sum and a
-        maximum in one would need an operator of our own, which MPI may apply to any part of the numbers.
+        Every rank receives the numbers of all and adds them in the order of ranks, so that all ranks, and repeated
+        runs, get the same bits. An Allreduce would not guarantee this, and would need a user-defined operator for
+        sums and maxima in one message.
         """
         self.tally["allreduce"] += 1
         if self.comm.size == 1:
@@ -135,15 +134,15 @@ class Slab:
         return [*summed.tolist(), *largest.tolist()]
 
     def agree(self, value: T) -> T:
-        """Collective. Root's value, on every rank."""
+        """Return root's value on every rank; collective."""
         return self.comm.bcast(value) if self.comm.size > 1 else value
 
     def from_root(self, field: Array | None) -> Array:
-        """Collective. This rank's rows of a map in double precision that root has, of shape (ny, nx)."""
+        """Return this rank's rows of a map in double precision of shape (ny, nx) on root; collective."""
         own = np.empty(self.shape)
         counts = [part.stop - part.start for part in self.dealt]
         starts = [part.start for part in self.dealt]
-        row = MPI.DOUBLE.Create_contiguous(self.nx).Commit()  # counts are of rows: of points they would leave 32 bits
+        row = MPI.DOUBLE.Create_contiguous(self.nx).Commit()  # counts of points could exceed 32 bits
         try:
             whole = None if field is None else [np.ascontiguousarray(field, dtype=np.float64), (counts, starts), row]
             self.comm.Scatterv(whole, [own, self.shape[0], row])
@@ -152,7 +151,7 @@ class Slab:
         return own
 
     def to_root(self, field: Array) -> Array | None:
-        """Collective. The whole map, shape (ny, nx), on root; None on the other ranks."""
+        """Return the whole map, shape (ny, nx), on root; None on the other ranks; collective."""
         own = np.ascontiguousarray(field)
         if not self.root:
             if own.size:
@@ -166,23 +165,23 @@ class Slab:
         return whole
 
     def from_all(self, value: T) -> list[T]:
-        """Collective. The value of every rank, in order, on every rank."""
+        """Return the values of all ranks, in order, on every rank; collective."""
         return self.comm.allgather(value)
 
 
 def allocate(shape: tuple[int, ...], dtype: DTypeLike, tally: Tally) -> NDArray[Any]:
-    """An uninitialised array aligned for SIMD transforms, its bytes counted; one without memory where a tally only
-    counts."""
+    """Return an uninitialised array, aligned for SIMD transforms and counted; without memory if the tally
+    only counts."""
     array = without_memory(shape, dtype) if tally.only_counts else pyfftw.empty_aligned(shape, dtype=dtype, n=64)
     tally.hold(array)
     return array
 
 
 def without_memory(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """An array that takes no memory: all its items are in the same place."""
+    """Return an array without memory: all its items share one place."""
     return np.ndarray(shape, dtype, np.zeros(1, dtype), strides=(0,) * len(shape))
 
 
 def reused(array: NDArray[Any], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """The memory of an array in one piece as another one, which takes no more, for while nobody needs the first."""
+    """Return the memory of a contiguous array as another array, at most as large, for temporary use."""
     return np.ndarray(shape, dtype, buffer=array)

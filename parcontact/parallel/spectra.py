@@ -1,8 +1,8 @@
-"""Spectra of maps as maps themselves, digit by digit: so that files of maps can have them, on any number of ranks.
+"""Spectra stored as maps, exactly, so that files of maps can hold them on any number of ranks.
 
-The half spectrum of a map of ny x nx points has `nx // 2 + 1` complex columns, dealt out to the ranks by columns. Its
-real parts fill as many columns of a map, imaginary parts the rest; those of the first column and, where nx is even, of
-the last one have no room there and are in a second map, which takes those of `per_map` spectra.
+The half spectrum of a map of ny x nx points has `nx // 2 + 1` complex columns, distributed over the ranks by
+columns. Its real parts fill as many columns of a map, imaginary parts the rest. The imaginary parts of the first
+column and, if nx is even, of the last one do not fit: a second map holds those of `per_map` spectra.
 """
 
 import numpy as np
@@ -13,18 +13,18 @@ from .slab import Array
 
 
 def edges(nx: int) -> int:
-    """Return how many columns of imaginary parts have no room in the map of a spectrum."""
+    """Return the number of columns of imaginary parts that do not fit into the map of a spectrum."""
     return 1 + (nx % 2 == 0)
 
 
 def per_map(nx: int) -> int:
-    """Return of how many spectra these columns fit into one map."""
+    """Return for how many spectra one map holds these columns."""
     return max(1, nx // edges(nx))
 
 
 def to_map(fft: FFT, spectrum: Spectrum, out: Array, rest: Array) -> None:
-    """Put this rank's rows of a spectrum, which is dealt out by columns, into `out`, and the columns without room into
-    `rest`, of shape (ny_loc, edges); collective."""
+    """Put this rank's rows of a spectrum, distributed by columns, into `out`, and the columns that do not fit into
+    `rest`, shape (ny_loc, edges); collective."""
     rows = to_rows(fft, spectrum)
     count, nx = rows.shape[1], fft.slab.nx
     out[:, :count] = rows.real
@@ -35,7 +35,7 @@ def to_map(fft: FFT, spectrum: Spectrum, out: Array, rest: Array) -> None:
 
 
 def from_map(fft: FFT, field: Array, rest: Array, out: Spectrum) -> None:
-    """Undo `to_map`; collective."""
+    """Reverse `to_map`; collective."""
     nx = fft.slab.nx
     count = nx // 2 + 1
     rows = np.empty((len(field), count), fft.complex)
@@ -48,14 +48,14 @@ def from_map(fft: FFT, field: Array, rest: Array, out: Spectrum) -> None:
 
 
 def to_rows(fft: FFT, spectrum: Spectrum) -> NDArray[np.complexfloating]:
-    """Return all columns of this rank's rows of a spectrum of the maps' own size; collective."""
+    """Return all columns of this rank's rows of a spectrum of the size of maps; collective."""
     slab = fft.slab
     parts = slab.comm.alltoall([np.ascontiguousarray(spectrum[rows]) for rows in slab.dealt])
     return np.concatenate(parts, axis=1)
 
 
 def to_columns(fft: FFT, rows: NDArray[np.complexfloating], out: Spectrum) -> None:
-    """Undo `to_rows`, into a spectrum; collective."""
+    """Reverse `to_rows`, into the spectrum `out`; collective."""
     slab = fft.slab
     columns = slab.comm.allgather(fft.columns)
     parts = slab.comm.alltoall([np.ascontiguousarray(rows[:, each]) for each in columns])

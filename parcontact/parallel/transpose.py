@@ -1,6 +1,6 @@
-"""The exchange between the passes of a distributed transform: rows with all x-wavenumbers become all rows of some.
+"""Exchange between the passes of a distributed transform: rows with all x-wavenumbers become all rows of some.
 
-It goes in legs, each of some rows of every rank: so what waits to be sent is never more than a part of a map.
+It is made in legs, each of some rows of every rank, so that messages never take more than a part of a map.
 """
 
 from itertools import pairwise
@@ -12,32 +12,33 @@ from .mpi import MPI
 from .slab import Slab
 
 Waves = NDArray[np.complexfloating]
-LEGS = 4  # tuning: of an exchange, where the rows of a rank have as many times LEG_BYTES
+LEGS = 4  # tuning: largest number of legs of an exchange
 LEG_BYTES = 1 << 19
 
 
 def count_legs(spectrum_bytes: int, ranks: int) -> int:
-    """How many legs there are for spectra of so many bytes on all ranks together."""
+    """Return the number of legs for a spectrum of `spectrum_bytes` on all ranks: one per LEG_BYTES of a rank, at most
+    LEGS."""
     return max(1, min(LEGS, spectrum_bytes // ranks // LEG_BYTES)) if ranks > 1 else 1
 
 
 def legs_of(rows: int, height: int, count: int) -> list[slice]:
-    """The rows of one rank in each leg, for blocks of so many rows that stay together."""
+    """Return the rows of one rank in each leg, in blocks of `height` rows."""
     blocks = -(-rows // max(height, 1))
     bounds = [min(rows, height * (blocks * leg // count)) for leg in range(count + 1)]
     return [slice(start, stop) for start, stop in pairwise(bounds)]
 
 
 def wire_points(legs: list[slice], columns: int) -> int:
-    """Wavenumbers in the longest of these legs, of `columns` in each row that belong to other ranks."""
+    """Return the wavenumbers in the longest leg, with `columns` in each row for other ranks."""
     return max(leg.stop - leg.start for leg in legs) * columns
 
 
 class Leg:
     """One leg, between blocks of rows and the `spectrum` with all rows of this rank's x-wavenumbers.
 
-    Parameters: `dealt`, the x-wavenumbers of each rank; `rows` of each rank, counted in the whole map; the `wire`, in
-    which there is a parcel for every other rank. What a rank keeps itself never passes through the wire.
+    Parameters: `dealt`, the x-wavenumbers of each rank; `rows` of each rank, counted in the whole map; `wire`, the
+    buffer of messages to other ranks.
     """
 
     def __init__(self, slab: Slab, dealt: list[slice], rows: list[slice], spectrum: Waves, wire: Waves) -> None:
@@ -59,21 +60,21 @@ class Leg:
         self.sent = sum(counts) * spectrum.itemsize
 
     def post(self, rows: slice, waves: Waves) -> None:
-        """Copy a block of this rank's rows to its place in the spectrum and to the parcels."""
+        """Copy a block of this rank's rows into the spectrum and the messages."""
         place = slice(rows.start - self._first, rows.stop - self._first)
         for parcel, columns in zip(self._parcels, self._dealt, strict=True):
             parcel[place] = waves[:, columns]
 
     def to_columns(self) -> None:
-        """Collective. Exchange the parcels."""
+        """Exchange the messages; collective."""
         self._comm.Alltoallv(self._in_rows, self._in_columns)
 
     def to_rows(self) -> None:
-        """Collective. The reverse of `to_columns`."""
+        """Reverse `to_columns`; collective."""
         self._comm.Alltoallv(self._in_columns, self._in_rows)
 
     def collect(self, rows: slice, waves: Waves) -> None:
-        """The reverse of `post`."""
+        """Reverse `post`."""
         place = slice(rows.start - self._first, rows.stop - self._first)
         for parcel, columns in zip(self._parcels, self._dealt, strict=True):
             waves[:, columns] = parcel[place]
