@@ -71,6 +71,11 @@ class ErrorBudget:
     friction: ErrorParts | None
     area: ErrorParts
 
+    def take_from_time(self, error: float) -> "ErrorBudget":
+        """Return the budget with a smaller error of friction by the time steps."""
+        friction = self.friction and self.friction._replace(time=self.friction.time - error)
+        return ErrorBudget(friction, self.area)
+
 
 def estimate(run: RunProperties, observed: StepObservation) -> ErrorBudget:
     """Return the budget of a step."""
@@ -151,7 +156,8 @@ class ErrorSums:
     @property
     def friction_within(self) -> float:
         """Friction is known to so much, in the mean over the way: an error of its coefficient, not of a share of it."""
-        return float(self.sums[0, 1:].sum() / self.sums[1, 0]) if self.sums[1, 0] > 0.0 else math.nan
+        parts, weight = self.friction, float(self.sums[1, 0])
+        return parts.of_friction * float(self.sums[0, 0]) / weight if parts and weight > 0.0 else math.nan
 
     @property
     def area(self) -> ErrorParts | None:

