@@ -155,9 +155,9 @@ FLASH = (
     ),
     Column(
         *("error_flash", ""),
-        "estimated relative error of `flash_temperature`: that of friction, which makes the heat (with `thermal`); "
-        "empty where it is 0",
-        lambda point: point.error_friction if point.flash and point.flash.mean else math.nan,
+        "estimated relative error of `flash_temperature`: 2.5 times that of friction, which makes the heat (with "
+        "`thermal`); empty where it is 0",
+        lambda point: point.error_flash,
         "thermal",
     ),
 )
@@ -236,7 +236,8 @@ MEASURES: Table = (
     Column(
         *("error_energy", "J"),
         "estimated error of `work` and `dissipated`: by how much the work of the load along its path and the energies "
-        "differ, summed over steps without snaps (with `adhesion` and `output.energy`)",
+        "differ, summed over steps without snaps, and 0.4 of the error of the area in what each step dissipates (with "
+        "`adhesion` and `output.energy`)",
         when="adhesion",
     ),
     Column("flow_x", "m³", "conductivity of the gap along x (with `leakage`, {doc}`seals`)", when="leakage"),
@@ -436,7 +437,7 @@ SWEEP: Table = tuple(
             "with adhesion: force of the last pull-off, empty where contact holds ({doc}`adhesion`)",
             when="adhesion",
         ),
-        Column(*("pull_off_error", "N"), "error of it by the steps and the solves", when="adhesion"),
+        Column(*("pull_off_error", "N"), "error of it by steps, solves and mesh", when="adhesion"),
         Column("pull_off_approach", "m", "approach at it", when="adhesion"),
         Column("dissipated", "J", "with `output.energy`: dissipated energy in the end", when="output.energy"),
         Column("flow_x", "m³", "with `leakage`: K along x, the last one that was calculated", when="leakage"),

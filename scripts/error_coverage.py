@@ -281,7 +281,9 @@ def _pull_off(series: Json) -> tuple[float, float] | None:
     """The highest pull of a run and its error [N], None without one."""
     names = ("time", "pressure", "approach", "max_pressure")
     columns = {name: [row[name] for row in series["rows"]] for name in names}
-    pulls = pull_off.find({**columns, "contact_area": [row["counted"] for row in series["rows"]]})
+    columns["contact_area"] = [row["counted"] for row in series["rows"]]
+    columns["error_area"] = [row["stated"][1] if row["stated"] else math.nan for row in series["rows"]]
+    pulls = pull_off.find(columns)
     if not pulls:
         return None
     pull = pulls[-1]

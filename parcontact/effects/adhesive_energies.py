@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..accuracy.constants import ENERGY
 from ..physics.measures import Measures
 from .effect import Instant
 
@@ -29,7 +30,8 @@ SURFACES, PUSHED, JUMPS = "surface_energy", "work_of_load", "leaves_equilibrium"
 class AdhesiveEnergies(NamedTuple):
     """Energies [J] since the start: the `work` of the rigid surface, the energy of the `surfaces`, 0 far apart, the
     energy `lost` in snaps, and the estimated `error` of the others: by how much the work along the path of the load
-    and the energies differ, summed over all steps without a snap."""
+    and the energies differ, summed over all steps without a snap, and ENERGY times the error of the area in what each
+    step dissipates."""
 
     work: float = 0.0
     surfaces: float = 0.0
@@ -71,9 +73,10 @@ def advance_energies(past: AdhesiveEnergies, instant: Instant, area: float) -> A
         doubt += 0.5 * area * abs((measures.pressure - before.pressure) * way)
     lost = work - gained
     snaps = lost > doubt + LEAST_SNAP * (abs(gained) + abs(surfaces))
+    error = past.error + ENERGY.value * instant.error_area * abs(instant.dissipated)
     if snaps:
-        return AdhesiveEnergies(past.work + work, surfaces, past.lost + lost, past.error)
-    return AdhesiveEnergies(past.work + gained, surfaces, past.lost, past.error + abs(lost))
+        return AdhesiveEnergies(past.work + work, surfaces, past.lost + lost, error)
+    return AdhesiveEnergies(past.work + gained, surfaces, past.lost, error + abs(lost))
 
 
 def _drag(before: Measures, now: Measures, moved: tuple[float, float]) -> tuple[float, float]:

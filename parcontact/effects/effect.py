@@ -60,10 +60,11 @@ class Instant:
     The pressure on this rank's rows is `modulus pressure`, `displacement` that of the body, and `touching` is not 0
     where the surfaces touch; they have the shape (ny_loc, nx). `before` and `measures` are those of the step before and
     of this one. The surface moved by `moved` [m] in the step, in which the energy of the body, stored and dissipated,
-    changed by `gained` [J], NaN where none is asked for. Edges of a contact with adhesion moved by `front` half process
-    zones; `untouched` says that nothing touched, and nothing was pulled, before and after the step. `error_friction` is
-    the estimated relative error of friction, infinite where there is none. `sheared` is what an effect before this one
-    has made of the step; `measures` are those without.
+    changed by `gained` [J], `dissipated` [J] of it, NaN where none is asked for. Edges of a contact with adhesion moved
+    by `front` half process zones; `untouched` says that nothing touched, and nothing was pulled, before and after the
+    step. `error_friction` is the estimated relative error of friction, infinite where there is none, and `error_area`
+    that of the contact area, 0 where nothing touches. `sheared` is what an effect before this one has made of the step;
+    `measures` are those without.
     """
 
     step: Step
@@ -74,9 +75,11 @@ class Instant:
     measures: Measures
     moved: tuple[float, float]
     gained: float
+    dissipated: float
     front: float
     untouched: bool
     error_friction: float = math.inf
+    error_area: float = 0.0
     sheared: Sheared | None = None
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 from pydantic import Field
 
+from ..accuracy.constants import FLASH
 from ..columns import added_by
 from ..errors import InputError, RunError
 from ..history.timeline import Timeline
@@ -253,10 +254,10 @@ class ThermalColumns(Effect[ThermalMemory]):
     def values(self, memory: ThermalMemory) -> Sequence[float]:
         """Return the flash temperature, the highest one, and the relative error of the former, NaN if it is not known.
 
-        It is that of the friction that makes the heat.
+        It is FLASH times that of the friction that makes the heat.
         """
         known = memory.flash != 0.0 and math.isfinite(memory.error)
-        return memory.flash, memory.highest, memory.error if known else math.nan
+        return memory.flash, memory.highest, FLASH.value * memory.error if known else math.nan
 
     def field(self, memory: ThermalMemory, name: str) -> Array:
         """Return this rank's rows of the temperature rise [K]."""

@@ -153,11 +153,12 @@ def _follow(
     scene: Scene, state: State, made: _Made, energy: EnergyMemory | None
 ) -> tuple[dict[str, Changes[Any]], Sheared | None]:
     """Return the changes by effects in a step, and update the relaxation of the body; collective."""
-    solved, u, gained = made.solved, made.solved.body.displacement, math.nan
+    solved, u, gained, dissipated = made.solved, made.solved.body.displacement, math.nan, math.nan
     assert u is not None
     if energy is not None and state.energy is not None and scene.energy is not None:
         now, old = ((each.stored, float(each.dissipated.sum())) for each in (energy, state.energy))
-        gained = scene.energy.unit * ((now[0] - old[0]) + (now[1] - old[1]))
+        dissipated = scene.energy.unit * (now[1] - old[1])
+        gained = scene.energy.unit * (now[0] - old[0]) + dissipated
     (x, y), (x_before, y_before) = solved.step.position, state.contact.last.position
     instant = Instant(
         solved.step,
@@ -168,9 +169,11 @@ def _follow(
         solved.measures,
         (x - x_before, y - y_before),
         gained,
+        dissipated,
         made.motion.front,
         made.motion.untouched,
         made.errors.of_friction,
+        made.errors.of_area,
     )
     changes = dict[str, Changes[Any]]()
     for name, effect in scene.effects.items():

@@ -42,6 +42,11 @@ class StepErrors:
         """Relative error of friction; infinite without friction."""
         return math.inf if self.budget is None or self.budget.friction is None else self.budget.friction.of_friction
 
+    @property
+    def of_area(self) -> float:
+        """The relative error of the contact area, 0 where there is none."""
+        return 0.0 if self.budget is None else self.budget.area.total
+
 
 @dataclass(frozen=True)
 class SolvedStep:

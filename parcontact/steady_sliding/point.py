@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from ..accuracy.budget import ErrorBudget
+from ..accuracy.constants import FLASH
 from ..physics.flash import Flash
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate
@@ -49,3 +50,8 @@ class Point:
     def error_friction(self) -> float:
         """The relative error of friction, 1 or more where it cannot be told from 0; NaN where there is none."""
         return self.errors.friction.of_friction if self.errors.friction else math.nan
+
+    @property
+    def error_flash(self) -> float:
+        """The relative error of the flash temperature, FLASH times that of friction; NaN where there is none."""
+        return FLASH.value * self.error_friction if self.flash and self.flash.mean else math.nan

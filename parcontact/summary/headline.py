@@ -51,12 +51,13 @@ def _friction(job: Job, columns: Columns) -> Iterator[str]:
 
 
 def _pull_off(job: Job, columns: Columns, detached: bool) -> Iterator[str]:
-    """Yield the force of the last pull-off and its error by steps and solves."""
+    """Yield the force of the last pull-off and its error, where that is known."""
     lost = [pull for pull in pull_off.find(columns, detached) if pull.lost is not None]
     if lost:
         box = job.grid.lx * job.grid.ly
         force, within = -lost[-1].pressure * box, lost[-1].error(job.numerics.tolerance) * box
-        yield f"the pull-off force is {quantity(force, 'N', 4)} ± {quantity(within, 'N', 2)}"
+        known = "" if math.isnan(within) else f" ± {quantity(within, 'N', 2)}"
+        yield f"the pull-off force is {quantity(force, 'N', 4)}{known}"
 
 
 def _leakage(directory: Path, columns: Columns) -> Iterator[str]:

@@ -5,18 +5,21 @@ the lowest load, the vertex of the parabola through the three lies lower than th
 
     e = (b s/t - a t/s)^2/(4 (s + t) (a/s + b/t)).
 
-It is the load of the pull-off, with the error e, and SOLVER times the tolerance of the solves. Chosen steps of spheres
-that were pulled off at seven rates, at accuracies from 0.1 to 0.005, were within that of 1500 equal steps in all cases.
+It is the load of the pull-off. Its error is e, SOLVER times the tolerance of the solves, and PULL_OFF times the median
+relative error of the contact area up to that row, by the mesh. Without the mesh's part, chosen steps of spheres that
+were pulled off at seven rates, at accuracies from 0.1 to 0.005, were within it of 1500 equal steps in all cases.
 The lowest load that was held is the pull-off where no further row has one, where the contact snaps, and of a contact
 that holds: the load of the step before says then what is left open.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..accuracy.constants import PULL_OFF
 from ..printed import quantity
 
 SAME_LOAD = 1e-9  # rounding: relative: loads this close are the same
@@ -31,21 +34,22 @@ Values = NDArray[np.float64]
 class PullOff(NamedTuple):
     """The row of the lowest load of a pull, the lowest load and what the steps leave open of it, as mean pressures
     [Pa], and the first row without contact: the one after the last where the run ended with it, None where contact
-    holds."""
+    holds; the relative error by the mesh, NaN where no row has an error of the area."""
 
     row: int
     pressure: float
     between: float
     lost: int | None
+    mesh: float = math.nan
 
     def error(self, tolerance: float) -> float:
-        """Return the error of the load [Pa] by the steps and by the `tolerance` of the solves."""
-        return self.between - SOLVER * tolerance * self.pressure
+        """Return the error of the load [Pa] by steps and mesh, and by the `tolerance` of the solves."""
+        return self.between - (SOLVER * tolerance + self.mesh) * self.pressure
 
 
 def find(columns: Columns, detached: bool = False) -> list[PullOff]:
-    """Return the pull-offs of a run in their order, from its columns `time`, `pressure`, `max_pressure`, `approach`
-    and `contact_area`; it may have ended as its surfaces `detached`.
+    """Return the pull-offs of a run in their order, from its columns `time`, `pressure`, `max_pressure`, `approach`,
+    `contact_area` and `error_area`; it may have ended as its surfaces `detached`.
 
     A pull begins where the surfaces of a contact are nearest, or when they last came nearer before it was lost: an
     earlier pull that it has held is no pull-off. It ends where the surfaces part no more: those that have come off may
@@ -58,7 +62,17 @@ def find(columns: Columns, detached: bool = False) -> list[PullOff]:
     last = len(area) if detached else len(area) - 1  # row at which a contact was lost at the latest
     pulls = [_find(time, pressure, approach, last, *ends) for ends in zip(changes[::2], changes[1::2], strict=True)]
     least = -LEAST_PULL * np.asarray(columns["max_pressure"], float)
-    return [pull for pull in pulls if pull.pressure < least[pull.row]]
+    return [
+        pull._replace(mesh=PULL_OFF.value * _median_to(columns["error_area"], pull.row))
+        for pull in pulls
+        if pull.pressure < least[pull.row]
+    ]
+
+
+def _median_to(values: Sequence[float], row: int) -> float:
+    """Return the median of the values that are known up to a row, NaN without one."""
+    known = [value for value in values[: row + 1] if value == value]
+    return float(np.median(known)) if known else math.nan
 
 
 def _find(time: Values, pressure: Values, approach: Values, last: int, start: int, end: int) -> PullOff:
@@ -104,11 +118,12 @@ def describe_pull_off(columns: Columns, area: float, tolerance: float, detached:
     pulls = find(columns, detached)
     many = sum(pull.lost is not None for pull in pulls) > 1
     for number, pull in enumerate(pulls, 1):
-        row, pressure, _, lost = pull
+        row, pressure, _, lost, _ = pull
         time, approach = (columns[name][row] for name in ("time", "approach"))
         load = f"{quantity(-pressure * area, 'N', 4)} ({quantity(-pressure, 'Pa', 4)})"
         where = f"at t = {quantity(time, 's', 4)}, approach {quantity(approach, 'm', 4)}"
-        within = f"its error by steps and solves is {quantity(pull.error(tolerance) * area, 'N', 2)}"
+        error = pull.error(tolerance) * area
+        within = "its error is not known" if math.isnan(error) else f"its error is {quantity(error, 'N', 2)}"
         if lost is None:
             yield f"largest pull so far: {load}, {where}; contact holds"
             continue
