@@ -1,4 +1,4 @@
-"""Reference of every key of a job: generated from the types, with a meaning and an example beside each."""
+"""Reference of every key of a job: generated from the types, each with its meaning and an example."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ RULE = re.compile(r"^[|\s:-]+$")  # below the head of a table
 
 
 def wrapped(text: str, width: int) -> str:
-    """Return Markdown with lines of at most so many letters, but for code, equations and words that are longer."""
+    """Return Markdown with lines of at most `width` letters; code, equations and longer words stay as they are."""
     parts = CODE.split(text)
     return "".join(part if number % 2 else "\n".join(_lines(part, width)) for number, part in enumerate(parts))
 

@@ -1,8 +1,8 @@
-"""The pages of the manual as text: which there are, and what is written into them of the program itself.
+"""Pages of the manual as text, with the parts that the program writes into them.
 
-A line `% written here: NAME` in a page is replaced by what the program says of NAME, so that it cannot grow old: the
-keys of a job (`reference.keys`), the columns of tables (`columns.TABLES`), and what the caller adds, such as the
-options of the verbs.
+A line `% written here: NAME` in a page is replaced by text that the program makes, so that it is always up to date: the
+keys of a job (`reference.keys`), the columns of tables (`columns.TABLES`), and texts of the caller, such as the options
+of the verbs.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ OURS: Writers = {
 
 
 def page_names() -> list[str]:
-    """The names of the pages, in the order of the table of contents."""
+    """Return the names of the pages, in the order of the table of contents."""
     listed = re.findall(r"^([a-z_]+)$", (PAGES / "index.md").read_text(encoding="utf-8"), re.MULTILINE)
     return ["index", *listed]
 
 
 def page_title(name: str) -> str:
-    """The heading of a page."""
+    """Return the heading of a page."""
     found = re.search(r"^# (.+)$", (PAGES / f"{name}.md").read_text(encoding="utf-8"), re.MULTILINE)
     return found.group(1) if found else name
 
 
 def page(name: str, writers: Writers | None = None) -> str:
-    """A page in full, as MyST Markdown. Raises InputError for a name that no page has."""
+    """Return a page in full, as MyST Markdown. Raises InputError for a name that no page has."""
     if name not in page_names():
         close = difflib.get_close_matches(name, page_names(), n=1)
         hint = f"; did you mean {close[0]}?" if close else f"; there are {', '.join(page_names())}"
@@ -51,7 +51,7 @@ def page(name: str, writers: Writers | None = None) -> str:
 
 
 def plain_page(name: str, writers: Writers | None = None, width: int = 80) -> str:
-    """A page to be read in a terminal of so many letters: without the marks of the web site."""
+    """Return a page for a terminal `width` letters wide, without the marks of the web site."""
     text = FENCE.sub("", docstrings.written(page(name, writers)))
     text = re.sub(r"\{(?:doc|download)\}`(?:([^<`]+) <([^>`]+)>|([^`]+))`", _reference, text)
     text = re.sub(r"^\(.+\)=\n", "", text, flags=re.MULTILINE)
