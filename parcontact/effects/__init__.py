@@ -1,1 +1,1 @@
-"""Effects that a job may call for; a new one has its own file here."""
+"""Effects that a job may ask for, each in a file of its own."""

@@ -1,4 +1,5 @@
-"""Adhesion: surfaces that attract each other (`physics.attraction`, `solve.adhesive`), and what is told of it."""
+"""Adhesion: surfaces that attract each other (`physics.attraction`, `solve.adhesive`), its section, columns and
+warnings."""
 
 from __future__ import annotations
 
@@ -29,12 +30,12 @@ from .adhesive_energies import NO_ENERGIES, AdhesiveEnergies
 from .contact_protocol import ContactLaw
 from .effect import Changes, Decision, Effect, Instant
 
-MOST_CELLS = 2.0  # physics: process zones in a cell; with more, nothing can be said about rates
-SAME = 1e-9  # rounding: of a range
-JKR_LIKE, DMT_LIKE = 3.0, 0.3  # physics: Tabor's parameter, above and below which spheres are as in these theories
-FULL_CONTACT = 0.56988  # physics: Johnson's parameter, from which a wave is in full contact without load
-SNAP_FRONT = 2.0  # accuracy: half process zones by which an edge moves in the shortest step of a snap
-CELLS = 2.0  # accuracy: of the process zone with the range `auto`; pull-off is then right to 0.6 %
+MOST_CELLS = 2.0  # physics: largest cell over the process zone of a viscoelastic body
+SAME = 1e-9  # rounding: relative tolerance on a range
+JKR_LIKE, DMT_LIKE = 3.0, 0.3  # physics: Tabor's parameter above and below which these theories hold
+FULL_CONTACT = 0.56988  # physics: least Johnson's parameter for full contact of a wave without load
+SNAP_FRONT = 2.0  # accuracy: motion of an edge [half process zones] above which the shortest step is a snap
+CELLS = 2.0  # accuracy: process zone over the cell with the range `auto`; the error of pull-off is 0.6 %
 AUTO: Literal["auto"] = "auto"
 LENGTH: TypeAdapter[float] = TypeAdapter(Positive)
 
@@ -67,7 +68,7 @@ def adhesion_law(section: Adhesion | None, grid: Grid, material: Any) -> Adhesio
 
 
 def chosen_range(job: Any) -> float | None:
-    """Return the range [m] that `auto` has on the mesh of a job; None where it is given, or nothing sticks."""
+    """Return the range [m] that `auto` has on the mesh of a job; None if it is given, or without adhesion."""
     section = job.section("adhesion")
     law = None if section is None or section.range != AUTO else adhesion_law(section, job.grid, job.material)
     return None if law is None else law.range
@@ -83,7 +84,7 @@ def _bodies(adhesion: Adhesion | None, material: Any) -> Iterator[Fault]:
 
 
 def _zone_is_resolved(adhesion: Adhesion | None, grid: Any, material: Any) -> Iterator[Fault]:
-    """Refuse what would depend on rates that the mesh cannot tell."""
+    """Refuse viscoelastic bodies whose process zone the mesh does not resolve."""
     if adhesion is None or grid is None or not material.fitted.branches:
         return
     if adhesion.range == AUTO or material.fitted.long_modulus == 0.0:
@@ -107,7 +108,7 @@ def _facts(job: Any) -> Iterator[str]:
     zone = law.process_zone(modulus)
     yield (
         f"adhesion: range {law.range:.4g} m, strength {law.strength:.4g} Pa, process zone l = {zone:.4g} m, "
-        f"cell h = {cell / zone:.3g} l; what counts of a rate is velocity times relaxation time over l"
+        f"cell h = {cell / zone:.3g} l; rates are velocity times relaxation time over l"
     )
     at_once = float(2.0 * job.material.fitted.instant_modulus / (1.0 - job.material.poisson))
     for index, shape in enumerate(job.surface):
@@ -135,8 +136,8 @@ def _kind(tabor: float) -> str:
 
 @dataclass(frozen=True)
 class AdhesionMemory:
-    """Memory of energies, of the number of steps in which the contact `snaps`, of a warning given, and the values of
-    the columns."""
+    """Memory of energies, of the number of steps in which the contact `snaps`, of the warning about fronts, and of the
+    values of the columns."""
 
     energies: AdhesiveEnergies = NO_ENERGIES
     snaps: int = 0
@@ -154,8 +155,8 @@ def _no_bands(adhesion: Any, bands: Any) -> Iterator[Fault]:
 
 
 class AdhesionColumns(Effect[AdhesionMemory]):
-    """The share of the area under tension, the force of all tension [N], the energy of the surfaces, the energy lost in
-    snaps, and the error of energies [J]."""
+    """Columns: share of the area under tension, force of all tension [N], energy of the surfaces [J], energy lost in
+    snaps [J], and error of energies [J]."""
 
     section: ClassVar[type[Part]] = Adhesion
     columns: ClassVar[tuple[str, ...]] = added_by("adhesion")
@@ -182,7 +183,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     @staticmethod
     def doubts(job: Any) -> Iterator[Doubt]:
-        """Yield doubts about physically implausible values, and a mesh that does not resolve the attraction."""
+        """Yield warnings about physically implausible values, and about a mesh that does not resolve the attraction."""
         law = adhesion_law(job.adhesion, job.grid, job.material)
         assert law is not None
         modulus, cell = modulus_of(job.material), cell_of(job.grid)
@@ -195,7 +196,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     @staticmethod
     def facts(job: Any) -> Iterator[str]:
-        """Yield the lengths and numbers that go with the law: process zone, Tabor's and Johnson's parameters."""
+        """Yield sentences on the process zone, Tabor's and Johnson's parameters."""
         yield from _facts(job)
 
     def __init__(self, scene: Any) -> None:
@@ -210,8 +211,8 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         return AdhesionMemory()
 
     def follow(self, instant: Instant, memory: AdhesionMemory) -> Changes[AdhesionMemory]:
-        """Return the energies after a step; errors are not stated across a snap, and a step is warned of once in which
-        the edges of contact of a viscoelastic body move too far."""
+        """Return the energies after a step. Errors are not stated across a snap. The first step in which edges of
+        contact of a viscoelastic body move too far gives a warning."""
         solved, energies = instant.solved, memory.energies
         columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan, math.nan
         if self._scene.energy is not None:

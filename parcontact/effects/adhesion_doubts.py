@@ -1,8 +1,8 @@
-"""Warnings about magnitudes of adhesion: work and range beside those of solids, the body, the surface, mesh and box.
+"""Warnings about magnitudes of adhesion: work and range compared with those of solids, body, surface, mesh and box.
 
-A sphere attracts a flat body at the gap d with `2 pi R gamma(d)`. Of that `gamma(d + r^2/(2 R))/gamma(d)` comes from
-further than r from its axis. Summed over the points of a mesh with cells h the force of the exponential law is wrong by
-up to `4 exp(-2 pi^2 R rho/h^2)`, by Poisson's sum of a Gaussian.
+A sphere attracts a flat body at the gap d with `2 pi R gamma(d)`, of which the share `gamma(d + r^2/(2 R))/gamma(d)`
+comes from points further than r from its axis. Summed over the points of a mesh with cells h, the force of the
+exponential law has an error of up to `4 exp(-2 pi^2 R rho/h^2)`, by Poisson's sum of a Gaussian.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from ..job.sections.calculation import Grid
 from ..job.sections.geometry import Sphere
 from ..physics.attraction import AdhesionLaw
 
-MOST_WORK = 1.0  # physics: surfaces of dry solids have less [J/m^2]; of rubber 0.03 to 0.1
-MOST_STRAIN = 0.5  # physics: as for slopes: the theory is linear
-MOST_RANGE = 0.2  # physics: of the box: the law is that of flat surfaces, as near as their curvature is small
-MOST_RING = 2.0  # accuracy: the force of an undeformed sphere is then wrong by 4 exp(-2 pi^2/4) = 3 %
-SMALL = 0.01  # accuracy: of a force; what is less passes
-PULL_OFF = 1.5 * math.pi  # physics: over w R, of a short range, elastic; others are larger
+MOST_WORK = 1.0  # physics: largest work of dry solids [J/m^2]; rubber has 0.03 to 0.1
+MOST_STRAIN = 0.5  # physics: largest strain of the linear theory
+MOST_RANGE = 0.2  # physics: largest range over the box; the law is that of flat surfaces
+MOST_RING = 2.0  # accuracy: largest cell over sqrt(R rho); the error of the force of a sphere is then 3 %
+SMALL = 0.01  # accuracy: least share of a force that is warned of
+PULL_OFF = 1.5 * math.pi  # physics: least pull-off force over w R, of elastic bodies with a short range
 
 
 def doubts_of_adhesion(job: Any, law: AdhesionLaw, modulus: float, cell: float) -> Iterator[Doubt]:
-    """Yield doubts about a work or a range whose magnitude cannot be meant, or that the model is not made for, with
-    E* of the relaxed body [Pa] and the side of a cell [m]."""
+    """Yield warnings about an implausible work or range, or one outside the model, with E* of the relaxed body [Pa] and
+    the side of a cell [m]."""
     given = {"work": law.work, "range": law.range}
     if law.work > MOST_WORK:
         yield Doubt("work", "adhesion", {**given, "most": MOST_WORK})
@@ -45,7 +45,7 @@ def doubts_of_adhesion(job: Any, law: AdhesionLaw, modulus: float, cell: float) 
 
 
 def _sphere(name: str, sphere: Sphere, grid: Grid, law: AdhesionLaw, cell: float) -> Iterator[Doubt]:
-    """Yield doubts about a sphere, of whose attraction the cells or the box see little, or which is too small."""
+    """Yield warnings about a sphere that is too small, or of whose attraction the cells or the box resolve little."""
     radius, ring = sphere.radius, math.sqrt(sphere.radius * law.range)
     if cell > MOST_RING * ring:
         remedies = {"most": MOST_RING, "fine": MOST_RING * ring, "enough": cell**2 / MOST_RING**2 / radius}
@@ -67,7 +67,6 @@ def _sphere(name: str, sphere: Sphere, grid: Grid, law: AdhesionLaw, cell: float
 
 
 def doubt_range(law: AdhesionLaw, span: float) -> Iterator[Doubt]:
-    """Yield a doubt about a range above the heights of a rough surface, from its lowest to its highest point [m]; a
-    flat one has none."""
+    """Yield a warning about a range above the height of a rough surface, from its lowest to its highest point [m]."""
     if law.range > span > 0.0:
         yield Doubt("range beyond heights", "adhesion", {"range": law.range, "span": span})

@@ -1,13 +1,13 @@
-"""Energies of contacts with adhesion: the work of the load, the energy of the surfaces, what snaps lose.
+"""Energies of contacts with adhesion: work of the load, energy of the surfaces, and losses in snaps.
 
-In a step in which the body gains energy, stored and dissipated, and the surfaces do, the load does its work along the
-path, by the trapezoidal rule, `F dd - F_t ds`. What is missing is lost in a snap if the load could not have done it on
-any way between its two ends; else it is what the rule makes wrong, and the work is that of the energies.
+In a step in which body and surfaces gain energy, the load does work along its path, by the trapezoidal rule, `F dd -
+F_t ds`. A difference is lost in a snap if the load could not have supplied it on any path between the two states.
+Otherwise it is an error of the rule, and the work is that of the energies.
 
-Surfaces that detach under a load are in no equilibrium until they are apart, and the same holds for those that a load
-brings together again. What a load does on such a way depends on the inertia that the model leaves out. Its work from
-the last equilibrium on then is the least that the change takes, and 0 if energy is set free, which is lost. While
-surfaces are apart nothing acts on them, and neither work nor losses change.
+Surfaces that detach under a load, or that a load closes again, pass through states without equilibrium. The work of
+the load on this path depends on inertia, which the model does not have. From the last equilibrium on it is taken as
+the least work that the change needs, and 0 if energy is released, which is lost. While surfaces are detached,
+neither work nor losses change.
 """
 
 from __future__ import annotations
@@ -22,16 +22,15 @@ from .effect import Instant
 if TYPE_CHECKING:
     from ..solve.contact import Contact
 
-LEAST_SNAP = 1e-4  # accuracy: of the energies of a step: less cannot be told from none
-FORCE_DOUBT = 0.3  # accuracy: of the tangential force, by which that of energy may differ
+LEAST_SNAP = 1e-4  # accuracy: least loss in a snap over the energies of the step
+FORCE_DOUBT = 0.3  # accuracy: relative error of the tangential force
 SURFACES, PUSHED, JUMPS = "surface_energy", "work_of_load", "leaves_equilibrium"  # numbers of the law
 
 
 class AdhesiveEnergies(NamedTuple):
-    """Energies [J] since the start: the `work` of the rigid surface, the energy of the `surfaces`, 0 far apart, the
-    energy `lost` in snaps, and the estimated `error` of the others: by how much the work along the path of the load
-    and the energies differ, summed over all steps without a snap, and ENERGY times the error of the area in what each
-    step dissipates."""
+    """Energies [J] since the start: `work` of the rigid surface, energy of the `surfaces`, 0 at large gaps, energy
+    `lost` in snaps, and `error`, the difference between the work along the path of the load and the energies, summed
+    over all steps without a snap."""
 
     work: float = 0.0
     surfaces: float = 0.0
@@ -44,7 +43,7 @@ NO_ENERGIES = AdhesiveEnergies()
 
 class PathWork:
     """Work of the load along its path by the trapezoidal rule, for the modulus 1, in the unit of the scene's energies;
-    0 where no energies are asked for."""
+    0 without energies."""
 
     def __init__(self, scene: Any, approach: float, pressure: float) -> None:
         self.scene, self.approach, self.pressure, self.total = scene, approach, pressure, 0.0
@@ -80,7 +79,7 @@ def advance_energies(past: AdhesiveEnergies, instant: Instant, area: float) -> A
 
 
 def _drag(before: Measures, now: Measures, moved: tuple[float, float]) -> tuple[float, float]:
-    """Return the work of sliding a way without the friction of the interface, and how wrong it may be [J]."""
+    """Return the work of sliding by `moved` without friction of the interface, and its error [J]."""
     (x, y), slid = moved, math.hypot(*moved)
     if not slid:
         return 0.0, 0.0

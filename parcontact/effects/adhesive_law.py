@@ -1,7 +1,7 @@
-"""The contact law with adhesion: the gap is the unknown, and a part of the state.
+"""Contact law with adhesion: the gap is the unknown, and a part of the state.
 
-Under the same load there are several equilibria, and history decides which one. A solve starts from the last two gaps,
-extrapolated in time and moved with the surface by whole cells.
+Under one load there are several equilibria, and the history decides which one is reached. A solve starts from the
+last two gaps, extrapolated in time and moved with the surface by whole cells.
 """
 
 import math
@@ -32,18 +32,18 @@ from ..solve.problem import Approach, Control, MeanPressure
 from .adhesive_energies import JUMPS, PUSHED, SURFACES, PathWork
 from .contact_protocol import Detached, EdgeMotion, End, PreviousContacts, SolvedContact
 
-JUMP_STRIDE = 1.0 / 8.0  # accuracy: of a jump: the longest part in which it is made
-LEAST_STRIDE = 1.0 / 16.0  # accuracy: of these, and of a step: the shortest part in which a hard one is made
-PART_TOLERANCE = 0.05  # tuning: of the parts of a step but for the last
-OPEN = 10.0  # physics: ranges of attraction between surfaces that are detached
-LEAST_LOAD = 1e-9  # accuracy: of all tension, and of the largest attraction on a point: a smaller load is none
-LEAST_TENSION = 1e-2  # physics: of the largest attraction: less is not counted as an area under tension
+JUMP_STRIDE = 1.0 / 8.0  # accuracy: longest part of a jump that is solved at once
+LEAST_STRIDE = 1.0 / 16.0  # accuracy: shortest part of these, and of a step
+PART_TOLERANCE = 0.05  # tuning: tolerance of all parts of a step except the last
+OPEN = 10.0  # physics: gap of detached surfaces over the range
+LEAST_LOAD = 1e-9  # accuracy: least load over all tension, and over the strength of a point
+LEAST_TENSION = 1e-2  # physics: least tension over the strength in the area under tension
 NEVER = -1.0  # a time [s] in a checkpoint
 UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
 
 
 class PastGap(NamedTuple):
-    """The gap after a step, and where the surface was [m]; one that is not `known` has not been."""
+    """The gap after a step and the position of the surface [m]; not `known` before the first step."""
 
     gap: Array
     position: tuple[float, float] = (0.0, 0.0)
@@ -54,8 +54,8 @@ class PastGap(NamedTuple):
 class AdhesiveMemory:
     """Memory of a contact with adhesion: the last gaps, the newest first, a spare map and a backup of the gap.
 
-    `free_correction` is what a free body lacks (`adhesive_solver`) per pressure, for the modulus `modulus`,
-    None of a periodic one. `end` is when nothing held the surfaces any more, None while they are held.
+    `free_correction` is that of a free body (`adhesive_solver`) per pressure, for the modulus `modulus`, None for a
+    periodic one. `end` has time and load of the detachment, None before.
     """
 
     pasts: tuple[PastGap, PastGap]
@@ -68,8 +68,8 @@ class AdhesiveMemory:
 
 @dataclass(frozen=True)
 class LoadPath:
-    """The way of the prescribed load from the last step to this one; approach and mean pressure of the last one; in the
-    units of the solver. A load that presses surfaces which are apart `closes_gap_first`."""
+    """Path of the prescribed load from the last step to this one, with the last approach and mean pressure, in the
+    units of the solver. A compressive load on detached surfaces `closes_gap_first`."""
 
     before: float
     control: Control
@@ -78,7 +78,7 @@ class LoadPath:
     closes_gap_first: bool = False
 
     def at(self, share: float) -> Control:
-        """Return what is prescribed at a share of the way; exact at its end."""
+        """Return the prescribed load at a share of the path; exact at its end."""
         if share == 1.0:
             return self.control
         return replace(self.control, value=self.before + share * (self.control.value - self.before))
@@ -125,10 +125,10 @@ class AdhesiveLaw:
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[AdhesiveMemory]:
-        """Solve a step from the gap of the one before; `effects.contact_protocol.ContactLaw.solve`.
+        """Solve a step from the last gap; see `effects.contact_protocol.ContactLaw.solve`.
 
-        Solves have the tolerance of the job. Where nothing holds the load the surfaces are far apart afterwards, if the
-        job goes on then.
+        Solves have the tolerance of the job. If the surfaces detach and the job continues, they are moved far from
+        each other.
         """
         law, path = self.law(trial.alpha), self._path(trial, control, past, before)
         walk = self._walk(law, memory, step, trial, path, past.spare)
@@ -140,9 +140,9 @@ class AdhesiveLaw:
         snapped, remark = walk.snapped, ""
         if walk.detached and self._goes_on_open:
             contact, now = self._open_up(contact, now, law, trial)
-            apart = before.contact_area == before.pressure == 0.0
-            end, snapped = ("open", False) if apart else ("opened", snapped)
-            remark = "" if apart else nothing_holds(step.control, step.load)
+            separate = before.contact_area == before.pressure == 0.0
+            end, snapped = ("open", False) if separate else ("opened", snapped)
+            remark = "" if separate else nothing_holds(step.control, step.load)
         numbers = self._tension(law, contact.p, trial.alpha) | {"points_changed": changed}
         if self.scene.energy is not None:
             sum_gamma = 0.0 if walk.detached else self.slab.sum(gap_kernels.surface_energy(law, gap))[0]
@@ -157,10 +157,10 @@ class AdhesiveLaw:
     def _walk(
         self, law: Law, memory: AdhesiveMemory, step: Step, trial: Trial, path: LoadPath, pressure: Array
     ) -> _Walk:
-        """Solve along the path of the load, up to its end, with gap and pressure in maps; collective.
+        """Solve along the path of the load up to its end, with gap and pressure in maps; collective.
 
-        A jump goes along its path in parts, so that it does not pass over an equilibrium on its way, and so does a step
-        that is not solved at once, or detaches. Where shorter parts are of no help that stands.
+        A jump is solved in parts, so that it does not pass over an equilibrium. A step that fails or detaches is
+        solved in parts, too, and accepted as it is if the shortest parts do not help.
         """
         gap, correction = memory.spare, memory.free_correction
         if correction is not None and memory.modulus:
@@ -193,14 +193,14 @@ class AdhesiveLaw:
             backup[...] = gap
 
     def motion(self, solved: SolvedContact[AdhesiveMemory], before: Measures, now: Measures) -> EdgeMotion:
-        """Return by how many half process zones the edge of the contact has moved in a step, in the mean.
+        """Return the mean motion of the edges of contact in a step [half process zones].
 
-        In cells that is the number of points that came into contact or left it, over the length of the edge, which is
-        pi/4 of the sides of cells along it. What is left of the load of an `untouched` contact is the solver's error.
+        In cells it is the number of points that came into contact or left it over the length of the edge, pi/4 of
+        the cell sides along it. The remaining load of an `untouched` contact is an error of the solver.
         """
         least = LEAST_LOAD * self.scene.choices.adhesion.strength
-        apart = not (before.contact_area or now.contact_area or solved.numbers["tensile_area"])
-        if apart or (not solved.loaded and max(before.max_pressure, -before.pressure) <= least):
+        separate = not (before.contact_area or now.contact_area or solved.numbers["tensile_area"])
+        if separate or (not solved.loaded and max(before.max_pressure, -before.pressure) <= least):
             return EdgeMotion(0.0, True)
         begins = (before.contact_area == 0.0) != (now.contact_area == 0.0)
         excess = max(each.contact_area - each.contact_area_corrected for each in (before, now))
@@ -212,7 +212,7 @@ class AdhesiveLaw:
         return EdgeMotion(2.0 * moved / zone if zone > 0.0 else 0.0, begins=begins)
 
     def _path(self, trial: Trial, control: Control, past: PreviousContacts, before: Measures) -> LoadPath:
-        """Return the way of what is prescribed since the last step, in the run's units."""
+        """Return the path of the prescribed load since the last step, in the run's units."""
         pressure = before.pressure / (trial.alpha * self.scene.units.pressure)
         if isinstance(control, MeanPressure):
             closes = control.value >= 0.0 and before.contact_area == 0.0
@@ -223,10 +223,9 @@ class AdhesiveLaw:
     def _start(
         self, memory: AdhesiveMemory, step: Step, trial: Trial, path: LoadPath, out: Array, still: bool = False
     ) -> None:
-        """Put the gap from which a step starts into a map: extrapolated, or `still` that of the last step; collective.
+        """Put the start of a step into a map: the extrapolated gap, or the last one if `still`; collective.
 
-        Before the first step it is the gap under a body that nothing has deformed, at the approach, or where the
-        surface touches.
+        Before the first step it is the gap of an undeformed body, at the approach, or where the surface touches.
         """
         now, before = memory.pasts
         if not now.known:
@@ -249,7 +248,7 @@ class AdhesiveLaw:
     def _open_up(
         self, contact: Contact, memory: AdhesiveMemory, law: Law, trial: Trial
     ) -> tuple[Contact, AdhesiveMemory]:
-        """Return the contact with the surfaces apart, and its memory; collective."""
+        """Return the contact with the surfaces far from each other, and its memory; collective."""
         now, before = memory.pasts
         contact.p.fill(0.0)
         contact.u.fill(0.0)
@@ -276,8 +275,8 @@ class AdhesiveLaw:
         return {"tensile_area": count / self.slab.points, "adhesive_force": pull * unit}
 
     def _least_load(self, law: Law, alpha: float, control: Control, p: Array, pull: float) -> float:
-        """Return the load up to which it is the solver's error [N]: a share of all tension and of what one point may
-        pull, or any load where no point presses or pulls more than its error; collective."""
+        """Return the load [N] up to which it is an error of the solver: a share of all tension and of the strength of
+        one point. It is infinite if no point has more pressure or tension than this error; collective."""
         largest = self.slab.reduce((), [float(np.abs(p).max(initial=0.0))])[0]
         least = LEAST_LOAD * law.strength
         unloaded = isinstance(control, MeanPressure) and abs(control.value) * self.slab.points <= least
@@ -293,11 +292,11 @@ class AdhesiveLaw:
         return memory.pasts[0].gap if memory.pasts[0].known else None
 
     def detached(self, memory: AdhesiveMemory) -> Detached | None:
-        """Return when nothing held the surfaces any more; None where they are held."""
+        """Return time and load of the detachment; None before."""
         return memory.end
 
     def with_end(self, memory: AdhesiveMemory, end: Detached) -> AdhesiveMemory:
-        """Return the memory of a run in which nothing holds the surfaces any more."""
+        """Return the memory of a run whose surfaces have detached."""
         return replace(memory, end=end)
 
     def at_rest(self) -> AdhesiveMemory:
@@ -307,7 +306,7 @@ class AdhesiveLaw:
         return AdhesiveMemory(pasts, self.slab.zeros(), self.slab.zeros(), correction)
 
     def entries(self, memory: AdhesiveMemory, units: Units) -> dict[str, Entry]:
-        """Return the gaps, where the surface was, and when nothing held it any more."""
+        """Return the gaps, the positions of the surface, and the detachment."""
         now, before = memory.pasts
         end = memory.end or (NEVER, 0.0)
         found = {
@@ -327,7 +326,7 @@ class AdhesiveLaw:
         return {**found, "free correction": Entry(memory.free_correction, units.height, "m")}
 
     def restored(self, memory: AdhesiveMemory, saved: Saved) -> AdhesiveMemory:
-        """Return the memory of a checkpoint, whose maps have been read into those of this one."""
+        """Return the memory of a checkpoint, whose maps have been read into those of `memory`."""
         now, before = (
             PastGap(past.gap, _place(saved[f"{age}position"]), bool(saved[f"{age}gap is known"]))
             for age, past in zip(("", "earlier "), memory.pasts, strict=True)
@@ -337,8 +336,8 @@ class AdhesiveLaw:
 
 
 def end_of(job: Any, saved: Saved) -> Detached | None:
-    """Return when nothing held the surfaces of a checkpoint any more, from the entries of the law; None where they were
-    held, or where the job goes on then or has another history ahead."""
+    """Return time and load of the detachment from the entries of the law in a checkpoint; None before a detachment, or
+    if the job continues after it or has another history."""
     section = job.section("adhesion")
     if section is None or section.detached == "open" or "detached at" not in saved or saved["detached at"] == NEVER:
         return None
@@ -353,10 +352,10 @@ def _place(saved: Array) -> tuple[float, float]:
 
 
 def _mark(job: Any) -> float:
-    """Return a number that tells the history of a job from others."""
+    """Return a checksum of the history of a job."""
     return float(zlib.crc32(repr(job.history).encode()))
 
 
 def nothing_holds(control: str, load: float) -> str:
     """Return the sentence on surfaces that detach under a prescribed load."""
-    return f"nothing holds the surfaces under a {control} of {load:g}{UNITS[control]} any more"
+    return f"the surfaces detach under a {control} of {load:g}{UNITS[control]}"

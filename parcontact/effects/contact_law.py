@@ -1,4 +1,4 @@
-"""Which law a contact obeys, from its job: what pressures are admissible, and where surfaces touch in saved maps."""
+"""The contact law of a job: admissible pressures, and where surfaces touch in saved maps."""
 
 import math
 
@@ -10,7 +10,8 @@ from ..solve.constraint import Constraint, Mask, NonNegative
 
 
 def constraint_of(job: Job, unit: float = 1.0, most: float = math.inf) -> Constraint:
-    """Return which pressures a job admits without adhesion, in a unit of pressure [Pa]; none is above `most` units."""
+    """Return the constraint of a job without adhesion, for a `unit` of pressure [Pa]; pressures are at most `most`
+    units."""
     hardness = job.material.hardness
     return NonNegative() if hardness is None or hardness / unit >= most else Bounded(hardness / unit)
 

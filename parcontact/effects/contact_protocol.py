@@ -1,7 +1,7 @@
-"""The law of a contact: how a step of it is solved, what it remembers, and where surfaces touch.
+"""Interface of contact laws: how a step is solved, its memory, and where surfaces touch.
 
-`ContactLaw` is all that a march asks. The law of a job without adhesion is that of a constraint on pressures
-(`march.dry_law`); with adhesion the gap is the unknown (`effects.adhesive_law`). An effect brings another law.
+`ContactLaw` is the interface that a march uses. Without adhesion the law is a constraint on pressures
+(`march.dry_law`); with adhesion the gap is the unknown (`effects.adhesive_law`). Effects may provide other laws.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..physics.entries import Entry, Memory, Saved
 from ..physics.measures import Measures
 from ..physics.units import Units
 
-if TYPE_CHECKING:  # what solves is not loaded to check a job
+if TYPE_CHECKING:  # solvers are not imported to check a job
     from ..physics.body import Trial
     from ..solve.constraint import Mask
     from ..solve.contact import Contact
@@ -28,8 +28,8 @@ End = Literal["equilibrium", "detached", "opened", "open"]
 
 
 class PreviousPressure(NamedTuple):
-    """The pressure after a step: a map of p with the pressure `alpha p`, and where the surface was [m]; with an alpha
-    of 0 none is known."""
+    """The pressure after a step, a map of p with the pressure `alpha p`, and the position of the surface [m]; unknown
+    if alpha is 0."""
 
     pressure: Array
     alpha: float = 0.0
@@ -38,9 +38,10 @@ class PreviousPressure(NamedTuple):
 
 @dataclass(frozen=True)
 class PreviousContacts:
-    """Memory of the contacts of earlier steps: the last pressures, the newest first, and the last approach d.
+    """Memory of earlier contacts: the last pressures, the newest first, and the last approach d.
 
-    A history of single solves keeps one pressure, others two or more. The next one will be in the map `spare`.
+    A history of single solves stores one pressure, others two or more. The next pressure is written to the map
+    `spare`.
     """
 
     pressures: tuple[PreviousPressure, ...]
@@ -54,13 +55,12 @@ class PreviousContacts:
 
 @dataclass(frozen=True)
 class SolvedContact(Generic[Remembered]):
-    """The contact of a step: what the law remembers after it, and a map that is not 0 where the surfaces touch.
+    """The contact of a step, the memory of the law after it, and a map that is not 0 where the surfaces touch.
 
-    `numbers` are those of the law, by name; all tension adds up to the force `pull` [N]. Loads up to `least_load` [N]
-    are the solver's error, any load where neither pressure nor tension is more than that. The contact is in
-    `equilibrium`; or it is `detached`, as nothing holds the load; or it was `opened` for that reason, where the run
-    goes on with the surfaces far apart, and then stays `open`. `snapped` says that it passed over states without
-    equilibrium. `remark` is a sentence for run.log, or ''.
+    `numbers` are those of the law, by name; `pull` is the force of all tension [N]. Loads up to `least_load` [N] are
+    errors of the solver. `end`: the contact is in `equilibrium`; or `detached`; or it was `opened` after detachment,
+    as the run continues with the surfaces far from each other, and then stays `open`. `snapped`: it passed through
+    states without equilibrium. `remark` is a sentence for run.log, or ''.
     """
 
     contact: Contact
@@ -75,13 +75,13 @@ class SolvedContact(Generic[Remembered]):
 
     @property
     def loaded(self) -> bool:
-        """Return whether there is pressure or tension."""
+        """True if there is pressure or tension."""
         return self.least_load < math.inf
 
 
 class EdgeMotion(NamedTuple):
-    """Motion of a contact in a step: half process zones by which its edges moved; whether nothing touches before and
-    after the step, nor is under tension; and whether an adhesive contact begins or ends."""
+    """Motion of a contact in a step: of its edges [half process zones]; `untouched` if nothing touches or is under
+    tension before and after the step; `begins` if an adhesive contact begins or ends."""
 
     front: float = 0.0
     untouched: bool = False
@@ -89,16 +89,16 @@ class EdgeMotion(NamedTuple):
 
 
 class Detached(NamedTuple):
-    """When nothing held the surfaces any more [s], and under which load."""
+    """Time [s] and load at which the surfaces detached."""
 
     time: float
     load: float
 
 
 class ContactLaw(Protocol[Memory]):
-    """A law of contact, which is a part of the run. Methods are collective."""
+    """A contact law, a part of the run. Methods are collective."""
 
-    may_shorten: bool  # whether a step that fails is made shorter, where it may be
+    may_shorten: bool  # True if a failed chosen step is repeated with a shorter one
 
     def solve(
         self,
@@ -110,20 +110,20 @@ class ContactLaw(Protocol[Memory]):
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[Memory]:
-        """Solve a step of the body from the memory, contacts and measures of the step before, with the pressure in the
-        spare map, to a tolerance, None for that of the job. A contact that was not solved has a `failure`."""
+        """Solve a step of the body, with the memory, contacts and measures of the step before, and put the pressure
+        into the spare map. A `tolerance` of None is that of the job. A contact that was not solved has a `failure`."""
 
     def motion(self, solved: SolvedContact[Memory], before: Measures, now: Measures) -> EdgeMotion:
-        """Return how the contact has moved in a step, from its measures before and after it."""
+        """Return the motion of the contact in a step from its measures before and after it."""
 
     def gap(self, memory: Memory) -> Array | None:
-        """Return the map of the gap if that is what is solved for, else None."""
+        """Return the map of the gap if it is the unknown, else None."""
 
     def detached(self, memory: Memory) -> Detached | None:
-        """Return when nothing held the surfaces any more; None where they are held."""
+        """Return time and load of the detachment; None before."""
 
     def with_end(self, memory: Memory, end: Detached) -> Memory:
-        """Return the memory of a run in which nothing holds the surfaces any more."""
+        """Return the memory of a run whose surfaces have detached."""
 
     # -- as a part of the run ------------------------------------------------------------------------------------------
 
@@ -131,7 +131,7 @@ class ContactLaw(Protocol[Memory]):
         """Return the memory before the first step, in new maps."""
 
     def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:
-        """Return what a checkpoint has of a memory."""
+        """Return the entries of a memory in checkpoints."""
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:
         """Return the memory of a checkpoint."""

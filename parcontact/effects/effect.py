@@ -1,7 +1,7 @@
-"""The interface of effects: a decision from the job alone, and what is made, remembered and written where it is on.
+"""Interface of effects: a decision from the job alone, and what is made, remembered and written if the effect is on.
 
-An effect is one class, found by the section that it adds to a job (`job.added_sections`): no other file knows it. It
-may bring the contact law of the steps, and it follows each step that was made.
+An effect is one class, found by the section that it adds to a job (`job.added_sections`); no other file refers to
+it. It may provide the contact law, and it is called after each step.
 """
 
 import math
@@ -33,7 +33,7 @@ Remembered = TypeVar("Remembered", covariant=True)
 
 @dataclass(frozen=True)
 class Decision:
-    """Decision whether an effect is on, and why in a few words."""
+    """Decision about an effect: whether it is on, and the reason in a few words."""
 
     name: str
     on: bool
@@ -55,16 +55,14 @@ class Sheared:
 
 @dataclass(frozen=True)
 class Instant:
-    """A step just made, in the run's units unless others are given; maps are valid until the next step begins.
+    """A step just made, in the run's units unless stated; maps are valid until the next step begins.
 
-    The pressure on this rank's rows is `modulus pressure`, `displacement` that of the body, and `touching` is not 0
-    where the surfaces touch; they have the shape (ny_loc, nx). `before` and `measures` are those of the step before and
-    of this one. The surface moved by `moved` [m] in the step, in which the energy of the body, stored and dissipated,
-    changed by `gained` [J], `dissipated` [J] of it, NaN where none is asked for. Edges of a contact with adhesion moved
-    by `front` half process zones; `untouched` says that nothing touched, and nothing was pulled, before and after the
-    step. `error_friction` is the estimated relative error of friction, infinite where there is none, and `error_area`
-    that of the contact area, 0 where nothing touches. `sheared` is what an effect before this one has made of the step;
-    `measures` are those without.
+    The pressure on this rank's rows is `modulus pressure`, `displacement` is that of the body, and `touching` is not
+    0 where the surfaces touch; their shape is (ny_loc, nx). `before` and `measures` belong to the step before and to
+    this one. In this step the surface moved by `moved` [m], and the stored plus dissipated energy of the body
+    changed by `gained` [J], NaN without energies. Edges of an adhesive contact moved by `front` half process zones;
+    `untouched` if nothing touched or was under tension before and after the step. `error_friction` is the estimated
+    relative error of friction, infinite without friction.
     """
 
     step: Step
@@ -92,14 +90,14 @@ class Instant:
 
     @property
     def slid(self) -> float:
-        """By how much the surface moved [m]."""
+        """Distance by which the surface moved [m]."""
         return math.hypot(*self.moved)
 
 
 @dataclass(frozen=True)
 class Changes(Generic[Remembered]):
-    """Changes that an effect makes in a step: its memory, a sentence for run.log or '', whether errors can be stated
-    across the step, and what tractions along the surface make of it, if the effect has any."""
+    """Changes by an effect in a step: its memory, a sentence for run.log or '', and whether errors can be stated across
+    the step."""
 
     memory: Remembered
     remark: str = ""
@@ -108,18 +106,17 @@ class Changes(Generic[Remembered]):
 
 
 class Effect(Protocol[Memory]):
-    """The class of an effect; made with a `Scene`, only where the job asks for it, and a part of the run.
+    """Class of an effect; made with a `Scene` only if the job asks for it, and a part of the run.
 
-    It may have `rules` for the whole job, as sections have them, `lifts`: checks of other jobs that do not hold with
-    it, and `doubts` and `facts`: functions of a job that give warnings (`doubts.Doubt`, or sentences), and what the
-    section means in it. Methods are
-    collective, unless they say otherwise. A class that inherits from this one remembers nothing, unless it says so.
+    It may have `rules` for the whole job, as sections have them; `lifts`, checks of jobs that do not apply with it;
+    and functions of a job `doubts` and `facts`, which give warnings (`doubts.Doubt`, or sentences) and sentences
+    about the section. Methods are collective unless stated. The base class has no memory.
     """
 
-    section: ClassVar[type[Part]]  # what it adds to a job
-    columns: ClassVar[tuple[str, ...]]  # what it adds to measures.csv
+    section: ClassVar[type[Part]]  # section that it adds to a job
+    columns: ClassVar[tuple[str, ...]]  # columns that it adds to measures.csv
     fields: ClassVar[tuple[str, ...]] = ()  # maps that effects of this package add to those of output.fields
-    brings_law: ClassVar[bool] = False  # true of classes with a `law` of their own; steady sliding is refused with them
+    brings_law: ClassVar[bool] = False  # True for classes with a `law`; they exclude steady sliding
 
     def __init_subclass__(cls, **others: Any) -> None:
         super().__init_subclass__(**others)
@@ -128,33 +125,33 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def decide(job: Any) -> Decision:
-        """Decide whether the job asks for it, and give its name in checkpoints; the same on every rank."""
+        """Return whether the job asks for it, with its name in checkpoints; the same on every rank."""
         ...
 
     @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
-        """Return the types of the maps that a checkpoint has of it and that it holds. `parcontact plan` counts these;
-        of the effects of this package it counts what they allocate."""
+        """Return the types of the maps that it has in checkpoints and in memory, for `parcontact plan`. For effects of
+        this package the plan counts allocations instead."""
         return ()
 
     @staticmethod
     def shear(job: Any) -> Shear | None:
-        """Return the friction of the contact area that it adds, in marches and in steady sliding; None if it adds none.
-        The area that touches has the forces of all effects."""
+        """Return the friction of the contact area that it adds, in marches and in steady sliding, or None. Forces of
+        all effects are added."""
         return None
 
     @staticmethod
     def touches(job: Any, pressure: Array, gap: Array) -> NDArray[Any] | None:
         """Return a map that is not 0 where surfaces touch, from saved maps of the pressure [Pa] and of the gap [m].
 
-        None if it brings no law. Local.
+        It is None without a law. Local.
         """
         return None
 
     def __init__(self, scene: Any) -> None: ...
 
     def law(self) -> ContactLaw[Any] | None:
-        """Return the contact law of the steps, None if the effect has none."""
+        """Return the contact law of the steps; None if the effect has none."""
         return None
 
     def at_rest(self) -> Memory:
@@ -162,11 +159,11 @@ class Effect(Protocol[Memory]):
         return None  # type: ignore[return-value]
 
     def follow(self, instant: Instant, memory: Memory) -> Changes[Memory]:
-        """Return the changes that a step makes which was made."""
+        """Return the changes of a step that was made."""
         ...
 
     def values(self, memory: Memory) -> Sequence[float]:
-        """Return what its columns have in the row of the last step, the same on every rank; NaN leaves one empty.
+        """Return the values of its columns for the last step, the same on every rank; NaN leaves a column empty.
 
         Local to this rank.
         """
@@ -177,11 +174,11 @@ class Effect(Protocol[Memory]):
         ...
 
     def time_factor(self, memory: Memory) -> float:
-        """Return relaxation times from now on over those of the job's temperature. Raises RunError."""
+        """Return the relaxation times after a step over those at the job's temperature. Raises RunError."""
         return 1.0
 
     def work(self, memory: Memory) -> float | None:
-        """Return the work of the load since the start [J], None where it is that on the body."""
+        """Return the work of the load since the start [J]; None if it is that on the body."""
         return None
 
     def further_energies(self, memory: Memory) -> "tuple[EnergyMemory, float] | None":
@@ -190,7 +187,7 @@ class Effect(Protocol[Memory]):
         return None
 
     def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:
-        """Return what a checkpoint has of a memory, by name; maps are its own, or made for a checkpoint."""
+        """Return the entries of a memory in checkpoints, by name; maps belong to it, or are made for a checkpoint."""
         return {}
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:
@@ -206,7 +203,7 @@ Memories = Mapping[str, Any]
 
 
 class _NamedLaw:
-    """The contact law of an effect of others; its methods name the effect where they fail."""
+    """Contact law of an effect of another package; errors of its methods name the effect."""
 
     def __init__(self, law: Any, section: str) -> None:
         self._law, self._section = law, section
@@ -225,8 +222,8 @@ class _NamedLaw:
 
 
 def guarded(section: str, effect: type[Effect[Any]]) -> type[Effect[Any]]:
-    """Return the class of an effect; where it is not of this package, its methods name it where they fail, and maps of
-    an instant are read-only for it."""
+    """Return the class of an effect. Errors in an effect of another package name it, and maps of an instant are
+    read-only for it."""
     if added_sections.is_ours(section):
         return effect
 
@@ -260,8 +257,7 @@ def columns_of(effects: Effects) -> tuple[str, ...]:
 
 
 def effect_values(effects: Effects, memories: Memories) -> tuple[float, ...]:
-    """Return what effects have for their columns in the row of the last step; raises InputError for what does not
-    fit."""
+    """Return the values of all columns of effects for the last step; raises InputError for values that do not fit."""
     return tuple(number for name, effect in effects.items() for number in _numbers(name, effect, memories[name]))
 
 

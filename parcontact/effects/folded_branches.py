@@ -1,23 +1,23 @@
-"""Folded branches: branches of a material that need no map, and the error that this makes.
+"""Folded branches: branches of a material without a map, and the error that this causes.
 
-With the notation of `physics.body`, branch k of modulus G and relaxation time tau adds `h <- decay h + gain du` to the
-stress of a step. Two rules save its map:
+With the notation of `physics.body`, branch k of modulus G and relaxation time tau adds `h <- decay h + gain du` to
+the stress of a step. Two approximations save its map:
 
     memoryless  tau far below the shortest step dt: `decay h` is dropped, and `gain du` stays
     frozen      tau far above the duration T of the history: h = G u, a part of the spring
 
-Bounds. A wave of displacement u that passes with the frequency w has the modulus M = stress/u. An error |dM| changes
-friction by |dM|/G''(w), relatively, and the contact area, which follows 1/|M|, by |dM|/|M|; both are added. The modulus
-of what does not pass is at least G(T).
+Bounds. A displacement wave u that passes with the frequency w has the modulus M = stress/u. An error |dM| changes
+friction by |dM|/G''(w), relatively, and the contact area, which follows 1/|M|, by |dM|/|M|; both are added. The
+modulus of a wave that does not pass is at least G(T).
 
     memoryless  |dM| <= decay |h|/u,  |h|/u <= G min(w tau, 1) in sliding, and <= G after a jump. The branch alone
-                has a G'' of half of G min(w tau, 1/(w tau)), and a step has the modulus `gain` at least, so that
+                has a G'' of half of G min(w tau, 1/(w tau)), and a step has at least the modulus `gain`, so that
                 error = decay (2 max(1, pi tau/dt) + G/gain),  w <= pi/dt, in any material
     frozen      |dM| = (G/tau) |integral_0^t exp((s - t)/tau) u ds|/u <= G min(1 - exp(-T/tau), n pi/(w tau)), as each
                 of n stages begins with any phase of a wave
                 error = (|dM|(w = 0)/G(T) + the largest |dM|/G'' of 1/T <= w <= pi/dt, if the surface slides)
 
-A slower wave than 1/T does not pass within the history. A frozen branch can be woken at any time: its map is G u.
+A wave slower than 1/T does not pass within the history. A frozen branch can get a map at any time: it is G u.
 """
 
 import math
@@ -31,14 +31,14 @@ from ..parallel.slab import Array
 from ..physics.prony import Integrator, Prony, coefficients, complex_modulus, relaxation
 from ..printed import per_cent
 
-LEAST_BOUND = 1e-6  # of an error: smaller ones are said to be at most that
-PER_DECADE = 4  # accuracy: frequencies at which errors of friction are looked at
-MEMORYLESS_SHARE = 0.5  # tuning: of the error for memoryless branches, which must not depend on how long a job is
+LEAST_BOUND = 1e-6  # least error that is stated
+PER_DECADE = 4  # accuracy: frequencies per decade for errors of friction
+MEMORYLESS_SHARE = 0.5  # tuning: share of the error for memoryless branches, whatever the duration of a job
 
 
 class TimeScales(NamedTuple):
-    """Time scales of a history: its duration and its shortest step [s], the number of stages that last, whether the
-    load jumps after the start, whether the surface slides, and whether it begins in steady sliding."""
+    """Time scales of a history: its duration and its shortest step [s], the number of stages with a duration, whether
+    the load jumps after the start, whether the surface slides, and whether the history starts in steady sliding."""
 
     duration: float
     shortest: float
@@ -49,7 +49,7 @@ class TimeScales(NamedTuple):
 
 
 def time_scales(timeline: Timeline, steady: bool) -> TimeScales:
-    """Return the time scales of a history, which begins in steady sliding or in a virgin body."""
+    """Return the time scales of a history that starts in steady sliding or at rest."""
     lasting = [span for span in timeline.spans if span.count]
     jumps = any(span.jumps and (span.before or steady) for span in timeline.spans)
     shortest = min((span.extremes[0] for span in lasting), default=0.0)
@@ -59,11 +59,11 @@ def time_scales(timeline: Timeline, steady: bool) -> TimeScales:
 
 @dataclass(frozen=True)
 class FoldedBranches:
-    """The role of each branch, by its number in the material; plain data.
+    """The role of each branch, by its number in the material.
 
-    `bound` is the largest relative error of friction (where the body rests: of the modulus) that all folded branches
-    make together, at most `allowed`. `memoryless_errors` are what each branch would add to it without memory. `reason`
-    says why nothing may be folded, if so.
+    `bound` is the largest relative error of friction (of the modulus, if the body rests) by all folded branches, at
+    most `allowed`. `memoryless_errors` are the errors of each branch if it were memoryless. `reason` states why
+    folding is not allowed, or is ''.
     """
 
     kept: tuple[int, ...]
@@ -76,15 +76,15 @@ class FoldedBranches:
 
     @property
     def folded(self) -> int:
-        """The number of branches without a map."""
+        """Number of branches without a map."""
         return len(self.memoryless) + len(self.frozen)
 
 
 def fold_branches(
     prony: Prony, scales: TimeScales, integrator: Integrator, allowed: float, reason: str = ""
 ) -> FoldedBranches:
-    """Return the branches of a material (Pa, s, in normal form) that need a map: all if there is a `reason`, else as
-    few as keep the sum of the errors of the others, of the fastest and of the slowest, at `allowed` or below."""
+    """Return the roles of the branches of a material (Pa, s, in normal form): all have maps if there is a `reason`;
+    otherwise the fastest and the slowest have none, as many as keep the sum of their errors at `allowed` or below."""
     without_memory, as_spring = memoryless_errors(prony, scales, integrator), frozen_errors(prony, scales)
     fast = (np.cumsum(without_memory) <= MEMORYLESS_SHARE * allowed) & (not reason)
     left = allowed - float(without_memory[fast].sum())
@@ -95,7 +95,7 @@ def fold_branches(
 
 
 def memoryless_errors(prony: Prony, scales: TimeScales, integrator: Integrator) -> Array:
-    """Return the relative error of each branch without memory; infinite where a jump reads what it remembers."""
+    """Return the relative error of each branch if it is memoryless; infinite if a jump depends on its memory."""
     if scales.jumps or not scales.shortest:
         return np.full_like(prony.moduli, np.inf)
     decay, gain, _ = coefficients(prony, integrator, scales.shortest)
@@ -104,7 +104,7 @@ def memoryless_errors(prony: Prony, scales: TimeScales, integrator: Integrator) 
 
 
 def frozen_errors(prony: Prony, scales: TimeScales) -> Array:
-    """Return the relative error of each branch as a spring; infinite after steady sliding, where h is not G u."""
+    """Return the relative error of each branch if it is a spring; infinite after steady sliding, where h is not G u."""
     if scales.steady:
         return np.full_like(prony.moduli, np.inf)
     relaxed = prony.moduli * -np.expm1(-scales.duration / prony.relaxation_times)
@@ -119,14 +119,14 @@ def frozen_errors(prony: Prony, scales: TimeScales) -> Array:
 
 
 def bounded_error(found: FoldedBranches, slides: bool) -> str:
-    """Return what the error of folded branches is of, and its bound: no closer to 0 than matters."""
+    """Return a text with the bound on the error of folded branches, at least LEAST_BOUND."""
     what = "friction" if slides else "the modulus"
     return f"error of {what} at most {per_cent(max(found.bound, LEAST_BOUND))}"
 
 
 def describe_folded_branches(found: FoldedBranches, prony: Prony, slides: bool) -> list[str]:
-    """Return what a user should know about the branches of a material [Pa, s] under a surface that `slides` or not:
-    nothing if they are as the job says."""
+    """Return sentences on the branches of a material [Pa, s] under a surface that `slides` or not; none if no branch is
+    folded without a reason."""
     count = prony.moduli.size
     if not found.folded:
         return [f"branches: all {count} are followed in time: {found.reason}"] if found.reason and count > 1 else []

@@ -15,9 +15,8 @@ from .relaxation import time_factor_of
 
 
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
-    """Return what the body and the interface make of friction: their forces in the direction of both together, over the
-    normal force. The part of one is negative where its force is against the whole, as the interface's may be after a
-    reversal."""
+    """Return the parts of friction of the body and of the interface: their forces along the total force, over the
+    normal force. A part is negative if its force opposes the total, as that of the interface may after a reversal."""
     scale = math.hypot(measures.force_x, measures.force_y) * math.hypot(*velocity)
     along = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / scale if scale else 0.0
     own = along * measures.friction_interface
@@ -25,7 +24,7 @@ def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, fl
 
 
 class InterfaceColumns(InterfaceEffect[tuple[float, float]]):
-    """Columns of the parts of friction that the body and the interface make, which add up to it."""
+    """Columns of the parts of friction of the body and of the interface; they add up to friction."""
 
     columns: ClassVar[tuple[str, ...]] = added_by("interface")
 

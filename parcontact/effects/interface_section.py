@@ -21,12 +21,12 @@ LEAST_POISSON = 0.49  # physics: below it shear moves the surface, and the solve
 def _whole_bell(velocity: float | None, width: float | None) -> Iterator[Fault]:
     if (velocity is None) != (width is None):
         missing, given = ("velocity", "width") if velocity is None else ("width", "velocity")
-        yield Fault(f"is missing; a bell over the velocity needs it beside {given}", (missing,))
+        yield Fault(f"is missing; a bell over the velocity needs it in addition to {given}", (missing,))
 
 
 def _coefficient(coefficient: float | None, velocity: float | None, stick: bool) -> Iterator[Fault]:
     if coefficient is not None and not stick:
-        yield Fault("needs stick: true beside it", ("coefficient",))
+        yield Fault("needs stick: true", ("coefficient",))
     if coefficient is not None and velocity is not None:
         yield Fault("goes with shear_stress: leave it out, a coefficient does not depend on it", ("velocity",))
 

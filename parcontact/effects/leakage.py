@@ -1,4 +1,4 @@
-"""Leakage: the flow of a fluid through the gap of the contact, while a run goes on (`leakage.flow`)."""
+"""Leakage: the flow of a fluid through the gap of the contact during a run (`leakage.flow`)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NOTHING = (math.nan, math.nan, math.nan)
 
 
 class Leakage(Part):
-    """The `leakage` section: after how many steps the flow is calculated."""
+    """The `leakage` section: the number of steps between two calculations of the flow."""
 
     label: ClassVar[str] = "leakage"
     every: Count = Field(default=1, description="a positive whole number of steps")

@@ -1,4 +1,4 @@
-"""The relaxation function of a material as its section of a job has it."""
+"""Relaxation function of a material from its section of a job."""
 
 import math
 from typing import Any
@@ -28,12 +28,13 @@ def relaxation_of(material: Material) -> Prony:
 
 
 def time_factor_of(material: Material) -> float:
-    """Return by what factor relaxation times at a material's temperature are longer than at the reference, a_T [-]."""
+    """Return relaxation times at a material's temperature over those at the reference, a_T [-]."""
     return material.fitted.time_factor
 
 
 def temperature_of(material: Material) -> float:
-    """Return the temperature of a material [deg C]: its own, else the reference of its shift; NaN without a shift."""
+    """Return the temperature of a material [deg C]: the given one, or the reference of its shift; NaN
+    without a shift."""
     body = material.fitted
     if not isinstance(body, jobs.Zener) or body.shift is None:
         return math.nan
@@ -41,9 +42,9 @@ def temperature_of(material: Material) -> float:
 
 
 def factor_at(material: Material, rise: float) -> float:
-    """Return relaxation times of a material that is warmer by a rise [K] over those at its own temperature [-].
+    """Return relaxation times of a material after a temperature rise [K] over those at its own temperature [-].
 
-    Raises InputError where its shift does not reach.
+    Raises InputError outside the range of its shift.
     """
     return time_factor_of(heated(material, temperature_of(material) + rise)) / time_factor_of(material)
 

@@ -1,4 +1,4 @@
-"""Heat of sliding: how warm the rubber becomes below the contact (`physics.heat`, `physics.heat_memory`)."""
+"""Heat of sliding: temperatures of the rubber below the contact (`physics.heat`, `physics.heat_memory`)."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ from ..physics.units import Units
 from .effect import Changes, Decision, Effect, Instant
 from .relaxation import factor_at, feeds_back, temperature_of
 
-LOOSEST, SHARE = 1e-3, 0.1  # accuracy: of the memory of heat: a share of the job's accuracy, this at most
-DECAYED = 10.0  # accuracy: heat of the longest wave of the box is forgotten when so many times its diffusion is over
+LOOSEST, SHARE = 1e-3, 0.1  # accuracy: error of the memory of heat: at most, and as a share of the job's accuracy
+DECAYED = 10.0  # accuracy: duration of the memory of heat over the diffusion time of the longest wave
 
 
 def _shifts(thermal: Thermal | None, material: Any) -> Iterator[Fault]:
@@ -69,7 +69,7 @@ def _no_strip_of_heat(thermal: Thermal | None, grid: Grid) -> Iterator[Fault]:
 
 
 class Counterbody(Part):
-    """The rigid body, as it conducts heat."""
+    """The rigid body as a conductor of heat."""
 
     label: ClassVar[str] = "counterbody"
     conductivity: Positive = Field(description="a positive conductivity of the rigid body [W/(m K)]")
@@ -77,12 +77,12 @@ class Counterbody(Part):
 
     @property
     def conductor(self) -> Conductor:
-        """The rigid body."""
+        """The rigid body as a conductor."""
         return Conductor(self.conductivity, self.diffusivity)
 
 
 class Thermal(Part):
-    """The `thermal` section: how the rubber conducts heat, and whether warm rubber relaxes faster."""
+    """The `thermal` section: conduction of heat in the rubber, and whether warm rubber relaxes faster."""
 
     label: ClassVar[str] = "thermal"
     conductivity: Positive = Field(description="a positive conductivity of the rubber [W/(m K)]")
@@ -93,18 +93,19 @@ class Thermal(Part):
 
     @property
     def conductor(self) -> Conductor:
-        """The rubber."""
+        """The rubber as a conductor."""
         return Conductor(self.conductivity, self.diffusivity)
 
     def sliding_time(self, grid: Grid, speed: float) -> float:
-        """Return for how long steady sliding has warmed the rubber [s]: over the distance, or else through a periodic
-        box once; for ever in a free one."""
+        """Return the time [s] for which steady sliding has warmed the rubber: over the distance, or once through a
+        periodic box; infinite in a free one."""
         free = grid.boundary == "free"
         return (self.distance or (math.inf if free else max(grid.size))) / speed
 
 
 def exponentials_of(job: Any) -> Exponentials:
-    """Return the sum of exponentials of a job: from its shortest step since it slides to its longest wave of heat."""
+    """Return the sum of exponentials of a job, from its shortest sliding step to the diffusion time of the longest
+    wave."""
     body = job.section("thermal").conductor
     longest = DECAYED / (body.diffusivity * (2.0 * np.pi / max(job.grid.size)) ** 2)
     steps, slides = [longest / 10.0], False
@@ -119,10 +120,10 @@ def exponentials_of(job: Any) -> Exponentials:
 
 @dataclass(frozen=True)
 class ThermalMemory:
-    """Memory of heat: the waves of `heat`, the map `rise` of the surface [K], the flash temperature and the highest one
-    [K]; the force of the body [N] and the contact area at the end of the last step; whether there was any heat, the
-    depths of the last heat, and the share of it that the body makes; the relative error of the friction that made it,
-    infinite where that is not known."""
+    """Memory of heat: the waves of `heat`; the map `rise` of the surface [K]; the flash temperature and the highest
+    rise [K]; the force of the body [N] and the contact area at the end of the last step; whether there was any heat;
+    the depths of the last heat and the share of it in the body; and the relative error of friction, infinite if
+    unknown."""
 
     heat: HeatMemory
     rise: Array
@@ -143,9 +144,9 @@ def _rubs(job: Any, shears: Sequence[Shear]) -> bool:
 
 
 class ThermalColumns(Effect[ThermalMemory]):
-    """The mean temperature rise of the contact, weighted by heat, and the highest one of the surface [K].
+    """Columns: the mean temperature rise of the contact, weighted by heat, and the highest rise of the surface [K].
 
-    Under a surface at rest the weights are as in the last sliding.
+    At rest the weights are those of the last sliding.
     """
 
     section: ClassVar[type[Part]] = Thermal
@@ -169,7 +170,7 @@ class ThermalColumns(Effect[ThermalMemory]):
 
     @staticmethod
     def facts(job: Any) -> Iterator[str]:
-        """Say what the distance of steady sliding is where the job gives none."""
+        """Yield a sentence on the distance of steady sliding if the job gives none."""
         if job.section("thermal").distance is None:
             free = job.grid.boundary == "free"
             way = "without end" if free else f"{max(job.grid.size):g} m, the longer side of the box, since it was cold"
@@ -227,7 +228,7 @@ class ThermalColumns(Effect[ThermalMemory]):
         return cold._replace(relaxation_times=cold.relaxation_times * self.time_factor(memory))
 
     def time_factor(self, memory: ThermalMemory) -> float:
-        """Return relaxation times at the flash temperature over those of the job's, if the job asks for that. Raises
+        """Return relaxation times at the flash temperature over those of the job, if the job has feedback. Raises
         RunError."""
         if not (self._feeds_back and memory.warmed):
             return 1.0
@@ -237,7 +238,7 @@ class ThermalColumns(Effect[ThermalMemory]):
             raise RunError(f"the flash temperature leaves what the material allows: {error}") from None
 
     def _heat(self, instant: Instant, memory: ThermalMemory) -> tuple[Heating, ThermalMemory]:
-        """Return the heat of a step, by the forces at both of its ends, and the memory of those of its end."""
+        """Return the heat of a step from the forces at both ends, and the memory with those of its end."""
         measures, velocity, sheared = instant.measures, instant.step.velocity, instant.sheared
         speed, box = math.hypot(*velocity), self._setup.grid.lx * self._setup.grid.ly
         own = measures.force_interface
@@ -252,10 +253,8 @@ class ThermalColumns(Effect[ThermalMemory]):
         return Heating(rubbed, pressed), replace(memory, force=force, area=measures.contact_area)
 
     def values(self, memory: ThermalMemory) -> Sequence[float]:
-        """Return the flash temperature, the highest one, and the relative error of the former, NaN if it is not known.
-
-        It is FLASH times that of the friction that makes the heat.
-        """
+        """Return the flash temperature, the highest rise, and the relative error of the former, that of friction; NaN
+        if unknown."""
         known = memory.flash != 0.0 and math.isfinite(memory.error)
         return memory.flash, memory.highest, FLASH.value * memory.error if known else math.nan
 
@@ -266,7 +265,7 @@ class ThermalColumns(Effect[ThermalMemory]):
     # -- checkpoints --------------------------------------------------------------------------------------------------
 
     def entries(self, memory: ThermalMemory, units: Units) -> dict[str, Entry]:
-        """Return the map, all spectra as maps, and what has no room in these; collective."""
+        """Return the map, all spectra as maps, and their columns without room there; collective."""
         known, depths = memory.heat.sum, memory.depths
         found = {
             "rise": Entry(memory.rise, 1.0, "K"),
@@ -291,15 +290,14 @@ class ThermalColumns(Effect[ThermalMemory]):
         return found
 
     def _spectra(self, memory: ThermalMemory) -> Iterator[tuple[int, str, Spectrum]]:
-        """Yield all spectra with a number and a name; more waves along the depth come last."""
+        """Yield all spectra with a number and a name; additional waves along the depth come last."""
         yield 0, "pressed", memory.heat.pressed
         if self._rubs:
             yield 1, "rubbed", memory.heat.rubbed
         yield from ((2 + number, f"wave {number}", wave) for number, wave in enumerate(memory.heat.waves))
 
     def restored(self, memory: ThermalMemory, saved: Saved) -> ThermalMemory:
-        """Return the memory of a checkpoint; collective. Waves of shorter steps than before, which it lacks, begin at
-        0."""
+        """Return the memory of a checkpoint; collective. Missing waves, of shorter steps than before, start at 0."""
         per, columns = spectra.per_map(self._slab.nx), spectra.edges(self._slab.nx)
         for number, name, spectrum in self._spectra(memory):
             if name in saved:

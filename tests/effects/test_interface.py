@@ -150,7 +150,7 @@ def test_it_costs_nothing() -> None:
         ("interface: {shear_stress: 1.0e5, velocity: 0.1}", "interface.width is missing"),
         ("interface: {shear_stress: 1.0e5, width: 1.0}", "interface.velocity is missing"),
         ("interface: {shear_stress: 1.0e5, speed: 1.0}", "interface.speed is not a key of interface"),
-        ("interface: {coefficient: 0.5}", "interface.coefficient needs stick: true beside it"),
+        ("interface: {coefficient: 0.5}", "interface.coefficient needs stick: true"),
         (
             "interface: {coefficient: 0.5, stick: true, velocity: 1.0, width: 1.0}",
             "interface.velocity goes with shear_stress",

@@ -117,7 +117,7 @@ def test_detached_state_from_python(bench: Bench) -> None:
     rows = [run.run() for run in (first, second)]
     last = max(bench.where.glob("out/checkpoint/step-*.h5"))
     back = Simulation.restore(last, comm=bench.comm)
-    assert "any more" in first.detached
+    assert "the surfaces detach" in first.detached
     assert [run.detached for run in (second, back)] == [first.detached] * 2
     assert (second.finished, back.finished, list(back.steps())) == (True, True, [])
     assert repr(rows[1]) == repr(back.row)
