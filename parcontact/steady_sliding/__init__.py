@@ -1,1 +1,1 @@
-"""Steady sliding: solved on nested grids, as the start of a march, and along friction curves."""
+"""Steady sliding, solved on nested grids: as the start of a march, and along friction curves."""

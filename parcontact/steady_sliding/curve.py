@@ -1,4 +1,5 @@
-"""Friction curves: steady sliding solved directly at many velocities and pressures, into steady.csv and a picture."""
+"""Friction curves: steady sliding solved directly at many velocities and pressures, written to steady.csv and a
+picture."""
 
 import math
 import os
@@ -35,8 +36,8 @@ SAME = (*marker.SCENE, *marker.EFFECTS, *(f"numerics.{key}" for key in ("kernel"
 
 @dataclass(frozen=True)
 class Request:
-    """Request of steady states: speeds [m/s] along a unit `direction`, each under each of the mean pressures [Pa], at
-    each of the temperatures [deg C], if there are any."""
+    """Request for steady states: speeds [m/s] along a unit `direction`, each under each of the mean pressures [Pa] and
+    at each of the temperatures [deg C], if there are any."""
 
     velocities: tuple[float, ...]
     pressures: tuple[float, ...]
@@ -56,7 +57,7 @@ class Request:
 def request(
     job: Job, velocities: Sequence[float] = (), pressures: Sequence[float] = (), temperatures: Sequence[float] = ()
 ) -> Request:
-    """Return what a job's `steady` section asks for, or what is given here; raises InputError if something lacks."""
+    """Return the request of a job's `steady` section, or of the arguments; raises InputError for an incomplete one."""
     section = job.steady
     speeds = tuple(velocities) or (section.velocities if section else ())
     loads = tuple(pressures) or (section.pressures if section and section.pressures else _pressures(job))
@@ -82,11 +83,11 @@ def _pressures(job: Job) -> tuple[float, ...]:
 
 
 class States(Protocol):
-    """Steady states of a job at one velocity and pressure after the other, as a curve asks for them; collective.
+    """Steady states of a job, one velocity and pressure after the other; collective.
 
-    `setup` says what they are of. `table` is the name of a further table with its columns, None without one; `rows`
-    are its lines for the last state at a velocity [m/s]. It may `keep_in` a directory what it has solved of a state,
-    and `forget` that once the state is written.
+    `setup` is that of the states. `table` is the name of an additional table with its columns, or None; `rows` are
+    its lines for the last state at a velocity [m/s]. Intermediate results may be stored by `keep_in` a directory,
+    until `forget` is called after the state is written.
     """
 
     setup: Setup
@@ -115,7 +116,7 @@ def on_one_grid(job: Job, slab: Slab) -> States:
 
 
 def transforms_of(job: Job) -> list[Any]:
-    """Return the facts that decide, beside the number of ranks, which transforms a curve has."""
+    """Return facts that, with the number of ranks, determine the transforms of a curve."""
     return [*scene.choices(job).transforms, "curve"]
 
 
@@ -129,11 +130,11 @@ def run_curve(
     sweep_stop_file: StopFile | None = None,
     make: Callable[[Job, Slab], States] = on_one_grid,
 ) -> int:
-    """Solve all points that are not there yet, writing each at once; collective. Returns the exit code.
+    """Solve all missing points, and write each at once; collective. Return the exit code.
 
-    A point that fails does so alone: the others are solved, and the exit code is 1. `restart` is `auto` or `never`;
-    of the warnings those are printed that it `shows`. `sweep_stop_file` is shared by all cases of a sweep; it is
-    not removed. `make` makes the steady states.
+    If a point fails, the others are still solved, and the exit code is 1. `restart` is `auto` or `never`; warnings
+    are printed if `shows` returns True. `sweep_stop_file` is shared by all cases of a sweep; it is not removed.
+    `make` makes the steady states.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
@@ -165,14 +166,14 @@ def run_curve(
 
 
 def _identity(job: Job, wanted: Request) -> dict[str, Any]:
-    """Return what a curve is of, as plain data: of the `steady` section only what no point may differ in."""
+    """Return the data that identify a curve; of the `steady` section only those that must agree for all points."""
     steady = {"direction": list(wanted.direction), "waves": wanted.waves}
     return {**marker.kept(listing.plain_job(job)), "steady": steady}
 
 
 def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
-    """Return whether points of the same curve are there; root only. Raises InputError if they are of another, and says
-    how to keep another mesh."""
+    """Return whether points of the same curve exist; root only. Raises InputError if they belong to another curve, with
+    advice on keeping several meshes."""
     if (claim := directory.claim) is None or not directory.results():
         return False
     if different := marker.list_differences(marker.differences(claim.job, plain, (*SAME, "steady"))):
@@ -182,7 +183,7 @@ def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
 
 
 def _table(path: Path, sliding: States, wanted: Request, quiet: bool) -> CurveTable | None:
-    """Begin the tables, or continue them, on root; collective. Raises InputError where that cannot be."""
+    """Start the tables, or continue them, on root; collective. Raises InputError if that fails."""
     further, made = WAVES if wanted.waves else sliding.table, list[CurveTable]()
     act = lambda: made.append(CurveTable(path, sliding.setup, further, bool(wanted.temperatures), quiet))  # noqa: E731
     hdf5.write_on_root(sliding.setup.slab, act, "cannot write the table of the curve", InputError)
@@ -190,7 +191,7 @@ def _table(path: Path, sliding: States, wanted: Request, quiet: bool) -> CurveTa
 
 
 def _maps(job: Job, slab: Slab, wanted: Request, directory: Directory) -> SteadyMaps | None:
-    """Make the file for the maps that the job asks for, if it does; collective."""
+    """Make the file for the maps of the job, if it has some; collective."""
     if not job.output.fields:
         return None
     cited = cite_lines(listing.plain_data(job))
@@ -201,7 +202,7 @@ def _maps(job: Job, slab: Slab, wanted: Request, directory: Directory) -> Steady
 
 @dataclass
 class _Curve:
-    """The points of a curve, one after the other; methods are collective."""
+    """The points of a curve, solved one after the other; methods are collective."""
 
     sliding: States
     wanted: Request
@@ -218,7 +219,7 @@ class _Curve:
         self.watch = sanity.ContactWatch(chosen.numerics.strict, chosen.timeline, more=more_points(chosen.grid))
 
     def go(self) -> int:
-        """Solve what lacks; collective. Returns the exit code."""
+        """Solve missing points; collective. Return the exit code."""
         bare = self.maps.lacking() if self.maps and self.slab.root else []
         lacking = self.slab.agree(self.table.lacking(self.wanted.points, bare) if self.table else [])
         for count, index in enumerate(lacking):
@@ -234,7 +235,7 @@ class _Curve:
         return FAILED if self.failures else DONE
 
     def _stopped(self) -> bool:
-        """Return whether it is asked to stop; its own stop file is removed then."""
+        """Return whether a stop was requested; its own stop file is then removed."""
         others = self.sweep_stop_file is not None and self.sweep_stop_file.asks
         asked = self.signals.stop or (self.slab.root and (others or os.path.lexists(self.directory.stop_file)))
         if not self.slab.reduce((), [float(asked)])[0]:
@@ -248,7 +249,7 @@ class _Curve:
             self.table.say(text)
 
     def _solve(self, index: int) -> None:
-        """Solve a point and write it; one that fails is told of."""
+        """Solve and write a point; a failure is reported."""
         wanted, table = self.wanted.points[index], self.table
         velocity = self.wanted.velocity(wanted.speed)
         try:

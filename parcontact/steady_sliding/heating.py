@@ -1,6 +1,6 @@
-"""Temperatures of steady sliding: the map below the contact, and the one temperature of the rubber that it makes.
+"""Temperatures of steady sliding: the map below the contact, and the one temperature of the rubber that follows.
 
-The map is exact for its heat (`physics.heat`, `physics.flash`). With feedback all of the rubber relaxes as at the flash
+The map is exact for its heat (`physics.heat`, `physics.flash`). With feedback all rubber relaxes as at the flash
 temperature, `T = T_0 + F(T)`: a fixed point, found by secants within a bracket. Each round is a steady state.
 """
 
@@ -25,9 +25,9 @@ from ..scene import Setup
 from ..solve.constraint import Mask
 from .point import Point
 
-MOST_ROUNDS = 10  # tuning: of the fixed point, more than any case has needed
-LEAST_ERROR = 0.02  # accuracy: of the flash temperature [K], 0.1 % of friction at most
-FINEST, COARSEST = 1e-3, 3e-2  # accuracy: of the same, relative
+MOST_ROUNDS = 10  # tuning: limit on the rounds of the fixed point
+LEAST_ERROR = 0.02  # accuracy: least error of the flash temperature [K]
+FINEST, COARSEST = 1e-3, 3e-2  # accuracy: limits on its relative error
 HOTTEST = 200.0  # physics: rise of the temperature [K] above which rubber decomposes
 Vector = tuple[float, float]
 
@@ -43,11 +43,11 @@ def find_temperatures(
 ) -> tuple[Flash, Array]:
     """Return the temperatures of a steady state, and this rank's rows of the map of rises [K]; collective.
 
-    `pressure` is its map in the run's units, `touching` is not 0 where the surfaces touch, `friction` is that of the
-    body without the interface.
+    `pressure` is a map in the run's units, `touching` is not 0 where the surfaces touch, and `friction` is that of
+    the body, without the interface.
     """
     slab, fft, size, speed = setup.slab, setup.fft, setup.grid.size, math.hypot(*velocity)
-    if not speed:  # nothing is dissipated
+    if not speed:  # no dissipation
         return Flash(), slab.zeros()
     place = fft, size, section.conductor, velocity
     made = sliding_heat_unbounded if setup.half_space.free else sliding_heat
@@ -74,8 +74,8 @@ def find_temperatures(
 
 
 class Feedback:
-    """The fixed point: the first round is that of the cold body, the second starts from the last fixed point where only
-    the velocity differs."""
+    """The fixed point of the temperature. The first round is that of the cold body; the second starts from the last
+    fixed point if only the velocity differs."""
 
     def __init__(self) -> None:
         self._speed, self._rise, self._place = 1.0, 0.0, (math.nan, math.nan)
@@ -83,10 +83,10 @@ class Feedback:
     def solve_fixed_point(
         self, warmed: Callable[[float], Point], speed: float, place: Vector, tolerance: float
     ) -> Point:
-        """Return the point whose flash temperature is the rise [K] at which it was solved, `warmed(rise)`, to the
-        `tolerance`, within 0.1 and 3 %. `place` is pressure and temperature of the body.
+        """Return the point `warmed(rise)` whose flash temperature is `rise` [K], to the relative `tolerance`, limited
+        to FINEST and COARSEST. `place` is pressure and temperature of the body.
 
-        Raises RunError where there is none in MOST_ROUNDS rounds, or where the material's shift ends.
+        Raises RunError if it is not found in MOST_ROUNDS rounds, or outside the range of the material's shift.
         """
         relative = min(max(tolerance, FINEST), COARSEST)
         guess = self._rise * math.sqrt(speed / self._speed) if place == self._place else 0.0
@@ -99,7 +99,7 @@ class Feedback:
             if abs(over) <= max(LEAST_ERROR, relative * rise):
                 self._speed, self._rise, self._place = speed, rise, place
                 return replace(point, operator_calls=calls, seconds=seconds, rounds=rounds, friction_cold=cold)
-            if rounds == 1 and guess:  # of the cold body, which may be far from the fixed point that is followed
+            if rounds == 1 and guess:  # the cold body may be far from the last fixed point
                 rise = guess
                 continue
             low, high = (rise, high) if over > 0.0 else (low, rise)
@@ -114,7 +114,7 @@ class Feedback:
 
 
 def describe_hot(points: Sequence[Point]) -> Iterator[Doubt]:
-    """Yield a doubt where rubber would become so hot that it decomposes."""
+    """Yield a warning if rubber would be so hot that it decomposes."""
     hot = [(point.flash.mean, point.speed) for point in points if point.flash and point.flash.mean > HOTTEST]
     if hot:
         rise, speed = max(hot)
@@ -123,7 +123,7 @@ def describe_hot(points: Sequence[Point]) -> Iterator[Doubt]:
 
 
 def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[Doubt]:
-    """Yield a doubt where rubber that relaxes at its flash temperature is beyond those it was measured at."""
+    """Yield a warning if the flash temperature of relaxing rubber is outside its measured range."""
     body = job.material.fitted
     if not feeds_back(job) or not isinstance(body, Zener) or body.temperatures is None:
         return

@@ -1,7 +1,7 @@
-"""Maps of the branches of a body in a steady state, and the power that they lose.
+"""Branch maps of a body in a steady state, and the power lost in each branch.
 
-A wave u^ loses the power `|u^|^2/A |w| G_k''(|w|)` in branch k, with A its displacement over its pressure for a modulus
-of 1 and the frequency w with which it passes a point.
+A wave u^ loses the power `|u^|^2/A |w| G_k''(|w|)` in branch k, with A its displacement over its pressure for a
+modulus of 1 and w the frequency with which it passes a point.
 """
 
 from collections.abc import Iterator
@@ -14,14 +14,17 @@ from ..physics.prony import Prony
 from ..scene import Setup
 from ..solve.nonsymmetric.steady import SteadyContact
 
-ROUNDING = 1e-9  # accuracy: of a wave whose length is that of an octave
+ROUNDING = 1e-9  # accuracy: relative rounding of wavelengths at the limits of octaves
 
 Vector = tuple[float, float]
 
 
 def branch_powers(setup: Setup, contact: SteadyContact, velocity: Vector) -> Array:
-    """Return the power [W] lost in each branch to waves of each octave, the first from the longer side of the box to
-    half of it, shape (branches, octaves); only of periodic scenes, where waves are independent. Collective."""
+    """Return the power [W] lost in each branch to waves of each octave, shape (branches, octaves); collective.
+
+    The first octave is from the longer side of the box to half of it. Scenes must be periodic, so that waves are
+    independent.
+    """
     fft, prony, grid, half_space = setup.fft, setup.prony, setup.grid, setup.half_space
     spectrum, speed, longest = fft.forward(contact.u), setup.in_units(velocity), max(grid.size)
     cells = max(longest / grid.dx, longest / grid.dy)  # along the longer side, of the smaller length
@@ -41,7 +44,7 @@ def branch_powers(setup: Setup, contact: SteadyContact, velocity: Vector) -> Arr
 
 
 def branch_maps(setup: Setup, contact: SteadyContact, velocity: Vector, out: Array) -> Iterator[Array]:
-    """Yield the map h_k of each branch in a steady state at a velocity [m/s], each time in `out`; collective."""
+    """Yield the map h_k of each branch in a steady state at a velocity [m/s], each in `out`; collective."""
     fft, half_space, speed = setup.fft, setup.half_space, setup.in_units(velocity)
     if half_space.free:
         for k in range(setup.prony.moduli.size):

@@ -1,4 +1,4 @@
-"""A steady state as data: where it is, what it measures, and what it took."""
+"""A steady state as data: its parameters, its measures, and its cost."""
 
 import math
 from dataclasses import dataclass
@@ -14,15 +14,15 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True)
 class Point:
-    """A steady state: velocity [m/s], pressure [Pa], temperature [deg C] (NaN where none was asked for), by what factor
-    relaxation times are longer than at the reference, what it measures, its certificate, and what it took.
+    """A steady state: velocity [m/s], pressure [Pa], temperature [deg C] (NaN if none is given), relaxation times over
+    those at the reference, measures, certificate, and cost.
 
-    `friction` is the power that the body dissipates, over load and velocity, and what an interface adds; that of
-    `measures` is by the slopes of the rigid surface. They differ by the mesh, and `errors` is the budget of the former.
-    `operator_calls` are in applications on the finest grid; `sets` is 0 where projected steps did.
-    `dissipated` is the power [W] of each branch (empty for a free scene, whose wake goes on outside the box). `flash`
-    has the temperatures of the contact, None where the job has no `thermal`; with feedback, found in so many `rounds`,
-    the shift factor is that of the flash temperature, and `friction_cold` that without feedback.
+    `friction` is the dissipated power over load and velocity, plus that of an interface; `errors` is its budget. The
+    friction of `measures` is by the slopes of the rigid surface; the difference is a mesh error. `operator_calls`
+    count applications on the finest grid; `sets` is 0 if projected steps sufficed. `dissipated` is the power [W] of
+    each branch (empty for a free scene, whose wake continues outside the box). `flash` has the temperatures of the
+    contact, None without `thermal`. With feedback, found in `rounds`, the shift factor is that of the flash
+    temperature, and `friction_cold` is friction without feedback.
     """
 
     velocity: Vector
@@ -43,12 +43,12 @@ class Point:
 
     @property
     def speed(self) -> float:
-        """The size of the velocity [m/s]."""
+        """Magnitude of the velocity [m/s]."""
         return math.hypot(*self.velocity)
 
     @property
     def error_friction(self) -> float:
-        """The relative error of friction, 1 or more where it cannot be told from 0; NaN where there is none."""
+        """Relative error of friction, 1 or more if friction is smaller than its error; NaN without friction."""
         return self.errors.friction.of_friction if self.errors.friction else math.nan
 
     @property

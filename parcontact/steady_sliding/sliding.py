@@ -1,4 +1,4 @@
-"""Steady sliding of a job's surface, solved directly: points of a friction curve, and where a march may start from."""
+"""Steady sliding of a job's surface, solved directly: points of a friction curve, and starts of marches."""
 
 import math
 import time
@@ -32,13 +32,13 @@ from .losses import branch_powers
 from .point import Point
 from .stiffness import loses_most, soft_stripes
 
-COARSE_TOLERANCE = 0.02  # tuning: of the certificate on all grids but the finest
+COARSE_TOLERANCE = 0.02  # tuning: tolerance on the certificate on all grids but the finest
 LOOSE, AS_RIGHT = (
     1e-3,
     0.6,
 )  # accuracy: so much of a tolerance above LOOSE leaves the contact area as right as in a march
-GIVE_UP = 250  # tuning: linear steps of the usual solver on a grid, where there are stripes: sets have not settled then
-NEAR = 1.1  # tuning: a velocity this many times the last one, or less, is near it
+GIVE_UP = 250  # tuning: limit on linear steps of the usual solver on a grid with stripes
+NEAR = 1.1  # tuning: largest ratio of a velocity to the last one for a start from the last state
 Vector = tuple[float, float]
 
 
@@ -77,28 +77,28 @@ class SteadySliding:
         self._feedback = Feedback()
 
     def hold(self, velocity: Vector, sets: bool) -> tuple[Array, SteadySolver, Convolution]:
-        """Make what a solve at a velocity [m/s] holds on the finest grid, if it changes `sets` of points or not."""
+        """Allocate what a solve at a velocity [m/s] holds on the finest grid, with or without active `sets`."""
         p, (solver, operator) = self.setup.slab.empty(), self._solver(self.levels[0], velocity)
         if sets:
             solver.hold_all()
         return p, solver, operator
 
     def set_temperature(self, temperature: float) -> None:
-        """Solve at this temperature [deg C] from now on; raises InputError where the material has no shift."""
+        """Set the temperature [deg C] of further solves; raises InputError if the material has no shift."""
         if temperature != self.temperature:
             self._set_material(temperature)
             self.temperature = temperature
 
     def _set_material(self, temperature: float) -> None:
-        """Take the material at this temperature [deg C] for the next solve."""
+        """Set the material at this temperature [deg C] for the next solve."""
         self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
         self.probe = self.setup.probe()
 
     def solve(self, velocity: Vector, pressure: float) -> Point:
-        """The steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
+        """Return the steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
 
-        With feedback from heat the rubber has its flash temperature everywhere. Raises RunError, with the certificate
-        reached, when none of the starts leads to one, or when no temperature is found that makes itself.
+        With feedback from heat all rubber has the flash temperature. Raises RunError, with the certificate reached,
+        if no start leads to a solution, or if no fixed point of the temperature is found.
         """
         section = self.setup.job.section("thermal")
         if section is None or section.feedback == "none":
@@ -117,7 +117,7 @@ class SteadySliding:
         return self._feedback.solve_fixed_point(warmed, math.hypot(*velocity), (pressure, cold), tolerance)
 
     def _solve(self, velocity: Vector, pressure: float) -> Point:
-        """Solve at the temperature that was taken."""
+        """Return the steady state at the temperature that was set."""
         began, calls, speed = time.perf_counter(), 0.0, math.hypot(*velocity)
         what, factor = f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa", self.setup.choices.time_factor
         for start, solver in self._starts(velocity, pressure):
@@ -142,18 +142,18 @@ class SteadySliding:
         return Point(*place, measures, friction, errors, contact.certificate, calls, contact.sets, seconds, lost, flash)
 
     def _advise(self, contact: SteadyContact) -> str:
-        """Return what may help a contact that was not solved; collective."""
+        """Return advice for a contact that was not solved; collective."""
         compliance, length = self.setup.half_space.largest_compliance, contact.certificate.length
         reach = reachable_certificate(self.setup.slab, [contact.u], contact.p, compliance, length)
         if self.setup.choices.numerics.tolerance < reach:
-            what = "look for loads or moduli that are too far apart"
+            what = "look for loads or moduli of very different magnitude"
             return f"; double precision reaches only about {reach:.1g} here: {what}"
         return ". Try a velocity nearer to one that works, a finer grid, or another numerics.tolerance."
 
     def _find_temperatures(
         self, contact: SteadyContact, friction: float, velocity: Vector, measures: Measures
     ) -> Flash | None:
-        """Return the temperatures of the contact, if the job asks for them; collective."""
+        """Return the temperatures of the contact; None without a thermal section; collective."""
         section = self.setup.job.section("thermal")
         if section is None:
             return None
@@ -178,27 +178,27 @@ class SteadySliding:
     table: tuple[str, Sequence[str]] | None = None
 
     def doubts(self, temperatures: Sequence[float]) -> list[Doubt]:
-        """Return doubts about the job, also at these temperatures [deg C]; collective."""
+        """Return warnings about the job, also at these temperatures [deg C]; collective."""
         return sanity.find_doubts(self.setup, temperatures)
 
     def notes(self) -> list[str]:
         return []
 
     def keep_in(self, directory: Path) -> None:
-        """Keep nothing: a point is one solve."""
+        """Do nothing: a point is one solve."""
 
     def forget(self) -> None:
-        """Forget nothing."""
+        """Do nothing."""
 
     def rows(self, velocity: Vector) -> list[list[float]]:
-        """Return the lines of steady_waves.csv for the last state. Collective."""
+        """Return the lines of steady_waves.csv for the last state; collective."""
         assert self.contact is not None
         place = math.hypot(*velocity), self._pressure
         return [[*place, *pair] for pair in zip(*map(np.ndarray.tolist, self.shares(velocity)), strict=True)]
 
     def shares(self, velocity: Vector) -> tuple[Array, Array]:
-        """Return the wavelengths [m] of `branch_powers`, and what share of the friction power the waves from each to
-        half of it have. Collective."""
+        """Return the wavelengths [m] of `branch_powers`, and the share of the friction power in the octave of each;
+        collective."""
         assert self.contact is not None
         power = branch_powers(self.setup, self.contact, velocity)
         total = power.sum()
@@ -208,13 +208,12 @@ class SteadySliding:
     # -- starts and levels --------------------------------------------------------------------------------------------
 
     def _starts(self, velocity: Vector, pressure: float) -> Iterator[tuple[Array | None, Make]]:
-        """Pressures on the finest grid to start from; None stands for coarser grids from a uniform pressure. Beside
-        each, what makes the solver: as a rule the usual one, and at last the one of proximal points, which comes first
-        where the body loses nearly all work.
+        """Yield pressures on the finest grid to start from, None for coarser grids from a uniform pressure, each with
+        the function that makes its solver.
 
-        The last state is the better start only very near it, else it is the second choice. To extrapolate it in the
-        logarithm of the velocity, or to add what changes on the next coarser grid, brings it no nearer: contact spots
-        appear and vanish.
+        The usual solver comes first, that of proximal points last, or first for a body with a very large loss
+        tangent. The last state is the better start only at nearly the same velocity. Extrapolating it is no better,
+        as contact spots appear and vanish.
         """
         speed = self.setup.choices.time_factor * math.hypot(*velocity)
         lossy = loses_most(self.setup, velocity)
@@ -232,10 +231,10 @@ class SteadySliding:
     def _descend(
         self, velocity: Vector, mean: float, start: Array | None, make: Make
     ) -> tuple[SteadyContact, float, float]:
-        """Solve on all grids, the coarsest first, or on the finest from `start`; also the operator calls it took, and
-        friction by energy, without an interface.
+        """Solve on all grids, the coarsest first, or on the finest from `start`. Return the contact, the operator
+        calls, and friction by energy without an interface.
 
-        Where the body is soft along stripes and the usual solver gives up, proximal points go on from there, and do all
+        If the usual solver fails where the body is soft along stripes, proximal points continue on this and all
         finer grids.
         """
         tally, calls = self.setup.slab.tally, 0.0
@@ -246,7 +245,7 @@ class SteadySliding:
             solver, operator = make(level, velocity)
             contact = solver.solve(level.heights, mean, p)
             if contact.failure and make == self._solver and soft_stripes(self.setup, velocity) is not None:
-                del solver, operator  # before others are made: their maps
+                del solver, operator  # frees their maps before others are made
                 make = self._proximal
                 solver, operator = make(level, velocity)
                 contact = solver.solve(level.heights, mean, p)
@@ -260,7 +259,7 @@ class SteadySliding:
             p[...] = start
         contact, operator = solve(self.levels[0], p)
         unit, load = self.setup.units.height / self.setup.units.length, kernels.sum_of(p)
-        lost = max(operator.loss(p, self.setup.size, _direction(velocity)), 0.0)  # not of rounding, of an elastic body
+        lost = max(operator.loss(p, self.setup.size, _direction(velocity)), 0.0)  # rounding for an elastic body
         return contact, calls, lost / (self.setup.slab.sum(load)[0] or math.nan) * unit
 
     def _solver(self, level: SteadyLevel, velocity: Vector) -> tuple[SteadySolver, Convolution]:
@@ -294,7 +293,7 @@ class SteadySliding:
         return SteadySolver(*what, along=along, pairs=pairs, least_cut=least_cut)
 
     def _operators(self, level: SteadyLevel, velocity: Vector) -> tuple[Convolution, Convolution]:
-        """Make the operator at a velocity [m/s], and its inverse (roughly, if the body is unbounded)."""
+        """Return the operator at a velocity [m/s], and its inverse, approximate for a free body."""
         body, moved = self.setup.half_space, (level.fft, self.setup.in_units(velocity), self.setup.prony)
         return body.sliding_operator(*moved), body.sliding_inverse(*moved)
 
@@ -302,7 +301,7 @@ class SteadySliding:
 def judge_state(
     setup: Setup, known: RunProperties, certificate: Certificate, by_energy: float, velocity: Vector, measures: Measures
 ) -> tuple[float, ErrorBudget]:
-    """Return friction by energy, with what an interface adds, and how wrong it and the area are."""
+    """Return friction by energy, including an interface, and the errors of friction and area."""
     friction = by_energy + measures.friction_interface
     seen = StepObservation(
         certificate.complementarity,
@@ -317,11 +316,11 @@ def judge_state(
 
 
 def tolerance_of(asked: float) -> float:
-    """Return the tolerance on the certificate of a steady state for the one that a job asks for."""
+    """Return the tolerance on the certificate of a steady state for the tolerance of a job."""
     return max(AS_RIGHT * asked, min(LOOSE, asked))
 
 
 def _direction(velocity: Vector) -> tuple[float, float]:
-    """Return the unit vector of a velocity; that of x for a surface at rest."""
+    """Return the unit vector of a velocity; that of x at rest."""
     speed = math.hypot(*velocity)
     return (velocity[0] / speed, velocity[1] / speed) if speed > 0.0 else (1.0, 0.0)

@@ -1,4 +1,4 @@
-"""The start of a march from steady sliding: contact, displacement and branches as if it had slid for ever."""
+"""Start of a march from steady sliding: contact, displacement and branches of a surface that has always slid."""
 
 from dataclasses import replace
 
@@ -16,10 +16,10 @@ from .sliding import SteadySliding
 
 
 def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = None) -> March:
-    """A march before the first step of a job, or after that of a checkpoint; collective.
+    """Return a march before the first step of a job, or after the step of a checkpoint; collective.
 
-    It can go on to the end of the history or, if later, to `until` [s]. Raises InputError for files that do not fit,
-    and for approaches beyond full contact.
+    It can continue to the end of the history or, if later, to `until` [s]. Raises InputError for files that do not
+    fit, and for approaches beyond full contact.
     """
     setup = set_up(job, slab, until)
     sanity.refuse_approaches(setup)
@@ -32,10 +32,10 @@ def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = Non
 
 
 def _from_steady_sliding(setup: Setup) -> March:
-    """A march in the steady state of its job's `initial` section; collective.
+    """Return a march in the steady state of its job's `initial` section; collective.
 
-    Maps of the scene are made when those of the steady solver are gone, and the pressures of the march last: until then
-    the pressure waits in a map of the workspace.
+    Maps of the scene are made after those of the steady solver are freed; meanwhile the pressure is in a map of the
+    workspace.
     """
     point, contact = _solve(setup)
     scene = build_on(setup)
@@ -59,7 +59,7 @@ def _from_steady_sliding(setup: Setup) -> March:
 
 
 def _solve(setup: Setup) -> tuple[Point, SteadyContact]:
-    """The state, and its contact, without the maps that it took to find it; collective."""
+    """Return the state and its contact, without the maps of the solver; collective."""
     sliding, initial = (
         SteadySliding(setup, tolerance_before(setup.job, 0, setup.choices.viscoelasticity.on)),
         setup.job.initial,

@@ -1,4 +1,4 @@
-"""steady.csv and steady_waves.csv: a line for each point of a friction curve, on root, and what is said of it."""
+"""steady.csv and steady_waves.csv: a line for each point of a friction curve, and messages about it; on root."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -21,19 +21,19 @@ from ..storage.tables import GrowingTable
 from .heating import describe_hot, describe_unmeasured
 from .point import Point
 
-WAVES = ("steady_waves.csv", names_of(STEADY_WAVES))  # a further table
-HEAD = "velocity [m/s]    load [Pa] corr.area  error  friction  error  calls  residual"  # the area as corrected
+WAVES = ("steady_waves.csv", names_of(STEADY_WAVES))  # an additional table
+HEAD = "velocity [m/s]    load [Pa] corr.area  error  friction  error  calls  residual"  # corr.area: corrected area
 
 
 class EarlierPoint(NamedTuple):
-    """A point that an earlier run has solved, and its relative errors of friction and of the corrected area."""
+    """A point solved by an earlier run, and its relative errors of friction and of the corrected area."""
 
     at: Wanted
     errors: tuple[float, float]
 
 
 class CurveTable:
-    """The tables in a directory, continued or begun; raises OSError, and InputError for one that cannot be read."""
+    """The tables in a directory, continued or new; raises OSError, and InputError for a table that cannot be read."""
 
     def __init__(
         self, directory: Path, setup: Setup, further: tuple[str, Sequence[str]] | None, heated: bool, quiet: bool
@@ -64,7 +64,7 @@ class CurveTable:
         self.say(f"{HEAD}   T [C]" if heated else HEAD)
 
     def _read(self) -> list[Wanted]:
-        """Return the points that are there; a line that was not finished is removed."""
+        """Return the points of the table; an incomplete line is removed."""
         if not self.path.exists():
             return []
         columns = tables.read_columns(self.path)
@@ -78,7 +78,7 @@ class CurveTable:
         return curve_points.of_table(columns)
 
     def _keep_known(self, path: Path, heated: bool) -> None:
-        """Remove the lines of a further table whose points are not there: those of one that was being solved."""
+        """Remove lines of an additional table that belong to no point, such as one that was interrupted."""
         if not path.exists():
             return
         head, *lines = tables.whole_lines(path)
@@ -91,7 +91,7 @@ class CurveTable:
         files.replace_file(path, "".join(f"{','.join(line)}\n" for line in [head, *kept]))
 
     def lacking(self, points: Sequence[Wanted], bare: Sequence[int] = ()) -> list[int]:
-        """Return the numbers of the points that are not there, or are `bare` of the maps that are asked for."""
+        """Return the numbers of the missing points, and of those `bare` of requested maps."""
         found = curve_points.lacking(points, self.known)
         if len(found) < len(points):
             self.say(f"{len(points) - len(found)} of {len(points)} points are there already")
@@ -103,7 +103,7 @@ class CurveTable:
 
     @property
     def count(self) -> int:
-        """The number of points that the table has."""
+        """Number of points in the table."""
         return len(self.known) + len(self._points)
 
     def pass_on(self) -> None:
@@ -116,12 +116,12 @@ class CurveTable:
         self._console.log(text)
 
     def warn(self, doubts: Sequence[Doubt], shown: Callable[[Doubt], bool] = always) -> None:
-        """Write doubts to the log, and show those that are `shown` even to those who asked for quiet."""
+        """Write warnings to the log, and print those that are `shown`, also with --quiet."""
         for doubt in doubts:
             self._console.warn(str(doubt), shown(doubt))
 
     def write(self, point: Point, rows: Sequence[Sequence[float]]) -> None:
-        """Add a point, unless it was there before and is solved for its maps only."""
+        """Add a point, unless it exists and is solved for its maps only."""
         m, speed = point.measures, point.speed
         if not curve_points.lacking([Wanted(speed, m.pressure, point.temperature)], self.known):
             return
@@ -138,7 +138,7 @@ class CurveTable:
         )
 
     def conclude(self, failures: int) -> None:
-        """Put a curve that was solved in parts into order, draw it, and say how it went; raises OSError."""
+        """Sort a curve that was solved in parts, draw it, and report failures; raises OSError."""
         self._bar.close()
         self._file.sync()
         if self.known:
@@ -155,7 +155,7 @@ class CurveTable:
         self.say(failed if failures else f"done: {self.path} and {picture}")
 
     def _earlier(self) -> list[EarlierPoint]:
-        """Return the points that were there before."""
+        """Return the points of earlier runs."""
         if not self.known:
             return []
         columns = tables.read_columns(self.path)
@@ -182,8 +182,8 @@ class CurveTable:
 
 
 def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[Doubt]:
-    """Yield a doubt about friction and one about the corrected area, as far as points are more wrong than the job asks
-    for, also `earlier` ones, of which the parts of the error are not known."""
+    """Yield warnings about friction and the corrected area of points whose error exceeds the accuracy of the job, also
+    of `earlier` ones, for which the parts of the error are not known."""
     chosen = ["solver"] * ("tolerance" in job.numerics.chosen) + ["mesh"] * bool(job.origin.mesh)
     friction = [(point, point.errors.friction) for point in points if point.errors.friction is not None]
     area = [(point, point.errors.area) for point in points]
@@ -196,8 +196,8 @@ def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[Earlier
         if missed:
             _, point, parts = max(missed, key=lambda one: one[0])
             place = Wanted(point.speed, point.pressure, point.temperature)
-            told = f"{describe(parts, name)}, at {place}{advice(parts, accuracy, chosen)}"
-            yield Doubt("inaccurate points", "", {"of": name, "where": f"{many}: up to {told}"})
+            text = f"{describe(parts, name)}, at {place}{advice(parts, accuracy, chosen)}"
+            yield Doubt("inaccurate points", "", {"of": name, "where": f"{many}: up to {text}"})
         elif before:
             error, place = max(before, key=lambda one: one[0])
             asked = f"more than the {100 * accuracy:g} % that numerics.accuracy asks for"
