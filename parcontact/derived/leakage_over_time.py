@@ -1,4 +1,4 @@
-"""Leakage of a run: the flow through the gaps that it has saved, as leak.csv and a picture."""
+"""Leakage of a run: the flow through its saved gaps, as leak.csv and a picture."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -26,17 +26,17 @@ from ..storage import files, hdf5, read_back
 from ..summary import leak_stop
 
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
-MOST_CELLS = 4e6  # tuning: of a map for each rank to take one; of larger ones fewer ranks do. 2048 x 2048 takes 1.4 GB
+MOST_CELLS = 4e6  # tuning: largest map of which every rank solves one; 2048 x 2048 takes 1.4 GB
 
 
 class LeakInstant(NamedTuple):
     """One row of leak.csv.
 
-    `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` these over K of the surface that just
-    touches, NaN where that is not known; `constriction` [m] is the smallest gap on the widest path of the direction
-    that leaks more; `error_x` and `error_y` are by what share K differs on half the mesh (`flow.flow_mesh_error`);
+    `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` their ratios to K of the surface
+    that just touches, NaN if unknown; `constriction` [m] is the smallest gap on the widest path of the direction
+    that leaks more; `error_x` and `error_y` are the relative changes of K on half the mesh (`flow.flow_mesh_error`);
     `flow_rate` [m^3/s] and `mass_flow` [kg/s] are those of a fluid in this direction (`leakage.fluids`), NaN without
-    one.
+    a fluid.
     """
 
     time: float
@@ -58,8 +58,8 @@ class LeakInstant(NamedTuple):
 
 
 class SolvedLeak(NamedTuple):
-    """The flow at an instant, without its maps, the error that the mesh makes along x and along y, and the
-    conductivities [m^3] for a fluid, which may slip."""
+    """The flow at an instant, without maps, its mesh errors along x and y, and the conductivities [m^3] for a fluid
+    with slip."""
 
     leak: Leak
     errors: tuple[float, float]
@@ -67,8 +67,7 @@ class SolvedLeak(NamedTuple):
 
 
 class Gaps:
-    """The saved gaps of a run, 0 in contact; those of the instant that is asked for, else all; `drop` is that of a
-    fluid which flows through them."""
+    """Saved gaps of a run, 0 in contact, of all instants or one; `drop` is that of a fluid."""
 
     def __init__(self, directory: Path, at: str = "", drop: PressureDrop | None = None) -> None:
         self.drop = drop
@@ -97,7 +96,7 @@ class Gaps:
         return hdf5.open_results(self.directory / "fields.h5")
 
     def read(self, index: int) -> Map:
-        """Return the gap [m] at a saved instant; raises InputError where it is not whole."""
+        """Return the gap [m] at a saved instant; raises InputError if the maps are incomplete."""
         with self._open() as file:
             gap, pressure = file["gap"][index], file["pressure"][index]
         if gap.shape != pressure.shape or not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
@@ -106,15 +105,15 @@ class Gaps:
         return np.where(touching_of(self.job, pressure, gap), 0.0, np.maximum(gap, 0.0))
 
     def bare(self) -> Map:
-        """Return the gap [m] of the undeformed surface that just touches; raises InputError where its heights are not
-        there any more."""
+        """Return the gap [m] of the undeformed surface that just touches; raises InputError if its heights no longer
+        exist."""
         job = reading.load(self.directory / RESOLVED)
         setup = scene.set_up(job, Slab.alone(*job.grid.points))
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
         return np.asarray(heights.max() - heights, dtype=float)
 
     def solve(self, index: int) -> tuple[SolvedLeak, list[Map]]:
-        """Return the flow at a saved instant, and for both directions where it is."""
+        """Return the flow at a saved instant, and its maps for both directions."""
         gap, flows, errors, shown = self.read(index), list[Flow](), list[float](), list[Map]()
         of_fluid = list[float]()
         for axis in ("x", "y"):
@@ -163,14 +162,14 @@ class Gaps:
 def write_leakage(
     directory: Path, at: str, over: str, comm: MPI.Intracomm, drop: PressureDrop | None = None
 ) -> Iterator[str]:
-    """Solve for the flow of the saved instants and write leak.csv and leak.png; of one instant leak.STEP.csv and
-    leak.STEP.png, with K `over` pressure or time, "" for a choice; with the flow of a fluid under a pressure `drop`.
-    Collective: ranks take an instant each.
+    """Solve for the flow at the saved instants and write leak.csv and leak.png, or leak.STEP.csv and leak.STEP.png for
+    one instant; collective. Each rank takes an instant at a time.
 
-    Yields, on root, what to say. Raises InputError for a directory without gaps.
+    K is drawn `over` pressure or time, "" for an automatic choice; `drop` adds the flow of a fluid. Yields sentences
+    on root. Raises InputError for a directory without gaps.
     """
     gaps = Gaps(directory, at, drop)
-    gaps.shown = comm.bcast(gaps.shown)  # a run that goes on may have saved more since another rank has looked
+    gaps.shown = comm.bcast(gaps.shown)  # a run may save more while ranks read
     leaks, drawn, maps = _solve_all(gaps, comm)
     if comm.rank > 0:
         return
@@ -185,8 +184,8 @@ def write_leakage(
     leakage_charts.draw_leakage(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
     yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
     yield from (text for axis in "xy" for text in _describe(rows, axis))
-    told = max((k for k, row in enumerate(rows) if row.percolates_x + row.percolates_y), default=len(rows) - 1)
-    yield from _describe_fluid(gaps, rows[told], leaks[gaps.shown[told]]) if drop else ()
+    chosen = max((k for k, row in enumerate(rows) if row.percolates_x + row.percolates_y), default=len(rows) - 1)
+    yield from _describe_fluid(gaps, rows[chosen], leaks[gaps.shown[chosen]]) if drop else ()
     yield from _describe_missing(gaps, at)
     if missing:
         yield f"share_x and share_y are left empty, as the undeformed surface cannot be made: {missing}"
@@ -194,8 +193,8 @@ def write_leakage(
 
 
 def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, SolvedLeak], int, list[Map]]:
-    """Return, on root, the flow at all instants, the one to draw and its maps: the last that has a flow in both
-    directions, or else in one; collective."""
+    """Return, on root, the flow at all instants, the instant to draw and its maps: the last one with a flow in both
+    directions, or in one; collective."""
     mine, drawn, maps, problem = dict[int, SolvedLeak](), (-1, -1), list[Map](), ""
     working = max(1, int(comm.size * min(1.0, MOST_CELLS / gaps.cells)))
     try:
@@ -215,7 +214,7 @@ def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, SolvedLeak], 
 
 
 def _bare_flow(gaps: Gaps) -> tuple[Leak | None, str]:
-    """Return the flow of the undeformed surface that just touches, or None and why there is none."""
+    """Return the flow of the undeformed surface that just touches, or None and the reason."""
     try:
         return leak(gaps.bare(), gaps.size, gaps.periodic), ""
     except (InputError, OSError) as error:
@@ -223,7 +222,8 @@ def _bare_flow(gaps: Gaps) -> tuple[Leak | None, str]:
 
 
 def _describe(rows: Sequence[LeakInstant], axis: str) -> Iterator[str]:
-    """Say of an axis when contact closes the gap, how far K depends on the mesh, and where it has no meaning."""
+    """Yield sentences on when contact closes the gap along an axis, on the mesh error of K, and where K has
+    no meaning."""
     yield _describe_closure(rows, axis)
     errors = [error for row in rows if (error := getattr(row, f"error_{axis}")) == error]
     if errors:
@@ -238,7 +238,7 @@ def _describe(rows: Sequence[LeakInstant], axis: str) -> Iterator[str]:
 
 
 def _describe_fluid(gaps: Gaps, last: LeakInstant, solved: SolvedLeak) -> Iterator[str]:
-    """Say how much of the fluid flows at the last instant with a flow, and where it is no continuum."""
+    """Yield sentences on the flow of the fluid at the last instant with a flow, and where it is not a continuum."""
     drop = gaps.drop
     assert drop is not None
     pressures = f"from {quantity(drop.high, 'Pa')} to {quantity(drop.low, 'Pa')}"
@@ -255,7 +255,7 @@ def _describe_fluid(gaps: Gaps, last: LeakInstant, solved: SolvedLeak) -> Iterat
 
 
 def _describe_missing(gaps: Gaps, at: str) -> Iterator[str]:
-    """Name the stages at whose end no gap is saved, of a run all of whose instants are shown."""
+    """Yield a sentence on stages at whose end no gap is saved."""
     run = PlottedRun(gaps.directory)
     saved = set(gaps.fields.steps[gaps.shown].tolist())
     ends = {index: int(run.columns["step"][rows[-1]]) for index, rows in run.rows_of_stages.items()}
@@ -265,7 +265,7 @@ def _describe_missing(gaps: Gaps, at: str) -> Iterator[str]:
 
 
 def _describe_closure(rows: Sequence[LeakInstant], axis: str) -> str:
-    """Say where leakage along an axis stops, and at how many instants contact closes the gap."""
+    """Return a sentence on where leakage along an axis stops, and at how many instants contact closes the gap."""
     names = (f"flow_{axis}", "pressure", "time")
     stop = leak_stop.describe_axis({name: [getattr(row, name) for row in rows] for name in names}, axis)
     closed = [row for row in rows if not getattr(row, f"percolates_{axis}")]

@@ -34,13 +34,13 @@ ONE_ROUGH = (
     "surface: the theory takes the power spectrum of one isotropic rough surface, and this job has none, or other "
     "shapes with it; with --waves lattice it takes the waves of the heights themselves, whatever they are made of"
 )
-OF_SPECTRA = "surface: the theory takes the spectra of rough shapes, and this job has a measured map beside them"
+OF_SPECTRA = "surface: the theory takes the spectra of rough shapes, and this job has a measured map in addition"
 STEADY_FILE, BANDS_FILE = "steady_theory.csv", "bands_theory.csv"
 WavesOf = Literal["continuum", "lattice"]
 
 
 class PredictedInstant(NamedTuple):
-    """One row of theory.csv: s, m, Pa, and two ratios."""
+    """One row of theory.csv [s, m, Pa, -, -]."""
 
     time: float
     distance: float
@@ -50,12 +50,11 @@ class PredictedInstant(NamedTuple):
 
 
 def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[PredictedInstant]:
-    """Return the rows for a job, the initial state first; `slab` must be that of one rank.
+    """Yield the rows for a job, the initial state first; `slab` must be that of one rank.
 
-    The waves are those of the job's spectrum as an unbounded surface has them (`continuum`), or those of the very
-    surface in the box (`lattice`). Stages that choose their steps have those of the run in the job's directory, before
-    it a ladder of steps that double up to one cell (`history.chosen`). Raises InputError for jobs that the theory does
-    not know.
+    The waves are those of the job's spectrum on an unbounded surface (`continuum`), or those of its heights in the
+    box (`lattice`). Stages that choose their steps have those of the run in the job's directory; before a run, steps
+    double up to one cell (`history.chosen`). Raises InputError for jobs outside the theory.
     """
     _refuse_unknown(job)
     timeline = Timeline.from_job(job).follow(_times_of_run(job))
@@ -67,7 +66,7 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Pred
 
 
 def _times_of_run(job: Job) -> dict[int, float]:
-    """Return when the steps of the job's run ended, by their numbers; none before the run."""
+    """Return the times at which the steps of the job's run ended, by their numbers; none before the run."""
     path = job.output.directory / "measures.csv"
     if not Timeline.from_job(job).chooses or not path.is_file():
         return {}
@@ -76,7 +75,7 @@ def _times_of_run(job: Job) -> dict[int, float]:
 
 
 class SteadyInstant(NamedTuple):
-    """One row of steady_theory.csv: m/s, Pa, deg C (NaN: that of the job), a_T, and two ratios."""
+    """One row of steady_theory.csv [m/s, Pa, deg C (NaN: that of the job), -, -, -]."""
 
     velocity: float
     pressure: float
@@ -87,7 +86,7 @@ class SteadyInstant(NamedTuple):
 
 
 def has_spectrum(job: Job) -> bool:
-    """Return whether the theory can do without the heights of a job: one in bands, or with one rough surface."""
+    """Return whether the theory does not need the heights of a job: in bands, or with one rough surface."""
     if job.bands is not None:
         return not isinstance(job.surface[0], jobs.Topography)
     return job.grid.boundary == "periodic" and _only_rough(job) is not None
@@ -104,10 +103,10 @@ def _only_rough(job: Job) -> jobs.Rough | jobs.RoughSpectrum | None:
 def predict_steady(
     job: Job, wanted: Request, gamma: float = persson.GAMMA, shortest: float = 0.0
 ) -> Iterator[SteadyInstant]:
-    """Yield the steady states of a curve for the spectrum of the job, as an unbounded surface has it; of a job in bands
-    without waves that are shorter than the `shortest` [m].
+    """Yield the steady states of a curve for the spectrum of the job on an unbounded surface; for bands without waves
+    below the `shortest` [m].
 
-    Raises InputError for jobs that the theory does not know.
+    Raises InputError for jobs outside the theory.
     """
     rings = _on_body(job, _continuum(job, 0.0, shortest))
     _, kx, ky = rings.waves
@@ -122,8 +121,8 @@ def predict_steady(
 
 
 class BandInstant(NamedTuple):
-    """One row of bands_theory.csv: m/s, Pa, deg C (NaN: that of the job), the number of the band, its wavelengths [m],
-    friction of its waves, and the share in contact down to its shortest."""
+    """One row of bands_theory.csv [m/s, Pa, deg C (NaN: that of the job)]: number of the band, its wavelengths [m],
+    friction of its waves, and the share in contact at its shortest wave."""
 
     velocity: float
     pressure: float
@@ -136,7 +135,7 @@ class BandInstant(NamedTuple):
 
 
 def predict_bands(job: Job, wanted: Request) -> Iterator[BandInstant]:
-    """Yield friction and area of each band of a job: what the theory adds where finer waves are seen, too."""
+    """Yield friction and area of each band of a job, as the increment by its waves."""
     cut = cut_bands(job)
     rows = dict[Wanted, list[SteadyInstant]]()
     for number in range(cut.count):
@@ -150,8 +149,8 @@ def predict_bands(job: Job, wanted: Request) -> Iterator[BandInstant]:
 
 
 def write_steady(job: Job, wanted: Request) -> SteadyInstant:
-    """Write the prediction for a curve as steady_theory.csv, and draw both if the curve is there; returns the point of
-    the highest friction."""
+    """Write steady_theory.csv for a curve, and draw both if the curve exists. Return the point of the
+    highest friction."""
     rows = list(predict_steady(job, wanted))
     if job.bands is not None:
         _write(job.output.directory / BANDS_FILE, BANDS_THEORY, predict_bands(job, wanted))
@@ -164,14 +163,14 @@ def write_steady(job: Job, wanted: Request) -> SteadyInstant:
 
 
 def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
-    """Write theory.csv for a job on one rank, or steady_theory.csv for a friction curve; returns sentences about it,
-    beside the job's run if there is one."""
+    """Write theory.csv for a job on one rank, or steady_theory.csv for a friction curve. Return sentences about it,
+    compared with the job's run if there is one."""
     settings = TheorySettings(gamma, waves)
     if not job.history:
         return _foretell_curve(job, settings)
     path = write_theory(job, predict(job, Slab.alone(*job.grid.points), gamma, waves), settings)
-    beside = theory_beside.describe_theory(path.parent, job.history, job.grid.dx)
-    return [f"Persson's theory, {settings.sentence}: {path}", *beside]
+    compared = theory_beside.describe_theory(path.parent, job.history, job.grid.dx)
+    return [f"Persson's theory, {settings.sentence}: {path}", *compared]
 
 
 def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
@@ -189,12 +188,12 @@ def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
 
 
 def write_theory(job: Job, rows: Iterator[PredictedInstant], settings: TheorySettings) -> Path:
-    """Write the rows as theory.csv, and theory.yaml beside it, for the job; returns the table's path."""
+    """Write the rows of a job as theory.csv, with theory.yaml. Return the path of the table."""
     return _write(job.output.directory / theory_settings.TABLE, THEORY, rows, settings)
 
 
 def _write(path: Path, table: Table, rows: Iterable[object], settings: TheorySettings | None = None) -> Path:
-    """Write a table, and its settings beside it; raises InputError for a path that cannot be written."""
+    """Write a table and its settings; raises InputError for a path that cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with files.replaced(path, theory_settings.is_own_table if settings else _is_own_curve) as file:
@@ -238,7 +237,7 @@ def _lattice(job: Job, slab: Slab) -> Rings:
 
 
 def _on_body(job: Job, rings: Rings) -> Rings:
-    """The waves on the body of the job: a layer is stiffer than a half space."""
+    """Return the waves on the body of the job: a layer is stiffer than a half space."""
     if job.body is None:
         return rings
     layer = Layer(job.body.thickness, job.body.base, job.material.poisson)
@@ -246,7 +245,7 @@ def _on_body(job: Job, rings: Rings) -> Rings:
 
 
 def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
-    """Return the spectrum between the limits of the job; the box holds no waves longer than its longer side."""
+    """Return the spectrum between the limits of the job; its longest wave is at most the longer side of the box."""
     if job.bands is not None:
         spectrum = cut_bands(job).spectrum.without_shorter(shortest)
         phi = lambda k: np.asarray(spectrum.phi(k), float)  # noqa: E731
@@ -286,7 +285,7 @@ def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings
 
 
 def _longest_slide(timeline: Timeline) -> float:
-    """Return the largest distance between two places of the surface [m]: waves are that far out of phase."""
+    """Return the largest distance between two positions of the surface [m], which bounds phase differences of waves."""
     places = {place for span in timeline.spans for place in (span.origin, span.position(span.ends.count))}
     return max((math.dist(*pair) for pair in combinations(places, 2)), default=0.0)
 
@@ -295,7 +294,7 @@ def _longest_slide(timeline: Timeline) -> float:
 
 
 def _material(job: Job) -> Prony:
-    """Return the incompressible body that is as stiff as the job's half space, to which nu is a factor."""
+    """Return the incompressible body with the stiffness of the job's half space, to which nu contributes a factor."""
     if job.section("adhesion") is not None:
         raise InputError("the theory excludes adhesion: leave out the section adhesion")
     if job.material.hardness is not None:
@@ -312,7 +311,7 @@ def _rows(job: Job, timeline: Timeline, memory: Memory, gamma: float) -> Iterato
     for span in timeline.spans:
         leg = _leg(job, span)
         touched = touched or bool(np.any(leg.pressures > 0.0))
-        legs.append(leg if touched else leg._replace(duration=0.0))  # a body that is not touched remembers nothing
+        legs.append(leg if touched else leg._replace(duration=0.0))  # a body without contact has no memory
     start, slid = [0.0, *(span.start for span in timeline.spans)], 0.0
     for leg, time, found in zip(legs, start, follow(memory, legs, gamma), strict=True):
         distances = slid + math.hypot(*leg.velocity) * leg.instants
@@ -322,7 +321,7 @@ def _rows(job: Job, timeline: Timeline, memory: Memory, gamma: float) -> Iterato
 
 
 def _leg(job: Job, span: Span) -> SlidingLeg:
-    """Return a stage: the jump of its load, if it begins with one, and its steps."""
+    """Return a stage as a leg: the jump of its load, if any, and its steps."""
     fractions = np.array([*([0.0] if span.jumps else []), *(span.ends[index] for index in range(1, span.count + 1))])
     area = job.grid.lx * job.grid.ly if span.stage.control == "force" else 1.0
     pressures = np.array([span.stage.load.at(min(fraction, 1.0)) for fraction in fractions]) / area

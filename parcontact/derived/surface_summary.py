@@ -18,10 +18,12 @@ from ..storage import hdf5
 NOT_SELF_AFFINE = "no self-affine range was found"
 
 
-def describe_surface(job: Job, heights: Array, told: list[str], shortest: float | None, picture: Path) -> Iterator[str]:
-    """Draw the picture and say what the heights [m], shape (ny, nx), are like, line by line; root only.
+def describe_surface(
+    job: Job, heights: Array, remarks: list[str], shortest: float | None, picture: Path
+) -> Iterator[str]:
+    """Draw the picture and yield sentences on the heights [m], shape (ny, nx); root only.
 
-    `shortest` [m] is the shortest wave of a measured surface, None of others. Raises InputError and RunError.
+    `shortest` [m] is the shortest wave of a measured surface, else None. Raises InputError and RunError.
     """
     if picture.suffix[1:] not in style.MARKED:
         raise InputError(f"--out must end in .{', .'.join(style.MARKED)}, got {str(picture)!r}")
@@ -42,7 +44,7 @@ def describe_surface(job: Job, heights: Array, told: list[str], shortest: float 
         surface_picture.draw_surface(surface_picture.Sketch(heights, job.grid.size, found, measured), picture)
     except OSError as error:
         raise InputError(f"{picture} cannot be written: {hdf5.reason(error)}") from error
-    yield from (*lines, *told)
+    yield from (*lines, *remarks)
     yield f"rms height     {quantity(found.rms_height, 'm', 4)}"
     yield f"rms slope      {found.rms_slope:.4g}"
     yield f"rms curvature  {found.rms_curvature:.4g} 1/m"
