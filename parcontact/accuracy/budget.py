@@ -1,7 +1,7 @@
-"""The error budget: how wrong friction and contact area are at most, by what makes it, of a step and of a whole run.
+"""The error budget: estimated errors of friction and contact area by source, of a step and of a whole run.
 
-The errors of the sources (`sources`) add up. They are estimates found by experiment: a true error may happen to be next
-to nothing, of which no estimate knows.
+The errors of the sources (`sources`) are added. They are calibrated estimates that hold in nearly all scenes; a true
+error may happen to be much smaller.
 """
 
 import math
@@ -17,12 +17,12 @@ from ..printed import per_cent
 from .observation import RunProperties, StepObservation
 from .sources import MARCH_SOURCES, STEADY_SOURCES, ErrorSource
 
-UNKNOWN = 0.5  # accuracy: of friction: one whose error is estimated as more cannot be told from 0
-AT_REST, AT_ONCE = 1e-100, 1e-200  # m/s and m: what a second at rest weighs against a way, and what a jump does
-LEAST_WAY = 1e-60  # m: smaller weights are those of rest
-ROUNDED = 1.01  # accuracy: errors are said with three digits, and no closer to a limit than that are they beyond it
-SUMS = "sums"  # in a checkpoint
-SMALLER = "a smaller numerics.accuracy"  # where it has chosen the setting
+UNKNOWN = 0.5  # accuracy: relative error of friction above which friction cannot be distinguished from 0
+AT_REST, AT_ONCE = 1e-100, 1e-200  # weights [m] of a second at rest and of a jump in means over the distance slid
+LEAST_WAY = 1e-60  # m: least weight of sliding
+ROUNDED = 1.01  # accuracy: least ratio of an error to its limit that counts as larger, as three digits are printed
+SUMS = "sums"  # its name in a checkpoint
+SMALLER = "a smaller numerics.accuracy"  # the remedy if the accuracy has chosen the setting
 OF_BANDS = {
     "method": "fewer bands with more points each (bands.count)",
     "scatter": "more surfaces of each band (bands.samples)",
@@ -33,8 +33,8 @@ SHOWN |= {"method": "coupling of bands", "scatter": "surfaces"}
 
 
 class ErrorParts(NamedTuple):
-    """Relative errors by what makes them. Of surfaces in bands `method` is what their coupling makes, and `scatter`
-    what other surfaces of the same spectrum do."""
+    """Relative errors by source. For surfaces in bands, `method` is the error of their coupling, and `scatter` the
+    variation between surfaces with the same spectrum."""
 
     solver: float
     time: float
@@ -49,15 +49,15 @@ class ErrorParts(NamedTuple):
 
     @property
     def of_friction(self) -> float:
-        """The error of friction as it is stated: 1 or more where it is more than UNKNOWN.
+        """The stated error of friction: at least 1 if it exceeds UNKNOWN.
 
-        Such a friction is the small difference of forces that are known, and its error to an order of magnitude only:
-        six times friction where 0.76 was estimated.
+        Such a friction is the small difference of large forces, and its error is known to an order of magnitude
+        only.
         """
         return max(self.total, 1.0) if self.total > UNKNOWN else self.total
 
     def plain(self) -> dict[str, float]:
-        """Return the parts, and all of them."""
+        """Return the parts and their total."""
         return {name: getattr(self, name) for name in NAMES} | {"total": self.total}
 
 
@@ -66,7 +66,7 @@ NAMES = ErrorParts._fields
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """Errors of one instant. Friction is None where there is none; it may be wrong by more than all of it."""
+    """Errors at one instant. `friction` is None without friction; its error may exceed 1."""
 
     friction: ErrorParts | None
     area: ErrorParts
@@ -83,13 +83,13 @@ def estimate(run: RunProperties, observed: StepObservation) -> ErrorBudget:
 
 
 def estimate_steady(run: RunProperties, observed: StepObservation) -> ErrorBudget:
-    """Return the budget of steady sliding, whose friction is that by energy."""
+    """Return the budget of steady sliding, for friction by energy."""
     return _estimate(STEADY_SOURCES, run, observed)
 
 
 def _estimate(sources: Sequence[ErrorSource], run: RunProperties, observed: StepObservation) -> ErrorBudget:
-    """Return the errors of sources: of friction relative to all of it, of which an interface has a part that is
-    proportional to the area."""
+    """Return the errors of the sources. That of friction is relative to the sum of body and interface; the interface
+    has the relative error of the area."""
     body = abs(observed.friction - observed.interface)
     pairs = {source.name: source.error(run, replace(observed, friction=body)) for source in sources}
     missing = dict.fromkeys(("solver", "time", "folded", "mesh"), 0.0)
@@ -114,23 +114,23 @@ def add_shear(budget: ErrorBudget, body: float, shear: float, whole: float, solv
 
 
 def weight_of(slid: float, seconds: float) -> float:
-    """Return what a step counts in a mean: as far as the surface slid [m], less by far how long it lasted."""
+    """Return the weight of a step in a mean: the distance slid, or a far smaller one for its duration at rest."""
     return slid or seconds * AT_REST or AT_ONCE
 
 
 @dataclass(frozen=True)
 class ErrorSums:
-    """Budgets of many steps, each for as far as the surface slid in it; friction also in proportion to it.
+    """Sums of the budgets of many steps, weighted by the distance slid; friction also by its value.
 
-    Where nothing slides they count for as long as they last, and steps that last no time only where none does: a long
-    rest does not dilute what a slide says. `sums` are, of friction and of area, the weight, and the weighted sum of
-    each part.
+    Without sliding the weight is the duration, and for steps without duration a still smaller one, so that rest does
+    not dilute the errors of a slide. `sums` has a row for friction and one for the area: the weight, and the
+    weighted sum of each part.
     """
 
     sums: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 1 + len(NAMES))))
 
     def plus(self, budget: ErrorBudget, friction: float, seconds: float, slid: float = 0.0) -> "ErrorSums":
-        """Return the sums with one step of so many seconds, in which the surface slid so far [m]."""
+        """Return the sums with one more step of `seconds`, in which the surface slid by `slid` [m]."""
         far, sums = weight_of(slid, seconds), self.sums.copy()
         for row, parts, weight in zip(sums, (budget.friction, budget.area), (friction, 1.0), strict=True):
             if parts is not None:
@@ -138,30 +138,30 @@ class ErrorSums:
         return ErrorSums(sums)
 
     def entries(self) -> dict[str, Entry]:
-        """Return its entry; a checkpoint may lack it."""
+        """Return its entry, which is optional."""
         return {SUMS: Entry(self.sums.ravel(), optional=True)}
 
     @classmethod
     def restored(cls, saved: Saved) -> "ErrorSums":
-        """Return the sums of a checkpoint; those of other parts, as of another version, begin anew."""
+        """Return the sums of a checkpoint, or new ones if its parts are those of another version."""
         own = cls()
         found = np.asarray(saved.get(SUMS, own.sums))
         return cls(found.reshape(own.sums.shape)) if found.size == own.sums.size else own
 
     @property
     def friction(self) -> ErrorParts | None:
-        """The mean over the way, None where nothing has slid, or without friction."""
+        """Mean over the distance slid; None without sliding or friction."""
         return self._mean(0)
 
     @property
     def friction_within(self) -> float:
-        """Friction is known to so much, in the mean over the way: an error of its coefficient, not of a share of it."""
+        """Absolute error of the friction coefficient, as a mean over the distance slid."""
         parts, weight = self.friction, float(self.sums[1, 0])
         return parts.of_friction * float(self.sums[0, 0]) / weight if parts and weight > 0.0 else math.nan
 
     @property
     def area(self) -> ErrorParts | None:
-        """The mean over the way, over time where nothing has slid; None where nothing has touched."""
+        """Mean over the distance slid, or over time without sliding; None without contact."""
         return self._mean(1)
 
     def _mean(self, index: int) -> ErrorParts | None:
@@ -169,7 +169,7 @@ class ErrorSums:
         return ErrorParts(*(value / weight for value in sums)) if weight > 0.0 else None
 
     def facts(self, accuracy: Any) -> dict[str, Any]:
-        """Return as plain data the accuracy that was asked for, and the relative errors by part, and in all."""
+        """Return the requested accuracy and the relative errors by part, and in total, as plain data."""
         found = {"friction": self.friction, "contact_area_corrected": self.area}
         parts = {name: each.plain() for name, each in found.items() if each is not None}
         if self.friction is not None:
@@ -177,8 +177,8 @@ class ErrorSums:
         return {"accuracy": accuracy, **parts}
 
     def lines(self, asked: tuple[float, float], chosen: Collection[str] = ()) -> list[str]:
-        """Return sentences for run.log, with what to change where friction or the area is more wrong than `asked` for;
-        the accuracy has `chosen` the settings behind these parts."""
+        """Return sentences for run.log, with remedies if friction or the area exceeds the `asked` accuracies. The
+        accuracy has `chosen` the settings of these parts."""
         found = zip(("friction", "the corrected contact area"), (self.friction, self.area), asked, strict=True)
         way = "the distance slid" if self.sums[1, 0] > LEAST_WAY else "time"
         lines = [
@@ -192,7 +192,7 @@ class ErrorSums:
 
 
 def advice(parts: ErrorParts, accuracy: float, chosen: Collection[str] = ()) -> str:
-    """Return what to change where more is wrong than `accuracy` allows, or that it is not."""
+    """Return a text with a remedy if the error exceeds `accuracy`, or that it does not."""
     if not exceeds(parts.total, accuracy):
         return f"; within the {100 * accuracy:g} % that numerics.accuracy asks for"
     worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
@@ -201,12 +201,12 @@ def advice(parts: ErrorParts, accuracy: float, chosen: Collection[str] = ()) -> 
 
 
 def exceeds(error: float, accuracy: float) -> bool:
-    """Return whether an estimated error is beyond the accuracy asked for, also as it is printed."""
+    """Return whether an estimated error exceeds the requested accuracy, also as it is printed."""
     return error > ROUNDED * accuracy
 
 
 def describe(parts: ErrorParts, name: str) -> str:
-    """Return the total error of "friction", or of another quantity, in per cent, and the parts that it is made of."""
+    """Return the total error of "friction", or of another quantity, in per cent, and its parts."""
     there = [part for part in NAMES if getattr(parts, part)]
     shares = ", ".join(f"{SHOWN[part]} {per_cent(getattr(parts, part))}" for part in there)
     total = parts.of_friction if name == "friction" else parts.total

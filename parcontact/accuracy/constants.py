@@ -1,7 +1,7 @@
-"""The calibrated constants of the error budget, in one table; the manual's page `coverage` shows how well they do.
+"""The fitted constants of the error budget; the manual's page `coverage` shows how well they hold.
 
-Each was fitted to true errors by the script that it names. `scatter` is the estimate over the true error: its median
-and the range of nine tenths, or what else is known. That of friction and area is of the sum of all sources.
+Each was fitted to true errors by the script named. `scatter` is the ratio of estimate to true error: its median and
+the range of 90 % of the cases, or what is known. That of friction and area belongs to the sum of all sources.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Fit:
-    """A calibrated constant: its `order` is the power with which the error falls with what is refined."""
+    """A fitted constant; `order` is the power with which the error falls on refinement."""
 
     name: str
     value: float

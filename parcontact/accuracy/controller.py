@@ -1,28 +1,27 @@
 """The tolerance of solves and the length of steps, both from the error budget of the steps made so far.
 
-**Tolerance.** `numerics.tolerance` is chosen for the worst scene. Where `numerics.accuracy` has chosen it, a solve may
-have a larger one: the solver may make its share (`shares`) of the accuracy, or of what the other parts of the budget
-make where that is more. Errors go with the certificate
-that a solve has reached. A mean over the last steps says in which proportion; it is a power of the root of two, so that
-rounding has no part in it, and a part of the state: a run goes on as if it had never stopped. The last solve before a
-change of velocity or load is a close one, and so is a steady start: the body remembers a displacement that is as wrong
-as the certificate allows, and holds it after the change with a modulus that may be far above the one before (on the
-compound synthetic_tyre, 300 times as fast, forty times). The last step of a stage seldom moves the surface by whole
-cells: its start is worse than those of the steps before it, from which its tolerance was learnt.
+**Tolerance.** `numerics.tolerance` suits the worst scene. If `numerics.accuracy` has chosen it, solves may have a
+larger one, as long as the error of the solver stays below its share (`shares`) of the accuracy, or of the other
+parts of the budget if these are larger. Errors are proportional to the certificate of a solve. The factor is a mean
+over the last steps, rounded to a power of the square root of two against rounding errors, and a part of the state,
+so that a restarted run continues identically. The last solve before a change of velocity or load is a close one, and
+so is a steady start: the body remembers the error of the displacement, and a much larger modulus may multiply it
+after the change. The last step of a stage seldom moves the surface by whole cells, so that its start is worse than
+those from which the factor was learnt.
 
-**Length.** The error E of a step of length dt is estimated from that step alone (`time_error`). It may be E0, the share
-of time steps. As E goes with dt^p (p = 3 for steps in which the displacement is quadratic, 1.7 where it is linear, 1
-for backward Euler), the next is
+**Length.** The error E of a step of length dt is estimated from that step alone (`time_error`). E0 is the share of
+time steps in the accuracy. As E varies as dt^p (p = 3 for a displacement quadratic in time, 1.7 for a linear one, 1
+for backward Euler), the next step is
 
     dt <- dt clip(SAFETY (E0/E)^(1/p), 1, MOST_GROWTH),
 
-and a step with E > REJECTED E0 is made anew from the same state, `max((REJECTED E0/E)^(1/p), MOST_SHRINK)` times as
-long; the one after it does not grow (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I
-(1993), II.4). At rest steps are a shortest one times powers of the fourth root of two, so that rounding has no part in
-their length. While the surface slides, steps end at multiples of their length, counted in cells from where the surface
-was at first (block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after
-a jump, parts of a cell, as large as E allows, lead back to whole cells, by which heights are moved without a
-transform. Halves, thirds and quarters start from the pressure of a whole cell ago (`march.starts`).
+and a step with E > REJECTED E0 is repeated from the same state, `max((REJECTED E0/E)^(1/p), MOST_SHRINK)` times as
+long; the step after it does not grow (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I
+(1993), II.4). At rest steps are the shortest one times powers of the fourth root of two, against rounding errors.
+While the surface slides, steps end at multiples of their length, counted in cells from the first position of the
+surface (block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after a
+jump, parts of a cell, as large as E allows, lead back to whole cells, by which heights are moved without a
+transform. Halves, thirds and quarters start from the pressure one whole cell earlier (`march.starts`).
 """
 
 import math
@@ -40,34 +39,33 @@ from .budget import ErrorBudget, ErrorParts
 from .shares import AREA, FRICTION, SOLVER_MEDIAN, TIME_MEDIAN
 from .time_error import order_of_time_error
 
-MOST = 8.0  # accuracy: times the job's tolerance, at most
-LOOSEST = 0.05  # accuracy: the largest tolerance, with which single steps may be wrong by a few times the mean
-CLOSE = 2.5e-4  # accuracy: before a change, if the tolerance is not smaller: 1 % over a rise of the modulus by 40
-FIRST = 0.01  # accuracy: in the first step of a stage, and in the last, which is seldom of whole cells, at most
-NEWEST = 0.25  # tuning: weight of the last step in the mean
-NAME = "mean logarithm"  # in a checkpoint
-SAFETY = 0.98  # tuning: of the length with which the error would be the one allowed
-REJECTED = 1.19  # accuracy: times the error allowed; that of a slide varies from step to step, and its mean counts
-MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0  # tuning: of a step over the one before it, or over one rejected
-LEVELS = 2  # tuning: the power of two of the number of lengths, of steps below a quarter of a cell, per factor of two
-REST_LEVELS = 4  # tuning: the same at rest
-LEAST_WAY = 0.35  # tuning: of a step that ends at a multiple of its length
-STRETCH = 1.1  # tuning: of the last step of a stage: no step shorter than a tenth of the one before is left over
-SNAP_SHARE = 1.0 / 64.0  # accuracy: of the longest step of a stage: in a shorter one the edge of contact may snap
-RELAXING = 0.1  # accuracy: of the shortest relaxation time: the same; and the first step at rest after a jump
-SAME_LEVEL = 1e-6  # rounding: of a level
+MOST = 8.0  # accuracy: largest tolerance of a solve over that of the job
+LOOSEST = 0.05  # accuracy: largest tolerance of a solve
+CLOSE = 2.5e-4  # accuracy: largest tolerance before a change of velocity or load
+FIRST = 0.01  # accuracy: largest tolerance in the first and the last step of a stage
+NEWEST = 0.25  # tuning: weight of the last step in the mean factor
+NAME = "mean logarithm"  # its name in a checkpoint
+SAFETY = 0.98  # tuning: length of a step over that with the allowed error
+REJECTED = 1.19  # accuracy: error of a rejected step over the allowed one
+MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0  # tuning: limits on a step over the one before, or over a rejected one
+LEVELS = 2  # tuning: log2 of the number of lengths per factor of two, for steps below a quarter of a cell
+REST_LEVELS = 4  # tuning: number of lengths per factor of two at rest
+LEAST_WAY = 0.35  # tuning: least length of a step that ends at a multiple, over its nominal length
+STRETCH = 1.1  # tuning: largest stretch of the last step of a stage, to avoid a short rest
+SNAP_SHARE = 1.0 / 64.0  # accuracy: step over the longest of the stage, below which the edge of contact may snap
+RELAXING = 0.1  # accuracy: the same over the shortest relaxation time; and the first step at rest after a jump
+SAME_LEVEL = 1e-6  # rounding: relative tolerance on a length
 
 
 @dataclass(frozen=True)
 class StepTolerance:
-    """Memory of the tolerance that steps may have over that of the job, the mean over the last ones of its logarithm
-    to the base 2."""
+    """Memory of the tolerance of steps: mean over the last ones of log2 of its ratio to that of the job."""
 
     mean: float = 0.0
 
 
 class TolerancePart:
-    """The tolerance of solves; with a checkpoint that lacks it all is to be learnt again."""
+    """Tolerance of solves, an optional part of checkpoints."""
 
     def at_rest(self) -> StepTolerance:
         return StepTolerance()
@@ -81,8 +79,8 @@ class TolerancePart:
 
 @dataclass(frozen=True)
 class Controller:
-    """Controller of a run: of a job with its stages, whose `body` may relax, whose `energies` are asked for or not, and
-    whose surfaces stick (`adhesive`) or not."""
+    """Controller of a run: of a job with its stages and `body`; `energies` is True if the job asks for them, `adhesive`
+    with adhesion."""
 
     job: Job
     timeline: Timeline
@@ -98,13 +96,13 @@ class Controller:
 
     @property
     def follows(self) -> bool:
-        """Return whether the tolerance of steps follows the error budget: `numerics.accuracy` has chosen that of the
-        job, and stages last. Contacts with adhesion are solved to the job's tolerance."""
+        """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen that of the job, and
+        stages have steps. Contacts with adhesion are solved to the job's tolerance."""
         return "tolerance" in self.job.numerics.chosen and self.timeline.lasts and not self.adhesive
 
     def tolerance(self, memory: StepTolerance, step: Step) -> float | None:
-        """Return the tolerance of the solve of a step, None where it is that of the job, as it is in a jump. Before a
-        change and in the first and last step of a stage it is smaller."""
+        """Return the tolerance of the solve of a step, None for that of the job, as in a jump. It is smaller before a
+        change and in the first and last step of a stage."""
         own = self.job.numerics.tolerance
         if step.dt == 0.0:
             return None
@@ -118,7 +116,7 @@ class Controller:
         return float(min(own * 2.0 ** (0.5 * round(2.0 * memory.mean)), max(LOOSEST, own), most))
 
     def learn(self, memory: StepTolerance, certificate: float, budget: ErrorBudget | None) -> StepTolerance:
-        """Return the memory after a step with this budget, whose solve has reached a `certificate`."""
+        """Return the memory after a step with this budget, whose solve has reached `certificate`."""
         if not self.follows or budget is None or certificate <= 0.0:
             return memory
         asked = self.job.numerics.asked
@@ -131,7 +129,7 @@ class Controller:
     # -- length of steps ----------------------------------------------------------------------------------------------
 
     def propose(self, chosen: ChosenSteps, span: Span, number: int) -> Step:
-        """Return the next step of a stage that chooses its own; it has this number, and `chosen` are those made."""
+        """Return step `number` of a stage that chooses its steps; `chosen` are those made."""
         first = number == span.before + span.jumps + 1
         return self._step(chosen, span, number, self._first(chosen, span) if first else chosen.next)
 
@@ -146,13 +144,13 @@ class Controller:
         front: float = 0.0,
         begins: bool = False,
     ) -> Step | MadeStep:
-        """Return the shorter step to make instead of one with such an error, or how the step is noted as made.
+        """Return a shorter step to make instead of one with this error, or the record of the accepted step.
 
-        It ends the stage at `end` [s]; `rejected` says whether a longer one was tried before. The `front` of a contact
-        with adhesion has moved by so many half process zones, of which one is allowed, but where it snaps. Steps in
-        which it snaps, `begins` or ends are a share of the shortest relaxation time: what is jump meets the body
-        before it relaxes. Where energies are asked for, so is what each point loses as it closes: then the root of the
-        accuracy is allowed.
+        The step ends at `end` [s] of the stage; `rejected` is True if a longer one was tried before. In contacts
+        with adhesion the edge has moved by `front` half process zones: one is allowed, unless it snaps. Steps in
+        which it snaps, `begins` or ends are limited to a share of the shortest relaxation time, so that a jump meets
+        the body before it relaxes. With energies this also applies to points that close; the square root of the
+        accuracy is then allowed.
         """
         numerics = self.job.numerics
         order = order_of_time_error(numerics.integrator, step.growth > 0.0)
@@ -172,7 +170,7 @@ class Controller:
         return MadeStep(span.index, end, self._level(span, step.dt * min(max(wanted, 1.0), most)))
 
     def _shorter(self, chosen: ChosenSteps, span: Span, step: Step, share: float) -> Step | None:
-        """Return a step that is at most that share of one, None if that one is the shortest."""
+        """Return a step of at most this share of a step, None if that one is the shortest."""
         least, dt = _bounds(span).least, share * step.dt
         while True:
             wanted = self._level(span, dt)
@@ -184,7 +182,7 @@ class Controller:
             dt = 0.5 * wanted
 
     def _level(self, span: Span, dt: float) -> float:
-        """Return the longest of the lengths that steps may have which is no longer than dt."""
+        """Return the longest admissible length of a step that does not exceed dt."""
         limits = _bounds(span)
         if dt <= limits.least or dt >= limits.most:
             return min(max(dt, limits.least), limits.most)
@@ -195,7 +193,7 @@ class Controller:
         return min(limits.least * 2.0 ** (power / REST_LEVELS), limits.most)
 
     def _first(self, chosen: ChosenSteps, span: Span) -> float:
-        """Return how long to try the first step of a stage."""
+        """Return the length of the first step of a stage."""
         limits = _bounds(span)
         if self._goes_on(span) and chosen.next:
             return self._level(span, chosen.next)
@@ -204,14 +202,14 @@ class Controller:
         return self._level(span, RELAXING * self.body.shortest_time)
 
     def _goes_on(self, span: Span) -> bool:
-        """Return whether nothing has changed since the stage before, which chose its steps too."""
+        """Return whether the stage before chose its steps and had the same velocity and load."""
         if span.index == 0 or span.jumps:
             return False
         before = self.timeline.history[span.index - 1]
         return before.chooses and before.velocity == span.stage.velocity
 
     def _step(self, chosen: ChosenSteps, span: Span, number: int, dt: float, rejected: bool = False) -> Step:
-        """Return the step that is about so long: it ends at a multiple of its length, or with the stage."""
+        """Return a step of about this length that ends at a multiple of its length, or with the stage."""
         ends = span.ends
         assert isinstance(ends, ChosenEnds)
         now = ends.made[-1] if ends.made else 0.0
@@ -225,9 +223,10 @@ class Controller:
         return self._ending(chosen, span, number, dt, now + dt, rejected)
 
     def _to_a_multiple(self, span: Span, now: float, dt: float) -> float:
-        """Return how long until the surface is at a multiple of the way of such a step: LEAST_WAY of it, or longer.
+        """Return the time until the surface is at a multiple of the way of such a step: at least LEAST_WAY of it.
 
-        From half a multiple it is half of one: a step that has just grown is not three times the one before.
+        From half a multiple it is half a step, so that a step that has just grown is not three times as long as the
+        one before.
         """
         if span.stage.velocity[1]:
             return dt
@@ -239,7 +238,7 @@ class Controller:
         return dt if math.isclose(way, dt, rel_tol=SAME_LEVEL) else way
 
     def _ending(self, chosen: ChosenSteps, span: Span, number: int, dt: float, end: float, rejected: bool) -> Step:
-        """Return the step that is so long and ends so long after the start of the stage."""
+        """Return the step of this length and end [s after the start of the stage]."""
         (x, y), (along_x, along_y) = span.origin, span.stage.velocity
         made = chosen.ends.get(span.index, [])
         last = made[-1] - (made[-2] if len(made) > 1 else 0.0) if made else 0.0
@@ -258,8 +257,8 @@ class Controller:
 
 
 def tolerance_before(job: Job, stage: int, relaxes: bool) -> float:
-    """Return the largest tolerance of the solve before a stage: CLOSE where velocity, control or load change there and
-    the body relaxes, else infinite."""
+    """Return the largest tolerance of the solve before a stage: CLOSE if velocity, control or load change there and the
+    body relaxes, else infinite."""
     history, start = job.history, job.initial
     if stage == len(history) or not relaxes:
         return math.inf
@@ -271,7 +270,7 @@ def tolerance_before(job: Job, stage: int, relaxes: bool) -> float:
 
 
 def cells_per_step(most: float) -> float:
-    """Return the longest way of a step that is no longer: 1, 2, 4 cells, or a half, a 3rd, ... 8th, 10th, ... of
+    """Return the longest admissible way of a step up to `most`: 1, 2, 4 cells, or a half, a 3rd, ... 8th, 10th, ... of
     one."""
     if most >= 1.0 - SAME_LEVEL:
         return 2.0 ** math.floor(math.log2(most) + SAME_LEVEL)
@@ -281,7 +280,7 @@ def cells_per_step(most: float) -> float:
 
 
 def _room(parts: ErrorParts, share: float, accuracy: float) -> float:
-    """Return how many times the estimated error by the solver may be; infinite where it makes none."""
+    """Return the factor by which the estimated error of the solver may grow; infinite if it is 0."""
     allowed = share * SOLVER_MEDIAN * max(accuracy, parts.total - parts.solver)
     return allowed / parts.solver if parts.solver > 0.0 else math.inf
 

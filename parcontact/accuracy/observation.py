@@ -1,12 +1,12 @@
-"""The error budget uses properties of a run, and observations of a step or of a steady state.
+"""Input of the error budget: properties of a run, and observations of a step or of a steady state.
 
-Spots of contact are taken as round. With S sides of cells between points in contact and others, on n points of which a
+Spots of contact are taken as round. With S cell sides between points in contact and others, on n points of which a
 share A touches, their mean radius in cells is
 
     r = (8/pi) min(A, 1 - A) n/S,
 
-of the gaps between them where these are the smaller. Contacts of waves, cylinders and flats are identical; they lie
-in the same way on the grid, so that they count as one.
+or that of the gaps between them if these are smaller. Contacts of waves, cylinders and flats are identical: they
+have the same position on the grid and count as one.
 """
 
 import math
@@ -19,19 +19,20 @@ from ..physics.measures import excess_of
 from ..physics.prony import Prony
 
 REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are identical
-ROUND = 8.0 / math.pi  # physics: cells of a round spot over its sides on the edge, times this: its radius in cells
-SPOTS_POWER = 0.25  # accuracy: of the number of spots, by which errors of many are smaller
+ROUND = 8.0 / math.pi  # physics: radius of a round spot [cells] over the ratio of its cells to sides on its edge
+SPOTS_POWER = 0.25  # accuracy: power of the number of spots by which the error of their mean falls
 Vector = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class RunProperties:
-    """Properties of a run that are known before it begins.
+    """Properties of a run that are known before it starts.
 
-    `points` of the grid; `cell`: its sides [m]; `cells_per_wave`: longer sides per shortest wave of a rough surface,
-    None without one; `measured`: the surface has a map, which may lack waves on a coarse grid; `edges_follow_grid`:
-    those of contact do; `identical_contacts`: as those of waves; `free`: the box; `prony`: what relaxes, None
-    of an elastic body; `folded`: the bound of its folded branches; `exponential`: the integrator is.
+    `points` of the grid; `cell`: its sides [m]; `cells_per_wave`: longer sides of a cell per shortest wave of a
+    rough surface, or None; `measured`: the surface has a map, which may lack waves on a coarse grid;
+    `edges_follow_grid`: edges of contact do; `identical_contacts`: as those of waves; `free`: the box is; `prony`:
+    relaxation function, None for an elastic body; `folded`: bound on the error of folded branches; `exponential`:
+    the integrator is.
     """
 
     points: int
@@ -47,7 +48,7 @@ class RunProperties:
 
     @property
     def mean_cell(self) -> float:
-        """The mean of the sides of a cell, in which radii of spots are counted."""
+        """Mean of the sides of a cell, the unit of the radii of spots."""
         return 0.5 * (self.cell[0] + self.cell[1])
 
 
@@ -55,16 +56,15 @@ class RunProperties:
 class StepObservation:
     """Observation of a step, or of a steady state.
 
-    `complementarity` of the certificate; `penetrating`: points that penetrate without pressure, as a share of those in
-    contact; `slope`: rms slope of the surface under the pressure; `friction`, and what an `interface` adds to it;
-    `area`, counted, and `corrected`, as shares; `spared` was not taken off, as points on the edge have yielded;
-    `friction_mismatch`: by how much friction by the slopes of the rigid surface and of the body differ; `way`: the
+    `complementarity` of the certificate; `penetrating`: points that penetrate without pressure, as a share of those
+    in contact; `slope`: rms slope of the surface under the pressure; `friction`, and the part of an `interface`;
+    `area`, counted, and `corrected`, as shares; `spared`: the correction not made at points on the edge that have
+    yielded; `friction_mismatch`: difference of friction by the slopes of the rigid surface and of the body; `way`:
     direction of sliding, (0, 0) at rest.
 
-    Of steps also: by what the embedded pair differs, `difference`, with its `order` in the step; cells (of mean sides)
-    `slid` in it, in so many `seconds`; the `angle` by which a wave turned that is as high as the surface under the
-    pressure and changes as much; `curved`: whether the displacement is quadratic in the step; the `change` of friction
-    since the step before, infinite after a jump; how `uneven` pressures are, as a share of their mean, 1 at most.
+    For steps also: `difference` of the embedded pair, and its `order`; cells (of mean sides) `slid` in `seconds`;
+    the `angle` of the pair; `curved`: the displacement is quadratic in time; the `change` of friction since the step
+    before, infinite after a jump; `uneven`: largest minus mean pressure over the mean, at most 1.
     """
 
     complementarity: float
@@ -88,17 +88,17 @@ class StepObservation:
 
     @property
     def correction(self) -> float:
-        """The counted area less the corrected one, over the latter."""
+        """The counted minus the corrected area, over the latter."""
         return (self.area - self.corrected) / self.corrected if self.corrected > 0.0 else 0.0
 
 
 def properties_of(job: Job, shortest: float | None, folded: float = 0.0, prony: Prony | None = None) -> RunProperties:
-    """Return the properties of a job: `shortest` is the shortest wave of its map [m], `folded` the bound of its folded
-    branches, and `prony` what relaxes."""
+    """Return the properties of a job: `shortest` is the shortest wave of its map [m], `folded` the bound on the error
+    of its folded branches, and `prony` its relaxation function."""
     waves = [shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)]
     waves += [shortest] if shortest is not None else []
     (nx, ny), (dx, dy) = job.grid.points, (job.grid.dx, job.grid.dy)
-    cell = (dx if nx > 1 else dy, dy if ny > 1 else dx)  # across a line of points there is nothing
+    cell = (dx if nx > 1 else dy, dy if ny > 1 else dx)  # a line of points has one direction
     line = 1 in job.grid.points
     return RunProperties(
         points=nx * ny,
@@ -115,7 +115,8 @@ def properties_of(job: Job, shortest: float | None, folded: float = 0.0, prony: 
 
 
 def _ridges(shapes: Sequence[Any]) -> bool:
-    """Return whether the surface is of cylinders and waves along one axis of the grid, as then edges of contact are."""
+    """Return whether the surface consists of cylinders and waves along one axis of the grid; edges of contact then
+    follow it."""
     across = {"y" if shape.axis == "x" else "x" for shape in shapes if isinstance(shape, Cylinder)}
     waves = [shape.waves for shape in shapes if isinstance(shape, Wave)]
     across |= {axis for x, y in waves for axis, count in (("x", x), ("y", y)) if count}
@@ -123,8 +124,8 @@ def _ridges(shapes: Sequence[Any]) -> bool:
 
 
 def radius_of(run: RunProperties, observed: StepObservation) -> float:
-    """Return the radius of round spots of contact, or of the gaps between them where these are the smaller, in cells of
-    mean sides; half the width of straight ones; infinite where there are no edges."""
+    """Return the radius of round spots of contact, or of smaller gaps between them, in cells of mean sides; half the
+    width of straight ones; infinite without edges."""
     excess = excess_of(*run.cell, run.edges_follow_grid)
     sides = (observed.area - observed.corrected + observed.spared) * run.points / excess
     if sides <= 0.0:
@@ -134,8 +135,8 @@ def radius_of(run: RunProperties, observed: StepObservation) -> float:
 
 
 def count_spots(run: RunProperties, observed: StepObservation) -> float:
-    """Return the number of spots of contact, or of the gaps between them where these are the smaller; of identical
-    contacts 1, and in full contact as many as half waves of the shortest length."""
+    """Return the number of spots of contact, or of smaller gaps between them; 1 for identical contacts; in full contact
+    the number of half waves of the shortest length."""
     radius, share = radius_of(run, observed), min(observed.area, 1.0 - observed.area)
     if run.identical_contacts:
         return 1.0
@@ -147,12 +148,12 @@ def count_spots(run: RunProperties, observed: StepObservation) -> float:
 
 
 def mean_over_spots(run: RunProperties, observed: StepObservation) -> float:
-    """Return by what factor an error of a single spot is smaller in the mean over all of them."""
+    """Return the factor by which the error of the mean over all spots is smaller than that of one spot."""
     return count_spots(run, observed) ** -SPOTS_POWER
 
 
 def cell_along(run: RunProperties, way: Vector) -> float:
-    """Return the length of cells along a way, in the unit of `run.cell`; at rest the longer one."""
+    """Return the length of cells along a direction, in the unit of `run.cell`; the longer side at rest."""
     (dx, dy), (x, y) = run.cell, way
     length = math.hypot(x, y)
     return math.hypot(x * dx, y * dy) / length if length else max(dx, dy)

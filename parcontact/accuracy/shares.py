@@ -1,21 +1,21 @@
-"""Shares of the accuracy asked for, which solver, folded branches, time steps and mesh may make of the error.
+"""Shares of solver, folded branches, time steps and mesh in the requested accuracy.
 
-They are shares of true errors, and add up to 1. Estimates are larger than errors, as they are to hold in nearly all
-scenes: in the median by the factors SOLVER_MEDIAN and TIME_MEDIAN. So much more than its share an estimate may be.
+They are shares of true errors and add up to 1. Estimates exceed errors, so that they hold in nearly all scenes: in
+the median by SOLVER_MEDIAN and TIME_MEDIAN. An estimate may exceed its share by this factor.
 """
 
 from dataclasses import astuple, dataclass
 
 from ..job.sections.calculation import BRANCH_SHARE
 
-SOLVER_MEDIAN = 2.0  # accuracy: estimate over error, of 100 scenes at tolerances of 0.003 to 0.1: 1.7 to 2.2
-TIME_MEDIAN = 2.67  # accuracy: the same of marches with chosen steps: 2.2 to 2.7; 0.3 of it is 0.8
-FOLDED_MEDIAN = 2.0  # accuracy: the bound of the folded branches over their error, which is more, as a rule
+SOLVER_MEDIAN = 2.0  # fitted: median of estimate over error of the solver
+TIME_MEDIAN = 2.67  # fitted: the same of marches with chosen steps
+FOLDED_MEDIAN = 2.0  # accuracy: bound of the folded branches over their error, usually more
 
 
 @dataclass(frozen=True)
 class Shares:
-    """Shares of the error by what makes it. Raises ValueError unless they add up to 1."""
+    """Shares of the error by source. Raises ValueError unless they add up to 1."""
 
     solver: float
     folded: float

@@ -59,12 +59,12 @@ from .observation import RunProperties, StepObservation, cell_along, count_spots
 from .time_error import error_of_rise, share_of_area, time_error
 
 STRIP, CIRCLE = 2.0 / math.pi, 3.0 / math.pi  # physics: q0 times the half width, and times the radius
-NODES = 16  # accuracy: of the integral, within 2 % of it for one branch
+NODES = 16  # accuracy: nodes of the integral; its error is 2 % for one branch
 AT, WEIGHTS = np.polynomial.legendre.leggauss(NODES)
-STRAIGHT_POWER = 0.5  # accuracy: of m along edges that follow the grid, which move by whole cells
-GAPS = 2.0  # accuracy: times what is open: from half contact on radii are those of gaps, with fewer edges
-FEW_CELLS = 3.0  # accuracy: per shortest wave of a map, below which it lacks waves
-ROUNDING = 1e-12  # rounding: of the slope of the surface: friction of pressures that are right to all digits
+STRAIGHT_POWER = 0.5  # accuracy: power of m along edges that follow the grid
+GAPS = 2.0  # accuracy: factor on the open share; above half contact radii are those of gaps
+FEW_CELLS = 3.0  # accuracy: cells per shortest wave below which a map lacks waves
+ROUNDING = 1e-12  # rounding: least friction over the slope of the surface
 
 
 @dataclass(frozen=True)
@@ -77,16 +77,16 @@ class ErrorPair:
 
 @dataclass(frozen=True)
 class ErrorSource:
-    """A source of error: its name, what makes it smaller, and the errors that it makes of an observation."""
+    """A source of error: its name, a remedy, and a function that gives its errors for an observation."""
 
     name: str
     remedy: str
     error: Callable[[RunProperties, StepObservation], ErrorPair]
-    shown: str = ""  # in sentences, where that is not its name
+    shown: str = ""  # its name in sentences, if different
 
 
 def solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return what the solve of a step makes wrong."""
+    """Return the errors by the solve of a step."""
     certificate, ratio = observed.complementarity, observed.slope / observed.friction if observed.friction else 0.0
     friction = SOLVER.value * certificate * math.sqrt(max(1.0, ratio)) * mean_over_spots(run, observed)
     noise = NOISE.value * max(certificate, ROUNDING) * ratio / math.sqrt(count_spots(run, observed))
@@ -94,7 +94,7 @@ def solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 
 
 def steady_solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the same of steady sliding, whose friction is a sum of squares."""
+    """Return the same for steady sliding, whose friction is a sum of squares."""
     friction = SOLVER.value * max(observed.complementarity, ROUNDING) * mean_over_spots(run, observed)
     return ErrorPair(friction, _solver_of_area(observed))
 
@@ -104,31 +104,31 @@ def _solver_of_area(observed: StepObservation) -> float:
 
 
 def steps_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return what the length of a step makes wrong, a rise of friction within it included."""
+    """Return the errors by the length of a step, including a rise of friction within it."""
     error = time_error(run, observed)
     return ErrorPair(max(error, error_of_rise(run, observed)), share_of_area(run, observed) * error)
 
 
 def folded_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the bound of the folded branches."""
+    """Return the bound on the errors by folded branches."""
     return ErrorPair(run.folded, run.folded * (1.0 - observed.area))
 
 
 def mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return what the mesh makes wrong in a step of a march."""
+    """Return the errors by the mesh in a step of a march."""
     friction = VIEWS.value * observed.friction_mismatch / observed.friction if observed.friction else 0.0
     return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(AREA if any(observed.way) else STILL, run, observed))
 
 
 def steady_mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the same of steady sliding."""
+    """Return the same for steady sliding."""
     correction = observed.correction * mean_over_spots(run, observed)
     friction = _grow_if_identical(run) * (lost_at_edges(run, observed) + STEADY_AREA.value * correction)
     return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(STILL, run, observed))
 
 
 def _lacking_waves(run: RunProperties) -> float:
-    """Return the error of friction by the waves that a map lacks on a coarse grid."""
+    """Return the error of friction by waves that a map lacks on a coarse grid."""
     cells = run.cells_per_wave
     if not run.measured or cells is None or cells >= FEW_CELLS:
         return 0.0
@@ -145,8 +145,8 @@ def _grow_if_identical(run: RunProperties) -> float:
 
 
 def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
-    """Return the share of friction that edges of contact lose in waves shorter than the cells along the sliding, at
-    most; 0 at rest, and of an elastic body."""
+    """Return an upper bound on the share of friction that edges of contact lose in waves shorter than the cells along
+    the sliding; 0 at rest, and for an elastic body."""
     if run.prony is None or not any(observed.way):
         return 0.0
     cell = cell_along(run, observed.way)
@@ -158,8 +158,8 @@ def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
 
 
 def lost_in_short_waves(prony: Prony, radius: float, speed: float, edges_follow_grid: bool) -> tuple[float, float]:
-    """Return s and m of the module, where spots of contact of a `radius` in cells, or `straight` ones of that half
-    width, slide by so many cells in a second; both are 1 at most, and 0 where there are no edges or no losses."""
+    """Return s and s m of the module for spots with a `radius` in cells, or straight ones of this half width, that
+    slide by `speed` cells per second; both at most 1, and 0 without edges or losses."""
     if radius == math.inf or not prony.moduli.size:
         return 0.0, 0.0
     first = (STRIP if edges_follow_grid else CIRCLE) / radius if radius > 0.0 else math.inf

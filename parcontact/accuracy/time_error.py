@@ -51,15 +51,15 @@ from .constants import (
 )
 from .observation import RunProperties, StepObservation, radius_of
 
-PASSING_LOSS = 0.19  # accuracy: times the share of a spot that passes: by what the loss is wrong in a linear step
-SLOW = 1e-3  # rounding: of its relaxation time: a step that is shorter, in which L has no digits left
-LEAST_POWER = 0.25  # accuracy: by which the error falls faster than the difference of a linear pair, at least
-FULL_POWER = 4  # accuracy: of the area: so much of the error is as in full contact, where no edges pass
-FIXED_EDGES = 0.9  # accuracy: of the error of a linear pair is from edges, of which full contact has none
+PASSING_LOSS = 0.19  # accuracy: relative error of the loss in a linear step over x
+SLOW = 1e-3  # rounding: z below which L is computed by its series
+LEAST_POWER = 0.25  # accuracy: least difference of the orders of error and of a linear pair
+FULL_POWER = 4  # accuracy: power of the area that is the share of the error in full contact
+FIXED_EDGES = 0.9  # accuracy: share of the error of a linear pair that edges cause
 
 
 def time_error(run: RunProperties, observed: StepObservation) -> float:
-    """Return what the length of a step adds to the error of friction, or would where something slides; at most 1."""
+    """Return the error of friction by the length of a time step, also at rest; at most 1."""
     if not run.exponential:
         return EULER.value * observed.difference**EULER.order
     pair = _error_by_pair(observed)
@@ -78,8 +78,8 @@ def time_error(run: RunProperties, observed: StepObservation) -> float:
 
 
 def _error_by_pair(observed: StepObservation) -> float:
-    """Return the error that the embedded pair shows. That of linear steps goes with the power LINEAR_PAIR.order of the
-    step, the difference with `order`."""
+    """Return the error by the embedded pair. For linear steps it has the order LINEAR_PAIR.order, the difference
+    `order`."""
     if observed.curved:
         return PAIR.value * observed.difference
     power = max(LEAST_POWER, LINEAR_PAIR.order / max(observed.order, 1.0) - 1.0)
@@ -89,8 +89,8 @@ def _error_by_pair(observed: StepObservation) -> float:
 
 
 def error_of_rise(run: RunProperties, observed: StepObservation) -> float:
-    """Return the error of friction that has changed since the step before, as after rest: the change comes <L> of a
-    step late. After a jump it counts as the slope times the sine of the loss angle, of pressures that are `uneven`."""
+    """Return the error of a change of friction since the step before, as after rest: it is delayed by <L> of a step.
+    After a jump the change is the slope times the sine of the loss angle, times `uneven`."""
     if run.prony is None or not run.exponential or not observed.slid or observed.friction <= 0.0:
         return 0.0
     x = max(_share_passed(run, observed), observed.angle)
@@ -113,20 +113,20 @@ def share_of_area(run: RunProperties, observed: StepObservation) -> float:
 
 
 def order_of_time_error(integrator: str, curved: bool) -> float:
-    """Return the order of the error in the length of a step, which is `curved` or linear."""
+    """Return the order of the error in the length of a step; `curved` if the displacement is quadratic in time."""
     if integrator == "backward-euler":
         return 1.0
     return PASSING.order if integrator == "exponential" and curved else LINEAR_PAIR.order
 
 
 def _share_passed(run: RunProperties, observed: StepObservation) -> float:
-    """Return by what share of the radius of spots the surface slides in a step."""
+    """Return the distance slid in a step over the radius of spots."""
     radius = radius_of(run, observed)
     return observed.slid / radius if radius > 0.0 else 0.0
 
 
 def _late(prony: Prony, angle: float, seconds: float) -> float:
-    """Return by what share of half a step forces are late, <L>, in the mean over the branches that make friction."""
+    """Return the delay of forces over half a step, <L>, averaged over the branches that cause friction."""
     z = seconds / prony.relaxation_times
     slow = np.maximum(z, SLOW)
     late = np.where(z > SLOW, 1.0 / np.tanh(0.5 * slow) - 2.0 / slow, z / 6.0)
