@@ -25,7 +25,7 @@ def ramp(start: float, end: float, steps: int, duration: float = 1.0) -> Job:
 
 
 def sphere(points: int, box: float, tabor: float, *history: Job, law: str = "exponential", **more: Any) -> Job:
-    """A sphere in a free box of so many radii of its contact without load."""
+    """A sphere in a free box of a given number of radii of its contact without load."""
     return {
         "grid": {"points": points, "size": box * UNLOADED, "boundary": "free"},
         "surface": {"shape": "sphere", "radius": RADIUS},

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import hypothesis
 import pytest
 from _pytest.config import create_terminal_writer
-from marching import load_script
+from marched_jobs import load_script
 from mpi4py import MPI
 from restarting import Bench
 

@@ -3,7 +3,7 @@
 from collections import Counter
 from typing import Any
 
-from marching import marched
+from marched_jobs import marched
 
 from parcontact import scene
 from parcontact.effects.effect import Decision

@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from marching import SLS
+from marched_jobs import SLS
 
 Json = dict[str, Any]
 

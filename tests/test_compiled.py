@@ -1,4 +1,5 @@
-"""Compiled loops: where they are kept, two processes that keep them at once, who is told, what of numba is imported."""
+"""Compiled loops: where they are kept, two processes that keep them at once, who is stated, what of numba is
+imported."""
 
 import io
 import subprocess
@@ -101,7 +102,7 @@ class Terminal(io.StringIO):
 
 
 @pytest.mark.parametrize(("stream", "lines"), [(Terminal, 1), (io.StringIO, 0)])
-def test_who_waits_is_told_that_loops_compile(
+def test_who_waits_is_stated_that_loops_compile(
     stream: type[io.StringIO], lines: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Once for all loops, on a terminal alone."""

@@ -5,8 +5,6 @@ import pickle
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 import parcontact
 from parcontact.doubts import SENTENCES, Doubt
 from parcontact.job import Job
@@ -49,22 +47,6 @@ def test_numbers_in_sentences() -> None:
     seam = {"axis": "x", "jump": 1e-6, "times": 3.14159, "tilt": 0.0}
     assert "3.14 times the largest step" in str(Doubt("seam", "surface", seam))
     assert "far above the largest step" in str(Doubt("seam", "surface", {**seam, "times": float("inf")}))
-
-
-@pytest.mark.parametrize(
-    ("kind", "place", "change", "same"),
-    [
-        ("seam", "surface", {"jump": 2.0}, True),
-        ("seam", "surface", {"where": "step 4"}, True),
-        ("seam", "surface", {"axis": "y"}, False),
-        ("tilt", "surface", {}, False),
-        ("seam", "surface.1", {}, False),
-    ],
-)
-def test_subjects(kind: str, place: str, change: dict[str, object], same: bool) -> None:
-    """Doubts of one subject differ in numbers alone, and in where they were seen."""
-    numbers = {"axis": "x", "jump": 1.0, "where": "step 3"}
-    assert (Doubt("seam", "surface", numbers).subject == Doubt(kind, place, {**numbers, **change}).subject) == same
 
 
 def test_jobs_have_doubts_and_their_sentences() -> None:

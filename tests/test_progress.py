@@ -1,4 +1,4 @@
-"""How far long work has come: told on a terminal, and nowhere else."""
+"""How far long work has come: shown on a terminal, and nowhere else."""
 
 import io
 import re
@@ -27,8 +27,8 @@ def job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "job.yaml"
 
 
-def told(monkeypatch: pytest.MonkeyPatch, terminal: io.StringIO, *words: str) -> str:
-    """What a verb writes beside its results, to a terminal or not."""
+def stated(monkeypatch: pytest.MonkeyPatch, terminal: io.StringIO, *words: str) -> str:
+    """What a verb writes next to its results, to a terminal or not."""
     monkeypatch.setattr(sys, "stderr", terminal)
     assert main(list(words)) == 0
     return terminal.getvalue()
@@ -47,11 +47,11 @@ def test_a_bar_stands_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_steady_states(job: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """How many of how many, below the lines of the table; nothing where errors go to a file."""
-    text = told(monkeypatch, Terminal(), "steady", "job.yaml")
+    text = stated(monkeypatch, Terminal(), "steady", "job.yaml")
     assert "steady states:   0%" in text
     assert "0/3" in text
     assert len([line for line in capsys.readouterr().out.splitlines() if "e-" in line]) >= 3
-    assert "0/3" not in told(monkeypatch, io.StringIO(), "steady", "job.yaml", "--restart", "never")
+    assert "0/3" not in stated(monkeypatch, io.StringIO(), "steady", "job.yaml", "--restart", "never")
     assert "steady states" not in (job.parent / "out/job/steady.log").read_text()
 
 
@@ -66,9 +66,9 @@ def test_the_maps_of_a_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 def test_a_fit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = [f"{f:g} {1 + f / (f + 10):g} {f / (f * f + 100):g}\n" for f in (0.1, 1, 10, 100)]
     (tmp_path / "rubber.csv").write_text("f[Hz] E'[MPa] E''[MPa]\n" + "".join(rows))
-    assert "number of branches:" in told(monkeypatch, Terminal(), "fit", str(tmp_path / "rubber.csv"))
+    assert "number of branches:" in stated(monkeypatch, Terminal(), "fit", str(tmp_path / "rubber.csv"))
 
 
 def test_a_plan(job: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = told(monkeypatch, Terminal(), "plan", "job.yaml", "--ranks", "1", "--seconds", "0.1")
+    text = stated(monkeypatch, Terminal(), "plan", "job.yaml", "--ranks", "1", "--seconds", "0.1")
     assert "trying the job for some 0.1 s:   0%" in text

@@ -92,7 +92,7 @@ def test_only_some_rooms_know_mpi(module: str) -> None:
     assert not [name for name in imports_that_run(module) if room(name) == "mpi4py" or name.startswith("parallel.mpi")]
 
 
-COMPARE = {"doctor", "plotting", "derived", "report", "command"}  # rooms that set theory beside results
+COMPARE = {"doctor", "plotting", "derived", "report", "command"}  # rooms that set theory next to results
 
 
 def test_theory_stands_alone() -> None:
@@ -155,7 +155,7 @@ def changing(kind: ast.ClassDef) -> set[str]:
     }
 
 
-def test_what_changes_is_told() -> None:
+def test_what_changes_is_stated() -> None:
     """Plain, augmented and annotated assignments, those to several at once, of loops, of `with` and of `del`."""
     text = """
 class Changing:
@@ -173,7 +173,7 @@ class Changing:
 """
     (found,) = ast.parse(text).body
     assert isinstance(found, ast.ClassDef)
-    assert changing(found) == {"plain", "read", "more", "told", "left", "right", "rest", "item", "opened", "gone"}
+    assert changing(found) == {"plain", "read", "more", "stated", "left", "right", "rest", "item", "opened", "gone"}
 
 
 def test_classes_change_little() -> None:

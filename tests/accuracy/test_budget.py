@@ -2,7 +2,6 @@
 
 from dataclasses import astuple, replace
 
-import numpy as np
 import pytest
 
 from parcontact.accuracy.budget import ErrorSums, estimate
@@ -59,29 +58,3 @@ def test_a_rest_does_not_dilute_what_a_slide_says() -> None:
     assert summary.friction == pytest.approx(slide.friction, rel=1e-12)
     assert summary.area == pytest.approx(slide.area, rel=1e-12)
     assert all(", mean over the distance slid" in line for line in summary.lines((0.012, 0.010)))
-
-
-def test_summary_goes_on() -> None:
-    """From the entries of another, as if there had been one; as plain data it has parts that add up."""
-    other = ErrorSums().plus(estimate(KNOWN, SEEN), 0.02, 3.0, 3e-4)
-    on = ErrorSums.restored({name: np.asarray(entry.value) for name, entry in other.entries().items()})
-    step = estimate(KNOWN, StepObservation(3e-3, 0.01, 0.1, 0.095, slope=0.01, difference=4e-4)), 0.01, 2.0, 2e-4
-    assert on.plus(*step).facts(0.01) == other.plus(*step).facts(0.01)
-    friction = on.facts(0.01)["friction"]
-    assert friction.pop("total") == pytest.approx(sum(friction.values()))
-    assert on.sums[0, 0] == pytest.approx(0.02 * 3e-4)  # not changed by what was added to it
-
-
-def test_steps_that_last_no_time_count_where_none_does() -> None:
-    """Three loads without duration: their mean; beside a step that lasts they are nothing."""
-    stills = [StepObservation(error, 0.0, 0.1, 0.1) for error in (1e-3, 2e-3, 6e-3, 8e-3)]
-    *loads, lasting = (estimate(KNOWN, still) for still in stills)
-    summary = ErrorSums()
-    for budget in loads:
-        summary = summary.plus(budget, 0.0, 0.0)
-    assert summary.friction is None
-    assert summary.area is not None
-    assert summary.area.solver == pytest.approx(np.mean([budget.area.solver for budget in loads]))
-    area = summary.plus(lasting, 0.0, 1e-9).area
-    assert area is not None
-    assert area.solver == pytest.approx(lasting.area.solver)

@@ -17,9 +17,9 @@ from parcontact.storage.step_row import StepRow
 
 def test_an_error_that_is_printed_like_its_limit_is_within_it() -> None:
     """Three digits are printed: 1.004 % of 1 % is no miss, 1.02 % is one."""
-    told = [advice(ErrorParts(solver=error, time=0.0, folded=0.0, mesh=0.0), 0.01) for error in (0.01004, 0.0102)]
-    assert told[0] == "; within the 1 % that numerics.accuracy asks for"
-    assert told[1] == "; more than the 1 % that numerics.accuracy asks for: try a smaller numerics.tolerance"
+    reported = [advice(ErrorParts(solver=error, time=0.0, folded=0.0, mesh=0.0), 0.01) for error in (0.01004, 0.0102)]
+    assert reported[0] == "; within the 1 % that numerics.accuracy asks for"
+    assert reported[1] == "; more than the 1 % that numerics.accuracy asks for: try a smaller numerics.tolerance"
 
 
 @pytest.mark.parametrize(("numerics", "key"), [({}, "accuracy"), ({"tolerance": 1e-2}, "tolerance")])
@@ -34,8 +34,8 @@ def test_a_curve_advises_the_key_that_was_given(numerics: dict[str, Any], key: s
     }
     errors = ErrorBudget(None, ErrorParts(solver=0.06, time=0.0, folded=0.0, mesh=0.01))
     point: Any = SimpleNamespace(errors=errors, speed=1.0, pressure=1e4, temperature=math.nan)
-    (told,) = describe_missed([point], Job.model_validate(data))
-    assert str(told).endswith(f"try a smaller numerics.{key}")
+    (reported,) = describe_missed([point], Job.model_validate(data))
+    assert str(reported).endswith(f"try a smaller numerics.{key}")
 
 
 def test_a_curve_that_goes_on_counts_earlier_points() -> None:
@@ -48,12 +48,12 @@ def test_a_curve_that_goes_on_counts_earlier_points() -> None:
         "numerics": {"accuracy": 0.05},
     }
     job, earlier = Job.model_validate(data), [EarlierPoint(Wanted(2.0, 1e4), (0.1, 0.2))]
-    for solver, told in ((0.06, ["10 %, at 2 m/s", "7 % ("]), (0.01, ["10 %, at 2 m/s", "20 %, at 2 m/s"])):
+    for solver, reported in ((0.06, ["10 %, at 2 m/s", "7 % ("]), (0.01, ["10 %, at 2 m/s", "20 %, at 2 m/s"])):
         errors = ErrorBudget(None, ErrorParts(solver=solver, time=0.0, folded=0.0, mesh=0.01))
         point: Any = SimpleNamespace(errors=errors, speed=1.0, pressure=1e4, temperature=math.nan)
         of_friction, of_area = map(str, describe_missed([point], job, earlier))
-        assert f"friction at 1 of {1 + 1} points: up to {told[0]}" in of_friction
-        assert f"area at {1 + (solver > 0.05)} of 2 points: up to {told[1]}" in of_area
+        assert f"friction at 1 of {1 + 1} points: up to {reported[0]}" in of_friction
+        assert f"area at {1 + (solver > 0.05)} of 2 points: up to {reported[1]}" in of_area
 
 
 @pytest.mark.parametrize(("mesh", "stated"), [(0.3, 0.31), (0.75, 1.0), (6.0, 6.01)])

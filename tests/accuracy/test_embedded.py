@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from held import HeldBody
 from mpi4py import MPI
 from numpy.testing import assert_allclose
+from stepping_body import HeldBody
 
-from parcontact.accuracy.embedded import SAMPLED_ROWS, EmbeddedPair
+from parcontact.accuracy.embedded import EmbeddedPair
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import MovedHeights, ZenerBody
 from parcontact.physics.prony import Prony
@@ -92,22 +92,6 @@ def test_difference_of_quadratic_and_linear_steps(comm: MPI.Intracomm, growth: f
 
 
 @pytest.mark.mpi
-def test_a_sample_of_the_rows(communicators: list[MPI.Intracomm]) -> None:
-    """Every so many rows of the whole map, the same on any number of ranks; between 8 and 16 of them in full contact,
-    which of twelve branch maps of 1024 rows is 1 % of one pass, where a step makes a hundred over a map; all of them
-    where only few points are pressed."""
-    whole = march(MPI.COMM_SELF, "exponential", 8, 200, 1e-2)[1][4]
-    assert whole[0] > 0.0
-    for comm in communicators:
-        assert_allclose(march(comm, "exponential", 8, 200, 1e-2)[1][4], whole, rtol=1e-12)
-    for ny in (1, 31, 64, 200, 1024, 4096):
-        pair = EmbeddedPair(Slab.alone(4, ny), ZenerBody(Slab.alone(1, 1), PRONY, "exponential"), DX)
-        assert len(range(0, ny, pair.stride(1.0))) <= 2 * SAMPLED_ROWS
-        assert len(range(0, ny, pair.stride(1.0))) >= min(ny, SAMPLED_ROWS)
-        assert len(range(0, ny, pair.stride(0.01))) >= min(ny, 10 * SAMPLED_ROWS)
-
-
-@pytest.mark.mpi
 @pytest.mark.parametrize("row", [0, 1, 63, 150])
 def test_a_contact_that_the_sample_misses(comm: MPI.Intracomm, row: int) -> None:
     """Pressure on a single row of 200: all ranks see what is on it, and find the same as if that was all the map."""
@@ -165,18 +149,3 @@ def test_second_order_of_a_step() -> None:
     bends = np.sin(3.0 * (1.0 - 1.0 / 64)) / np.sin(3.0 * (1.0 - 1.0 / 128))  # second differences are of a step before
     assert curved[0].difference / curved[1].difference == pytest.approx(8.0 * bends, rel=0.01)
     assert curved[1].order == pytest.approx(3.0, rel=0.01)
-
-
-@pytest.mark.parametrize(
-    ("times", "dt", "order"),
-    [([1.0], 1e-6, 2.0), (np.logspace(-9.0, 9.0, 73).tolist(), 1e-3, 1.0), ([1.0], 0.0, 2.0), ([], 1e-3, 2.0)],
-)
-def test_order_in_the_length_of_a_step(times: list[float], dt: float, order: float) -> None:
-    """Two where the branch is slow, to z = dt/tau; one where there are as many branches of every time, to the share of
-    those beyond the ends. A jump, and a body of no branch, have none: two is what is told."""
-    slab, prony = Slab.alone(4, 1), Prony(1.0, np.full(len(times), 1e-3), np.array(times))
-    body = HeldBody(ZenerBody(slab, prony, "exponential"))
-    trial = body.begin(dt, MovedHeights(slab.zeros()))
-    body.commit(trial, np.ones((1, 4)))
-    look = EmbeddedPair(slab, body.body, DX).compare(dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0)
-    assert look.order == pytest.approx(order, rel=1e-5)

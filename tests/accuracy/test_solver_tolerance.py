@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from marching import begun, column, marched
+from marched_jobs import begun, column, marched
 from mpi4py import MPI
 from sliding import rough, slide
 
 import parcontact as pc
 from parcontact.accuracy.budget import ErrorBudget, ErrorParts
-from parcontact.accuracy.controller import CLOSE, FIRST, MOST, StepTolerance, tolerance_before
+from parcontact.accuracy.controller import CLOSE, FIRST, StepTolerance, tolerance_before
 from parcontact.accuracy.shares import AREA, FRICTION, SOLVER_MEDIAN
 from parcontact.history.timeline import Step
 from parcontact.march.loop import March
@@ -59,28 +59,6 @@ def test_what_friction_allows(rest: float, allowed: float) -> None:
         found = tolerance(march, after(march, ErrorParts(error, rest, 0.0, 0.0), ErrorParts(0.0, 0.0, 0.0, 0.0)))
         assert found is not None
         assert abs(np.log2(found / (CERTIFICATE * allowed / error))) <= 0.2501  # the nearest power of the root of two
-
-
-def test_bounds() -> None:
-    """Never smaller than the job's, nor more than so many times it, nor larger than what single steps bear."""
-    nothing, much = ErrorParts(0.0, 0.0, 0.0, 0.0), ErrorParts(1.0, 0.0, 0.0, 0.0)
-    for accuracy, highest in ((1e-3, MOST * 5e-4), (1e-2, MOST * 5e-3), (2e-2, 0.05), (0.5, 0.25)):
-        march = begun(job(accuracy=accuracy))
-        assert tolerance(march, after(march, nothing, nothing)) == pytest.approx(highest)
-        assert tolerance(march, after(march, much, nothing)) == pytest.approx(0.5 * accuracy)
-        area = ErrorParts(AREA.solver * SOLVER_MEDIAN * accuracy, 0.0, 0.0, 0.0)  # as much as allowed
-        found = tolerance(march, after(march, nothing, area))
-        assert found == pytest.approx(max(0.5 * accuracy, CERTIFICATE))
-
-
-def test_where_it_is_the_jobs() -> None:
-    """A tolerance that is given stays, and a jump has that of the job."""
-    loose = StepTolerance(3.0)
-    march = begun(job(accuracy=1e-2))
-    jump = march.timeline().span(1).step(1)
-    assert jump.dt == 0.0
-    assert march.scene.controller.tolerance(loose, jump) is None
-    assert begun(job(tolerance=5e-3)).scene.controller.tolerance(loose, step(march)) is None
 
 
 def test_what_it_saves() -> None:
@@ -167,17 +145,6 @@ def test_the_last_solve_before_a_change_is_close() -> None:
 def test_the_last_step_of_a_stage_is_solved_as_closely_as_the_first() -> None:
     """It seldom moves by whole cells. On a measured road its friction was 4 % too large, as the start was accepted."""
     assert at_ends([BEFORE], initial=STEADY)[-2:] == [math.inf, FIRST]
-
-
-def test_nothing_is_close_where_nothing_changes() -> None:
-    """Velocity and load go on, or the body has no memory; a tolerance that is smaller stays."""
-    ramp = {**BEFORE, "pressure": {"from": PRESSURE, "to": 2 * PRESSURE}}
-    assert CLOSE not in at_ends([BEFORE, BEFORE, ramp])[1:]
-    assert at_ends([BEFORE], initial=STEADY)[0] == math.inf
-    elastic = {"model": "elastic", "shear_modulus": 1e6}
-    assert all(map(math.isinf, at_ends([BEFORE, FAST], material=elastic)))
-    march = begun(changing([BEFORE, FAST], numerics={"tolerance": 1e-6}))
-    assert all(march.scene.controller.tolerance(StepTolerance(), each) is None for each in march.timeline())
 
 
 @pytest.mark.parametrize(("history", "first"), [([FAST], 1), ([BEFORE, FAST], 5)])

@@ -32,18 +32,6 @@ def friction_of(run: RunProperties, seen: StepObservation, steady: bool = False)
 # -- what is seen -----------------------------------------------------------------------------------------------------
 
 
-def test_radius_of_a_spot() -> None:
-    """A circle of ten cells has pi r^2 cells and 8 r sides. A hole in full contact has as many."""
-    points, cells, sides = 10_000, 100 * math.pi, 80
-    spot = replace(SEEN, area=cells / points, corrected=(cells - SIDE * sides) / points)
-    hole = replace(SEEN, area=1 - cells / points, corrected=1 - (cells + SIDE * sides) / points)
-    assert radius_of(RUN, spot) == pytest.approx(10.0)
-    assert radius_of(RUN, hole) == pytest.approx(10.0)
-    assert radius_of(RUN, replace(SEEN, area=1.0, corrected=1.0)) == math.inf
-    yielded = replace(spot, corrected=spot.area, spared=spot.area - spot.corrected)  # its edge is as long
-    assert radius_of(RUN, yielded) == pytest.approx(10.0)
-
-
 def test_spots_are_counted() -> None:
     """Four circles of ten cells, and four such holes; in full contact those of half the shortest wave; one where they
     are identical."""
@@ -77,16 +65,6 @@ def test_parts_add_up() -> None:
         assert parts.total == pytest.approx(parts.solver + parts.time + parts.folded + parts.mesh, rel=1e-15)
         assert min(parts.plain().values()) >= 0.0
     assert (budget.friction.folded, budget.area.folded) == (1e-4, pytest.approx(0.9e-4))
-
-
-def test_little_friction_counts_more() -> None:
-    """A quarter of the slope's friction: twice the relative error; none at all: no budget. Steady friction is a sum of
-    squares, whose error does not grow."""
-    one, other = friction_of(RUN, SEEN), friction_of(RUN, replace(SEEN, slope=0.08))
-    assert other.solver == pytest.approx(2 * one.solver)
-    assert (other.time, other.folded, other.mesh) == (one.time, one.folded, one.mesh)
-    assert estimate(RUN, replace(SEEN, slope=0.08, friction=0.0)).friction is None
-    assert friction_of(RUN, replace(SEEN, slope=0.08), steady=True).solver == pytest.approx(one.solver)
 
 
 @pytest.mark.parametrize("friction", [1e-18, 1e-7, 1e-6])
@@ -173,22 +151,6 @@ def test_far_above_the_frequencies_of_the_body() -> None:
     """The loss angle falls with the frequency: s^3 in all."""
     share, slow = lost_in_short_waves(ONE, 5.0, FAST, False)
     assert slow == pytest.approx(share**2, rel=1e-4)
-
-
-def test_between_both() -> None:
-    """m by adaptive quadrature, to 2 %."""
-
-    def mean(frequency: float) -> float:
-        def loss(t: float) -> float:
-            turn = 1j * frequency / t * 1e-3
-            modulus = 1.0 + turn / (1.0 + turn)
-            return 2.0 * t * modulus.imag / abs(modulus)
-
-        return float(quad(loss, 0.0, 1.0)[0])
-
-    for speed in (1e2, 1e3):
-        share, slow = lost_in_short_waves(ONE, 5.0, speed, False)
-        assert slow == pytest.approx(share * mean(math.pi * speed) / mean(share * math.pi * speed), rel=0.02)
 
 
 def test_without_edges_or_losses() -> None:

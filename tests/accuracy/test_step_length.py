@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from marching import SLS, begun
+from marched_jobs import SLS, begun
 
 from parcontact.accuracy.controller import MOST_GROWTH, REJECTED, SAFETY
 from parcontact.accuracy.shares import FRICTION, TIME_MEDIAN
@@ -32,7 +32,7 @@ def march_of(*history: Json, **numerics: Any) -> March:
 
 def attempts(march: March, error: Errors, most: int = 1000) -> list[list[Step]]:
     """The tries of each step that is chosen, the one that is made last, for the `error(number, step)` of each; at most
-    so many steps."""
+    a given number of steps."""
     chosen, found, number = march.state.chosen, list[list[Step]](), 0
     assert chosen is not None
     while (number := number + 1) <= len(march.timeline()) and len(found) < most:
@@ -104,35 +104,10 @@ def test_whole_cells_are_those_of_where_the_surface_was_at_first(velocity: float
     np.testing.assert_allclose(found, [1, 2, 3, 4, 5, 6, 6.3, *cells], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("changes", "goes_on"),
-    [({}, True), ({"velocity": 0.2}, False), ({"velocity": -0.1}, False), ({"pressure": 2e4}, False)],
-)
-def test_a_stage_goes_on_with_the_steps_before_it_if_nothing_has_changed(changes: Json, goes_on: bool) -> None:
-    """With small parts of a cell; else a whole one is tried first."""
-    march = march_of({**SLIDE, "distance": 6 * CELL}, {**SLIDE, **changes})
-    tries = attempts(march, lambda number, step: ALLOWED * (2.0 if step.dt > 0.13 * CELL / 0.1 else 1.0))
-    last = [steps[-1] for steps in tries if steps[-1].stage == 0][-1]
-    first = next(step for steps in tries for step in steps if step.stage == 1)
-    assert last.dt < 0.13 * CELL / 0.1
-    assert first.dt == pytest.approx(last.dt if goes_on else CELL / abs(first.velocity[0]), rel=1e-9)
-
-
-def test_growth_is_from_the_step_before() -> None:
-    """In the same stage; in the first one there is none."""
-    steps = made(march_of(PRESS, SLIDE), lambda number, step: ALLOWED * (0.1, 2.0, 0.4)[number % 3] * step.dt / 1e-4)
-    assert len({step.dt for step in steps}) > 5
-    before: Step | None = None
-    for step in steps:
-        expected = step.dt / before.dt if before is not None and before.stage == step.stage else 0.0
-        assert step.growth == pytest.approx(expected, rel=1e-9)
-        before = step
-
-
 @pytest.mark.parametrize("duration", np.linspace(3.05e-4, 5.05e-4, 21).tolist())
 def test_no_short_step_is_left_over_at_rest(duration: float) -> None:
-    """Of steps that are alike the last one is a tenth longer at most, or the last two are halves of what is left. The
-    error is what is allowed where a step is as long as the first, and goes with the power 1.7."""
+    """Of steps that are identical the last one is a tenth longer at most, or the last two are halves of what is left.
+    The error is what is allowed where a step is as long as the first, and goes with the power 1.7."""
     first = list[float]()
 
     def error(number: int, step: Step) -> float:

@@ -12,16 +12,12 @@ from mpi4py import MPI
 from parcontact import job as jobs
 from parcontact.__main__ import main
 from parcontact.bands.band import Band, Rung
-from parcontact.bands.band_heat import uniform, waves_along_depth
-from parcontact.bands.cascade import Cascade, mean_rungs
-from parcontact.bands.choice import cut_bands
 from parcontact.bands.ladder import PressureLadder
 from parcontact.bands.road_sliding import RoadSliding
 from parcontact.bands.wave_spectrum import spectrum_of
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import JobError
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.heat import Conductor
 from parcontact.physics.prony import complex_modulus
 from parcontact.scene import set_up
 from parcontact.steady_sliding.sliding import SteadySliding
@@ -85,17 +81,6 @@ def test_full_contact_is_the_closed_form(count: int) -> None:
     assert point.measures.contact_area == pytest.approx(1.0, abs=1e-5)  # of the interpolation between rungs
 
 
-def test_load_is_kept_from_band_to_band() -> None:
-    """To rounding, also under a load of which some is beyond the ladder; bands of friction add up."""
-    job = jobs.load({**JOB, "bands": {"count": 3, "samples": 1}})
-    cascade = Cascade(job, cut_bands(job), Slab.alone(1, 1))
-    cascade.press((0.1, 0.0), 1e6)
-    rungs = cascade.climb([0])
-    results = cascade.fall(lambda band, _: mean_rungs(rungs, band, [0]))
-    assert [result.load for result in results] == pytest.approx([1e6] * 3, rel=1e-13)
-    assert all(result.friction > 0.0 for result in results)
-
-
 @pytest.mark.mpi(2, 3)
 def test_ranks_agree() -> None:
     """Whole contacts on other ranks: friction and area to the last digits but those of transforms."""
@@ -126,21 +111,6 @@ def test_heat_of_one_band_is_that_of_one_grid(feedback: str) -> None:
     assert bands.flash.mean == pytest.approx(grid.flash.mean, rel=0.03 if bands.rounds > 1 else 2e-3)
     assert bands.friction == pytest.approx(grid.friction, rel=1e-3)
     assert (bands.rounds > 1) == (feedback == "mean")
-
-
-def test_uniform_heat_of_bands() -> None:
-    """On the surface the rise is `2 sqrt(t/pi)/e`; at one depth, after a time much shorter than it takes through the
-    depth, heat stays where it is, here by the sum of its density over depths: to 5 %."""
-    body, q, time = Conductor(0.2, 1e-7), 1e4, 0.3
-    m, weights = waves_along_depth(1e3, 1e6)
-    surface = np.sum(weights * uniform(body, m, time))
-    assert surface == pytest.approx(2 * np.sqrt(time / np.pi) / body.effusivity, rel=1e-3)
-    z = (np.arange(4000) + 0.5) * 1e-6
-    spread = 4 * q**3 * z**2 * np.exp(-2 * q * z)
-    short = 1e-3  # s, in which heat goes 0.01 mm, a tenth of the depth
-    stays = short * np.sum(spread**2) * 1e-6 * body.diffusivity / body.conductivity
-    share = np.real((1.0 - 0.5j * m / q) ** -3)
-    assert np.sum(weights * share**2 * uniform(body, m, short)) == pytest.approx(stays, rel=0.05)
 
 
 def test_finer_bands_are_warmer() -> None:
@@ -270,20 +240,6 @@ def test_a_point_that_was_killed_goes_on(tmp_path: Path, monkeypatch: pytest.Mon
         one, other = (tables.read_columns(Path(place) / name) for place in ("whole", "out/job"))
         for column in set(one) - {"seconds"}:
             assert other[column] == pytest.approx(one[column], rel=1e-12, nan_ok=True)
-
-
-@pytest.mark.parametrize("pressure", [2e4, 1e5])
-def test_elastic_contact_in_two_bands(pressure: float) -> None:
-    """Area and mean gap of one grid with the same coarse waves, 6 and 27 % in contact: to 4 %, the chance of finer
-    waves, and to 1 %."""
-    body = {"material": {"model": "elastic", "shear_modulus": 1e6}, "numerics": {"tolerance": 1e-2}}
-    surface = {"surface": {**ROUGH, "short_wavelength": LONG / 16}}
-    one = sliding({**body, **surface, "bands": {"count": 1, "points": 256, "samples": 2}}).solve((1.0, 0.0), pressure)
-    two = sliding({**body, **surface, "bands": {"count": 2, "points": 64, "samples": 2}}).solve((1.0, 0.0), pressure)
-    assert two.measures.contact_area == pytest.approx(one.measures.contact_area, rel=0.04)
-    assert two.measures.mean_gap == pytest.approx(one.measures.mean_gap, rel=0.01)
-    assert two.friction == one.friction == 0.0
-    assert two.errors.friction is None
 
 
 def test_weights_of_a_ladder() -> None:

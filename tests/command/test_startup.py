@@ -64,25 +64,6 @@ def test_info_and_a_run(outside_mpi: dict[str, str], tmp_path: Path) -> None:
     assert not found & {"numba", "scipy", "pyfftw.interfaces", "matplotlib", "xarray", "parcontact.scene"}
 
 
-CYCLES = """
-import gc, itertools, sys, warnings, parcontact
-warnings.simplefilter("ignore")
-steps = parcontact.Simulation(sys.argv[1], set={"grid.points": 64}).steps()
-for _ in range(20):  # loops are loaded when they are first called, which leaves some
-    next(steps)
-gc.collect()
-gc.disable()
-print(len(list(itertools.islice(steps, 10))), gc.collect())
-"""
-
-
-def test_steps_leave_no_cycles(outside_mpi: dict[str, str]) -> None:
-    """The program looks for cycles of objects seldom, and at its end not at all."""
-    words = [sys.executable, "-c", CYCLES, str(JOBS / "velocity_step.yaml")]
-    done = subprocess.run(words, env=outside_mpi, capture_output=True, text=True, timeout=120)
-    assert done.stdout.split() == ["10", "0"], done.stderr
-
-
 def test_the_package_alone(outside_mpi: dict[str, str]) -> None:
     program = "import sys, parcontact; print([m for m in sys.argv[1:] if m in sys.modules])"
     words = [sys.executable, "-c", program, *SLOW, *FURTHER]
@@ -115,21 +96,6 @@ def test_ranks_speak_once(run_parcontact: RunParcontact, words: list[str], code:
     assert (done.stdout + done.stderr).count(once) == 1
     assert "alone" not in done.stderr
     assert "Traceback" not in done.stderr
-
-
-def test_without_an_mpi_library(tmp_path: Path, outside_mpi: dict[str, str]) -> None:
-    """A sentence says what to install; the fault of mpi4py, as it is where no library is found, is made by a module in
-    its place."""
-    (tmp_path / "mpi4py").mkdir()
-    (tmp_path / "mpi4py" / "__init__.py").write_text("raise RuntimeError('cannot load MPI library')\n")
-    job = JOBS / "westergaard.yaml"
-    command = [sys.executable, "-m", "parcontact", str(job), "--out", "out"]
-    done = subprocess.run(
-        command, cwd=tmp_path, env={**outside_mpi, "PYTHONPATH": str(tmp_path)}, capture_output=True, text=True
-    )
-    assert done.returncode == 2
-    assert done.stderr.startswith("parcontact: no MPI library can be started: cannot load MPI library; install one")
-    assert done.stderr.count("\n") == 1
 
 
 def test_interrupted_before_it_has_begun(main: Main, monkeypatch: pytest.MonkeyPatch) -> None:

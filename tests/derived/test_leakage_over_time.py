@@ -82,30 +82,6 @@ def test_table_picture_and_columns_of_a_run(comm: MPI.Intracomm, shared_path: Pa
     assert float(rows[-1]["share_x"]) == pytest.approx(float(rows[-1]["flow_x"]) / touching.flow_x)
 
 
-@pytest.mark.mpi
-def test_one_instant(comm: MPI.Intracomm, shared_path: Path) -> None:
-    """It has files of its own, after its step, and leaves those of the whole run as they are. The flow is
-    that of its map, to 1e-10."""
-    out = run(comm, shared_path, leakage=None)
-    assert __main__.main(["leak", str(out)]) == 0
-    comm.Barrier()
-    whole = (out / "leak.csv").read_bytes(), (out / "leak.png").read_bytes()
-    comm.Barrier()
-    assert __main__.main(["leak", str(out), "--at", "0.5"]) == 0
-    comm.Barrier()
-    (row,) = table(out / "leak.3.csv")
-    assert float(row["time"]) == 0.5
-    gaps = leak.Gaps(out)
-    index = int(np.flatnonzero(gaps.fields.times == 0.5)[0])
-    alone = pc.leak(gaps.read(index), gaps.size)
-    assert alone.flow_x > 0.0
-    assert float(row["flow_x"]) == pytest.approx(alone.flow_x, rel=1e-10)
-    assert float(row["flow_y"]) == pytest.approx(alone.flow_y, rel=1e-10)
-    assert (out / "leak.3.png").is_file()
-    assert whole == ((out / "leak.csv").read_bytes(), (out / "leak.png").read_bytes())
-    assert "flow_x" not in table(out / "measures.csv")[0]
-
-
 def test_a_report_has_the_leakage_at_the_end(tmp_path: Path) -> None:
     """The table has the last flow, which is calculated at every second step, and no friction, as nothing slides."""
     out = run(MPI.COMM_SELF, tmp_path, history=[PRESS, {**PRESS, "pressure": {"from": 8e4, "to": 2e4}}])
@@ -194,8 +170,8 @@ def test_a_gap_that_is_no_number_is_refused_by_all_ranks(
             file["gap"][1, 3, 4] = np.nan
     comm.Barrier()
     assert __main__.main(["leak", str(out)]) == 2
-    told = capsys.readouterr().err
-    assert comm.rank > 0 or "maps after step 2 are no whole maps of numbers" in told
+    stated = capsys.readouterr().err
+    assert comm.rank > 0 or "maps after step 2 are no whole maps of numbers" in stated
     assert not (out / "leak.csv").exists()
 
 

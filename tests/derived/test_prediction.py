@@ -9,7 +9,7 @@ import pytest
 import yaml
 from conftest import RunParcontact
 from csv_rows import rows
-from marching import JOBS, PRONY, SLS, column, marched
+from marched_jobs import JOBS, PRONY, SLS, column, marched
 from numpy.testing import assert_allclose
 
 from parcontact import __version__
@@ -53,27 +53,6 @@ def predicted(
     return list(prediction.predict(job, Slab.alone(*job.grid.points), gamma, waves))
 
 
-def test_instants_are_those_of_the_run() -> None:
-    """Time, distance and pressure of each row; jumps of the load have rows of their own."""
-    one = job(history=[*HISTORY[:3], {**HISTORY[3], "time_step": 1e-4}, HISTORY[4]])
-    found, (_, rows) = predicted(one), marched(one)
-    assert_allclose([row.time for row in found], [row.time for row in rows], rtol=1e-12)
-    assert_allclose([row.distance for row in found], [row.distance for row in rows], rtol=1e-9, atol=1e-18)
-    assert_allclose([row.pressure for row in found], column(rows, "pressure"), rtol=1e-3)
-    assert sum(row.contact_area == 0.0 for row in found) == sum(row.pressure == 0.0 for row in found) == 3
-
-
-def test_time_before_the_first_touch_does_not_count() -> None:
-    """A body that is not touched remembers nothing: it rests or slides below the surface, and then begins."""
-    wait = {"pressure": 0.0, "velocity": 0.04, "duration": 2e-3, "time_step": 1e-3}
-    at_once, late = (predicted(job(history=[*before, *HISTORY[1:3]])) for before in ([], [wait]))
-    assert late[2].contact_area == 0.0
-    for name in ("friction", "contact_area"):
-        found, exact = ([getattr(row, name) for row in rows] for rows in (late[2:], at_once))
-        assert_allclose(found, exact, rtol=1e-12)
-    assert max(row.friction for row in late) > 0.0
-
-
 def test_full_contact_is_that_of_the_run() -> None:
     """In full contact the theory is exact: friction of every row, to what the run's short steps err by.
 
@@ -89,18 +68,6 @@ def test_full_contact_is_that_of_the_run() -> None:
     assert min(row.contact_area for row in found[1:]) > 1.0 - 1e-9
 
 
-@pytest.mark.parametrize("gamma", [0.0, 1.0])
-def test_steady_start_and_poisson(gamma: float) -> None:
-    """The first row is the steady state; nu is a factor of all moduli."""
-    material = {**SLS, "poisson": 0.2}
-    stage = {"pressure": 4e5, "velocity": 0.04, "duration": 1e-3, "time_step": 5e-4}
-    start = {"state": "steady", "velocity": 0.04, "pressure": 4e5}
-    found = predicted(job(material=material, initial=start, history=[stage]), gamma=gamma)
-    k = 2 * np.pi * 4 / 1e-3
-    exact = k**2 * 0.5e-6**2 * complex_modulus(0.04 * k, *PRONY).imag / 4e5 * 0.5 / 0.8
-    assert_allclose([row.friction for row in found], exact, rtol=1e-12)
-
-
 @pytest.mark.parametrize("amount", [{"rms_slope": 0.01}, {"rms_height": 3e-7}, {"psd_constant": 1e-21}])
 def test_continuum_and_lattice(amount: dict[str, float]) -> None:
     """In full contact friction depends on the spectrum only: a box with many waves of fixed amplitudes is near it.
@@ -114,21 +81,6 @@ def test_continuum_and_lattice(amount: dict[str, float]) -> None:
     lattice, continuum = (predicted(one, waves)[-1] for waves in ("lattice", "continuum"))
     assert lattice.contact_area == continuum.contact_area == 1.0
     assert_allclose(lattice.friction, continuum.friction, rtol=0.05)
-
-
-def test_steady_friction_of_the_continuum() -> None:
-    """A plateau, then a power law: the steady sum in full contact against Simpson's rule over k and the angle."""
-    k = np.linspace(1.0, 4.0, 1001) * 2 * np.pi / 1e-3
-    rough = {"shape": "rough", "hurst": 0.5, "long_wavelength": 1e-3, "rolloff_wavelength": 5e-4}
-    rough |= {"short_wavelength": 2.5e-4, "psd_constant": 1e-21}
-    angle = (np.arange(200) + 0.5) / 200 * np.pi / 2
-    density = 1e-21 * np.maximum(k / k[333], 1.0) ** -3.0
-    loss = complex_modulus(0.04 * k[:, None] * np.cos(angle), *PRONY).imag
-    exact = np.trapezoid(density * 2 * k**3 * np.mean(loss * np.cos(angle), axis=1), k) / (2 * np.pi) / 1e6
-    stage = {"pressure": 1e6, "velocity": 0.04, "duration": 1.0, "time_step": 1.0}
-    start = {"state": "steady", "velocity": 0.04, "pressure": 1e6}
-    found = predicted(job(surface=[rough], history=[stage], initial=start), "continuum")
-    assert_allclose(found[0].friction, exact, rtol=3e-3)  # the trapezoids, of which one holds the kink
 
 
 @pytest.mark.parametrize(
@@ -187,7 +139,7 @@ def test_settings_are_those_of_the_table_beside_them(tmp_path: Path) -> None:
     assert theory_settings.read_settings(paths[0]) == first
 
 
-def test_damaged_settings_are_told_by_name(tmp_path: Path) -> None:
+def test_damaged_settings_are_stated_by_name(tmp_path: Path) -> None:
     """By `parcontact info`, and where pictures and reports name them."""
     one = job(output={"directory": str(tmp_path / "out")})
     prediction.write_theory(one, iter([]), TheorySettings(0.5, "lattice"))
@@ -196,10 +148,10 @@ def test_damaged_settings_are_told_by_name(tmp_path: Path) -> None:
     damaged = f"{path} is damaged: it does not say gamma and waves"
     assert theory_settings.describe_settings(path.parent) == f"theory of unknown settings: {damaged}"
     (path.parent / "measures.csv").write_text("")
-    told, sound = info.describe_path(path.parent)
+    stated, sound = info.describe_path(path.parent)
     assert not sound
-    assert "  Persson's theory: 0 rows, of unknown settings\n" in told
-    assert f"  {damaged}" in told.splitlines()
+    assert "  Persson's theory: 0 rows, of unknown settings\n" in stated
+    assert f"  {damaged}" in stated.splitlines()
 
 
 def test_a_directory_that_cannot_be_written(tmp_path: Path) -> None:

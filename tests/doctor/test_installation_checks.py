@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from marching import JOBS
+from marched_jobs import JOBS
 from mpi4py import MPI
 
 from parcontact import __main__

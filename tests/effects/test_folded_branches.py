@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from closed_forms import step_responses
 from csv_rows import rows
-from marching import begun, column, marched
+from marched_jobs import begun, column, marched
 from mpi4py import MPI
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from restarting import Bench
 from rubbers import complex_modulus
@@ -29,7 +29,7 @@ from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import MovedHeights, ZenerBody
-from parcontact.physics.prony import Prony, creep, normal_form
+from parcontact.physics.prony import Prony, normal_form
 
 Json = dict[str, Any]
 Array = NDArray[np.float64]
@@ -68,23 +68,6 @@ def scales_of(*history: Json, **changes: Any) -> TimeScales:
     return time_scales(Timeline.from_job(job), job.initial.state == "steady")
 
 
-# -- from a job to its time scales -------------------------------------------------------------------------------------
-
-
-def test_time_scales_of_a_job() -> None:
-    """Only stages that last count; the jump with which a virgin body is loaded is none that reads memory."""
-    ramp = {"pressure": {"from": 0.0, "to": 1e5}, "duration": 7e-3, "time_step": {"first": 1e-3, "growth": 2.0}}
-    cell = 2.5e-3 / 12
-    assert scales_of(SLIDE) == pytest.approx((2.5e-3, cell, 1, False, True, False))
-    assert scales_of(ramp, SLIDE) == pytest.approx((9.5e-3, cell, 2, False, True, False))
-    assert scales_of(ramp, {"pressure": 3e5}) == pytest.approx((7e-3, 1e-3, 1, True, False, False))
-    start = {"state": "steady", "velocity": 0.2, "pressure": 1e5}
-    assert scales_of(SLIDE, initial=start) == pytest.approx((2.5e-3, cell, 1, False, True, True))
-    assert scales_of(SLIDE, initial={**start, "pressure": 2e5}).jumps
-    chosen = scales_of({"pressure": 1e5, "duration": 1.0})
-    assert chosen.shortest == 2.0**-20
-
-
 # -- bounds against closed forms and against all branches --------------------------------------------------------------
 
 
@@ -112,15 +95,6 @@ def test_friction_of_a_wave_with_frozen_branches(rest: float, duration: float) -
     assert len(found.frozen) >= 2
     assert not found.memoryless
     assert 0.01 * found.bound < wrong < found.bound
-
-
-def test_creep_with_frozen_branches() -> None:
-    """At rest the bound is one of the modulus, and of the creep compliance too, which the contact follows."""
-    found = fold_branches(DECADES, TimeScales(100.0, 1e-9, slides=False), "exponential", 0.01)
-    t = np.geomspace(1e-3, 100.0, 200)
-    wrong = np.max(np.abs(creep(t, *frozen(DECADES, found)) / creep(t, *DECADES) - 1.0))
-    assert len(found.frozen) == 2
-    assert 0.1 * found.bound < wrong < found.bound
 
 
 def stresses(moments: list[tuple[float, float]], without: tuple[int, ...] = ()) -> Array:
@@ -151,23 +125,6 @@ def test_stress_of_a_wave_without_the_memory_of_a_branch(dt: float) -> None:
         assert wrong < errors[k] + 1e-14
 
 
-def test_rest_after_a_jump_without_the_memory_of_a_branch() -> None:
-    """A displacement that is held on a body of one branch alone: the step after the jump lacks `exp(-z) G` of a
-    modulus of `G (1 - exp(-z))/z`, which is the second part of the bound."""
-    prony, dt = normal_form(0.0, [1e6], [1e-2]), 0.08
-    moments, found = [(0.0, 1.0), (dt, 1.0)], []
-    for without in ((), (0,)):
-        body = ZenerBody(POINT, prony, "exponential", memoryless=without)
-        memory = body.at_rest()
-        for step, u in moments:
-            trial = body.begin(memory, step, MovedHeights(np.full((1, 1), u)))
-            displacement = trial.effective.copy()
-            memory = body.commit(memory, trial, displacement, np.empty((1, 1)))
-        found.append(float(displacement[0, 0]))
-    error = memoryless_errors(prony, TimeScales(1.0, dt, slides=False), "exponential")[0]
-    assert_allclose(abs(found[1] - found[0]), error - 2.0 * np.exp(-8.0), rtol=1e-12)
-
-
 # -- what is chosen ----------------------------------------------------------------------------------------------------
 
 FAST_SLIDE = TimeScales(5e-4 / 3, 1e-3 / 512 / 3)  # half a millimetre at 3 m/s, one cell of 2 um per step
@@ -179,15 +136,6 @@ def test_tyre_at_three_metres_per_second() -> None:
     assert (found.memoryless, found.kept, found.frozen) == ((0, 1), (2, 3, 4, 5, 6), (7, 8, 9, 10, 11))
     fast, slow = (errors(TYRE, FAST_SLIDE, *more) for errors, more in BOTH)
     assert_allclose(found.bound, fast[:2].sum() + slow[7:].sum(), rtol=1e-12)
-
-
-@pytest.mark.parametrize("allowed", [1e-7, 1e-4, 1.5e-4, 3.3e-4, 4.1e-4, 1e-2])
-def test_errors_add_up_to_what_is_allowed_at_most(allowed: float) -> None:
-    """Half of it at most is for memoryless branches; one branch more of either kind would be too much."""
-    found = fold_branches(TYRE, FAST_SLIDE, "exponential", allowed)
-    fast, slow = (errors(TYRE, FAST_SLIDE, *more) for errors, more in BOTH)
-    assert fast[list(found.memoryless)].sum() <= allowed / 2 < fast[: len(found.memoryless) + 1].sum()
-    assert found.bound <= allowed < found.bound + slow[found.kept[-1]]
 
 
 def test_what_keeps_every_branch() -> None:
@@ -247,16 +195,6 @@ def test_bound_of_a_frozen_branch_where_contacts_keep_their_tracks(pressure: flo
     assert 0.01 < wrong / frozen_errors(base.prony, scales_of(slide))[1] < 1.0
 
 
-def test_nothing_to_fold_costs_nothing() -> None:
-    """All counts and all rows are those of a run that must not fold."""
-    runs = [marched(sliding(times=(MIDDLE,), numerics={"branch_error": allowed})) for allowed in (1e-3, 0.0)]
-    tallies = [march.scene.slab.tally for march, _ in runs]
-    assert runs[0][0].scene.folded.folded == 0
-    assert tallies[0] == tallies[1]
-    for name in ("friction", "contact_area", "max_pressure"):
-        assert_array_equal(column(runs[0][1], name), column(runs[1][1], name))
-
-
 def test_energies_keep_every_branch() -> None:
     found = begun(sliding(output={"energy": True})).scene
     assert found.folded.folded == 0
@@ -264,16 +202,6 @@ def test_energies_keep_every_branch() -> None:
         next(scene.describe_scene(found))
         == "branches: all 4 are followed in time: output.energy counts the energy of every branch"
     )
-
-
-def test_a_steady_start_freezes_nothing() -> None:
-    """The memoryless branch has no map to fill."""
-    start = {"state": "steady", "velocity": 0.2, "pressure": 1e5}
-    fewer, whole = (
-        begun(sliding(initial=start, numerics={"tolerance": 1e-6, "branch_error": allowed})) for allowed in (1e-3, 0.0)
-    )
-    assert (fewer.scene.folded.memoryless, fewer.scene.folded.frozen) == ((0,), ())
-    assert_array_equal(fewer.state.body.branches, whole.state.body.branches[1:])
 
 
 # -- restarts ----------------------------------------------------------------------------------------------------------
@@ -312,37 +240,6 @@ def test_restart_with_folded_branches_is_bit_for_bit(place: Place) -> None:
     assert [name for name in place.maps(13) if "branch" in name] == ["material/branch 1"]
 
 
-@pytest.mark.mpi(3)
-def test_a_longer_run_wakes_frozen_branches(place: Place) -> None:
-    """In twice the time the slow branch is G u no more. Its map is made, and friction is that of a run that always had
-    it: within the error allowed, and not the same."""
-    content = data(numerics={"branch_error": 5e-3})
-    place.go(content)
-    before = place.maps(13)
-    place.go(content, until=5e-3)
-    place.go(content, "whole", until=5e-3)
-    assert "material/branch 2" not in before
-    assert "material/branch 2" in place.maps(25)
-    found, expected = (np.array([float(text) for text in place.friction(name)]) for name in ("out", "whole"))
-    assert 0.0 < np.max(np.abs(found - expected)) / expected[-1] < 5e-3
-
-
-def test_a_body_that_had_no_time_wakes_when_it_gets_some(place: Place) -> None:
-    """After one solve without any branch map, a stage that lasts: it goes on as a run that always had them.
-
-    To 1e-9, the tolerance: h = G u is what the jump leaves.
-    """
-    touch, hold = {"pressure": 1e5}, {"pressure": 1e5, "duration": 1e-3, "time_step": 1e-4}
-    place.go(data(touch))
-    before = place.maps(1)
-    place.go(data(touch, hold))
-    place.go(data(touch, hold), "whole")
-    assert not [name for name in before if "branch" in name]
-    assert [name for name in place.maps(11) if "branch" in name] == ["material/branch 1"]
-    found, expected = (np.frombuffer(place.maps(11, name)["material/displacement"]) for name in ("out", "whole"))
-    assert_allclose(found, expected, atol=1e-9 * np.max(np.abs(expected)))
-
-
 def test_a_smaller_error_wakes_all_and_a_larger_one_folds(place: Place) -> None:
     """Either way the run goes on; the branch that had no memory starts again with none."""
     place.go(data(numerics={"branch_error": 1e-2}), until=1e-3)
@@ -361,11 +258,3 @@ def test_steps_too_short_for_a_branch_without_memory_are_refused(place: Place) -
     with pytest.raises(InputError, match=r"does not have the branch of relaxation time 1e-06 s, .*never"):
         place.go(data(SLIDE, SHORT))
     place.go(data(SLIDE, SHORT), restart="never", until=2e-4)
-
-
-def test_the_log_says_what_is_folded(tmp_path: Path) -> None:
-    Place(MPI.COMM_SELF, tmp_path).go(data(numerics={"branch_error": 1e-2}), until=2e-4)
-    log = (tmp_path / "out" / "run.log").read_text()
-    bound = scene.choices(sliding(numerics={"branch_error": 1e-2})).folded.bound
-    assert "branches: 1 of 4 are followed in time; those of 1e-06 s are too fast to remember; those of 3, 10" in log
-    assert f"Error of friction at most {100 * bound:.2g} % (numerics.branch_error allows 1 %)" in log

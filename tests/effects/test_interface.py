@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 import pytest
-from marching import marched
+from marched_jobs import marched
 
 from parcontact import scene
 from parcontact.errors import InputError
@@ -33,15 +33,6 @@ def job(amplitude: float = 4e-6, **more: Any) -> Job:
 
 
 @pytest.mark.mpi
-def test_full_contact_adds_the_stress_over_the_pressure() -> None:
-    """To 1e-12: friction with the interface, less friction without."""
-    plain, added = (marched(job(1e-7, interface=section))[1][-1] for section in (None, CONSTANT))
-    assert added.measures.contact_area == 1.0
-    assert added.measures.friction - plain.measures.friction == pytest.approx(STRESS / PRESSURE, rel=1e-12)
-    assert added.added == pytest.approx((plain.measures.friction, STRESS / PRESSURE), rel=1e-12)
-
-
-@pytest.mark.mpi
 @pytest.mark.parametrize("speed", [SPEED, -SPEED])
 def test_partial_contact_adds_the_stress_on_the_area(speed: float) -> None:
     """In either direction it opposes motion; pressures and area are as without, bit for bit."""
@@ -54,29 +45,6 @@ def test_partial_contact_adds_the_stress_on_the_area(speed: float) -> None:
     assert added.force_x - plain.force_x == pytest.approx(-math.copysign(STRESS * area, speed), rel=1e-12)
     assert math.copysign(1.0, added.friction_x) == math.copysign(1.0, speed)
     assert added.friction == pytest.approx(plain.friction + STRESS * added.contact_area_corrected / PRESSURE, rel=1e-12)
-
-
-@pytest.mark.parametrize("stress", [1.0, 1e3])
-def test_parts_add_up_to_friction(stress: float) -> None:
-    """A wave at 45 degrees to the sliding, in full contact, has as much force across as along, f. With s of the
-    interface friction is hypot(f + s, f), and its parts are the forces in that direction, before a reversal and after:
-    at first the body still pushes along the motion, and a weak interface is against the whole."""
-    slides = [{**SLIDE, "velocity": way * SPEED, "distance": 1e-4, "cells_per_step": 0.2} for way in (1.0, -1.0)]
-    grid, wave = {"points": 16, "size": LENGTH}, {"shape": "wave", "amplitude": 1e-7, "waves": [2, 2]}
-    same: dict[str, Any] = {"grid": grid, "surface": wave, "history": slides}
-    plain, added = (marched(job(interface=section, **same))[1][1:] for section in (None, {"shear_stress": stress}))
-    signs = set()
-    for one, two in zip(plain, added, strict=True):
-        x, y = (-force / one.measures.normal_force for force in (one.measures.force_x, one.measures.force_y))
-        assert y == pytest.approx(x, rel=1e-7)
-        own = stress / PRESSURE * (1.0 if two.distance < 1.01e-4 else -1.0)
-        whole = math.hypot(x + own, y)
-        body, interface = two.added
-        assert two.measures.friction == pytest.approx(whole, rel=1e-12)
-        assert body + interface == pytest.approx(whole, rel=1e-12)
-        assert interface == pytest.approx(own * (x + own) / whole, rel=1e-9)
-        signs.add(interface > 0.0)
-    assert signs == {True, False} if stress == 1.0 else {True}
 
 
 def test_rest_has_none() -> None:

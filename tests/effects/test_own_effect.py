@@ -2,7 +2,6 @@
 
 import pickle
 import re
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import h5py
 import pytest
 import yaml
 from csv_rows import Rows, rows
-from marching import begun, marched
+from marched_jobs import begun, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 from restarting import Bench
@@ -91,37 +90,6 @@ def test_restart_on_another_number_of_ranks(installed: Path, comm: MPI.Intracomm
         assert_allclose(depths[name], depths["whole"], rtol=0, atol=1e-7 * depths["whole"].max())
         assert_allclose(columns[name], columns["whole"], rtol=1e-7)
     assert columns["whole"][-1] == depths["whole"].max() > 0.0
-
-
-def test_plan_counts_its_bytes(installed: Path, comm: MPI.Intracomm) -> None:
-    planned = Job.model_validate(WEAR)
-    march, _ = marched(WEAR, comm=comm)
-    slab = march.scene.slab
-    held = memory.holdings(planned, comm.size, comm.rank)
-    assert held["wear"] == 8 * slab.shape[0] * NX
-    assert sum(held.values()) == slab.tally["map bytes"]
-    assert memory.saved(planned) - memory.saved(Job.model_validate(DATA)) == 8 * NX * NY + 4 * NY
-    assert [decision.why for decision in scene.choices(planned).decisions if decision.name == "wear"] == [
-        "the job has a section wear"
-    ]
-
-
-def test_absent_it_costs_nothing(installed: Path, comm: MPI.Intracomm) -> None:
-    """Its file is not even imported; where it is on, one map and a reduction in each step are all that is more."""
-    off, rows = marched(DATA, comm=comm)
-    assert "tread_wear" not in sys.modules
-    assert off.scene.effects == {}
-    assert rows[-1].added == ()
-    on, _ = marched(WEAR, comm=comm)
-    more, less = on.scene.slab.tally, off.scene.slab.tally
-    extra = {
-        name: more[name] - less[name] for name in {*more, *less} if more[name] != less[name] and "most" not in name
-    }
-    expected = {"map bytes": 8 * NX * on.scene.slab.shape[0], "allreduce": len(rows) - 1}
-    assert extra == {name: count for name, count in expected.items() if count}
-    assert not next(
-        decision.on for decision in scene.choices(Job.model_validate(DATA)).decisions if decision.name == "wear"
-    )
 
 
 def test_a_job_reaches_other_ranks(installed: Path, comm: MPI.Intracomm) -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from marching import marched
+from marched_jobs import marched
 from mpi4py import MPI
 
 from parcontact.job import Job

@@ -37,7 +37,7 @@ CHANGES = {
 
 @pytest.fixture
 def changed(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, str], None]]:
-    """Install the manual's effect with a change, beside two jobs of which one asks for it."""
+    """Install the manual's effect with a change, next to two jobs of which one asks for it."""
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
     (tmp_path / "plain.yaml").write_text(yaml.safe_dump({key: JOB[key] for key in JOB if key != "wear"}))
     monkeypatch.syspath_prepend(str(tmp_path))

@@ -12,7 +12,7 @@ from parcontact.job.sections.part import Origin
 from parcontact.parallel.slab import Slab
 from parcontact.run import runner
 from parcontact.run.run import Options
-from parcontact.storage import fields, tables
+from parcontact.storage import tables
 
 
 @pytest.fixture
@@ -27,25 +27,6 @@ def run(tmp_path: Path) -> Callable[..., Path]:
         return tmp_path / name
 
     return go
-
-
-def test_fields(run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Off: no file, no byte, no map made for it; on: at their instants only, every third step and the last."""
-    saved: list[int] = []
-    save = fields.FieldsFile.save
-
-    def noted(self: fields.FieldsFile, step: int, *args: Any) -> None:
-        saved.append(step)
-        save(self, step, *args)
-
-    monkeypatch.setattr(fields.FieldsFile, "save", noted)
-    off, on = run("off"), run("on", output={"fields": ["pressure"], "every": 3})
-    assert not list(off.glob("fields*"))
-    assert saved == [3, 5]
-    with_maps = {path.name for path in on.iterdir()} - {path.name for path in off.iterdir()}
-    assert with_maps == {"fields.h5", "fields.xdmf"}
-    assert not row(job(), "fields").on
-    assert row(job(output={"fields": ["gap"]}), "fields").on
 
 
 def test_checkpoints(run: Callable[..., Path]) -> None:

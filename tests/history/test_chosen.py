@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from csv_rows import Rows, measures
 from job.texts import job_of, with_stage
-from marching import SLS, begun, column, marched
+from marched_jobs import SLS, column, marched
 from mpi4py import MPI
 from restarting import Bench
 
 from parcontact import scene
 from parcontact.errors import InputError, JobError
-from parcontact.history.chosen import ChosenEnds, ChosenSteps, StepLadder, bounds
+from parcontact.history.chosen import ChosenEnds, ChosenSteps, StepLadder
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
 from parcontact.scene import sanity
@@ -37,15 +37,6 @@ def data(*history: dict[str, Any], **sections: Any) -> dict[str, Any]:
 
 def job(*history: dict[str, Any], **sections: Any) -> Job:
     return Job.model_validate(data(*history, **sections))
-
-
-def test_it_is_what_a_stage_does_that_says_nothing() -> None:
-    """Where it lasts; it is written into the resolved job."""
-    silent, told, given = job(PRESS), job({**PRESS, "time_step": "auto"}), job({**PRESS, "time_step": 1e-3})
-    assert silent == told
-    assert "time_step: auto" in silent.resolved()
-    assert (Timeline.from_job(silent).chooses, Timeline.from_job(given).chooses) == (True, False)
-    assert job({"pressure": 1e4}).history[0].time_step is None
 
 
 @pytest.mark.parametrize(
@@ -126,16 +117,6 @@ def test_an_elastic_body_needs_no_choice() -> None:
     assert Timeline.from_job(ramp).count == 16
 
 
-def test_a_job_that_gives_its_steps_has_none_of_it() -> None:
-    """No entry, no record, no judge, and no map beside those of the fixed steps."""
-    fixed = begun(job({**SLIDE, "cells_per_step": 1}))
-    assert fixed.state.chosen is None
-    for step in fixed.steps():
-        assert step.decide is None
-        fixed.advance(step)
-    assert not any(name in fixed.entries() for name in ChosenSteps().numbers())
-
-
 def test_timeline_is_read_from_the_times_of_rows() -> None:
     march, rows = marched(data())
     times = {row.step: row.time for row in rows}
@@ -147,32 +128,6 @@ def test_timeline_is_read_from_the_times_of_rows() -> None:
     assert len(ends.made) == 6
 
 
-def test_bounds_of_a_stage() -> None:
-    """In sliding up to a cell and down to a thousandth, or to a millionth of a shorter stage; at rest up to the whole
-    stage; on a ramp a sixteenth."""
-    grid = job().grid
-    far = {**SLIDE, "distance": 2000 * CELL}
-    slide, short, press = (bounds(stage, grid) for stage in job(far, SLIDE, PRESS).history)
-    assert (slide.most, slide.least) == (pytest.approx(CELL / 0.1), pytest.approx(CELL / 0.1 / 1024))
-    assert (short.most, short.least) == (pytest.approx(CELL / 0.1), pytest.approx(CELL / 0.1 / 2**18))
-    assert short.least <= 6.5 * CELL / 0.1 / 2**20
-    assert press.most == 5e-3
-    ramp = bounds(job({**PRESS, "pressure": {"from": 0.0, "to": 1.0}}).history[0], grid)
-    assert ramp.most == pytest.approx(5e-3 / 16)
-
-
-@pytest.mark.parametrize("tau", [1e-12, 1e12])
-@pytest.mark.parametrize("history", [(PRESS,), (PRESS, SLIDE)])
-def test_branches_that_are_all_folded(tau: float, history: tuple[dict[str, Any], ...]) -> None:
-    """Nothing then relaxes: the same contact as with given steps, to the solver's tolerance."""
-    body = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 9e6, "relaxation_time": tau}]}
-    given = [{**stage, "time_step": stage.get("duration", 1e-4)} for stage in history]
-    exact = {"tolerance": 1e-8}
-    found, expected = (marched(data(*h, material=body, numerics=exact))[1][-1] for h in (history, given))
-    assert found.time == pytest.approx(expected.time)
-    assert found.measures.approach == pytest.approx(expected.measures.approach, rel=1e-6)
-
-
 def test_creep_after_a_jump_while_hardly_sliding() -> None:
     """A slide of a nanometre takes as many relaxation times as a stage at rest, and ends in the same contact: to 1 %,
     the accuracy asked for."""
@@ -182,17 +137,6 @@ def test_creep_after_a_jump_while_hardly_sliding() -> None:
     assert slow[-1].measures.contact_area_corrected == pytest.approx(
         still[-1].measures.contact_area_corrected, rel=1e-2
     )
-
-
-def test_times_of_rows_long_after_the_start() -> None:
-    """A stage ends where it should also where the instants have fewer digits than its steps."""
-    late = job({**PRESS, "duration": 1e6}, {**SLIDE, "distance": 6 * CELL})
-    timeline = Timeline.from_job(late)
-    assert timeline.chosen is not None
-    timeline.chosen.ends = {0: [1e6], 1: [k * CELL / 0.1 for k in range(1, 7)]}
-    times = {n: timeline[n].time for n in range(1, timeline.count + 1)}
-    found = Timeline.from_job(late).follow(times)
-    assert found.count == timeline.count == 8
 
 
 # -- runs -------------------------------------------------------------------------------------------------------------
@@ -245,35 +189,6 @@ def test_going_on_beyond_the_end(tmp_path: Path) -> None:
     assert any(time == pytest.approx(end, rel=1e-12) for time in times)
 
 
-def test_a_body_without_load_has_an_error_too() -> None:
-    """What it remembers of its load relaxes while nothing touches: steps are shorter where more is asked for."""
-    lifted = {"name": "lifted", "pressure": 0.0, "duration": 5e-3}
-    counts = []
-    for accuracy in (0.1, 1e-4):
-        march, rows = marched(data(PRESS, lifted, numerics={"accuracy": accuracy, "tolerance": 1e-4}))
-        assert rows[-1].measures.contact_area == 0.0
-        counts.append(march.timeline().spans[1].count)
-    assert counts[1] > 2 * counts[0]
-
-
-def test_errors_do_not_depend_on_the_direction() -> None:
-    """A wave that slides along its own direction, whichever that is; across it there is no friction. Equal to 1e-6: the
-    directions of loose solves are in single precision, which rounds by 6e-8."""
-    estimates = []
-    for waves, velocity in (([2, 0], [0.1, 0.0]), ([0, 2], [0.0, 0.1]), ([2, 0], [0.0, 0.1])):
-        wave = {"shape": "wave", "amplitude": 1e-6, "waves": waves}
-        slide = {"pressure": 1e6, "velocity": velocity, "distance": 5e-4, "cells_per_step": 1}
-        rest = {"pressure": 1e6, "duration": 1e-3, "time_step": 1e-3}
-        grid = {"points": 32, "size": 1e-3}
-        _, rows = marched({"grid": grid, "surface": wave, "material": SLS, "history": [rest, slide]})
-        errors = rows[-1].errors
-        assert errors is not None
-        estimates.append(errors.friction.time if errors.friction else 0.0)
-    assert estimates[0] == pytest.approx(estimates[1], rel=1e-6)
-    assert estimates[0] > 0.0
-    assert estimates[2] == 0.0
-
-
 # -- histories of more steps than anybody makes: they cost nothing until they are made --------------------------------
 
 COUNT = 10**8
@@ -293,21 +208,6 @@ def test_a_timeline_of_so_many_steps(tmp_path: Path, way: str) -> None:
     assert timeline[timeline.count].dt == 1.0
     assert scene.choices(job).decisions
     assert time.process_time() - began < 10.0
-
-
-def test_the_first_step_between_cells_of_so_many(tmp_path: Path) -> None:
-    """A drift of 1e-12 cells a step counts where it has come to 1e-6 cells, and not before."""
-    cell = 1e-3 / 64
-    stage = f"{{pressure: 1e5, velocity: {cell * (1 + 1e-12)!r}, duration: {COUNT}.0, time_step: 1.0}}"
-    timeline = Timeline.from_job(job_of(tmp_path, with_stage(stage)))
-    step = timeline.first_between_cells()
-    assert step is not None
-
-    def off(number: int) -> float:
-        cells = timeline[number].position[0] / cell
-        return abs(cells - round(cells))
-
-    assert off(step.number) >= 1e-6 > off(step.number - 1)
 
 
 def test_more_steps_are_refused(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from parcontact.history.chosen import ChosenSteps, reached
+from parcontact.history.chosen import reached
 from parcontact.history.given import divide
 from parcontact.history.timeline import Timeline
 from parcontact.job import Grid, Stage
@@ -101,24 +101,6 @@ def test_where_the_surface_first_is_between_cells(stages: list[dict[str, Any]], 
     assert expected == number
 
 
-def test_chosen_steps_are_counted_as_they_are_made() -> None:
-    """What is known after each is what a new look at the whole history tells."""
-    stage = {key: value for key, value in SLIDE.items() if key != "cells_per_step"} | {"distance": 2.0 * GRID.dx}
-    stages = [{**stage, "velocity": 0.1 * (1 + n % 3)} for n in range(8)]
-    stages[4:6] = [{"pressure": 2e4}, {"pressure": 1e4, "duration": 1.0, "time_step": 0.5}]
-    chosen = ChosenSteps()
-    found = timeline(*stages, chosen=chosen)
-    number = 0
-    while (number := number + 1) <= len(found):
-        span = found.span(number)
-        if span.stage.chooses and number > span.before + span.jumps:
-            made = chosen.ends.setdefault(span.index, [])
-            made.append(span.stage.seconds * min(0.3 * (len(made) + 1), 1.0))
-        assert len(found) == len(timeline(*stages, chosen=chosen))
-    assert found.spans == timeline(*stages, chosen=chosen).spans
-    assert [span.count for span in found.spans[3:7]] == [4, 0, 2, 4]
-
-
 def test_a_million_steps_cost_nothing_before_they_are_made() -> None:
     """Neither memory nor a look at each; a restart finds its step at once."""
     tracemalloc.start()
@@ -140,27 +122,6 @@ def test_only_stages_alike_are_shared() -> None:
     one = timeline(press, {**SLIDE, "distance": 1e-3})
     assert one.shared(timeline(press, {**SLIDE, "distance": 2e-3})) == 11
     assert one.shared(timeline({**press, "pressure": 2e4}, {**SLIDE, "distance": 1e-3})) == 0
-
-
-LASTS = {"duration": 1.0, "time_step": 0.5}
-RISES = {"pressure": {"from": 1e4, "to": 3e4}, **LASTS}
-
-
-@pytest.mark.parametrize(
-    ("stages", "pressure", "jumps"),
-    [
-        ([{"pressure": 1e4, **LASTS}], None, [True]),
-        ([{"pressure": 0.0, **LASTS}], None, [False]),
-        ([{"pressure": 1e4, **LASTS}], 1e4, [False]),
-        ([{"approach": 0.0, **LASTS}], None, [True]),
-        ([{"pressure": 1e4, **LASTS}, RISES, {"pressure": 3e4, **LASTS}], None, [True, False, False]),
-        ([{"pressure": 3e4, **LASTS}, RISES, {"pressure": 1e4, **LASTS}], None, [True, True, True]),
-        ([{"pressure": 1.0, **LASTS}, {"approach": 1.0, **LASTS}, {"approach": 1.0}], None, [True, True, True]),
-    ],
-)
-def test_where_loads_jump(stages: list[dict[str, Any]], pressure: float | None, jumps: list[bool]) -> None:
-    """Where a stage has another load, or control, than the one before in its end, and in each that is one solve."""
-    assert [span.jumps for span in timeline(*stages, pressure=pressure).spans] == jumps
 
 
 def test_there_is_no_step_zero() -> None:

@@ -35,8 +35,8 @@ def test_warning_of_a_box_that_is_out_of_proportion(tmp_path: Path, size: str, w
     rough = ROUGH.replace("5e-4", "1.25e-4")
     text = replaced(SMALL, surface=rough, grid=f"{{points: 1, size: {size}}}")
     found = job_of(tmp_path, text, "grid.points=[32000, 2400]").warnings
-    told = "grid.size: a side of 1 m, 8000 times surface.0.long_wavelength, 0.000125 m; is it in m?"
-    assert [warning.startswith(told) for warning in found if warning.startswith("grid.size")] == [True] * warned
+    stated = "grid.size: a side of 1 m, 8000 times surface.0.long_wavelength, 0.000125 m; is it in m?"
+    assert [warning.startswith(stated) for warning in found if warning.startswith("grid.size")] == [True] * warned
 
 
 def test_no_warning_of_a_few_points_that_lack(tmp_path: Path) -> None:

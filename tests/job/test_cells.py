@@ -14,7 +14,7 @@ from parcontact.__main__ import main
 from parcontact.job import Job
 from parcontact.job.checks import cells
 from parcontact.job.checks.advice import describe_sample
-from parcontact.job.sections.calculation import Accuracy, Grid
+from parcontact.job.sections.calculation import Accuracy
 from parcontact.job.sections.height_arrays import GivenHeights
 
 SIZE = (1e-3, 1e-3)
@@ -58,50 +58,7 @@ def test_the_mesh_of_fewest_points(asked: Accuracy, angle: float) -> None:
     assert found[0] * found[1] == least
 
 
-def test_slow_sliding_needs_cells_in_the_first_order() -> None:
-    """As many as the term of slow sliding asks for, where others are small; half as many for twice the error."""
-    guess = cells.Guess(share=0.2, phase=0.0, waves=100.0, slow=1.0)
-    for asked in (0.02, 0.01):
-        nx, _ = cells.choose_points(WAVE, SIZE, [(1.0, 0.0)], Accuracy(friction=asked, area=0.9), [guess])
-        least = 0.09 * 4.0 * 2.0 / asked * SIZE[0] / WAVE  # 2 = (0.8/0.2)^0.5
-        assert least <= nx < 1.15 * least
-
-
-def test_long_cells_lie_across_the_sliding() -> None:
-    asked, guess = Accuracy(friction=0.001, area=0.1), [cells.Guess(0.2, 0.4, 12.0)]
-    along_x, along_y, both, still = (
-        cells.choose_points(WAVE, SIZE, ways, asked, guess)
-        for ways in ([(1.0, 0.0)], [(0.0, 1.0)], [(1.0, 0.0), (0.0, 1.0)], [])
-    )
-    assert along_x == along_y[::-1]
-    assert along_x[0] >= 2 * along_x[1]
-    assert both[0] == both[1] > 2 * along_x[1]
-    assert max(still) < along_x[0]
-    assert max(still) < 1.5 * min(still)  # squares, but for lengths that transform fast
-
-
-def test_the_worst_of_all_loads_decides() -> None:
-    """An elastic body, whose error is by cells across the sliding as by those along it, and one that loses energy,
-    whose error is by those along it: neither mesh does for both."""
-    still, lossy = cells.Guess(0.2, 0.0, 24.0), cells.Guess(0.2, 0.5, 24.0)
-    one, other, both = (
-        cells.choose_points(WAVE, SIZE, [(1.0, 0.0)], BOTH, found) for found in ([still], [lossy], [still, lossy])
-    )
-    assert one[0] < both[0]
-    assert other[1] < both[1]
-
-
-def test_where_more_points_pay() -> None:
-    """Along the longer sides of cells; on squares and lines of points nothing is said."""
-    found = [
-        cells.more_points(Grid(points=points, size=SIZE))
-        for points in ((64, 64), (64, 60), (64, 16), (16, 64), (64, 1))
-    ]
-    more = "more grid.points"
-    assert found == [more, more, f"{more} along y", f"{more} along x", more]
-
-
-# -- what is told of a random surface as one sample, and of a slide that comes round its box --------------------------
+# -- what is stated of a random surface as one sample, and of a slide that returns to its box --------------------------
 
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "short_wavelength": 6.25e-5, "rms_slope": 0.1}
 SAMPLE_WAVE = {"shape": "wave", "amplitude": 1e-6, "waves": [4, 0]}
@@ -119,23 +76,6 @@ def job(slide: dict[str, Any] = ROUND, **changes: Any) -> Job:
     return Job.model_validate(data | changes)
 
 
-@pytest.mark.parametrize(
-    ("grid", "shares"),
-    [
-        ({"points": 128, "size": 1e-3}, ("6 %", "4.2 %", "4 x 4")),
-        ({"points": [256, 128], "size": [2e-3, 1e-3]}, ("4.2 %", "3 %", "8 x 4")),
-        ({"points": [1024, 1], "size": [8e-3, 1e-3]}, ("4.2 %", "3 %", "32")),
-    ],
-)
-def test_another_seed(grid: dict[str, Any], shares: tuple[str, str, str]) -> None:
-    """It differs by the root of the number of long waves in the box; 1/4 of 24 % and 17 % with 4 x 4."""
-    friction, area, waves = shares
-    text = sample(grid=grid)
-    assert f"friction by about {friction} and the contact area by about {area}" in text
-    assert f": {waves} of its longest waves" in text
-    assert "friction" not in sample(slides=False, grid=grid)
-
-
 def test_waves_have_no_seed() -> None:
     assert sample(surface=SAMPLE_WAVE) == ""
 
@@ -149,7 +89,7 @@ def test_waves_have_no_seed() -> None:
     ],
 )
 def test_a_slide_round_the_box(changes: dict[str, Any], start: str) -> None:
-    """The imprint is that of 4 boxes before: told with the distance from which."""
+    """The imprint is that of 4 boxes before: stated with the distance from which."""
     (text,) = (text for text in job(ROUND | changes).warnings if "imprint" in text)
     assert text.startswith(f"history.0: after {start}")
     assert "remembers for 0.01 s" in text
@@ -178,7 +118,7 @@ def test_stages_of_one_slide_count_together() -> None:
     assert text.startswith("history.0: after 0.0009 m of its 0.00095 m")
 
 
-# -- heights as a numpy array in a job from Python: as good as a file, stored beside results, dealt out to the ranks --
+# -- heights as a numpy array in a job from Python: as good as a file, stored next to results, dealt out to the ranks --
 
 
 WORLD = MPI.COMM_WORLD
@@ -214,15 +154,6 @@ def test_an_array_is_the_surface(nowhere: Path) -> None:
     of_file = pc.Simulation({**JOB, "surface": {"shape": "file", "path": "heights.npy"}})
     assert [row.friction for row in run.steps()] == [row.friction for row in of_file.steps()]
     assert [path.name for path in nowhere.iterdir()] == ["heights.npy"]
-
-
-def test_arrays_add_up_with_other_shapes() -> None:
-    """Alone, with its key, or in a list; to rounding."""
-    wave: dict[str, Any] = {"shape": "wave", "amplitude": 1e-6, "waves": [1, 0]}
-    both = pc.surface([{"shape": "array", "heights": HEIGHTS}, wave], JOB["grid"])
-    rounding = 1e-14 * 1e-6
-    assert both == pytest.approx(HEIGHTS + pc.surface(wave, JOB["grid"]), abs=100 * rounding)
-    assert pc.surface([HEIGHTS, wave], JOB["grid"]).tolist() == both.tolist()
 
 
 def test_heights_with_names_of_axes() -> None:
@@ -276,7 +207,7 @@ def test_other_heights_are_another_job() -> None:
 
 @pytest.mark.mpi
 def test_a_checkpoint_finds_its_heights(nowhere: Path) -> None:
-    """Beside a checkpoint that was saved by hand, also where both were moved; up to rounding by what is recomputed."""
+    """Next to a checkpoint that was saved by hand, also where both were moved; up to rounding by what is recomputed."""
     run = pc.Simulation(JOB)
     next(run.steps())
     (nowhere / "there").mkdir(exist_ok=True)

@@ -1,26 +1,12 @@
 """Jobs that are right: the contract's own example, short forms, defaults, round trips."""
 
-import math
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import InputError
-from parcontact.job import (
-    Elastic,
-    GeometricStep,
-    JobError,
-    PronyBranch,
-    Ramp,
-    Stage,
-    ZenerBranch,
-    added_sections,
-    describe_job,
-    load,
-)
-from parcontact.job.checks.cells import cells_per_wave, has_wave
+from parcontact.job import Elastic, JobError, Ramp, Stage, added_sections, describe_job, load
 from parcontact.job.resolved import shown_job
 from parcontact.job.sections import listing
 
@@ -65,26 +51,6 @@ checkpoint: {every: 200, keep: 2}           # steps; {minutes: 10} also
 """
 
 
-def test_contract_loads(tmp_path: Path) -> None:
-    (tmp_path / "road.npy").touch()
-    job = job_of(tmp_path, CONTRACT)
-    assert job.title == "Rubber pressed on a road, then sliding"
-    assert (job.grid.nx, job.grid.ny, job.grid.lx, job.grid.ly) == (1024, 1024, 1e-3, 1e-3)
-    assert job.grid.dx == 1e-3 / 1024
-    assert [shape.shape for shape in job.surface] == ["rough", "sphere", "cylinder", "wave", "file", "flat"]
-    assert job.material.model == "zener"
-    assert [type(branch) for branch in job.material.branches] == [ZenerBranch, PronyBranch]
-    press, slide = job.history
-    assert (press.control, press.load, press.seconds) == ("pressure", Ramp(1e5, 1e5), 1e-3)
-    assert press.time_step == GeometricStep(first=1e-7, growth=1.2)
-    assert (slide.velocity, slide.cells_per_step, slide.time_step) == ((3.0, 0.0), 1.0, None)
-    assert slide.seconds == 5e-4 / 3.0
-    assert job.output.directory == Path("out/rough")
-    assert job.output.fields == ("pressure", "displacement", "gap")
-    assert (job.checkpoint.every, job.checkpoint.minutes, job.checkpoint.keep) == (200, None, 2)
-    assert job.warnings == ()
-
-
 def test_defaults(tmp_path: Path) -> None:
     job = job_of(tmp_path, SMALL, name="small.yaml")
     assert job.path == tmp_path / "small.yaml"
@@ -116,17 +82,6 @@ def test_numbers(tmp_path: Path, text: str, number: float) -> None:
     assert job_of(tmp_path, SMALL, f"grid.size={text}").grid.lx == number
 
 
-def test_accuracy_chooses_what_is_not_given(tmp_path: Path) -> None:
-    """Half of it for the solver, a tenth for folded branches, a mesh of the order 2.5; a key that is given wins."""
-    job = job_of(tmp_path, replaced(SMALL, numerics="{accuracy: 1.0e-3}"))
-    assert (job.numerics.tolerance, job.numerics.branch_error) == (5e-4, 1e-4)
-    job = job_of(tmp_path, replaced(SMALL, numerics="{accuracy: 0.1, tolerance: 1.0e-6, branch_error: 0.0}"))
-    assert (job.numerics.tolerance, job.numerics.branch_error) == (1e-6, 0.0)
-    default = job_of(tmp_path, SMALL).numerics
-    assert default == job_of(tmp_path, replaced(SMALL, numerics="{accuracy: 1.0e-2}")).numerics
-    assert [cells_per_wave(accuracy) for accuracy in (0.05, 1e-2, 3e-3)] == [5, 8, 13]
-
-
 def test_an_empty_value_is_an_absent_key(tmp_path: Path) -> None:
     assert job_of(tmp_path, SMALL, "numerics=", "title=").numerics.tolerance == 5e-3
 
@@ -148,7 +103,7 @@ def test_ramps(tmp_path: Path, control: str) -> None:
 
 
 def test_the_duration_of_an_approach_follows_from_its_velocity(tmp_path: Path) -> None:
-    """Both ways, beside a sliding velocity, in steps that are chosen or given; |to - from| / velocity to rounding."""
+    """Both ways, next to a sliding velocity, in steps that are chosen or given; |to - from| / velocity to rounding."""
     down = "{approach: {from: -1e-6, to: 2e-6, velocity: 1.5e-6}, velocity: 3.0}"
     up = "{approach: {from: 2e-6, to: -1e-6, velocity: 3e-5}, time_step: 0.01}"
     press, pull = job_of(tmp_path, replaced(SMALL.split("history")[0], history=f"[{down}, {up}]")).history
@@ -164,17 +119,6 @@ def test_a_maxwell_fluid_is_legal(tmp_path: Path) -> None:
     assert job.material.modulus_inf == 0.0
     job = job_of(tmp_path, replaced(SMALL, material="{model: zener, branches: [{modulus: 1, relaxation_time: 1}]}"))
     assert job.material.long_modulus == 0.0
-
-
-def test_steady_may_stand_alone(tmp_path: Path) -> None:
-    text = replaced(SMALL.split("history")[0], steady="{velocities: 1e-3:1e1:5, pressures: 1e5, direction: [3, 4]}")
-    job = job_of(tmp_path, text)
-    assert job.history == ()
-    assert job.steady is not None
-    assert job.steady.velocities == pytest.approx((1e-3, 1e-2, 1e-1, 1.0, 10.0), rel=1e-14)
-    assert (job.steady.velocities[0], job.steady.velocities[-1]) == (1e-3, 10.0)
-    assert (job.steady.pressures, job.steady.waves) == ((1e5,), False)
-    assert job.steady.unit_direction == pytest.approx((0.6, 0.8), rel=1e-15)
 
 
 ROUND_TRIPS = {
@@ -261,17 +205,6 @@ def test_words_have_no_unit() -> None:
     assert line.endswith("time_step 0.5 s")
 
 
-def test_a_resolved_job_keeps_what_is_given(tmp_path: Path) -> None:
-    """Values chosen by the accuracy are a comment, and chosen again; equal values that are given make another job."""
-    chosen, given = (job_of(tmp_path, SMALL, *words) for words in ((), ("numerics.tolerance=5e-3",)))
-    assert chosen.resolved().endswith("# chosen by numerics.accuracy: tolerance 0.005, branch_error 0.001\n")
-    assert chosen != given
-    for job, names in ((chosen, {"tolerance", "branch_error"}), (given, {"branch_error"})):
-        again = job_of(tmp_path, job.resolved(), name="job.resolved.yaml")
-        assert set(again.numerics.chosen) == names
-        assert again.numerics.tolerance == 5e-3
-
-
 # -- jobs that no run could begin are mistakes, found when they are read ----------------------------------------------
 
 FLUID = "{model: zener, modulus_inf: 0, branches: [{modulus: 1e6, relaxation_time: 1}]}"
@@ -313,18 +246,6 @@ def test_a_rough_surface_needs_a_wave(tmp_path: Path) -> None:
     assert job_of(tmp_path, replaced(SMALL, surface=ROUGH % ("4.5e-4", "4.0e-4"))).surface
 
 
-def test_waves_of_a_box(tmp_path: Path) -> None:
-    """The limits as in the spectrum: a wave of the longest length is one, of the shortest none; not even as one of a
-    number of points that ends at two cells along y, where a wave has no phase."""
-    grid = job_of(tmp_path, replaced(SMALL, grid="{points: [8, 4], size: [1e-3, 1e-3]}")).grid
-    assert has_wave(grid, 2.5e-4, 1e-3)
-    assert has_wave(grid, 9e-4, 1e-3)
-    assert not has_wave(grid, 1e-3, 1.1e-3)
-    line = grid.model_copy(update={"points": (1, 4)})
-    assert has_wave(line, 6e-4, 1e-3)
-    assert not has_wave(line, 4e-4, 6e-4)
-
-
 def test_a_layer_is_in_proportion_to_its_box(tmp_path: Path) -> None:
     (mistake,) = mistakes_of(tmp_path, replaced(SMALL, body="{thickness: 1e-13}"))
     assert mistake.startswith("job.yaml:1:19: body.thickness must be at least 1e-09 of the box, 1e-12 m, got 1e-13")
@@ -338,15 +259,6 @@ FRACTIONS = [{"g": 0.5, "tau": 1e-3}, {"g": 0.25, "tau": 1.0}]
 def job_with(**material: Any) -> Any:
     data = {"grid": {"points": 4, "size": 1e-3}, "surface": {"shape": "flat"}, "history": [{"pressure": 1e5}]}
     return load({**data, "material": {"model": "zener", **material}})
-
-
-@pytest.mark.parametrize("time", [0.0, 1e-3, 0.5, 1e3])
-def test_relaxation_is_that_of_the_series(time: float) -> None:
-    """G(t) = G_0 (1 - sum g (1 - exp(-t/tau))), to rounding."""
-    body = relaxation_of(job_with(modulus_0=4e6, branches=FRACTIONS).material)
-    found = body.modulus_inf + float(sum(body.moduli * [math.exp(-time / tau) for tau in body.relaxation_times]))
-    exact = 4e6 * (1.0 - sum(term["g"] * -math.expm1(-time / term["tau"]) for term in FRACTIONS))
-    assert found == pytest.approx(exact, rel=1e-14)
 
 
 def test_fractions_that_add_up_to_1_are_a_liquid() -> None:
@@ -374,15 +286,3 @@ def test_fractions_that_add_up_to_1_are_a_liquid() -> None:
 def test_mistakes(material: dict[str, Any], said: str) -> None:
     with pytest.raises(JobError, match=said):
         job_with(**material)
-
-
-@pytest.mark.parametrize(("count", "shown"), [(6, 6), (7, 3), (20, 3)])
-def test_describe_shortens_many_branches(tmp_path: Path, count: int, shown: int) -> None:
-    """The first, the last, and which are left out; the resolved job has them all."""
-    branches = ", ".join(f"{{modulus: 1.0e+6, relaxation_time: {k}.0e-3}}" for k in range(1, count + 1))
-    job = job_of(tmp_path, replaced(SMALL, material=f"{{model: zener, modulus_inf: 1.0e+6, branches: [{branches}]}}"))
-    lines = [line for line in describe_job(job).splitlines() if line.startswith("material.branches")]
-    assert len(lines) == shown
-    assert "relaxation_time 0.001 s" in lines[0]
-    assert f"relaxation_time {count / 1e3:g} s" in lines[-1]
-    assert job.resolved().count("relaxation_time") == count

@@ -92,20 +92,6 @@ def test_a_missing_file_and_a_directory(tmp_path: Path) -> None:
 # --- overrides
 
 
-def test_overrides_of_every_kind() -> None:
-    text = SMALL.replace("- {", "- {velocity: 1, distance: 2, time_step: 1, ")
-    job = job_of(
-        text, "grid.points=[512, 256]", "history.0.pressure={from: 1, to: 2e5}", "numerics.tolerance=0.01",
-        "title=a = b", "steady.velocities=1e-1:1e1:3", "history.0.distance=null", "history.0.duration=3",
-        "grid.boundary=free",
-    )  # fmt: skip
-    assert (job.grid.points, job.grid.boundary, job.numerics.kernel) == ((512, 256), "free", "love")
-    assert (job.history[0].load.start, job.history[0].load.end) == (1.0, 2e5)
-    assert (job.history[0].distance, job.history[0].seconds) == (None, 3.0)
-    assert (job.numerics.tolerance, job.title) == (0.01, "a = b")
-    assert job.steady.velocities == pytest.approx((0.1, 1.0, 10.0), rel=1e-15)
-
-
 def test_later_overrides_win() -> None:
     assert job_of(SMALL, "grid={points: 32, size: 2}", "grid.points=16", "grid.points=8").grid.nx == 8
 
@@ -252,7 +238,6 @@ def test_an_include_that_is_not_there() -> None:
 
 # -- the `sweep` section: cases, and mistakes at their places ---------------------------------------------------------
 
-TOGETHER = "  - {grid.points: [16, 32], grid.size: [2e-3, 4e-3]}\n"
 TIMES = "  - {history.0.pressure: [1e5, 2e5, 3e5]}\n"
 
 
@@ -271,19 +256,6 @@ def sweep_mistakes(path: Path, sweep: str, *overrides: str) -> list[str]:
     with pytest.raises(JobError) as caught:
         cases_of(path, sweep, *overrides)
     return caught.value.mistakes
-
-
-def test_keys_of_a_mapping_move_together_and_mappings_multiply(path: Path) -> None:
-    """The last mapping goes the fastest; each case is a job like any other, with a directory of its own."""
-    cases = cases_of(path, TOGETHER + TIMES)
-    assert [case.number for case in cases] == list(range(6))
-    jobs = [case.job for case in cases]
-    assert [job.grid.nx for job in jobs] == [16, 16, 16, 32, 32, 32]
-    assert [job.grid.lx for job in jobs] == [2e-3, 2e-3, 2e-3, 4e-3, 4e-3, 4e-3]
-    assert [job.history[0].load.start for job in jobs] == [1e5, 2e5, 3e5, 1e5, 2e5, 3e5]
-    assert jobs[4].output.directory == Path("out/job/cases/004")
-    assert cases[4].settings == {"grid.points": 32, "grid.size": 4e-3, "history.0.pressure": 2e5}
-    assert str(cases[4]) == "case 4: grid.points = 32, grid.size = 0.004, history.0.pressure = 200000.0"
 
 
 def test_a_job_without_a_sweep_is_one_case(path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import jsonschema
 import pytest
 import yaml
-from marching import ROOT
+from marched_jobs import ROOT
 
 from parcontact import __main__
 from parcontact.job import schema
@@ -88,15 +88,6 @@ def test_every_mistake_in_order(tmp_path: Path) -> None:
     ]
 
 
-def test_missing_sections() -> None:
-    assert mistakes_of("title: nothing else\n") == [
-        "job.yaml:1:1: grid is missing; it must be a mapping with points and size",
-        "job.yaml:1:1: surface is missing; it must be one shape, or a list of shapes",
-        "job.yaml:1:1: material is missing; it must be a mapping with model: elastic | zener",
-        "job.yaml:1:1: history needs at least one stage, unless there is a steady section",
-    ]
-
-
 ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 2e-4, short_wavelength: 1e-4, rms_slope: 0.1}"
 
 
@@ -126,20 +117,6 @@ def test_roughness() -> None:
         expected = sentence if sentence.startswith("job") else f"--set {override}: {sentence}"
         assert expected.replace("--set grid.size=1e-5", "job.yaml:2:78") in found
     assert job_of(text, "surface.short_wavelength=3.125e-5").surface[0].short_wavelength == 3.125e-5
-
-
-def test_checks_between_sections_run_beside_other_mistakes() -> None:
-    text = SMALL.replace("surface: {", "surface:\n  - {shape: ball}\n  - {").replace("waves: [1, 0]", "waves: [99, 0]")
-    assert mistakes_of(text, "numerics.kernel=spectral", "grid.boundary=free", "checkpoint.keep=-1") == [
-        "job.yaml:3:13: surface.0.shape must be rough | sphere | cylinder | wave | file | array | topography | flat, "
-        "got 'ball'",
-        "job.yaml:4:44: surface.1.waves.0 must be within -32 and 32 waves for 64 points (Nyquist), got 99",
-        "--set checkpoint.keep=-1: checkpoint.keep must be a whole number of checkpoints, zero or more, got -1",
-        (
-            "--set numerics.kernel=spectral: numerics.kernel must be love when grid.boundary is free: "
-            "the spectral kernel is periodic"
-        ),
-    ]
 
 
 def test_steady_needs_pressures() -> None:
@@ -233,7 +210,7 @@ def test_every_key_is_in_it(validator: jsonschema.Draft202012Validator) -> None:
 
 
 def test_nothing_is_left_open(validator: jsonschema.Draft202012Validator) -> None:
-    """A type for which there is no schema would allow anything; only a material beside an include has some."""
+    """A type for which there is no schema would allow anything; only a material next to an include has some."""
     found = schema.json_schema()
     empty = [path for path, value in walk(found) if value == {} or value == {"description": value_of(value)}]
     assert not empty

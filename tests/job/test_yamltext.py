@@ -133,7 +133,7 @@ def test_values_that_overflow_later(tmp_path: Path, text: str, sentence: str) ->
     assert sentence in found[0]
 
 
-def test_an_include_that_changes_nothing_is_told(tmp_path: Path) -> None:
+def test_an_include_that_changes_nothing_is_stated(tmp_path: Path) -> None:
     """Keys that the job gives itself win over those of a file that --set includes."""
     own = with_material("{model: zener, modulus_inf: 1e6, branches: [{modulus: 1e6, relaxation_time: 1}]}")
     assert mistakes_of(tmp_path, own, "material.include=synthetic_tyre") == [

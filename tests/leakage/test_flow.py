@@ -1,7 +1,6 @@
 """Flow through gaps: closed forms of waves, mazes and checkerboards, closure, and what rotations and scales do."""
 
 import heapq
-import math
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from parcontact.errors import InputError
 from parcontact.leakage.elimination import Balance
 from parcontact.leakage.flow import Map, flow_mesh_error, leak, solve_flow
 from parcontact.leakage.fluids import FLUIDS, Fluid, PressureDrop
-from parcontact.leakage.paths import connected_from_end_to_end, critical_constriction
+from parcontact.leakage.paths import critical_constriction
 
 
 def wave(points: int, depth: float) -> Map:
@@ -33,8 +32,8 @@ def test_flow_across_the_crests_of_a_wave() -> None:
 
 
 def test_error_by_the_mesh() -> None:
-    """Gaps in a row resist one after the other: K = n/sum(1/g^3), of the even ones and of the odd ones alike. Side by
-    side K is the mean of g^3. Where contact closes no error is known."""
+    """Gaps in a row resist one after the other: K = n/sum(1/g^3), of the even ones and of the odd ones identical. Side
+    by side K is the mean of g^3. Where contact closes no error is known."""
     gaps = np.random.default_rng(1).uniform(0.5, 1.5, 32)
     gap = np.broadcast_to(gaps, (8, 32))
     whole, even, odd = (len(each) / float(np.sum(each**-3.0)) for each in (gaps, gaps[::2], gaps[1::2]))
@@ -77,42 +76,14 @@ def test_a_maze_with_a_single_path() -> None:
     assert turned.conductivity == pytest.approx(flow.conductivity, rel=1e-12)
 
 
-def test_a_closed_gap_has_no_flow() -> None:
-    gap = wave(16, 0.5)
-    gap[:, 3] = 0.0
-    flow = solve_flow(gap, (1.0, 1.0), "x")
-    assert (flow.conductivity, flow.constriction, flow.position, flow.percolates) == (0.0, 0.0, None, False)
-    assert solve_flow(np.zeros((4, 4)), (1.0, 1.0)).conductivity == 0.0
-    assert solve_flow(gap, (1.0, 1.0), "y").percolates
-
-
 def test_sides_are_periodic_or_closed() -> None:
     """A channel that leaves on one side and comes back on the other leads through periodic sides only."""
     gap = np.zeros((4, 6))
     gap[:2, 0] = gap[2:, 5] = 1.0
     gap[2, 5] = gap[1, 0] = 1.0
-    gap[1, 5] = 1.0  # beside (1, 0) across the side
+    gap[1, 5] = 1.0  # next to (1, 0) across the side
     assert solve_flow(gap, (1.0, 1.0), "y", periodic_sides=True).percolates
     assert not solve_flow(gap, (1.0, 1.0), "y", periodic_sides=False).percolates
-
-
-@pytest.mark.parametrize("axis", ["x", "y"])
-def test_scales(axis: str) -> None:
-    """K scales with the cube of the gap, and depends on the shape of the box but not on its size."""
-    gap = np.random.default_rng(2).uniform(0.1, 1.0, (12, 16))
-    first = solve_flow(gap, (4.0, 3.0), axis)
-    assert solve_flow(1e-6 * gap, (4e-3, 3e-3), axis).conductivity == pytest.approx(1e-18 * first.conductivity, 1e-12)
-    assert first.imbalance < 1e-12  # rounding
-
-
-def test_pressure_falls_from_end_to_end() -> None:
-    """The fluid's pressure obeys the maximum principle, and the mirrored map has the mirrored pressure."""
-    gap = np.maximum(np.random.default_rng(3).normal(0.5, 0.4, (24, 24)), 0.0)
-    flow, mirrored = solve_flow(gap, (1.0, 1.0), "y"), solve_flow(gap[::-1], (1.0, 1.0), "y")
-    wet = np.isfinite(flow.pressure)
-    assert (flow.pressure[wet] > 0.0).all()
-    assert (flow.pressure[wet] < 1.0).all()
-    np.testing.assert_allclose(flow.pressure[wet], 1.0 - mirrored.pressure[::-1][wet], atol=1e-9)
 
 
 def test_narrow_gaps_hardly_matter() -> None:
@@ -127,7 +98,7 @@ def test_narrow_gaps_hardly_matter() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gap", "size", "told"),
+    ("gap", "size", "stated"),
     [
         ([["a"]], (1.0, 1.0), "got values of type <U1"),
         ([[1.0], [1.0, 2.0]], (1.0, 1.0), "gap must be a map of numbers"),
@@ -147,8 +118,8 @@ def test_narrow_gaps_hardly_matter() -> None:
         (np.ones((4, 4)), (1.0, np.nan), "positive lengths"),
     ],
 )
-def test_what_is_no_map_of_gaps(gap: Any, size: Any, told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_what_is_no_map_of_gaps(gap: Any, size: Any, stated: str) -> None:
+    with pytest.raises(InputError, match=stated):
         leak(gap, size)
 
 
@@ -193,21 +164,6 @@ def test_mean_free_paths(name: str, path: float) -> None:
     assert FLUIDS[name].mean_free_path(1e5) == pytest.approx(path, rel=0.03)
 
 
-def test_masses() -> None:
-    """Dry air at 20 C and 1 bar has 1.189 kg/m^3; 1e-9 m^3/s of it are 1.189e-3 mg/s, and 3.6 ml/h. Into a vacuum the
-    mass is that of p1^2, though no volume is; a flow has one mass at both ends."""
-    air, oil = FLUIDS["air"], Fluid("oil", 0.1)
-    drop, vacuum = PressureDrop(air, 2e5, 1e5), PressureDrop(air, 2e5, 0.0)
-    assert air.density_at(1e5) == pytest.approx(1.189, rel=1e-3)
-    through = 1e-9 / drop.flow_rate(1.0, *SIZE), *SIZE
-    assert drop.describe_rate(*through) == "1e-09 m³/s (3.6 ml/h) at the low side, 0.00119 mg/s"
-    assert drop.mass_flow(*through) == pytest.approx(air.density_at(1e5) * drop.flow_rate(*through), rel=1e-14)
-    assert vacuum.mass_flow(*through) == pytest.approx(4 / 3 * drop.mass_flow(*through), rel=1e-14)
-    assert vacuum.describe_rate(*through) == "0.00158 mg/s, 4.8 ml/h of gas at 1 bar"
-    assert PressureDrop(oil, 2e5, 0.0).describe_rate(*through).endswith("ml/h) at the low side")
-    assert math.isnan(oil.density_at(1e5))
-
-
 # -- connected cells and critical constrictions against a search that grows from the first row ------------------------
 
 
@@ -240,15 +196,6 @@ def test_the_constriction_is_that_of_the_widest_path(periodic: bool) -> None:
         closed += position is None
         assert position is None or gap[position] == found
     assert 0 < closed < 40  # both happen
-
-
-def test_what_leads_nowhere_is_left_out() -> None:
-    gap = np.zeros((4, 5), dtype=bool)
-    gap[:, 1] = gap[0, 3] = gap[2, 2] = True
-    gap[3, 4] = True
-    kept = connected_from_end_to_end(gap, periodic_sides=False)
-    gap[0, 3] = gap[3, 4] = False
-    assert (kept == gap).all()
 
 
 # -- elimination of half of the cells against a dense solution, for odd and even, narrow and wide maps ----------------

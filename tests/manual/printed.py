@@ -1,4 +1,4 @@
-"""What a page says that a run prints, beside what it printed."""
+"""What a page says that a run prints, in addition to what it printed."""
 
 import re
 

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from marching import ROOT
+from marched_jobs import ROOT
 
 import parcontact
 from parcontact.manual import texts

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import yaml
 from csv_rows import rows
-from marching import JOBS, ROOT
+from marched_jobs import JOBS, ROOT
 from mpi4py import MPI
 from pydantic import TypeAdapter
 

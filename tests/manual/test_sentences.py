@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 
 import pytest
-from marching import ROOT
+from marched_jobs import ROOT
 
 from parcontact.manual import texts
 

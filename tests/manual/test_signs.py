@@ -8,7 +8,7 @@ import io
 import re
 
 import pytest
-from marching import ROOT
+from marched_jobs import ROOT
 
 from parcontact.printed import quantity, with_error
 from parcontact.streams import TolerantStream

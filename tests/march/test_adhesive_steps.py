@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from marching import column, marched
-from mpi4py import MPI
+from marched_jobs import column, marched
 from numpy.testing import assert_allclose
 from restarting import ELASTIC, ROUGH, ZENER, Bench, cut, rows, same
 
@@ -69,33 +68,6 @@ def test_conditions_of_contact(boundary: str, control: str) -> None:
     assert march.row.measures.contact_area == touching.sum() / touching.size
 
 
-@pytest.mark.mpi(2, 3)
-def test_ranks(comm: MPI.Intracomm) -> None:
-    """The same contact on any number of ranks, to a hundred times the tolerance."""
-    job = {"grid": {"points": [20, 14], "size": [1e-3, 7e-4]}, "surface": ROUGH, "material": ZENER, "adhesion": STICK}
-    job |= {"history": [LOAD, SLIDE], "numerics": {"tolerance": 1e-7}}
-    alone, together = (column(marched(job, comm=each)[1], "approach") for each in (MPI.COMM_SELF, comm))
-    assert_allclose(together, alone, rtol=1e-5)
-
-
-def test_a_jump_of_load_passes_no_equilibrium() -> None:
-    """A wave with Johnson's parameter 0.3 is in partial contact under 0.3 pi E* h/lambda, which a ramp reaches, and in
-    full contact only from 0.3877 on (K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423): 0.585 of its length; a cell
-    is 0.8 % of it, and the range adds to it."""
-    length, amplitude, modulus, n = 1e-3, 5e-6, 4e6, 128
-    work = 0.3**2 * np.pi**2 * modulus * amplitude**2 / (2.0 * length)
-    reach = float(np.sqrt(2.0 * length / n * work / modulus))
-    job = {
-        "grid": {"points": [n, 1], "size": [length, length / n]},
-        "surface": {"shape": "wave", "amplitude": amplitude, "waves": [1, 0]},
-        "material": ELASTIC,
-        "adhesion": {"work": work, "range": reach},
-        "history": [{"pressure": 0.3 * np.pi * modulus * amplitude / length}],
-    }
-    march, _ = marched(job)
-    assert 0.56 < march.row.measures.contact_area < 0.62
-
-
 def test_detached(bench: Bench) -> None:
     """Under a force of which no part holds the run ends, with exit code 0, and says when; going on says it too."""
     out = bench.where / "out"
@@ -127,7 +99,7 @@ def test_detached_state_from_python(bench: Bench) -> None:
 
 
 def test_a_wave_that_fills_its_free_box_comes_off() -> None:
-    """Near a snap the passes of a free body go round between two states, unless they are made on a stiffer one. The
+    """Near a snap the passes of a free body cycle between two states, unless they are made on a stiffer one. The
     contact ends in long steps where it does in short ones, to a long step."""
     surface, grid = {"shape": "wave", "amplitude": 1.8e-7, "waves": [1, 0]}, {"points": 32, "size": 4.5e-5}
     job = {"grid": {**grid, "boundary": "free"}, "surface": surface, "material": ELASTIC}
@@ -179,34 +151,6 @@ def test_no_adhesion_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         marched({**job, "adhesion": STICK})
 
 
-@pytest.mark.parametrize("boundary", ["free", "periodic"])
-def test_surfaces_far_apart_pull_each_other(boundary: str) -> None:
-    """A sphere is pulled off, and 20 ranges on: from 8 on it is pulled by what rigid surfaces are at its approach, the
-    sum of the attraction over the points, to 1 % of it, however little that is beside the pull-off."""
-    grid = {"points": 24, "size": 3e-4, "boundary": boundary}
-    job = {"grid": grid, "surface": {"shape": "sphere", "radius": 1e-3}, "material": ELASTIC}
-    pull = {"approach": {"from": 5e-7, "to": -2e-5}, "duration": 1.0, "time_step": 1 / 43}
-    march, made = marched({**job, "adhesion": STICK, "history": [pull]})
-    apart = [row.measures for row in made if row.measures.approach < -8e-6]
-    assert len(apart) > 20
-    for each in apart:
-        rigid = -0.05 / 1e-6 * np.exp((march.field("height") + each.approach) / 1e-6).mean()
-        assert each.pressure == pytest.approx(rigid, rel=0.01)
-
-
-def test_the_memory_that_a_plan_tells(bench: Bench, tmp_path: Path) -> None:
-    """To the byte; see `plan/test_memory`."""
-    from parcontact.job import Job
-    from parcontact.plan import memory
-
-    for name in ("rough", "free"):
-        planned = Job.model_validate(adhesive(bench, name))
-        march, _ = marched(planned)
-        assert memory.total_bytes(planned) == march.scene.slab.tally["map bytes"]
-        maps = [np.asarray(entry.value) for entry in march.entries().values() if entry.is_map]
-        assert sum(each.nbytes + 4 * len(each) for each in maps) == memory.saved(planned)
-
-
 def test_energies_of_a_reversible_contact() -> None:
     """A sphere in contact is pressed and let go: the work is the integral of force over approach, by the trapezoidal
     rule of two steps extrapolated (points come into contact one by one, which leaves 2e-4 on this grid), the loop loses
@@ -249,31 +193,6 @@ def test_chosen_steps_follow_the_edge() -> None:
     moved = np.abs(np.diff(radius)) / (0.5 * zone)
     snapped = np.array([row.errors is None for row in found[1:]])
     assert 0.1 < moved[(areas[:-1] > 0.01) & ~snapped].max() < 1.5
-
-
-def test_given_steps_that_are_too_long_are_said_once() -> None:
-    """A rubber sphere is pulled off in three steps: the edge passes many process zones, which one remark says."""
-    rubber = {**ZENER, "branches": [{"modulus": 9e6, "relaxation_time": 1.0}]}
-    grid = {"points": 32, "size": 4e-4, "boundary": "free"}
-    job = {"grid": grid, "surface": {"shape": "sphere", "radius": 1e-3}, "material": rubber}
-    job["adhesion"] = {**STICK, "range": 3e-7}
-    pull = {"approach": {"from": 1e-6, "to": -1e-6}, "duration": 3.0, "time_step": 1.0}
-    _, found = marched({**job, "history": [{"approach": 1e-6}, pull]})
-    assert ["process zone" in row.remark for row in found].count(True) == 1
-
-
-def test_chosen_steps_of_surfaces_apart_are_long() -> None:
-    """Before it touches and is under tension, a load is no more than the solver's error: that shortens no step of
-    rubber whose fastest branch relaxes in 1e-9 of the stage (thousands of steps if it did), and is no snap."""
-    grid = {"points": 24, "size": 3e-4, "boundary": "free"}
-    branches = [{"modulus": 1e6 * 10**k, "relaxation_time": 10.0 ** (-3 * k)} for k in range(4)]
-    body = {"model": "zener", "modulus_inf": 1e6, "branches": branches}
-    surface = {"shape": "sphere", "radius": 1e-3}
-    history = [{"approach": {"from": -4e-5, "to": -2e-5}, "duration": 1.0}]
-    job = {"grid": grid, "surface": surface, "material": body, "adhesion": STICK, "history": history}
-    march, made = marched({**job, "numerics": {"accuracy": 0.05}})
-    assert len(made) < 100
-    assert march.state.memories["adhesion"].snaps == 0
 
 
 def test_a_load_of_zero_has_no_friction_and_shortens_no_step(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from marching import begun, column
+from marched_jobs import begun, column
 from mpi4py import MPI
 
 from parcontact import job as jobs

@@ -1,10 +1,10 @@
-"""Surfaces that come off under a load, and stay apart until they are brought together again (`detached: open`)."""
+"""Surfaces that detach under a load, and stay apart until they are brought together again (`detached: open`)."""
 
 from typing import Any
 
 import numpy as np
 import pytest
-from marching import column, marched
+from marched_jobs import column, marched
 from numpy.testing import assert_allclose
 from restarting import ELASTIC, SPHERE, ZENER
 
@@ -35,7 +35,7 @@ def test_open_after_detachment(control: str, boundary: str, material: dict[str, 
 @pytest.mark.parametrize("count", [1, 4])
 @pytest.mark.parametrize("material", [ELASTIC, ZENER], ids=["elastic", "rubber"])
 def test_open_surfaces_add_neither_work_nor_losses(material: dict[str, Any], count: int) -> None:
-    """A body that was pressed has pushed the surface back before it comes off, also in one step: little but what the
+    """A body that was pressed has pushed the surface back before it detaches, also in one step: little but what the
     body dissipates is lost then. Open rubber dissipates what it stores, in steps of any length."""
     job = {"grid": {"points": 20, "size": 1e-3, "boundary": "free"}, "surface": SPHERE, "material": material}
     press = {"force": {"from": 0.0, "to": 5e-2}, "duration": 1.0, "time_step": 0.25}

@@ -7,7 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from marching import begun, marched
+from marched_jobs import begun, marched
 from restarting import ELASTIC, ROUGH, SLIDE, ZENER, Bench, cut, rows, same
 
 from parcontact.history.timeline import Timeline
@@ -114,26 +114,3 @@ def test_until_stops_within_a_dwell(bench: Bench) -> None:
     assert bench.run(data, out) == 0
     assert int(rows(out)[-1]["step"]) == len(timeline)
     assert not [line for line in (out / "run.log").read_text().splitlines() if "warning" in line and "lost" in line]
-
-
-def test_a_checkpoint_is_not_passed_over(bench: Bench) -> None:
-    """That of a step which was not made is written after the one that stands for it."""
-    data, out = dwelling(bench, output={"fields": []}) | {"checkpoint": {"every": 3, "keep": 100}}, bench.where / "out"
-    assert bench.run(data, out) == 0
-    made = [int(row["step"]) for row in rows(out)]
-    kept = {int(path.stem[5:]) for path in (out / "checkpoint").iterdir()}
-    assert kept == {b for a, b in pairwise(made) if b // 3 > a // 3} | {made[-1]}
-
-
-def test_steps_are_decided_on_one_by_one() -> None:
-    """When the last one was made. One that stands for others takes all their time; nothing is extrapolated to it."""
-    march = begun(job(DWELL, material=ELASTIC))
-    timeline = Timeline.from_job(march.scene.job)
-    steps = march.steps(timeline)
-    first = next(steps)
-    assert first == timeline[1]
-    march.advance(first)
-    last = next(steps)
-    assert last == timeline[len(timeline)]._replace(dt=0.1, growth=0.0, passed=len(timeline) - 2)
-    march.advance(last)
-    assert not list(steps)

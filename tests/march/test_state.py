@@ -5,10 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
-from marching import begun, marched
+from marched_jobs import begun, marched
 
 from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
@@ -111,17 +110,6 @@ def test_ways_in_a_checkpoint_are_in_metres(tmp_path: Path) -> None:
     assert contents.numbers["row/distance"] * contents.units["row/distance"] == expected[0]
 
 
-def test_pressures_and_times_in_a_checkpoint_are_in_si_units(tmp_path: Path) -> None:
-    """Pressures as strains of a modulus, and when each step of a stage ended that chooses them."""
-    march, rows = marched(job(RUBBER, CHOSEN))
-    contents = checkpoint.inspect(written(march, tmp_path / "step.h5"))
-    values = {name: value * contents.units[name] for name, value in contents.numbers.items() if "plans" not in name}
-    with h5py.File(tmp_path / "step.h5") as file:
-        strain = file["contact/pressure"][...] * contents.units["contact/pressure"]
-    np.testing.assert_allclose(strain * values["contact/modulus"], march.field("pressure"), rtol=1e-12)
-    assert values["steps/ends"].tolist() == pytest.approx([row.time for row in rows[2:]], rel=1e-12)
-
-
 @pytest.mark.parametrize("material", [ELASTIC, RUBBER])
 def test_a_run_in_other_units_goes_on_alike(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, material: dict[str, Any]
@@ -170,15 +158,6 @@ def test_a_start_from_steady_sliding_is_a_state_like_any_other(material: dict[st
     assert np.mean(np.abs(gap[pressed])) < 2.0 * limit
 
 
-def test_a_start_from_steady_sliding_knows_the_friction_of_the_body() -> None:
-    """Without that of the interface: the stress on the corrected area over the load, to rounding."""
-    march = begun(job(RUBBER, SLIDES, **STEADY, interface={"shear_stress": 1e3}))
-    measures = march.row.measures
-    own = 1e3 * measures.contact_area_corrected / measures.pressure
-    assert own > 0.0
-    assert march.state.friction == pytest.approx(measures.friction - own, rel=1e-9)
-
-
 @pytest.mark.parametrize(("boundary", "surface"), [("periodic", ROUGH), ("free", ROUGH), ("free", SPHERE)])
 def test_without_load_the_surface_just_touches(boundary: str, surface: dict[str, Any]) -> None:
     """Before the first step as after one that takes the load away: no gap is negative, the smallest is 0. The mean of
@@ -199,22 +178,3 @@ def test_without_load_the_surface_just_touches(boundary: str, surface: dict[str,
     assert not march.field("displacement").any()
     assert after.friction == 0.0
     assert (before.approach, before.mean_gap) == pytest.approx((after.approach, after.mean_gap), rel=1e-9)
-
-
-def test_at_first_the_highest_point_just_touches(tmp_path: Path) -> None:
-    """Heights that a file gives above some level: to touch at their highest point, the level is that far away."""
-    heights = 5e-6 + 1e-6 * np.random.default_rng(3).random((32, 32))
-    np.save(tmp_path / "heights.npy", heights)
-    march = begun(job(ELASTIC, STANDS, surface={"shape": "file", "path": str(tmp_path / "heights.npy")}))
-    assert march.row.measures.approach == pytest.approx(-heights.max(), rel=1e-12)
-    assert march.row.measures.mean_gap == pytest.approx(heights.max() - heights.mean(), rel=1e-12)
-
-
-def test_energies_are_in_joules() -> None:
-    """An elastic body stores half of pressure times displacement; work on rubber is stored or lost. To rounding."""
-    march, rows = marched(job(ELASTIC, SLIDES))
-    half = 0.5 * float(np.sum(march.field("pressure") * march.field("displacement"))) * (1e-3 / 32) ** 2
-    assert (rows[-1].stored, rows[-1].work, rows[-1].dissipated) == (pytest.approx(half, rel=1e-12),) * 2 + (0.0,)
-    last = marched(job(RUBBER, SLIDES))[1][-1]
-    assert 0.0 < last.dissipated == pytest.approx(sum(last.branch_dissipation), rel=1e-14)
-    assert last.work == pytest.approx(last.stored + last.dissipated, rel=1e-12)

@@ -2,7 +2,6 @@
 
 import itertools
 import re
-from contextlib import nullcontext
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -10,20 +9,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from marching import begun, column, example, marched
+from marched_jobs import begun, column, example, marched
 from mpi4py import MPI
 from numpy.typing import NDArray
 from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
-from parcontact.accuracy.controller import LEAST_WAY, cells_per_step
+from parcontact.accuracy.controller import cells_per_step
 from parcontact.errors import InputError, RunError
 from parcontact.history.chosen import MadeStep
 from parcontact.history.timeline import Step, Timeline
 from parcontact.job import Job
 from parcontact.march.failure import StepError
 from parcontact.march.loop import March, run_steps
-from parcontact.physics.convolution import Convolution, MirroredConvolution
-from parcontact.scene import solver_on
 from parcontact.solve.contact import Contact, ContactSolver
 from parcontact.solve.fallback import active_set
 
@@ -86,33 +83,6 @@ def test_what_stalls_at_first_is_solved(tmp_path: Path, seed: int, stretch: floa
     said = r"stalled: no residual below \d[.]\d+ in .*; solved when retried with .*"
     assert re.search(said, found[-1].remark)
     assert march.scene.slab.tally["retry"] == 1 + found[-1].remark.count(", with ")
-
-
-def test_no_cost_where_nothing_fails() -> None:
-    """No operator call but those of the steps, no transform of another size."""
-    data = {"grid": GRID, "surface": ROUGH, "material": ZENER, "history": [PRESS, SLIDE]}
-    march, found = marched(data)
-    tally = march.scene.slab.tally
-    assert tally["retry"] == 0
-    assert not any(row.remark for row in found)
-    assert {name.split()[1] for name in tally if name.startswith("fft ")} == {"64x64"}
-    solves = sum(row.operator_calls for row in found)
-    assert tally["operator"] == solves
-
-
-@pytest.mark.parametrize("precision", ["double", "mixed"])
-@pytest.mark.parametrize("boundary", ["periodic", "free"])
-def test_coarse_grids_have_the_same_plans_every_time(boundary: str, precision: str) -> None:
-    """FFTW guesses them: what it measures depends on how busy the machine is, and the last digits on that."""
-    data = {"grid": {**GRID, "boundary": boundary}, "surface": ROUGH, "material": ELASTIC, "history": [PRESS]}
-    built = begun(data | {"numerics": {"precision": precision}}).scene
-    coarse, operators = solver_on(built.setup, built.slab.resized(32, 32), 1e-3)
-    assert coarse.slab.shape == (32, 32)
-    assert built.setup.fft.measured
-    for operator in operators:
-        assert isinstance(operator, Convolution | MirroredConvolution)
-        plans = operator.fft.fft if isinstance(operator, MirroredConvolution) else operator.fft
-        assert not plans.measured
 
 
 # -- given up ---------------------------------------------------------------------------------------------------------
@@ -204,7 +174,7 @@ def test_a_failed_run_leaves_a_checkpoint(bench: Bench) -> None:
 
 
 def test_an_approach_beyond_full_contact_is_refused_before_the_first_step(bench: Bench) -> None:
-    """Value and limit are told, and nothing is written."""
+    """Value and limit are stated, and nothing is written."""
     data, out = bench.job("viscoelastic", history=[PRESS, {"approach": 1e-3}]), bench.where / "out"
     with pytest.raises(InputError, match=r"history\.1: an approach of 0\.001 m is beyond full contact.* at 0 m; "):
         bench.run(data, out)
@@ -216,25 +186,6 @@ def test_an_approach_beyond_full_contact_is_refused_before_the_first_step(bench:
 # -- what to change ---------------------------------------------------------------------------------------------------
 
 RUBBER = {"model": "elastic", "shear_modulus": 1e6}
-ADVICE: list[tuple[dict[str, Any], dict[str, Any], str]] = [
-    ({"max_iterations": 1}, {}, "try numerics.max_iterations above 1"),
-    (
-        {"max_iterations": 2, "tolerance": 1e-9},
-        {},
-        "try numerics.max_iterations above 2, or try numerics.tolerance above ",
-    ),
-    ({"tolerance": 1e-18}, {}, "double precision reaches only about "),
-    ({"tolerance": 1e-18, "precision": "mixed"}, {}, "mixed precision reaches only about "),
-]
-
-
-@pytest.mark.parametrize(("numerics", "changes", "advice"), ADVICE)
-def test_advice(numerics: dict[str, Any], changes: dict[str, Any], advice: str) -> None:
-    data = {"grid": GRID, "surface": ROUGH, "material": RUBBER, "history": [{"pressure": 1e4}], "numerics": numerics}
-    with pytest.raises(StepError, match=re.escape(advice)) as failure:
-        marched(data | changes)
-    asked = re.search(r"numerics\.tolerance above (\S+)", str(failure.value))
-    assert not asked or float(asked[1]) <= 0.1
 
 
 def test_advice_on_long_steps() -> None:
@@ -247,28 +198,6 @@ def test_advice_on_long_steps() -> None:
         r"one the surface moves by 2\.\d+ cells$",
     ):
         run_steps(march, [lambda now: setattr(now.scene.solver, "max_iterations", now.row.step == 0 and 500)])
-
-
-def test_unconverged_is_not_retried_where_it_is_accepted() -> None:
-    """But numbers that are not finite are never accepted."""
-    data = {"grid": GRID, "surface": ROUGH, "material": RUBBER, "history": [{"pressure": 1e4}]}
-    numerics = {"max_iterations": 2, "tolerance": 1e-9, "accept_unconverged": True}
-    march, found = marched(data | {"numerics": numerics})
-    assert found[-1].iterations == 2
-    assert march.scene.slab.tally["retry"] == 0
-    march = begun(data | {"numerics": numerics})
-    march.scene.motion.at((0.0, 0.0)).base[0, 0] = np.nan
-    with pytest.raises(StepError, match="not finite"):
-        run_steps(march, [])
-
-
-@pytest.mark.parametrize(("share", "refused"), [(5e-15, False), (1e-12, True)])
-def test_an_approach_to_full_contact_is_one_to_rounding(share: float, refused: bool) -> None:
-    """The mean of the surface is 0: to go beyond it by a rounding of its height is to reach it."""
-    data = {"grid": GRID, "surface": ROUGH, "material": ELASTIC, "history": [{"approach": 0.0}]}
-    height = begun(data).scene.setup.height
-    with pytest.raises(InputError, match="is beyond full contact") if refused else nullcontext():
-        run_steps(begun(data | {"history": [{"approach": share * height}]}), ())
 
 
 # -- steps that choose themselves after a jump of the velocity: short ones at first, which grow to whole --------------
@@ -291,7 +220,7 @@ def data(accuracy: float) -> dict[str, Any]:
 def test_a_step_that_is_made_anew_leaves_nothing() -> None:
     """The state after it is that of a march to which the shorter step was proposed at once: to the last bit."""
     sudden = Job.model_validate(data(1e-3))
-    tried, told = begun(sudden), begun(sudden)
+    tried, stated = begun(sudden), begun(sudden)
     made: list[Step] = []
     rejected = 0
     for step in itertools.islice(tried.steps(), 12):
@@ -308,23 +237,11 @@ def test_a_step_that_is_made_anew_leaves_nothing() -> None:
         made.append(attempts[-1]._replace(decide=None))
         rejected += len(attempts) - 1
     for step in made:
-        told.advance(step)
+        stated.advance(step)
     assert rejected > 0
-    for name, entry in told.entries().items():
+    for name, entry in stated.entries().items():
         if not (name.startswith(("steps/", "row/")) or "position" in name):
             np.testing.assert_array_equal(np.asarray(entry.value), np.asarray(tried.entries()[name].value), name)
-
-
-def test_steps_double_at_most() -> None:
-    """After a jump, until they are whole cells: but for the part that leads to a multiple of a new length."""
-    for accuracy in (3e-3, 1e-2, 2e-2):
-        march, _ = marched(data(accuracy))
-        assert march.state.chosen is not None
-        ends = np.array([0.0, *march.state.chosen.ends[0]]) / CELL
-        steps = np.diff(ends)
-        assert (steps[1:] <= (1.0 + LEAST_WAY) * 2.0 * steps[:-1]).all()
-        for end in range(1, 7):
-            assert min(abs(ends - end)) < 1e-9
 
 
 def test_lengths_of_steps() -> None:

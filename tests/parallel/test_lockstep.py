@@ -1,4 +1,4 @@
-"""Ranks that do different things are told so; nothing hangs."""
+"""Ranks that do different things are stated so; nothing hangs."""
 
 import subprocess
 import sys
@@ -61,7 +61,7 @@ def test_what_cannot_be_sent_reaches_all(comm: MPI.Intracomm) -> None:
 
 @pytest.mark.mpi
 def test_a_break_of_one_rank(comm: MPI.Intracomm) -> None:
-    """The others are at the next step while it gathers a map: all are told, and may go on together."""
+    """The others are at the next step while it gathers a map: all are stated, and may go on together."""
     if comm.size == 1:
         return
     run = pc.Simulation(JOB, comm=comm)
@@ -86,7 +86,7 @@ def test_different_jobs_are_refused(comm: MPI.Intracomm) -> None:
         pc.steady(JOB, [1.0 + comm.rank], comm=comm)
 
 
-def test_ranks_in_a_row_are_told_together() -> None:
+def test_ranks_in_a_row_are_stated_together() -> None:
     assert lockstep._ranks_of(["a", "b", "b", "a"]) == "rank 0 a, ranks 1 to 2 each b, rank 3 a"
 
 

@@ -81,24 +81,6 @@ def test_root_is_believed(communicators: list[MPI.Intracomm]) -> None:
         assert slab.from_all(comm.rank) == list(range(comm.size))
 
 
-def test_maps_are_aligned_and_counted(comm: MPI.Intracomm) -> None:
-    slab = Slab(comm, 7, 9)
-    double, single = slab.zeros(), slab.empty(np.float32)
-    assert double.shape == single.shape == slab.shape
-    assert not double.any()
-    assert double.ctypes.data % 64 == single.ctypes.data % 64 == 0
-    assert slab.tally["map bytes"] == double.nbytes + single.nbytes == 12 * double.size
-
-
-def test_tally_since() -> None:
-    tally = Tally(fft=2)
-    before = tally.copy()
-    tally["fft"] += 3
-    tally["shift"] += 1
-    assert tally.since(before) == {"fft": 3, "shift": 1}
-    assert tally["never counted"] == 0
-
-
 def test_maps_are_counted_while_they_are_held() -> None:
     """Also through views of them."""
     tally = Tally()
@@ -123,21 +105,6 @@ def test_rolls_like_numpy(ny: int, count: int, single: bool) -> None:
     field[...] = whole[slab.rows]
     np.testing.assert_array_equal(rows.roll_rows(slab, field, count, out), np.roll(whole, count, axis=0)[slab.rows])
     np.testing.assert_array_equal(field, whole[slab.rows])
-
-
-@settings(max_examples=40)
-@given(ny=st.integers(1, 9), cyclic=st.booleans())
-def test_row_before_the_first(ny: int, cyclic: bool) -> None:
-    """Copies, so equal; only ranks that have rows have one before them."""
-    slab = Slab(MPI.COMM_WORLD, 3, ny)
-    whole = np.arange(3.0 * ny).reshape(ny, 3)
-    field, first = whole[slab.rows].copy(), slab.rows.start
-    sent = slab.tally["bytes sent"]
-    before = rows.before_first(slab, field, cyclic)
-    if slab.rows.start < slab.rows.stop:
-        np.testing.assert_array_equal(before, whole[first - 1 if cyclic or first else 0])
-    assert before.shape == (3,)
-    assert slab.tally["bytes sent"] - sent <= 24  # one row
 
 
 def test_counts_what_is_sent() -> None:

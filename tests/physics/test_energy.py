@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from held import HeldBody
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 from rubbers import complex_modulus
+from stepping_body import HeldBody
 
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import MovedHeights, ZenerBody
@@ -40,16 +40,6 @@ def test_weights_are_integrals_over_the_step(z: float) -> None:
     work = [weights @ memory - ends[0], weights @ change - ends[1], rises[0]]
     work += [weights @ bent - 0.5 * at_end + rises[1], rises[2]]
     assert_allclose(bend_weights(np.array(z)), [0.0, *work], rtol=1e-13, atol=4e-15)
-
-
-@pytest.mark.parametrize("z", [0.0, 1e-300, 1e100])
-def test_weights_at_the_ends_are_finite(z: float) -> None:
-    """For short steps `b = s^2 - s`; for long ones `z a = 1`, `z b = 2 s - 1`."""
-    short = z, z, z / 3, -z / 3, -z / 6, z / 30
-    long = 0.5, 1 / z if z else 0.0, 1 / z if z else 0.0, -1 / z if z else 0.0, 0.0, 1 / (3 * z) if z else 0.0
-    assert_allclose(dissipation_weights(np.array(z)), long if z > 1 else short, rtol=1e-14, atol=1e-110)
-    bends = (0.0, -0.5, 0.5 / z, -1 / z, -0.5 / z, 1 / (3 * z)) if z > 1 else (0.0, 0.0, z / 12, -z / 6, -z / 12, 0.0)
-    assert_allclose(bend_weights(np.array(z)), bends, rtol=1e-14, atol=1e-16)
 
 
 class Identity:
@@ -90,18 +80,6 @@ def motion(t: float) -> Array:
     return np.array([1.0, 0.5, -2.0, 0.0]) * np.sin(3.0 * t) + np.array([0.0, t, 0.0, 1.0])
 
 
-@pytest.mark.parametrize("integrator", ["exponential", "exponential-linear", "backward-euler"])
-def test_stored_energy_is_that_of_the_maps(integrator: Integrator) -> None:
-    """After jumps and 200 uneven steps, to the rounding of the sums."""
-    driven, t = Driven(integrator), 0.0
-    for n in range(200):
-        dt = 0.0 if n % 50 == 0 else 1e-3 * 1.03 ** (n % 70)
-        t += dt or 0.1
-        balance = driven.to(motion(t), dt)
-        if n % 40 == 0:
-            assert_allclose(balance.stored, driven.stored(), rtol=1e-12)
-
-
 @pytest.mark.parametrize("integrator", ["exponential", "exponential-linear"])
 def test_exponential_balance_closes(integrator: Integrator) -> None:
     """Work is of pressures, stored and dissipated energies are of branches; equal but for the rounding of 300 steps,
@@ -113,31 +91,6 @@ def test_exponential_balance_closes(integrator: Integrator) -> None:
         balance = driven.to(motion(t), dt)
         assert np.all(balance.dissipated >= 0.0)
     assert_allclose(balance.stored + balance.dissipated.sum(), balance.work, rtol=1e-12)
-
-
-def test_work_on_a_ramp_is_exact() -> None:
-    """Against the integral of `int_0^t G ds dt` for u = t from rest, whatever the steps; rounding."""
-    driven, t = Driven("exponential"), 0.0
-    for dt in (1e-4, 1e-2, 3.0, 0.5):
-        t += dt
-        balance = driven.to(np.full(4, t), dt)
-    moduli, times = BODY.moduli, BODY.relaxation_times
-    exact = 0.5 * BODY.modulus_inf * t**2 + moduli @ (times * (t + times * np.expm1(-t / times)))
-    assert_allclose(balance.work, 4 * exact, rtol=1e-13)
-
-
-def test_holding_dissipates_what_has_been_stored() -> None:
-    """After a jump each branch loses `G (1 - exp(-2 t/tau))/2` in any number of steps; the work is done at once."""
-    driven = Driven("exponential")
-    jumped = driven.to(np.ones(4), 0.0)
-    assert_allclose(jumped.work, 2 * (BODY.modulus_inf + BODY.moduli.sum()), rtol=1e-15)
-    assert np.all(jumped.dissipated == 0.0)
-    work = jumped.work
-    for dt in (1e-4, 1e-2, 2.0):
-        balance = driven.to(np.ones(4), dt)
-    lost = -2 * BODY.moduli * np.expm1(-2 * 2.0101 / BODY.relaxation_times)
-    assert_allclose(balance.dissipated, lost, rtol=1e-14)
-    assert balance.work == work
 
 
 @pytest.mark.parametrize(

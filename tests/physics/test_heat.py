@@ -15,7 +15,7 @@ from parcontact.physics.exponentials import fit_exponentials, shares_of_step
 from parcontact.physics.flash import flash_of
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.heat import Conductor, Depths, depths_of, sliding_heat
-from parcontact.physics.heat_memory import Heating, HeatMemory, MeanMemory, along_depth
+from parcontact.physics.heat_memory import Heating, HeatMemory
 from parcontact.physics.heat_unbounded import _reaching, sliding_heat_unbounded
 from parcontact.physics.prony import Prony
 from parcontact.physics.roughness import Roughness
@@ -183,17 +183,6 @@ def test_a_bell_of_heat(velocity: tuple[float, float], depths: Depths | None) ->
         assert rise[j, i] == pytest.approx(exact, abs=0.01 * rise.max())
 
 
-def test_the_depth_of_a_wave() -> None:
-    """One wave dissipates at its own wavenumber, whatever the unit of length."""
-    fft = transform(16, 16)
-    x, _ = positions(fft, (1.0, 1.0))
-    prony = Prony(1e6, np.array([1e6]), np.array([1e-3]))
-    spectrum = fft.forward(np.cos(2 * math.pi * 3 * x) * np.ones((16, 1)))
-    found = depths_of(spectrum, fft, HalfSpace((1.0, 1.0)), 1e-3, (0.1, 0.0), prony)
-    assert found.wavenumbers[np.argmax(found.shares)] == pytest.approx(2 * math.pi * 3 / 1e-3, rel=1e-12)
-    assert found.shares.max() == pytest.approx(1.0, abs=1e-12)
-
-
 def rough_pressure(fft: FFT, seed: int) -> np.ndarray:
     """A tenth of a rough surface under pressure."""
     waves = Roughness(0.8, 2.5e-4, 2.5e-4, 6e-5, seed, rms_slope=0.3).spectrum(fft, (LENGTH, LENGTH))
@@ -224,34 +213,9 @@ def test_each_wave_heats_its_own_depths(speed: float, seed: int) -> None:
     assert rises[0] == pytest.approx(rises[1], rel=2e-4, abs=0.0)
 
 
-def test_waves_that_stand_heat_nothing() -> None:
-    """A body without long-term modulus flows under them; one with a millionth of it dissipates the same."""
-    fft = FFT(Slab.alone(32, 32), measured=False)
-    spectrum = fft.forward(rough_pressure(fft, 1))
-    depths = []
-    for spring in (0.0, 1.0):
-        prony = Prony(spring, np.array([9e6, 1e6]), np.array([1e-3, 1.0]))
-        depths.append(depths_of(spectrum, fft, HalfSpace((LENGTH, LENGTH)), 1.0, (1.0, 0.0), prony))
-    assert depths[0].shares.sum() == pytest.approx(1.0, rel=1e-12)
-    assert depths[0].wavenumbers == pytest.approx(depths[1].wavenumbers, rel=1e-6)
-    assert depths[0].shares == pytest.approx(depths[1].shares, rel=1e-3)
-
-
 # -- heat that changes with time: the sum of exponentials keeps its bound, and waves and depths their closed ----------
 
 MEMORY_LENGTH, NX, NY = 1e-3, 16, 6
-
-
-@pytest.mark.parametrize("error", [1e-2, 1e-3, 1e-6, 1e-9])
-@pytest.mark.parametrize("range_", [(1e-6, 1.0), (1e-3, 1e-2)])
-def test_the_sum_keeps_its_bound(error: float, range_: tuple[float, float]) -> None:
-    """At a thousand times of the range; it is not idle: the bound is at most twice what is asked, and half reached."""
-    found = fit_exponentials(*range_, error)
-    times = np.geomspace(*range_, 1000)
-    kept = slice(0, found.kept)
-    series = np.exp(-np.outer(times, found.rates[kept])) @ found.weights[kept] * np.sqrt(np.pi * times)
-    assert np.abs(series - 1.0).max() <= found.bound <= 1.01 * error
-    assert np.abs(series - 1.0).max() > 0.3 * found.bound
 
 
 def test_shares_of_a_step() -> None:
@@ -291,51 +255,6 @@ def test_heat_that_stays() -> None:
         exact = mean + size * (heat - 1.0)
         assert np.abs(rise - exact).max(initial=0.0) < (1e-4 if number < 5 else 1e-5) * size + 1e-7 * mean
         assert made.mean.stored == pytest.approx(3 * time, rel=1e-12)
-
-
-def test_heat_that_slides_becomes_steady() -> None:
-    """A wave that moves, in steps of a 200th of it, after ten waves: the steady one, at the surface and from depth.
-    To 3e-4: steps over which heat changes linearly make (pi/200)^2/3 of it smaller, and e^-9 of the start is left."""
-    depths = Depths(np.array([K]), np.ones(1))
-    speed, turn = 0.05, 2 * math.pi / 200
-    fast = Conductor(0.2, 1e-6)  # forgets in a tenth of the steps
-    beta = np.sqrt(K**2 - 1j * K * speed / fast.diffusivity)
-    dt = turn / (K * speed)
-    for heating, factor in (
-        (Heating((2.0, 2.0)), 1.0),
-        (Heating(pressed=(2.0, 2.0), depths=depths), (1 + beta / (2 * K)) ** -3),
-    ):
-        made = memory(dt, MPI.COMM_SELF, fast)
-        rise = made.fft.slab.empty()
-        made.set_heating(wave(made), wave(made), (1.0, 1.0))
-        for step in range(1, 2001):
-            heat = wave(made, turn * step)
-            made.advance(dt, heating, heat, made.fft.forward(heat).copy(), (1.0, 1.0), rise)
-        x = np.arange(NX) / NX
-        exact = 2.0 / fast.conductivity * (np.exp(1j * (2 * math.pi * 2 * x - turn * 2000)) * factor / beta).real
-        assert np.abs(rise[0] - rise[0].mean() - exact).max() < 3e-4 * np.abs(exact).max()
-
-
-def test_the_depth_of_the_mean() -> None:
-    """Constant heat of one wave: the cosine transform (2), and the mean after a time, by quadrature; to 1e-6."""
-    q, time = 3e4, 2e-3
-    depths = Depths(np.array([q]), np.ones(1))
-    density = lambda z: 4 * q**3 * z**2 * math.exp(-2 * q * z)  # noqa: E731
-    for m in (1.0, 30.0):
-        exact = quad(lambda z, m=m: density(z) * math.cos(m * z / math.sqrt(RUBBER.diffusivity)), 0, 6e-4)[0]
-        assert along_depth(np.array([m**2]), RUBBER, depths)[0] == pytest.approx(exact, rel=1e-6)
-    made = MeanMemory(RUBBER)
-    found = made.advance(time, Heating(pressed=(2.0, 2.0), depths=depths))
-
-    def after(root: float) -> float:
-        reach = 4 * RUBBER.diffusivity * root**2
-        return quad(lambda z: density(z) * math.exp(-(z**2) / reach), 0, 6e-4)[0] if root else 0.0
-
-    exact = 4 / math.sqrt(math.pi) * quad(after, 0, math.sqrt(time))[0] / RUBBER.effusivity
-    assert found[0] == pytest.approx(exact, rel=1e-6)
-    inside = quad(lambda r: 2 * r * depths.staying(np.array([r * r * RUBBER.diffusivity]))[0], 0, math.sqrt(time))
-    assert found[1] == pytest.approx(2 * inside[0] * RUBBER.diffusivity / RUBBER.conductivity, rel=1e-5)
-    assert made.stored == pytest.approx(2 * time, rel=1e-12)
 
 
 @pytest.mark.mpi

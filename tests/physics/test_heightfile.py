@@ -35,32 +35,11 @@ def test_rows(
         assert_array_equal(rows, whole[slab.rows])
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.int16, np.uint8, ">f8"])
-@pytest.mark.parametrize("kind", ["npy", "h5"])
-def test_other_numbers(comm: MPI.Intracomm, shared_path: Path, kind: str, dtype: str) -> None:
-    whole = np.arange(NX * NY).reshape(NY, NX).astype(dtype)
-    path = made(comm, shared_path / f"map.{kind}", lambda path: write(path, whole))
-    slab = Slab(comm, NX, NY)
-    assert_array_equal(heightfile.read_heights(path, "heights", slab), whole[slab.rows].astype(float))
-
-
 def test_columns_first(comm: MPI.Intracomm, shared_path: Path) -> None:
     whole = random_map(NX, NY)
     path = made(comm, shared_path / "map.npy", lambda path: np.save(path, np.asfortranarray(whole)))
     slab = Slab(comm, NX, NY)
     assert_array_equal(heightfile.read_heights(path, "", slab), whole[slab.rows])
-
-
-def test_dataset_in_a_group(comm: MPI.Intracomm, shared_path: Path) -> None:
-    whole = random_map(NX, NY)
-
-    def make(path: Path) -> None:
-        with h5py.File(path, "w") as file:
-            file["measured/left"] = whole
-
-    path = made(comm, shared_path / "map.h5", make)
-    slab = Slab(comm, NX, NY)
-    assert_array_equal(heightfile.read_heights(path, "measured/left", slab), whole[slab.rows])
 
 
 def test_comments_and_empty_lines(comm: MPI.Intracomm, shared_path: Path) -> None:
@@ -86,16 +65,6 @@ def test_other_shape(comm: MPI.Intracomm, shared_path: Path, kind: str, shape: t
 def test_no_map(comm: MPI.Intracomm, shared_path: Path, kind: str, shape: tuple[int, ...]) -> None:
     path = made(comm, shared_path / f"map.{kind}", lambda path: write(path, np.ones(shape)))
     assert f"has shape {shape}" in complaint(comm, path)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_not_finite(comm: MPI.Intracomm, shared_path: Path, kind: str, value: float) -> None:
-    """Wherever it stands: in the rows of one rank only."""
-    whole = random_map(NX, NY)
-    whole[-1, 2:4] = value
-    path = made(comm, shared_path / f"map.{kind}", lambda path: write(path, whole))
-    assert f"2 of its {NX * NY} heights are not finite numbers" in complaint(comm, path)
 
 
 @pytest.mark.parametrize("kind", KINDS)

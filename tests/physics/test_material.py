@@ -4,12 +4,12 @@ from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
-from held import HeldBody
 from numpy.testing import assert_allclose
-from rubbers import TWELVE_DECADES, ZENER, relaxation
+from rubbers import ZENER
+from stepping_body import HeldBody
 
 from parcontact.parallel.slab import Slab
-from parcontact.physics.body import ElasticBody, MovedHeights, ZenerBody
+from parcontact.physics.body import MovedHeights, ZenerBody
 from parcontact.physics.prony import (
     Integrator,
     Prony,
@@ -22,8 +22,7 @@ from parcontact.physics.prony import (
 from parcontact.physics.units import Units
 
 POINT = Slab.alone(1, 1)
-MICRON = 1e-6
-# two Zener branches beside a spring of 0.5 MPa, and the time step of the printed numbers
+# two Zener branches next to a spring of 0.5 MPa, and the time step of the printed numbers
 BRANCHES = ([2e6, 1e6], [1e6, 0.0], [3e3, 1e4])
 TWO = zener_to_prony(*BRANCHES, 0.5e6)
 DT = 0.5e-3
@@ -52,50 +51,7 @@ def load(body: HeldBody, p: float, dt: float, growth: float = 0.0) -> float:
     return float(body.u[0, 0])
 
 
-def branch(body: HeldBody, k: int) -> float:
-    """The part of branch k of the pressure."""
-    return float(body.branches[k, 0, 0])
-
-
 # -- printed numbers, to their twelve digits ---------------------------------------------------------------------------
-
-
-def test_coefficients_of_eq_8() -> None:
-    """alpha, beta and gamma of Eq. (8), printed to 1e-9 of their size."""
-    made = body(TWO, "backward-euler")
-    alpha = made.begin(DT, MovedHeights(np.zeros((1, 1)))).alpha
-    decay, gain, _ = made.body.coefficients(DT)
-    g0, g1, eta1 = (np.array(values) for values in BRANCHES)
-    both = g0 + g1
-    kelvin = 1 + g1 / g0 + eta1 / (g0 * DT)
-    assert_allclose(alpha, 3007936.507936508, rtol=1e-15)
-    assert_allclose(alpha, 0.5e6 + np.sum((g1 + eta1 / DT) / kelvin), rtol=1e-15)
-    assert_allclose(np.sum(eta1 / DT / kelvin), 2285714.285714286, rtol=1e-15)
-    assert_allclose(decay, [2 / 3, 0.9523809523809523], rtol=1e-15)
-    assert_allclose(decay, eta1 / (g0 * DT) / kelvin, rtol=1e-15)
-    assert_allclose(gain, g0**2 / both * decay, rtol=1e-15)
-
-
-@pytest.mark.parametrize(
-    ("integrator", "pressures"),
-    [
-        ("backward-euler", [3.00793650794, 5.67422524565, 8.09979123925, 10.3525348663, 12.4783106898]),
-        ("exponential", [3.19132975075, 5.92223979616, 8.35749337777, 10.5978241831, 12.7050910089]),
-    ],
-)
-def test_steps_of_one_micron(integrator: Integrator, pressures: list[float]) -> None:
-    made = body(TWO, integrator)
-    assert_allclose([push(made, n * MICRON, DT) for n in range(1, 6)], pressures, rtol=1e-11)
-
-
-def test_part_of_one_branch() -> None:
-    """The pressure of the paper's branch is the long-term part of it and what still relaxes."""
-    made = body(TWO, "backward-euler")
-    long_term, parts = 2e6 * 1e6 / 3e6, []
-    for n in range(1, 6):
-        push(made, n * MICRON, DT)
-        parts.append(long_term * n * MICRON + branch(made, 0))
-    assert_allclose(parts, [1.55555555556, 2.81481481481, 3.87654320988, 4.80658436214, 5.6488340192], rtol=1e-11)
 
 
 def test_unit_load_from_rest() -> None:
@@ -117,15 +73,6 @@ def test_exponential_steps_are_exact_on_a_parabola() -> None:
         for modulus, tau in zip(TWO.moduli, TWO.relaxation_times, strict=True):
             exact += 2 * modulus * tau * (t + tau * np.expm1(-t / tau))
         assert_allclose(push(made, t**2, dts[n], dts[n] / dts[n - 1]), exact, rtol=1e-11)
-
-
-def test_exponential_steps_are_exact_on_a_ramp() -> None:
-    """Against the integral of G; rounding grows with the number of steps."""
-    made, dts = body(TWO), [1e-9, 3e-4, 3e-4, 2e-2, 1e-6, 5.0]
-    ends = np.cumsum(dts)
-    moduli, times = TWO.moduli, TWO.relaxation_times
-    exact = TWO.modulus_inf * ends - np.expm1(-ends[:, None] / times) @ (moduli * times)
-    assert_allclose([push(made, t, dt) for t, dt in zip(ends, dts, strict=True)], exact, rtol=1e-14)
 
 
 # -- jumps -------------------------------------------------------------------------------------------------------------
@@ -185,26 +132,6 @@ def test_coefficients_at_extreme_steps(integrator: Integrator, z: float) -> None
     assert_allclose(found, [float(decay), float(gain), float(back)], rtol=1e-15)
 
 
-def test_times_over_eleven_decades() -> None:
-    """After a jump the steps follow the relaxation function, however long they are; rounding."""
-    prony = Prony(1e6, np.full(12, 1e6), 5 * np.logspace(-9, 2, 12))
-    made = body(prony)
-    push(made, 1.0, 0.0)
-    for t, dt in ((1e-7, 1e-7), (1e-4, 1e-4 - 1e-7), (10.0, 10.0 - 1e-4)):
-        assert_allclose(push(made, 1.0, dt), relaxation(t, *prony), rtol=1e-14)
-
-
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_branches_without_a_part(integrator: Integrator) -> None:
-    """G1 = 0 is a Maxwell branch, eta1 = 0 leaves two springs in series, eta1 = inf the spring G0; rounding."""
-    odd = zener_to_prony([2e6, 3e6, 4e6], [0.0, 1e6, 1e6], [2e3, 0.0, np.inf], 1e5)
-    plain = Prony(1e5 + 3e6 * 1e6 / 4e6 + 4e6, np.array([2e6]), np.array([1e-3]))
-    first, second = body(odd, integrator), body(plain, integrator)
-    assert first.branches.shape == (1, 1, 1)
-    for n, dt in enumerate([0.0, 1e-4, 1e-3, 1.0]):
-        assert_allclose(push(first, n + 1.0, dt), push(second, n + 1.0, dt), rtol=1e-15)
-
-
 # -- what it does with maps --------------------------------------------------------------------------------------------
 
 
@@ -223,16 +150,6 @@ def test_moved_heights_are_moved_heights(integrator: Integrator) -> None:
         first.commit(trial, displacement)
         second.commit(same, displacement)
         assert_allclose(second.u, first.u, rtol=0, atol=1e-14)
-
-
-def test_elastic_heights() -> None:
-    slab = Slab.alone(5, 2)
-    base, made = np.arange(10.0).reshape(2, 5), ElasticBody(slab, 3.0)
-    memory = made.at_rest()
-    assert made.begin(memory, 0.0, MovedHeights(base)).effective is base
-    trial = made.begin(memory, 1.0, MovedHeights(base, 2))
-    assert trial.alpha == 3.0
-    np.testing.assert_array_equal(trial.effective, np.roll(base, 2, axis=1))
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
@@ -275,33 +192,6 @@ def test_a_step_that_is_dropped_leaves_the_memory() -> None:
 
 
 # -- discrete moduli of time steps against tables, limits and a march of the body -------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("steps", "omega", "loss_euler", "loss", "storage_euler", "storage"),
-    [
-        (8, 1e4, -23.298, -7.017, 17.124, 15.597),
-        (8, 1e6, -25.827, -6.299, 9.792, 9.312),
-        (16, 1e4, -11.093, -1.662, 9.769, 6.171),
-        (16, 1e6, -12.767, -1.477, 5.904, 3.199),
-        (32, 1e4, -5.380, -0.385, 5.199, 2.258),
-        (32, 1e6, -6.323, -0.348, 3.231, 1.023),
-        (64, 1e4, -2.645, -0.090, 2.680, 0.773),
-        (64, 1e6, -3.143, -0.083, 1.689, 0.299),
-        (128, 1e4, -1.310, -0.022, 1.361, 0.265),
-        (128, 1e6, -1.566, -0.020, 0.864, 0.085),
-    ],
-)
-def test_discrete_modulus_table(
-    steps: int, omega: float, loss_euler: float, loss: float, storage_euler: float, storage: float
-) -> None:
-    """Errors in per cent of a body of twelve decades, printed to 0.001."""
-    exact = complex_modulus(omega, *TWELVE_DECADES)
-    for integrator, table in (("backward-euler", (storage_euler, loss_euler)), ("exponential-linear", (storage, loss))):
-        dt = 2 * np.pi / (steps * omega)
-        stepped = discrete_modulus(omega, dt, *TWELVE_DECADES, integrator=integrator)  # type: ignore[arg-type]
-        errors = 100 * np.array([stepped.real / exact.real - 1, stepped.imag / exact.imag - 1])
-        assert_allclose(errors, table, rtol=0, atol=6e-4)
 
 
 @pytest.mark.parametrize("integrator", ["backward-euler", "exponential-linear", "exponential"])

@@ -13,7 +13,7 @@ from parcontact.effects.interface import shares
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.interface_friction import InterfaceFriction
-from parcontact.physics.measures import SIDE, Measures
+from parcontact.physics.measures import SIDE
 from parcontact.physics.probe import Probe
 from parcontact.physics.shapes import Round
 from parcontact.physics.surface import Surface, single_wave
@@ -58,21 +58,6 @@ def test_pressure_ahead_of_a_wave(comm: MPI.Intracomm, waves: tuple[int, int], c
     assert_allclose(found.max_pressure, slab.reduce((), [p.max(initial=0.0)])[0] * PRESSURE, rtol=1e-14)
     assert (found.contact_area, found.approach) == (1.0, d * UNITS.height)
     assert_allclose(found.mean_gap, 0.0, atol=1e-14 * UNITS.height)
-
-
-def test_partial_contact(comm: MPI.Intracomm) -> None:
-    """Some points carry load; the gap counts everywhere."""
-    surface = wave(comm, (1, 0))
-    slab = surface.slab
-    p, u, h = slab.zeros(), slab.zeros(), slab.zeros()
-    p[:, :4] = 1.5
-    u += 0.5
-    h -= 0.25
-    found = Probe(slab, surface, UNITS).measure(p, ALPHA, u, h, -0.125, p, (0.0, 0.0))
-    assert found.contact_area == 0.25
-    assert_allclose(found.pressure, 0.25 * 1.5 * PRESSURE, rtol=1e-15)
-    assert_allclose(found.mean_gap, 0.875 * UNITS.height, rtol=1e-15)
-    assert_allclose(found.max_pressure, 1.5 * PRESSURE, rtol=1e-15)
 
 
 def test_force_on_a_shape(comm: MPI.Intracomm) -> None:
@@ -139,15 +124,6 @@ def test_area_and_gap_where_points_yield(nx: int, ny: int, periodic: bool, seed:
     area = max(area, whole.sum() / 2.0) if whole.any() else 0.0
     assert_allclose(found.contact_area_corrected, area / (nx * ny), rtol=1e-5)
     assert_allclose(found.mean_gap, gap[whole < 2.0].sum() / (nx * ny) * UNITS.height, atol=1e-13 * UNITS.height)
-
-
-def test_without_load_there_is_no_friction(comm: MPI.Intracomm) -> None:
-    surface = wave(comm, (1, 0))
-    none = surface.slab.zeros()
-    h = surface.heights((0.0, 0.0), surface.slab.empty())
-    found = Probe(surface.slab, surface, UNITS).measure(none, ALPHA, none, h, -1.0, none, (0.0, 0.0))
-    assert found == Measures(approach=-UNITS.height, mean_gap=found.mean_gap)
-    assert_allclose(found.mean_gap, UNITS.height, rtol=1e-14)  # the wave has no mean
 
 
 @pytest.mark.parametrize("touches", [False, True])

@@ -93,22 +93,6 @@ def test_zener_branches_with_and_without_a_long_term_share_are_one_body() -> Non
     assert_allclose(relaxation(times, *whole), relaxation(times, *maxwell), rtol=1e-13)
 
 
-@pytest.mark.parametrize(
-    ("kelvin_modulus", "viscosity", "early", "late"),
-    [
-        (0.0, 10.0, 2.0, 0.0),  # Maxwell: flows in the end
-        (3.0, 0.0, 1.2, 1.2),  # two springs in series
-        (3.0, np.inf, 2.0, 2.0),  # the series spring alone
-        (0.0, np.inf, 2.0, 2.0),
-        (3.0, 10.0, 2.0, 1.2),
-    ],
-)
-def test_limits_of_zener_branch(kelvin_modulus: float, viscosity: float, early: float, late: float) -> None:
-    series = zener_to_prony(2.0, kelvin_modulus, viscosity, modulus_inf=0.5)
-    assert_allclose(relaxation(np.array([1e-14, 1e6]), *series), [0.5 + early, 0.5 + late], rtol=1e-13)
-    assert_allclose(creep(1e12, *series), 1 / (0.5 + late), rtol=1e-12)
-
-
 def test_mistakes_are_sentences() -> None:
     with pytest.raises(ValueError, match="2 moduli but 1 relaxation"):
         normal_form(1.0, [1.0, 2.0], [1.0])
@@ -155,23 +139,3 @@ def test_retardation_times_lie_between_relaxation_times(material: Prony) -> None
     times, later = normal_form(*material).relaxation_times, creep_spectrum(*material).retardation_times
     assert np.all(later >= times[: later.size])  # equal where they differ by less than rounding
     assert np.all(later[: times.size - 1] <= times[1:])
-
-
-@pytest.mark.parametrize("material", BODIES)
-def test_time_of_a_compliance(material: Prony) -> None:
-    spectrum = creep_spectrum(*material)
-    assert spectrum.time(spectrum.glass / 2) == 0
-    most = spectrum.glass + spectrum.compliances.sum()
-    assert (spectrum.time(2 * most) == np.inf) == (spectrum.fluidity == 0)
-    for target in np.geomspace(spectrum.glass * 1.001, most * 0.999, 5) if most > 1.1 * spectrum.glass else []:
-        assert_allclose(spectrum.compliance(spectrum.time(target)), target, rtol=1e-12)
-
-
-def test_shapes_and_units() -> None:
-    t = np.ones((2, 3))
-    assert relaxation(t, *TWELVE_DECADES).shape == creep(t, *TWELVE_DECADES).shape == (2, 3)
-    assert relaxation(1.0, *ZENER).shape == creep(1.0, *ZENER).shape == ()
-    stiffer = Prony(7 * ZENER.modulus_inf, 7 * ZENER.moduli, 3 * ZENER.relaxation_times)
-    assert_allclose(relaxation(3 * t, *stiffer), 7 * relaxation(t, *ZENER), rtol=1e-14)
-    assert_allclose(creep(3 * t, *stiffer), creep(t, *ZENER) / 7, rtol=1e-14)
-    assert_allclose(complex_modulus(t / 3, *stiffer), 7 * complex_modulus(t, *ZENER), rtol=1e-14)

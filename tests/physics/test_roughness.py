@@ -3,7 +3,6 @@
 `ROAD` is the surface of the paper's section 4 on a box of 1 mm: waves 4 <= |n| < 128 of the box.
 """
 
-import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,6 @@ from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.roughness import Roughness, moments, shortest_wave
-from parcontact.physics.surface import single_wave
 
 from .maps import gathered
 
@@ -48,13 +46,6 @@ def test_a_finer_grid_refines_the_same_surface(comm: MPI.Intracomm, roughness: R
     for nx, ny in [(48, 48), (24, 72), (120, 24), (96, 240)]:
         fine = heights_of(roughness, comm, nx, ny)
         assert_allclose(fine[:: ny // 24, :: nx // 24], coarse, rtol=0, atol=1e-14 * 1e-6)
-
-
-@pytest.mark.parametrize(("nx", "ny"), [(24, 24), (25, 31), (40, 27)])
-def test_any_number_of_ranks(communicators: list[MPI.Intracomm], nx: int, ny: int) -> None:
-    alone = heights_of(SMALL, MPI.COMM_SELF, nx, ny)
-    for comm in communicators:
-        assert_allclose(heights_of(SMALL, comm, nx, ny), alone, rtol=0, atol=1e-14 * 1e-6)
 
 
 def test_seeds_differ(comm: MPI.Intracomm) -> None:
@@ -126,18 +117,6 @@ def test_lattice_sums_of_the_road(comm: MPI.Intracomm) -> None:
     assert found.rms_height == pytest.approx(0.2684e-6, abs=5e-11)
 
 
-def test_waves_down_to_two_cells(communicators: list[MPI.Intracomm]) -> None:
-    """The road on 256 points: two cells for the shortest wave, which is just left out; on 512 it is the same."""
-    for comm in communicators[-1:]:
-        coarse, fine = heights_of(ROAD, comm, 256, 256), heights_of(ROAD, comm, 512, 512)
-        assert_allclose(fine[::2, ::2], coarse, rtol=0, atol=1e-13 * np.abs(coarse).max())
-        transform = np.fft.rfft2(coarse)
-        largest = np.abs(transform).max()
-        assert np.abs(transform[:, 128]).max() < 1e-12 * largest
-        assert np.abs(transform[128]).max() < 1e-12 * largest
-        assert np.abs(transform[0, 127]) > 1e-6 * largest
-
-
 @pytest.mark.parametrize("psd_constant", [None, 1e-22])
 def test_no_wave_within_the_limits(comm: MPI.Intracomm, psd_constant: float | None) -> None:
     """Said in one sentence on every rank, instead of a flat surface."""
@@ -157,33 +136,6 @@ def test_one_row(comm: MPI.Intracomm) -> None:
     """Waves along x only."""
     heights = heights_of(SMALL, comm, 64, 1)
     assert np.sqrt(np.mean(heights**2)) == pytest.approx(1e-7, rel=1e-12)
-
-
-def test_no_rank_holds_a_whole_map(comm: MPI.Intracomm) -> None:
-    """What a rank allocates at most while it makes its part: less than five times that part."""
-    fft = FFT(Slab(comm, 512, 512))
-    ROAD.spectrum(fft, BOX)
-    tracemalloc.start()
-    spectrum = ROAD.spectrum(fft, BOX)
-    _, most = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert spectrum.shape == (512, fft.columns.stop - fft.columns.start)
-    assert most < 5 * spectrum.nbytes
-
-
-def test_moments_of_a_wave(comm: MPI.Intracomm) -> None:
-    """h = A cos(q x): <h^2> = A^2/2, <h'^2> = A^2 q^2/2, <(laplace h)^2> = A^2 q^4/2, whatever the mean height."""
-    fft = FFT(Slab(comm, 20, 16))
-    A, q = 1e-6, np.hypot(2 * np.pi * 3 / L, 2 * np.pi * 2 / (2 * L))
-    waves = single_wave(fft, A, (3, -2), 0.7) + single_wave(fft, 5.0, (0, 0), 0.0)
-    found = moments(waves, fft, (L, 2 * L))
-    assert found.rms_height == pytest.approx(A / np.sqrt(2), rel=1e-12)
-    assert found.rms_slope == pytest.approx(A * q / np.sqrt(2), rel=1e-12)
-    assert found.m0 == pytest.approx(A**2 / 2, rel=1e-12)
-    assert found.m2 == pytest.approx(A**2 * q**2 / 4, rel=1e-12)
-    assert found.m4 == pytest.approx(3 / 8 * A**2 * q**4 / 2, rel=1e-12)
-    assert found.nayak == pytest.approx(1.5, rel=1e-12)
-    assert np.isnan(moments(0 * waves, fft, BOX).nayak)
 
 
 def test_a_single_point_has_no_wave() -> None:

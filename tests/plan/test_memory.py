@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from marching import marched
+from marched_jobs import marched
 from mpi4py import MPI
 
 from parcontact import scene
@@ -29,15 +29,6 @@ def test_memory(comm: MPI.Intracomm, name: str) -> None:
     maps = [np.asarray(entry.value) for entry in march.entries().values() if entry.is_map]
     saved = sum(rows.nbytes + 4 * len(rows) for rows in maps)
     assert sum(slab.from_all(saved)) == memory.saved(planned)
-
-
-def test_no_rank_has_more_than_is_planned() -> None:
-    """The last has the most but for the few waves of the surface, which another one may have."""
-    for name, ranks in [("free", 7), ("mixed", 3), ("viscoelastic", 100)]:
-        planned = job(**JOBS[name])
-        most = max(memory.total_bytes(planned, ranks, rank) for rank in range(ranks))
-        waves = memory.holdings(planned, ranks).get("surface spectrum", 0)
-        assert most <= memory.total_bytes(planned, ranks) <= most + waves
 
 
 def test_the_most_that_is_held() -> None:

@@ -58,7 +58,7 @@ def costs_of_a_trial(share: float = 1.0) -> Costs:
     return Costs(job(), Sample(job(), 2, 0.0, 1.0, 0.0, 0, (stage,), share=share), 1e9)
 
 
-def test_what_other_programs_have_disturbed_is_told() -> None:
+def test_what_other_programs_have_disturbed_is_stated() -> None:
     """A trial that waited for its cores: a warning before its times."""
     (quiet, _), (warning, *_) = printed_plan.times(costs_of_a_trial(0.95)), printed_plan.times(costs_of_a_trial(0.46))
     assert "busy" not in quiet
@@ -92,7 +92,7 @@ def test_waiting_for_a_core_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_times_as_people_tell_them(seconds: float, text: str) -> None:
-    """No longer than a column of a table, so that one can be told from the next."""
+    """No longer than a column of a table, so that one can be stated from the next."""
     assert printed_plan.duration_text(seconds) == text
     assert len(text) < 11
 
@@ -103,15 +103,6 @@ def test_steady_states_beside_a_history() -> None:
     assert steady.history == ()
     assert steady.steady is not None
     assert steady.steady.pressures == (1e4,)
-
-
-def test_effects_of_a_curve_alone() -> None:
-    """The plan of a curve lists the effects that a steady state can have; each is one of a run, too."""
-    curve = job(history=[], steady={"velocities": [1e-2], "pressures": [1e5]})
-    names = [
-        [re.split(" {2,}", line.strip())[1] for line in list(printed_plan.effects(each))[1:]] for each in (curve, job())
-    ]
-    assert set(names[0]) == set(printed_plan.OF_STEADY_STATES) < set(names[1])
 
 
 def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: Any) -> None:
@@ -126,10 +117,10 @@ def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert re.search(r"tried: [12] states on 1 rank in", said)
     assert re.search(r"time on 1 rank: \S+ s\*? a state, ", said)
     steady = said[said.index("parcontact steady:") :]
-    told = re.search(r"from the errors of the trial: friction ([\d.]+) % by mesh, area ", steady)
-    assert told
+    stated = re.search(r"from the errors of the trial: friction ([\d.]+) % by mesh, area ", steady)
+    assert stated
     found = pc.steady(planned)
-    assert 0.01 * float(told[1]) == pytest.approx(found.error_friction.mean(), rel=0.2)  # the rest is the solver's
+    assert 0.01 * float(stated[1]) == pytest.approx(found.error_friction.mean(), rel=0.2)  # the rest is the solver's
 
 
 def test_plan_of_a_whole_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

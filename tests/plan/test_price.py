@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from marching import marched
+from marched_jobs import marched
 
 from parcontact.accuracy.budget import ErrorSums
 from parcontact.accuracy.constants import AREA, LINEAR_PAIR, PASSING, VIEWS

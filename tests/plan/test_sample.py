@@ -5,7 +5,7 @@ import time
 from functools import partial
 
 import pytest
-from marching import begun, marched
+from marched_jobs import begun, marched
 from mpi4py import MPI
 
 from parcontact import scene

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawing import ELASTIC, SPHERE, WAVE, outside, touching
+from drawing import ELASTIC, SPHERE, WAVE, touching
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
@@ -65,17 +65,6 @@ def test_errors_and_the_corrected_area(tmp_path: Path, drawn: list[Figure]) -> N
         assert np.allclose(ends, expected)
     assert area.get_ylim()[1] > 0.165  # bars are not cut off, but those of more than all of a value
     assert friction.get_ylim()[1] > 0.2
-
-
-def test_one_key_for_all_panels(tmp_path: Path, drawn: list[Figure]) -> None:
-    """Outside of them, where no line passes."""
-    plots.draw_steady(curve(tmp_path, degrees=(0.0, 20.0, 60.0)))
-    (figure,) = drawn
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["0 °C", "20 °C", "60 °C"]
-    assert len(figure.axes) == 3
-    assert all(axes.get_legend() is None for axes in figure.axes)
-    assert not touching(figure)
-    assert not outside(figure)
 
 
 def test_a_table_without_errors(tmp_path: Path) -> None:

@@ -1,20 +1,17 @@
 """`parcontact plot`: a picture with the panels that a job has."""
 
-import re
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from drawing import AREA, ELASTIC, FRACTION, KINDS, PEAK, SLIDE, SPHERE, WAVE, ZENER, panels, ran
+from drawing import ELASTIC, FRACTION, KINDS, PEAK, SLIDE, SPHERE, WAVE, ZENER, panels, ran
 from matplotlib.figure import Figure
 
 from parcontact.errors import InputError
 from parcontact.plotting import plots
 from parcontact.storage import tables
 from parcontact.summary import theory_settings
-
-BOX = 2e-3**2  # area of the box of a sphere [m^2]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -37,33 +34,10 @@ def test_hertz_beside_the_sphere(tmp_path: Path, drawn: list[Figure]) -> None:
     assert np.abs(p - exact)[inside].max() < 0.02 * exact.max()
 
 
-def test_areas_are_corrected(tmp_path: Path, drawn: list[Figure]) -> None:
-    """In the title of a single solve, to its four digits, and in the panel of a run: by more than a digit."""
-    for kind in ("Hertz", "creep"):
-        (tmp_path / kind).mkdir()
-        plots.plot([ran(tmp_path / kind, KINDS[kind][0])])
-    hertz, creep = (tables.read_columns(tmp_path / kind / "out" / "measures.csv") for kind in ("Hertz", "creep"))
-    (told,) = re.findall(r"contact area (\S+) mm²", drawn[0].get_suptitle())
-    corrected, raw = (hertz[name][-1] * BOX * 1e6 for name in ("contact_area_corrected", "contact_area"))
-    assert abs(float(told) - corrected) < 1e-3 * corrected < abs(corrected - raw)
-    (panel,) = (axes for axes in drawn[1].axes if axes.get_ylabel() == AREA)
-    shown = np.array(panel.get_lines()[0].get_ydata())
-    assert np.allclose(shown, BOX * np.array(creep["contact_area_corrected"])[-shown.size :], rtol=1e-12)
-
-
 def test_no_panel_of_friction_that_is_0(tmp_path: Path, drawn: list[Figure]) -> None:
     """A flat surface slides without friction."""
     plots.plot([ran(tmp_path, WAVE.replace("1.0e-6", "0.0") + ZENER + SLIDE)])
     assert panels(drawn[0]) == [FRACTION, PEAK]
-
-
-def test_peak_of_friction_is_named(tmp_path: Path, drawn: list[Figure]) -> None:
-    stop = SLIDE.replace("}]", "}, {pressure: 1.0e3, duration: 5.0e-3, time_step: 5.0e-4}]")
-    plots.plot([ran(tmp_path, WAVE + ZENER + stop)])
-    axes = drawn[0].axes[0]
-    named = [str(label) for label in axes.get_legend_handles_labels()[1]]
-    assert any(" at " in name and name.endswith("ms") for name in named)
-    assert "stage 1" in [text.get_text() for text in axes.texts]
 
 
 def test_theory_beside_a_run(tmp_path: Path, drawn: list[Figure]) -> None:

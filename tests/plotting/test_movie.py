@@ -64,15 +64,6 @@ def test_a_gif_alone_without_ffmpeg(out: Path, capsys: pytest.CaptureFixture[str
 
 
 @pytest.mark.rendered
-@pytest.mark.parametrize("kind", ["gif", "mp4"])
-def test_one_kind_by_its_name(out: Path, kind: str) -> None:
-    put_ffmpeg()
-    assert asked(out, "--movie", "gap", "--out", f"one.{kind}") == 0
-    assert [path.name for path in Path().glob("one.*")] == [f"one.{kind}"]
-    assert not list(out.glob("gap.*"))
-
-
-@pytest.mark.rendered
 def test_an_ffmpeg_that_fails(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put_ffmpeg("echo 'frames were read' >&2; echo 'no codec' >&2; exit 3")
     assert asked(out, "--movie", "gap") == 2
@@ -87,6 +78,6 @@ def test_a_true_mp4(tmp_path: Path) -> None:
     found = ran(tmp_path, LOADS)
     assert asked(found, "--movie", "pressure") == 0
     command = ["ffmpeg", "-i", str(found / "pressure.mp4"), "-f", "null", "-"]
-    told = subprocess.run(command, capture_output=True, text=True, check=True).stderr
-    assert "frame=    2" in told
+    stated = subprocess.run(command, capture_output=True, text=True, check=True).stderr
+    assert "frame=    2" in stated
     assert files.is_marked(found / "pressure.mp4")

@@ -1,7 +1,6 @@
 """Pictures of a study: everything is on the page, nothing overlaps."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,15 +42,6 @@ def test_quantities_without_an_error_are_left_out(tmp_path: Path, drawn: list[Fi
     assert study_pictures.plot_study(tmp_path, [], {"mu_max": nothing}, {})[0].stat().st_size > 0
     study_pictures.plot_study(tmp_path, [], {"mu_max": nothing, "area_corrected": points(0.5)}, {})
     assert [axes.get_ylabel() for axes in drawn[1].axes] == ["contact area, corrected:\nerror [%]", ""]
-
-
-def test_cases_that_are_alike(tmp_path: Path, drawn: list[Figure]) -> None:
-    """One error, and one case: their axes have a range all the same, without a warning."""
-    alike = [replace(one, error=0.02) for one in points(1.0)]
-    study_pictures.plot_study(tmp_path, [], {"mu_max": alike, "mu_end": alike[:1]}, {})
-    for axes in drawn[0].axes:
-        low, high = axes.get_ylim()
-        assert (low * high, high / low) == (pytest.approx(4.0), pytest.approx(10.0))
 
 
 def test_how_errors_fall(tmp_path: Path, drawn: list[Figure]) -> None:

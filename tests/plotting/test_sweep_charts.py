@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawing import ELASTIC, LOADS, WAVE, outside, touching
+from drawing import outside, touching
 from matplotlib.figure import Figure
 
-from parcontact import job
 from parcontact.plotting import sweep_charts
 from parcontact.plotting.plots import PlotOptions, plot
 
@@ -40,15 +39,6 @@ def test_means_over_seeds_beside_cases_and_theory(tmp_path: Path) -> None:
     assert {one.look["color"] for one in (highest, cases, theory)} == {highest.look["color"]}
     assert [one.name for one in (highest, theory, *dynamic)] == ["highest", "theory, highest", "dynamic", ""]
     assert np.allclose(area.series[0].y, 0.2)
-
-
-def test_corrected_areas_beside_those_of_the_theory(tmp_path: Path) -> None:
-    """The theory has no cells to correct for: its column is that of the contact area."""
-    head = (*HEAD, "theory_contact_area")
-    _, area = sweep_charts.chart_sweep(
-        saved(tmp_path, case(1.0, 1, 3.0, theory=0.25), case(2.0, 1, 4.0, theory=0.35), head=head)
-    )
-    assert {one.name: one.y.tolist() for one in area.series} == {"simulation": [0.2, 0.2], "theory": [0.25, 0.35]}
 
 
 def test_a_second_key_tells_lines_apart(tmp_path: Path) -> None:
@@ -124,27 +114,6 @@ def test_the_picture(tmp_path: Path) -> None:
     (picture,) = plot([saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 4.0))], PlotOptions())
     assert picture == tmp_path / "picture.png"
     assert picture.stat().st_size > 10_000
-
-
-def test_the_title_is_that_of_the_job(tmp_path: Path, drawn: list[Figure]) -> None:
-    """As the first case has it; without a case that of the directory."""
-    saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 4.0))
-    plot([tmp_path], PlotOptions())
-    (tmp_path / "cases" / "000").mkdir(parents=True)
-    (tmp_path / "job.yaml").write_text(f"title: A road at several speeds\n{WAVE}{ELASTIC}{LOADS}")
-    (tmp_path / "cases" / "000" / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
-    plot([tmp_path], PlotOptions())
-    assert [figure.get_suptitle() for figure in drawn] == [tmp_path.name, "A road at several speeds"]
-
-
-def test_dots_of_cases_have_a_key(tmp_path: Path, drawn: list[Figure]) -> None:
-    """Once: those of every line look alike. None where each case is a point of the line."""
-    plot([saved(tmp_path, case(1.0, 1, 3.0), case(1.0, 2, 5.0), case(2.0, 1, 7.0))], PlotOptions())
-    plot([saved(tmp_path, case(1.0, 1, 3.0), case(2.0, 1, 7.0))], PlotOptions())
-    legends = [figure.axes[0].get_legend() for figure in drawn]
-    names = [[text.get_text() for text in legend.get_texts()] for legend in legends if legend is not None]
-    assert names == [["highest", "each case", "theory, highest", "dynamic"], ["highest", "theory, highest", "dynamic"]]
-    assert not touching(drawn[0])
 
 
 def test_many_lines_have_their_key_beside_them(tmp_path: Path, drawn: list[Figure]) -> None:

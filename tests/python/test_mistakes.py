@@ -164,22 +164,6 @@ def test_warnings_are_those_of_python() -> None:
     assert {warning.filename for warning in [*said, *also]} == {__file__}
 
 
-def test_warnings_of_a_run_with_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """They are those of a run in memory, of its surface and of its contact, and are in run.log; none is printed."""
-    odd = {**JOB, "grid": {**JOB["grid"], "boundary": "free"}, "surface": {"shape": "sphere", "radius": 0.1}}
-    told = []
-    for files in ({}, {"output.directory": str(tmp_path / "here")}):
-        with pytest.warns(pc.ParcontactWarning, match="the box") as said:
-            pc.Simulation(odd, files, MPI.COMM_SELF).run()
-        told.append([str(warning.message) for warning in said])
-        assert {warning.filename for warning in said} == {__file__}
-    assert told[0] == told[1]
-    assert "reaches the edge of the box" in told[0][-1]
-    log = (tmp_path / "here" / "run.log").read_text()
-    assert all(f"warning: {text}" in log for text in told[0])
-    assert "warning" not in capsys.readouterr().err
-
-
 def test_a_line_warns_once_of_each_problem() -> None:
     """Python shows a warning once for each line; calls in a fit differ in the numbers of their warnings alone."""
     steep = {**JOB, "surface": {"shape": "wave", "amplitude": 1e-4, "waves": [2, 1]}}

@@ -63,21 +63,6 @@ def test_errors_are_those_that_a_run_says(nowhere: Path, capsys: pytest.CaptureF
         assert f"estimated error of {said}: {per_cent(parts['total'], 3)} (" in out
 
 
-def test_a_file_is_as_good_as_a_mapping(nowhere: Path) -> None:
-    """Also one that PyYAML has read, to which 1e-3 is a text; keys may be replaced."""
-    text = yaml.safe_dump(JOB).replace("1.0e-06", "1e-6")
-    assert yaml.safe_load(text)["surface"]["amplitude"] == "1e-6"
-    (nowhere / "job.yaml").write_text(text)
-    changes = {"grid.points": "16", "history.1.velocity": np.float64(0.2)}
-    runs = [
-        pc.Simulation(job, changes, MPI.COMM_SELF) for job in ("job.yaml", yaml.safe_load(text), nowhere / "job.yaml")
-    ]
-    for run in runs:
-        assert run.job.grid.points == (16, 16)
-        assert run.job.history[1].velocity == (0.2, 0.0)
-        assert run.job == runs[0].job
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -247,17 +232,6 @@ def test_open(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         pc.open("here")
 
 
-def test_a_finished_run_has_its_last_row(nowhere: Path) -> None:
-    """Also one that is restored, of which nothing is left to be done."""
-    (nowhere / "job.yaml").write_text(yaml.safe_dump(JOB))
-    assert main(["job.yaml", "--quiet"]) == 0
-    done = pc.Simulation.restore(nowhere / "out" / "job" / "checkpoint" / f"step-{STEPS}.h5", comm=MPI.COMM_SELF)
-    written = rows_of(nowhere / "out" / "job" / "measures.csv")[-1]
-    assert numbers(done.row) == {name: float(text) for name, text in written.items() if text and name != "seconds"}
-    assert numbers(done.run()) == numbers(done.row)
-    assert done.finished
-
-
 def test_the_example_of_the_readme(nowhere: Path, outside_mpi: dict[str, str]) -> None:
     """As it stands, in the project's directory but for its output."""
     (section,) = re.findall(r"^## From Python\n(.*?)^## ", (ROOT / "README.md").read_text(), re.M | re.S)
@@ -322,16 +296,6 @@ def test_steady_at_temperatures() -> None:
     assert np.all(np.isnan(shifted.temperature))
     with pytest.raises(pc.InputError, match="temperatures"):
         pc.steady(job, [0.05], 1e5, "20:40:3", comm=MPI.COMM_SELF)
-
-
-def test_surface() -> None:
-    """Heights as given, to round-off, with their mean; a mistake names the key."""
-    heights = pc.surface({"shape": "wave", "amplitude": 2e-6, "waves": [1, 2]}, {"points": [8, 6], "size": [8.0, 6.0]})
-    x, y = np.meshgrid(np.arange(8), np.arange(6))
-    assert heights.shape == (6, 8)
-    assert np.allclose(heights, 2e-6 * np.cos(2 * np.pi * (x / 8 + 2 * y / 6)), rtol=0.0, atol=1e-20)
-    with pytest.raises(pc.JobError, match=r"^surface.0?.*waves"):
-        pc.surface({"shape": "wave", "amplitude": 2e-6, "waves": [5, 2]}, {"points": [8, 6], "size": 1.0})
 
 
 def test_material() -> None:

@@ -2,12 +2,7 @@
 
 import math
 import re
-import shutil
-import subprocess
-import sys
-from importlib import util
 from pathlib import Path
-from types import ModuleType
 
 import matplotlib.image
 import numpy as np
@@ -20,8 +15,6 @@ from parcontact import job as jobs
 from parcontact import mesh, scene
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
-from parcontact.plotting import compound_files as files
-from parcontact.rubber import compound
 from parcontact.scene import sanity
 
 from . import truth
@@ -83,17 +76,6 @@ def test_the_slope_comes_back(road: Path, periodic: str, finer: int) -> None:
     assert truth.rms_slope(found, copies * LENGTH) == pytest.approx(expected, rel=0.02)
 
 
-def test_a_smaller_box_takes_the_middle(road: Path) -> None:
-    """Of half the length: the truth there, but near its edges, to 5 % of its height."""
-    found = heights_of(road, MPI.COMM_SELF, POINTS // 2, LENGTH / 2)
-    quarter = POINTS // 4
-    expected = np.load(road / "truth.npy")[quarter : 3 * quarter, quarter : 3 * quarter]
-    inner = slice(8, -8)
-    apart = (found - expected)[inner, inner]
-    assert np.abs(apart - apart.mean()).max() < 0.2 * np.ptp(expected)
-    assert np.std(apart) < 0.05 * np.ptp(expected)
-
-
 def test_a_larger_box_is_refused(road: Path) -> None:
     with pytest.raises(InputError, match=r"the box is 0\.002 m along y, the map only 0\.001 m; make the box smaller"):
         heights_of(road, MPI.COMM_SELF, POINTS, 2 * LENGTH)
@@ -151,19 +133,6 @@ def test_the_verb_surface(road: Path, main: "Main", run_parcontact: "RunParconta
 
 
 # -- what is taken out of a map, and what is doubted ------------------------------------------------------------------
-
-
-def test_waves_that_are_taken_out_are_reported(road: Path) -> None:
-    """By 50 µm of a road with waves down to 40 µm: a ring of its spectrum is missing, and the report says so."""
-    (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=", short_wavelength: 50.0e-6"))
-    setup = scene.set_up(jobs.load(road / "job.yaml"), Slab.alone(POINTS, POINTS))
-    assert setup.remarks.notes[-1] == "road: waves shorter than 50 µm were removed (ideal low-pass)"
-    found = heights_of(road, MPI.COMM_SELF, more=", short_wavelength: 50.0e-6")
-    q = 2 * np.pi * np.fft.fftfreq(POINTS, LENGTH / POINTS)
-    power = np.abs(np.fft.fft2(found)) ** 2
-    beyond = np.hypot(q, q[:, None]) > 2 * np.pi / 49.9e-6
-    assert power[beyond].sum() < 1e-20 * power.sum()
-    assert setup.shortest == pytest.approx(50e-6, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -332,7 +301,7 @@ def test_points_that_stick_out(shared_path: Path, comm: MPI.Intracomm, communica
     heights, high = truth.rough(POINTS, LENGTH, 2.5e-4, 4e-5, SLOPE), 20e-6
     spiked = heights.copy()
     spiked[[60, 90], [70, 100]] += high, -high
-    squares = (2 * np.pi * np.fft.fftfreq(POINTS, LENGTH / POINTS)) ** 2  # a point has all waves alike
+    squares = (2 * np.pi * np.fft.fftfreq(POINTS, LENGTH / POINTS)) ** 2  # a point has all waves identical
     expected = math.sqrt(SLOPE**2 + 2 * (high / POINTS) ** 2 * 2 * squares.mean())
     if comm.rank == 0:
         np.save(shared_path / "road.npy", spiked * 1e6)
@@ -371,37 +340,3 @@ def test_a_profile_is_one_point_wide(fine_map: dict[str, object]) -> None:
     heights = pc.surface(fine_map, {"points": [8, 1], "size": [8 * APART, APART]})
     assert heights.shape == (1, 8)
     assert np.ptp(heights) > 0.0
-
-
-# -- jobs/road: from measured files to friction, against a truth that its script knows --------------------------------
-
-ROAD = Path(__file__).resolve().parents[2] / "jobs" / "road"
-
-
-@pytest.fixture(scope="module")
-def compare(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    """The script that compares, in a directory with the measured files and the material that is fitted to them."""
-    there = tmp_path_factory.mktemp("chain") / "road"
-    there.mkdir()
-    for name in ("make.py", "compare.py", "road.yaml"):
-        shutil.copy(ROAD / name, there)
-    subprocess.run([sys.executable, there / "make.py"], check=True, timeout=120)
-    made = compound.fitted(there / "measured" / "compound.csv", 0.5, 20.0, "wlf", 0.02)
-    list(files.write_compound(made, there / "materials" / "compound.yaml", None))
-    spec = util.spec_from_file_location("compare", there / "compare.py")
-    assert spec
-    assert spec.loader
-    script = util.module_from_spec(spec)
-    spec.loader.exec_module(script)
-    return script
-
-
-def test_friction_of_the_fitted_rubber_and_of_the_treated_road(
-    compare: ModuleType, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """3 % and 5 %, which are asked of the chain; 1 % and 3 % are found."""
-    monkeypatch.setattr(compare, "VELOCITIES", np.array([0.01, 0.3]))
-    truth = compare.friction(material=compare.TRUE_RUBBER, **compare.TRUE_ROAD)
-    assert compare.friction(**compare.TRUE_ROAD) == pytest.approx(truth, rel=0.03)
-    assert compare.friction(material=compare.TRUE_RUBBER) == pytest.approx(truth, rel=0.05)
-    assert truth.min() > 0.02

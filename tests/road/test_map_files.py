@@ -134,15 +134,6 @@ def test_a_line_scan_of_an_instrument(tmp_path: Path) -> None:
     assert odd.size[0] == pytest.approx(x[-1] ** 2 * 24 / 23, rel=1e-12)
 
 
-def test_size_by_pixels_and_a_mark_of_missing_points(tmp_path: Path) -> None:
-    marked = HEIGHTS * 1e6
-    marked[0, 1] = -9999.0
-    np.save(tmp_path / "road.npy", marked)
-    found = read(tmp_path / "road.npy", "um", pixel=(2.5e-6, 2.5e-6), nodata=-9999.0)
-    assert_allclose(found.size, SIZE, rtol=1e-12)
-    assert np.argwhere(np.isnan(found.heights)).tolist() == [[0, 1]]
-
-
 def test_missing_points(tmp_path: Path) -> None:
     """NaN in .npy and .txt, rows that are not there in .xyz."""
     holed = HEIGHTS.copy()
@@ -223,7 +214,7 @@ def test_what_will_not_do(tmp_path: Path, case: str) -> None:
 
 
 def test_a_header_of_gigabytes(tmp_path: Path) -> None:
-    """In a file without so many bytes on the disk: it is not read."""
+    """In a file whose bytes are not on the disk: it is not read."""
     with (tmp_path / "road.npy").open("wb") as file:
         file.write(b"\x93NUMPY\x02\x00\xff\xff\xff\xe0")
         file.truncate(3_900_000_000)

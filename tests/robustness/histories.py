@@ -25,7 +25,7 @@ PRESSURES = {"full": 1e6, "partial": 1e5}  # [Pa]
 
 
 def back_and_forth(periods: int, contact: str, modulus_inf: float = 1e6) -> Job:
-    """Two waves, in full or in partial contact, pressed and slid so many times there and back."""
+    """Two waves, in full or in partial contact, pressed and slid a given number of times there and back."""
     size = 1e-3
     speed, pressure = size / POINTS / DT, PRESSURES[contact]
     ways = [
@@ -93,7 +93,7 @@ class Drift:
 
 
 def drift(periods: int, contact: str, modulus_inf: float = 1e6) -> Drift:
-    """March so many periods, more than SETTLED."""
+    """March a given number of periods, more than SETTLED."""
     job, found = back_and_forth(periods, contact, modulus_inf), Periods()
     run_steps(March(scene.build(job, Slab.alone(POINTS, POINTS))), [found])
     states = np.array(found.states[SETTLED:])
@@ -136,7 +136,7 @@ def in_full_contact() -> Array:
 
 
 def campaign(steps: int) -> bool:
-    """March for so many steps in full and in partial contact; whether nothing drifts."""
+    """March for a given number of steps in full and in partial contact; whether nothing drifts."""
     held = True
     for contact in PRESSURES:
         found = drift(-(-steps // PERIOD), contact)

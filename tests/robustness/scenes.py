@@ -37,7 +37,7 @@ class Storyteller:
     way: tuple[float, float] = (0.0, 0.0)
 
     def history(self, most: int) -> tuple[Json, ...]:
-        """A jump from nothing and up to so many stages."""
+        """A jump from nothing and up to a given number of stages."""
         return (self.jump(), *(self.stage() for _ in range(self.dice.randint(1, most))))
 
     def stage(self) -> Json:
@@ -250,7 +250,7 @@ def box(dice: Random) -> tuple[float, float]:
 
 
 def sketch(dice: Random, stages: int = 6) -> Sketch:
-    """A scene of at most so many stages."""
+    """A scene of at most a given number of stages."""
     body, (ny, nx), size = material(dice), shape(dice), box(dice)
     height = min(size) * decades(dice, -6, 0)
     surface = height * heights(dice, ny, nx)

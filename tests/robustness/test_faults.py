@@ -22,7 +22,6 @@ from parcontact import __main__
 from parcontact.errors import RunError
 from parcontact.storage import console, hdf5
 from parcontact.storage.tables import GrowingTable
-from parcontact.streams import printable
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="starts runs of its own")
 
@@ -39,7 +38,7 @@ SECONDS = 200.0  # in which a run that was hit must have ended
 
 
 class Runs:
-    """Runs of job.yaml in a directory, on two ranks unless told otherwise."""
+    """Runs of job.yaml in a directory, on two ranks unless stated otherwise."""
 
     def __init__(self, where: Path) -> None:
         self.where, self.started = where, list[subprocess.Popen[str]]()
@@ -183,20 +182,6 @@ def test_error_of_one_rank(runs: Runs, tmp_path: Path) -> None:
     assert "a mistake of ours" in said[0]
 
 
-def test_second_run(runs: Runs, tmp_path: Path) -> None:
-    """A second run in the directory of one that is alive is refused, and does it no harm."""
-    out = tmp_path / "out"
-    first = runs.under_way(out)
-    first.send_signal(signal.SIGSTOP)
-    for pid in children(first):
-        os.kill(pid, signal.SIGSTOP)
-    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    code, errors = ended(runs.start(out, ranks=1))
-    assert code == BAD_INPUT
-    assert f"the output directory {out} is in use by another run (process {children(first)[0]} on " in errors
-    assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
-
-
 def test_vanished_directory(runs: Runs, tmp_path: Path) -> None:
     out = tmp_path / "out"
     process = runs.under_way(out, ranks=1)
@@ -308,17 +293,6 @@ def test_reader_that_leaves(here: Path, outside_mpi: dict[str, str]) -> None:
     assert rows(here / "out") == STEPS + 1
 
 
-def test_escapes_in_a_title(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """What would command a terminal is spelt out, in the log too."""
-    assert __main__.main(["job.yaml", "--out", "out", "--set", 'title="\\e[31mred\\a\\u202e"']) == DONE
-    said = capsys.readouterr()
-    log = (here / "out" / "run.log").read_text(encoding="utf-8")
-    for text in (said.out, said.err, log):
-        assert not set(text) & set("\x1b\x07\u202e")
-    assert "\\x1b[31mred\\x07\\u202e: 32 x 24 points" in said.out
-    assert printable("plain µ\ttext\n") == "plain µ\ttext\n"
-
-
 def start(words: Sequence[str], environment: dict[str, str], ranks: int = 1) -> subprocess.Popen[str]:
     launch = [str(BIN / "mpirun"), "-n", str(ranks)] if ranks > 1 else []
     command = [*launch, sys.executable, "-m", "parcontact", *words, "--quiet"]
@@ -338,7 +312,7 @@ def newest(out: Path) -> int:
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
-def test_mpirun_that_is_told_to_end(here: Path, outside_mpi: dict[str, str], number: signal.Signals) -> None:
+def test_mpirun_that_is_asked_to_end(here: Path, outside_mpi: dict[str, str], number: signal.Signals) -> None:
     """Its ranks save the last step that they have made, and it ends with 3 as they do."""
     process = start(["job.yaml", "--out", "out", *LONG], outside_mpi, ranks=2)
     wait_for(process, lambda: rows(here / "out") > 3)
@@ -346,15 +320,6 @@ def test_mpirun_that_is_told_to_end(here: Path, outside_mpi: dict[str, str], num
     process.communicate(timeout=SECONDS)
     assert process.returncode == AGAIN
     assert newest(here / "out") == rows(here / "out") - 1
-
-
-def test_mpirun_that_is_killed(here: Path, outside_mpi: dict[str, str]) -> None:
-    """No rank goes on without it: soon another run may use the directory."""
-    process = start(["job.yaml", "--out", "out", *LONG], outside_mpi, ranks=2)
-    wait_for(process, lambda: rows(here / "out") > 3)
-    process.kill()
-    process.communicate(timeout=SECONDS)
-    assert __main__.main(["job.yaml", "--out", "out", "--quiet", "--until", "1e-9"]) == DONE
 
 
 def test_signal_during_the_start(here: Path, outside_mpi: dict[str, str]) -> None:
@@ -373,7 +338,7 @@ def test_signal_during_the_start(here: Path, outside_mpi: dict[str, str]) -> Non
 def test_full_disk_while_rows_are_written(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The real reason is told, the state is saved, and the same command makes up for the row that had no room."""
+    """The real reason is stated, the state is saved, and the same command makes up for the row that had no room."""
     append = GrowingTable.append
 
     def full(self: GrowingTable, cells: Sequence[str]) -> None:

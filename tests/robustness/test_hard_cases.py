@@ -5,9 +5,9 @@ What is expected and how far off it may be stands with the cases: here, and in p
 
 from collections.abc import Callable
 
-import jgh
 import numpy as np
 import pytest
+import wavy_contact
 from closed_forms import step_responses
 from mpi4py import MPI
 
@@ -357,7 +357,7 @@ def two_waves(bench: Bench) -> None:
 
 
 def _two_waves(bench: Bench, share: float) -> None:
-    full = float(jgh.full_contact_pressure(HEIGHT, WAVELENGTH, GLASSY))
+    full = float(wavy_contact.full_contact_pressure(HEIGHT, WAVELENGTH, GLASSY))
     surface = [{"shape": "wave", "amplitude": HEIGHT / 2, "waves": [1, sign]} for sign in (1, -1)]
     march, rows = bench.march(
         wave([{"pressure": share * full}], points=(64, 64), material=zener(GLASSY, [], []), surface=surface)
@@ -365,9 +365,11 @@ def _two_waves(bench: Bench, share: float) -> None:
     x = np.arange(64) * WAVELENGTH / 64
     measures = rows[-1].measures
     if share >= 1.0:
-        exact = jgh.full_contact_pressure_field(x[None, :], x[:, None], share * full, HEIGHT, WAVELENGTH, GLASSY)
+        exact = wavy_contact.full_contact_pressure_field(
+            x[None, :], x[:, None], share * full, HEIGHT, WAVELENGTH, GLASSY
+        )
         bench.expect_all("Johnson", bench.whole(march, "pressure"), exact, 1e-9)
-    closed = float(jgh.high_load_contact_fraction(share * full, HEIGHT, WAVELENGTH, GLASSY))
+    closed = float(wavy_contact.high_load_contact_fraction(share * full, HEIGHT, WAVELENGTH, GLASSY))
     bench.expect("area, Johnson", measures.contact_area, closed, 0.0 if share > 1 else 12 / 64**2, scale=1.0)
     bench.expect("peak, Johnson", measures.max_pressure, (1.0 + share) * full, 1e-3)
 

@@ -3,7 +3,6 @@
 import errno
 import os
 import resource
-import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -125,27 +124,10 @@ def test_working_directory_that_was_removed(here: Path, main: Main, verb: str) -
     assert said.startswith("parcontact: the working directory cannot be found (No such file or directory): change to")
 
 
-@pytest.mark.parametrize("kind", ["matplotlibrc", "MPLBACKEND"])
-def test_settings_of_others_with_which_matplotlib_does_not_start(
-    here: Path, main: Main, outside_mpi: dict[str, str], kind: str
-) -> None:
-    assert main("job.yaml", "--quiet", "--out", "out")[0] == DONE
-    if kind == "matplotlibrc":
-        (here / kind).write_bytes(b"\xff\xfe: 1")
-    environment = outside_mpi if kind == "matplotlibrc" else {**outside_mpi, kind: "none"}
-    command = [sys.executable, "-m", "parcontact", "plot", "out"]
-    done = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True)
-    assert done.returncode == FAILED
-    assert done.stderr.splitlines()[-1].startswith(
-        "parcontact: Matplotlib cannot start; mend MPLBACKEND, or matplotlib"
-    )
-    assert "Traceback" not in done.stderr
-
-
 def test_pictures_are_as_without_the_settings_of_others(
     here: Path, main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A matplotlibrc beside the job that asks for LaTeX."""
+    """A matplotlibrc next to the job that asks for LaTeX."""
     drawn: list[object] = []
     monkeypatch.setattr(Figure, "savefig", lambda *_, **__: drawn.append(mpl.rcParams["text.usetex"]))
     table = "".join(f"{f:g},{1e6 + 1e5 * f:g},{2e5 + 1e4 * f:g}\n" for f in (0.1, 0.3, 1.0, 3.0, 10.0, 30.0))

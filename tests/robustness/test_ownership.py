@@ -1,8 +1,6 @@
 """Whose an output directory is: nothing of another run or of a user is replaced, followed or lost."""
 
-import fcntl
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -18,7 +16,6 @@ import short_job
 import yaml
 from restarting import ROUGH
 
-import parcontact as pc
 from parcontact import __main__
 from parcontact.march.loop import March
 
@@ -145,7 +142,7 @@ def test_checkpoint_of_another_run(main: Main, tmp_path: Path) -> None:
 
 
 def test_finished_run_without_its_checkpoints(main: Main, tmp_path: Path) -> None:
-    """The same command replaces nothing; with --restart never it does as it is told."""
+    """The same command replaces nothing; with --restart never it does as it is asked."""
     out = tmp_path / "out"
     main("job.yaml", "--out", "out")
     shutil.rmtree(out / "checkpoint")
@@ -159,7 +156,7 @@ def test_finished_run_without_its_checkpoints(main: Main, tmp_path: Path) -> Non
 
 
 def test_results_of_unknown_origin(main: Main, tmp_path: Path) -> None:
-    """Files that bear our names, without a marker, are somebody's: refused, or put aside when told to."""
+    """Files that bear our names, without a marker, are somebody's: refused, or put aside when asked to."""
     out = tmp_path / "out"
     out.mkdir()
     for name in ("measures.csv", "fields.h5", "job.yaml", "notes.txt"):
@@ -223,16 +220,6 @@ def test_another_job_that_left_no_checkpoint(main: Main, tmp_path: Path) -> None
 # -- what others have planted in a directory, or changed in its maps, is neither followed nor lost --------------------
 
 
-def test_planted_picture(main: Main, tmp_path: Path) -> None:
-    """`plot` replaces a link instead of what it leads to."""
-    main("job.yaml", "--out", "out")
-    (tmp_path / "precious").write_text("years of work")
-    (tmp_path / "out" / "picture.png").symlink_to(tmp_path / "precious")
-    assert main("plot", "out")[0] == DONE
-    assert (tmp_path / "precious").read_text() == "years of work"
-    assert (tmp_path / "out" / "picture.png").read_bytes().startswith(b"\x89PNG")
-
-
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # files that are left open then
 @pytest.mark.parametrize(
     ("name", "verb"), [("run.log", ()), ("measures.csv", ()), ("steady.csv", ("steady",)), ("steady.log", ("steady",))]
@@ -255,7 +242,7 @@ def test_planted_links_where_a_run_goes_on(main: Main, tmp_path: Path, name: str
 
 
 def test_locked_fields(main: Main, tmp_path: Path) -> None:
-    """A file that another program holds is neither lost nor replaced: its name is told."""
+    """A file that another program holds is neither lost nor replaced: its name is stated."""
     main("job.yaml", "--out", "out", "--until", "0.003")
     before = contents(tmp_path / "out")
     program = "import h5py, sys; file = h5py.File(sys.argv[1], 'r+'); print(flush=True); sys.stdin.read()"
@@ -345,18 +332,6 @@ def test_by_commands(
     assert said[1] == ""
 
 
-def test_by_python(tmp_path: Path) -> None:
-    """Simulation.save replaces a checkpoint, and nothing else."""
-    path = tmp_path / "mine.h5"
-    path.write_text(MINE)
-    run = pc.Simulation(JOB)
-    run.save(path)
-    run.save(path)
-    assert pc.Simulation.restore(path).row.step == 0
-    assert [found.name for found in sorted(tmp_path.iterdir())] == ["mine.h5", "mine.h5.aside"]
-    assert path.with_name("mine.h5.aside").read_text() == MINE
-
-
 # -- rows of measures.csv that were edited, before a run or a plot ----------------------------------------------------
 
 
@@ -398,26 +373,8 @@ def test_edited_rows(main: Main, tmp_path: Path, edit: Callable[[str], str], mes
     }
 
 
-@pytest.mark.parametrize(
-    ("edit", "message"),
-    [
-        (change(4, lambda line: line.replace(",", ",x", 1)), "measures.csv, line 4: time is 'x"),
-        (change(4, lambda line: line + ",7"), "measures.csv, line 4, has "),
-        (lambda text: "", "measures.csv is empty"),
-    ],
-)
-def test_plot_of_edited_rows(main: Main, tmp_path: Path, edit: Callable[[str], str], message: str) -> None:
-    """The line is named."""
-    main("job.yaml", "--out", "out")
-    path = tmp_path / "out" / "measures.csv"
-    path.write_text(edit(path.read_text()))
-    code, said = main("plot", "out")
-    assert code == BAD_INPUT
-    assert message in said
-
-
 def test_missing_rows(main: Main, tmp_path: Path) -> None:
-    """Told from what the checkpoint says of the table; the run goes on."""
+    """Stated from what the checkpoint says of the table; the run goes on."""
     main("job.yaml", "--out", "out", "--until", "0.003")
     path = tmp_path / "out" / "measures.csv"
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:3]))
@@ -429,29 +386,10 @@ def test_missing_rows(main: Main, tmp_path: Path) -> None:
 # -- while it runs ----------------------------------------------------------------------------------------------------
 
 
-def test_locked_fields_do_not_disturb_a_run(
-    main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path
-) -> None:
-    """HDF5's lock, taken by another program while it runs."""
-    path, locks = tmp_path / "out" / "fields.h5", list[int]()
-
-    def lock() -> None:
-        locks.append(os.open(path, os.O_RDONLY))
-        fcntl.flock(locks[0], fcntl.LOCK_EX)
-
-    at_step(6, lock)
-    try:
-        assert main("job.yaml", "--out", "out") == (DONE, "")
-    finally:
-        os.close(locks[0])
-    with h5py.File(path) as file:
-        assert not np.isnan(file["t"][...]).any()
-
-
 def test_xdmf_that_cannot_be_written(
     main: Main, at_step: Callable[[int, Callable[[], Any]], None], tmp_path: Path
 ) -> None:
-    """It is beside the point: a warning, and every checkpoint."""
+    """It is a warning, and every checkpoint."""
     out = tmp_path / "out"
 
     def block() -> None:

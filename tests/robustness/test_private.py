@@ -160,7 +160,7 @@ def give(path: Path, owner: int, mode: int) -> None:
 
 @as_others
 def test_code_that_somebody_prepared_is_not_loaded(common: Path) -> None:
-    """Compiled code in a common home, with code for others in it; the user's own, beside it, is loaded."""
+    """Compiled code in a common home, with code for others in it; the user's own, next to it, is loaded."""
     program, home, payload = common / "program", common / "home", common / "executed"
     program.mkdir()
     (program / "loops.py").write_text(LOOP)

@@ -32,8 +32,6 @@ numerics: {tolerance: 1.0e-11}
 output: {fields: [pressure, displacement, gap, height]}
 """
 ROWS = "surface={shape: wave, amplitude: 1.0e-6, waves: [3, 1], phase: 0.3}"  # of 3 rows: no rough wave would fit
-RUBBER = "material={model: zener, modulus_inf: 1.0e6, branches: [{modulus: 9.0e6, relaxation_time: 1.0e-3}]}"
-SLIDE = "history=[{pressure: 5.0e3}, {pressure: 5.0e3, velocity: 0.3, distance: 8.0e-5, cells_per_step: 1}]"
 GRIDS = {
     "even": [],
     "free": ["grid.boundary=free"],
@@ -75,17 +73,6 @@ def test_fields_do_not_depend_on_the_ranks(path: Path, communicators: list[MPI.I
             assert found.shape == expected[rows].shape
             assert np.abs(found - expected[rows]).max(initial=0.0) <= 1e-9 * np.abs(expected).max()
         assert together.row.measures.contact_area == alone.row.measures.contact_area
-
-
-@pytest.mark.mpi(4)
-@pytest.mark.parametrize("grid", ["even", "odd, free"])
-def test_friction_agrees(path: Path, communicators: list[MPI.Intracomm], grid: str) -> None:
-    """Of rubber that slides, solved to 1e-8 of the surface's height: to 1e-6 of itself, and it is not small."""
-    overrides = [*GRIDS[grid], RUBBER, SLIDE, "numerics.tolerance=1.0e-8"]
-    expected = solved(path, MPI.COMM_SELF, *overrides).row.measures.friction
-    assert expected > 1e-3
-    for comm in communicators:
-        assert abs(solved(path, comm, *overrides).row.measures.friction / expected - 1.0) <= 1e-6
 
 
 @pytest.mark.mpi

@@ -1,4 +1,4 @@
-"""The same scene told in another way: what must come out alike."""
+"""The same scene described in another way: what must come out identical."""
 
 import math
 from collections.abc import Callable
@@ -13,11 +13,12 @@ from .scenes import Json, Map, Sketch, decades
 
 @dataclass(frozen=True)
 class Twin:
-    """A sketch that must give the same as another: its maps of pressures [Pa] `told` back; `exact` to the last bit."""
+    """A sketch that must give the same as another: its maps of pressures [Pa] `stated` back; `exact` to the last
+    bit."""
 
     name: str
     sketch: Sketch
-    told: Callable[[Map], Map]
+    stated: Callable[[Map], Map]
     exact: bool = False
 
 
@@ -52,7 +53,7 @@ def scaled(dice: Random, of: Sketch) -> Twin:
 
 
 def rescaled(of: Sketch, length: float, modulus: float, time: float) -> tuple[Sketch, Callable[[Map], Map]]:
-    """The same scene in units that are so many times smaller, and what turns its pressures back."""
+    """The same scene in units that are a given number of times smaller, and what turns its pressures back."""
     factors = {
         **dict.fromkeys(("shear_modulus", "modulus_inf", "modulus", "G0", "G1", "pressure"), modulus),
         **dict.fromkeys(("radius", "rms_height", "long_wavelength", "short_wavelength", "approach"), length),

@@ -158,7 +158,7 @@ class Witness:
         return 2.0 * scene.job.numerics.tolerance * self.scales.certified * modulus, 2.0 * self.scales.length * modulus
 
 
-def distance(one: Witness, other: Witness, told: Callable[[Array], Array]) -> float:
+def distance(one: Witness, other: Witness, stated: Callable[[Array], Array]) -> float:
     """How far apart the pressures of two witnesses are, the largest of all steps, over what certificates allow.
 
     Two pressures p of the same load or approach with gaps g that meet the certificate (complementarity and penetration
@@ -171,7 +171,7 @@ def distance(one: Witness, other: Witness, told: Callable[[Array], Array]) -> fl
     """
     folded, largest = abs(one.march.scene.folded.bound - other.march.scene.folded.bound), 0.0
     for step in one.pressures.keys() & other.pressures.keys():
-        p, q = one.pressures[step], told(other.pressures[step])
+        p, q = one.pressures[step], stated(other.pressures[step])
         certified, by_folding = one.blurs[step]
         allowed = (certified + folded * by_folding) * one.march.scene.slab.sum(float(p.sum() + q.sum()))[0]
         apart = energy_of(one.march, p - q)
@@ -217,14 +217,14 @@ def witness(sketch: Sketch, directory: Path, comm: MPI.Intracomm = MPI.COMM_SELF
 
 
 def trial(dice: Random, directory: Path, stages: int = 6) -> Trial:
-    """March a random scene and the same told in another way."""
+    """March a random scene and the same described in another way."""
     sketch = scenes.sketch(dice, stages)
     twin = twins.twin(dice, sketch)
     one, other = witness(sketch, directory), witness(twin.sketch, directory)
-    apart = distance(one, other, twin.told)
+    apart = distance(one, other, twin.stated)
     violations = [*one.violations, *(f"{twin.name}: {sentence}" for sentence in other.violations)]
     alike = {
-        step: np.array_equal(p, twin.told(other.pressures[step]))
+        step: np.array_equal(p, twin.stated(other.pressures[step]))
         for step, p in one.pressures.items()
         if step in other.pressures
     }

@@ -10,7 +10,7 @@ import pytest
 import parcontact as pc
 from parcontact.errors import InputError
 from parcontact.job import Flat, Job, Rough, Sphere, Wave
-from parcontact.rubber import compound, measured_moduli, sane
+from parcontact.rubber import compound, measured_moduli
 from parcontact.rubber.series import Weigh
 from parcontact.rubber.shift import WLF, Factors, read_shift
 from parcontact.scene.measured_range import doubt_band, wave_numbers
@@ -91,17 +91,6 @@ def test_headers_of_instruments(tmp_path: Path, head: str, columns: list[np.ndar
 # -- misfit and scatter ------------------------------------------------------------------------------------------------
 
 
-def test_scatter_is_what_neighbours_differ_by() -> None:
-    """Of 3 %, by 1000 points, to a tenth (its own scatter is 3 %); a smooth curve, of a slope that changes by 1 in a
-    decade, has next to none."""
-    x = np.geomspace(1.0, 1e20, 1000)
-    smooth = np.exp(np.sin(np.log(x)))
-    dice = np.random.default_rng(1)
-    assert sane.scatter([(x, smooth)]) < 1e-5
-    assert sane.scatter([(x, smooth * np.exp(0.03 * dice.standard_normal(1000)))]) == pytest.approx(0.03, rel=0.1)
-    assert np.isnan(sane.scatter([(x[:4], smooth[:4])]))
-
-
 def test_sweeps_that_do_not_overlap(tmp_path: Path) -> None:
     """A fitted law joins sweeps of three decades at -20 and 60 C as it likes; one that is given is not judged."""
     path = measured.write_sweeps(tmp_path / "rubber.csv", temperatures=(-20.0, 60.0))
@@ -124,12 +113,12 @@ def test_moduli_of_no_rubber(tmp_path: Path, unit: str, says: str) -> None:
 
 
 def contradiction(path: Path, factor: float = 3.0) -> Path:
-    """A loss modulus that is so many times what the storage modulus asks for (Kramers-Kronig)."""
+    """A loss modulus that is a given number of times what the storage modulus asks for (Kramers-Kronig)."""
     return sweep(path, "f[Hz],G'[MPa],G''[MPa]", [FREQUENCY, STORAGE, factor * LOSS])
 
 
 def test_moduli_that_contradict_each_other(tmp_path: Path) -> None:
-    """The misfit is not told as scatter, of which there is none; either modulus alone is met to 2 %."""
+    """The misfit is not stated as scatter, of which there is none; either modulus alone is met to 2 %."""
     path = contradiction(tmp_path / "rubber.csv")
     made = compound.fitted(path, 0.5, None, "wlf", 0.02)
     assert made.series.best > 0.2
@@ -241,7 +230,7 @@ def test_temperatures_beyond_the_measured_ones() -> None:
 
 def test_a_curve_from_python_warns_at_its_own_temperatures() -> None:
     """They are not those of the job, whose material has its reference."""
-    with warnings.catch_warnings(record=True, action="always") as told:
+    with warnings.catch_warnings(record=True, action="always") as stated:
         pc.steady(rubber(0.1, band=None), velocities=[0.1], pressures=[1e4], temperatures=[-40.0])
     beyond = "material: -40 C is beyond the -20 to 60 C of its measurement"
-    assert [str(one.message).startswith(beyond) for one in told].count(True) == 1
+    assert [str(one.message).startswith(beyond) for one in stated].count(True) == 1

@@ -16,7 +16,7 @@ from parcontact.rubber.series import PronySeries, Weigh
 from parcontact.rubber.shift import WLF, Arrhenius, Factors, read_shift
 
 from . import measured
-from .bodies import BROAD, DENSE, STEEP, TEN, Body, branches, noisy, write
+from .bodies import BROAD, DENSE, STEEP, TEN, Body, noisy, write
 from .measured import Array
 
 JOB = """
@@ -29,7 +29,7 @@ history: [{pressure: 1.0e4, velocity: 1.0e6, distance: 1.0e-3, cells_per_step: 1
 
 @pytest.mark.rendered
 def test_a_table_becomes_a_material(tmp_path: Path, main: "Main") -> None:
-    """The file is included by a job, the picture has a picture's size, and frequencies beyond the data are told."""
+    """The file is included by a job, the picture has a picture's size, and frequencies beyond the data are stated."""
     measured.write_sweeps(tmp_path / "rubber.csv", noise=0.02)
     job = tmp_path / "job.yaml"
     job.write_text(JOB.replace("{include: rubber}", "{model: elastic, shear_modulus: 1.0e6}"))
@@ -80,7 +80,7 @@ def moduli(tmp_path: Path, head: str, given: tuple[int, int], drawn: "list[Figur
 def test_the_picture_shows_what_was_measured(
     tmp_path: Path, drawn: "list[Figure]", head: str, given: tuple[int, int], label: str, names: list[str]
 ) -> None:
-    """Moduli of the table itself, whatever Poisson's ratio divides Young's by, and a fit of 5 % beside them."""
+    """Moduli of the table itself, whatever Poisson's ratio divides Young's by, and a fit of 5 % next to them."""
     shown, lines = moduli(tmp_path, head, given, drawn)
     assert shown == label
     truth = measured.complex_modulus(2 * np.pi * measured.FREQUENCIES)
@@ -209,17 +209,6 @@ def test_the_stated_error(tmp_path: Path, noise: float) -> None:
     assert np.mean(np.array(ends) < 1.0) >= 0.75
 
 
-def test_a_body_that_flows(tmp_path: Path) -> None:
-    """One without a spring is told to be a liquid, one with a spring is not."""
-    for modulus_inf, told in ((0.0, True), (1e5, False)):
-        body = branches(modulus_inf, np.array([1e6, 1e6]), np.array([1e-2, 1.0]))
-        f = np.geomspace(1e-4, 1e2, 40)
-        g = body.modulus(2 * np.pi * f)
-        table = write(tmp_path / "table.txt", "f[Hz] G'[Pa] G''[Pa]", f, g.real, g.imag)
-        doubts = compound.fitted(table, 0.5, None, "wlf", 0.02).doubts()
-        assert any("flows like a liquid" in text for text in doubts) == told
-
-
 def test_creep(tmp_path: Path) -> None:
     """J(t) of a standard solid in closed form, J_0 + J_1 (1 - exp(-t/lambda)): G* = 1/J* to 2 % in the band, also the
     loss; and the fit shows the same J(t). In tension D = J/3."""
@@ -235,13 +224,3 @@ def test_creep(tmp_path: Path) -> None:
         np.testing.assert_allclose(made.series.modulus(omega)[peak].imag, right[peak].imag, rtol=0.02)
         np.testing.assert_allclose(1.0 / made.series.response("creep", t), compliance, rtol=0.02)
         assert made.doubts() == []
-
-
-def test_creep_of_a_liquid(tmp_path: Path) -> None:
-    """A Maxwell body, J = 1/G + t/eta: its relaxation is G exp(-t G/eta), and it is told to flow."""
-    t, modulus, viscosity = np.geomspace(1e-2, 1e3, 41), 1e6, 1e6
-    table = write(tmp_path / "table.txt", "t[s] J(t)[1/Pa]", t, 1.0 / modulus + t / viscosity)
-    made = compound.fitted(table, 0.5, None, "wlf", 0.01)
-    omega = np.geomspace(0.05, 5.0, 20)
-    np.testing.assert_allclose(made.series.modulus(omega), modulus * 1j * omega / (1.0 + 1j * omega), rtol=0.02)
-    assert any("flows like a liquid" in text for text in made.doubts())

@@ -10,7 +10,6 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from conftest import Main
 from mpi4py import MPI
 from restarting import ELASTIC, FASTER, PRESS, ROUGH, SCENES, SLIDE, TOUCH, Bench, cut, maps, part_way, rows, same
 
@@ -42,12 +41,6 @@ def test_cut_anywhere(bench: Bench, name: str) -> None:
     """k steps, and the other N - k after a restart, equal all N at once; for every k of one scene, that of the initial
     state too, and for some k of the others."""
     cut_anywhere(bench, bench.job(name), name == "viscoelastic")
-
-
-def test_cut_after_steady_start(bench: Bench) -> None:
-    data = bench.job("viscoelastic", history=[SLIDE, FASTER], output={"energy": False, "branch_dissipation": False})
-    initial = {"state": "steady", "velocity": 0.2, "pressure": 1e5}
-    cut_anywhere(bench, data | {"initial": initial}, everywhere=False)
 
 
 def test_the_error_budget_is_that_of_the_whole_run(bench: Bench) -> None:
@@ -172,15 +165,6 @@ def test_falls_back(
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
-def test_restart_never(bench: Bench) -> None:
-    data = bench.job("viscoelastic")
-    out = part_way(bench, data)
-    (out / "checkpoint" / "step-99.h5").write_bytes(b"")
-    assert bench.run(data, out, restart="never") == 0
-    same(bench.where / "whole", out, len(rows(out)) - 1)
-    assert not (out / "checkpoint" / "step-99.h5").exists()
-
-
 def test_restart_from_a_path(bench: Bench) -> None:
     """From an earlier checkpoint of the same directory, whose later ones are put aside; or from another directory."""
     data, whole = bench.job("viscoelastic"), bench.where / "whole"
@@ -196,15 +180,6 @@ def test_restart_from_a_path(bench: Bench) -> None:
     assert bench.run(data, new, restart=str(whole / "checkpoint" / "step-6.h5")) == 0
     assert rows(new) == rows(whole)[7:]
     assert maps(new / f"checkpoint/step-{total}.h5") == maps(whole / f"checkpoint/step-{total}.h5")
-
-
-def test_keeps_the_newest(bench: Bench) -> None:
-    data = bench.job("elastic", checkpoint={"every": 3, "keep": 2})
-    out = bench.where / "out"
-    assert bench.run(data, out) == 0
-    total = len(rows(out)) - 1
-    kept = sorted(int(path.stem[5:]) for path in (out / "checkpoint").iterdir())
-    assert kept == [max(step for step in range(0, total, 3)), total]
 
 
 # -- which settings a run may change when it goes on, and which are refused -------------------------------------------
@@ -299,27 +274,6 @@ def test_surface_file(bench: Bench) -> None:
     with pytest.raises(InputError, match=r"surface\.0\.content was .*, is "):
         bench.run(bench.job("viscoelastic", surface=[surface]), out)
     assert bench.run(moved, out) == 0
-
-
-# -- which maps a run saves: by `output.every` and nothing else -------------------------------------------------------
-
-JOB = """\
-grid: {{points: 16, size: 1.0e-3}}
-surface: {{shape: wave, amplitude: 1.0e-6, waves: [1, 0]}}
-material: {{model: zener, modulus_inf: 1.0e+6, branches: [{{modulus: 1.0e+6, relaxation_time: 1.0e-3}}]}}
-output: {{fields: [gap], every: 3}}
-history: [{{pressure: 1.0e+4, duration: 1.0e-3{steps}}}]
-"""
-
-
-@pytest.mark.parametrize("steps", ["", ", time_step: 1.0e-4"])
-def test_every_third_step_and_the_last(main: Main, tmp_path: Path, steps: str) -> None:
-    """Also where steps are chosen, whose number is not known before; not the state before the first step."""
-    (tmp_path / "job.yaml").write_text(JOB.format(steps=steps))
-    assert main("job.yaml", "--quiet")[0] == 0
-    last = len((tmp_path / "out" / "job" / "measures.csv").read_text().splitlines()) - 2
-    with h5py.File(tmp_path / "out" / "job" / "fields.h5") as file:
-        assert file["step"][:].tolist() == sorted({*range(3, last + 1, 3), last})
 
 
 # -- what a run advises where it is more wrong than asked for ---------------------------------------------------------

@@ -20,7 +20,7 @@ from sweeping import JOB, table
 
 from parcontact.__main__ import main
 from parcontact.doubts import Doubt
-from parcontact.errors import InputError, InUseError, RunError
+from parcontact.errors import InputError, RunError
 from parcontact.job import Case, Job, load_cases
 from parcontact.parallel.groups import Groups
 from parcontact.parallel.signals import Signals
@@ -87,8 +87,8 @@ def test_a_case_that_fails_does_not_stop_the_others(
     assert seeds_done(cases, {1: 1}) == (1, [1, 2, 3, 1, 2, 3])
     assert capsys.readouterr().err == "parcontact: case 1: the third law does not hold; try another planet\n"
     assert [row["state"] for row in table()] == ["-", "failed", "-", "-", "-", "-"]
-    told, _ = info.describe_path(cases[0].job.output.directory.parent.parent)
-    assert told.splitlines()[-1] == "  case 1 failed: the third law does not hold"
+    stated, _ = info.describe_path(cases[0].job.output.directory.parent.parent)
+    assert stated.splitlines()[-1] == "  case 1 failed: the third law does not hold"
     assert seeds_done(cases, {})[0] == 0
     assert [row["state"] for row in table()] == ["-"] * 6
 
@@ -112,16 +112,6 @@ def test_a_finished_case_whose_table_lacks_rows_is_damaged(
     assert len(csv.read_text().splitlines()) == len(whole.splitlines())
 
 
-def test_errors_are_those_that_the_end_of_a_run_tells(cases: tuple[Case, ...]) -> None:
-    """To 1 %: in tables a row that is wrong by more than half counts as 1 or more, in the sum of a run as it is."""
-    assert main(["job.yaml", "--case", "0", "--quiet"]) == 0
-    log = (cases[0].job.output.directory / "run.log").read_text()
-    for name, what in (("error_friction", "friction"), ("error_area", "the corrected contact area")):
-        told = re.search(f"estimated error of {what}: ([0-9.]+) %", log)
-        assert told is not None
-        assert 100.0 * float(table()[0][name]) == pytest.approx(float(told[1]), rel=1e-2)
-
-
 def test_a_sweep_ends_with_its_largest_errors(cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str]) -> None:
     """And warns of the cases in which they are more than the accuracy, here one between those of two cases."""
     two = "sweep={surface.seed: [1, 2]}"
@@ -132,8 +122,8 @@ def test_a_sweep_ends_with_its_largest_errors(cases: tuple[Case, ...], capsys: p
         lines = [line for line in said.out.splitlines() if line.startswith("largest estimated error of ")]
         return lines[-2:], [line for line in said.err.splitlines() if "more than numerics.accuracy asks for" in line]
 
-    told, warned = end("--set", "numerics.accuracy=0.5")
-    for column, what, line in zip(slide.ERRORS, ("friction", "the corrected contact area"), told, strict=True):
+    stated, warned = end("--set", "numerics.accuracy=0.5")
+    for column, what, line in zip(slide.ERRORS, ("friction", "the corrected contact area"), stated, strict=True):
         errors = [float(row[column]) for row in table()]
         worst = errors.index(max(errors))
         assert line == f"largest estimated error of {what}: {100 * max(errors):.3g} %, in case {worst}"
@@ -167,7 +157,7 @@ def test_no_case_begins_when_the_time_is_used_up(cases: tuple[Case, ...], capsys
 def test_groups_of_ranks_take_cases_by_turns(
     shared_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Each unfinished case is done by one group, as many by each; a failure is told and does not stop the others, and
+    """Each unfinished case is done by one group, as many by each; a failure is stated and does not stop the others, and
     a stop file that is made before a case stops all, and stays."""
     (cases, groups), world = cases_in_groups(shared_path, monkeypatch), MPI.COMM_WORLD
     begun: list[int] = []
@@ -186,11 +176,11 @@ def test_groups_of_ranks_take_cases_by_turns(
     assert sweep.SweepRun(cases, groups, act, sweep.stop_file(cases)).run(cases) == 1
     assert groups.from_all(begun) == [list(range(6))[number :: groups.count] for number in range(groups.count)]
     said = capsys.readouterr()
-    told = "".join(world.allgather(said.err)).splitlines()
-    assert "parcontact: case 3: it fell over" in told
-    assert sum("the edge of the box" in line and line.endswith(" (cases 0-5)") for line in told) == 1
+    stated = "".join(world.allgather(said.err)).splitlines()
+    assert "parcontact: case 3: it fell over" in stated
+    assert sum("the edge of the box" in line and line.endswith(" (cases 0-5)") for line in stated) == 1
     rare = f"warning: {Doubt('cells', '', {**CELLS, 'where': 'step 5'})} (case 5)"
-    assert (rare in told) == (groups.count > 1)  # else it was shown at once
+    assert (rare in stated) == (groups.count > 1)  # else it was shown at once
     assert ("case 4: done\n" in "".join(world.allgather(said.out))) == (groups.count > 1)
     if world.rank == 0:
         assert [row["state"] for row in table()] == ["-", "-", "-", "failed", "-", "-"]
@@ -232,9 +222,9 @@ def test_another_jobs_directory_is_refused(cases: tuple[Case, ...], capsys: pyte
     Path("mine").mkdir()
     Path("mine/letter.txt").write_text("Dear")
     before = sorted(Path(".").rglob("*"))
-    for out, told in (("there", "there holds a run of another job: grid.points"), ("mine", "it holds letter.txt")):
+    for out, stated in (("there", "there holds a run of another job: grid.points"), ("mine", "it holds letter.txt")):
         assert main(["job.yaml", "--quiet", "--out", out]) == 2
-        assert told in capsys.readouterr().err
+        assert stated in capsys.readouterr().err
     assert sorted(Path(".").rglob("*")) == before
     sweep.refuse_foreign_sweep(cases)  # the directory of its own job, which may be there already
 
@@ -264,8 +254,8 @@ def test_cases_run_on_ranks_and_only_once(run_parcontact: RunParcontact, tmp_pat
     assert "case 5: history.1.velocity = 0.1, surface.seed = 3 (of 6)\n" in done.stdout
     assert "case 5: done\n" in done.stdout
     assert "results of all cases: out/job/sweep.csv\n" in done.stdout  # what another rank says may come after it
-    told = run_parcontact(["info", "out/job"], ranks=0)
-    assert (told.returncode, told.stdout.splitlines()[-1]) == (0, "  sweep of 6 cases: 6 done")
+    stated = run_parcontact(["info", "out/job"], ranks=0)
+    assert (stated.returncode, stated.stdout.splitlines()[-1]) == (0, "  sweep of 6 cases: 6 done")
     assert (here / "cases" / "004" / "measures.csv").stat().st_mtime_ns == before
     assert "34 x 34 points on 1 rank\n" in (here / "cases" / "005" / "run.log").read_text()
     rows, means = table(directory=here), table("sweep_mean.csv", here)
@@ -297,13 +287,13 @@ def test_nothing_runs_with_a_mistake_in_any_case(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_warning_of_many_cases_is_told_once(run_parcontact: RunParcontact, tmp_path: Path) -> None:
+def test_a_warning_of_many_cases_is_stated_once(run_parcontact: RunParcontact, tmp_path: Path) -> None:
     """With the cases that it holds for; run.log of each has its own. One case alone tells its own as any run does."""
     (tmp_path / "job.yaml").write_text(COARSE)
     done = run_parcontact(["job.yaml", "--quiet"])
     assert done.returncode == 0, done.stderr
-    told = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
-    coarse = [line for line in told if "cells per shortest wave" in line]
+    stated = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
+    coarse = [line for line in stated if "cells per shortest wave" in line]
     assert [line.rpartition(" (")[2] for line in coarse] == ["cases 0-1, 3)"], done.stderr
     text = coarse[0].removeprefix("warning: ").rpartition(" (")[0]
     logs = [(tmp_path / f"out/job/cases/{name}/run.log").read_text() for name in ("000", "001", "002", "003")]
@@ -342,21 +332,6 @@ def test_a_case_that_another_program_runs(
         assert capsys.readouterr().err == f"parcontact: {in_use}"
     assert main(["job.yaml", "--quiet"]) == 0
     assert {row["state"] for row in table()} == {"done"}
-
-
-@pytest.mark.mpi
-def test_groups_that_find_cases_taken(
-    shared_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """One rank of each group says so, and the others go on with it."""
-    (cases, groups), world = cases_in_groups(shared_path, monkeypatch), MPI.COMM_WORLD
-
-    def act(job: Job, slab: Slab, shows: sweep.Shows) -> int:
-        raise InUseError("taken")
-
-    assert sweep.SweepRun(cases[:4], groups, act, sweep.stop_file(cases)).run(cases[:4]) == 0
-    err = "".join(world.allgather(capsys.readouterr().err)).splitlines()
-    assert sorted(err) == [f"parcontact: case {n} is being run by another program: taken" for n in range(4)]
 
 
 def test_tables_are_written_by_one_program_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from marching import column, marched
+from marched_jobs import column, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
@@ -99,21 +99,6 @@ def sliding_wave(layer: dict[str, Any] | None) -> dict[str, Any]:
     return job if layer is None else {**job, "body": layer}
 
 
-@pytest.mark.parametrize("base", ["bonded", "smooth"])
-def test_friction_of_a_wave_in_full_contact(base: Any) -> None:
-    """The pressure of the wave, and with it the friction, is that on a half space over S, at the start and in the
-    march, where the integrator sees 32 steps per wave: 1 %."""
-    thickness, q = 1e-4, 2 * np.pi * 2 / 1e-3
-    ratio = float(Layer(thickness, base).compliance_ratio(np.array(q)))
-    omega, amplitude = q * 0.1, 1e-6
-    loss = 3e6 * omega * 1e-3 / (1 + (omega * 1e-3) ** 2)
-    exact = 0.5 * q * amplitude**2 * 2 * q * loss / ratio / 1e6
-    rows = list(pc.Simulation(sliding_wave({"thickness": thickness, "base": base}), comm=MPI.COMM_SELF).steps())
-    assert rows[0].friction == pytest.approx(exact, rel=1e-6)
-    assert rows[-1].friction == pytest.approx(exact, rel=0.01)
-    assert min(row.contact_area for row in rows) == 1.0
-
-
 def test_energies_balance_on_a_layer() -> None:
     """Work = stored + dissipated, to the tolerance of the solver."""
     job = sliding_wave({"thickness": 1e-4}) | {"initial": {"state": "virgin"}, "output": {"energy": True}}
@@ -151,15 +136,6 @@ def test_theory_of_a_layer_in_full_contact(tmp_path: Any) -> None:
     *_, row = prediction.predict(job, Slab.alone(32, 4), 0.45, "lattice")
     assert row.contact_area == pytest.approx(1.0)
     assert row.friction == pytest.approx(last_row(sliding_wave({"thickness": 1e-4})).friction, rel=0.01)
-
-
-@pytest.mark.mpi
-@pytest.mark.filterwarnings("ignore:.*the contact reaches the edge of the box")
-def test_ranks_agree(comm: MPI.Intracomm) -> None:
-    """Preconditioners sum up in single precision: to 1e-7 of a step, the last of which are 1e-2 of p or less."""
-    for boundary in ("periodic", "free"):
-        job = rough(3e4, boundary, body={"thickness": 1e-4})
-        assert last_row(job, comm).max_pressure == pytest.approx(last_row(job).max_pressure, rel=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -239,30 +215,6 @@ def test_edges_where_the_pressure_ends_at_the_hardness(comm: Any, pressure: floa
     assert measures.contact_area_corrected < measures.contact_area
     opened = comm.allreduce(float(np.maximum(march.field("gap"), 0.0).sum())) / 96**2
     assert measures.mean_gap == pytest.approx(opened, rel=1e-3, abs=1e-4 * 1.5e-6)  # residual of solves; rms height
-
-
-def test_where_all_yields_the_load_is_hardness_times_area() -> None:
-    """All but the rim of the contact of a sphere: a hardness of a twentieth of Hertz's highest pressure."""
-    hardness = 1.5e3
-    march, rows = marched(scene(material={**ELASTIC, "hardness": hardness}))
-    p, measures = march.field("pressure"), rows[-1].measures
-    rim = np.count_nonzero((p > 0.0) & (p < hardness * (1.0 - 1e-12)))
-    assert_allclose(measures.max_pressure, hardness, rtol=1e-12)
-    assert rim < 0.02 * np.count_nonzero(p)
-    assert abs(measures.contact_area * p.size * hardness - p.sum()) <= rim * hardness
-    assert march.field("gap")[p > 0.0].min() < -1e-7  # of some 1e-6 m of approach
-
-
-@pytest.mark.mpi
-def test_steel_of_a_round_hardness(comm: Any) -> None:
-    """1 GPa under 1 MPa on 100 x 100 points, of which ten yield; what people type. The load is made up of these."""
-    steel = {"model": "elastic", "shear_modulus": 8e10, "poisson": 0.3, "hardness": 1e9}
-    rough = {**ROUGH, "long_wavelength": 2.5e-4, "short_wavelength": 4e-5, "rms_slope": 0.2, "seed": 0}
-    grid = {"points": 100, "size": 1e-3}
-    _, rows = marched(scene(grid=grid, surface=rough, material=steel, history=[{"pressure": 1e6}]), comm=comm)
-    assert rows[-1].measures.contact_area == 1e-3
-    assert_allclose(rows[-1].measures.max_pressure, 1e9, rtol=1e-12)
-    assert_allclose(rows[-1].measures.pressure, 1e6, rtol=1e-12)
 
 
 @pytest.mark.mpi

@@ -12,7 +12,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from marching import column, marched
+from marched_jobs import column, marched
 from numpy.testing import assert_allclose
 
 import parcontact as pc

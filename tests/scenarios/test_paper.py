@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from marching import JOBS, load_script, marched
+from marched_jobs import JOBS, load_script, marched
 from numpy.typing import NDArray
 
 from parcontact.derived import prediction

@@ -1,4 +1,4 @@
-"""What each precision promises: loads, certificates, and results beside those of double precision."""
+"""What each precision promises: loads, certificates, and results next to those of double precision."""
 
 import math
 import random
@@ -12,18 +12,16 @@ import numpy as np
 import pytest
 import yaml
 from conftest import Main
-from judging import HERE, Json, job_of, rough_heights
-from judging import run as warnings_of
-from marching import begun, column, marched
-from mpi4py import MPI
+from judged_scenes import Json, job_of, rough_heights
+from judged_scenes import run as warnings_of
+from marched_jobs import begun, column, marched
 from numpy.typing import NDArray
 from short_job import JOB
 
 from parcontact import scene
 from parcontact.history.timeline import Timeline
-from parcontact.job import Job, load_cases
+from parcontact.job import Job
 from parcontact.march.failure import StepError
-from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Slab
 from parcontact.physics.measures import Measures
 from parcontact.physics.probe import Probe
@@ -31,34 +29,11 @@ from parcontact.scene import sanity
 from parcontact.solve.certificate import Certificate
 
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "rms_slope": 0.02, "seed": 1}
-RUBBER = {"model": "elastic", "shear_modulus": 1e6}
 DECADES = {
     "model": "zener",
     "modulus_inf": 1e6,
     "branches": [{"modulus": 3e6, "relaxation_time": 10.0**decade} for decade in (-6, -5, -4, -3)],
 }
-
-
-def mean(march: March) -> float:
-    """Of the pressure [Pa], from a sum without rounding of all points of all ranks."""
-    rows = [math.fsum(row) for row in march.field("pressure").astype(np.float64)]
-    slab = march.scene.slab
-    return math.fsum(math.fsum(part) for part in slab.from_all(rows)) / slab.points
-
-
-@pytest.mark.mpi(3)
-@pytest.mark.parametrize(("precision", "limit"), [("double", 1e-14), ("mixed", 1e-14)])
-def test_mean_load(comm: MPI.Intracomm, precision: str, limit: float) -> None:
-    """Sums taken row by row lose some ten roundings, whatever the grid and the ranks; at 4096 x 4096 it was 7e-16."""
-    loads = [1e3, 1e4, 3.3333e4]
-    surface = {**ROUGH, "short_wavelength": 3e-5}
-    data = {"grid": {"points": [512, 256], "size": 1e-3}, "surface": surface, "material": RUBBER}
-    found: list[float] = []
-    run_steps(
-        begun({**data, "history": [{"pressure": load} for load in loads], "numerics": {"precision": precision}}, comm),
-        [lambda now: found.append(mean(now))],
-    )
-    np.testing.assert_allclose(found[1:], loads, rtol=limit)
 
 
 Results = tuple[dict[str, NDArray[np.float64]], NDArray[np.float64], int]
@@ -96,20 +71,6 @@ def test_marches_beside_double_precision(boundary: str) -> None:
         assert np.abs(series[name] - double[name]).max() <= allowed * np.abs(double[name]).max(), name
     assert np.abs(found - p).max() <= 1e-7 * p.max()
     assert took <= 1.1 * calls
-
-
-@pytest.mark.parametrize("boundary", ["periodic", "free"])
-def test_loose_marches_beside_double_precision(boundary: str) -> None:
-    """With an operator in single precision, too: rounding may end a solve an iteration sooner or later, so that results
-    agree to the tolerance of what is largest (measured: 2e-7 to 1e-4), with at most a fifth more calls (measured: a
-    tenth, of the free body)."""
-    tolerance = 1e-3
-    double, p, calls = results(boundary, "double", tolerance, energy=False)
-    series, found, took = results(boundary, "mixed", tolerance, energy=False)
-    for name in NAMES[:4]:
-        assert np.abs(series[name] - double[name]).max() <= tolerance * np.abs(double[name]).max(), name
-    assert np.abs(found - p).max() <= tolerance * p.max()
-    assert took <= 1.2 * calls
 
 
 @pytest.mark.parametrize(("tolerance", "kept"), [(1e-3, np.float32), (0.9e-3, np.float64)])
@@ -186,20 +147,8 @@ def test_no_run_and_no_point_of_a_curve_is_one(
     assert (code, (shown + errors).count(said)) == (1, times)
 
 
-# -- of no sound scene anything is told -------------------------------------------------------------------------------
-
-OURS = sorted(
-    path for path in HERE.rglob("*.yaml") if path.parent.name != "road" and path.stem != "rubber"
-)  # that one: tests/road/test_jobs.py
-
-
-@pytest.mark.parametrize("path", OURS, ids=lambda path: path.stem)
-def test_no_job_of_ours_is_told(path: Path) -> None:
-    """Of a sweep, the last case: that over the size of the box begins with boxes that are told to be too small."""
-    job = load_cases(path)[-1].job
-    assert job.warnings == ()
-    if sanity.is_quickly_made(job):
-        assert sanity.check_heights(scene.set_up(job, Slab.alone(*job.grid.points))) == []
+# -- of no sound scene anything is stated
+# -------------------------------------------------------------------------------
 
 
 def sound(dice: random.Random, directory: Path) -> Job:
@@ -249,7 +198,7 @@ def _measured(dice: random.Random, directory: Path) -> Job:
     return job_of({"shape": "file", "path": str(path)}, history, material=material)
 
 
-def test_no_sound_scene_is_told(tmp_path: Path) -> None:
+def test_no_sound_scene_is_stated(tmp_path: Path) -> None:
     """50 random ones, each with its heights and its steps."""
     dice = random.Random(12)
     for number in range(50):

@@ -1,6 +1,5 @@
 """A surface that slides on a viscoelastic body: order in time, energies, directions."""
 
-import tracemalloc
 import warnings
 from pathlib import Path
 from typing import Any
@@ -9,16 +8,14 @@ import numpy as np
 import pytest
 from closed_forms import step_responses
 from conftest import Main, RunParcontact
-from marching import JOBS, PRONY, SLS, column, example, marched
+from marched_jobs import JOBS, PRONY, SLS, column, example, marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
-from rubbers import relaxation
-from sliding import CELL, FAST, HEIGHT, MEAN, PRESS, TYRE, WAVELENGTH, Json, K, rough, slide, wave
+from sliding import CELL, FAST, HEIGHT, MEAN, PRESS, WAVELENGTH, Json, K, rough, slide, wave
 
 import parcontact as pc
 from parcontact.march.loop import March
-from parcontact.parallel.fft import BLOCK_BYTES
 from parcontact.physics.prony import Integrator
 from parcontact.storage import tables
 from parcontact.storage.step_row import StepRow
@@ -155,25 +152,6 @@ def test_friction_is_what_is_dissipated() -> None:
     assert_allclose(power(last, WAVELENGTH**2)[-1], lost, rtol=1e-3)
 
 
-def test_quarters_of_cells() -> None:
-    """64 quarters of a cell and 16 cells: the same heights to 1e-9; friction to 1e-3, as both resolve the time."""
-    waves = [([1, 0], 5e-7), ([1, 1], 3e-7), ([2, -1], 5e-8)]
-    found = []
-    for cells in (1, 0.25):
-        stage = {"velocity": 0.02, "distance": 16 * WAVELENGTH / 256, "cells_per_step": cells}
-        data = wave([{"duration": 5e-3, "time_step": 5e-3}, stage], points=(256, 32), tolerance=1e-8)
-        data["history"][0]["pressure"] = data["history"][1]["pressure"] = 3e4
-        data["surface"] = [{"shape": "wave", "amplitude": a, "waves": w} for w, a in waves]
-        march, rows = marched(data)
-        base, offset = march.scene.motion.at(march.state.contact.last.position).parts
-        found.append((np.roll(base, offset, axis=1), rows[-1].measures, len(rows)))
-    (heights, whole, steps), (same, quarters, more) = found
-    assert (steps, more) == (19, 67)
-    assert_allclose(same, heights, rtol=0, atol=1e-9 * float(np.ptp(heights)))
-    assert whole.contact_area < 0.95
-    assert_allclose(quarters.friction, whole.friction, rtol=1e-3)
-
-
 def test_along_y_as_along_x(tmp_path: Path) -> None:
     """A surface that slides along y is the transposed one along x: the same to 1e-7 of solves at 1e-10, at the cost."""
     rng = np.random.default_rng(3)
@@ -222,11 +200,6 @@ STEADY = [
 ]
 
 
-def traction(rows: list[StepRow]) -> NDArray[np.float64]:
-    """Tangential force over normal force, along x."""
-    return column(rows, "force_x") / (column(rows, "pressure") * WAVELENGTH**2)
-
-
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize(("velocity", "exponential", "euler"), STEADY)
 def test_steady_friction(integrator: Integrator, velocity: float, exponential: float, euler: float) -> None:
@@ -258,45 +231,6 @@ def test_error_of_a_step_in_full_contact() -> None:
     assert true < errors.friction.time < 3.0 * true
 
 
-def transient(before: float, after: float, steps: int, integrator: Integrator) -> float:
-    """Largest error, over the largest exact value, in 5 ms after 20 ms at one velocity and then at another."""
-    stages = [{"duration": 20e-3, "time_step": 20e-3 / (4 * steps if before else 1), "velocity": before}]
-    stages += [{"duration": 5e-3, "time_step": 5e-3 / steps, "velocity": after}]
-    _, rows = marched(wave(stages, points=(8, 1), integrator=integrator))
-    late = [row for row in rows if row.time > 20.0001e-3]
-    t = column(late, "time") - 20e-3
-    modulus = step_responses.velocity_step_modulus(t, K * before, np.array([K * after]), *PRONY)
-    exact = full_contact.traction(HEIGHT, np.array([K]), np.array([0.0]), modulus)[:, 0] / MEAN
-    return float(np.abs(traction(late) - exact).max() / np.abs(exact).max())
-
-
-def test_start_after_a_rest() -> None:
-    """Load, 1 ms of rest, sliding: within 1e-6 of the peak at 500 steps in 5 ms, with order 3."""
-    errors = []
-    for steps in (125, 250, 500):
-        sliding = {"duration": 5e-3, "time_step": 5e-3 / steps, "velocity": FAST}
-        stages = [{"duration": 1e-3, "time_step": 1e-3}, sliding]
-        _, rows = marched(wave(stages, points=(8, 1)))
-        late = rows[2:]
-        t = column(late, "time") - 1e-3
-        modulus = step_responses.load_rest_slide_modulus(t, 1e-3, np.array([K * FAST]), *PRONY)
-        exact = full_contact.traction(HEIGHT, np.array([K]), np.array([0.0]), modulus)[:, 0] / MEAN
-        errors.append(float(np.abs(traction(late) - exact).max() / np.abs(exact).max()))
-    assert errors[-1] < 1e-6
-    assert_allclose(np.log2(errors[:-1]) - np.log2(errors[1:]), 3.0, rtol=0.05)
-    printed = [0, -1.20719, -2.35062, -5.32082, -8.62804, -10.6389, -9.73556]
-    at = np.array([0, 0.1, 0.2, 0.5, 1, 2, 5]) * 1e-3
-    assert_allclose(np.interp(at, t, traction(late)), 1e-4 * np.array(printed), rtol=0, atol=5e-6 * 1e-4 * 11)
-
-
-@pytest.mark.parametrize(
-    ("integrator", "order"), [("exponential", 3.0), ("exponential-linear", 2.0), ("backward-euler", 1.0)]
-)
-def test_order_of_a_velocity_step(integrator: Integrator, order: float) -> None:
-    coarse, fine = (transient(0.004, FAST, steps, integrator) for steps in (100, 200))
-    assert_allclose(np.log2(coarse / fine), order, rtol=0.05)
-
-
 @pytest.mark.parametrize("waves", [(1, 1), (2, 1), (1, -2)])
 def test_oblique_waves(waves: tuple[int, int]) -> None:
     """Sliding along x: mu = |q| kx h0^2 G''(kx v)/P0 of these steps; and a force across. To 1e-9."""
@@ -315,32 +249,6 @@ def test_oblique_waves(waves: tuple[int, int]) -> None:
     assert_allclose(data.friction, mu * np.hypot(kx, ky) / kx, rtol=1e-9 + 3 * settled)
 
 
-@pytest.mark.parametrize("direction", [(1.0, 0.0), (0.0, 1.0), (0.6, -0.8)])
-def test_only_motion_along_a_wave_dissipates(direction: tuple[float, float]) -> None:
-    """A wave along y (or x) that slides along x (or y) relaxes as at rest: amplitude 2 k h0 G(t), no friction."""
-    velocity = (FAST * np.array(direction)).tolist()
-    stage = {"velocity": velocity, "duration": 2e-3, "time_step": 2e-4}
-    for waves, along in (((1, 0), direction[0]), ((0, 1), direction[1])):
-        march, rows = marched(wave([stage], waves, (16, 16)))
-        amplitude = np.ptp(march.field("pressure")) / 2
-        if along == 0.0:
-            assert amplitude == pytest.approx(float(2 * K * HEIGHT * relaxation(2e-3, *PRONY)), rel=1e-12)
-            assert_allclose(column(rows, "friction"), 0.0, atol=1e-15)
-        else:
-            assert rows[-1].measures.friction > 1e-4
-
-
-def test_a_reversal_changes_the_sign_of_friction_x() -> None:
-    """`-force_x` over the normal force to rounding, past 0 after the reversal, where `friction` has a cusp."""
-    there, back = ({"velocity": speed, "distance": 16 * CELL, "cells_per_step": 1} for speed in (FAST, -FAST))
-    _, rows = marched(wave([there, back]))
-    signed, magnitude = (column(rows, name) for name in ("friction_x", "friction"))
-    assert_allclose(signed[1:], -traction(rows[1:]), rtol=1e-14)
-    assert np.array_equal(np.abs(signed), magnitude)
-    assert np.all(signed[2:17] > 0.0)
-    assert signed[-1] < 0.0
-
-
 @pytest.mark.parametrize(("cells", "boundary"), [(3.0, "periodic"), (2.25, "periodic"), (2.25, "free")])
 def test_height_is_where_the_surface_is(tmp_path: Path, cells: float, boundary: str) -> None:
     """`h0(x - s)` with its mean, to 1e-12 of it, which the gap is counted from; 10 roundings of each length."""
@@ -357,22 +265,6 @@ def test_height_is_where_the_surface_is(tmp_path: Path, cells: float, boundary: 
 
 
 # -- the examples of jobs/ that slide, as they promise ----------------------------------------------------------------
-
-
-def test_example_of_full_contact() -> None:
-    """What jobs/full_contact.yaml promises, to its four digits and the 1e-4 of its steps."""
-    _, rows = marched(example("full_contact"))
-    t, friction = column(rows, "time"), column(rows, "friction")
-    ends = [20e-3, 30e-3, 40e-3]
-    assert_allclose(np.interp(ends, t, friction), [1.945e-4, 9.771e-4, 9.771e-4], rtol=5e-4)
-    peaks = [(20e-3, 30e-3, 1.178e-3, 1.47e-3), (30.6e-3, 40e-3, 1.108e-3, 2.36e-3 - 0.6e-3)]
-    for start, end, highest, when in peaks:
-        there = (t > start) & (t < end)
-        assert friction[there].max() == pytest.approx(highest, rel=5e-4)
-        assert t[there][friction[there].argmax()] - start == pytest.approx(when, abs=5e-5)
-    force = column(rows, "force_x")
-    assert np.all(np.abs(np.diff(force[t > 1e-3])) < 0.05 * np.abs(force).max())  # it does not jump
-    assert friction[-1] == pytest.approx(9.771e-4 * np.exp(-5.0), rel=5e-3)
 
 
 def test_example_of_a_sphere() -> None:
@@ -411,43 +303,10 @@ def calls_per_step(points: int, history: list[Json], tolerance: float = 5e-3) ->
     return float(np.mean(column(rows[11:], "operator_calls"))), rows[-1].measures.friction
 
 
-@pytest.mark.parametrize(
-    ("most", "change"),
-    [(11, {}), (11, {"velocity": [0.0, 0.3]}), (13, {"cells_per_step": 0.25}), (15, {"velocity": [0.2, 0.2]})],
-)
-def test_warm_starts_save_work(most: float, change: Json) -> None:
-    """A start that moves with the surface and is extrapolated: 9, 9, 10 and 13 operator applications are measured."""
-    cells = 8 if "cells_per_step" in change else 30
-    calls, _ = calls_per_step(512, [slide(512, cells, **change)])
-    assert calls < most
-
-
 def test_tolerance_of_friction() -> None:
     """At the default tolerance, 5e-3, friction is good to 1e-3."""
     stages = [slide(256, 30)]
     assert calls_per_step(256, stages)[1] == pytest.approx(calls_per_step(256, stages, 1e-7)[1], rel=1e-3)
-
-
-@pytest.mark.mpi(3)
-@pytest.mark.parametrize("velocity", [0.3, [0.0, 0.3]])
-def test_memory(comm: MPI.Intracomm, velocity: Any) -> None:
-    """At most one map of a rank's rows per branch and 14 more, counted and traced, beside the blocks of transforms
-    and the larger cells of the preconditioner: two maps of 4 bytes on 1/4 + 1/16 + ... of the points, of which several
-    ranks have the largest cells all, less than half a map in all."""
-    data = rough(1024, [slide(1024, 2, velocity=velocity)], numerics={"tolerance": 0.1})
-    data["material"] = {**TYRE, "branches": TYRE["branches"][:2]}  # type: ignore[index]
-    blocks = 4 * BLOCK_BYTES
-    marched({**data, "grid": {**data["grid"], "points": 128}, "numerics": {"accept_unconverged": True}}, comm=comm)
-    tracemalloc.start()
-    try:
-        march, rows = marched(data, comm=comm)
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    maps = 8 * march.scene.slab.shape[0] * 1024
-    assert len(rows) == 4
-    assert march.scene.slab.tally["map bytes"] <= 16 * maps + blocks
-    assert peak <= 16.5 * maps + blocks
 
 
 @pytest.mark.mpi(3)
@@ -486,7 +345,7 @@ def friction(points: int, surface: Any, body: Any, speed: float, boundary: str =
     grid = {"points": points, "size": 1e-3, "boundary": boundary}
     job = {"grid": grid, "surface": surface, "material": body, "numerics": {"accuracy": 0.003}}
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # coarse meshes are told
+        warnings.simplefilter("ignore", UserWarning)  # coarse meshes are stated
         curve = pc.steady(job, velocities=[speed], pressures=[1e4])
     return curve.friction[0], curve.error_friction[0]
 

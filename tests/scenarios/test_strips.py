@@ -133,7 +133,7 @@ def test_a_surface_slides_along_x_for_ever_and_along_y_once() -> None:
         assert off.run()["contact_area"] == 0.0
 
 
-def test_contact_at_the_free_edges_alone_is_told() -> None:
+def test_contact_at_the_free_edges_alone_is_stated() -> None:
     along_y = pc.Simulation(job([32, 32], surface={"shape": "cylinder", "radius": R, "axis": "y"}), comm=MPI.COMM_SELF)
     along_x = pc.Simulation(job([32, 32]), comm=MPI.COMM_SELF)
     with pytest.warns(UserWarning, match="reaches the edge of the box"):

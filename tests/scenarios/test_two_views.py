@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from marching import marched
+from marched_jobs import marched
 
 import parcontact as pc
 from parcontact.accuracy.budget import ErrorSums
@@ -27,7 +27,7 @@ FIVE = [  # Hurst exponent, rms slope, body, pressure [Pa], velocity [m/s]: fric
 
 
 def scene(cells: int, body: Json, hurst: float = 0.8, slope: float = 0.1, **more: Any) -> Json:
-    """A rough surface with so many cells per shortest wave."""
+    """A rough surface with a given number of cells per shortest wave."""
     rough = {"shape": "rough", "hurst": hurst, "long_wavelength": 2.5e-4, "short_wavelength": CELLS, "rms_slope": slope}
     grid = {"points": 16 * cells, "size": 1e-3}
     return {"grid": grid, "surface": {**rough, "seed": 1}, "material": body, "history": [{"pressure": 1e5}], **more}
@@ -35,7 +35,7 @@ def scene(cells: int, body: Json, hurst: float = 0.8, slope: float = 0.1, **more
 
 def steady(data: Json, velocity: float, pressure: float) -> Curve:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # coarse meshes are told
+        warnings.simplefilter("ignore", UserWarning)  # coarse meshes are stated
         return pc.steady(data, velocities=[velocity], pressures=[pressure], set={"numerics.tolerance": 2e-4})
 
 
@@ -44,7 +44,8 @@ def test_friction_by_energy_on_coarse_meshes(
     hurst: float, slope: float, body: Json, pressure: float, velocity: float
 ) -> None:
     """Within 3 % with 4 cells per shortest wave, 1 % with 8, of that with 32; its estimate is at least half of its
-    error, beside what the solver may make of both (2e-4). The force across is small: `friction_slopes` counts it."""
+    error, in addition to what the solver may make of both (2e-4). The force across is small: `friction_slopes` counts
+    it."""
     exact = steady(scene(32, body, hurst, slope), velocity, pressure).friction[0]
     for cells, bound in ((4, 3e-2), (8, 1e-2)):
         found = steady(scene(cells, body, hurst, slope), velocity, pressure)
@@ -56,8 +57,9 @@ def test_friction_by_energy_on_coarse_meshes(
 
 @pytest.mark.parametrize("radius", [2.0, 4.0])
 def test_estimates_of_fast_small_spots(radius: float) -> None:
-    """A sphere with a spot of so many cells, in four places between the points, on a body that loses most of the work:
-    the estimate is 0.4 of each error at least, and in the mean at most five times the root of the mean square."""
+    """A sphere with a spot of a given number of cells, in four places between the points, on a body that loses most of
+    the work: the estimate is 0.4 of each error at least, and in the mean at most five times the root of the mean
+    square."""
     body = {"model": "zener", "modulus_inf": 1e5, "branches": ONE["branches"]}
     cell, velocity = 1e-3 / 32, 3.0 * radius / 32
     stiffness = abs(complex(pc.material(body).complex_modulus(np.pi * velocity / (radius * cell))))
@@ -82,36 +84,6 @@ def test_estimates_where_contacts_are_alike(phase: float) -> None:
     error = abs(found.friction[0] / fine.friction[0] - 1.0)
     assert error > 0.01
     assert found.error_friction[0] > 0.5 * error
-
-
-def test_full_contact_has_no_error_by_few_cells_per_wave() -> None:
-    """Each wave of the surface has its loss on any grid that has the wave: friction with 3 cells per shortest wave is
-    that with 12, within ten times the tolerance of the solver. Its estimate is what the solver makes: 1.1e-12 at least,
-    where all digits are right."""
-    fine, found = (steady(scene(cells, ONE), 1.0, 1e7) for cells in (12, 3))
-    assert found.contact_area[0] == fine.contact_area[0] == 1.0
-    assert found.friction[0] == pytest.approx(fine.friction[0], rel=2e-3)
-    assert abs(found.friction[0] / fine.friction[0] - 1.0) < found.error_friction[0] < 0.1 / 48 + 1e-3
-
-
-@pytest.mark.parametrize("direction", [[1.0, 0.0], [0.6, 0.8]])
-def test_it_is_the_power_over_the_velocity(direction: list[float]) -> None:
-    """What the branches dissipate, to round-off; oblique slides to 1e-3, as waves at the Nyquist wavenumber across have
-    two frequencies, of which the power takes one (1e-4 with 8 cells per wave)."""
-    section = {"velocities": [0.2], "pressures": [1e5], "direction": direction}
-    found = pc.steady(scene(8, ONE, steady=section, numerics={"accuracy": 0.1}))
-    friction = found.power[0].sum() / (0.2 * 1e5 * 1e-6)
-    assert found.friction[0] == pytest.approx(friction, rel=1e-12 if direction[1] == 0.0 else 1e-3)
-
-
-@pytest.mark.parametrize("across", [0, 1, 4])
-def test_only_friction_by_slopes_counts_the_force_across(across: int) -> None:
-    """In full contact the force is along the waves, at an angle with the sliding; that by energy has its cosine."""
-    wave = {"shape": "wave", "amplitude": 1e-6, "waves": [2, across]}
-    found = steady({**scene(1, ONE), "surface": wave}, 0.1, 5e5)
-    assert found.contact_area[0] == 1.0
-    cosine = 2.0 / np.hypot(2.0, across)
-    assert found.friction[0] / found.friction_slopes[0] == pytest.approx(cosine, rel=1e-9)
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])

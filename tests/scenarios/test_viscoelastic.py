@@ -6,15 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_forms import step_responses
-from marching import BRANCHES, PRONY, SLS, begun, column, example, marched
+from marched_jobs import PRONY, SLS, column, example, marched
 from numpy.testing import assert_allclose
 from sliding import TYRE
 
-import parcontact.accuracy.sources
 from parcontact.march.loop import March
 from parcontact.physics.body import BodyMemory, ZenerBody, surface_of
 from parcontact.physics.energy import ElasticPressure, ZenerEnergy
-from parcontact.storage.step_row import StepRow
 from parcontact.theory import lee_radok
 
 Json = dict[str, Any]
@@ -102,21 +100,6 @@ def test_retraction(rise: float) -> None:
     assert column(rows, "approach")[t > lift_off].max() > 0.05 * depth  # no contact, and yet below the surface
 
 
-def near(rows: list[StepRow], t: float, name: str) -> float:
-    """A number at an instant, between steps linearly."""
-    return float(np.interp(t, column(rows, "time"), column(rows, name)))
-
-
-def test_example_of_creep() -> None:
-    """What jobs/creep.yaml promises, within 0.5 % of approach and 1 % of radius at a third of its points."""
-    march, rows = marched(example("creep", "grid.points=96"))
-    promised = [(1, 0.5748, 33.03), (3, 0.6985, 48.79), (10, 0.8811, 77.64), (50, 1.0055, 101.1)]
-    for t, radius, approach in [(0, 0.4676, 21.87), *promised]:
-        area = near(rows[1:], 1e-3 * t, "contact_area")
-        assert contact_radius(march, np.array(area)) == pytest.approx(1e-3 * radius, rel=1e-2)
-        assert near(rows[1:], 1e-3 * t, "approach") == pytest.approx(1e-6 * approach, rel=5e-3)
-
-
 @pytest.mark.parametrize(("between", "approach"), [(0.0, 43.88), (0.075, 71.68)])
 def test_example_of_unloading(between: float, approach: float) -> None:
     """What jobs/unload_reload.yaml promises of the second loading: the approach, to 0.5 % at a third of its points."""
@@ -175,33 +158,6 @@ def bumps(**changes: Any) -> Json:
         "output": {"energy": True},
         **changes,
     }
-
-
-MEASURES = ("pressure", "force_x", "force_y", "friction", "contact_area", "approach", "mean_gap", "max_pressure")
-ENERGIES = ("work", "stored", "dissipated")
-
-
-def numbers(data: Json) -> dict[str, np.ndarray]:
-    _, rows = marched(data)
-    return {name: column(rows, name) for name in ("time", *MEASURES, *ENERGIES)}
-
-
-@pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])
-def test_branches_far_from_the_time_steps(integrator: str) -> None:
-    """A relaxation time of 1e9 s is a spring, one of 1e-15 s nothing (after a jump it would be felt). To 1e-8."""
-    load = {"pressure": {"from": 0.0, "to": 2e4}, "velocity": 0.1, "duration": 2e-3, "time_step": 2e-4}
-    common = {"history": [load], "numerics": {"tolerance": 1e-9, "integrator": integrator}}
-
-    def measures(modulus_inf: float, *more: Json) -> dict[str, np.ndarray]:
-        material = {"model": "zener", "modulus_inf": modulus_inf, "branches": [*BRANCHES, *more]}
-        return numbers(bumps(material=material, **common))
-
-    slow = measures(0.275e6, {"modulus": 1e6, "relaxation_time": 1e9})
-    fast = measures(0.275e6, {"modulus": 1e6, "relaxation_time": 1e-15})
-    for found, expected in ((slow, measures(1.275e6)), (fast, measures(0.275e6))):
-        for name in MEASURES:
-            scale = np.abs(expected[name]).max()
-            assert_allclose(found[name], expected[name], rtol=0, atol=1e-8 * scale, err_msg=name)
 
 
 # -- energy ------------------------------------------------------------------------------------------------------------
@@ -264,15 +220,6 @@ def inverse(march: March, index: int) -> np.ndarray:
     return scene.operators.preconditioner.apply(field, np.empty_like(field))
 
 
-def test_energy_costs_nothing_unless_asked_for() -> None:
-    """No map and no operator application more."""
-    data = bumps()
-    plain = begun({**data, "output": {}})
-    asked = begun(data)
-    assert plain.scene.energy is None
-    assert asked.scene.slab.tally["map bytes"] == plain.scene.slab.tally["map bytes"]
-
-
 # -- errors of friction that rises from rest in steps of whole cells: it comes late, most of all in the first ---------
 
 POINTS, CELLS, FINER = 48, 4, 16
@@ -301,17 +248,3 @@ def test_stated_errors_cover_what_comes_late(material: Any, speed: float, seed: 
     true = np.abs(found - exact).mean() / found.mean()
     assert march.state.errors.friction is not None
     assert 0.7 * true < march.state.errors.friction.time < 4.0 * true
-
-
-def test_solves_do_not_follow_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All results are the same without that error, digit by digit."""
-    with_it, rows = marched(job(TYRE, 1e-3, 1))
-    monkeypatch.setattr(parcontact.accuracy.sources, "error_of_rise", lambda *_: 0.0)
-    without, others = marched(job(TYRE, 1e-3, 1))
-    for name in ("friction", "contact_area", "approach", "operator_calls"):
-        np.testing.assert_array_equal(column(rows, name), column(others, name))
-    assert with_it.state.tolerance == without.state.tolerance
-    one, other = with_it.state.errors.friction, without.state.errors.friction
-    assert one is not None
-    assert other is not None
-    assert one.time > 2.0 * other.time

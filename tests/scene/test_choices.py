@@ -4,9 +4,6 @@ Programs are compared by all their counts: operator calls, transforms by size an
 and held. A solve that is given up after a fixed number of iterations makes them the same for all loads and bodies.
 """
 
-import math
-
-import pytest
 from counting import (
     ELASTIC,
     ITERATIONS,
@@ -27,22 +24,12 @@ from counting import (
     row,
     whole,
 )
-from marching import begun, marched
+from marched_jobs import begun, marched
 
 from parcontact import scene
 from parcontact.history.timeline import Timeline
-from parcontact.march.dry_law import DryLaw
-from parcontact.solve import contact as contact_solver
 from parcontact.solve.constraint import NonNegative
 from parcontact.solve.problem import Approach, Problem
-
-
-@pytest.fixture
-def iterations_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    """How often the load is restored near by, which takes a message, and a step is made exact, which takes an operator
-    call, depends on the pressures."""
-    monkeypatch.setattr(contact_solver, "LEAST_CUT", math.inf)
-    monkeypatch.setattr(contact_solver, "MAX_STEP_RATIO", math.inf)
 
 
 def test_every_row_has_a_test() -> None:
@@ -100,16 +87,6 @@ ROWS: dict[str, tuple[Json, Json, dict[str, int] | None]] = {  # off, on, and wh
 }
 
 
-@pytest.mark.usefixtures("iterations_alike")
-@pytest.mark.parametrize("name", ROWS)
-def test_rows(name: str) -> None:
-    """Off, it is not there; on, it counts what it is made of, and nothing else changes."""
-    off, on, more = ROWS[name]
-    assert not row(job(**off), name).on
-    assert row(job(**on), name).on
-    assert more is None or extra(job(**on), job(**off)) == more
-
-
 def test_energy_of_a_body_with_memory() -> None:
     """One operator application and one reduction per step, no map: the inverse is at hand."""
     planned = {"history": [PRESS], "material": RUBBER}
@@ -123,53 +100,6 @@ def test_mixed_precision() -> None:
     off, on, _ = ROWS["preconditioner in single precision"]
     assert [name for name in whole(job(**off)) if name.startswith("fft ")] == [TRANSFORM]
     assert whole(job(**on))[f"fft {NX}x{NY} float32"] == 2 * ITERATIONS
-
-
-@pytest.mark.parametrize(
-    ("changes", "on"),
-    [
-        ({"tolerance": 1e-5}, True),
-        ({"tolerance": 0.99e-5}, False),
-        ({"tolerance": 1e-5, "energy": True}, False),
-        ({"tolerance": 1e-5, "energy": True, "kernel": "love"}, True),
-    ],
-)
-def test_preconditioner_of_loose_solves(changes: Json, on: bool) -> None:
-    """In single precision beside double, unless energies take it for the inverse of the operator."""
-    numerics = {key: value for key, value in changes.items() if key != "energy"}
-    planned = job(history=[PRESS], material=RUBBER, numerics=numerics, output={"energy": "energy" in changes})
-    assert row(planned, "preconditioner in single precision").on == on
-
-
-def test_single_operator(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On, only the surface and the forces are transformed in double precision, as often as with other tolerances; these
-    solves, which are all given up, would be tried again with an operator in double precision."""
-    monkeypatch.setattr(DryLaw, "_retry", lambda law, step, past, problem, failed: (failed, ""))
-    off, on, _ = ROWS["operator in single precision"]
-    double, single = whole(job(**off)), whole(job(**on))
-    assert double["fft"] == single["fft"]
-    assert single[f"fft {NX}x{NY} float32"] == 2 * single["operator"]
-    assert double[f"fft {NX}x{NY} float32"] == 2 * ITERATIONS
-
-
-@pytest.mark.parametrize(
-    ("changes", "on"),
-    [({"precision": "mixed"}, True), ({"precision": "double"}, False), ({"precision": "mixed", "energy": True}, False)],
-)
-def test_operator_of_very_loose_solves(changes: Json, on: bool) -> None:
-    """In single precision only where that is asked for, and no energies are balanced."""
-    numerics = {"tolerance": 1e-3, "precision": changes["precision"]}
-    planned = job(history=[PRESS], material=RUBBER, numerics=numerics, output={"energy": "energy" in changes})
-    assert row(planned, "operator in single precision").on == on
-
-
-def test_isolated_contact() -> None:
-    """Off: no padded transform; on: one for every operator call but the preconditioner's."""
-    off, on = job(surface=SPHERE), job(surface=SPHERE, grid={"boundary": "free"})
-    assert [name for name in whole(off) if name.startswith("fft ")] == [TRANSFORM]
-    assert whole(on)[f"fft {2 * NX}x{2 * NY} float64"] == 1 + 2 * (1 + ITERATIONS)  # of the coefficients
-    assert not row(off, "isolated contact").on
-    assert row(on, "isolated contact").on
 
 
 def test_extrapolated_starts() -> None:
@@ -210,34 +140,6 @@ def test_chosen_time_steps() -> None:
     marches = [marched(planned)[0] for planned in (off, on)]
     assert [march.state.chosen is None for march in marches] == [True, False]
     assert len({march.scene.slab.tally["map bytes"] for march in marches}) == 1
-
-
-def test_steady_start() -> None:
-    """Off: nothing is solved before the first step."""
-    start = {"state": "steady", "velocity": 0.1, "pressure": 2e3}
-    solved = {"tolerance": 1e-4, "max_iterations": 500}
-    off, on = (job(history=[SLIDE], material=RUBBER, numerics=solved, **more) for more in ({}, {"initial": start}))
-    assert begun(off).scene.slab.tally["operator"] == 0
-    assert begun(on).scene.slab.tally["operator"] > 0
-    assert [row(planned, "steady start").on for planned in (off, on)] == [False, True]
-
-
-def test_adhesion() -> None:
-    """Off: no operator of gaps, no map; on: all of the gaps and their solver."""
-    off, on = job(history=[PRESS]), job(history=[PRESS], adhesion={"work": 1e-9, "range": 1e-6})
-    assert [row(planned, "adhesion").on for planned in (off, on)] == [False, True]
-    march = begun(off)
-    assert march.scene.law is None
-    assert march.state.law is None
-
-
-def test_yielding_counterbody() -> None:
-    """A bound that nothing reaches costs sums over ranks alone, and one above the whole load on a point, here 1.9 MPa,
-    costs nothing: see `solve/test_bounded` for one that is reached."""
-    off, on = job(history=[PRESS]), job(history=[PRESS], material={**ELASTIC, "hardness": 9e5})
-    assert [row(planned, "yielding counterbody").on for planned in (off, on)] == [False, True]
-    assert set(extra(on, off)) == {"allreduce"}
-    assert not extra(job(history=[PRESS], material={**ELASTIC, "hardness": 2e6}), off)
 
 
 def test_displacement_control() -> None:

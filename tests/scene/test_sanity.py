@@ -1,4 +1,4 @@
-"""Scenes that mean nothing are told, each with its value, its limit and what to change."""
+"""Scenes that mean nothing are stated, each with its value, its limit and what to change."""
 
 import math
 import re
@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from conftest import RunParcontact
-from judging import RUBBER, SPHERE, Json, job_of, of_file, rough_heights, run
+from judged_scenes import RUBBER, SPHERE, Json, job_of, of_file, rough_heights, run
 from mpi4py import MPI
 
 from parcontact import scene
@@ -72,22 +72,22 @@ PRESS = {"pressure": 1e4}
     ],
     ids=str,
 )
-def test_absurd_jobs_are_told(job: Job, words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_absurd_jobs_are_stated(job: Job, words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(size_advice, "_memory", lambda: 64e9)
     monkeypatch.setattr(size_advice, "_free", lambda directory: 100e9)
     found = [warning for warning in job.warnings if all(word in warning for word in words)]
     assert len(found) == 1, job.warnings
 
 
-def test_loads_that_press_less_than_one_point_are_told() -> None:
+def test_loads_that_press_less_than_one_point_are_stated() -> None:
     """One of 64 x 64 points is a share of 2.4e-4, which sqrt(8/pi) p/(E* h') is at 61 Pa, with E* of 4 MPa and a slope
     of 0.1; a load that is approached, or sticks, says nothing."""
     grid = {"points": 64, "size": 1e-3}
     limit = math.sqrt(math.pi / 8.0) * 4e6 * 0.1 / 64**2
-    for factor, told in ((0.99, True), (1.01, False)):
+    for factor, stated in ((0.99, True), (1.01, False)):
         loads = [{"pressure": {"from": 0.0, "to": factor * limit}, "duration": 1.0}]
         found = [text for text in job_of(ROUGH, loads, grid=grid).warnings if "would touch" in text]
-        assert bool(found) == told
+        assert bool(found) == stated
     sticking = job_of(ROUGH, [{"pressure": 1.0}], grid=grid, adhesion={"work": 0.05, "range": 1e-6})
     assert not any("would touch" in text for text in sticking.warnings)
     assert not any("would touch" in text for text in job_of(ROUGH, [{"approach": -1e-7}], grid=grid).warnings)
@@ -126,12 +126,12 @@ def test_rubber_under_several_loads_at_one_instant() -> None:
     assert not said(loads, material=ZENER, initial={"state": "steady", "velocity": 0.1, "pressure": 1e4})
 
 
-@pytest.mark.parametrize(("slope", "told"), [(0.4, False), (0.6, True), (590.0, True)])
-def test_slopes_of_more_than_some_tenths(tmp_path: Path, slope: float, told: bool) -> None:
+@pytest.mark.parametrize(("slope", "stated"), [(0.4, False), (0.6, True), (590.0, True)])
+def test_slopes_of_more_than_some_tenths(tmp_path: Path, slope: float, stated: bool) -> None:
     """Of a job and of a file."""
     found = [*job_of({**ROUGH, "rms_slope": slope}, [PRESS]).warnings]
     found += of_file(tmp_path / "road.npy", 10.0 * slope * rough_heights(64, 16.0))
-    assert sum("theory is one of small slopes, 0.5 at most" in text for text in found) == 2 * told
+    assert sum("theory is one of small slopes, 0.5 at most" in text for text in found) == 2 * stated
 
 
 def test_heights_in_micrometres(tmp_path: Path) -> None:
@@ -152,20 +152,11 @@ def test_a_measured_road_is_looked_at_before_it_runs(tmp_path: Path) -> None:
     assert "unit: um of a topography" in text
 
 
-def test_a_seam_across_the_periodic_edge(tmp_path: Path) -> None:
-    """Half of a periodic surface is none; along each direction."""
-    half = rough_heights(128, 32.0)
-    for name, part in (("x", half[:, :48]), ("y", half[:48])):
-        found = of_file(tmp_path / "road.npy", part)
-        assert [text for text in found if f"the heights at the two ends along {name}" in text], found
-        assert all("cut it where it fits" in text for text in found)
-
-
 def test_a_tilt(tmp_path: Path) -> None:
     """Of 0.1 mm over the box of 1 mm; a neighbour more or less, and an increment of the roughness."""
     ramp = 1e-4 * np.arange(64) / 64
     for name, tilt in (("x", ramp), ("y", -ramp[:, None])):
-        *_, text = of_file(tmp_path / "road.npy", rough_heights(64, 16.0) + tilt)  # beside the slope of that wall
+        *_, text = of_file(tmp_path / "road.npy", rough_heights(64, 16.0) + tilt)  # next to the slope of that wall
         assert f"the heights at the two ends along {name}" in text
         found = re.search(r"tilted by ([-+.e0-9]+): subtract its mean plane", text)
         assert found
@@ -184,7 +175,7 @@ def test_a_file_that_does_not_resolve_itself(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("cells", "accuracy"), [(4.0, 0.01), (7.5, 0.01), (8.2, 0.01), (4.0, 0.06), (4.4, 0.05)])
 def test_the_limit_of_resolution_is_that_of_rough_surfaces(tmp_path: Path, cells: float, accuracy: float) -> None:
-    """A single wave of so many cells, its length known to 0.5 %."""
+    """A single wave of a given number of cells, its length known to 0.5 %."""
     x = np.arange(400)
     wave = 1e-8 * np.cos(2 * np.pi * round(400 / cells) / 400 * x) * np.ones((400, 1))
     found = of_file(tmp_path / "road.npy", wave, numerics={"accuracy": accuracy})
@@ -192,7 +183,7 @@ def test_the_limit_of_resolution_is_that_of_rough_surfaces(tmp_path: Path, cells
 
 
 def test_a_contact_that_reaches_the_edge_of_the_box() -> None:
-    """Told once, by the first step in which it does; also along one line of points, where there is no edge across."""
+    """Stated once, by the first step in which it does; also along one line of points, where there is no edge across."""
     cylinder = {"shape": "cylinder", "radius": 1e-2}
     grid = {"points": [64, 1], "size": [1e-3, 1e-3], "boundary": "free"}
     history = [{"approach": d} for d in (1e-6, 1e-5, 3e-5, 4e-5)]
@@ -270,7 +261,7 @@ def test_what_no_machine_here_can_hold_is_refused(monkeypatch: pytest.MonkeyPatc
         sanity.refuse_impossible(long, Timeline.from_job(long))
 
 
-def test_approaches_beyond_full_contact_are_told_with_their_places(tmp_path: Path) -> None:
+def test_approaches_beyond_full_contact_are_stated_with_their_places(tmp_path: Path) -> None:
     """All of them at once, each with its line and column."""
     path = tmp_path / "job.yaml"
     stages = "{approach: 1e-7}\n  - {name: up, approach: {from: 0, to: 1e-6}, duration: 1}"

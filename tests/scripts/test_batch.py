@@ -137,7 +137,7 @@ def test_launcher_with_a_code_of_its_own(batch: Batch, system: str, code: int, l
 
 @BOTH
 def test_launcher(batch: Batch, tmp_path: Path, system: str) -> None:
-    """The one asked for, with its options; without one beside parcontact, that of the machine."""
+    """The one asked for, with its options; without one next to parcontact, that of the machine."""
     link = batch(system, ["job.yaml"], PARCONTACT_LAUNCHER="srun --mpi=pmix", CODE=3)
     assert link.launcher == ["srun", "--mpi=pmix", "-n", "2"]
     assert system == "slurm" or link.submitted[1:3] == ["-v", "JOB,PARCONTACT_BIN,PARCONTACT_LAUNCHER"]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from marching import load_script
+from marched_jobs import load_script
 
 from parcontact import job as jobs
 from parcontact import scene

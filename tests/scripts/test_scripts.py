@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from marching import ROOT, load_script
+from marched_jobs import ROOT, load_script
 
 ROOT_scripts = Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT_scripts / "scripts").glob("*.py"))
@@ -96,7 +96,7 @@ def test_a_program_that_is_too_slow(peers: ModuleType) -> None:
 
 
 def test_a_slide_goes_on_for_as_many_rounds_as_are_asked_for() -> None:
-    """Also past the length of the box, whose surface comes round again."""
+    """Also past the length of the box, whose surface returns to again."""
     slide = load_script("bench.work").Slide(64)
     for _ in range(66):
         slide.step()

@@ -13,7 +13,7 @@ import sysconfig
 from pathlib import Path
 
 import pytest
-from marching import ROOT, load_script
+from marched_jobs import ROOT, load_script
 
 import parcontact
 

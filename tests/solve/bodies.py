@@ -68,7 +68,7 @@ class Bench:
 
 
 def rough(points: int, seed: int = 1, cells: int = 8) -> Map:
-    """Hurst 0.9, four longest waves in the box, the shortest of so many cells, rms slope 1."""
+    """Hurst 0.9, four longest waves in the box, the shortest of a given number of cells, rms slope 1."""
     fft = FFT(Slab.alone(points, points))
     waves = Roughness(0.9, 0.25, 0.25, cells / points, seed, rms_slope=1.0).spectrum(fft, (1.0, 1.0))
     return np.asarray(fft.backward(waves, np.empty((points, points))), dtype=np.float64)

@@ -96,15 +96,6 @@ def test_tiles_beside_an_edge() -> None:
     assert set(zip(found.rows, found.columns, strict=True)) == {(j, i) for j in (4, 5, 6) for i in (0, 1)}
 
 
-@pytest.mark.mpi(2, 3, 4)
-def test_any_number_of_ranks(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Root solves on tiles: all ranks together find what one alone does, to the tolerance of the coarse grids."""
-    _, p, _ = found(comm, LIGHT, monkeypatch)
-    _, alone, _ = found(MPI.COMM_SELF, LIGHT, monkeypatch)
-    if p is not None and alone is not None:
-        assert np.linalg.norm(p - alone) <= TOLERANCE * np.linalg.norm(alone)
-
-
 @pytest.mark.mpi
 def test_maps_of_ranks_without_rows(comm: MPI.Intracomm) -> None:
     """Rows of tiles come together from all ranks and go back, whoever has them: here the last one has all."""

@@ -103,13 +103,6 @@ def test_steady_contact_stays(frictions: Callable[..., list[float]], text: str, 
         assert found[-1] == pytest.approx(found[0], rel=bound)
 
 
-def test_long_march_from_rest_becomes_steady(frictions: Callable[..., list[float]]) -> None:
-    """Within 1 %: the loss modulus of the shortest wave is 0.4 % off at 32 cells per wave and one cell per step."""
-    steady = frictions(ROUGH, "history.0.distance=7.8125e-6")[0]
-    marched = frictions(ROUGH, "initial={state: virgin}", "history.0.distance=2.5e-3", "numerics.tolerance=1e-5")
-    assert marched[-1] == pytest.approx(steady, rel=1e-2)
-
-
 def test_curve_from_the_command_line(run_parcontact: Callable, tmp_path: Path) -> None:
     (tmp_path / "wave.yaml").write_text(WAVE)
     done = run_parcontact(["steady", "wave.yaml", "--velocities", "0.004:0.4:3", "--pressures", "2e5,4e5"], ranks=2)
@@ -171,15 +164,3 @@ def test_a_force_is_a_pressure_over_the_box(tmp_path: Path, added: list[str]) ->
     path.write_text(WAVE)
     job = jobs.load(path, ["history.0.pressure=null", "history.0.force=1e-4", *added])
     assert request(job, [0.1]).pressures == pytest.approx((25.6e3,), rel=1e-12)
-
-
-def test_one_point_is_a_flat_surface(main: Main, tmp_path: Path) -> None:
-    """Which is in full contact, without friction."""
-    material = "{model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e6, relaxation_time: 1.0e-3}]}"
-    job = tmp_path / "job.yaml"
-    job.write_text(f"grid: {{points: 1, size: 1.0e-3}}\nsurface: {{shape: flat}}\nmaterial: {material}\n")
-    code, _, err = main("steady", job, "--velocities", "0.1", "--pressures", "1e5", "--quiet")
-    assert code == 0, err
-    (row,) = rows(tmp_path / "out" / "job" / "steady.csv")
-    assert (float(row["contact_area"]), float(row["friction"]), float(row["max_pressure"])) == (1.0, 0.0, 1e5)
-    assert row["error_friction"] == "", "an error that cannot be relative is empty"

@@ -1,7 +1,6 @@
-"""A friction curve in parts: it goes on where it was stopped, beside a run, and a point that fails does so alone."""
+"""A friction curve in parts: it goes on where it was stopped, next to a run, and a point that fails does so alone."""
 
 import os
-import re
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -174,19 +173,6 @@ def test_curve_of_another_job(main: Main, tmp_path: Path) -> None:
     assert "out holds the friction curve of another job: numerics.tolerance was 0.005, is 1e-05" in said
     assert "to keep its mesh" not in said
     assert (tmp_path / "out" / "steady.csv").read_bytes() == before
-
-
-def test_curve_on_a_chosen_mesh(main: Main, tmp_path: Path) -> None:
-    """Other velocities may ask for other points; the message says how to keep those that are there."""
-    rough = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2e-4, "short_wavelength": 1e-4, "rms_slope": 0.05}
-    scene = {"grid": {"points": "auto", "size": 2e-4}, "surface": rough, "numerics": {"accuracy": 0.05}}
-    (tmp_path / "chosen.yaml").write_text(yaml.safe_dump({**JOB, **scene}))
-    asked = "steady", "chosen.yaml", "--out", "chosen", "--pressures", "5e3"
-    assert main(*asked, "--velocities", "0.05")[0] == DONE
-    code, said = main(*asked, "--velocities", "1e-6:0.05:2")
-    assert code == BAD_INPUT
-    (keep,) = re.findall(r"give --set (grid.points=\S+) to keep its mesh", said)
-    assert main(*asked, "--velocities", "1e-6:0.05:2", "--set", keep)[0] == DONE
 
 
 def test_curve_beside_a_run(main: Main, tmp_path: Path) -> None:

@@ -14,16 +14,14 @@ from parcontact import Simulation, scene
 from parcontact.errors import RunError
 from parcontact.job import Job
 from parcontact.parallel.slab import Slab
-from parcontact.physics.halfspace import HalfSpace
 from parcontact.plan import memory, printed_plan
 from parcontact.scene import Setup
 from parcontact.solve.nonsymmetric import steady
 from parcontact.steady_sliding import sliding as solver
 from parcontact.steady_sliding import start, stiffness
-from parcontact.steady_sliding.losses import branch_maps
 from parcontact.steady_sliding.point import Point
 from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.steady_sliding.stiffness import CONTRAST, LOSSY, SOFT, loses_most, soft_stripes
+from parcontact.steady_sliding.stiffness import loses_most, soft_stripes
 from parcontact.theory import full_contact
 
 FORCE = 0.15  # N
@@ -72,15 +70,6 @@ def test_sphere(shared_path: Path, comm: MPI.Intracomm, speed: float, friction: 
     assert point.measures.force_x < 0.0
     if approach is not None:
         assert point.measures.approach * RADIUS / CONTACT**2 == pytest.approx(approach, rel=5e-3)
-
-
-def test_sphere_at_the_ends(shared_path: Path, comm: MPI.Intracomm) -> None:
-    """Slow: (1 - G_inf/G0) V*, here to the 2 % of a pressure front thinner than a cell. Fast: towards 7.2/V*, of which
-    0.954 is left at V* = 100."""
-    slow = sphere_at(shared_path, comm, 3e-3).measures.friction * RADIUS / CONTACT
-    assert slow == pytest.approx(0.9 * 3e-3, rel=2e-2)
-    fast = sphere_at(shared_path, comm, 300.0, 128).measures.friction * RADIUS / CONTACT
-    assert fast == pytest.approx(7.2 / 300.0, rel=3e-2)
 
 
 @pytest.mark.parametrize(("seed", "pressure"), [(0, 1e3), (0, 10.0), (3, 1e3), (11, 10.0)])
@@ -222,22 +211,6 @@ def test_load_is_taken_back_near_by(shared_path: Path, comm: MPI.Intracomm, monk
     assert near_by.measures.friction == pytest.approx(everywhere.measures.friction, rel=1e-3)
 
 
-def test_long_cells(shared_path: Path, comm: MPI.Intracomm) -> None:
-    """Cells of 4 : 1 take at most 1.15 times the operator calls of squares of the same height; measured 0.96, and 1.49
-    with the preconditioner of squares."""
-    text = (
-        "surface: {shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: 6.25e-5, rms_slope: 0.02}\n"
-        "material: {include: synthetic_tyre}\n"
-        "history: [{pressure: 1.0}]\n"
-    )
-
-    def calls(nx: int) -> float:
-        states = sliding(shared_path, f"grid: {{points: [{nx}, 128], size: 1.0e-3}}\n" + text, comm)
-        return sum(states.solve((speed, 0.0), 1e5).operator_calls for speed in (0.01, 0.03, 0.1))
-
-    assert calls(512) <= 1.15 * calls(128)
-
-
 def test_random_scenes_are_right_or_say_so(shared_path: Path, comm: MPI.Intracomm) -> None:
     """What is returned as converged meets the contact conditions, by an operator of numpy's own."""
     random = np.random.default_rng(20)
@@ -276,23 +249,6 @@ def test_a_load_beyond_all_digits_is_named(shared_path: Path, comm: MPI.Intracom
         sliding(shared_path, WAVE, comm).solve((0.02, 0.0), 1e22)
 
 
-@pytest.mark.parametrize("boundary", ["periodic", "free"])
-def test_branches_add_up_to_the_body(shared_path: Path, comm: MPI.Intracomm, boundary: str) -> None:
-    """`A p = G_inf u + sum h_k` in the steady state, to round-off: what a march that starts from it relies on."""
-    text = WAVE.replace("2.0e6}]", "1.0e5}]") if boundary == "periodic" else SPHERE.format(points=48, size=7 * CONTACT)
-    states = sliding(shared_path, text, comm)
-    velocity, pressure = ((0.02, 0.03), 1.0e5) if boundary == "periodic" else ((0.04, 0.01), FORCE / (7 * CONTACT) ** 2)
-    states.solve(velocity, pressure)
-    base, contact = states.setup, states.contact
-    assert contact is not None
-    body = base.prony.modulus_inf * contact.u
-    for branch in branch_maps(base, contact, velocity, base.slab.empty()):
-        body = body + branch
-    elastic = HalfSpace(base.size, free=boundary == "free").operator(base.fft)
-    expected = elastic.apply(contact.p, base.slab.empty())
-    assert np.max(np.abs(body - expected)) <= 1e-12 * np.max(np.abs(expected))
-
-
 # -- which way is taken to a steady state, by the moduli of a body of one branch --------------------------------------
 
 TIME, SIZE = 1e-3, 1e-3
@@ -314,30 +270,6 @@ def body(ratio: float, points: tuple[int, int] = (32, 48), boundary: str = "peri
         }
     )
     return scene.set_up(made, Slab.alone(*points))
-
-
-def test_soft_stripes_stiffness() -> None:
-    """At high speed, of more than `CONTRAST` times the modulus; along either axis, but in no other direction."""
-    stiff = body(1.01 * CONTRAST)
-    assert [soft_stripes(stiff, way) for way in ((FAST, 0.0), (-FAST, 0.0), (0.0, FAST))] == [1, 1, 0]
-    assert [soft_stripes(stiff, way) for way in ((FAST, FAST), (1e-3 * FAST / 48, 0.0), (0.0, 0.0))] == [None] * 3
-    assert soft_stripes(body(0.99 * CONTRAST), (FAST, 0.0)) is None
-    assert soft_stripes(body(1.01 * CONTRAST, (32, 1)), (FAST, 0.0)) is None
-    assert soft_stripes(body(1.01 * CONTRAST, boundary="free"), (FAST, 0.0)) is None
-
-
-def test_loses_most() -> None:
-    """The loss tangent of a body r times as stiff at once is (r - 1)/(2 sqrt(r)) at most, where `w tau = 1/sqrt(r)`.
-
-    |G| is sqrt(r) G_inf there: more than `SOFT`, if this is the longest wave. Beside the second, the longest has half.
-    """
-    root = LOSSY + (LOSSY**2 + 1.0) ** 0.5  # of r, for a loss tangent of LOSSY
-    second = SIZE / (2.0 * np.pi * TIME * root) / 2.0  # velocity at which the second wave loses most
-    assert 0.5 * root < SOFT < root
-    assert loses_most(body(1.05 * root**2), (second, 0.0))
-    assert loses_most(body(1.05 * root**2), (0.0, -second))
-    assert not loses_most(body(0.95 * root**2), (second, 0.0))
-    assert not loses_most(body(1.05 * root**2), (2.0 * second, 0.0))
 
 
 @pytest.mark.parametrize("velocity", [(0.0, 0.0), (1e-9, 0.0)])
@@ -448,47 +380,6 @@ def test_what_is_held_while_it_is_solved(comm: MPI.Intracomm, name: str) -> None
     few, most = (memory.steady_start(planned, comm.size, comm.rank, sets) for sets in (False, True))
     held = slab.tally["map bytes at most"]
     assert held == few < most or (name == "free" and few < held)
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize(("tolerance", "itemsize"), [(5e-3, 4), (2e-3, 8)])
-def test_what_is_held_where_sets_change(
-    comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, name: str, tolerance: float, itemsize: int
-) -> None:
-    """To the byte, without projected steps, and with linear steps that use all their directions: a map more, and two
-    for each of seven directions, in single precision where six tenths of the tolerance are 1.5e-3 or more."""
-    monkeypatch.setattr(steady, "MAX_STEPS_TO_HALVE", 0)
-    monkeypatch.setattr(steady, "REDUCTION", 0.0)
-    grid, surface, velocity = SCENES[name]
-    planned = job(grid, surface, velocity, tolerance=tolerance)
-    slab = Slab(comm, *planned.grid.points)
-    assert SteadySliding(scene.set_up(planned, slab)).solve(velocity, 1e5 if name == "free" else 3e3).sets > 0
-    few, most = (memory.steady_start(planned, comm.size, comm.rank, sets) for sets in (False, True))
-    assert slab.tally["map bytes at most"] == most
-    assert most - few == (8 + 2 * 7 * itemsize) * slab.shape[0] * slab.nx
-
-
-@pytest.mark.mpi
-def test_no_more_than_steps_hold(comm: MPI.Intracomm) -> None:
-    """With twelve branches: the solver's maps are gone when those of the march are made."""
-    planned = job(*SCENES["along x"], branches=12)
-    slab = Slab(comm, *planned.grid.points)
-    march = start.first(planned, slab)
-    assert march.row.measures.friction > 0.0
-    assert (
-        slab.tally["map bytes at most"] == slab.tally["map bytes"] == memory.total_bytes(planned, comm.size, comm.rank)
-    )
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_no_rank_has_more_than_is_planned(name: str) -> None:
-    """On three ranks or seven, of which the first have fewer rows than the last."""
-    planned = job(*SCENES[name])
-    for ranks in (3, 7):
-        each = [memory.steady_start(planned, ranks, rank) for rank in range(ranks)]
-        waves = 16 * 3 * 3  # bytes of those up to (2, 1), which another rank may have
-        assert each[0] < max(each) <= memory.steady_start(planned, ranks) <= max(each) + waves
 
 
 def test_plan_tells_both() -> None:

@@ -1,6 +1,5 @@
 """Checkpoints: whole or refused, the same from any number of ranks."""
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -72,15 +71,6 @@ def test_any_number_of_ranks_reads_it(communicators: list[MPI.Intracomm], shared
 
 
 @pytest.mark.mpi
-def test_same_bytes_at_any_time(comm: MPI.Intracomm, shared_path: Path) -> None:
-    write(shared_path / "first.h5", comm)
-    time.sleep(1.0)  # instants within a file would differ: HDF5 keeps them in seconds
-    write(shared_path / "second.h5", comm)
-    comm.Barrier()
-    assert (shared_path / "first.h5").read_bytes() == (shared_path / "second.h5").read_bytes()
-
-
-@pytest.mark.mpi
 def test_other_units(comm: MPI.Intracomm, shared_path: Path) -> None:
     """A run in other units (powers of two) reads the same values, exactly."""
     path = shared_path / "file.h5"
@@ -130,18 +120,6 @@ def test_maps_that_cannot_be_read(comm: MPI.Intracomm, tmp_path: Path, monkeypat
     write(tmp_path / "file.h5", comm)
     monkeypatch.setattr(hdf5, "read_rows", fail)
     assert look(tmp_path / "file.h5", comm) == "cannot read file.h5"
-
-
-def test_where_the_maps_are(tmp_path: Path) -> None:
-    """Byte by byte those of both maps, and nothing of the numbers between them."""
-    with h5py.File(tmp_path / "file.h5", "w") as file:
-        for name, shape in (("a", (2, 3)), ("b", (40,)), ("c", (3, 5)), ("d", (3, 5))):
-            file[name] = np.ones(shape)
-        maps = [(file[name].id.get_offset(), file[name].nbytes) for name in "acd"]
-        found = checkpoint.find_regions(file)
-    bytes_of_maps = {byte for start, length in maps for byte in range(start, start + length)}
-    assert [byte for start, stop in found for byte in range(start, stop)] == sorted(bytes_of_maps)
-    assert 1 < len(found) <= len(maps)
 
 
 def test_every_bit_counts(comm: MPI.Intracomm, tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """fields.h5: laid out once, readable at any instant, continued under other settings."""
 
-from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -11,7 +10,7 @@ from mpi4py import MPI
 
 from parcontact.errors import InputError, RunError
 from parcontact.parallel.slab import Array, Slab
-from parcontact.storage import checkpoint, fields, hdf5
+from parcontact.storage import fields, hdf5
 from parcontact.storage.fields import FieldsFile
 from parcontact.storage.hdf5 import Slice
 from parcontact.storage.provenance import Link, Provenance, extend_chain, read_chain
@@ -181,7 +180,7 @@ def test_xdmf_puts_maps_into_the_x_y_plane(comm: MPI.Intracomm, shared_path: Pat
 
 
 def test_xdmf_tells_loads_without_duration_apart() -> None:
-    """Maps of one time are one instant to a reader: single solves are told apart by their steps."""
+    """Maps of one time are one instant to a reader: single solves are distinguished by their steps."""
     text = fields.xdmf("fields.h5", np.array([0.0, 0.0, np.nan]), np.array([1, 2, 3]), (NY, NX), SIZE, ("gap",))
     times = [time.get("Value") for time in ElementTree.fromstring(text).iter("Time")]
     assert times == ["1.0", "2.0"]
@@ -301,41 +300,6 @@ def test_one_error_for_all(
         hdf5.write_rows(path, slab, [Slice("a", (), field_hdf5(slab)), Slice("absent", (), field_hdf5(slab))])
     with pytest.raises(RunError, match=r"cannot make .*: No such file"):
         make(shared_path / "absent" / "file.h5", slab)
-
-
-def test_error_of_one_rank(comm: MPI.Intracomm, shared_path: Path) -> None:
-    """A rank whose rows do not fit fails, and all of them say why."""
-    slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
-    make(path, slab)
-    rows = field_hdf5(slab)
-    if comm.rank == comm.size - 1:
-        rows = np.zeros((slab.shape[0] + 50, 6))
-    with pytest.raises(RunError, match="cannot write"):
-        hdf5.write_rows(path, slab, [Slice("a", (), rows), Slice("group/b", (), field_hdf5(slab))])
-
-
-def test_change_keeps_maps(comm: MPI.Intracomm, shared_path: Path) -> None:
-    slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
-    make(path, slab)
-    hdf5.write_rows(path, slab, [Slice("a", (), field_hdf5(slab))])
-    hdf5.change(path, slab, lambda file: file.attrs.modify("text", np.bytes_("y")))
-    hdf5.write_on_root(slab, lambda: hdf5.put(path, {"t": np.array([1.0, 2.0, np.nan])}), "put")
-    rows = np.empty(slab.shape)
-    hdf5.read_rows(path, slab, [Slice("a", (), rows)])
-    assert np.array_equal(rows, field_hdf5(slab))
-    with h5py.File(path) as file:
-        assert file.attrs["text"] == b"y"
-        assert np.array_equal(file["t"][...], [1.0, 2.0, np.nan], equal_nan=True)
-
-
-def test_regions_of_maps(comm: MPI.Intracomm, shared_path: Path) -> None:
-    """They are in order, do not meet, and hold the bytes of all maps."""
-    slab, path = Slab(comm, 6, 9), shared_path / "file.h5"
-    make(path, slab)
-    with h5py.File(path) as file:
-        found = checkpoint.find_regions(file)
-    assert all(stop < start for (_, stop), (start, _) in pairwise(found))
-    assert sum(stop - start for start, stop in found) == (2 + 3) * 6 * 9 * 8
 
 
 @pytest.mark.parametrize("kind", ["link", "virtual", "outside"])

@@ -16,7 +16,7 @@ from parcontact.physics.measures import Measures
 from parcontact.scene import choices
 from parcontact.storage import directory, files, marker, tables, wisdom
 from parcontact.storage.checkpoint import TableMark
-from parcontact.storage.curve_points import asked, lacking, of_table
+from parcontact.storage.curve_points import asked
 from parcontact.storage.directory import Directory
 from parcontact.storage.marker import Claim
 from parcontact.storage.step_row import MeasuresFile, StepRow, cut_back_table
@@ -144,7 +144,7 @@ def test_other_files_and_other_jobs_are_refused(tmp_path: Path, job: Path) -> No
         make(directory_at(out), job)
 
 
-def test_the_directory_of_a_sweep_is_told(tmp_path: Path, job: Path) -> None:
+def test_the_directory_of_a_sweep_is_stated(tmp_path: Path, job: Path) -> None:
     """A sweep has no marker of its own, its cases have."""
     for case in ("000", "001"):
         make(directory_at(tmp_path / "out" / "cases" / case), job)
@@ -168,15 +168,6 @@ def test_differences_of_jobs() -> None:
         "grid.points was [8, 8], is [8, 9]",
         "surface.0.seed was 1, is 2",
     ]
-
-
-def test_many_differences_are_counted() -> None:
-    """Another rubber with many branches differs in many keys."""
-    branches = marker.differences({"k": dict.fromkeys("abcdef", 1)}, {"k": dict.fromkeys("abcdef", 2)}, ("k",))
-    assert (
-        marker.list_differences(branches)
-        == "k.a was 1, is 2; k.b was 1, is 2; k.c was 1, is 2; k.d was 1, is 2; and 2 more"
-    )
 
 
 # -- fFTW's wisdom is kept for runs with the same transforms, where nobody else can have put it -----------------------
@@ -227,33 +218,10 @@ def test_wisdom_of_a_checkpoint(cache: Path) -> None:
 
 # -- which points of a friction curve are asked for, and which its table lacks ----------------------------------------
 
-NONE = math.nan  # the temperature of the material
-COLUMNS = {"velocity": [0.1, 1.0], "pressure": [1e5, 1e5], "friction": [0.2, 0.3]}
-
-
-def test_every_speed_under_every_pressure_at_every_temperature() -> None:
-    """In the order in which they are solved."""
-    speeds, pressures = (0.1, 1.0), (1e5, 2e5)
-    assert asked(speeds, pressures, (20.0, -5.0)) == [
-        (v, p, t) for t in (20.0, -5.0) for p in pressures for v in speeds
-    ]
-    assert lacking(asked(speeds, pressures), [(v, p, NONE) for p in pressures for v in speeds]) == []
-
 
 def test_a_point_that_is_asked_for_again_is_one() -> None:
     assert asked((0.1, 1.0, 0.1), (1e5, 1e5)) == asked((0.1, 1.0), (1e5,))
     assert asked((0.1, 0.1), (1e5,), (20.0, 20.0)) == [(0.1, 1e5, 20.0)]
-
-
-def test_what_a_table_lacks() -> None:
-    """Speeds and pressures to rounding; a temperature that was not asked for is no other one."""
-    there = of_table(COLUMNS)
-    assert lacking(asked((1.0, 0.5, 0.1), (1e5,)), there) == [1]
-    assert lacking([(0.1 * (1 + 5e-7), 1e5, NONE), (0.1 * (1 + 2e-6), 1e5, NONE), (0.1, 1.1e5, NONE)], there) == [1, 2]
-    assert lacking(asked((0.1,), (1e5,), (20.0,)), there) == [0]
-    heated = of_table({**COLUMNS, "temperature": [20.0, -5.0]})
-    assert lacking(asked((0.1, 1.0), (1e5,), (20.0, -5.0)), heated) == [1, 2]
-    assert lacking(asked((0.1,), (1e5,)), heated) == [0]
 
 
 # -- measures.csv: exact numbers, cut back without repeating or losing a row ------------------------------------------
@@ -268,17 +236,6 @@ def written(path: Path, count: int, branches: int = 0) -> None:
     for step in range(count):
         file.write(row(step, (0.1,) * branches))
     file.close()
-
-
-def test_numbers_read_back(tmp_path: Path) -> None:
-    path = tmp_path / "measures.csv"
-    written(path, 3)
-    found = tables.read_columns(path)
-    assert list(found) == [column.name for column in choose_columns(MEASURES)]
-    assert found["step"] == [0, 1, 2]
-    assert found["time"] == [0.0, 0.1, 0.2]
-    assert found["pressure"] == [1 / 3] * 3
-    assert all(math.isnan(value) for value in found["work"])
 
 
 @pytest.mark.parametrize(

@@ -373,7 +373,7 @@ def test_steps_without_a_ladder_are_chosen_in_every_case(path: Path) -> None:
     assert found.shared == 0.01
 
 
-def test_a_time_step_of_a_slide_is_told_in_cells(path: Path) -> None:
+def test_a_time_step_of_a_slide_is_stated_in_cells(path: Path) -> None:
     """1e-6 s at 1 m/s over cells of 1e-3/64 m, and a ladder that refines it takes those cells."""
     path.write_text(TEXT.replace(", cells_per_step: 2", ", time_step: 1.0e-6"))
     _, found = refined(path, "{mesh: [64]}")
@@ -385,14 +385,14 @@ def test_a_time_step_of_a_slide_is_told_in_cells(path: Path) -> None:
 
 @pytest.mark.parametrize(("reach", "held"), [("auto", True), ("2.0e-6", False)])
 def test_the_range_of_adhesion_is_that_of_the_job_on_every_mesh(path: Path, reach: str, held: bool) -> None:
-    """`auto` is `sqrt(2 h w/E*)` on cells h, and would follow the ladder; it is told that it does not."""
+    """`auto` is `sqrt(2 h w/E*)` on cells h, and would follow the ladder; it is stated that it does not."""
     path.write_text(f"{TEXT}adhesion: {{work: 0.01, range: {reach}}}\n")
     job, found = refined(path, "{mesh: [32, 64, 128]}")
     cases = [load_job(path, overrides(job, found.own, case)) for case in found.combine()]
     assert {case.grid.nx for case in cases} == {32, 64, 128}
     assert {choices(case).adhesion for case in cases} == {choices(job).adhesion}
-    told = f"adhesion.range: {math.sqrt(2 * (1e-3 / 64) * 0.01 / 4e6):.4g} m in every case"
-    assert [text.startswith(told) for text in describe_choices(job)] == [True] * held
+    stated = f"adhesion.range: {math.sqrt(2 * (1e-3 / 64) * 0.01 / 4e6):.4g} m in every case"
+    assert [text.startswith(stated) for text in describe_choices(job)] == [True] * held
 
 
 # -- limits of sequences whose limit is known -------------------------------------------------------------------------

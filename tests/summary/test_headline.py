@@ -40,21 +40,21 @@ def test_a_slide(tmp_path: Path) -> None:
     ways = [k * 5.0e-5 for k in range(21)]
     replace_rows(out, *((way / 0.1, way, 1.0e3, 0.4 if k == 2 else 0.2, 0.5, 0.5, 0, 1) for k, way in enumerate(ways)))
     friction = "The mean friction is 0.200 ± 0.020 and the highest 0.400 ± 0.0"
-    told = headline.find_headline(out)
-    assert told.startswith(friction)
-    assert told.endswith("; the mean contact area is 50.0 ± 2.5 % of the nominal area.")
+    stated = headline.find_headline(out)
+    assert stated.startswith(friction)
+    assert stated.endswith("; the mean contact area is 50.0 ± 2.5 % of the nominal area.")
 
 
 def test_a_press(tmp_path: Path) -> None:
     """No friction is named where nothing slides. The area is Hertz's, within twice the estimate of its error."""
-    told = headline.find_headline(ran(tmp_path, SPHERE + ELASTIC + "history: [{force: 0.1}]\n"))
-    found = re.fullmatch(r"The contact area is ([\d.]+) mm² ± ([\d.]+) mm² at 100 mN\.", told)
+    stated = headline.find_headline(ran(tmp_path, SPHERE + ELASTIC + "history: [{force: 0.1}]\n"))
+    found = re.fullmatch(r"The contact area is ([\d.]+) mm² ± ([\d.]+) mm² at 100 mN\.", stated)
     assert found
     radius = (3 * 0.1 * 1.0e-2 / (4 * 4.0e6)) ** (1 / 3)  # E* = 4 G of an incompressible body
     assert float(found[1]) == pytest.approx(1e6 * np.pi * radius**2, abs=2 * float(found[2]))
 
 
-def test_a_pull_off_is_told_with_the_area_at_it(tmp_path: Path) -> None:
+def test_a_pull_off_is_stated_with_the_area_at_it(tmp_path: Path) -> None:
     """The last load is 0 and nothing touches. The box has 4 mm². The parabola through 2, -3 and -2.5 Pa is lowest at
     -3 - 2.25^2/11 Pa; the tolerance adds 0.25 of 0.5 %, and the error of the area of 5 % 0.15 of it."""
     out = ran(tmp_path, WAVE + ELASTIC + "history: [{pressure: 1.0e3}, {pressure: 2.0e3}]\n")
@@ -87,12 +87,12 @@ def test_curves_sweeps_and_studies(tmp_path: Path) -> None:
 # -- `parcontact info`: what it says of friction ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("history", "told"), [(SLIDE, True), ("history: [{pressure: 1.0e3}]\n", False)])
-def test_friction_is_told_where_something_slides(tmp_path: Path, history: str, told: bool) -> None:
+@pytest.mark.parametrize(("history", "stated"), [(SLIDE, True), ("history: [{pressure: 1.0e3}]\n", False)])
+def test_friction_is_stated_where_something_slides(tmp_path: Path, history: str, stated: bool) -> None:
     said, sound = info.describe_path(ran(tmp_path, WAVE + ZENER + history))
     assert sound
     assert "last row: pressure 1 kPa, " in said
-    assert (", friction " in said) == told
+    assert (", friction " in said) == stated
 
 
 # -- the references of a run follow from its job ----------------------------------------------------------------------
@@ -123,15 +123,6 @@ def test_what_to_cite(tmp_path: Path) -> None:
     assert "Bugnicourt" in rubber
     assert "Persson" in rubber
     assert "Taylor" in rubber
-
-
-@pytest.mark.parametrize(("name", "credited"), [("road.npy", False), ("road.txt", False), ("road.nc", True)])
-def test_surface_topography_is_credited_for_what_it_reads(tmp_path: Path, name: str, credited: bool) -> None:
-    (tmp_path / name).touch()
-    part = {"shape": "topography", "path": name, "unit": "um", "pixel": 1e-6}
-    (tmp_path / "job.yaml").write_text(yaml.safe_dump({**JOB, "surface": part}))
-    (tmp_path / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
-    assert ("SurfaceTopography" in citations.describe_citations(tmp_path)) == credited
 
 
 # -- results of Persson's theory and of a run, from tables whose means are known --------------------------------------
@@ -278,7 +269,7 @@ def test_two_pulls() -> None:
 
 
 def test_a_pull_that_was_held_is_no_pull_off() -> None:
-    """Rubber holds a fast pull, and comes off slowly under less."""
+    """Rubber holds a fast pull, and detaches slowly under less."""
     again = [(-8.0, -1e-6, 0.2), (1.0, 0.0, 0.2), *PULL]
     assert where(table(*NEAR, *again, *OFF)) == [(6, 8)]
     assert find(table(*NEAR, *again)) == [PullOff(4, -8.0, 10.0, None, MESH)]

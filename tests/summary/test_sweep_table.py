@@ -22,8 +22,8 @@ def cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Case, ...]:
     return load_cases("job.yaml")
 
 
-def test_before_a_slide_no_error_of_friction_is_told(cases: tuple[Case, ...]) -> None:
-    """There is no friction to be told then; the residual is the worst of all rows."""
+def test_before_a_slide_no_error_of_friction_is_stated(cases: tuple[Case, ...]) -> None:
+    """There is no friction to be stated then; the residual is the worst of all rows."""
     directory = cases[0].job.output.directory
     directory.mkdir(parents=True)
     head = "step,time,distance,friction,contact_area,residual,seconds,error_friction,contact_area_corrected"
@@ -124,17 +124,6 @@ def test_so_does_a_table_without_a_column(cases: tuple[Case, ...]) -> None:
     assert [(row["state"], row["contact_area"]) for row in table()[:2]] == [("begun", "0.2"), ("damaged", "")]
 
 
-def test_the_start_is_no_result(cases: tuple[Case, ...]) -> None:
-    """A case that failed in its first step has no areas of 0, which would count in means. A row of theory counts."""
-    cases[0].job.output.directory.mkdir(parents=True)
-    head = "step,time,distance,friction,contact_area,residual,seconds"
-    (cases[0].job.output.directory / "measures.csv").write_text(f"{head}\n0,0,0,0,0,0,0\n")
-    (cases[0].job.output.directory / "theory.csv").write_text("time,distance,friction,contact_area\n0,0,0,0.3\n")
-    sweep_table.write_sweep_tables(Path("out/job"), cases)
-    assert [table()[0][name] for name in ("contact_area", "residual", "seconds")] == ["", "", ""]
-    assert table()[0]["theory_contact_area"] == "0.3"
-
-
 def test_lines_of_curves_differ_in_all_that_is_no_sample(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two pressures and two moduli make four lines over the velocity, each the mean over two seeds."""
     monkeypatch.chdir(tmp_path)
@@ -186,7 +175,7 @@ def test_theory_of_all_cases_stands_beside_them(cases: tuple[Case, ...]) -> None
 
 
 def test_pull_offs_of_cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A case that ends as its surfaces come off is done, and has its pull-off; one that holds is done without."""
+    """A case that ends as its surfaces detach is done, and has its pull-off; one that holds is done without."""
     monkeypatch.chdir(tmp_path)
     pull = "{force: {from: 0.0, to: -6.0e-4}, duration: 1.0, time_step: 0.1}"
     lines = (

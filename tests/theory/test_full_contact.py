@@ -6,7 +6,7 @@ from closed_forms import step_responses
 from numpy.testing import assert_allclose
 from rubbers import TWELVE_DECADES, ZENER, complex_modulus
 
-from parcontact.physics.prony import Integrator, Prony, discrete_modulus
+from parcontact.physics.prony import discrete_modulus
 from parcontact.theory import full_contact
 
 K, HEIGHT, MEAN = 2 * np.pi / 0.25e-3, 0.5e-6, 0.2e6  # wave number (rad/m), amplitude (m), mean pressure (Pa)
@@ -41,25 +41,8 @@ def test_steady_table(row: tuple[float, ...]) -> None:
     assert_allclose(-np.angle(amplitude) / K, 1e-6 * shift, rtol=4e-5)
 
 
-def stepped_friction(v: float, cells: float, integrator: Integrator) -> np.ndarray:
-    """Friction of the table's wave with a number of cells per step."""
-    wave, dt = (HEIGHT, ALONG, ACROSS), cells * CELL / v
-    return step_responses.discrete_friction_coefficient(MEAN, *wave, v, 0.0, dt, *ZENER, integrator=integrator)
-
-
-@pytest.mark.parametrize("row", STEADY)
-def test_friction_table(row: tuple[float, ...]) -> None:
-    """Printed to 7 digits."""
-    v, mu, euler, exponential = row[0], *row[-3:]
-    wave = (MEAN, HEIGHT, ALONG, ACROSS, v, 0.0)
-    assert_allclose(full_contact.friction_coefficient(*wave, *ZENER), mu, rtol=3e-7)
-    assert_allclose(stepped_friction(v, 1.0, "backward-euler"), euler, rtol=3e-7)
-    assert_allclose(stepped_friction(v, 1.0, "exponential-linear"), exponential, rtol=3e-7)
-
-
 # changes of velocity: before, after (m/s), 1e4 F/P0 at TIMES, its largest size and when (ms)
 
-TIMES = 1e-3 * np.array([0, 0.1, 0.2, 0.5, 1, 1.5, 2, 3, 5, 10, 30])
 # maps of many waves
 
 NX, NY, LX, LY, VX, VY = 48, 40, 2e-3, 1e-3, 0.03, -0.02
@@ -121,14 +104,3 @@ def test_changing_sign_gives_no_friction() -> None:
     modulus = discrete_modulus(np.pi / 1e-4, 1e-4, *ZENER)
     size = full_contact.traction(HEIGHT, np.array([np.pi / CELL]), np.array([0.0]), np.array([modulus]))
     assert_allclose(size, 0, atol=1e-12 * MEAN)
-
-
-def test_scaling_and_reversal() -> None:
-    """mu is the same for pressures times g and times times t and in both directions; it is 0 for v -> 0 and inf."""
-    case = (HEIGHT, ALONG, ALONG)
-    other = Prony(5 * ZENER.modulus_inf, 5 * ZENER.moduli, 3 * ZENER.relaxation_times)
-    mu = full_contact.friction_coefficient(MEAN, *case, 0.03, 0.01, *ZENER)
-    assert_allclose(full_contact.friction_coefficient(5 * MEAN, *case, 0.01, 0.01 / 3, *other), mu, rtol=1e-14)
-    assert_allclose(full_contact.friction_coefficient(MEAN, *case, -0.03, -0.01, *ZENER), mu, rtol=1e-14)
-    for v in (1e-9, 1e9):
-        assert abs(full_contact.friction_coefficient(MEAN, *case, v, 0.0, *ZENER)) < 1e-7 * mu

@@ -13,11 +13,10 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.solve.contact import Contact, ContactSolver
 from parcontact.solve.fallback import active_set, retry
-from parcontact.solve.fallback.cold_start import start_on_coarse_grids
 from parcontact.solve.problem import Approach, MeanPressure, Operators
 from parcontact.solve.workspace import Workspace
 
-from ..bodies import TIGHT, Bench, Map, keep, rough, solver, white
+from ..bodies import TIGHT, Bench, Map, keep, rough, solver
 
 
 def found_by_sets(body: Bench, h: Any, control: MeanPressure | Approach, start: float = 0.0) -> Contact:
@@ -42,37 +41,6 @@ def test_agrees_with_the_projected_method(boundary: str, kernel: str, mean: floa
         assert_allclose(found.d, expected.d, rtol=0, atol=1e-9 * np.ptp(h))
 
 
-SCENES = [(seed, stretch) for seed in (1, 2, 3) for stretch in (1e-4, 1e-3, 1e3, 1e4)]
-
-
-@pytest.mark.parametrize(("seed", "stretch"), SCENES)
-@pytest.mark.parametrize("control", ["load", "approach"])
-def test_cells_much_longer_than_wide(seed: int, stretch: float, control: str) -> None:
-    """White noise on boxes of up to 10 000 : 1, where projected steps stall or take thousands; half way to full
-    contact."""
-    h = white((16, 16), seed)
-    body = solver(h, (1.0, stretch), tolerance=1e-8)
-    pressure = body.preconditioner.apply(h - h.mean(), np.empty_like(h))
-    half: MeanPressure | Approach = MeanPressure(-0.5 * pressure.min()) if control == "load" else Approach(-h.max() / 2)
-    found = found_by_sets(body, h, half)
-    assert found.converged
-    assert found.certificate.worst <= 1e-8
-    assert found.p.min() >= 0.0
-    gap = body.operator.apply(found.p, np.empty_like(h)) - h - found.d
-    assert gap.min() >= -1.1e-8 * np.ptp(h)
-
-
-def test_from_full_contact_to_none() -> None:
-    """A given approach that touches nowhere, from pressure everywhere: a uniform pressure moves a periodic body
-    nowhere, so that nothing says how far to go."""
-    h = rough(64)
-    body = solver(h)
-    found = found_by_sets(body, h, Approach(-1.01 * h.max()), 1.0)
-    assert found.converged
-    assert np.all(found.p == 0.0)
-    assert found.iterations == 0  # what would not penetrate the undeformed body is no set to begin with
-
-
 def test_on_a_set_the_load_is_kept_and_the_gap_is_closed() -> None:
     """From a start with half of the load on the set, and as much outside: the load to rounding, the gap to what was
     asked for, nothing outside; in some ten conjugate directions, of which each would change the load by itself."""
@@ -94,27 +62,6 @@ def test_it_says_when_it_has_found_nothing(monkeypatch: pytest.MonkeyPatch) -> N
     found = found_by_sets(solver(h), h, MeanPressure(0.1))
     assert found.failure == "found no contact among 1 sets of points"
     assert found.certificate.worst > 1e-6
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("control", [MeanPressure(0.4), Approach(-0.01)])
-def test_any_number_of_ranks(comm: MPI.Intracomm, control: MeanPressure | Approach) -> None:
-    """To 1e-9 of the highest pressure, on cells of 100 : 1; some ranks may have no rows."""
-
-    def solved(on: MPI.Intracomm) -> tuple[Slab, Any]:
-        slab = Slab(on, 24, 3)
-        fft, size = FFT(slab), (1.0, 12.5)
-        h = slab.empty()
-        h[...] = white((3, 24), 5)[slab.rows]
-        solving = ContactSolver(Workspace(slab, 1e-11), 1.0, 1e-11, 500)
-        body = Bench(solving, HalfSpace(size).operator(fft), HalfSpace(size).inverse(fft))
-        return slab, found_by_sets(body, h, control)
-
-    slab, together = solved(comm)
-    _, alone = solved(MPI.COMM_SELF)
-    assert together.converged
-    assert alone.converged
-    assert_allclose(together.p, alone.p[slab.rows], rtol=0, atol=1e-9 * alone.p.max())
 
 
 # -- a failed solve is tried again, and only then ---------------------------------------------------------------------
@@ -157,17 +104,6 @@ def test_a_start_that_is_not_finite(control: MeanPressure | Approach, bad: float
     assert tried == ["a cold start on 3 nested grids"]
     assert contact.converged
     assert_allclose(contact.p, expected.p, atol=1e-7 * expected.p.max())
-
-
-def test_a_nested_start_saves_iterations() -> None:
-    """On the finest grid; so it helps where a cold start runs out of them."""
-    h = rough(256)
-    cold = solver(h).solve(h, LOAD, np.zeros_like(h)).iterations
-    body = solver(h)
-    start = np.zeros_like(h)
-    assert start_on_coarse_grids(body.solver, body.problem(h, LOAD), start, factory(np.ptp(h))) == (4, None)
-    assert 0 < body.slab.tally["operator"] <= 10  # all coarse grids cost no more than so many calls on the finest one
-    assert body.solve(h, LOAD, start).iterations <= 0.8 * cold
 
 
 def test_everything_is_tried_before_giving_up() -> None:

@@ -11,7 +11,7 @@ from scipy.sparse.linalg import spsolve
 
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.layer import LongWaves
-from parcontact.solve.preconditioner.extension import FADING, FLOOR, ExtendedPreconditioner, Grids, grids_for, pairs_for
+from parcontact.solve.preconditioner.extension import FLOOR, ExtendedPreconditioner, Grids
 from parcontact.solve.preconditioner.long_waves import DECAY, LongWavePreconditioner
 
 Map = NDArray[np.float64]
@@ -48,8 +48,8 @@ def fewer(pairs: int) -> int:
 
 
 def extended(s: Map, w: Map, points: Map, pairs: int = 0) -> Map:
-    """The sums s and w over cells of so many points, extended: `(s + f I e)/(w + f)`; first over so many `pairs`, below
-    0 along y."""
+    """The sums s and w over cells of a given number of points, extended: `(s + f I e)/(w + f)`; first over a given
+    number of `pairs`, below 0 along y."""
     ny, nx = s.shape
     if s.size == 1 and not pairs:
         return np.asarray(s / (w + FLOOR * points))
@@ -57,10 +57,10 @@ def extended(s: Map, w: Map, points: Map, pairs: int = 0) -> Map:
     across, told_across = (np.eye(nx), np.eye(nx)) if pairs < 0 else (adding(nx), interpolating(nx))
     s_above, w_above, points_above = (down @ field @ across.T for field in (s, w, points))
     above = extended(s_above, w_above, points_above, fewer(pairs))
-    told = told_down @ above @ told_across.T
+    stated = told_down @ above @ told_across.T
     if points.max() == 1.0:
-        return np.where(w > 0.0, s, told)
-    return np.asarray((s + FLOOR * points * told) / (w + FLOOR * points))
+        return np.where(w > 0.0, s, stated)
+    return np.asarray((s + FLOOR * points * stated) / (w + FLOOR * points))
 
 
 @pytest.mark.mpi
@@ -107,47 +107,6 @@ def test_brings_back_by_the_transpose(ny: int, nx: int, pairs: int, seed: int) -
         float(np.sum(np.abs(r_extended * 2.0 * inverse.given))),
     )
     assert abs(left - right) <= SINGLE * size
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize(
-    "larger", [Grids(), Grids(3), Grids(None, 2), Grids(4, -1), Grids(1, 2), Grids(None, -3), Grids(0)]
-)
-@pytest.mark.parametrize("shape", [(1, 1), (5, 300), (64, 64), (33, 18)])
-def test_holds_what_it_says(shape: tuple[int, int], larger: Grids) -> None:
-    """To the byte, on every rank."""
-    comm = MPI.COMM_WORLD
-    slab = Slab(comm, shape[1], shape[0])
-    _held = ExtendedPreconditioner(slab, larger=larger)
-    planned = Slab.planned(shape[1], shape[0], comm.size, comm.rank)
-    _counted = ExtendedPreconditioner(planned, larger=larger)
-    assert slab.tally["map bytes"] == planned.tally["map bytes"]
-
-
-def test_pairs_until_cells_are_square() -> None:
-    """Along the direction in which points are nearer; up to a reach of eight of the longer distances."""
-    found = [pairs_for(dx, dy) for dx, dy in ((1.0, 1.0), (1.0, 1.4), (1.0, 1.5), (1.0, 4.0), (4.0, 1.0))]
-    assert found == [0, 0, 1, 2, -2]
-    assert grids_for(1.0, 4.0, reach=32.0) == (5, 2, 1.0)
-    assert grids_for(4.0, 1.0, reach=32.0) == (5, -2, 1.0)
-    assert grids_for(1.0, 1.0, reach=1.0) == (2, 0, pytest.approx(2.0 ** (1.5 * FADING)))  # cells of two count for less
-    assert pairs_for(1.0, 17.0) == pairs_for(17.0, 1.0) == 0
-    assert grids_for(1.0, 17.0).most == grids_for(17.0, 1.0).most == 0
-
-
-@pytest.mark.parametrize(("last", "equal"), [(1.0, False), (1e9, True)])
-def test_largest_cells_of_a_high_floor_count_for_nothing(last: float, equal: bool) -> None:
-    """To single precision: they tell and ask nothing then, as if they were not there."""
-    random, slab = np.random.default_rng(2), Slab.alone(16, 16)
-    c = random.random((16, 16)) < 0.2
-    r = np.where(c, random.normal(size=(16, 16)), 0.0)
-    given_to_k = []
-    for larger in (Grids(2, 0, last), Grids(1)):
-        inverse, z = Doubling(), r.copy()
-        ExtendedPreconditioner(slab, larger=larger).apply(inverse, c, z)
-        given_to_k.append(inverse.given)
-    apart = np.abs(given_to_k[0] - given_to_k[1]).max()
-    assert (apart <= SINGLE * np.abs(r).max()) == equal
 
 
 # -- long waves on a thin layer: one V-cycle against a direct solve, its symmetry, any ranks, its memory --------------
@@ -218,28 +177,3 @@ def test_is_symmetric_and_positive(shape: tuple[int, int]) -> None:
     m_r, m_s = (added(MPI.COMM_SELF, one, contact, 0.1) for one in (r, s))
     assert abs(np.sum(r * m_s) - np.sum(m_r * s)) < SINGLE * np.sum(np.abs(m_r * s))
     assert np.sum(r * m_r) > 0.0
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize(("shape", "thickness"), [((48, 64), 0.03), ((48, 64), 0.15), ((33, 18), 0.3), ((2, 40), 0.1)])
-def test_ranks_agree(comm: MPI.Intracomm, shape: tuple[int, int], thickness: float) -> None:
-    contact, r = patches(*shape)
-    alone = added(MPI.COMM_SELF, r, contact, thickness)
-    mine = added(comm, r, contact, thickness)
-    np.testing.assert_allclose(mine, alone[Slab(comm, *shape[::-1]).rows], rtol=0, atol=SINGLE * np.abs(alone).max())
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("thickness", [0.03, 0.4])
-@pytest.mark.parametrize("shape", [(64, 64), (33, 18)])
-def test_holds_what_it_says_long_waves(comm: MPI.Intracomm, shape: tuple[int, int], thickness: float) -> None:
-    """To the byte, on every rank."""
-    slab = Slab(comm, shape[1], shape[0])
-    extended = ExtendedPreconditioner(slab)
-    before = slab.tally["map bytes"]
-    _held = LongWavePreconditioner(slab, waves(thickness), extended)
-    planned = Slab.planned(shape[1], shape[0], comm.size, comm.rank)
-    extended = ExtendedPreconditioner(planned)
-    less = planned.tally["map bytes"]
-    _counted = LongWavePreconditioner(planned, waves(thickness), extended)
-    assert slab.tally["map bytes"] - before == planned.tally["map bytes"] - less

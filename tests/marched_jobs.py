@@ -17,7 +17,7 @@ from parcontact.parallel.slab import Slab
 from parcontact.steady_sliding import start
 from parcontact.storage.step_row import StepRow
 
-# the paper's Hertz material as one Maxwell branch beside the long-term spring: modulus 2.75 MPa at once, a tenth of it
+# the paper's Hertz material as one Maxwell branch next to the long-term spring: modulus 2.75 MPa at once, a tenth of it
 # in the end, relaxation time 1 ms, creep time 10 ms
 BRANCHES = [{"modulus": 2.475e6, "relaxation_time": 1e-3}]
 SLS = {"model": "zener", "modulus_inf": 0.275e6, "branches": BRANCHES}

@@ -34,7 +34,7 @@ def of_file(path: Path, heights: NDArray[np.floating], **sections: Any) -> list[
 
 
 def rough_heights(points: int, shortest: float, seed: int = 1) -> NDArray[np.floating]:
-    """Periodic heights with waves down to so many cells, rms slope 0.1 on a box of 1 mm."""
+    """Periodic heights with waves down to a given number of cells, rms slope 0.1 on a box of 1 mm."""
     q = 2 * np.pi * np.hypot(np.fft.fftfreq(points)[:, None], np.fft.rfftfreq(points)[None, :])  # rad per cell
     kept = (q > 0) & (q <= 2 * np.pi / shortest)
     noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((points, points)))
