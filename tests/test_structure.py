@@ -111,7 +111,7 @@ MADE_BY = {  # which modules make objects of a kind
     "HalfSpace": {"scene.scene"},
     "SteadySolver": {"steady_sliding.sliding"},
     "SteadySliding": {"steady_sliding.start", "steady_sliding.curve", "plan.sample", "plan.memory"},
-    "March": {"steady_sliding.start", "study.outcome"},
+    "March": {"steady_sliding.start"},
 }
 
 
@@ -164,7 +164,7 @@ class Changing:
     def go(self, other):
         self.plain = self.read = 1
         self.more += 1
-        self.told: int = 1
+        self.stated: int = 1
         self.left, (self.right, *self.rest) = other
         for self.item in other: pass
         with other as self.opened: pass

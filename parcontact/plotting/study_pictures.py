@@ -1,4 +1,4 @@
-"""Pictures of a study: how errors fall with mesh and time (the paper's Fig. 6), and what accuracy costs."""
+"""Pictures of a study: how errors fall with mesh and time (the paper's Fig. 6)."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,12 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator, ScalarFormatter
 
 from ..parallel.slab import Array
-from . import charts, style
+from . import style
 
 NAMES = {"mu_max": "largest friction", "mu_end": "friction in the end", "area_corrected": "contact area, corrected"}
 MARKS = {"mesh and time together": "o-", "mesh with auto steps": "o-", "mesh alone": "s--", "time alone": "^:"}
 INTEGRATORS = {"exponential": style.BLUE, "exponential-linear": style.GREEN, "backward-euler": style.RED}
-COSTS = {"work": "transforms × N log₂ N", "seconds": "CPU time"}
 BAND = 5.0  # times the upper edge of the grey band over its lower one
 LEAST = 1e-7  # smaller errors are drawn here
 
@@ -33,32 +32,16 @@ class StudyCurve:
     errors: Sequence[float]
 
 
-@dataclass(frozen=True)
-class StudyPoint:
-    """One case: its work, its time [s], its relative error, and whether none is both cheaper and more accurate."""
-
-    work: float
-    seconds: float
-    error: float
-    integrator: str
-    best: bool
-
-
-def plot_study(
-    directory: Path,
-    curves: Sequence[StudyCurve],
-    points: Mapping[str, Sequence[StudyPoint]],
-    doubts: Mapping[str, float],
-) -> list[Path]:
-    """Draw `convergence.png`, if anything is refined, and `work_precision.png`; returns their paths.
+def plot_study(directory: Path, curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Path | None:
+    """Draw `convergence.png` and return its path; None if nothing is refined.
 
     `doubts` are the relative uncertainties of the references, shown as grey bands: what lies in them is not known.
     """
     drawn = [curve for curve in curves if any(0.0 < error < math.inf for error in curve.errors)]
+    if not drawn:
+        return None
     with style.drawing():
-        figures = {"convergence.png": _convergence(drawn, doubts)} if drawn else {}
-        figures["work_precision.png"] = _work_precision(points)
-        return [style.save_figure(figure, directory / name) for name, figure in figures.items()]
+        return style.save_figure(_convergence(drawn, doubts), directory / "convergence.png")
 
 
 def _convergence(curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Figure:
@@ -88,32 +71,6 @@ def _draw_ladders(axes: Axes, name: str, curves: Sequence[StudyCurve], doubt: fl
     axes.xaxis.set_major_formatter(ScalarFormatter())
 
 
-def _work_precision(points: Mapping[str, Sequence[StudyPoint]]) -> Figure:
-    """Draw a row for each quantity that is known, over both costs; study.csv has the settings of the points."""
-    known = {name: [one for one in found if math.isfinite(one.error)] for name, found in points.items()}
-    groups = [
-        [partial(_draw_points, name=name, points=found, cost=cost) for cost in COSTS]
-        for name, found in known.items()
-        if found
-    ]
-    return style.figure_of("", groups, legend=True)
-
-
-def _draw_points(axes: Axes, name: str, points: Sequence[StudyPoint], cost: str) -> None:
-    """Draw errors of a quantity over one cost; over the work with a line through the best points."""
-    for integrator, color in INTEGRATORS.items():
-        mine = [one for one in points if one.integrator == integrator]
-        if mine:
-            axes.plot(*_places(mine, cost), "o", color=color, label=integrator)
-    if cost == "work":
-        front = sorted((one for one in points if one.best), key=lambda one: one.work)
-        axes.plot(*_places(front, cost), "-", color=style.GREY, lw=1.0, zorder=0)
-        axes.set_ylabel(f"{NAMES[name]}:\nerror [%]")
-    axes.margins(x=0.1)
-    charts.set_scale(axes, "x", COSTS[cost], "s" if cost == "seconds" else "", log=True)
-    _scale_errors(axes, [one.error for one in points])
-
-
 def _scale_errors(axes: Axes, errors: Sequence[float]) -> None:
     """Set a logarithmic axis of errors [%], of at least a decade, with few ticks."""
     low, high = _per_cent(errors).min(), _per_cent(errors).max()
@@ -127,7 +84,3 @@ def _scale_errors(axes: Axes, errors: Sequence[float]) -> None:
 
 def _per_cent(errors: Sequence[float]) -> Array:
     return 100 * np.maximum(errors, LEAST)
-
-
-def _places(points: Sequence[StudyPoint], cost: str) -> tuple[list[float], Array]:
-    return [getattr(one, cost) for one in points], _per_cent([one.error for one in points])

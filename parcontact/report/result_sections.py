@@ -29,7 +29,7 @@ from ..storage import hdf5, marker, read_back
 from ..summary import leak_stop, pull_off, slide, sweep_table, theory_beside, theory_settings
 from .page_parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
 
-STUDY_PICTURES = {"convergence.png": "errors over refinement", "work_precision.png": "error over cost"}
+STUDY_PICTURES = {"convergence.png": "errors over refinement"}
 INTERFACE = ("friction_viscous", "friction_interface")
 SHOWN = (
     *("friction", "contact_area", "approach", "mean_gap", "max_pressure", *INTERFACE),

@@ -34,7 +34,7 @@ RESULTS = {
         "bands_theory.csv",
         curve_points.LOG,
     ),
-    "study": ("study.csv", "study.txt", "convergence.png", "work_precision.png"),
+    "study": ("study.csv", "study.txt", "convergence.png"),
 }
 COPIES = {  # of the job: as given, and with every default
     "run": ("job.yaml", "job.resolved.yaml"),

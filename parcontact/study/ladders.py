@@ -129,17 +129,13 @@ def _sliding(job: Job) -> list[Stage]:
 
 
 def describe_choices(job: Job) -> list[str]:
-    """Return sentences on what would follow the mesh or the accuracy, but is the same or chosen in every case."""
+    """Return sentences on what is the same, or chosen for the accuracy, in every case."""
     lines, reach = list[str](), chosen_range(job)
     if reach is not None:
         own = f"{job.grid.nx} x {job.grid.ny} points, the job's own mesh"
         lines.append(f"adhesion.range: {reach:.4g} m in every case, which auto is for {own}")
-    sliding = [] if job.study and job.study.cells_per_step else _sliding(job)
-    rest = [stage for stage in job.history if stage.chooses and not stage.speed]
-    steps = f"time steps are chosen in every case, for numerics.accuracy = {job.numerics.asked.of_steps:g}; "
-    steps += "a ladder study.cells_per_step would show what they add to the errors"
-    at_rest = "time steps at rest are chosen in every case, they have no cells per step"
-    for stages, text in ((sliding, steps), (rest, at_rest)):
-        if stages:
-            lines.append(f"{', '.join(dict.fromkeys(stage.name for stage in stages))}: {text}")
+    refined = _sliding(job) if job.study and job.study.cells_per_step else []
+    if stages := [stage.name for stage in job.history if stage.chooses and stage not in refined]:
+        bound = f"numerics.accuracy = {job.numerics.asked.of_steps:g}"
+        lines.append(f"{', '.join(dict.fromkeys(stages))}: time steps are chosen in every case, for {bound}")
     return lines

@@ -12,7 +12,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from .. import scene
 from ..columns import STUDY, names_of, to_csv
 from ..job import AUTO, Job
 from ..march import loop
@@ -24,7 +23,6 @@ from ..storage import files
 from ..storage.step_row import StepRow
 from .ladders import Settings
 
-FIRST_STEPS = 2
 LAST_SHARE = 0.25  # accuracy: of the last stage that slides (or lasts): its mean is taken for what has settled
 
 
@@ -50,11 +48,6 @@ QUANTITIES = ("mu_max", "mu_end", "area", "area_corrected")
 SETTINGS, RESULTS = (tuple(field.name for field in fields(kind)) for kind in (Settings, Outcome))
 COLUMNS = names_of(STUDY)  # the fingerprint, settings, results and errors
 COUNTS = ("mesh", "steps", "operator_calls")
-
-
-def warm_up(job: Job, slab: Slab) -> None:
-    """Make the first steps of a job, so that no case pays for compiled loops and transform plans; collective."""
-    loop.run_steps(March(scene.build(job, slab)), [lambda state: state.row.step >= FIRST_STEPS])
 
 
 def march_through(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome | None:

@@ -53,7 +53,6 @@ class _Study:
         self.prints = {case: _fingerprint(one) for case, one in jobs.items()}
         known = read_outcomes(self.path, self.prints) if self.slab.root else {}
         self.outcomes: dict[Settings, Outcome] = self.slab.agree(known)
-        self.warm = False
 
     def say(self, text: str) -> None:
         if self.slab.root and not self.quiet:
@@ -62,7 +61,7 @@ class _Study:
     def run(self, stopped: Callable[[], bool]) -> bool:
         """Run the cases that lack; whether all are there in the end."""
         self.say(f"{len(self.jobs)} cases" + f", {len(self.outcomes)} of them finished before" * bool(self.outcomes))
-        self._say_line("case", "friction max", "area", "CPU [s]")
+        self.say(f"  {'case':50}{' friction max' * self.refined.slides} {'area':>9} {'CPU [s]':>8}")
         for case, job in self.jobs.items():
             if case not in self.outcomes:
                 found = self._one(case, job, stopped)
@@ -72,19 +71,13 @@ class _Study:
                 if self.slab.root:
                     write_outcomes(self.path, self.prints, self.outcomes)
             one = self.outcomes[case]
-            numbers = f"{one.mu_max:.6g}", f"{one.area_corrected:.5f}", f"{one.cpu_seconds:.2f}"
-            self._say_line(str(case), *numbers)
+            friction = f" {one.mu_max:13.6g}" * self.refined.slides
+            self.say(f"  {case!s:50}{friction} {one.area_corrected:9.5f} {one.cpu_seconds:8.2f}")
         return True
-
-    def _say_line(self, case: str, friction: str, area: str, seconds: str) -> None:
-        self.say(f"  {case:50}" + f" {friction:>13}" * self.refined.slides + f" {area:>9} {seconds:>8}")
 
     def _one(self, case: Settings, job: Job, stopped: Callable[[], bool]) -> Outcome | None:
         slab = self.slab.resized(*job.grid.points)
         try:
-            if not self.warm:
-                outcome.warm_up(job, slab)
-                self.warm = True
             return outcome.march_through(job, slab, stopped)
         except RunError as error:
             raise RunError(f"{case}: {error}") from error
@@ -100,11 +93,9 @@ class _Study:
         lines = [*notes, *map(str, verdict.limits(self.refined, ordered))]
         lines += verdict.sentences(ordered, reference, self.slab.comm.size)
         files.replace_file(self.path.with_suffix(".txt"), "\n".join(lines) + "\n")
-        proven = {case: verdict.proven(error, reference) for case, error in errors.items()}
         doubts = {name: limit.doubt for name, limit in reference.items()}
-        points = {quantity: _points(ordered, proven, quantity) for quantity in verdict.NEEDED if quantity in doubts}
-        pictures = study_plots.plot_study(self.path.parent, self._curves(ordered, errors), points, doubts)
-        for line in (*lines, f"done: {self.path} and {', '.join(picture.name for picture in pictures)}"):
+        study_plots.plot_study(self.path.parent, self._curves(ordered, errors), doubts)
+        for line in (*lines, f"done: {self.path.parent}"):
             self.say(line)
 
     def _curves(
@@ -118,18 +109,6 @@ class _Study:
             for quantity in verdict.NEEDED
             if quantity in errors[cases[0]]
         ]
-
-
-def _points(
-    outcomes: dict[Settings, Outcome], errors: dict[Settings, dict[str, float]], quantity: str
-) -> list[study_plots.StudyPoint]:
-    """Error and cost of every case, and whether it is on the front."""
-    error = {case: errors[case][quantity] for case in outcomes}
-    best = verdict.front(outcomes, error)
-    return [
-        study_plots.StudyPoint(found.transform_work, found.cpu_seconds, error[case], case.integrator, case in best)
-        for case, found in outcomes.items()
-    ]
 
 
 def _fingerprint(job: Job) -> str:

@@ -1,7 +1,7 @@
 """Results of a study: limits, errors of every case, which settings are worth their price, and sentences about it."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from ..printed import per_cent, with_error
@@ -72,23 +72,8 @@ def limits(ladders: Ladders, outcomes: Outcomes) -> list[StudyFinding]:
         for name, (sizes, cases) in sequences(ladders, outcomes, integrator).items():
             for quantity in judged(ladders):
                 values = [float(getattr(outcomes[case], quantity)) for case in cases]
-                finer = [getattr(outcomes[case], quantity) for case in _finer(outcomes, cases[-1])]
-                found.append(StudyFinding(quantity, integrator, name, _cover(extrapolate(sizes, values), finer)))
+                found.append(StudyFinding(quantity, integrator, name, extrapolate(sizes, values)))
     return found
-
-
-def _finer(outcomes: Outcomes, last: Settings) -> list[Settings]:
-    """The cases that are in mesh and time as fine as the last one of a ladder, or finer, with all else the same."""
-    alike = [case for case in outcomes if case.integrator == last.integrator]
-    return [case for case in alike if case.mesh >= last.mesh and case.time_step <= last.time_step]
-
-
-def _cover(limit: Limit, finer: Sequence[float]) -> Limit:
-    """Let a limit without an order be as uncertain as it differs from cases that are as fine as the last one."""
-    if not math.isnan(limit.order):
-        return limit
-    apart = max((abs(value - limit.value) for value in finer), default=0.0)
-    return replace(limit, uncertainty=apart) if apart > 0.0 and not apart <= limit.uncertainty else limit
 
 
 def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
@@ -131,43 +116,19 @@ def worst(error: Mapping[str, float]) -> float:
     return max(values, default=math.nan)
 
 
-def front(outcomes: Outcomes, error: Mapping[Settings, float]) -> list[Settings]:
-    """The cases than which none is both cheaper, in transforms, and more accurate; the cheapest first."""
-    best, chosen = math.inf, []
-    for case in sorted(outcomes, key=lambda case: (outcomes[case].transform_work, error[case])):
-        if error[case] < best:
-            best = error[case]
-            chosen.append(case)
-    return chosen
-
-
 def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) -> list[str]:
-    """Return what is held to the targets, and for each the cheapest settings that reach it, with the time they take."""
+    """Return the cheapest settings that reach each target, with their time, and the error of the reference."""
     error = {case: worst(proven(errors(outcome, reference), reference)) for case, outcome in outcomes.items()}
-    best = min(error, key=lambda case: error[case] if not math.isnan(error[case]) else math.inf)
-    if math.isnan(error[best]):
+    if all(map(math.isnan, error.values())):
         return ["nothing touches: there are no errors to tell"]
     needed = [name for name in NEEDED if name in reference]
-    doubts = [reference[name].doubt for name in needed if reference[name].value]
-    doubt = max((doubt for doubt in doubts if not math.isnan(doubt)), default=math.nan)
-    lines: list[str] = []
+    on = "1 rank" if ranks == 1 else f"{ranks} ranks"
+    lines = [f"the cheapest settings with errors of {', '.join(needed)} within a bound, CPU times on {on}:"]
     for target in TARGETS:
-        enough, text = [case for case in outcomes if error[case] <= target], ""
-        if enough:
-            case = min(enough, key=lambda case: outcomes[case].transform_work)
-            on = "1 rank" if ranks == 1 else f"{ranks} ranks"
-            text += f"{case}; {outcomes[case].cpu_seconds:.3g} s of CPU time on {on}"
-        else:
-            text += (
-                f"none of these settings is good enough; the best, {best}, have an error of {100 * error[best]:.2g} %"
-            )
-        if math.isnan(doubt):
-            text += " (compared with the most expensive case, whose own error is not known)"
-        elif doubt > target:
-            text += f" (the reference itself is known to {100 * doubt:.2g} %)"
-        if lines and not enough and lines[-1].endswith(f"%: {text}"):  # the same is said of both
-            lines[-1] = lines[-1].replace(" %: none", f" %, {100 * target:g} %: none")
-        else:
-            lines.append(f"for {100 * target:g} %: {text}")
-    held = f"errors of {', '.join(needed)} are all" if len(needed) > 1 else f"error of {needed[0]} is"
-    return [f"the cheapest settings whose {held} within a bound:", *lines]
+        enough = [case for case in outcomes if error[case] <= target]
+        case = min(enough, key=lambda case: outcomes[case].transform_work, default=None)
+        found = f"{case}; {outcomes[case].cpu_seconds:.3g} s" if case else "none of these settings is good enough"
+        lines.append(f"for {per_cent(target)}: {found}")
+    doubt = worst({name: limit.doubt for name, limit in reference.items() if limit.value})
+    known = "is not known" if math.isnan(doubt) else f"is {100 * doubt:.2g} %"
+    return [*lines, f"the error of the reference, to which they are compared, {known}"]
