@@ -1,9 +1,8 @@
-"""Stages that choose their own time steps: within which bounds, which were chosen, and a guess of those to come.
+"""Stages that choose their own time steps: bounds, chosen steps, and an estimate of the steps to come.
 
-The next step is decided when the one before it has been made (`accuracy.controller`). The chosen steps are kept, so
-that a history has numbered steps here as everywhere, and a run goes on from them. Those to come are guessed as a
-ladder: steps double from the shortest to the longest that are allowed and go on with these, as they do where the error
-permits it.
+The next step is decided after the one before has been made (`accuracy.controller`). Chosen steps are stored, so that
+steps have numbers and a run can restart. Steps to come are estimated as a ladder: they double from the shortest to
+the longest that is allowed and then stay constant.
 """
 
 import math
@@ -17,21 +16,21 @@ from ..job.sections.calculation import Grid, Numerics
 from ..job.sections.geometry import Cylinder, Flat, Rough, Sphere, Wave
 from ..job.sections.stages import Initial, Stage
 
-SAME_TIME = 1e-9  # accuracy: a duration this close, relatively, to a whole number of steps is one
-HALVINGS = 10  # tuning: of a cell, in the shortest step of a surface that slides
-LEAST_SHARE = 2.0**-20  # tuning: of its duration, in the shortest step of a stage
-MOST_CELLS = 4  # tuning: slid in the longest step
-WAVE_STEPS = 4  # accuracy: in which the shortest wave passes, at least
-RAMP_STEPS = 16  # accuracy: at least, while a load changes
+SAME_TIME = 1e-9  # accuracy: relative deviation of a duration from a whole number of steps that is ignored
+HALVINGS = 10  # tuning: halvings of a cell in the shortest step of a slide
+LEAST_SHARE = 2.0**-20  # tuning: shortest step of a stage over its duration
+MOST_CELLS = 4  # tuning: largest number of cells slid in a step
+WAVE_STEPS = 4  # accuracy: least number of steps in which the shortest wave passes
+RAMP_STEPS = 16  # accuracy: least number of steps while a load changes
 
 
 def reached(time: float, until: float) -> bool:
-    """Return whether a time is the one asked for, or later."""
+    """Return whether a time equals the requested one or is later."""
     return time >= until * (1.0 - SAME_TIME)
 
 
 class Planned(Protocol):
-    """Source of the steps of a job: these sections of it, and whether its body has a memory."""
+    """Sections of a job that determine its steps, and whether its body has a memory."""
 
     grid: Grid
     surface: tuple[Any, ...]
@@ -45,16 +44,16 @@ class Planned(Protocol):
 
 @dataclass(frozen=True)
 class Bounds:
-    """The shortest and the longest step of a stage that chooses its own [s]."""
+    """Shortest and longest step of a stage that chooses its own [s]."""
 
     least: float
     most: float
 
 
 def most_cells(job: Planned) -> int:
-    """Return how many cells the longest step slides, a power of two: a quarter of the shortest wave.
+    """Return the largest number of cells slid in a step, a power of two: a quarter of the shortest wave.
 
-    It is one cell where that is shorter, or where a file may have any wave.
+    It is one cell if a quarter wave is shorter, or if a file may have any wave.
     """
     grid, waves = job.grid, [2.0 * MOST_CELLS * WAVE_STEPS]
     cells = [one_cell(stage, grid) * stage.speed for stage in job.history if stage.speed]
@@ -69,7 +68,7 @@ def most_cells(job: Planned) -> int:
 
 
 def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
-    """Return the bounds of steps that slide by at most some `cells`; at rest the longest is the whole stage."""
+    """Return the bounds of steps that slide by at most `cells`; at rest the longest is the whole stage."""
     most = stage.seconds if stage.load.constant else stage.seconds / RAMP_STEPS
     if not stage.speed:
         return Bounds(min(LEAST_SHARE * stage.seconds, most), most)
@@ -81,7 +80,7 @@ def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
 
 @dataclass(frozen=True)
 class StepLadder:
-    """Steps that double from `first` to `most` [s], and then are alike, over some `seconds`."""
+    """Steps that double from `first` to `most` [s] and then stay constant, for `seconds`."""
 
     first: float
     most: float
@@ -101,7 +100,7 @@ class StepLadder:
         return self.doublings + math.ceil(self.seconds / top * (1.0 - SAME_TIME))
 
     def end(self, index: int) -> float:
-        """Return when step `index`, from 1, ends [s]; 0 is the start."""
+        """Return the end of step `index`, counted from 1 [s]; 0 is the start."""
         if index <= 0:
             return 0.0
         doubled = min(index - 1, self.doublings)
@@ -110,9 +109,9 @@ class StepLadder:
 
 @dataclass(frozen=True)
 class ChosenEnds:
-    """Ends of the steps of a stage: those that were `made` [s after its start], then a ladder.
+    """Ends of the steps of a stage: those that were `made` [s after its start], followed by a ladder.
 
-    The stage ends at the first of `stops` [s]; a later one is where it was asked to go on to.
+    The stage ends at the first of `stops` [s]; a later one is the end of a longer run.
     """
 
     made: Sequence[float]
@@ -125,14 +124,14 @@ class ChosenEnds:
         return len(self.made) + self.ladder.count
 
     def elapsed(self, index: int) -> float:
-        """Return when the step ends [s after the start of the stage]."""
+        """Return the end of the step [s after the start of the stage]."""
         if index <= len(self.made):
             return self.made[index - 1] if index > 0 else 0.0
         now = self.made[-1] if self.made else 0.0
         return self.stops[-1] if index >= self.count else now + self.ladder.end(index - len(self.made))
 
     def interval(self, index: int, since: int | None = None) -> float:
-        """Return how long the step takes, or all steps since another one [s]."""
+        """Return the length of the step [s], or of all steps since another one."""
         return self.elapsed(index) - self.elapsed(index - 1 if since is None else since)
 
     def __getitem__(self, index: int) -> float:
@@ -141,8 +140,8 @@ class ChosenEnds:
 
 
 class MadeStep(NamedTuple):
-    """A step that a stage has chosen, and whose error will do: its stage, its end [s after the start of the stage] and
-    how long the next one is meant to be [s]."""
+    """An accepted step that a stage has chosen: its stage, its end [s after the start of the stage], and the length of
+    the next one [s]."""
 
     stage: int
     end: float
@@ -151,9 +150,8 @@ class MadeStep(NamedTuple):
 
 @dataclass
 class ChosenSteps:
-    """The steps that the stages of a history have chosen so far: their `ends` [s after the start of their stage] by the
-    number of the stage, and how long the `next` one is meant to be [s], 0 where that is yet to be found. None is longer
-    than some `cells` of sliding."""
+    """The steps that the stages of a history have chosen so far: their `ends` [s after the start of the stage] by the
+    number of the stage, and the length of the `next` one [s], 0 if undecided. None slides by more than `cells`."""
 
     cells: int = 1
     ends: dict[int, list[float]] = field(default_factory=dict)
@@ -161,7 +159,7 @@ class ChosenSteps:
 
     @classmethod
     def from_job(cls, job: Planned, saved: Mapping[str, Any] | None = None) -> "ChosenSteps":
-        """Return those that the stages of a job had chosen when a checkpoint with these arrays was written."""
+        """Return the steps of a job, with those chosen when a checkpoint with the arrays `saved` was written."""
         found = cls(most_cells(job))
         if saved is not None and "ends" in saved:
             ends = iter(saved["ends"].tolist())
@@ -171,7 +169,7 @@ class ChosenSteps:
         return found
 
     def add(self, step: "MadeStep") -> None:
-        """Note a step that has been made."""
+        """Add a step that has been made."""
         self.ends.setdefault(step.stage, []).append(step.end)
         self.next = step.next
 
@@ -180,7 +178,7 @@ class ChosenSteps:
         return sum(map(len, self.ends.values()))
 
     def of_stage(self, index: int, stage: Stage, grid: Grid, until: float = 0.0) -> ChosenEnds:
-        """Return those of a stage that may go on to `until` [s after its start]."""
+        """Return the steps of a stage that may continue to `until` [s after its start]."""
         made, limits = self.ends.get(index, []), bounds(stage, grid, self.cells)
         stops = (stage.seconds, *([until] if not reached(stage.seconds, until) else []))
         now = made[-1] if made else 0.0
@@ -190,7 +188,7 @@ class ChosenSteps:
         return ChosenEnds(made, stops, StepLadder(first, max(first, longest), left), limits)
 
     def numbers(self) -> dict[str, tuple[list[float] | float, str]]:
-        """Return all this, with units, by the names that it has in a checkpoint."""
+        """Return all data with units, by their names in checkpoints."""
         stages = sorted(self.ends)
         return {
             "stages": ([float(stage) for stage in stages], "1"),
@@ -201,7 +199,7 @@ class ChosenSteps:
 
 
 def describe_steps(job: Planned) -> str:
-    """Return which stages choose their own time steps, how, and why; '' if none does."""
+    """Return a text on the stages that choose their own time steps, with the reason; '' if there are none."""
     names = ", ".join(stage.name for stage in job.history if stage.chooses)
     if not names:
         return ""

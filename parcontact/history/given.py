@@ -1,4 +1,4 @@
-"""The steps of a stage that follow from the job alone: all alike, or each a factor longer than the one before."""
+"""Steps of a stage that follow from the job alone: of constant length, or growing by a constant factor."""
 
 import math
 from dataclasses import dataclass
@@ -11,9 +11,9 @@ from .chosen import RAMP_STEPS, SAME_TIME, reached
 
 @dataclass(frozen=True)
 class GivenEnds:
-    """Ends of `count` steps as fractions of a stage of some `seconds`, each `growth` times as long as the one before.
+    """Ends of `count` steps as fractions of a stage of `seconds`, each `growth` times as long as the one before.
 
-    The last is 1; what goes on beyond it goes on with the last step.
+    The last is 1; further steps have the length of the last one.
     """
 
     count: int
@@ -21,7 +21,7 @@ class GivenEnds:
     seconds: float
 
     def __getitem__(self, index: int) -> float:
-        """Return the end of step `index`, from 1; 0 is the start of the stage."""
+        """Return the end of step `index`, counted from 1; 0 is the start of the stage."""
         if index > self.count:
             return 1.0 + (index - self.count) * self._last
         if self.growth == 1.0 or index == self.count:
@@ -30,21 +30,21 @@ class GivenEnds:
 
     @property
     def _last(self) -> float:
-        """The last step as a fraction of the stage."""
+        """Length of the last step as a fraction of the stage."""
         return 1.0 - self[self.count - 1]
 
     def elapsed(self, index: int) -> float:
-        """Return when the step ends [s after the start of the stage]."""
+        """Return the end of the step [s after the start of the stage]."""
         return self[index] * self.seconds if index else 0.0
 
     def interval(self, index: int, since: int | None = None) -> float:
-        """Return how long the step takes, or all steps since another one [s]; steps that are alike are so exactly."""
+        """Return the length of the step [s], or of all steps since another one; equal steps are exactly equal."""
         if since is None and self.growth == 1.0:
             return self.seconds / self.count
         return (self[index] - self[index - 1 if since is None else since]) * self.seconds
 
     def beyond(self, until: float) -> int:
-        """Return how many more steps it takes to reach the time `until` [s after the start of the stage]."""
+        """Return the number of further steps to reach the time `until` [s after the start of the stage]."""
         fraction = until / self.seconds
         more = max(0, math.ceil((fraction * (1.0 - SAME_TIME) - 1.0) / self._last) - 1)
         while not reached(self[self.count + more], fraction):
@@ -53,9 +53,9 @@ class GivenEnds:
 
 
 def divide(stage: Stage, grid: Grid) -> GivenEnds:
-    """Return the steps of a stage: none is longer than asked for, and an instantaneous stage has none.
+    """Return the steps of a stage: none exceeds the requested length, and an instantaneous stage has none.
 
-    Of a body without memory that may choose its own: one cell in sliding, the whole stage at rest, some on a ramp.
+    Automatic steps of a body without memory are one cell in sliding, the whole stage at rest, and several on a ramp.
     """
     if stage.seconds == 0.0:
         return GivenEnds(0, 1.0, 0.0)

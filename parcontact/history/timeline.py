@@ -1,4 +1,5 @@
-"""The instants of a history: every step follows from the job alone, so that a restart needs only a step's number."""
+"""The instants of a history. Every step follows from the job and its number, so that a restart needs only
+this number."""
 
 import math
 import sys
@@ -14,18 +15,18 @@ from ..job.sections.stages import GeometricStep, Stage
 from .chosen import ChosenEnds, ChosenSteps, MadeStep, Planned, reached
 from .given import GivenEnds, divide
 
-ROUNDINGS = 4.0  # accuracy: of an instant, between two that are the same
-SAME_PLACE = 1e-6  # accuracy: a displacement this close to whole cells [cells] is one of whole cells
+ROUNDINGS = 4.0  # accuracy: rounding units between two equal instants
+SAME_PLACE = 1e-6  # accuracy: deviation from a displacement of whole cells that is ignored [cells]
 
 
 class Step(NamedTuple):
     """One solve: it ends at `time` [s], `dt` [s] after the last, with the surface at `position` [m].
 
-    `dt` = 0 is a jump, at an instant, of the load. `control` names what `load` prescribes (Pa, N or m). `growth` is
-    dt over the dt of the step before, 0 where that was a jump: how far to extrapolate what changes smoothly. `passed`
-    is the number of steps that this one stands for besides its own. `judge`, of a step that may be too long, is told
-    the error of the step when it has been tried, and how far the edge of a contact with adhesion has moved, in half
-    process zones: it returns the shorter one to make instead, or how it is noted.
+    `dt` = 0 is a jump of the load. `control` names what `load` prescribes (Pa, N or m). `growth` is dt over the dt
+    of the step before, 0 after a jump: the factor for extrapolation. `passed` is the number of further steps that
+    this one replaces. `decide`, for a step that may be too long, gets the error of the step and the motion of the
+    edge of an adhesive contact, in half process zones; it returns the shorter step to make instead, or the record of
+    this one.
     """
 
     number: int
@@ -47,7 +48,8 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True)
 class Span:
-    """The steps of one stage: after the first `before` of the history a jump or none, then `count` that last.
+    """The steps of one stage: after the first `before` of the history one jump or none, and `count` steps with a
+    duration.
 
     They start at `start` [s], with the surface at `origin` [m].
     """
@@ -72,29 +74,29 @@ class Span:
 
     @cached_property
     def rests(self) -> bool:
-        """True if it stands under a constant load, and its steps may be as long as what happens allows."""
+        """True if the surface rests under a constant load, and the length of steps is free."""
         free = self.stage.chooses or isinstance(self.stage.time_step, GeometricStep)
         return free and not any(self.stage.velocity) and self.stage.load.constant
 
     @property
     def extremes(self) -> tuple[float, float]:
-        """The first and the last step that lasts [s]; of steps that a stage chooses, the shortest and the longest."""
+        """First and last step with a duration [s]; for chosen steps, the shortest and the longest."""
         if isinstance(self.ends, ChosenEnds):
             return self.ends.limits.least, self.ends.limits.most
         return self.ends.interval(1), self.ends.interval(self.count)
 
     def time(self, index: int) -> float:
-        """Return when the step `index` of those that last ends [s]."""
+        """Return the end [s] of step `index` of those with a duration."""
         return self.start + self.ends.elapsed(index)
 
     def position(self, index: int) -> tuple[float, float]:
-        """Return where the surface then is [m]."""
+        """Return the position of the surface at this end [m]."""
         slid = self.ends.elapsed(index)
         (x, y), (along_x, along_y) = self.origin, self.stage.velocity
         return x + along_x * slid, y + along_y * slid
 
     def place(self, number: int) -> int:
-        """Return which of those that last the step of this number is; 0 is the jump."""
+        """Return the index of the step `number` among those with a duration; 0 is the jump."""
         return number - self.before - self.jumps
 
     def leap(self, number: int, target: int) -> Step:
@@ -115,14 +117,14 @@ class Span:
 
 
 class Timeline:
-    """All steps of a history, numbered from 1; step 0 is the initial state. Only stages are kept, not their steps.
+    """All steps of a history, numbered from 1; step 0 is the initial state. Only stages are stored, not their steps.
 
-    Where the history ends before `until`, its last stage goes on with its last time step, velocity and load, to the
-    first step that reaches it; a last stage that is one solve cannot go on. `pressure` [Pa] is that of the initial
-    state, None for a virgin body.
+    If the history ends before `until`, its last stage continues with its last time step, velocity and load, to the
+    first step that reaches it; a stage of a single solve cannot continue. `pressure` [Pa] is that of the initial
+    state, None at rest.
 
-    `chosen` has the steps of stages that choose their own: as it grows, so does what is known here, and the others
-    are guessed. None: these stages have the steps of a body without memory.
+    `chosen` has the steps of stages that choose their own, and grows during a run; further steps are estimated. If
+    it is None, these stages have the steps of a body without memory.
     """
 
     def __init__(
@@ -137,20 +139,20 @@ class Timeline:
         self.chooses = chosen is not None and any(stage.chooses for stage in history)
         self._before = None if pressure is None else ("pressure", pressure)
         self._spans: list[Span] = []
-        self._open, self._seen = 0, 0  # the stage that was choosing its steps, and how many had been chosen
+        self._open, self._seen = 0, 0  # the stage that chooses its steps, and the number of chosen steps
 
     @classmethod
     def from_job(cls, job: Planned, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
-        """Return all steps of a job; its last stage goes on to `until` [s] if that is later than its end.
+        """Return all steps of a job; its last stage continues to `until` [s] if that is later than its end.
 
-        `chosen` are the steps that stages have chosen so far; those to come are guessed.
+        `chosen` are the steps that stages have chosen so far; further ones are estimated.
         """
         record = (chosen or ChosenSteps.from_job(job)) if job.remembers else None
         return cls(job.history, job.grid, until, job.initial.pressure, record)
 
     @property
     def spans(self) -> list[Span]:
-        """The steps of each stage, with those that have been chosen by now."""
+        """The steps of each stage, with those chosen so far."""
         chosen = self.chosen.count if self.chosen is not None else 0
         if chosen != self._seen:
             del self._spans[self._open :]
@@ -176,7 +178,7 @@ class Timeline:
         return Span(index, stage, number, _jumps(stage, before), count, ends, time, position)
 
     def follow(self, times: Mapping[int, float]) -> "Timeline":
-        """Take the times [s] of steps that were made, by their numbers, as those that the stages have chosen."""
+        """Use the times [s] of steps that were made, by their numbers, as chosen steps."""
         for index in range(len(self.history)):
             span = self.spans[index]
             if self.chosen is None or not isinstance(span.ends, ChosenEnds):
@@ -198,7 +200,7 @@ class Timeline:
         return len(self)
 
     def __getitem__(self, number: int) -> Step:
-        """Return the step of this number, from 1."""
+        """Return the step of this number, counted from 1."""
         if not 1 <= number <= len(self):
             raise IndexError(number)
         return self.span(number).step(number)
@@ -215,17 +217,17 @@ class Timeline:
 
     @property
     def end(self) -> float:
-        """The end of the last step [s]."""
+        """End of the last step [s]."""
         return self[len(self)].time if len(self) else 0.0
 
     @property
     def lasts(self) -> bool:
-        """True if there is more than jumps."""
+        """True if there are steps with a duration."""
         return any(span.count for span in self.spans)
 
     @property
     def moves(self) -> bool:
-        """True if the surface leaves its place."""
+        """True if the surface moves."""
         return any(span.moves for span in self.spans)
 
     def first_reaching(self, time: float) -> int:
@@ -233,12 +235,12 @@ class Timeline:
         return min(1 + bisect_left(range(1, len(self) + 1), True, key=lambda n: reached(self[n].time, time)), len(self))
 
     def shared(self, other: "Timeline") -> int:
-        """Return how many of the first steps are those of another history too, stage by stage."""
+        """Return how many of the first steps agree with those of another history, stage by stage."""
         same = takewhile(lambda pair: pair[0] == pair[1], zip(self.spans, other.spans, strict=False))
         return max((span.last for span, _ in same), default=0)
 
     def first_between_cells(self) -> Step | None:
-        """Return the first step after which the surface is not moved by whole cells along x."""
+        """Return the first step after which the displacement of the surface is not of whole cells along x."""
         for span in filter(lambda span: span.moves, self.spans):
             first = span.before + span.jumps + 1
             if isinstance(span.ends, ChosenEnds):
@@ -249,7 +251,7 @@ class Timeline:
                 off, drift = abs(cells - round(cells)), abs(each - round(each))
                 if off + drift * (1 + span.count) < SAME_PLACE / 2:
                     continue
-                first += max(0, int((SAME_PLACE - off) / drift) - 2) if drift else 0  # none before is that far off
+                first += max(0, int((SAME_PLACE - off) / drift) - 2) if drift else 0  # earlier steps deviate less
             for step in map(span.step, range(first, span.last + 1)):
                 cells = step.position[0] / self.grid.dx
                 if step.position[1] != 0.0 or abs(cells - round(cells)) > SAME_PLACE:
@@ -258,10 +260,8 @@ class Timeline:
 
 
 def _elapsed(start: float, stops: tuple[float, ...], time: float) -> float:
-    """Return how long after the start of a stage an instant is [s].
-
-    It is a stop of the stage if times have no digits to tell them apart.
-    """
+    """Return the time from the start of a stage to an instant [s]; exactly a stop of the stage if it equals one to
+    rounding."""
     for stop in stops:
         if math.isclose(time, start + stop, rel_tol=ROUNDINGS * sys.float_info.epsilon):
             return stop
@@ -269,7 +269,8 @@ def _elapsed(start: float, stops: tuple[float, ...], time: float) -> float:
 
 
 def _jumps(stage: Stage, before: tuple[str, float] | None) -> bool:
-    """Return whether the stage begins with a jump: it is instantaneous, or has another load or control than before."""
+    """Return whether the stage starts with a jump: it is instantaneous, or its load or control differs from the one
+    before."""
     if stage.seconds == 0.0:
         return True
     if before is None:
