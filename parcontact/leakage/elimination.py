@@ -1,7 +1,7 @@
 """Direct solution of the flow between cells: half of the cells are eliminated at once, the rest by sparse factors.
 
-The flows that leave each wet cell balance: with the conductances c of its faces, `sum c (p - p_neighbour) = given`.
-Cells on the white fields of a checkerboard touch black ones only, so that each of them is eliminated on its own:
+The flows out of each wet cell balance: with the conductances c of its faces, `sum c (p - p_neighbour) = given`.
+White cells of a checkerboard touch black ones only, so that each is eliminated on its own:
 
     p_white = (given + sum c p_black)/sum c,
 
@@ -18,18 +18,17 @@ from scipy.sparse.linalg import splu
 from ..compiled import loop
 
 Map = NDArray[np.floating]
-DRY, WHITE = -1, -2  # numbers of cells that are no black ones
-MOST_NEIGHBOURS = 17  # of a black cell, itself included: three beyond each of four white ones, and four black ones
-PANEL = 1  # tuning: columns that SuperLU takes at once; they are short
+DRY, WHITE = -1, -2  # numbers of cells that are not black
+MOST_NEIGHBOURS = 17  # entries of a row of the matrix, at most, including the diagonal
+PANEL = 1  # tuning: columns per panel of SuperLU
 
 
 class Balance:
     """Balance of the flows in a map.
 
-    `resistances` are 1/g^3, infinite in dry cells; `aspect` is across over along the flow, of a cell.
-
-    Flow is along y, from the first to the last row; the other sides are `periodic` or closed. The pressure is given
-    half a cell from these rows: `first` and `last` are the conductances from there, shape (nx,).
+    `resistances` are 1/g^3, infinite in dry cells; `aspect` is the side of a cell across the flow over that along
+    it. Flow is along y, from the first to the last row; the other sides are `periodic` or closed. The pressure is
+    prescribed half a cell from these rows: `first` and `last` are the conductances from there, shape (nx,).
     """
 
     def __init__(self, resistances: Map, aspect: float, periodic: bool) -> None:
@@ -55,7 +54,7 @@ class Balance:
         return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=PANEL, options=options)
 
     def solve(self, given: Map) -> Map:
-        """Return the pressures for what is `given` to each cell, both of the shape of the map; 0 in dry cells."""
+        """Return the pressures for the sources `given` in each cell, both of the shape of the map; 0 in dry cells."""
         black, pressure = self._number >= 0, np.zeros_like(self._sum)
         if self._factors is not None:
             total = given.copy()
@@ -68,14 +67,15 @@ class Balance:
         return pressure
 
     def power(self, pressure: Map) -> float:
-        """Return what the flow dissipates, sum c (p - p_neighbour)^2, with the pressures 1 and 0 at the ends."""
+        """Return the dissipation of the flow, sum c (p - p_neighbour)^2, with the pressures 1 and 0 at the ends."""
         return float(_dissipate(*self._map, self.first, self.last, pressure))
 
 
 def _number_black_cells(resistances: Map) -> NDArray[np.int32]:
     """Return the numbers of black wet cells, WHITE and DRY elsewhere.
 
-    Two white cells would touch across periodic sides where the number of columns is odd: its last column has none.
+    If the number of columns is odd, two white cells would touch across periodic sides: the last column then has
+    none.
     """
     ny, nx = resistances.shape
     white = np.add.outer(np.arange(ny), np.arange(nx)) % 2 == 0
@@ -88,7 +88,7 @@ def _number_black_cells(resistances: Map) -> NDArray[np.int32]:
 
 @loop
 def _neighbour(resistances, aspect, periodic, row, column, side):
-    """Row, column and conductance of the face of a neighbour, 0 where there is none."""
+    """Return row, column and conductance of the face of a neighbour; 0 if there is none."""
     i, j, width = row, column, resistances.shape[1]
     if side < 2:
         i = row - 1 if side == 0 else row + 1
@@ -108,7 +108,7 @@ def _neighbour(resistances, aspect, periodic, row, column, side):
 
 @loop
 def _add_faces(resistances, aspect, periodic, first, last, out):
-    """Sum the conductances of the faces of each cell, those of the ends included."""
+    """Put the sum of the conductances of the faces of each cell, including those of the ends, into `out`."""
     for row in range(resistances.shape[0]):
         for column in range(resistances.shape[1]):
             total = 0.0
@@ -149,7 +149,7 @@ def _eliminate(resistances, aspect, periodic, number, total, starts, columns, va
 
 @loop
 def _add(other, value, begin, end, columns, values):
-    """Add a value to an entry of the row that began there; returns where the row ends."""
+    """Add a value to an entry of a row that starts at `begin`. Return the end of the row."""
     for k in range(begin, end):
         if columns[k] == other:
             values[k] += value
@@ -160,8 +160,8 @@ def _add(other, value, begin, end, columns, values):
 
 @loop
 def _gather(resistances, aspect, periodic, number, total, field, black, out):
-    """Add to black cells what their white neighbours pass on of a field, or to white cells `c` times that of black
-    ones."""
+    """Add the flow from white neighbours of a field to black cells, or `c` times that of black neighbours to white
+    cells."""
     for row in range(resistances.shape[0]):
         for column in range(resistances.shape[1]):
             own = number[row, column]
@@ -175,7 +175,7 @@ def _gather(resistances, aspect, periodic, number, total, field, black, out):
 
 @loop
 def _dissipate(resistances, aspect, periodic, first, last, pressure):
-    """Sum the dissipation of all faces, each seen from one of its cells, and of the ends."""
+    """Return the sum of the dissipation of all faces, each counted once, and of the ends."""
     total = 0.0
     for row in range(resistances.shape[0]):
         for column in range(resistances.shape[1]):

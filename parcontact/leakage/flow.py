@@ -4,11 +4,11 @@ The Reynolds equation for a fluid of viscosity eta between two bodies that touch
 
     div(g^3 grad p) = 0,      flow per width  Q = -(K / 12 eta) grad p,
 
-is solved by finite volumes: each point of the map is a cell, and the conductance of the face between two cells is the
-harmonic mean of their g^3. The pressure is given on two opposite ends of the map. The other two sides are periodic, or
-closed. Contact is impermeable. Only cells that lie on a path from end to end matter; the matrix of these is factorized
-directly, since g^3 spans many decades and iterations stall. The flow follows from what it dissipates,
-`sum c (p - p_neighbour)^2`, which is least for the exact pressures: their errors enter with their squares.
+is solved by finite volumes: each point of the map is a cell, and the conductance of the face between two cells is
+the harmonic mean of their g^3. The pressure is prescribed on two opposite ends of the map. The other two sides are
+periodic or closed. Contact is impermeable. Only cells on a path from end to end are used. Their matrix is factorized
+directly, as g^3 spans many decades and iterations stall. The flow follows from its dissipation, `sum c (p -
+p_neighbour)^2`, which is minimal for the exact pressures, so that their errors enter squared.
 """
 
 import math
@@ -24,18 +24,18 @@ from .elimination import Balance
 from .paths import connected_from_end_to_end, critical_constriction
 
 Map = NDArray[np.float64]
-LEAST_GAP = 1e-3  # accuracy: of the largest gap; cells of a smaller one are closed, which costs some 1e-5 of the flow
-LEAST_OF_CONSTRICTION = 0.1  # accuracy: of the critical constriction, for maps where all paths are that narrow
-MOST_OF_CONSTRICTION = 1e3  # accuracy: wider cells are taken to be that wide; what they resist is 1e-9 of the whole
+LEAST_GAP = 1e-3  # accuracy: least open gap over the largest; this changes the flow by about 1e-5
+LEAST_OF_CONSTRICTION = 0.1  # accuracy: least open gap over the critical constriction
+MOST_OF_CONSTRICTION = 1e3  # accuracy: largest gap over the critical constriction; wider cells resist 1e-9 of the whole
 
 
 @dataclass(frozen=True)
 class Flow:
-    """Flow along one direction: `conductivity` is K [m^3], 0 where no path leads from end to end.
+    """Flow along one direction: `conductivity` is K [m^3], 0 if no path leads from end to end.
 
     `constriction` [m] is the smallest gap on the widest path and `position` its row and column; `imbalance` is the
-    difference of what flows out and of what dissipation takes to flow in, over the flow, which rounding makes;
-    `pressure` is the map of the fluid's pressure, 1 at the first and 0 at the last end, NaN where no fluid flows.
+    difference of outflow and of the inflow by dissipation, over the flow, a rounding error; `pressure` is the map of
+    the fluid's pressure, 1 at the first and 0 at the last end, NaN where no fluid flows.
     """
 
     conductivity: float
@@ -69,7 +69,7 @@ def solve_flow(gap: Map, size: tuple[float, float], axis: str = "x", periodic_si
 
 
 def _resistances(gap: Map, constriction: float, periodic_sides: bool) -> Map:
-    """Return 1/g^3 over that of the constriction; infinite in cells that do not matter."""
+    """Return 1/g^3 over that of the constriction; infinite in cells that are not used."""
     least = min(LEAST_GAP * float(gap.max()), LEAST_OF_CONSTRICTION * constriction)
     wet = connected_from_end_to_end(gap >= least, periodic_sides)
     found = np.full(gap.shape, np.inf)
@@ -80,12 +80,8 @@ def _resistances(gap: Map, constriction: float, periodic_sides: bool) -> Map:
 def flow_mesh_error(
     gap: Map, flow: Flow, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True
 ) -> float:
-    """Return by what share K of a flow differs if only every second point of its gap is known, beginning with the first
-    or with the second, whichever differs more; NaN where contact closes. The other arguments are those of `solve_flow`.
-
-    K of a contact on twice the points differs by a third of that, in the median of three turned surfaces on 128 and 256
-    points under loads up to closure.
-    """
+    """Return the relative change of K if only every second point of its gap is used, starting with the first or the
+    second, whichever changes it more; NaN if contact closes the gap. The other arguments are those of `solve_flow`."""
     if not flow.percolates:
         return math.nan
     found = []
@@ -99,9 +95,9 @@ def flow_mesh_error(
 class Leak:
     """Flow through a gap along x and along y.
 
-    `flow_x` and `flow_y` are the conductivities K [m^3]: a pressure that falls by `dp` over the length drives
-    `K/(12 eta) dp/length` through each metre of width. `constriction` [m] is the smallest gap on the widest path in the
-    direction that leaks more; 0 where contact closes the gap.
+    `flow_x` and `flow_y` are the conductivities K [m^3]: a pressure that falls by `dp` over the length drives `K/(12
+    eta) dp/length` through each metre of width. `constriction` [m] is the smallest gap on the widest path in the
+    direction that leaks more; 0 if contact closes the gap.
     """
 
     along_x: Flow
@@ -123,8 +119,8 @@ class Leak:
 def leak(gap: ArrayLike, size: Sequence[float], periodic: bool | tuple[bool, bool] = True) -> Leak:
     """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m], along x and along y.
 
-    Contact is where the gap is 0 or less. Sides along the flow are `periodic`, or closed. Raises InputError for gaps
-    that are no such map, or not finite, and for other sizes.
+    A gap of 0 or less is contact. Sides along the flow are `periodic`, or closed. Raises InputError for maps or
+    sizes of another kind, and for gaps that are not finite.
     """
     try:
         given = np.asanyarray(gap)

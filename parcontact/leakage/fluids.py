@@ -1,18 +1,18 @@
-"""Fluids that flow through a gap: liquids by their viscosity, gases that expand and slip.
+"""Fluids that flow through a gap: liquids, described by their viscosity, and gases, which expand and slip.
 
 A pressure that falls from p1 to p2 over the length L of a gap of conductivity K drives through a width W the flow
 
     liquid   Q = K/(12 eta) (p1 - p2) W/L,
     gas      Q = K/(12 eta) (p1^2 - p2^2)/(2 p2) W/L,    at the pressure p2,
 
-an ideal gas at constant temperature T being as dense as its pressure. Its mean free path is (R the gas constant, M the
-molar mass; J. C. Maxwell, Phil. Trans. R. Soc. 170 (1879) 231)
+for an ideal gas at constant temperature T. Its mean free path is (R the gas constant, M the molar mass; J. C.
+Maxwell, Phil. Trans. R. Soc. 170 (1879) 231)
 
     lambda = (eta/p) sqrt(pi R T/(2 M)).
 
 At walls that reflect all molecules diffusely it slips, and a gap g conducts like one of `g^3 (1 + 6 lambda/g)`, here
-with lambda at the mean pressure (p1 + p2)/2, which is exact for an even gap. This holds to some 10 % for gaps above
-ten mean free paths; in smaller ones more flows.
+with lambda at the mean pressure (p1 + p2)/2, which is exact for an even gap. The error is about 10 % for gaps above
+ten mean free paths; in smaller gaps the true flow is larger.
 """
 
 import math
@@ -28,8 +28,8 @@ ROOM = 293.15  # physics: temperature of the table [K]
 
 @dataclass(frozen=True)
 class Fluid:
-    """A fluid at 20 C: its viscosity [Pa s], and the molar mass of a gas [kg/mol] or the density of a liquid
-    [kg/m^3], NaN where it is not known."""
+    """A fluid at 20 C: its viscosity [Pa s], and the molar mass of a gas [kg/mol] or the density of a liquid [kg/m^3],
+    NaN if unknown."""
 
     name: str
     viscosity: float
@@ -37,13 +37,13 @@ class Fluid:
     density: float = math.nan
 
     def mean_free_path(self, pressure: float) -> float:
-        """Return the mean free path of a gas at a pressure [Pa], 0 of a liquid [m]."""
+        """Return the mean free path [m] of a gas at a pressure [Pa]; 0 for a liquid."""
         if self.molar_mass is None:
             return 0.0
         return self.viscosity / pressure * math.sqrt(math.pi * GAS_CONSTANT * ROOM / (2.0 * self.molar_mass))
 
     def density_at(self, pressure: float) -> float:
-        """Return the density at a pressure [Pa], in kg/m^3; NaN where it is not known."""
+        """Return the density [kg/m^3] at a pressure [Pa]; NaN if unknown."""
         return self.density if self.molar_mass is None else pressure * self.molar_mass / (GAS_CONSTANT * ROOM)
 
 
@@ -57,7 +57,7 @@ FLUIDS = {  # at 20 C and 1 bar: CRC Handbook of Chemistry and Physics, 97th edi
 
 @dataclass(frozen=True)
 class PressureDrop:
-    """A fluid under a pressure that falls from `high` to `low` [Pa], absolute pressures of a gas."""
+    """A fluid under a pressure that falls from `high` to `low` [Pa], absolute pressures for a gas."""
 
     fluid: Fluid
     high: float
@@ -65,32 +65,32 @@ class PressureDrop:
 
     @property
     def mean_free_path(self) -> float:
-        """The mean free path at the mean pressure [m]."""
+        """Mean free path at the mean pressure [m]."""
         return self.fluid.mean_free_path(0.5 * (self.high + self.low))
 
     def conducting_gap(self, gap: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the gaps [m] that conduct without slip as much as these do with slip."""
+        """Return the gaps [m] whose conductance without slip equals that of `gap` with slip."""
         if not (path := self.mean_free_path):
             return gap
         return np.cbrt(gap**2 * (gap + 6.0 * path))
 
     def flow_rate(self, conductivity: float, length: float, width: float) -> float:
-        """Return the flow [m^3/s] at the low side through a conductivity [m^3] over a length and a width [m]; NaN of a
-        gas that flows into a vacuum, where it has no end."""
+        """Return the flow [m^3/s] at the low side through a conductivity [m^3] over a length and a width [m]; NaN for a
+        gas that flows into a vacuum."""
         drive = self.high - self.low
         if self.fluid.molar_mass is not None:
             drive = drive * 0.5 * (self.high + self.low) / self.low if self.low else math.nan
         return conductivity / (12.0 * self.fluid.viscosity) * drive * width / length
 
     def mass_flow(self, conductivity: float, length: float, width: float) -> float:
-        """Return the flow [kg/s] through a conductivity [m^3] over a length and a width [m]; NaN where no density is
-        known."""
+        """Return the flow [kg/s] through a conductivity [m^3] over a length and a width [m]; NaN for an unknown
+        density."""
         mean = self.fluid.density_at(0.5 * (self.high + self.low))
         return conductivity / (12.0 * self.fluid.viscosity) * (self.high - self.low) * mean * width / length
 
     def describe_rate(self, conductivity: float, length: float, width: float) -> str:
-        """Return the flow through a conductivity [m^3] over a length and a width [m]: in ml/h at the low side, of a gas
-        at 1 bar too, and in mg/s where the density is known."""
+        """Return a text on the flow through a conductivity [m^3] over a length and a width [m]: in ml/h at the low
+        side, for a gas also at 1 bar, and in mg/s if the density is known."""
         rate, mass = (flow(conductivity, length, width) for flow in (self.flow_rate, self.mass_flow))
         said = [] if math.isnan(rate) else [f"{rate:.3g} m³/s ({3.6e9 * rate:.3g} ml/h) at the low side"]
         said += [] if math.isnan(mass) else [f"{1e6 * mass:.3g} mg/s"]

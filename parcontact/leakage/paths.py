@@ -10,7 +10,7 @@ Mask = NDArray[np.bool_]
 
 
 def connected_from_end_to_end(open_cells: Mask, periodic_sides: bool) -> Mask:
-    """Return the cells that are connected, by faces, to both the first and the last row."""
+    """Return the cells that are connected by faces to both the first and the last row."""
     labels, count = ndimage.label(open_cells)
     if periodic_sides and count:
         both = (labels[:, 0] > 0) & (labels[:, -1] > 0)
@@ -22,10 +22,11 @@ def connected_from_end_to_end(open_cells: Mask, periodic_sides: bool) -> Mask:
 
 
 def critical_constriction(gap: NDArray[np.float64], periodic_sides: bool) -> tuple[float, tuple[int, int] | None]:
-    """Return the smallest gap on the path from end to end whose smallest gap is the largest, and its row and column.
+    """Return the smallest gap on the widest path from end to end, and its row and column; the widest path is that with
+    the largest smallest gap.
 
-    Returns 0 and None where contact closes all paths. Cells open one after the other, the largest gap first, until both
-    ends are connected: the last one is the constriction.
+    Returns 0 and None if contact closes all paths. Cells are opened in the order of falling gaps until both ends are
+    connected: the last one is the constriction.
     """
     open_, (ny, nx) = np.flatnonzero(gap > 0.0), gap.shape
     cell = int(_open_until_connected(open_[np.argsort(-gap.ravel()[open_])], ny, nx, periodic_sides))
@@ -37,9 +38,9 @@ def critical_constriction(gap: NDArray[np.float64], periodic_sides: bool) -> tup
 
 @loop
 def _open_until_connected(order, ny, nx, periodic):
-    """Open cells in an order until a path leads from the first row to the last; return the last one, -1 if none does.
+    """Open cells in an order until a path leads from the first row to the last. Return the last one, or -1.
 
-    Open cells that touch are one tree, `parent` leading to its root; both ends are cells of their own.
+    Open cells that touch form a tree, `parent` leads to its root; both ends are additional cells.
     """
     first, last = nx * ny, nx * ny + 1
     parent = np.full(nx * ny + 2, -1, np.int64)
@@ -65,7 +66,7 @@ def _open_until_connected(order, ny, nx, periodic):
 
 @loop
 def _root(parent, cell):
-    """Return the root of a tree, and let cells on the way there skip every other one."""
+    """Return the root of a tree, and shorten the path to it."""
     while parent[cell] != cell:
         parent[cell] = parent[parent[cell]]
         cell = parent[cell]
