@@ -1,1 +1,1 @@
-"""Friction of a whole road: its spectrum in bands, each on a grid of its own, coupled by statistics."""
+"""Friction of a whole road: its spectrum in bands, each on its own grid, coupled by statistics."""

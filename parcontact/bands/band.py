@@ -1,4 +1,4 @@
-"""One band of the spectrum on a grid of its own: a surface of its waves, and its steady states under many pressures."""
+"""One band of the spectrum on its own grid: a surface with its waves, and its steady states under many pressures."""
 
 import math
 from dataclasses import dataclass, replace
@@ -26,18 +26,20 @@ from .band_heat import Warming, shares_of_depth, warming_of, waves_along_depth
 from .choice import Cut
 from .ladder import PressureLadder
 
-PARTS = 6  # accuracy: of a cell of wavenumbers, along each side, over which the spectrum is summed
-MOST_STEPS = 20000  # tuning: of one contact, more than any has needed
+PARTS = 6  # accuracy: parts of a cell of wavenumbers, along each side, for sums of the spectrum
+MOST_STEPS = 20000  # tuning: limit on the steps of the splitting for one contact
 Vector = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Rung:
-    """Steady state of one band under a mean `pressure` [Pa]: friction of its waves by energy and by slopes [-], area as
-    a share, counted and corrected, approach [m] (by `Cascade.climb` with that of finer bands), highest pressure [Pa];
-    weights of the rungs of the next finer band and the share of the load above them; power [W/m^2] that each branch
-    loses; S_j and g of its heat (`band_heat`), of one 0 without `thermal`; relative errors of friction and area by the
-    solver and by the grid; residual, and calls of the operator."""
+    """Steady state of one band under a mean `pressure` [Pa].
+
+    Friction of its waves by energy and by slopes [-]; area as a share, counted and corrected; approach [m] (in
+    `Cascade.climb` including finer bands); highest pressure [Pa]; `weights` of the rungs of the next finer band, and
+    the share of the load above them; power [W/m^2] lost in each branch; S_j and g of its heat (`band_heat`), one 0
+    without `thermal`; relative errors of friction and area by solver and grid; residual, and operator calls.
+    """
 
     pressure: float
     friction: float
@@ -60,8 +62,8 @@ class Rung:
 class Band:
     """A surface with the waves of one band, on this rank alone.
 
-    `number` counts bands from the coarsest; each `sample` is another surface of the same spectrum. All waves have the
-    amplitude of the spectrum, so that surfaces differ in their phases only.
+    `number` counts bands from the coarsest; each `sample` is another surface with the same spectrum. All waves have
+    the amplitude of the spectrum, so that surfaces differ in their phases only.
     """
 
     def __init__(self, job: Job, cut: Cut, number: int, sample: int) -> None:
@@ -89,11 +91,11 @@ class Band:
         self._velocity: Vector = (math.nan, math.nan)
 
     def set_temperature(self, temperature: float) -> None:
-        """Take the material at this temperature [deg C] from now on. Raises InputError where it has no shift."""
+        """Set the temperature [deg C] of the material. Raises InputError if it has no shift."""
         self._set_up(replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature))))
 
     def slide(self, velocity: Vector, seconds: float) -> None:
-        """Slide at a velocity [m/s] from now on, which has lasted so long [s] where there is heat."""
+        """Set the velocity [m/s] and, for heat, the time of sliding [s]."""
         if velocity != self._velocity:
             body, moved = self.setup.half_space, (self.setup.fft, self.setup.in_units(velocity), self.setup.prony)
             self.operator: Convolution = body.sliding_operator(*moved)
@@ -109,12 +111,12 @@ class Band:
 
     @property
     def full_contact_rms(self) -> float:
-        """The rms pressure [Pa] that its waves have in full contact."""
+        """Rms pressure [Pa] of its waves in full contact."""
         return self._full * self.setup.units.pressure
 
     def solve(self, pressure: float, law: InterfaceLaw, below: PressureLadder | None) -> Rung:
         """Return the steady state under a mean pressure [Pa] with the closing of all finer bands [m over Pa], and its
-        distribution over the ladder `below`, that of the next finer band. Raises RunError where it is not found."""
+        distribution over `below`, the ladder of the next finer band. Raises RunError if it is not found."""
         setup, velocity, units = self.setup, self._velocity, self.setup.units
         mean = pressure / units.pressure
         gamma = step_for(self._stiffest, self._softest, mean / self._full)
@@ -150,7 +152,7 @@ class Band:
         )
 
     def _heat_of(self, pressure: Array) -> tuple[Array, Array]:
-        """Return S_j and g of the heat under a map of pressure."""
+        """Return S_j and g of the heat for a map of pressure."""
         if self.warming is None:
             return np.zeros(1), np.zeros(1)
         shares = shares_of_depth(self.setup, pressure, self._velocity, self._depth_waves)
@@ -163,8 +165,8 @@ class Band:
 def _make_waves(cut: Cut, number: int, seed: int, fft: FFT, side: float) -> Spectrum:
     """Return the transform of the heights [m] of a band on a box with this side [m].
 
-    Each wave of the box has the mean square slope that the spectrum has in its cell of wavenumbers, as far as the cell
-    is within the band; phases are random, those of `physics.roughness`.
+    Each wave of the box has the mean square slope of the spectrum in its cell of wavenumbers, as far as the cell is
+    within the band; phases are random, those of `physics.roughness`.
     """
     step, line = 2.0 * np.pi / side, fft.my == 1
     low, high = float(cut.edges[number]), float(cut.edges[number + 1])
@@ -185,7 +187,8 @@ def _make_waves(cut: Cut, number: int, seed: int, fft: FFT, side: float) -> Spec
 
 
 def _seed(job: Job, number: int, sample: int) -> int:
-    """Return the seed of a surface: that of the job for the first one of the coarsest band, others follow from it."""
+    """Return the seed of a surface: that of the job for the first one of the coarsest band; the others
+    follow from it."""
     seed = next((part.seed for part in job.surface if hasattr(part, "seed")), 0)
     if number == sample == 0:
         return int(seed)

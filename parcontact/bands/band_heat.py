@@ -1,8 +1,8 @@
-"""Temperatures of bands: what each feels of its own heat and of that of all others.
+"""Temperatures of bands: the rise in each band by its own heat and by that of all others.
 
-Heat of a band lies where its waves strain the rubber, and is spread over the contact in proportion to the pressure.
-With waves cos(m z) along the depth, of which the heat of band i and what band k feels have the shares g_i(m) and g_k(m)
-of `physics.heat`, and 1 on the surface, the rise of band k is
+Heat of a band lies where its waves strain the rubber, and is distributed over the contact in proportion to the
+pressure. With waves cos(m z) along the depth, in which the heat of band i and the temperature of band k have the
+shares g_i(m) and g_k(m) of `physics.heat`, 1 on the surface, the rise of band k is
 
     T_k = sum_i h_i 2/pi int g_i g_k (S(m) + sum_(j <= i, k) S_j(m)) dm,
 
@@ -11,7 +11,7 @@ and for the waves of the pressure of band j, of power P(q) relative to the squar
 
     S_j(m) = sum_q P(q) Re (1 - exp(-(beta^2 + m^2) D t))/(beta^2 + m^2)/kappa.
 
-Only bands as fine as j are modulated by its waves. Heat of the interface is on the surface and finer than all.
+Waves of band j modulate only bands as fine as j or finer. Heat of the interface is on the surface and the finest.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ from ..physics.heat import Conductor, depths_of
 from ..scene import Setup
 
 Vector = tuple[float, float]
-SPACING, LOWEST, HIGHEST = 0.3, 1e-4, 30.0  # accuracy: of m, in its logarithm, and over wavenumbers of bands
+SPACING, LOWEST, HIGHEST = 0.3, 1e-4, 30.0  # accuracy: spacing of ln m; limits of m over wavenumbers of bands
 
 
 def waves_along_depth(low: float, high: float) -> tuple[Array, Array]:
@@ -36,7 +36,7 @@ def waves_along_depth(low: float, high: float) -> tuple[Array, Array]:
     m = np.exp(np.linspace(*ends, 2 + int((ends[1] - ends[0]) / SPACING)))
     step = float(np.log(m[1] / m[0]))
     weights = 2.0 / np.pi * step * m
-    weights[0] /= 1.0 - np.exp(-step)  # with all below
+    weights[0] /= 1.0 - np.exp(-step)  # includes all waves below
     return m, weights
 
 
@@ -58,7 +58,7 @@ class Warming:
 
 
 def warming_of(setup: Setup, section: Thermal, time: float, velocity: Vector, m: Array) -> Warming:
-    """Return S_j of a band that slides at `velocity` [m/s], after a `time` [s] of sliding."""
+    """Return S_j of a band that slides at `velocity` [m/s], after sliding for a `time` [s]."""
     fft, size, body = setup.fft, setup.grid.size, section.conductor
     q = np.hypot(*wavenumbers(fft, size))
     along_x, along_y = travelling_wavenumbers(fft, size)
@@ -72,7 +72,7 @@ def warming_of(setup: Setup, section: Thermal, time: float, velocity: Vector, m:
 
 
 def shares_of_depth(setup: Setup, pressure: Array, velocity: Vector, m: Array) -> Array:
-    """Return the shares g(m) of the depths where the heat of a band lies, under this map of pressure."""
+    """Return the shares g(m) of the depths of the heat of a band, under this map of pressure."""
     depths = depths_of(
         setup.fft.forward(pressure), setup.fft, setup.half_space, setup.units.length, velocity, setup.prony
     )
@@ -87,7 +87,7 @@ def rises_of(
     heats: Sequence[float],
     rubbed: float,
 ) -> list[float]:
-    """Return the rise [K] of each band, from the coarsest: by the weights of m, S, and g, S_j and the heat [W/m^2] of
+    """Return the rise [K] of each band, from the coarsest, from the weights of m, S, and g, S_j and the heat [W/m^2] of
     each band; `rubbed` is the heat of the interface."""
     sums = uniform + np.cumsum(warmings, axis=0)  # S and all S_j down to a band
     sources = [*zip(shares, heats, strict=True), (np.ones_like(weights), rubbed)]

@@ -1,4 +1,4 @@
-"""Plan of a job in bands: its steps and costs, by a trial of its finest band."""
+"""Plan of a job in bands: its steps and costs, from a trial of its finest band."""
 
 import time
 from collections.abc import Iterator

@@ -1,13 +1,14 @@
 """The upward pass, from the finest band to the coarsest, and the downward pass back.
 
-Upward each band is solved on the rungs of its ladder with the closing of all finer bands as the law of its interface;
-its own approach is the law of the next coarser one. Downward the distribution of pressure goes through the bands,
+Upward each band is solved on the rungs of its ladder, with the closing of all finer bands as the law of its
+interface; its own approach is the law of the next coarser one. Downward the distribution of pressure passes through
+the bands,
 
     P_0 = delta(p - p0),    P_k(p') = sum_j W_j F_k(p'|p_j),    W_j = int P_(k-1)(p) w_j(p) dp,
     mu = (1/p0) sum_k sum_j W_j tau_k(p_j),    area = sum_j W_j a_K(p_j),
 
 with the friction stress tau_k and the share of contact a_k of band k under p_j, the distribution F_k of pressure
-within it, and the weights w_j of `ladder`. Contacts of one pass are independent: ranks share them, whole ones each.
+within it, and the weights w_j of `ladder`. Contacts of one pass are independent: ranks solve different ones.
 """
 
 import math
@@ -26,7 +27,7 @@ from .choice import Cut
 from .contact_store import ContactStore
 from .ladder import PressureLadder
 
-NEGLIGIBLE = 1e-12  # accuracy: of the load: a rung that carries less is not solved behind hard walls
+NEGLIGIBLE = 1e-12  # accuracy: least share of the load of a rung that is solved without laws
 
 
 class Task(NamedTuple):
@@ -40,10 +41,12 @@ class Task(NamedTuple):
 
 @dataclass(frozen=True)
 class BandResult:
-    """Result of one band under a distribution of pressure: its weights and the load [Pa] on it; friction of its
-    waves over the whole load [-], by energy and by slopes; area down to it, counted and corrected; share of the load
-    above its ladder; power [W/m^2] per branch; S_j and g of its heat
-    (`band_heat`) in the mean over the load; absolute errors of friction and of area by solver and grid."""
+    """Result of one band under a distribution of pressure.
+
+    Its weights and load [Pa]; friction of its waves over the whole load [-], by energy and by slopes; area at its
+    shortest wave, counted and corrected; share of the load above its ladder; power [W/m^2] per branch; S_j and g of
+    its heat (`band_heat`), averaged over the load; absolute errors of friction and of area by solver and grid.
+    """
 
     weights: Array
     load: float
@@ -63,9 +66,9 @@ Solved = Mapping[tuple[int, int], Sequence[Rung]]  # rungs by band and sample
 
 
 class Cascade:
-    """Bands of a job on the ranks of `slab`, whose points do not matter; methods are collective.
+    """Bands of a job on the ranks of `slab`, whose points are not used; methods are collective.
 
-    Contacts that its `store` has are not solved again.
+    Contacts in its `store` are not solved again.
     """
 
     def __init__(self, job: Job, cut: Cut, slab: Slab) -> None:
@@ -77,7 +80,7 @@ class Cascade:
         self.pressure = math.nan
 
     def band(self, number: int, sample: int) -> Band:
-        """Return a band, sliding at the velocity at its temperature; on this rank alone."""
+        """Return a band at its velocity and temperature; on this rank alone."""
         if (number, sample) not in self._bands:
             self._bands[number, sample] = Band(self.job, self.cut, number, sample)
             if not math.isnan(temperature := self._temperatures[number]):
@@ -88,25 +91,26 @@ class Cascade:
 
     @property
     def seconds(self) -> float:
-        """For how long the rubber has slid [s]: over the distance of `thermal`, or the box of the coarsest band."""
+        """Time for which the rubber has slid [s]: over the distance of `thermal`, or over the box of the
+        coarsest band."""
         section = self.job.section("thermal")
         return ((section and section.distance) or self.cut.box) / math.hypot(*self.velocity)
 
     def set_temperatures(self, temperatures: Sequence[float]) -> None:
-        """Take these temperatures [deg C] of the bands from now on; NaN for that of the material."""
+        """Set the temperatures [deg C] of the bands; NaN for that of the material."""
         for (number, _), band in self._bands.items():
             if temperatures[number] != self._temperatures[number]:
                 band.set_temperature(temperatures[number])
         self._temperatures = list(temperatures)
 
     def press(self, velocity: Vector, pressure: float) -> None:
-        """Slide at a velocity [m/s] under a mean pressure [Pa] from now on."""
+        """Set the velocity [m/s] and the mean pressure [Pa]."""
         self.velocity, self.pressure = velocity, pressure
         squares = np.cumsum([0.0, *(self.band(k, 0).full_contact_rms ** 2 for k in range(self.cut.count))])
         self.ladders = [PressureLadder.over(pressure, math.sqrt(square)) for square in squares[:-1]]
 
     def climb(self, samples: Sequence[int]) -> dict[tuple[int, int], list[Rung]]:
-        """Solve all rungs of all bands with the laws of finer ones: the upward pass, for each sample on its own."""
+        """Solve all rungs of all bands with the laws of finer ones (upward pass), separately for each sample."""
         found: dict[tuple[int, int], list[Rung]] = {}
         laws, touching = dict.fromkeys(samples, HARD), dict.fromkeys(samples, 0.0)
         for number in reversed(range(self.cut.count)):
@@ -121,14 +125,14 @@ class Cascade:
         return found
 
     def closing_of(self, number: int, rungs: Sequence[Rung]) -> tuple[InterfaceLaw, float]:
-        """Return how a band and all finer ones close, and their approach [m] where c is 0; what the solver leaves of a
-        rise is taken off."""
+        """Return the closing of a band and all finer ones, and their approach [m] where c is 0, without the residual of
+        the solver."""
         closings = np.maximum.accumulate([rung.approach for rung in rungs])
         law = InterfaceLaw.of_table(self.ladders[number].rungs, closings)
         return law, float(closings[0] - law.closings[1])
 
     def fall(self, solve: Callable[[int, Array], Sequence[Rung]]) -> Results:
-        """Send the load down through the bands: the downward pass. `solve(band, weights)` returns its rungs."""
+        """Distribute the load over the bands (downward pass). `solve(band, weights)` returns the rungs of a band."""
         weights, found, lost = np.ones(1), list[BandResult](), 0.0
         for number, ladder in enumerate(self.ladders):
             rungs = solve(number, weights)
@@ -161,7 +165,7 @@ class Cascade:
         )
 
     def hard(self, sample: int) -> Results:
-        """Return the results without laws, each band on its own: behind hard walls."""
+        """Return the results without laws: each band alone, on hard walls."""
 
         def solve(number: int, weights: Array) -> Sequence[Rung]:
             ladder = self.ladders[number]
@@ -183,7 +187,7 @@ class Cascade:
         return self.store.find(states, lambda lacking: self._share([tasks[number] for number in lacking]))
 
     def _share(self, tasks: Sequence[Task]) -> list[Rung]:
-        """Solve the contacts of some tasks, each on one rank."""
+        """Solve the contacts of the tasks, each on one rank."""
         rank, size = self.slab.comm.rank, self.slab.comm.size
         own: list[Rung | None] = []
         problem = ""
@@ -210,7 +214,7 @@ class Cascade:
 
 
 def mean_rungs(found: Solved, band: int, samples: Sequence[int]) -> list[Rung]:
-    """Return the rungs of a band as the mean of some samples."""
+    """Return the rungs of a band, averaged over samples."""
     each = zip(*(found[band, sample] for sample in samples), strict=True)
     return [_mean(rungs) for rungs in each]
 

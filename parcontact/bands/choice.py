@@ -1,4 +1,4 @@
-"""Choice of what a job in bands leaves open: the number of bands, their boxes, points and numbers of surfaces."""
+"""Choice of the open parameters of a job in bands: numbers of bands, boxes, points and numbers of surfaces."""
 
 import math
 from collections.abc import Sequence
@@ -19,18 +19,21 @@ from .measured_band import MapBand, band_of_map
 from .steep_waves import doubt_steep_waves
 from .wave_spectrum import WaveSpectrum, spectrum_of
 
-WIDTH = 0.75  # accuracy: decades of a band, about; 0.65 to 1 are right to 4 % in friction, 0.45 to 7 %
-WAVES, WAVES_OF_LINE = 4, 16  # accuracy: longest waves along a box
-CELLS = 4.0  # accuracy: per shortest wave
-FEWEST, MOST = 2, 8  # tuning: surfaces of each band, where the scatter chooses them
-SAMPLE_SHARE = 0.3  # accuracy: of the accuracy asked for, which the scatter of surfaces may have
+WIDTH = 0.75  # accuracy: width of a band [decades]; the error of friction is 4 % for 0.65 to 1
+WAVES, WAVES_OF_LINE = 4, 16  # accuracy: number of longest waves along a box
+CELLS = 4.0  # accuracy: cells per shortest wave
+FEWEST, MOST = 2, 8  # tuning: limits on the number of surfaces per band
+SAMPLE_SHARE = 0.3  # accuracy: share of the scatter of surfaces in the requested accuracy
 
 
 @dataclass(frozen=True)
 class Cut:
-    """Bands as they are solved: their `edges` [rad/m], the points along x and y of each, the longest waves along its
-    box, and surfaces of each: as many as `samples`, or until their scatter is below an accuracy where that is 0. With a
-    `measured` map that is the coarsest band, and the `spectrum` that of all others."""
+    """Bands as they are solved.
+
+    `edges` [rad/m]; points along x and y of each band; number of longest waves along its box; `samples`, the
+    surfaces of each band, or 0 for as many as the accuracy needs. With a `measured` map this is the coarsest band,
+    and `spectrum` that of all others.
+    """
 
     spectrum: WaveSpectrum
     edges: Array
@@ -41,7 +44,7 @@ class Cut:
 
     @property
     def box(self) -> float:
-        """The longer side of the box of the coarsest band [m]."""
+        """Longer side of the box of the coarsest band [m]."""
         return self.waves * self.spectrum.longest if self.measured is None else max(self.measured.grid.size)
 
     @property
@@ -64,13 +67,13 @@ class Cut:
 
     @property
     def rms_height(self) -> float:
-        """The rms height of all bands [m]."""
+        """Rms height of all bands [m]."""
         of_map = self.measured is not None
         square = float(np.var(self.measured.heights)) if self.measured else 0.0
         return math.sqrt(square + self.spectrum.moment(float(self.edges[int(of_map)]), float(self.edges[-1]), 0))
 
     def rms_slope(self, band: int, first: int | None = None) -> float:
-        """Return the rms slope of a band, or of all from the `first` to it."""
+        """Return the rms slope of a band, or of all bands from `first` to it."""
         start = band if first is None else first
         of_map = self.measured is not None and start == 0
         square = self.measured.rms_slope**2 if self.measured and of_map else 0.0
@@ -107,7 +110,7 @@ def cut_bands(job: Job) -> Cut:
 
 
 def describe_cut(cut: Cut, job: Job) -> list[str]:
-    """Return what was chosen, and how high and steep the surface is."""
+    """Return sentences on what was chosen, and on the height and slope of the surface."""
     many = f"{cut.samples}" if cut.samples else f"{FEWEST} to {MOST}, as their scatter asks for"
     decades, count = math.log10(float(cut.edges[-1] / cut.edges[-2])), cut.count - bool(cut.measured)
     of_map = []
@@ -129,14 +132,14 @@ def describe_cut(cut: Cut, job: Job) -> list[str]:
 
 
 def on_one_grid_of_all(job: Job, cut: Cut) -> Job:
-    """Return a job in bands with one grid that holds all of its waves: who asks which frequencies they excite."""
+    """Return a job in bands with one grid that holds all its waves, to find the frequencies they excite."""
     side = cut.wavelengths(0)[0]
     points = 2 * math.ceil(side / cut.spectrum.shortest)
     return job.model_copy(update={"grid": Grid(points=(points, points), size=(side, side)), "bands": None})
 
 
 def doubts_of_bands(job: Job, cut: Cut, temperatures: Sequence[float] = ()) -> list[Doubt]:
-    """Return doubts about a job in bands: its own, of frequencies that were not measured, and of steep waves."""
+    """Return warnings about a job in bands: its own, about unmeasured frequencies, and about steep waves."""
     whole = on_one_grid_of_all(job, cut)
     of_map = cut.measured.doubts if cut.measured else ()
     return [*job.doubts, *of_map, *doubt_band(whole, temperatures), *doubt_steep_waves(cut.spectrum)]

@@ -1,8 +1,7 @@
-"""Contacts of the point that is being solved, in a file too: a run that was killed goes on within that point.
+"""Contacts of the point that is being solved, also in a file, so that a killed run continues within this point.
 
-What a contact depends on has a digest. A line of the file is a digest and a rung, whose numbers are read back to the
-last bit, so that passes of `cascade` which are done again find the same states without a solve. So do passes that come
-to the same contact twice. A line that was not finished is left out.
+All input of a contact has a digest. A line of the file is a digest and a rung, whose numbers are read back exactly,
+so that repeated passes of `cascade` find the same states without a solve. An incomplete line is ignored.
 """
 
 import hashlib
@@ -22,26 +21,25 @@ from ..parallel.slab import Slab
 from ..storage import hdf5
 from .band import Rung
 
-APART = ("title", "steady", "output")  # sections on which no contact depends
-NAME = "bands.part"  # removed with all unfinished files where a curve begins afresh
+IGNORED = ("title", "steady", "output")  # sections on which no contact depends
+NAME = "bands.part"  # removed with all unfinished files when a curve starts again
 
 
 class ContactStore:
-    """Contacts of a job that are known, on root; methods are collective."""
+    """Solved contacts of a job, on root; methods are collective."""
 
     def __init__(self, slab: Slab) -> None:
         self._slab, self._job, self._path = slab, "", Path()
         self._known: dict[str, Rung] = {}
 
     def keep_in(self, directory: Path, job: Job) -> None:
-        """Keep contacts in a file of this directory, and take those that it has. Raises RunError for one that cannot be
-        written."""
+        """Store contacts in a file of this directory, and read those in it. Raises RunError if it cannot be written."""
         self._path = directory / NAME
         self._on_root(lambda: self._read(job))
 
     def find(self, states: Sequence[Any], solve: Callable[[Sequence[int]], Sequence[Rung]]) -> list[Rung]:
-        """Return contacts by what they depend on beside the job, plain data; `solve` is asked for those that are not
-        known, by their numbers. Raises RunError where the file cannot be written."""
+        """Return contacts by their input in addition to the job, plain data; `solve` solves those that are not stored,
+        given by their numbers. Raises RunError if the file cannot be written."""
         digests = [hashlib.sha256(repr((self._job, state)).encode()).hexdigest() for state in states]
         known = self._slab.agree([self._known.get(digest) for digest in digests])
         lacking = [number for number, rung in enumerate(known) if rung is None]
@@ -60,7 +58,7 @@ class ContactStore:
             self._on_root(lambda: self._path.unlink(missing_ok=True))
 
     def _read(self, job: Job) -> None:
-        of_job = {name: part for name, part in listing.plain_job(job).items() if name not in APART}
+        of_job = {name: part for name, part in listing.plain_job(job).items() if name not in IGNORED}
         self._job = repr((__version__, of_job))
         if not self._path.exists():
             return

@@ -1,13 +1,12 @@
 """Ladders of pressures, and distributions of pressure as weights of their rungs.
 
-What a band makes of a pressure p, a function f(p), is known at the rungs p_j of a ladder. Between them f(p)/p is the
-cubic in log p through the four nearest rungs, `f(p) = p sum_j psi_j(p) f(p_j)/p_j`, below the first rung and above the
-last it is level. A distribution P(p) is then known by `W_j = int P(p) p psi_j(p) dp/p_j`, and as the psi_j add up to 1,
+A result f(p) of a band is known at the rungs p_j of a ladder. Between them f(p)/p is the cubic in log p through the
+four nearest rungs, `f(p) = p sum_j psi_j(p) f(p_j)/p_j`; below the first and above the last rung it is constant. A
+distribution P(p) is represented by `W_j = int P(p) p psi_j(p) dp/p_j`. As the psi_j add up to 1,
 
     int P(p) f(p) dp = sum_j W_j f(p_j),    sum_j W_j p_j = int P(p) p dp:
 
-the load is kept. Hats that are linear in p keep it too, but take f for too small where it is concave: by more than 1 %
-of friction and area near full contact.
+the load is conserved. Functions linear in p would conserve it, too, but underestimate a concave f.
 """
 
 from dataclasses import dataclass
@@ -16,11 +15,11 @@ import numpy as np
 
 from ..parallel.slab import Array
 
-RUNGS, LOWEST = 14, 5e-4  # accuracy: 8 rungs erred by up to 9 %, 20 gained nothing; the first one over the top
-NODES = 4  # accuracy: rungs of an interpolation
-ROUNDING = 1e-9  # accuracy: of the place of a pressure on the ladder
-ABOVE = 4.0  # accuracy: rms pressures above the mean that the top is; 1.4 % of the load was beyond at most
-BELOW = 4.5  # accuracy: rms pressures below the mean, less than which full contact has
+RUNGS, LOWEST = 14, 5e-4  # accuracy: number of rungs, and the first one over the last
+NODES = 4  # accuracy: rungs per interpolation
+ROUNDING = 1e-9  # accuracy: rounding of the position of a pressure on the ladder
+ABOVE = 4.0  # accuracy: last rung above the mean, over the rms pressure
+BELOW = 4.5  # accuracy: first rung below the mean, over the rms pressure, near full contact
 
 
 @dataclass(frozen=True)
@@ -31,8 +30,8 @@ class PressureLadder:
 
     @classmethod
     def over(cls, mean: float, rms: float) -> "PressureLadder":
-        """Return the ladder for pressures of this mean and of this rms deviation in full contact [Pa], equally spaced
-        in the logarithm; of one rung where nothing deviates."""
+        """Return the ladder for pressures of this mean and rms deviation in full contact [Pa], equally spaced in the
+        logarithm; one rung without deviation."""
         if not rms > 0.0:
             return cls(np.array([mean]))
         top = mean + ABOVE * rms

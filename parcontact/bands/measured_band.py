@@ -1,6 +1,6 @@
-"""The coarsest band of a job whose surface begins with a measured map: the map itself, without finer waves.
+"""The coarsest band of a job whose surface starts with a measured map: the map itself, without finer waves.
 
-A road is not Gaussian, so that its long waves are not known by their spectrum alone.
+A road is not Gaussian, so that a spectrum alone does not describe its long waves.
 """
 
 import math
@@ -17,13 +17,13 @@ from ..road import map_files
 from ..road.prepared_map import prepare
 from ..scene import map_sentences
 
-FEWEST_WAVES = 4  # accuracy: of the shortest kind along a map, fewer of which are no surface
-RESOLVED = 8  # accuracy: points of a map along a wave that it has measured well
+FEWEST_WAVES = 4  # accuracy: least number of shortest waves along a map
+RESOLVED = 8  # accuracy: points of a map per wave that it resolves
 
 
 @dataclass(frozen=True)
 class MapBand:
-    """Heights [m] of the map on its `grid`, shape (ny, nx), its rms slope, and what was done with it."""
+    """Heights [m] of the map on its `grid`, shape (ny, nx), its rms slope, notes on its preparation, and warnings."""
 
     grid: Grid
     heights: Array
@@ -33,8 +33,8 @@ class MapBand:
 
 
 def band_of_map(job: Job, shortest: float, cells: float) -> MapBand | None:
-    """Return the measured map that a job's surface begins with, with waves down to the `shortest` [m], which has so
-    many cells; None without a map. Raises InputError for a map that cannot be read."""
+    """Return the measured map with which a job's surface starts, with waves down to `shortest` [m], of `cells` cells;
+    None without a map. Raises InputError for a map that cannot be read."""
     part = job.surface[0]
     if not isinstance(part, Topography):
         return None

@@ -1,4 +1,4 @@
-"""Steady sliding of a surface in bands: points of a friction curve with the same columns as those of one grid."""
+"""Steady sliding of a surface in bands: points of a friction curve with the columns of those on one grid."""
 
 import math
 import time
@@ -26,20 +26,25 @@ from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, cut_bands, describe_cut, doubts_of_bands
 from .steep_waves import STRAIN
 
-MOST_ROUNDS = 20  # tuning: of temperatures, more than any case has needed
-LEAST_ERROR, RELATIVE = 0.1, 0.02  # accuracy: of the rise of a band [K], and relative
-HARD_SHARE = 0.25  # accuracy: of the difference to hard walls, all of profiles; found on 17 cases with the next one
-LEAST_METHOD = 0.03  # accuracy: relative; chosen on 26 cases (`scripts/band_errors.py`), covers 99 of 104 of others
-NEARLY_ALL = 0.1  # accuracy: of the area; where less is not in contact, errors go to 0 with it
-SURE = 2.0  # accuracy: standard errors of the scatter of surfaces that count as an error
+MOST_ROUNDS = 20  # tuning: limit on rounds of the temperatures
+LEAST_ERROR, RELATIVE = 0.1, 0.02  # accuracy: error of the rise of a band [K], and relative
+HARD_SHARE = (
+    0.25  # fitted: error of the method over the difference to hard walls, 1 for profiles (`scripts/band_errors.py`)
+)
+LEAST_METHOD = 0.03  # fitted: least relative error of the method (`scripts/band_errors.py`)
+NEARLY_ALL = 0.1  # accuracy: open area below which errors fall to 0 with it
+SURE = 2.0  # accuracy: error by the scatter of surfaces over its standard error
 TABLE = "bands.csv"
 
 
 @dataclass(frozen=True)
 class BandOutcome:
-    """Results of all bands: results with laws from all samples, friction and area of the first sample with laws and
-    behind hard walls, and standard errors of friction and area by the scatter of surfaces; the rungs of each band, and
-    whether these are of profiles."""
+    """Results of all bands.
+
+    `results` with laws from all samples; friction and area of the first sample with laws, and without (`hard`);
+    standard errors of friction and area by the `scatter` of surfaces; the rungs of each band; `line`: these are
+    profiles.
+    """
 
     results: Results
     with_laws: tuple[float, float]
@@ -54,8 +59,8 @@ class BandOutcome:
 
     @property
     def method(self) -> list[float]:
-        """The error of the method in friction and in the corrected area: a share of the difference between hard walls
-        and laws, or more, but less where nearly all touches; none of one band."""
+        """Error of the method in friction and in the corrected area: a share of the difference between hard walls and
+        laws, at least LEAST_METHOD, less near full contact; 0 for one band."""
         if len(self.results) == 1:
             return [0.0, 0.0]
         least = LEAST_METHOD * min(1.0, (1.0 - self.results[-1].contact_area_corrected) / NEARLY_ALL)
@@ -66,16 +71,16 @@ class BandOutcome:
 
 @dataclass(frozen=True)
 class BandTemperatures:
-    """Search for the temperatures of bands: the number of `rounds`, and friction without them."""
+    """Search for the temperatures of bands: the number of `rounds`, and friction without heat."""
 
     rounds: int = 1
     friction_cold: float = math.nan
 
 
 class RoadSliding:
-    """Steady states of a job in bands, on the ranks of `slab`; making and calling it are collective.
+    """Steady states of a job in bands, on the ranks of `slab`; the constructor and the methods are collective.
 
-    It has what a friction curve asks of `steady_sliding.sliding.SteadySliding`.
+    It has the interface of `steady_sliding.sliding.SteadySliding` for friction curves.
     """
 
     table: tuple[str, Sequence[str]] | None = (TABLE, names_of(BANDS))
@@ -94,11 +99,11 @@ class RoadSliding:
         return doubts_of_bands(self.job, self.cut, temperatures)
 
     def notes(self) -> list[str]:
-        """Return what was chosen, and where linear theory fails."""
+        """Return sentences on the chosen bands."""
         return describe_cut(self.cut, self.job)
 
     def keep_in(self, directory: Path) -> None:
-        """Keep contacts in a file of this directory until their point is written; raises RunError."""
+        """Store contacts in a file of this directory until their point is written; raises RunError."""
         self._cascade.store.keep_in(directory, self.job)
 
     def forget(self) -> None:
@@ -106,7 +111,7 @@ class RoadSliding:
         self._cascade.store.clear()
 
     def set_temperature(self, temperature: float) -> None:
-        """Solve at this temperature [deg C] from now on; raises InputError where the material has no shift."""
+        """Set the temperature [deg C] of further solves; raises InputError if the material has no shift."""
         if temperature != self.temperature:
             self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
             self._cascade.set_temperatures([temperature] * self.cut.count)
@@ -159,10 +164,11 @@ class RoadSliding:
         return rises_of(weights, whole, shares, warmings, heats, rubbing / box * speed)
 
     def _solve_fixed_point(self) -> "BandTemperatures":
-        """Find the temperatures of bands that make themselves, with one surface of each band, and leave them in the
-        cascade. Raises RunError where none are found.
+        """Find the fixed point of the temperatures of all bands, with one surface per band, and set them in the
+        cascade. Raises RunError if it is not found.
 
-        Rounds go by Aitken's relaxation: a first one with cold bands, then from those of the last state.
+        Rounds use Aitken's relaxation. The first is that of cold bands, the second starts from the temperatures of
+        the last state.
         """
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
         rises, last, relax, friction_cold = np.zeros(self.cut.count), np.zeros(0), 1.0, math.nan
@@ -184,7 +190,7 @@ class RoadSliding:
         raise RunError(f"temperatures of bands did not settle in {MOST_ROUNDS} rounds. Try feedback: none")
 
     def _set_temperatures(self, temperatures: Array) -> None:
-        """Take these temperatures [deg C] of the bands; raises RunError where the material's shift ends."""
+        """Set the temperatures [deg C] of the bands; raises RunError outside the range of the material's shift."""
         try:
             self._cascade.set_temperatures(temperatures.tolist())
             finest = self.setup.job.at_temperature(float(temperatures[-1]))
@@ -194,7 +200,7 @@ class RoadSliding:
             raise RunError(f"the flash temperature leaves what the material allows: {error}") from None
 
     def _rub(self, results: Results) -> float:
-        """Return the shear stress [Pa] of the interface, in the mean over the whole."""
+        """Return the shear stress [Pa] of the interface, averaged over the nominal area."""
         area, shears = results[-1].contact_area_corrected, self.setup.choices.shears
         forces = [shear.force(area, self._cascade.velocity) for shear in shears]
         return math.hypot(*(sum(force[axis] for force in forces) for axis in (0, 1)))
@@ -202,7 +208,7 @@ class RoadSliding:
     # -- samples and errors -------------------------------------------------------------------------------------------
 
     def _solve(self) -> BandOutcome:
-        """Solve surfaces until their scatter is below its share of the accuracy asked for."""
+        """Solve surfaces until their scatter is below its share of the requested accuracy."""
         asked, fixed = self.job.numerics.asked, self.cut.samples
         samples = list(range(fixed or FEWEST))
         rungs: dict[tuple[int, int], list[Rung]] = dict(self._cascade.climb(samples))
@@ -266,7 +272,7 @@ class RoadSliding:
         )
 
     def _errors(self, outcome: BandOutcome, friction: float) -> ErrorBudget:
-        """Return relative errors: those of grids and of load beyond ladders add up over bands."""
+        """Return relative errors; those of grids and of loads beyond ladders are added over bands."""
         area = outcome.results[-1].contact_area_corrected
         lost = sum(result.load_lost for result in outcome.results)
         of_bands = np.sum([result.errors for result in outcome.results], axis=0)[:2]

@@ -1,4 +1,4 @@
-"""Where linear theory fails: rms slopes and strains of bands, alone and with all coarser ones."""
+"""Warning where linear theory fails: the surface is too steep."""
 
 import math
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ STRAIN = math.exp(-1.0)  # physics: rms strain over rms slope, at the depth 1/q 
 
 
 def doubt_steep_waves(spectrum: WaveSpectrum) -> Iterator[Doubt]:
-    """Yield a doubt where the surface is too steep for linear theory, with the cut-off that is usual."""
+    """Yield a warning if the surface is too steep for linear theory, with the usual cut-off."""
     slope = math.sqrt(spectrum.moment(*spectrum.ends, 2))
     if slope <= STEEP:
         return

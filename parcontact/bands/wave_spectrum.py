@@ -1,10 +1,10 @@
-"""The spectrum of a job's surface as one function, and what its waves between two wavenumbers come to.
+"""The spectrum of a job's surface as one function, and moments of its waves between two wavenumbers.
 
 An isotropic spectrum Phi(k) has, between two wavenumbers,
 
-    <h^2> = int Phi k dk/(2 pi),    <|grad h|^2> = int Phi k^3 dk/(2 pi),
+    <h^2> = int Phi k dk/(2 pi),    <|grad h|^2> = int Phi k^3 dk/(2 pi);
 
-on a line of points the same without one k and to a factor. Spectra of several rough shapes add up.
+on a line of points the integrals have one factor k less. Spectra of several rough shapes are added.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,13 +19,13 @@ from ..parallel.slab import Array
 from ..physics.roughness import EDGE, Roughness
 from ..road import spectrum as measured_spectrum
 
-POINTS = 4000  # accuracy: of the midpoint rule over the logarithm of wavenumbers, 1e-5 over six decades
+POINTS = 4000  # accuracy: points of the midpoint rule over ln k; its error is 1e-5 over six decades
 
 
 @dataclass(frozen=True)
 class WaveSpectrum:
-    """Phi [m^4] by wavenumbers [rad/m], from the `longest` to the `shortest` wavelength [m], of a surface or, with
-    `line`, of a profile along the sliding; it is smooth but for the `kinks` [rad/m]."""
+    """Phi [m^4] as a function of wavenumbers [rad/m], from the `longest` to the `shortest` wavelength [m], of a surface
+    or, with `line`, of a profile along the sliding; smooth except at the `kinks` [rad/m]."""
 
     phi: Callable[[Array], Array]
     longest: float
@@ -35,29 +35,29 @@ class WaveSpectrum:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The smallest and the largest wavenumber [rad/m]."""
+        """Smallest and largest wavenumber [rad/m]."""
         return 2.0 * np.pi / self.longest, 2.0 * np.pi / self.shortest
 
     def moment(self, low: float, high: float, power: int) -> float:
-        """Return `int Phi k^(1 + power) dk/(2 pi)` between two wavenumbers [rad/m]: 0 gives the mean square height
-        [m^2], 2 the mean square slope, 3 of two surfaces of one slope how short their waves are."""
+        """Return `int Phi k^(1 + power) dk/(2 pi)` between two wavenumbers [rad/m]: the mean square height [m^2] for 0,
+        the mean square slope for 2."""
         step = np.log(high / low) / POINTS
         k = low * np.exp(step * (np.arange(POINTS) + 0.5))
         return float(np.sum(self.phi(k) * k ** (power + 2 - self.line)) * step / (2.0 * np.pi))
 
     def density_of_slopes(self, k: Array, low: float, high: float) -> Array:
-        """Return the mean square slope per area of the plane of wavenumbers over 4 pi^2, on a line per length over
-        2 pi, between two wavenumbers; 0 elsewhere."""
+        """Return the mean square slope per area of the plane of wavenumbers over 4 pi^2, or per length over 2 pi on a
+        line, between two wavenumbers; 0 elsewhere."""
         inside = (k >= low) & (k < high)
         known = np.where(inside, k, low)
         return np.where(inside, self.phi(known) * known**2, 0.0)
 
     def cut(self, count: int) -> Array:
-        """Return the wavenumbers [rad/m] at which so many bands begin and end, equally spaced in the logarithm."""
+        """Return the wavenumbers [rad/m] at the ends of `count` bands, equally spaced in the logarithm."""
         return np.geomspace(*self.ends, count + 1)
 
     def steep_beyond(self, slope: float) -> float:
-        """Return the wavelength [m] down to which all longer waves have this rms slope together; 0 where all have
+        """Return the wavelength [m] down to which all longer waves together have this rms slope; 0 if all waves have
         less."""
         edges = self.cut(POINTS)
         middle, step = np.sqrt(edges[1:] * edges[:-1]), np.log(edges[1] / edges[0])
@@ -72,7 +72,7 @@ class WaveSpectrum:
 
 def spectrum_of(job: Job, line: bool = False) -> WaveSpectrum:
     """Return the spectrum of the rough shapes of a job. Raises InputError for tables that cannot be read, and for
-    spectra in m^4 of a profile."""
+    spectra of a surface [m^4] if the job has profiles."""
     parts = [part for part in job.surface if isinstance(part, jobs.Rough | jobs.RoughSpectrum)]
     found = [_part(part, line) for part in parts]
     longest, shortest = max(one.longest for one in found), min(one.shortest for one in found)
