@@ -1,4 +1,4 @@
-"""A compound from a table of measured moduli: fitted, and written as a material file that any job can include."""
+"""A compound from a table of measured moduli: fitted, and written as a material file that jobs can include."""
 
 import math
 from collections.abc import Iterator
@@ -15,25 +15,27 @@ if TYPE_CHECKING:
     from .series import Weigh
     from .superposition import Superposition, Vertical
 
-TITLE = "# Fitted by parcontact fit to"  # with which material files of fits begin
-POOR, HOPELESS = 0.2, 1.0  # accuracy: rms errors of fits that are warned of, and refused
-CONTRADICTS, LEAST_DOUBT = 2.0, 0.02  # accuracy: misfits of more than so many times the scatter, and so much, are told
-SWAPPED = 0.5  # accuracy: of the misfit: that of exchanged moduli, if they were
-WIDE_GAP = 1.0  # accuracy: decades between sweeps as shifted, beyond which they say nothing of the shift
-DIGITS = 7  # accuracy: of the numbers in a material file
-LEAST_SHOWN = 1e-5  # accuracy: of misfits: less is rounding
-LIQUID = 1e-4  # accuracy: long-term modulus over the storage modulus at the lowest frequency: nothing is left of it
-UNKNOWN = 1.0  # accuracy: error from which on nothing is known
-VAGUE = 0.1  # accuracy: error of the loss modulus inside the band that is warned of
+TITLE = "# Fitted by parcontact fit to"  # first words of material files of fits
+POOR, HOPELESS = 0.2, 1.0  # accuracy: rms errors of fits above which there is a warning, or an error
+CONTRADICTS, LEAST_DOUBT = 2.0, 0.02  # accuracy: misfit over scatter, and misfit, above which there is a warning
+SWAPPED = 0.5  # accuracy: misfit of exchanged moduli over the misfit, below which they were exchanged
+WIDE_GAP = 1.0  # accuracy: largest gap between shifted sweeps that determine the shift [decades]
+DIGITS = 7  # accuracy: digits of numbers in a material file
+LEAST_SHOWN = 1e-5  # accuracy: least misfit that is printed
+LIQUID = 1e-4  # accuracy: long-term over lowest storage modulus, below which the body is a liquid
+UNKNOWN = 1.0  # accuracy: relative error above which a modulus is unknown
+VAGUE = 0.1  # accuracy: error of the loss modulus inside the band above which there is a warning
 LAWS = {WLF: "wlf", Arrhenius: "arrhenius", Factors: "factors", Density: "density"}
 
 
 @dataclass(frozen=True)
 class Compound:
     """The measurement (`measured`, its `sets` at `temperatures`), the `series` fitted to it at the reference, and the
-    `shift` (None for a table of one temperature); `poisson` is the ratio with which Young's moduli were divided; both
-    moduli count in the fit, or only the one to `weigh`; `found` is what the sweeps themselves say of the shift, None
-    where it is given."""
+    `shift` (None for a table of one temperature).
+
+    `poisson` converts Young's moduli; `weigh` names the modulus that is fitted, or both; `found` is the
+    superposition of the sweeps, None if the shift is given.
+    """
 
     measured: Any
     series: Any
@@ -63,7 +65,7 @@ class Compound:
         return "moduli" if self.weigh == "both" else f"{self.weigh} modulus"
 
     def doubts(self) -> list[str]:
-        """Return warnings of a fit that misses the table by more than it scatters, and of tables of no rubber."""
+        """Return warnings about a misfit larger than the scatter, and about tables that are not of rubber."""
         from .sane import odd_moduli  # with numpy, which is slow to import
 
         series, found = self.series, list(self.measured.doubts)
@@ -84,7 +86,7 @@ class Compound:
         return [*found, *self._describe_loss(), *self._describe_free(), *self._gaps(), *odd_moduli(self.measured.sets)]
 
     def _describe_loss(self) -> Iterator[str]:
-        """Yield warnings about a loss modulus that the table hardly shows, and about a body without a spring."""
+        """Yield warnings about a loss modulus that the table hardly determines, and about a body without a spring."""
         series = self.series
         counts = self.measured.kind == "frequency" and self.weigh != "storage"
         low, high = (frequency / (2 * math.pi) for frequency in series.band)
@@ -101,7 +103,7 @@ class Compound:
             )
 
     def _describe_free(self) -> Iterator[str]:
-        """Yield a warning where factors b_T of their own join the sweeps much better than the law does."""
+        """Yield a warning if free factors b_T join the sweeps much better than the vertical law."""
         free = self.found.free if self.found else None
         if self.found and free:
             yield (
@@ -111,7 +113,7 @@ class Compound:
             )
 
     def _gaps(self) -> Iterator[str]:
-        """Tell neighbouring sweeps that are far from overlapping, where the shift was fitted to them."""
+        """Yield warnings about neighbouring sweeps that do not overlap, if the shift was fitted to them."""
         if self.shift is None or not self.found:
             return
         sign = 1.0 if self.measured.kind == "frequency" else -1.0
@@ -142,7 +144,7 @@ class Compound:
         yield f"# Vertical shift: {vertical}{'; ' if factors else ''}{factors}."
 
     def text(self) -> str:
-        """The material file: what it is and how good, then the material."""
+        """Return the material file: comments on its origin and quality, and the material."""
         series, shift, section = self.series, self.shift, self.material()
         to = f", shifted to {shift.reference:g} C" if shift is not None else ""
         kind = "Young's moduli, divided by 2 (1 + poisson)," if self.measured.tension else "shear moduli"
@@ -183,9 +185,12 @@ def fitted(
     weigh: "Weigh" = "both",
     vertical: "Vertical" = "auto",
 ) -> Compound:
-    """Read a table and fit it. `law` is wlf, arrhenius or free (constants are fitted too), or a shift that is known;
-    `vertical` is the law of b_T, unless the known shift has one; `reference` [deg C] defaults to the middle one of the
-    measured temperatures. Raises InputError, also for a table that no fit meets."""
+    """Read a table and fit it.
+
+    `law` is wlf, arrhenius or free (constants are fitted, too), or a known shift; `vertical` is the law of b_T,
+    unless the known shift has one; `reference` [deg C] is by default the middle one of the measured temperatures.
+    Raises InputError, also for a table that no fit meets.
+    """
     from . import measured_moduli, series  # scipy is for fits only
     from .superposition import log_factors, superpose
 
@@ -213,7 +218,7 @@ def fitted(
 
 
 def _refuse_misfit(path: Path, best: Any, data: Any) -> None:
-    """Raise InputError for moduli that no series meets."""
+    """Raise InputError for moduli that no series fits."""
     missed = best.error
     exchanged = missed if missed <= POOR or data.kind != "frequency" else data.exchanged_misfit()
     if exchanged < min(SWAPPED * missed, POOR):
@@ -235,7 +240,7 @@ def _percents(errors: tuple[float, float, float]) -> str:
 
 
 def _shift_section(shift: Any) -> dict[str, Any]:
-    """Return a shift as a job has it; its vertical law has the same reference."""
+    """Return a shift as a section of a job; its vertical law has the same reference."""
     numbers = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(shift).items()}
     vertical = numbers.pop("vertical", None)
     section = {"law": LAWS[type(shift)], **_rounded(numbers)}
@@ -247,14 +252,14 @@ def _shift_section(shift: Any) -> dict[str, Any]:
 
 
 def _rounded(value: Any) -> Any:
-    """Return a number, or all in a list or mapping, in the digits of a material file."""
+    """Return a number, or all numbers in a list or mapping, with the digits of a material file."""
     if isinstance(value, dict):
         return {key: _rounded(inner) for key, inner in value.items()}
     return [_rounded(inner) for inner in value] if isinstance(value, list) else float(f"{value:.{DIGITS}g}")
 
 
 def _flow(value: Any) -> str:
-    """A value in one line of YAML."""
+    """Return a value in one line of YAML."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key}: {_flow(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, list):

@@ -1,18 +1,18 @@
-"""Tables of measured moduli: what a text file says, in SI units, or one sentence with file and line why it will not do.
+"""Tables of measured moduli, converted to SI units, or refused in one sentence with file and line.
 
-Lines of a laboratory may stand above the names of the columns. These have one of two forms; nothing is guessed.
+Lines of a laboratory may precede the names of the columns. These have one of two forms; nothing is guessed.
 
-* Two header rows, the names and the units of the columns, as in pyvisco's files (comma, semicolon or tab between them):
-  `f, omega, t, f_set` (Hz, rad/s, s), `E_stor, E_loss, E_relax` or `G_...` (Pa, kPa, MPa, GPa), `T` (C, K), `tan_del`.
-  E(t) and G(t) are relaxation moduli, D(t) and J(t) creep compliances in tension and shear (1/MPa, ...), |E*| and |G*|
-  absolute values, and delta the phase angle (deg, rad).
-* One header row in which units stand in brackets: `f[Hz] E'[MPa] E''[MPa] T[C]`, any white space or comma between; or
-  words with units, `Frequency (Hz), Storage Modulus (MPa), Loss Modulus (MPa)`, a comma, semicolon or tab between.
+* Two header rows, the names and the units of the columns, as in pyvisco's files (comma, semicolon or tab between
+  them): `f, omega, t, f_set` (Hz, rad/s, s), `E_stor, E_loss, E_relax` or `G_...` (Pa, kPa, MPa, GPa), `T` (C, K),
+  `tan_del`. E(t) and G(t) are relaxation moduli, D(t) and J(t) creep compliances in tension and shear (1/MPa, ...),
+  |E*| and |G*| absolute values, and delta the phase angle (deg, rad).
+* One header row with units in brackets: `f[Hz] E'[MPa] E''[MPa] T[C]`, separated by white space or commas; or words
+  with units, `Frequency (Hz), Storage Modulus (MPa), Loss Modulus (MPa)`, separated by commas, semicolons or tabs.
 
-A modulus named by words alone is Young's. Where rates are in rad/s, as of rheometers, and of compliances it is that of
-shear, with a warning. Moduli that are missing follow from tan delta or the phase angle. Lines that begin with # are
-comments, columns with other names are not read. Rows of one temperature are one set; without T all rows are one set,
-and rows of one frequency at many temperatures are a set each.
+A modulus named by words alone is Young's. If rates are in rad/s, as from rheometers, and for compliances, it is that
+of shear, with a warning. Missing moduli follow from tan delta or the phase angle. Lines that begin with # are
+comments; columns with other names are ignored. Rows of one temperature are one set; without T all rows are one set,
+and rows of one frequency at many temperatures are one set each.
 """
 
 import math
@@ -31,8 +31,8 @@ from .sane import refuse_odd, refuse_rising
 
 Array = NDArray[np.float64]
 Kind = Literal["frequency", "time", "creep"]
-LEAST_ROWS = 3  # accuracy: of a set: fewer say nothing about a spectrum
-NEAR = 1.5  # accuracy: degrees: measured temperatures of one set vary by less
+LEAST_ROWS = 3  # accuracy: least number of rows of a set
+NEAR = 1.5  # accuracy: largest variation of the temperatures of one set [K]
 ONE_FREQUENCY = 1.01  # accuracy: highest over lowest frequency of a temperature sweep
 PRESSURES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
 COMPLIANCES = {form.format(unit): 1.0 / size for unit, size in PRESSURES.items() for form in ("1/{}", "{}^-1", "{}-1")}
@@ -42,7 +42,7 @@ TIMES = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "degrees": math.pi / 180, "rad": 1.0}
 TEMPERATURES = {"C": 0.0, "°C": 0.0, "degC": 0.0, "deg C": 0.0, "K": -273.15}
 PRIMES = {"'": "stor", "''": "loss", '"': "loss"}  # E', E'', E"
-WORDS = {  # in small letters, as instruments write them; * is a letter that they do not say
+WORDS = {  # lower case, as instruments write them; * is an unknown letter
     **{"frequency": "f", "f_set": "f", "angular frequency": "omega", "w": "omega", "ω": "omega", "time": "t"},
     **{"step time": "t", "temperature": "T", "temp": "T", "temp.": "T"},
     **{"storage modulus": "*_stor", "loss modulus": "*_loss", "relaxation modulus": "*_relax"},
@@ -64,9 +64,9 @@ WITH_UNIT = re.compile(r"(.+?)\s*(?:\[([^\]]*)\]|\(([^()]*)\))")  # Storage Modu
 class Set:
     """Moduli measured at one temperature [deg C] (None if the table has none), at rising rates or times.
 
-    `at`, shape (n,): angular frequencies [rad/s] of a frequency sweep, times [s] of a relaxation or of creep. `storage`
-    and `loss`, shape (n,) [Pa]: of shear. Of a relaxation `storage` is the relaxation modulus, of creep the inverse of
-    the compliance, and `loss` is empty.
+    `at`, shape (n,): angular frequencies [rad/s] of a frequency sweep, times [s] of relaxation or creep. `storage`
+    and `loss`, shape (n,) [Pa], of shear. For relaxation `storage` is the relaxation modulus, for creep the inverse
+    compliance, and `loss` is empty.
     """
 
     temperature: float | None
@@ -77,10 +77,10 @@ class Set:
 
 @dataclass(frozen=True)
 class Measurement:
-    """All sets of a file, by temperature; `tension`: moduli were Young's and have been divided.
+    """All sets of a file, by temperature; `tension`: Young's moduli were converted.
 
-    `derived` is the modulus that follows from the other one and tan delta, "stor" or "loss"; "" where both are given.
-    `doubts` are sentences about what was not clear or is left out.
+    `derived` is the modulus computed from the other one and tan delta, "stor" or "loss", or "". `doubts` are
+    sentences about ambiguities and omissions.
     """
 
     path: Path
@@ -92,16 +92,16 @@ class Measurement:
 
     @property
     def temperatures(self) -> list[float]:
-        """At which it was measured [deg C], rising; none if the file does not say."""
+        """Measured temperatures [deg C], rising; none if the file has none."""
         return [each.temperature for each in self.sets if each.temperature is not None]
 
     @property
     def has_short_sets(self) -> bool:
-        """Whether a set is too short to tell a shift from, as all of a temperature sweep are."""
+        """True if a set is too short to determine a shift, as in a temperature sweep."""
         return any(each.at.size < LEAST_ROWS for each in self.sets)
 
     def without_short_sets(self) -> "Measurement":
-        """Leave out sets that are too short to tell a shift from; raises InputError where none is long enough."""
+        """Return the sets that are long enough to determine a shift; raises InputError if there are none."""
         long = tuple(each for each in self.sets if each.at.size >= LEAST_ROWS)
         short = [each for each in self.sets if each.at.size < LEAST_ROWS]
         if not long:
@@ -119,11 +119,11 @@ class Measurement:
 
 class _Column(NamedTuple):
     name: str
-    unit: str | None  # None: of a one-row header that names none
+    unit: str | None  # None in a one-row header without a unit
 
 
 def read_moduli(path: Path, poisson: float = 0.5) -> Measurement:
-    """Read a table; Young's moduli become those of shear, `G = E/(2 (1 + nu))`. Raises InputError."""
+    """Read a table; Young's moduli are converted to shear, `G = E/(2 (1 + nu))`. Raises InputError."""
     lines = read_lines(path, "a table of moduli")
     columns, first = _columns(path, lines)
     rows = np.array([_numbers(path, number, text, columns) for number, text in lines[first:]])
@@ -139,8 +139,8 @@ def read_moduli(path: Path, poisson: float = 0.5) -> Measurement:
 
 
 def _columns(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[list[_Column], int]:
-    """Return the columns, and the number of lines down to the last that names them: the first that names a modulus
-    and a rate, time or temperature, else the first of all."""
+    """Return the columns, and the number of lines down to the last header row: the first row that names a modulus and a
+    rate, time or temperature, else the first of all."""
     heads = [_head(text) for _, text in lines]
     named = (at for at, head in enumerate(heads) if (names := {each.name for each in head}) & KNOWN and names & OTHERS)
     at = next(named, 0)
@@ -166,7 +166,7 @@ def _cells(text: str) -> list[str]:
 
 
 def _head(text: str) -> list[_Column]:
-    """Return what the cells of a line name, with the units in brackets."""
+    """Return the names in a line, with the units in brackets."""
     return [_with_unit(cell) for cell in _cells(text)]
 
 
@@ -178,7 +178,7 @@ def _with_unit(cell: str) -> _Column:
 
 
 def _name(text: str) -> str:
-    """Return the name of a column as pyvisco spells it: E' is E_stor, f_set is f; |E*| is E_abs."""
+    """Return the name of a column in pyvisco's spelling: E' is E_stor, f_set is f; |E*| is E_abs."""
     text = text.strip().replace("″", "''").replace("′", "'").replace("’", "'")
     if match := re.fullmatch(r"([EG])('{1,2}|\")", text):
         return f"{match[1]}_{PRIMES[match[2]]}"
@@ -188,7 +188,7 @@ def _name(text: str) -> str:
 
 
 def _number(text: str) -> float:
-    """Return the number that a text is; nan for another text."""
+    """Return the number in a text; nan if it is not a number."""
     try:
         return float(text)
     except ValueError:
@@ -196,7 +196,7 @@ def _number(text: str) -> float:
 
 
 def _numbers(path: Path, number: int, text: str, columns: Sequence[_Column]) -> list[float]:
-    """Return the numbers of a row; nan in columns that are not read."""
+    """Return the numbers of a row; nan in ignored columns."""
     parts = split_cells(text)
     if has_decimal_commas(text) and (";" in text or "\t" in text or len(parts) != len(columns)):
         raise InputError(f"{path}:{number}: its numbers have decimal commas; write them with points")
@@ -210,7 +210,7 @@ def _numbers(path: Path, number: int, text: str, columns: Sequence[_Column]) -> 
 
 @dataclass
 class _Table:
-    """The columns of a file by name, their units, and the number of each row's line."""
+    """Columns of a file by name, their units, and the line number of each row."""
 
     path: Path
     values: dict[str, Array]
@@ -239,7 +239,7 @@ class _Table:
         return Measurement(self.path, kind, sets, letter == "E", derived, doubts)
 
     def _name_letter(self, factor: float) -> Iterator[str]:
-        """Decide whether moduli named by words are of tension (E) or shear (G); yield a warning where it is shear."""
+        """Decide whether moduli named by words are of tension (E) or shear (G); yield a warning for shear."""
         if not any(name.startswith("*") for name in self.values):
             return
         creep, named = (
@@ -266,7 +266,8 @@ class _Table:
                 )
 
     def _complete(self) -> str:
-        """Add the moduli that follow from tan delta or the phase angle; return which, if one follows from the other."""
+        """Add the moduli that follow from tan delta or the phase angle. Return the one that follows from the other, or
+        ""."""
         if "delta" in self.values and "tan_del" not in self.values:
             self.values["tan_del"], self.units["tan_del"] = np.tan(self._column("delta", ANGLES)), ""
         for letter in "EG" if "tan_del" in self.values else "":
@@ -284,7 +285,7 @@ class _Table:
         return ""
 
     def _find_moduli(self) -> tuple[str, Kind]:
-        """Return E or G, whichever the columns name completely, and what was measured."""
+        """Return E or G, whichever the columns name completely, and the kind of measurement."""
         kinds: dict[Kind, tuple[str, ...]] = {"time": ("relax",), "creep": ("creep",), "frequency": ("stor", "loss")}
         for letter in "EG":
             for kind, parts in kinds.items():
@@ -297,7 +298,7 @@ class _Table:
         )
 
     def _column(self, name: str, units: dict[str, float]) -> Array:
-        """A column of positive numbers in SI units."""
+        """Return a column of positive numbers in SI units."""
         return self._positive(name) * self._unit(name, units)
 
     def _positive(self, name: str) -> Array:
@@ -319,7 +320,7 @@ class _Table:
 
 
 def _sets(path: Path, at: Array, moduli: list[Array], temperatures: Array | None) -> Iterator[Set]:
-    """Yield rows of one temperature each, in the order of their rates; of a temperature sweep one row each."""
+    """Yield the set of each temperature, by rising rates; for a temperature sweep one set per row."""
     one = iter([np.arange(at.size)])
     for rows in one if temperatures is None else _of_one_temperature(path, at, temperatures):
         mean = None if temperatures is None else float(temperatures[rows].mean())
@@ -329,7 +330,7 @@ def _sets(path: Path, at: Array, moduli: list[Array], temperatures: Array | None
 
 
 def _of_one_temperature(path: Path, at: Array, temperatures: Array) -> Iterator[NDArray[np.intp]]:
-    """Rows of one temperature each, which may waver: of one sweep, in which no rate or time comes twice."""
+    """Yield the rows of each temperature, which may vary within a sweep: no rate or time occurs twice in a sweep."""
     order = np.argsort(temperatures, kind="stable")
     if at.max() < ONE_FREQUENCY * at.min() and np.ptp(temperatures) >= NEAR:
         yield from order[:, None]

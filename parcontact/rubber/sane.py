@@ -1,4 +1,4 @@
-"""Checks that a table can be of a measured rubber: wrong units and orders are refused before anything is fitted."""
+"""Checks that a table can be of a measured rubber; wrong units are refused before a fit."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from ..errors import InputError
 
 Array = NDArray[np.float64]
-MOST_DECADES = 40.0  # tuning: of frequencies or times in one table
-COLDEST = -150.0  # physics [deg C]: rubbers are not measured below
-SOFTEST, HARDEST = 3e3, 1e13  # physics [Pa]: of the largest modulus of a table; a soft gel, ten times diamond
-GLASS, SOFT = 4e9, 1e5  # physics [Pa]: no rubber is stiffer as a glass, and none has a softer glass transition
-RISE = 0.1  # accuracy: of a relaxation modulus from its first to its last time, beyond scatter
+MOST_DECADES = 40.0  # tuning: largest range of frequencies or times of a table
+COLDEST = -150.0  # physics [deg C]: lowest temperature of a measurement
+SOFTEST, HARDEST = 3e3, 1e13  # physics [Pa]: limits on the largest modulus of a table: a soft gel, ten times diamond
+GLASS, SOFT = 4e9, 1e5  # physics [Pa]: largest glassy modulus of rubbers, and least modulus at a glass transition
+RISE = 0.1  # accuracy: relative rise of a relaxation modulus that scatter may cause
 
 
 def refuse_odd(path: Path, kind: str, at: Array, storage: Array, temperatures: Array | None) -> None:
@@ -35,7 +35,7 @@ def refuse_odd(path: Path, kind: str, at: Array, storage: Array, temperatures: A
 
 
 def odd_moduli(sets: Sequence[Any]) -> Iterator[str]:
-    """Tell shear moduli [Pa] of `sets` that are allowed but of no rubber."""
+    """Yield warnings about shear moduli [Pa] of `sets` that no rubber has."""
     largest = max(float(each.storage.max()) for each in sets)
     if largest > GLASS:
         yield f"its largest shear modulus is {largest:.3g} Pa, more than rubber has as a glass: is the unit right?"
@@ -44,7 +44,7 @@ def odd_moduli(sets: Sequence[Any]) -> Iterator[str]:
 
 
 def refuse_rising(path: Path, kind: str, sets: Sequence[Array]) -> None:
-    """Raise InputError where relaxation moduli of a set, by rising times, grow; or, of creep, inverse compliances."""
+    """Raise InputError if relaxation moduli, or inverse compliances, of a set rise with time."""
     for moduli in sets:
         if moduli[-1] <= (1.0 + RISE) * moduli[0]:
             continue
@@ -57,12 +57,12 @@ def refuse_rising(path: Path, kind: str, sets: Sequence[Array]) -> None:
 
 
 def scatter(sweeps: Sequence[tuple[Array, Array]]) -> float:
-    """Return the rms of the scatter of the logarithms of moduli: by how much a point differs from the curve through
-    its two neighbours on either side. `sweeps` are rates and moduli, each of shape (n,), by rising rates; nan where
-    all have less than five points.
+    """Return the rms scatter of the logarithms of moduli: the deviation of a point from the curve through its two
+    neighbours on either side.
 
-    The interpolation is cubic in the logarithms, so that a smooth curve has none; of independent errors it shows the
-    root of 1 + the squares of its weights, which is taken back.
+    `sweeps` are rates and moduli, each of shape (n,), by rising rates; nan if all have less than five points. The
+    interpolation is cubic in the logarithms, so that smooth curves have no scatter. For independent errors the
+    deviation is divided by the root of 1 + the squares of its weights.
     """
     found = []
     for rates, moduli in sweeps:

@@ -3,12 +3,12 @@
     G*(w) = G_inf + sum_k G_k i w tau_k/(1 + i w tau_k),     G(t) = G_inf + sum_k G_k exp(-t/tau_k),     all G_k >= 0
     J(t)  = J_0 + sum_k J_k (1 - exp(-t/lambda_k)) + t/eta,  J*(w) = J_0 + sum_k J_k/(1 + i w lambda_k) + 1/(i w eta)
 
-A relaxation modulus and a storage modulus hardly show the loss modulus, on which friction depends. Therefore the data
-are met twice. First by a dense spectrum (`Spectrum`), by non-negative least squares of the relative errors with a
-penalty on its roughness. The penalty is the prior of a Gaussian process, so that the spectrum has a covariance, and the
-loss modulus that follows an error (G. Wahba, J. R. Statist. Soc. B 45 (1983) 133; J. Honerkamp, J. Weese, Rheol. Acta
-32 (1993) 65). Then the shortest series is taken which meets both moduli of this spectrum, everywhere in the band.
-Creep is 1/J*(w) of its spectrum (J. D. Ferry, Viscoelastic Properties of Polymers (1980), chapter 3).
+A relaxation modulus or a storage modulus hardly determines the loss modulus, on which friction depends. Therefore
+the data are fitted twice. The first fit is a dense spectrum (`Spectrum`), by non-negative least squares of the
+relative errors with a penalty on its roughness. The penalty is the prior of a Gaussian process, so that the spectrum
+has a covariance, and the loss modulus an error (G. Wahba, J. R. Statist. Soc. B 45 (1983) 133; J. Honerkamp, J.
+Weese, Rheol. Acta 32 (1993) 65). The second is the shortest series that fits both moduli of this spectrum everywhere
+in the band. Creep is 1/J*(w) of its spectrum (J. D. Ferry, Viscoelastic Properties of Polymers (1980), chapter 3).
 """
 
 import math
@@ -27,18 +27,18 @@ from .sane import scatter
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Weigh = Literal["both", "storage", "loss"]
-MOST = 48  # tuning: branches
+MOST = 48  # tuning: largest number of branches
 DENSE = 6  # accuracy: times per decade of the dense spectrum
-SPARE = 1.0  # accuracy: decades of times beyond the data, to either side, of the dense spectrum
-ROUGH = 3.0  # fitted: prior of second differences of the spectrum over its mean; errors are as stated on eight bodies
-BEYOND = 0.7  # fitted: prior of the spectrum beyond the data over that in the last decade, likewise
-LEAST_NOISE = 1e-4  # accuracy: relative, below which no table is trusted
-PER_DECADE = 10  # accuracy: frequencies at which a short series is held to the dense spectrum
-ENDS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # accuracy: decades beyond the data that are tried for a short series
-NEAR_END = 0.5  # accuracy: decades of the band that count as its ends
-EARLIEST = 20.0  # accuracy: a relaxation or creep from t on shows the loss up to a frequency of 1/(20 t)
-NEGLIGIBLE = 1e-4  # accuracy: of the storage modulus, for a branch that is left out
-NOTHING = 1e-9  # rounding: of the absolute modulus: the least of both parts, by which others are divided
+SPARE = 1.0  # accuracy: decades of the dense spectrum beyond the data on each side
+ROUGH = 3.0  # fitted: prior of second differences of the spectrum over its mean
+BEYOND = 0.7  # fitted: prior of the spectrum beyond the data over that in the last decade
+LEAST_NOISE = 1e-4  # accuracy: least relative noise of a table
+PER_DECADE = 10  # accuracy: frequencies per decade at which series and dense spectrum are compared
+ENDS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # accuracy: decades beyond the data that a short series may have
+NEAR_END = 0.5  # accuracy: length of the ends of a band [decades]
+EARLIEST = 20.0  # accuracy: relaxation or creep from t on determines the loss up to a frequency of 1/(20 t)
+NEGLIGIBLE = 1e-4  # accuracy: largest modulus of a dropped branch over the storage modulus
+NOTHING = 1e-9  # rounding: least part of a modulus over its absolute value, as a divisor
 Errors = tuple[float, float, float]
 
 
@@ -46,11 +46,10 @@ Errors = tuple[float, float, float]
 class PronySeries:
     """`modulus_inf` [Pa], `moduli` [Pa] and `times` [s], shape (n,), at the reference temperature.
 
-    `error` is the rms of the relative misfit of the data that count; `best` the smallest one of any series; `alone` the
-    same of storage and of loss without the other; `scatter` the relative scatter of neighbours in a sweep about a
-    smooth curve, nan if sweeps are too short. `band` [rad/s] holds the frequencies at which moduli are known, and
-    `loss_errors` the relative error (two standard deviations) of the loss modulus inside it, at its lower and its upper
-    end.
+    `error` is the rms relative misfit of the fitted data; `best` the smallest one of any series; `alone` the same
+    for storage and for loss alone; `scatter` the relative scatter of neighbours in a sweep about a smooth curve, nan
+    if sweeps are too short. `band` [rad/s] holds the frequencies at which moduli are known, and `loss_errors` the
+    relative error (two standard deviations) of the loss modulus inside it, at its lower and its upper end.
     """
 
     modulus_inf: float
@@ -72,14 +71,14 @@ class PronySeries:
         return float(self.modulus(np.array([omega]))[0].real)
 
     def response(self, kind: Kind, at: Array) -> Array:
-        """Return what a measurement of a kind shows: storage before loss [Pa] at frequencies [rad/s], or G(t) or 1/J(t)
-        [Pa] at times [s]. Of n frequencies or times, the shape is (2 n,) or (n,)."""
+        """Return the data of a kind of measurement: storage before loss [Pa] at frequencies [rad/s], or G(t) or 1/J(t)
+        [Pa] at times [s]. For n frequencies or times, the shape is (2 n,) or (n,)."""
         if kind == "creep":
             return 1.0 / self._creep(at)
         return np.asarray(kernel(at, kind, self.times) @ np.append(self.moduli, self.modulus_inf))
 
     def _creep(self, t: Array) -> Array:
-        """Return J(t) [1/Pa]: retardation rates are the eigenvalues of a diagonal and a dyad."""
+        """Return J(t) [1/Pa]; retardation rates are the eigenvalues of a diagonal matrix plus a dyad."""
         instant, v = self.modulus_inf + self.moduli.sum(), np.sqrt(self.moduli / self.times)
         rates, vectors = np.linalg.eigh(np.diag(1.0 / self.times) - np.outer(v, v) / instant)
         rates = np.maximum(rates, np.finfo(float).tiny)
@@ -88,8 +87,8 @@ class PronySeries:
 
 
 def kernel(at: Array, kind: Kind, times: Array) -> Array:
-    """Return what each unit weight of a spectrum adds to the data, shape (data, weights): those of the times, then the
-    spring, or of creep the instantaneous compliance and the fluidity."""
+    """Return the contribution of each unit weight of a spectrum to the data, shape (data, weights): weights of the
+    times, followed by the spring, or for creep by the instantaneous compliance and the fluidity."""
     if kind == "frequency":
         found = complex_kernel(at, kind, times)
         return np.vstack([found.real, found.imag])
@@ -99,7 +98,7 @@ def kernel(at: Array, kind: Kind, times: Array) -> Array:
 
 
 def complex_kernel(omega: Array, kind: Kind, times: Array) -> ComplexArray:
-    """Return what each unit weight adds to G* at angular frequencies [rad/s], of creep to J*."""
+    """Return the contribution of each unit weight to G* at angular frequencies [rad/s], for creep to J*."""
     z, one = 1j * omega[:, None] * times, np.ones((omega.size, 1))
     if kind == "creep":
         return np.hstack([1.0 / (1.0 + z), one, 1.0 / (1j * omega[:, None])])
@@ -109,7 +108,7 @@ def complex_kernel(omega: Array, kind: Kind, times: Array) -> ComplexArray:
 @dataclass(frozen=True)
 class ReducedData:
     """The data of all sets, reduced to one temperature: `at`, shape (n,), frequencies [rad/s] or times [s], and
-    `moduli` [Pa], shape (n,) of G(t) or 1/J(t), or (2 n,), storage before loss, of which those in `counts` are met."""
+    `moduli` [Pa], shape (n,) of G(t) or 1/J(t), or (2 n,), storage before loss. Those in `counts` are fitted."""
 
     kind: Kind
     at: Array
@@ -118,38 +117,38 @@ class ReducedData:
 
     @property
     def counted(self) -> int:
-        """The number of data that count."""
+        """Number of fitted data."""
         return len(self.moduli[self.counts])
 
     @property
     def rates(self) -> tuple[float, float]:
-        """The lowest and the highest rate [1/s]."""
+        """Lowest and highest rate [1/s]."""
         rates = self.at if self.kind == "frequency" else 1.0 / self.at
         return float(rates.min()), float(rates.max())
 
     @property
     def band(self) -> tuple[float, float]:
-        """The angular frequencies [rad/s] between which the data show the moduli."""
+        """Angular frequencies [rad/s] between which the data determine the moduli."""
         low, high = self.rates
         return (low, high) if self.kind == "frequency" else (low, 2 * math.pi / EARLIEST * high)
 
     def columns(self, times: Array) -> Array:
-        """Return what each unit weight adds to the data that count, relative to them; creep is J over 1/(1/J)."""
+        """Return the contribution of each unit weight to the fitted data, relative to them; creep is J over 1/(1/J)."""
         found, data = kernel(self.at, self.kind, times), self.moduli[:, None]
         return np.asarray((found * data if self.kind == "creep" else found / data)[self.counts])
 
     def misfit(self, response: Array) -> float:
-        """Return the rms of the logarithms of a response over the data that count."""
+        """Return the rms misfit of the logarithms of a response to the fitted data."""
         ratio = np.maximum(response, np.finfo(float).tiny)[self.counts] / self.moduli[self.counts]
         return float(np.sqrt(np.mean(np.log(ratio) ** 2)))
 
     def find_spring(self, storage: Array) -> float:
-        """Return by how much measured storage moduli exceed those of a spectrum without a spring [Pa], in the mean."""
+        """Return the mean excess of measured storage moduli over those of a spectrum without a spring [Pa]."""
         measured = self.moduli[: self.at.size]
         return max(0.0, float(np.mean(1.0 - storage / measured) / np.mean(1.0 / measured)))
 
     def exchanged_misfit(self) -> float:
-        """Return the rms of the misfit of the best series, if storage and loss moduli are taken for each other."""
+        """Return the rms misfit of the best series if storage and loss moduli are exchanged."""
         moduli = np.roll(self.moduli, self.at.size)
         return _rms(best_residuals(replace(self, moduli=moduli, counts=slice(None))))
 
@@ -167,7 +166,7 @@ def reduce_sets(
 
 
 def best_residuals(data: ReducedData, per_decade: int = DENSE) -> Array:
-    """Return by how much the best series of any number of branches misses the data that count, relative to them."""
+    """Return the residuals of the fitted data for the best series of any number of branches, relative to the data."""
     low, high = data.rates
     first, last = (round(per_decade * (math.log10(1.0 / rate) + side)) for rate, side in ((high, -SPARE), (low, SPARE)))
     columns = data.columns(np.power(10.0, np.arange(first, last + 1) / per_decade))
@@ -181,8 +180,8 @@ def _non_negative(columns: Array, goal: Array | None = None) -> Array:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """A dense spectrum of relaxation times (of creep: of retardation times) [s] with its weights [Pa or 1/Pa], and the
-    matrix whose product with its transpose is the covariance of the weights."""
+    """A dense spectrum of relaxation times (for creep: retardation times) [s] with weights [Pa or 1/Pa], and a matrix
+    whose product with its transpose is the covariance of the weights."""
 
     kind: Kind
     times: Array
@@ -191,7 +190,7 @@ class Spectrum:
 
     @staticmethod
     def fit(data: ReducedData) -> "Spectrum":
-        """Return the smooth spectrum that meets the data within their noise."""
+        """Return the smooth spectrum that fits the data within their noise."""
         high, low = (-math.log10(rate) for rate in data.rates)
         inside = max(2, math.ceil((high - low) * DENSE)) + 1
         step, beyond = max(high - low, 0.1) / (inside - 1), round(SPARE * DENSE)
@@ -203,7 +202,7 @@ class Spectrum:
         noise = max(math.sqrt(float(missed @ missed) / free), LEAST_NOISE)
         prior = noise * _prior(inside, beyond, columns.shape[1] - times.size)
         goal = np.concatenate([np.ones(len(columns)), np.zeros(len(prior))])
-        for _ in range(3):  # the scale is that of the spectrum itself
+        for _ in range(3):  # the scale depends on the spectrum
             scale = _scale(times, weights, slice(beyond, beyond + inside))
             system = np.vstack([columns * scale, prior])
             weights = scale * _non_negative(system, goal)
@@ -213,7 +212,7 @@ class Spectrum:
 
     def modulus(self, omega: Array) -> tuple[ComplexArray, Array]:
         """Return G* [Pa] at angular frequencies [rad/s], shape (n,), and the relative standard deviation of its
-        imaginary part. Neither part is 0."""
+        imaginary part. Both parts are positive."""
         found = complex_kernel(omega, self.kind, self.times)
         modulus = found @ self.weights
         if self.kind == "creep":
@@ -226,7 +225,7 @@ class Spectrum:
 
 
 def _prior(inside: int, beyond: int, rest: int) -> Array:
-    """Return rows that are 0 for a spectrum that is smooth, and that goes on beyond the data as in the last decade."""
+    """Return rows that give 0 for a smooth spectrum that continues beyond the data as in the last decade."""
     count, last = inside + 2 * beyond, min(DENSE, inside)
     smooth = np.diff(np.eye(count), 2, axis=0) / ROUGH
     tails = np.eye(count)[[*range(beyond), *range(beyond + inside, count)]]
@@ -236,7 +235,7 @@ def _prior(inside: int, beyond: int, rest: int) -> Array:
 
 
 def _scale(times: Array, weights: Array, inside: slice) -> Array:
-    """Return weights without features: a share of the loss at each time, as a power law beyond the data."""
+    """Return weights of a featureless spectrum: a share of the loss at each time, and a power law beyond the data."""
     z = times / times[:, None]
     logs = np.log(np.maximum((z / (1.0 + z**2)) @ weights[: times.size], 1e-30 * weights.max()))
     at = np.arange(times.size)
@@ -247,11 +246,11 @@ def _scale(times: Array, weights: Array, inside: slice) -> Array:
 
 
 def fit_series(data: ReducedData, error: float, sweeps: Sequence[tuple[Array, Array]] = ()) -> PronySeries:
-    """Return the shortest series that meets the data as closely as the smooth spectrum within them does.
+    """Return the shortest series that fits the data as closely as the smooth spectrum does.
 
-    At all rates of the data its moduli differ from those of the spectrum by `error` at most, beside the standard
-    deviation of the loss modulus as far as that is smaller. It has a branch per decade at least. `sweeps`, rates and
-    moduli, are what the scatter is found from.
+    At all rates of the data its moduli differ from those of the spectrum by at most `error`, plus the standard
+    deviation of the loss modulus if that is smaller. It has at least a branch per decade. `sweeps` are rates and
+    moduli, from which the scatter is computed.
     """
     spectrum, (low, high), (slow, fast) = Spectrum.fit(data), data.band, data.rates
     decades = math.log10(fast / slow)
@@ -291,7 +290,7 @@ def _rms(values: Array) -> float:
 
 
 def _alone(data: ReducedData) -> tuple[float, float]:
-    """Return how closely storage and loss moduli could be met without the other."""
+    """Return the misfits of storage and loss moduli if each is fitted alone."""
     if data.kind != "frequency":
         return math.nan, math.nan
     parts = slice(data.at.size), slice(data.at.size, None)
@@ -300,14 +299,15 @@ def _alone(data: ReducedData) -> tuple[float, float]:
 
 
 def _times(rates: tuple[float, float], count: int, spare: float) -> Array:
-    """Return relaxation times [s] of rates and some decades beyond, in the middles of equal parts of them."""
+    """Return relaxation times [s] for a range of rates extended by `spare` decades, at the centres of `count` equal
+    parts."""
     low, high = math.log10(1.0 / rates[1]) - spare, math.log10(1.0 / rates[0]) + spare
     step = (high - low) / count
     return np.asarray(10.0 ** (low + step * (0.5 + np.arange(count))))
 
 
 def _short(omega: Array, goal: ComplexArray, times: Array) -> tuple[Array, Array]:
-    """Return times and weights of the series that meets moduli best; branches that nobody would see are left out."""
+    """Return times and weights of the series that fits moduli best; negligible branches are dropped."""
     target = np.concatenate([goal.real, goal.imag])
     weights = _non_negative(kernel(omega, "frequency", times) / target[:, None])
     kept = weights[:-1] > _negligible(weights[:-1], times, float(weights[-1]))
@@ -320,8 +320,8 @@ def _frequencies(low: float, high: float) -> Array:
 
 
 def _distance(omega: Array, goal: ComplexArray, allowed: Array, times: Array, weights: Array) -> float:
-    """Return by how much the loss moduli of a series, or its storage moduli, differ from the goal at most, over what is
-    allowed of the loss moduli, or least allowed."""
+    """Return the largest deviation of the moduli of a series from the goal, over the `allowed` deviation of the loss
+    moduli, or over the least allowed one for storage moduli."""
     found = complex_kernel(omega, "frequency", times) @ weights
     loss, storage = np.abs(found.imag / goal.imag - 1.0), np.abs(found.real / goal.real - 1.0)
     return float(max((loss / allowed).max(), storage.max() / allowed.min()))
@@ -330,7 +330,7 @@ def _distance(omega: Array, goal: ComplexArray, allowed: Array, times: Array, we
 def _thin(
     omega: Array, goal: ComplexArray, measured: slice, allowed: Array, found: tuple[Array, Array], least: int
 ) -> tuple[Array, Array]:
-    """Return times and weights without the weakest branches, as long as the series meets the goal without them."""
+    """Return times and weights without the weakest branches, as long as the series fits the goal without them."""
     while found[0].size > least:
         times, moduli = found[0], found[1][:-1]
         z = times / times[:, None]
@@ -343,7 +343,7 @@ def _thin(
 
 
 def _negligible(moduli: Array, times: Array, spring: float) -> Array:
-    """Return the modulus of each time [Pa] below which nobody would see that it is left out: a share of the storage
-    modulus at its frequency."""
+    """Return the modulus [Pa] at each time below which a branch is dropped: a share of the storage modulus at its
+    frequency."""
     z = times / times[:, None]  # of the row's frequency
     return NEGLIGIBLE * (spring + (z**2 / (1.0 + z**2)) @ moduli)

@@ -22,16 +22,16 @@ from ..datafiles import read_lines, split_cells
 from ..errors import InputError
 
 GAS = 8.314462618  # physics: J/(mol K)
-ENERGY = 1e3, 1e7  # physics: J/mol: energies of activation are some 1e5
-CONSTANT = 1e-3, 1e4  # physics: C1 [-] and C2 [K] of WLF
-SHOWN = 12  # factors that are printed one by one
+ENERGY = 1e3, 1e7  # physics: limits on the activation energy [J/mol]
+CONSTANT = 1e-3, 1e4  # physics: limits on C1 [-] and C2 [K] of WLF
+SHOWN = 12  # largest number of factors that are printed
 ZERO = 273.15  # physics: K at 0 deg C
 
 
 @dataclass(frozen=True)
 class Density:
-    """Moduli that go with density times temperature; `expansion` [1/K] is the loss of density per kelvin over the
-    density at the reference temperature [deg C]."""
+    """Moduli proportional to density times temperature; `expansion` [1/K] is the relative loss of density per kelvin at
+    the reference temperature [deg C]."""
 
     expansion: float
     reference: float
@@ -40,7 +40,7 @@ class Density:
         return f"density times temperature, with an expansion of {self.expansion:.3g} 1/K"
 
     def log_factor(self, temperature: float) -> float:
-        """log10 of b_T; raises InputError at or below absolute zero, and where no density is left."""
+        """Return log10 of b_T; raises InputError at or below absolute zero, and if the density is not positive."""
         density = 1.0 - self.expansion * (temperature - self.reference)
         if temperature <= -ZERO or density <= 0.0:
             raise InputError(f"{temperature:g} C is beyond the density law of the moduli")
@@ -60,7 +60,7 @@ class WLF:
         return f"WLF with C1 = {self.C1:.4g}, C2 = {self.C2:.4g} K, reference {self.reference:g} C"
 
     def log_factor(self, temperature: float) -> float:
-        """log10 of a_T; raises InputError where the law has no meaning, at or below T_ref - C2."""
+        """Return log10 of a_T; raises InputError at or below T_ref - C2, where the law is not defined."""
         above = temperature - self.reference
         if self.C2 + above <= 0.0:
             lowest = self.reference - self.C2
@@ -70,7 +70,7 @@ class WLF:
 
 @dataclass(frozen=True)
 class Arrhenius:
-    """`energy` of activation [J/mol], reference temperature [deg C]."""
+    """Activation `energy` [J/mol] and reference temperature [deg C]."""
 
     energy: float
     reference: float
@@ -80,7 +80,7 @@ class Arrhenius:
         return f"Arrhenius with {self.energy:.4g} J/mol, reference {self.reference:g} C"
 
     def log_factor(self, temperature: float) -> float:
-        """log10 of a_T; raises InputError at or below absolute zero."""
+        """Return log10 of a_T; raises InputError at or below absolute zero."""
         if temperature <= -ZERO:
             raise InputError(f"{temperature:g} C is below absolute zero")
         inverse = 1.0 / (temperature + ZERO) - 1.0 / (self.reference + ZERO)
@@ -102,7 +102,7 @@ class Factors:
         return f"{len(pairs)} factors, log10: {', '.join(shown)}, reference {self.reference:.4g} C"
 
     def log_factor(self, temperature: float) -> float:
-        """log10 of a_T; raises InputError beyond the temperatures given."""
+        """Return log10 of a_T; raises InputError outside the given temperatures."""
         low, high = self.temperatures[0], self.temperatures[-1]
         if not low <= temperature <= high:
             raise InputError(f"{temperature:g} C is outside the shift factors, which reach from {low:g} to {high:g} C")
@@ -114,19 +114,19 @@ class Factors:
         return start + (end - start) * (temperature - low) / (high - low)
 
 
-Shift = WLF | Arrhenius | Factors  # of relaxation times; `reference` [deg C] is where they are as given
+Shift = WLF | Arrhenius | Factors  # shift of relaxation times, which are given at `reference` [deg C]
 
 
 def log_vertical(shift: Shift, temperature: float) -> float:
-    """Return log10 of b_T at a temperature [deg C], 0 without a vertical law; raises InputError where it ends."""
+    """Return log10 of b_T at a temperature [deg C], 0 without a vertical law; raises InputError outside its range."""
     return 0.0 if shift.vertical is None else shift.vertical.log_factor(temperature)
 
 
 def read_shift(text: str, reference: float | None) -> str | Shift:
-    """Return what a text of the command line means: the name of a law whose constants are to be fitted, or a law.
+    """Return the shift of a command line: the name of a law whose constants are to be fitted, or a law.
 
-    `wlf:8.86,101.6` and `arrhenius:1.2e5` hold constants at the reference temperature, another text is the path of a
-    file with the columns T[C] and log_aT, and perhaps log_bT. Raises InputError.
+    `wlf:8.86,101.6` and `arrhenius:1.2e5` have constants at the reference temperature; another text is the path of a
+    file with the columns T[C] and log_aT, and optionally log_bT. Raises InputError.
     """
     if text in ("wlf", "arrhenius", "free"):
         return text

@@ -1,11 +1,11 @@
-"""Time-temperature superposition of measured sets: horizontal factors a_T and vertical factors b_T, found together.
+"""Time-temperature superposition of measured sets: horizontal factors a_T and vertical factors b_T, fitted together.
 
     G*(w, T) = b_T G*(a_T w, T_ref)
 
-Rates are reduced by a_T and moduli divided by b_T, so that one series meets all sets as closely as any can: least
-squares of its misfit over the constants of both laws, of which the series is eliminated (variable projection: G. H.
-Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). Without b_T, which rubber has by its entropy (J. D. Ferry,
-Viscoelastic Properties of Polymers (1980), chapter 11), constants of a_T come out wrong by a tenth and more.
+Rates are reduced by a_T and moduli divided by b_T, so that one series fits all sets as closely as possible: least
+squares of its misfit over the constants of both laws, with the series eliminated (variable projection: G. H. Golub,
+V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). Without b_T, a consequence of the entropy of rubber (J. D. Ferry,
+Viscoelastic Properties of Polymers (1980), chapter 11), constants of a_T have errors of a tenth and more.
 """
 
 import itertools
@@ -26,23 +26,23 @@ from .shift import WLF, Arrhenius, Density, Factors, Shift, log_vertical
 
 Array = NDArray[np.float64]
 Vertical = Literal["auto", "density", "free", "none"]
-MOST_DECADES = 45.0  # tuning: of shift between the coldest and the warmest set
-CLOSE = 1e-4  # accuracy: relative, of constants and of the misfit, at which a search ends
-FAR = 1e3  # accuracy: residual of shifts that are out of question: no step goes there
-Ranges = tuple[tuple[float, float, int], ...]  # from, to, how many: where the constants of a law are looked for
+MOST_DECADES = 45.0  # tuning: largest shift between the coldest and the warmest set
+CLOSE = 1e-4  # accuracy: relative change of constants and of the misfit at which a search ends
+FAR = 1e3  # accuracy: residual assigned to impossible shifts
+Ranges = tuple[tuple[float, float, int], ...]  # grid of constants of a law: from, to, number
 WLF_CONSTANTS: Ranges = ((2.0, 60.0, 16), (20.0, 600.0, 16))  # physics: C1 [-], C2 [K]
 ENERGIES: Ranges = ((1e4, 1e6, 40),)  # physics: J/mol
-EXPANSION = 6e-4  # physics: 1/K: of rubbers, 5e-4 to 7e-4, which moduli hardly tell apart from the shift
-COARSE = 3  # accuracy: times per decade of the series by which first constants and warnings are judged
-STEP = 1e-4  # accuracy: of finite differences, relative to constants and to factors
-ROUNDING = 1e-6  # accuracy: of misfits, below which no law is better
-BETTER = 0.7  # accuracy: misfit with free vertical factors over that without, below which it is told
+EXPANSION = 6e-4  # physics: expansion of rubbers [1/K], 5e-4 to 7e-4
+COARSE = 3  # accuracy: times per decade of the series for first constants and warnings
+STEP = 1e-4  # accuracy: relative step of finite differences
+ROUNDING = 1e-6  # accuracy: difference of misfits below which no law is better
+BETTER = 0.7  # accuracy: misfit with free vertical factors over that without, below which there is a warning
 
 
 @dataclass(frozen=True)
 class Superposition:
-    """The shift that was found, its `misfit` (rms, relative), and what `free` vertical factors would give instead,
-    where that is much better."""
+    """A fitted shift, its `misfit` (rms, relative), and the result with `free` vertical factors if that is
+    much better."""
 
     shift: Shift
     misfit: float
@@ -54,9 +54,9 @@ def superpose(
 ) -> Superposition:
     """Return the shift that joins the sets of a measurement to one curve at a reference temperature [deg C].
 
-    `law` is wlf, arrhenius or free (factors at the measured temperatures), whose constants are found, or a shift that
-    is known. `vertical` says what b_T is: the density law, free factors, none (1), or (auto) the density law unless the
-    data prefer none. Raises InputError where the sets are too few or do not overlap.
+    `law` is wlf, arrhenius or free (factors at the measured temperatures), whose constants are fitted, or a known
+    shift. `vertical` is the law of b_T: density, free factors, none (1), or (auto) density unless the data prefer
+    none. Raises InputError if the sets are too few or do not overlap.
     """
     known = measured.temperatures
     if len(known) < 2:
@@ -71,7 +71,7 @@ def superpose(
     if vertical != "auto":
         return search.refine(start, vertical)
     none, density = search.refine(start, "none"), search.refine(start, "density")
-    free = search.refine(start, "free", COARSE)  # which only warns
+    free = search.refine(start, "free", COARSE)  # for a warning only
     chosen = density if density.misfit < none.misfit - ROUNDING else none
     return replace(chosen, free=free if free.misfit < BETTER * chosen.misfit else None)
 
@@ -88,7 +88,7 @@ class _Search:
         return self.measured.temperatures
 
     def start(self) -> Array:
-        """Return logarithms of the constants of the horizontal law to begin from, of WLF for free factors."""
+        """Return logarithms of initial constants of the horizontal law, of WLF for free factors."""
         if not isinstance(self.law, str):
             return np.zeros(0)
         ranges = ENERGIES if self.law == "arrhenius" else WLF_CONSTANTS
@@ -119,11 +119,11 @@ class _Search:
         return Density(EXPANSION, self.reference) if kind == "density" else None
 
     def refine(self, start: Array, kind: Vertical, per_decade: int = DENSE) -> Superposition:
-        """Return the best shift near to constants, with a vertical law of a kind; shifts are compared by series of so
-        many times per decade."""
+        """Return the best shift near initial constants, with a vertical law of a kind. Shifts are compared by series of
+        `per_decade` times per decade."""
         count = len(self._known) - 1
         begin = np.concatenate([start, np.zeros(count if kind == "free" else 0)])
-        if self.law == "free":  # from WLF, with the same vertical law
+        if self.law == "free":  # start from WLF with the same vertical law
             logs = log_factors(replace(self, law="wlf").refine(start, kind, per_decade).shift, self._known)
             begin = np.concatenate([np.array(log[1:]) - log[0] for log in logs[: 2 if kind == "free" else 1]])
             start = begin[:count]
@@ -154,7 +154,7 @@ class _Search:
         return reduce_sets(sets, kind, log_factors(shift, self._known), self.weigh)
 
     def _spread(self, shift: Shift) -> float:
-        """Return the decades of shift between the measured temperatures."""
+        """Return the shift between the measured temperatures [decades]."""
         return float(np.ptp([shift.log_factor(t) for t in self._known]))
 
     def _misfit(self, shift: Shift) -> float:
@@ -172,7 +172,7 @@ def log_factors(shift: Shift, temperatures: Sequence[float]) -> tuple[list[float
 
 
 def _factors(temperatures: Sequence[float], logs: Sequence[float], reference: float) -> Factors:
-    """Return factors that are 1 at the reference, and beyond the temperatures as at the nearest one."""
+    """Return factors that are 1 at the reference; beyond the temperatures they equal the nearest one."""
     known = sorted({*temperatures, min(reference, temperatures[0]), max(reference, temperatures[-1])})
     there = float(np.interp(reference, temperatures, logs))
     return Factors(tuple(known), tuple(float(log - there) for log in np.interp(known, temperatures, logs)), reference)
