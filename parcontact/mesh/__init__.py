@@ -1,6 +1,6 @@
-"""Jobs whose grid is given in words: `points: auto`, and `from surface` for points and size of a measured map.
+"""Jobs whose grid is given by words: `points: auto`, and `from surface` for points and size of a measured map.
 
-`load` and `load_cases` read a job as the functions of the same names in `job` do, and put numbers for these words.
+`load` and `load_cases` read a job like the functions of the same names in `job`, and replace these words by numbers.
 """
 
 from functools import partial

@@ -1,8 +1,8 @@
-"""Words that stand for numbers of the grid: `points: auto`, and `from surface` for points and size of a measured map.
+"""Words for numbers of the grid: `points: auto`, and `from surface` for points and size of a measured map.
 
-`auto` is the mesh of fewest points on which the errors are those of `numerics.accuracy`. It follows from the shortest
-wave of the surface, from the directions of sliding (`job.checks.cells`) and from a guess of what touches
-(`mesh.contact_guess`). The mesh may make its share of the error (`accuracy.shares`).
+`auto` is the mesh with the fewest points for which the errors are those of `numerics.accuracy`. It follows from the
+shortest wave of the surface, the directions of sliding (`job.checks.cells`) and a guess of the contact area
+(`mesh.contact_guess`). The mesh has its share of the error (`accuracy.shares`).
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from ..job.text.places import UNREADABLE, Source
 from ..job.text.python_data import is_array
 from .contact_guess import guesses
 
-MOST_POINTS = 100_000  # tuning: along a side: ten times as many as have been run
-KEYS = ("points", "size")  # of a grid, which a measured map has
+MOST_POINTS = 100_000  # tuning: largest number of points along a side
+KEYS = ("points", "size")  # keys of a grid that a measured map determines
 Extent = tuple[tuple[int, int], tuple[float, float] | None]
 
 
@@ -46,14 +46,16 @@ class Scenery(Part):
 
 
 def fill_grid(source: Source, origin: Origin) -> Origin:
-    """Put numbers for all words of the grid into the source of a job; return the origin with the sentence on them."""
+    """Replace all words of the grid in the source of a job by numbers. Return the origin with a sentence on them."""
     _take_grid(source, origin)
     return _choose_points(source, origin)
 
 
 def _choose_points(source: Source, origin: Origin) -> Origin:
-    """Put numbers for `points: auto` into the source of a job; return the origin with what is to be said of them. What
-    stands in the way is a mistake at the key; mistakes in other sections are found when the job is validated."""
+    """Replace `points: auto` in the source of a job. Return the origin with a sentence.
+
+    Errors are mistakes at this key; mistakes in other sections are found when the job is validated.
+    """
     grid = source.data.get("grid") if isinstance(source.data, dict) else None
     if not isinstance(grid, dict) or grid.get("points") != AUTO_POINTS:
         return origin
@@ -73,20 +75,20 @@ def _choose_points(source: Source, origin: Origin) -> Origin:
 
 
 def points_for(job: Job, accuracy: float) -> tuple[int, int]:
-    """Return the points along x and y that `auto` takes for a job at another accuracy. Raises InputError."""
+    """Return the points along x and y that `auto` chooses for a job at another accuracy. Raises InputError."""
     numerics = job.numerics.model_copy(update={"accuracy": accuracy})
     (nx, ny), _ = _choose(job.model_copy(update={"numerics": numerics}), job.grid, plain_data(job), job.origin)
     return nx, ny
 
 
 def find_shortest_wave(job: Job) -> float:
-    """Return the shortest wave [m] of the surface of a job, infinite where none is known. Raises InputError."""
+    """Return the shortest wave [m] of the surface of a job, infinite if unknown. Raises InputError."""
     data, shapes = plain_data(job), (shape for shape in job.surface if not isinstance(shape, OnOneMesh))
     return min((_shortest(shape, job.grid, data, job.origin) for shape in shapes), default=math.inf)
 
 
 def _choose(scenery: Scenery | Job, box: Grid, data: dict[str, Any], origin: Origin) -> tuple[list[int], str]:
-    """Return points along x and y, and a sentence. Raises InputError where the surface has no shortest wave."""
+    """Return points along x and y, and a sentence. Raises InputError if the surface has no shortest wave."""
     wave = min((_shortest(shape, box, data, origin) for shape in scenery.surface), default=math.inf)
     if not math.isfinite(wave):
         raise InputError("the surface has no shortest wave, from which cells follow; give numbers of points")
@@ -111,7 +113,7 @@ def _choose(scenery: Scenery | Job, box: Grid, data: dict[str, Any], origin: Ori
 
 
 def _shortest(shape: Any, box: Grid, data: dict[str, Any], origin: Origin) -> float:
-    """Return the shortest wave [m] of a shape, infinite of one without waves. Raises InputError."""
+    """Return the shortest wave [m] of a shape, infinite without waves. Raises InputError."""
     if isinstance(shape, Rough):
         return shape.short_wavelength
     if isinstance(shape, Wave):
@@ -131,10 +133,10 @@ def _shortest(shape: Any, box: Grid, data: dict[str, Any], origin: Origin) -> fl
 
 
 def _alone(shape: Topography, data: dict[str, Any], origin: Origin) -> Job:
-    """Return a job of the measured map alone on its own points: what other sections ask of a mesh is not asked of that
-    one. Raises InputError."""
+    """Return a job with the measured map alone on its own points; requirements of other sections do not apply. Raises
+    InputError."""
     of_box, of_map = (extent_of(data["surface"], box, origin)[0] for box in (data["grid"].get("size"), None))
-    grid = {**data["grid"], "points": list(map(min, of_box, of_map))}  # no box that is too large takes all memory
+    grid = {**data["grid"], "points": list(map(min, of_box, of_map))}  # limits memory for large boxes
     body, load = {"model": "elastic", "shear_modulus": 1.0}, {"pressure": 1.0}
     return Job.model_validate({"grid": grid, "surface": (shape,), "material": body, "history": [load]}, context=origin)
 
@@ -143,7 +145,7 @@ def _alone(shape: Topography, data: dict[str, Any], origin: Origin) -> Job:
 
 
 def _take_grid(source: Source, origin: Origin) -> None:
-    """Put numbers for `from surface` into the source of a job; what stands in the way is a mistake at the key."""
+    """Replace `from surface` in the source of a job by numbers; errors are mistakes at this key."""
     grid = source.data.get("grid") if isinstance(source.data, dict) else None
     wanted = [key for key in KEYS if isinstance(grid, dict) and grid.get(key) == FROM_SURFACE]
     if not isinstance(grid, dict) or not wanted:
@@ -154,7 +156,7 @@ def _take_grid(source: Source, origin: Origin) -> None:
             raise InputError("a measured map is needed; an array has points, but no size")
         found = {"points": points, "size": size}
         grid.update({key: list(found[key] or ()) for key in wanted})
-    except ValidationError:  # mistakes of the surface, which are told where it is read
+    except ValidationError:  # mistakes of the surface are reported where it is read
         grid.update(dict.fromkeys(wanted, UNREADABLE))
     except InputError as error:
         names = " and ".join(f"grid.{key}" for key in wanted)
@@ -163,7 +165,7 @@ def _take_grid(source: Source, origin: Origin) -> None:
 
 
 def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
-    """Return points of the box along x and y, and its size [m]; the box is the whole map unless it is given, and a
+    """Return the points of the box along x and y, and its size [m]. The box is the whole map unless it is given; a
     mirrored map is twice as long. Raises InputError, also for line scans."""
     shapes = surface if isinstance(surface, list) else [surface]
     heights: list[Any] = [shape.get("heights") if isinstance(shape, dict) else shape for shape in shapes]

@@ -1,15 +1,14 @@
-"""A guess of what touches before anything is solved, for the mesh that `points: auto` chooses.
+"""A guess of the contact area before any solve, for the mesh that `points: auto` chooses.
 
-Persson's theory for frictionless contact of an elastic body (B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840): under a
-mean pressure p on a surface of rms slope h' the share is
+Persson's theory for frictionless contact of an elastic body (B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840):
+under a mean pressure p on a surface of rms slope h' the share in contact is
 
     A = erf(sqrt(2) p/(E h')),      E = 2 |G|/(1 - nu),
 
-here with the modulus G at FEW times the frequency with which the shortest wave passes. Sliding surfaces have more: in
-50 steady states 1 - (1 - A)^MORE was right to 17 % of the exponent, at any loss. The phase of the modulus is that at
-EDGES times this frequency. Of 4 to 32 times, 4 told the most of what the mesh makes of friction, and as much of
-the area. Where the loss angle is still in proportion to the frequency at FINEST times it, sliding is slow, and edges
-lose power in waves shorter than the cells (`accuracy.sources`).
+here with the modulus G at FEW times the frequency with which the shortest wave passes. Sliding surfaces have the
+larger area 1 - (1 - A)^MORE. The phase of the modulus is that at EDGES times this frequency. If the loss angle is
+still proportional to the frequency at FINEST times it, sliding is slow, and edges lose power in waves shorter than
+the cells (`accuracy.sources`).
 """
 
 from __future__ import annotations
@@ -24,16 +23,20 @@ from ..job.sections.geometry import Rough, Spectral
 from ..job.sections.materials import AnyMaterial
 from ..job.sections.stages import Initial, Stage, Steady
 
-UNKNOWN, USUAL_PHASE = 0.1, 0.25  # accuracy: where slopes or loads are not known
-LEAST, MOST = 0.005, 0.99  # accuracy: for which the laws of the mesh were found
-MORE = 1.42  # accuracy: power of the share that is open by the theory
-FEW, EDGES, FINEST = 0.5, 4.0, 16.0  # accuracy: times the frequency of the shortest wave: of spots, edges, the finest
-SLOWNESS = 1.5  # accuracy: power with which it counts
-NODES = 400  # accuracy: of integrals over the spectrum, to 1e-4
+UNKNOWN, USUAL_PHASE = 0.1, 0.25  # accuracy: share in contact and phase if slopes or loads are unknown
+LEAST, MOST = 0.005, 0.99  # accuracy: limits on the share for which the laws of the mesh hold
+MORE = 1.42  # fitted: power of the open share in sliding (50 steady states, 17 %)
+FEW, EDGES, FINEST = (
+    0.5,
+    4.0,
+    16.0,
+)  # accuracy: frequencies of spots, edges and the finest waves over that of the shortest wave
+SLOWNESS = 1.5  # accuracy: power of the slowness
+NODES = 400  # accuracy: nodes of integrals over the spectrum; their error is 1e-4
 
 
 class Loaded(Protocol):
-    """Sections of a job that say what touches."""
+    """Sections of a job that determine the contact area."""
 
     surface: tuple[Any, ...]
     material: AnyMaterial
@@ -43,8 +46,8 @@ class Loaded(Protocol):
 
 
 def guesses(job: Loaded, wave: float, area: float) -> list[Guess]:
-    """Return what is guessed of each load and speed of a job, whose shortest wave [m] and box [m^2] are these; sliding
-    is slow in friction curves alone."""
+    """Return guesses for each load and speed of a job with this shortest wave [m] and area of the box [m^2]; slow
+    sliding only occurs in friction curves."""
     from ..effects.relaxation import relaxation_of  # only a mesh that is chosen needs it
 
     slope, series = _slope(job.surface), relaxation_of(job.material)
@@ -60,8 +63,8 @@ def guesses(job: Loaded, wave: float, area: float) -> list[Guess]:
 
 
 def _slowness(series: Any, omega: float) -> float:
-    """Return how nearly in proportion to the frequency the body loses, from FEW to FINEST times this one: 1 far below
-    its own frequencies, 0 above."""
+    """Return how nearly the loss is proportional to the frequency, from FEW to FINEST times this one: 1 far below the
+    frequencies of the body, 0 above."""
     few, many = (math.sin(cmath.phase(_modulus(series, times * omega))) for times in (FEW, FINEST))
     return (FEW / FINEST * many / few) ** SLOWNESS if few > 0.0 else 0.0
 
@@ -73,7 +76,7 @@ def _share(pressure: float, modulus: float, poisson: float, slope: float) -> flo
 
 
 def _modulus(series: Any, omega: float) -> complex:
-    """Return G [Pa] at a frequency [rad/s]; of a body at rest that at once, if it has none in the end."""
+    """Return G [Pa] at a frequency [rad/s]; the instantaneous modulus if a body at rest has no other."""
     turns = [1j * omega * float(tau) for tau in series.relaxation_times]
     moduli = [float(modulus) for modulus in series.moduli]
     found = series.modulus_inf + sum(g * w / (1.0 + w) for g, w in zip(moduli, turns, strict=True))

@@ -1,18 +1,18 @@
-"""Persson's theory of any history: rest, starts, stops, reversals, other loads; in between, velocities are constant.
+"""Persson's theory for any history: rest, starts, stops, reversals, changes of load, with piecewise constant
+velocities.
 
-At the transfer modulus M of a wave (see `full_contact`) every term of the relaxation function has its own memory m_j of
-how the wave has passed a point of the body. While it does so at omega = q . v, from a memory m_j(0) at t = 0 on,
+In the transfer modulus M of a wave (see `full_contact`) every term of the relaxation function has a memory m_j of
+how the wave has passed a point of the body. At constant omega = q . v, from a memory m_j(0) at t = 0 on,
 
     M(t) = G_inf + sum_j G_j m_j(t)
     m_j(t) = b_j + (m_j(0) - b_j) exp(-t/tau_j - i omega t),    b_j = i omega tau_j/(1 + i omega tau_j)
 
-exactly, however long t. A body that is touched for the first time has m_j = 1 (it answers with its modulus of the
-first instant), one in steady sliding has m_j = b_j. Contact area and friction follow from M at each instant, and from
-the load at that instant, as in `persson`.
+exactly, for any t. A body at first contact has m_j = 1 (its instantaneous modulus), one in steady sliding has m_j =
+b_j. Contact area and friction follow from M and the load at each instant, as in `persson`.
 
-What is reconstructed here: from the first touch on the wave in full contact is taken to follow the surface for good,
-and a load p0(t) that changes, or vanishes for a while, changes only the share in contact.
-Source: as `persson`; B. N. J. Persson and A. I. Volokitin, Phys. Rev. B 65 (2002) 134106, for changes of velocity.
+Assumption: from first contact on the wave in full contact follows the surface, and a load p0(t) that changes or
+vanishes only changes the share in contact. Source: as `persson`; B. N. J. Persson and A. I. Volokitin, Phys. Rev. B
+65 (2002) 134106, for changes of velocity.
 """
 
 from collections.abc import Iterable, Iterator
@@ -25,11 +25,11 @@ from . import full_contact, persson
 from .arrays import Array, ComplexArray
 from .persson_rings import Rings
 
-CHUNK = 1_000_000  # tuning: transfer moduli held at a time, of 16 bytes; some ten arrays of that size are needed
+CHUNK = 1_000_000  # tuning: transfer moduli per chunk, of 16 bytes; about ten arrays of this size are needed
 
 
 class SlidingLeg(NamedTuple):
-    """A stretch at constant velocity (vx, vy) m/s: its duration, instants since its start (s), and p0 there (Pa)."""
+    """A stretch at constant velocity [m/s]: its duration [s], instants since its start [s], and p0 at these [Pa]."""
 
     velocity: tuple[float, float]
     duration: float
@@ -38,13 +38,13 @@ class SlidingLeg(NamedTuple):
 
 
 class TheoryOutcome(NamedTuple):
-    """At each instant: <p grad h> in Pa, shape (instants, 2), and A/A0."""
+    """<p grad h> [Pa], shape (instants, 2), and A/A0 at each instant."""
 
     traction: Array
     contact_area: Array
 
     def friction(self, pressures: Array) -> Array:
-        """The tangential over the normal force, not negative; 0 without load."""
+        """Return the tangential over the normal force, not negative; 0 without load."""
         size = np.hypot(*self.traction.T)
         return np.divide(size, pressures, out=np.zeros_like(size), where=pressures > 0)
 
@@ -53,17 +53,17 @@ class Memory:
     """Memory m_j of each wave in the body: shape (waves, terms)."""
 
     def __init__(self, rings: Rings, material: Prony) -> None:
-        """A body that is touched for the first time."""
+        """Start with the memory of a body at first contact."""
         self.rings = rings
         self.spring, self.terms, self.times = normal_form(*material)
         self.shares = np.ones((rings.waves.kx.size, self.times.size), complex)
 
     def slide_for_ever(self, velocity: tuple[float, float]) -> None:
-        """Forget everything but steady sliding."""
+        """Set the memory of steady sliding."""
         self.shares = self._steady(self._frequency(velocity))
 
     def moduli(self, velocity: tuple[float, float], instants: Array) -> ComplexArray:
-        """M in Pa at instants (s) of sliding, from now on, at a velocity: shape (instants, waves)."""
+        """Return M [Pa] at instants [s] of sliding at a velocity: shape (instants, waves)."""
         omega = self._frequency(velocity)
         steady = self._steady(omega)
         fading = np.exp(-instants[:, None] / self.times) @ (self.terms * (self.shares - steady)).T
@@ -72,7 +72,7 @@ class Memory:
         return np.asarray(self.spring + steady @ self.terms + fading)
 
     def slide(self, velocity: tuple[float, float], duration: float) -> None:
-        """Go on for a duration (s)."""
+        """Advance by sliding for a duration [s]."""
         omega = self._frequency(velocity)[:, None]
         steady = self._steady(omega[:, 0])
         self.shares = steady + (self.shares - steady) * np.exp(-duration / self.times - 1j * duration * omega)
@@ -86,7 +86,7 @@ class Memory:
 
 
 def follow(memory: Memory, legs: Iterable[SlidingLeg], gamma: float = persson.GAMMA) -> Iterator[TheoryOutcome]:
-    """Follow the instants of each leg, one after the other, with the `memory`."""
+    """Yield the outcome of each leg, one after the other; `memory` is advanced."""
     for leg in legs:
         count = max(1, CHUNK // max(1, len(memory.shares)))
         starts = range(0, max(1, leg.instants.size), count)

@@ -1,8 +1,8 @@
-"""Waves in rings of equal wave number: the sums over k of Persson's theory, for a spectrum or for a given surface.
+"""Waves in rings of equal wavenumber: the sums over k of Persson's theory, for a spectrum or for a given surface.
 
-An isotropic spectrum is integrated by Gauss' rule on panels of x, with k = smallest (largest/smallest)^(x^2): the share
-of the surface in contact falls like the root of log(k/smallest) where contact is small, which is smooth in x. What lies
-within a ring follows from the polynomial through the points of its panel, so that sums and partial sums err alike.
+An isotropic spectrum is integrated by Gauss's rule on panels of x, with k = smallest (largest/smallest)^(x^2): the
+share in contact falls like the root of log(k/smallest) at small areas, which is smooth in x. Partial sums within a
+ring follow from the polynomial through the points of its panel, so that sums and partial sums have the same errors.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,22 +15,22 @@ from numpy.typing import NDArray
 from .arrays import Array
 from .full_contact import Waves
 
-EQUAL = 1e-9  # accuracy: wave numbers that differ by less than this share of the largest are equal
-PANEL_POINTS = 10  # accuracy: of Gauss' rule
-HALVINGS = 14  # accuracy: of panels towards the longest wave
-PANEL_LOGARITHM = 1.0  # accuracy: of the wave numbers at the ends of a panel: at most this far apart
-PANEL_PHASE = 12.0  # accuracy: rad by which the phases of waves at the ends of a panel may differ
-MAX_PHASE = 400.0  # accuracy: rad by which the shortest wave may move (64 000 waves); then sums err by 4e-5
-QUADRANT_ANGLES = 24  # accuracy: of waves whose phases all agree
-ANGLES_STEP = 8  # accuracy: more of them come by so many
+EQUAL = 1e-9  # accuracy: difference of equal wavenumbers over the largest
+PANEL_POINTS = 10  # accuracy: points of Gauss's rule
+HALVINGS = 14  # accuracy: halvings of panels towards the longest wave
+PANEL_LOGARITHM = 1.0  # accuracy: largest logarithm of the ratio of wavenumbers at the ends of a panel
+PANEL_PHASE = 12.0  # accuracy: largest difference of phases at the ends of a panel [rad]
+MAX_PHASE = 400.0  # accuracy: largest phase of the shortest wave [rad]; the error of sums is 4e-5
+QUADRANT_ANGLES = 24  # accuracy: number of angles without phases
+ANGLES_STEP = 8  # accuracy: step in the number of angles
 
 
 @dataclass(frozen=True)
 class Rings:
-    """Waves ring by ring, from the longest on; `starts` is the first wave of each ring.
+    """Waves by rings, from the longest on; `starts` is the first wave of each ring.
 
-    `share`, shape (n, n), says what is within each ring of a panel of n: that share of each ring of the panel.
-    `stiffness` is by what factor the body is stiffer than a half space for each wave, as a layer is.
+    `share`, shape (n, n), has for each ring of a panel of n the share of each ring of the panel that lies within it.
+    `stiffness` is that of the body over that of a half space for each wave, as of a layer.
     """
 
     waves: Waves
@@ -39,16 +39,16 @@ class Rings:
     stiffness: NDArray[np.floating] | float = 1.0
 
     def scaled(self, factor: float) -> "Rings":
-        """The same surface with heights that are larger by a factor."""
+        """Return the surface with heights multiplied by a factor."""
         amplitude, kx, ky = self.waves
         return replace(self, waves=Waves(factor * amplitude, kx, ky))
 
     def sums(self, values: Array) -> Array:
-        """Values of waves, shape (..., waves), summed over each ring: shape (..., rings)."""
+        """Return values of waves, shape (..., waves), summed over each ring: shape (..., rings)."""
         return np.asarray(np.add.reduceat(values, self.starts, axis=-1))
 
     def within(self, own: Array) -> Array:
-        """Sums up to the k of each ring, from the sums of the rings themselves; both of shape (..., rings)."""
+        """Return sums up to the k of each ring, from the sums of the rings; both of shape (..., rings)."""
         panels = own.reshape(*own.shape[:-1], -1, len(self.share))
         totals = panels.sum(axis=-1)
         before = np.cumsum(totals, axis=-1) - totals
@@ -56,7 +56,7 @@ class Rings:
 
 
 def rings_of_surface(waves: Waves) -> Rings:
-    """The rings of given waves (`full_contact.waves`). Of a ring's own sum one half counts as within it."""
+    """Return the rings of given waves (`full_contact.waves`). Half of the sum of a ring counts as within it."""
     k = np.hypot(waves.kx, waves.ky)
     order = np.argsort(k)
     starts = np.flatnonzero(np.diff(k[order], prepend=-np.inf) > EQUAL * k.max(initial=0.0))
@@ -72,11 +72,11 @@ def rings_of_spectrum(
     kinks: Sequence[float] = (),
     refinement: int = 1,
 ) -> Rings:
-    """Waves that stand for an isotropic spectrum Phi(k) in m^4 between two wave numbers (rad/m).
+    """Return waves that represent an isotropic spectrum Phi(k) [m^4] between two wavenumbers [rad/m].
 
-    `distance` (m) is how far the surface will be moved while the body remembers where it was: neighbouring waves of the
-    sums must not go out of phase, as far as MAX_PHASE. `kinks` (rad/m) are wave numbers where Phi is not smooth. Each
-    panel is divided into `refinement` ones, each angle into as many, to see what the sums err by.
+    `distance` [m] is the largest displacement that the body remembers: neighbouring waves of the sums must stay in
+    phase, up to MAX_PHASE. `kinks` [rad/m] are wavenumbers where Phi is not smooth. Panels and angles are divided by
+    `refinement`, to test the error of the sums.
     """
     logarithm = np.log(largest / smallest)
     nodes, weights = np.polynomial.legendre.leggauss(PANEL_POINTS)
@@ -95,7 +95,8 @@ def rings_of_spectrum(
 
 
 def _edges(smallest: float, logarithm: float, distance: float, kinks: Sequence[float], refinement: int) -> Array:
-    """Ends of panels in x: halving towards 0, at the kinks, and as close as phases and powers of k demand."""
+    """Return the ends of panels in x: halving towards 0, at the kinks, and as close as phases and powers of
+    k require."""
     inner = [np.sqrt(np.log(kink / smallest) / logarithm) for kink in kinks if 0 < np.log(kink / smallest) < logarithm]
     coarse = np.unique([0.0, *(0.5 ** np.arange(HALVINGS)), *inner])
     phase = np.diff(distance * smallest * np.exp(logarithm * coarse**2)) / PANEL_PHASE
@@ -106,7 +107,7 @@ def _edges(smallest: float, logarithm: float, distance: float, kinks: Sequence[f
 
 
 def _ring(k: float, area: float, angles: int) -> tuple[Array, Array, Array]:
-    """kx, ky and the area in the plane of wave vectors of each wave of a ring: Gauss' points of two quadrants."""
+    """Return kx, ky and the area in the plane of wave vectors of each wave of a ring: Gauss points of two quadrants."""
     cosines, sines, weights = _two_quadrants(angles)
     return k * cosines, k * sines, area * weights
 
@@ -119,7 +120,7 @@ def _two_quadrants(count: int) -> tuple[Array, Array, Array]:
 
 
 def _partial_shares(nodes: Array, weights: Array) -> Array:
-    """Weights of the integrals over a panel from its start to each of its points; shape (points, points)."""
+    """Return weights of the integrals over a panel from its start to each of its points; shape (points, points)."""
     legendre = np.polynomial.legendre
     coefficients = np.linalg.inv(legendre.legvander(nodes, nodes.size - 1))  # of the polynomials that are 1 at a point
     return np.asarray(legendre.legval(nodes, legendre.legint(coefficients, lbnd=-1)).T / weights)

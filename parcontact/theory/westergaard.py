@@ -19,7 +19,7 @@ from .arrays import Array, Values
 
 
 def full_contact_pressure(amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5) -> Array:
-    """p* = pi E* Delta/lambda in Pa, the mean pressure at which contact becomes complete."""
+    """Return p* = pi E* Delta/lambda [Pa], the mean pressure at which contact becomes complete."""
     modulus = 2 * shear_modulus / (1 - poisson)
     return np.asarray(np.pi * modulus * amplitude / wavelength)
 
@@ -27,7 +27,7 @@ def full_contact_pressure(amplitude: Values, wavelength: Values, shear_modulus: 
 def contact_fraction(
     mean_pressure: Values, amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5
 ) -> Array:
-    """The part of the surface that is in contact, f = 2a/lambda = (2/pi) asin sqrt(p/p*)."""
+    """Return the share in contact, f = 2a/lambda = (2/pi) asin sqrt(p/p*)."""
     load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
     return _fraction(load)
 
@@ -40,7 +40,7 @@ def pressure(
     shear_modulus: Values,
     poisson: Values = 0.5,
 ) -> Array:
-    """p(x) in Pa at distances x (m) from a crest; any x, also beyond one wave."""
+    """Return p(x) [Pa] at distances x [m] from a crest; any x."""
     full = full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
     psi = np.pi * x / wavelength
     inside = np.maximum(mean_pressure / full - np.sin(psi) ** 2, 0)
@@ -51,7 +51,7 @@ def pressure(
 def peak_pressure(
     mean_pressure: Values, amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5
 ) -> Array:
-    """p(0) in Pa: 2 sqrt(p p*) in partial contact, p + p* in full contact."""
+    """Return p(0) [Pa]: 2 sqrt(p p*) in partial contact, p + p* in full contact."""
     return pressure(0.0, mean_pressure, amplitude, wavelength, shear_modulus, poisson)
 
 
@@ -63,7 +63,7 @@ def gap(
     shear_modulus: Values,
     poisson: Values = 0.5,
 ) -> Array:
-    """g(x) in m, the distance between the surfaces; zero in the contact."""
+    """Return g(x) [m], the distance between the surfaces; 0 in contact."""
     load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
     edge = np.sqrt(np.clip(load, np.finfo(float).tiny, 1))
     y = np.maximum(np.abs(np.sin(np.pi * x / wavelength)), edge)
@@ -73,7 +73,7 @@ def gap(
 def mean_gap(
     mean_pressure: Values, amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5
 ) -> Array:
-    """The mean of the gap over one wave in m, Delta (1 - s + s ln s)."""
+    """Return the mean gap over one wave [m], Delta (1 - s + s ln s)."""
     load = mean_pressure / full_contact_pressure(amplitude, wavelength, shear_modulus, poisson)
     s = np.clip(load, np.finfo(float).tiny, 1)
     return amplitude * (1 - s + s * np.log(s))
