@@ -1,36 +1,36 @@
-"""Sources of error: what a solve, time steps, folded branches and the mesh make of friction and of the contact area.
+"""Sources of error: estimates for the solver, time steps, folded branches and the mesh, of friction and contact area.
 
-Each is an estimate of a relative error (1 is all of it), from numbers that a step has anyway; its constants are fitted
-to true errors (`constants`). With c the counted area less the corrected one, over the latter, and N spots of contact:
+Each estimates a relative error from numbers of a step; its constants are fitted to true errors (`constants`). c is
+the counted minus the corrected area, over the latter, and N is the number of spots of contact.
 
-solver: from the `complementarity` C of the certificate (see `solve.certificate`). Friction is wrong in proportion to
-    it, less where many spots average it out. Where friction is far less than the slopes it is the small difference of
-    large forces: what is wrong with pressures counts more, by the root of the ratio, and pressures that are wrong by C
-    may have tangential forces of that share of the slopes (NOISE). Area is wrong by the points that penetrate and have
-    no pressure; and somewhat, as C^0.7, where there happen to be none.
-time: from how far the spots of contact, or the waves of the surface, pass in a step, and from the embedded pair
+solver: proportional to the `complementarity` C of the certificate (`solve.certificate`) for friction, and smaller
+for many
+    spots. Where friction is far below the slopes it is a small difference of large forces: errors of pressures then
+    count more, by the root of the ratio, and pressures with the error C may have tangential forces of this share of the
+    slopes (NOISE). For the area: the points that penetrate without pressure, and a small part that varies as C^0.7.
+time: from the distance by which spots of contact, or waves of the surface, pass in a step, and from the embedded
+pair
     (`time_error`).
-folded: the bound of the branches without a map, of the area where the gap is open.
-mesh: of the area AREA c/N^(1/4) while the surface slides and errors of its places average out, STILL at rest and in
-    steady sliding, a cell at least. Of friction in a march VIEWS times the difference of its two views, by the slopes
-    of the rigid surface and of the body. Of steady friction, which is a sum of squares and does not vanish by
-    cancellation, what edges of contact lose in waves shorter than the cells, and STEADY_AREA c/N^(1/4). Identical
-    contacts lie on the grid in the same way: their errors do not average out (N = 1), and those of the area and of
-    steady friction are larger by IDENTICAL.
-    A map lacks waves on a grid of less than FEW_CELLS per shortest wave: friction is then wrong by WAVES (4/cells)^2.5
-    as well.
+folded: the bound for the branches without a map; for the area times the open share. mesh: for the area AREA
+c/N^(1/4) while the surface slides and errors of its positions average out, STILL at rest and in
+    steady sliding, at least one cell. For friction in a march VIEWS times the difference of friction by the slopes of the
+    rigid surface and of the body. For steady friction, a sum of squares without cancellation, the loss at edges in waves
+    shorter than the cells, and STEADY_AREA c/N^(1/4). Identical contacts have the same position on the grid: their
+    errors do not average out (N = 1), and those of the area and of steady friction are larger by IDENTICAL.
+    A map lacks waves on a grid with less than FEW_CELLS per shortest wave, with a further error of friction
+    WAVES (4/cells)^2.5.
 
-Power that edges lose: pressure rises from an edge of contact as the root of the distance, so that its waves of
-wavenumber q across the edge have a mean square that falls as q^-3. A steadily sliding surface loses power in them in
-proportion to q^-3 sin delta(q v), with the loss angle delta of the body at the frequency with which they pass. For
-Hertz's contacts of a body whose loss angle grows with the frequency, all waves together lose as much as this law does
-from a wavenumber q0 on: q0 = 2/(pi a) for a strip of half width a, q0 = 3/(pi a) for a circle of radius a, from the
-integrals of J1(x)^2/x and j1(x)^2. A mesh of cells of length dx has waves up to Q = pi/dx. The others lose
+Loss at edges: the pressure rises from an edge of contact as the root of the distance, so that the mean square of its
+waves of wavenumber q across the edge falls as q^-3. In steady sliding these lose power in proportion to q^-3 sin
+delta(q v), with the loss angle delta of the body at the frequency with which they pass. For Hertzian contacts of a
+body whose loss angle grows with the frequency, all waves together lose as much as this law gives from a wavenumber
+q0 on: q0 = 2/(pi a) for a strip of half width a, q0 = 3/(pi a) for a circle of radius a, from the integrals of
+J1(x)^2/x and j1(x)^2. A mesh of cells of length dx has waves up to Q = pi/dx. The share of the loss in shorter waves
+is
 
-    s m = (q0/Q)^2 M(Q v)/M(q0 v),      M(w) = int_0^1 2 t sin delta(w/t) dt,      s = q0/Q
+    s m = (q0/Q)^2 M(Q v)/M(q0 v),      M(w) = int_0^1 2 t sin delta(w/t) dt,      s = q0/Q.
 
-of all. Far below the frequencies of the body m is 1, and what is lost of the first order in the cell. Far above m is
-s^2.
+Far below the frequencies of the body m is 1, and the share is of first order in the cell; far above m is s^2.
 """
 
 import math
