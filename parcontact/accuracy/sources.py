@@ -13,10 +13,10 @@ pair
     (`time_error`).
 folded: the bound for the branches without a map; for the area times the open share. mesh: for the area AREA
 c/N^(1/4) while the surface slides and errors of its positions average out, STILL at rest and in
-    steady sliding, at least one cell. For friction in a march VIEWS times the difference of friction by the slopes of the
-    rigid surface and of the body. For steady friction, a sum of squares without cancellation, the loss at edges in waves
-    shorter than the cells, and STEADY_AREA c/N^(1/4). Identical contacts have the same position on the grid: their
-    errors do not average out (N = 1), and those of the area and of steady friction are larger by IDENTICAL.
+    steady sliding, at least one cell. For friction in a march VIEWS times the difference of friction by the slopes of
+    the rigid surface and of the body. For steady friction, a sum of squares without cancellation, the loss at edges in
+    waves shorter than the cells, and STEADY_AREA c/N^(1/4). Identical contacts have the same position on the grid:
+    their errors do not average out (N = 1), and those of the area and of steady friction are larger by IDENTICAL.
     A map lacks waves on a grid with less than FEW_CELLS per shortest wave, with a further error of friction
     WAVES (4/cells)^2.5.
 

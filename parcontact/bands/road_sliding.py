@@ -28,9 +28,7 @@ from .steep_waves import STRAIN
 
 MOST_ROUNDS = 20  # tuning: limit on rounds of the temperatures
 LEAST_ERROR, RELATIVE = 0.1, 0.02  # accuracy: error of the rise of a band [K], and relative
-HARD_SHARE = (
-    0.25  # fitted: error of the method over the difference to hard walls, 1 for profiles (`scripts/band_errors.py`)
-)
+HARD_SHARE = 0.25  # fitted: error of the method over the difference to hard walls; 1 for profiles
 LEAST_METHOD = 0.03  # fitted: least relative error of the method (`scripts/band_errors.py`)
 NEARLY_ALL = 0.1  # accuracy: open area below which errors fall to 0 with it
 SURE = 2.0  # accuracy: error by the scatter of surfaces over its standard error

@@ -26,11 +26,7 @@ from ..job.sections.stages import Initial, Stage, Steady
 UNKNOWN, USUAL_PHASE = 0.1, 0.25  # accuracy: share in contact and phase if slopes or loads are unknown
 LEAST, MOST = 0.005, 0.99  # accuracy: limits on the share for which the laws of the mesh hold
 MORE = 1.42  # fitted: power of the open share in sliding (50 steady states, 17 %)
-FEW, EDGES, FINEST = (
-    0.5,
-    4.0,
-    16.0,
-)  # accuracy: frequencies of spots, edges and the finest waves over that of the shortest wave
+FEW, EDGES, FINEST = 0.5, 4.0, 16.0  # accuracy: frequencies of spots, edges and finest waves over the shortest wave's
 SLOWNESS = 1.5  # accuracy: power of the slowness
 NODES = 400  # accuracy: nodes of integrals over the spectrum; their error is 1e-4
 
