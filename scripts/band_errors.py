@@ -100,11 +100,11 @@ def compare(whole: Point, found: Point, text: str) -> list[float]:
     standard errors of the means over surfaces."""
     parts = [part or ErrorParts(0.0, 0.0, 0.0, 0.0) for part in (found.errors.friction, found.errors.area)]
     errors = [found.friction / whole.friction - 1, found.measures.contact_area / whole.measures.contact_area - 1]
-    told = [
+    stated = [
         f"{name} {100 * error:+5.1f} % (method {100 * part.method:.1f}, surfaces {100 * part.scatter:.1f})"
         for name, error, part in zip(("friction", "area"), errors, parts, strict=True)
     ]
-    print(f"{text}: {', '.join(told)}, {whole.seconds:.0f} s and {found.seconds:.0f} s", flush=True)
+    print(f"{text}: {', '.join(stated)}, {whole.seconds:.0f} s and {found.seconds:.0f} s", flush=True)
     return [*errors, *(part.method + part.scatter for part in parts), *(part.scatter / SURE for part in parts)]
 
 

@@ -8,7 +8,7 @@
     free     operator calls of cold solves in free boxes at 0.2 to 35 % contact to a pressure error of 1e-5: on
              512 x 512 points, and on ever finer grids
     adhesion a cold adhesive elastic solve at 24 % contact to a pressure error of 1e-5, and peers'
-    slide    sliding over a rough surface with twelve branches, by one cell a step; with peers, beside them with eight
+    slide    sliding over a rough surface with twelve branches, by one cell a step; with peers, next to them with eight
     march    the velocity step of the paper's Fig. 8 on two ranks: a step over its transforms, and what it holds
     steady   steady sliding from a cold start, and along a curve of eight velocities per decade
     flow     leakage through the gap of a contact of 30 %, along x and along y: for --points 2048
@@ -19,8 +19,8 @@
 Operator calls are those on the finest grid, coarser ones counted by their share of its points. Times of one process are
 CPU times, those of `march` and `scale` wall times. What is compared takes turns, round by round;
 shown are the median, and of the ratios of each round the median and the quartiles. The pressure error is the relative
-L2 distance from a solution to 1e-11, for every program alike, that of friction from steps to a tolerance of 5e-5,
-beside peers 1e-7. `--peers DIRECTORY` installs tamaas, aspher and Adhesion there, each in an environment of its own,
+L2 distance from a solution to 1e-11, the same for every program, of friction from steps to a tolerance of 5e-5,
+next to peers 1e-7. `--peers DIRECTORY` installs tamaas, aspher and Adhesion there, each in an environment of its own,
 and gives each 7 minutes of CPU time for `solve`, `adhesion` and `slide` to find the loosest tolerance by which it
 reaches the error; one that does not has a ratio of "more than".
 """

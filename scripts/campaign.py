@@ -1,4 +1,4 @@
-"""The frame of campaigns: trials drawn from a seed and a number; those with faults are told, to be made again."""
+"""The frame of campaigns: trials drawn from a seed and a number; those with faults are stated, to be made again."""
 
 import argparse
 import time
@@ -51,12 +51,13 @@ def go(
         number += 1
         if (number - chosen.start) % EVERY == 0:
             seconds = time.monotonic() - began
-            print(f"{number - chosen.start:6} made, {faulty} with faults, {seconds:.0f} s: {told(counts)}", flush=True)
-    print(f"{number - chosen.start} made: {faulty} with faults; {told(counts)}")
+            made = number - chosen.start
+            print(f"{made:6} made, {faulty} with faults, {seconds:.0f} s: {stated(counts)}", flush=True)
+    print(f"{number - chosen.start} made: {faulty} with faults; {stated(counts)}")
     return faulty
 
 
-def told(counts: Counter[str]) -> str:
+def stated(counts: Counter[str]) -> str:
     return ", ".join(f"{count} {what}" for what, count in sorted(counts.items()))
 
 

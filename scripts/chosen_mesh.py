@@ -101,7 +101,7 @@ def trial(asked: argparse.Namespace, counts: Counter[str], ratios: list[float], 
 
 
 def meshes_of(dozens: int, finest: int) -> list[Mesh]:
-    """Return the meshes for so many dozens of shortest waves, those of the fewest points first; none is near
+    """Return the meshes for a given number of dozens of shortest waves, those of the fewest points first; none is near
     the reference."""
     lengths = [dozens * length for length in LENGTHS if 4 * length <= finest]
     return sorted(((nx, ny) for nx, ny in product(lengths, lengths) if ny <= nx <= 4 * ny), key=math.prod)

@@ -45,7 +45,8 @@ class Sketch:
     kind: Json
 
     def job(self, directory: Path, finer: int = 1, sharper: float = 1.0) -> Json:
-        """The job on a grid so many times finer, with so much more accuracy asked for; its map in this directory."""
+        """The job on a grid a given number of times finer, with so much more accuracy asked for; its map in this
+        directory."""
         grid = self.plain["grid"]
         points = [n * finer if n > 1 else 1 for n in grid["points"]]
         numerics = {**self.plain["numerics"], "accuracy": self.plain["numerics"]["accuracy"] / sharper}
@@ -62,7 +63,7 @@ class Sketch:
 
 
 def _finer(stage: Json, finer: int) -> Json:
-    """Steps that are given so many times finer; cells already are."""
+    """Steps that are given a given number of times finer; cells already are."""
     step = stage.get("time_step")
     if isinstance(step, dict):
         return {**stage, "time_step": {"first": step["first"] / finer, "growth": step["growth"] ** (1.0 / finer)}}

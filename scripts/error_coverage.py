@@ -217,8 +217,8 @@ def at(rows: list[Json], name: str, row: Json) -> float:
 def judged(to: Path) -> pandas.DataFrame:
     """A row for each scene and quantity: its value, the true error and the estimate, both relative to the value.
 
-    `told`: it says that the accuracy asked for is not met. `kept`: it is as wrong as asked for at most, or says that it
-    is not. `within`: the error is the estimate at most, or is stated as "1 or more" of friction.
+    `reported`: it says that the accuracy asked for is not met. `kept`: it is as wrong as asked for at most, or says
+    that it is not. `within`: the error is the estimate at most, or is stated as "1 or more" of friction.
     """
     lines = []
     for path in sorted((to / "scenes").glob("*.json"), key=lambda path: int(path.stem)):
@@ -227,8 +227,8 @@ def judged(to: Path) -> pandas.DataFrame:
             own, reference = line.pop("own"), line.pop("reference")
             lines += [{**line, **found} for found in (*_means(line, own, reference), *_others(own, reference))]
     found = pandas.DataFrame(lines)
-    found["told"] = found.estimate > found.asked
-    found["kept"] = found.told | (found.error <= np.maximum(found.asked, ROUNDING))
+    found["reported"] = found.estimate > found.asked
+    found["kept"] = found.reported | (found.error <= np.maximum(found.asked, ROUNDING))
     found["within"] = found.error <= np.maximum(found.estimate, ROUNDING)
     found["within"] |= (found.quantity == "friction") & (found.estimate >= 1.0)
     return found
@@ -325,7 +325,7 @@ def _short_row(some: pandas.DataFrame) -> str:
 def _row(some: pandas.DataFrame) -> str:
     ratios = (some.estimate / some.error)[some.error > ROUNDING]
     low, middle, high = np.percentile(ratios, [5, 50, 95]) if len(ratios) else [math.nan] * 3
-    shares = " | ".join(f"{100 * some[name].mean():.1f} %" for name in ("kept", "told", "within"))
+    shares = " | ".join(f"{100 * some[name].mean():.1f} %" for name in ("kept", "reported", "within"))
     return f"{shares} | {middle:.2g} | {low:.2g} to {high:.2g}"
 
 

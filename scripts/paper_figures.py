@@ -113,12 +113,12 @@ def over_key(out: Path, name: str, key: str, label: str, scale: float = 1.0) -> 
     if (out / f"{name}_finer" / "sweep.csv").is_file():
         found.append(rows_of(out / f"{name}_finer"))
     figure, (top, middle, bottom) = panels(3, 1.75)
-    for rows, (marks, dashes, line, told) in zip(found, LOOKS, strict=False):
+    for rows, (marks, dashes, line, stated) in zip(found, LOOKS, strict=False):
         for number, (axes, (column, short)) in enumerate(zip((top, top, middle), QUANTITIES, strict=True)):
             look = {"color": style.COLORS[number]}
             (x, y, spread), (tx, theory, _) = (means(rows, key, each) for each in (column, f"theory_{column}"))
-            names = [f"{short}, simulation", f"{short}, theory", short] if told else [None] * 3
-            axes.errorbar(scale * x, y, spread if told else None, label=names[0], capsize=2, **marks, **look)
+            names = [f"{short}, simulation", f"{short}, theory", short] if stated else [None] * 3
+            axes.errorbar(scale * x, y, spread if stated else None, label=names[0], capsize=2, **marks, **look)
             axes.plot(scale * tx, theory, dashes, label=names[1], **look)
             if x.size == tx.size:
                 kind = {"mfc": marks.get("mfc"), "label": names[2]}

@@ -5,12 +5,12 @@
     .venv/bin/python scripts/random_scenes.py --long [--steps 100000]
     .venv/bin/python scripts/random_scenes.py --mixed [--scenes 250] [--seed 77]
 
-Each scene is marched twice, the second time told in another way (raised, in other units, mirrored, transposed), until
-there are at least so many scenes and steps. Every step is checked as in tests/robustness/witness.py. A solve that asks
-for more digits than double precision has may fail, and is counted; no other may. `--long` marches one small scene back
-and forth for so many steps and looks for drift, as tests/robustness/test_long.py does for fewer. Ends with 0 if all
-held. `--mixed` counts in how many scenes mixed precision fails, or gives a contact area off by more than 1 %, where
-double precision solves them, all at the default tolerance.
+Each scene is marched twice, the second time described in another way (raised, in other units, mirrored, transposed),
+until there are at least a given number of scenes and steps. Every step is checked as in tests/robustness/witness.py. A
+solve that asks for more digits than double precision has may fail, and is counted; no other may. `--long` marches one
+small scene back and forth for a given number of steps and looks for drift, as tests/robustness/test_long.py does for
+fewer. Ends with 0 if all held. `--mixed` counts in how many scenes mixed precision fails, or gives a contact area off
+by more than 1 %, where double precision solves them, all at the default tolerance.
 """
 
 import sys

@@ -5,7 +5,7 @@
 
 Rubbers of 2 to 12 branches, 3 to 1000 times as stiff at once as in the end, on self-affine surfaces, under 1 to 100 MPa
 at 0.3 to 100 m/s. Each result is checked by an operator of numpy's own. Ends with 1 if a body was not solved, a result
-was wrong, or took more than so many operator calls.
+was wrong, or took more than a given number of operator calls.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""Parts `dilute` and `free`: cold solves in free boxes, of few points in contact beside aspher, and of any contact."""
+"""Parts `dilute` and `free`: cold solves in free boxes, of few points in contact next to aspher, and of any contact."""
 
 import argparse
 import statistics

@@ -1,4 +1,4 @@
-"""Parts `scale` and `march`: one rank beside two, and a run on two ranks."""
+"""Parts `scale` and `march`: one rank next to two, and a run on two ranks."""
 
 import argparse
 import time
@@ -60,7 +60,7 @@ def _sliding_step(points: int, comm: MPI.Intracomm, boxes: int) -> Work:
 def _in_turns(
     make: Callable[[int, MPI.Intracomm, int], Work], points: int, boxes: int, rounds: int
 ) -> tuple[list[float], list[float]]:
-    """Seconds of one box on rank 0 alone, and of so many boxes on both ranks; collective."""
+    """Seconds of one box on rank 0 alone, and of a given number of boxes on both ranks; collective."""
     single = make(points, MPI.COMM_SELF, 1) if WORLD.rank == 0 else None
     double = make(points, WORLD, boxes)
     one, two = list[float](), list[float]()

@@ -1,6 +1,6 @@
 """Parts `slide` and `steady`: sliding step by step and directly.
 
-The slide beside peers has eight branches and backward Euler, as tamaas can do it too: relaxation times from 1e-4 to
+The slide next to peers has eight branches and backward Euler, as tamaas can do it too: relaxation times from 1e-4 to
 1e3, moduli of 2 each over a long-term modulus of 1, in a box of length 1 at a velocity of 1, by one cell a step.
 Friction is judged, and a step is timed, over the second half of FIRST steps of others and of LATER ones of ours: tamaas
 starts each solve from nothing, so that its later steps take as long as its first ones. Ours are solved in mixed
@@ -30,8 +30,8 @@ DEFAULT, EXACT = 5e-3, 5e-5  # tolerances of a job that gives none, and of one t
 LARGER = (0.1, 0.05, 0.02, 0.01)
 ERROR = 1e-3  # of friction
 FEWEST = 8  # steps: the first ones are not like the others
-FIRST, LATER = 12, 48  # steps beside peers
-PRESSURE = 0.165  # beside peers, for 7 to 9 % of contact
+FIRST, LATER = 12, 48  # steps next to peers
+PRESSURE = 0.165  # next to peers, for 7 to 9 % of contact
 RELAXATION_TIMES = [10.0**k for k in range(-4, 4)]
 MODULUS = 2.0
 EXACT_BESIDE_PEERS = 1e-7
@@ -41,7 +41,7 @@ PEERS = (Task("tamaas", TAMAAS_SLIDING, -3.0),)
 
 def slide(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
     """Means over the second half of the steps: at the default tolerance, and at the largest one with which friction is
-    nowhere wrong by more than ERROR; with eight branches beside peers."""
+    nowhere wrong by more than ERROR; with eight branches next to peers."""
     steps = max(4 * rounds, FEWEST)
     half = steps // 2
     exact = _friction(sliding_job(points, steps, EXACT))[half:]

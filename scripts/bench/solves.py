@@ -44,7 +44,8 @@ def solve(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]
 
 
 def sizes(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
-    """Up to so many points, twice as many along each side every time; times are also told over N^2 log2 N."""
+    """Up to a given number of points, twice as many along each side every time; times are also stated over N^2 log2
+    N."""
     side = min(SMALLEST, points)
     while side <= points:
         surface, slide = Cold(side), Slide(side)

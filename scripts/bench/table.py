@@ -38,7 +38,8 @@ def interleave(
     clock: Callable[[], float] = time.process_time,
     before: int = 1,
 ) -> dict[str, list[float]]:
-    """Seconds of each function in every round, in turns; `before` these all are called once, or so many times."""
+    """Seconds of each function in every round, in turns; `before` these all are called once, or a given number of
+    times."""
     times: dict[str, list[float]] = {name: [] for name in functions}
     for count in range(before + rounds):
         for name, function in functions.items():

@@ -26,7 +26,7 @@ Solver = tuple[ContactSolver, Operators]
 EXACT = 1e-11  # a tolerance whose pressures others are compared with
 TOLERANCES = [10.0**-exponent for exponent in np.arange(3.0, 10.5, 0.25)]
 WARM = 12  # first steps of a slide, which are not like the others
-ENDLESS = 1_000_000  # steps: more than anybody asks for; the surface comes round again and again
+ENDLESS = 1_000_000  # steps: more than anybody asks for; the surface returns again and again
 
 
 def pair(slab: Slab, dtype: str) -> Callable[[], object]:
@@ -46,8 +46,8 @@ def distance(p: NDArray[np.floating], reference: NDArray[np.floating]) -> float:
 class Cold:
     """Cold elastic solves of one surface: Hurst 0.8, from a quarter of the box to eight cells, rms slope 1.
 
-    The box has the length 1 along x, and that of so many `boxes` along y; `load` is the mean pressure over E*.
-    """
+    The box has the length 1 along x, and that of a given number of `boxes` along y; `load` is the mean pressure over
+    E*."""
 
     def __init__(self, points: int, comm: MPI.Intracomm = MPI.COMM_SELF, boxes: int = 1, load: float = LOAD) -> None:
         self.slab, self.size, self.load = Slab(comm, points, boxes * points), (1.0, float(boxes)), load

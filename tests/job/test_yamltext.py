@@ -150,11 +150,11 @@ def test_an_include_is_searched_beside_the_job_only(tmp_path: Path) -> None:
     text = with_material("{include: m}")
     (mistake,) = mistakes_of(tmp_path / "deep", text)
     assert "must name a material file, got 'm' (looked for m.yaml and materials/m.yaml beside the job file" in mistake
-    beside = tmp_path / "deep" / "materials" / "m.yaml"
-    beside.write_bytes(b"abc: 1\n")
+    alongside = tmp_path / "deep" / "materials" / "m.yaml"
+    alongside.write_bytes(b"abc: 1\n")
     included = read_job(tmp_path / "deep" / "job.yaml", ()).included
     assert included is not None
-    assert included.path == beside
+    assert included.path == alongside
     # printf 'abc: 1\n' | sha256sum
     assert included.sha256 == "be10690b979a6439e0a095045129e20996ed424d61bb7149016297110c1b4303"
 

@@ -43,8 +43,8 @@ def test_error_by_the_mesh() -> None:
     row = gap[:1]
     assert flow_mesh_error(row, solve_flow(row, (2.0, 1.0)), (2.0, 1.0)) == pytest.approx(found, rel=1e-12)
     whole, even, odd = (float(np.mean(each**3.0)) for each in (gaps, gaps[::2], gaps[1::2]))
-    beside = flow_mesh_error(gap, solve_flow(gap, (2.0, 1.0), "y"), (2.0, 1.0), "y")
-    assert beside == pytest.approx(max(abs(even / whole - 1.0), abs(odd / whole - 1.0)), rel=1e-12)
+    alongside = flow_mesh_error(gap, solve_flow(gap, (2.0, 1.0), "y"), (2.0, 1.0), "y")
+    assert alongside == pytest.approx(max(abs(even / whole - 1.0), abs(odd / whole - 1.0)), rel=1e-12)
     assert np.isnan(flow_mesh_error(0.0 * gap, solve_flow(0.0 * gap, (2.0, 1.0)), (2.0, 1.0)))
 
 

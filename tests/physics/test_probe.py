@@ -113,9 +113,9 @@ def test_area_and_gap_where_points_yield(nx: int, ny: int, periodic: bool, seed:
     p[...], u[...] = whole[slab.rows], gap[slab.rows] + 0.5
     found = Probe(slab, surface, UNITS, hardness=hardness).measure(p, ALPHA, u, h, 0.5, p, (0.0, 0.0))
     around = np.pad(whole, 1, mode="wrap" if periodic else "edge")
-    beside = np.array([around[1:-1, :-2], around[1:-1, 2:], around[:-2, 1:-1], around[2:, 1:-1]])
-    sides, partly = (beside == 0.0).sum(axis=0), (whole > 0.0) & (whole < 2.0)
-    sharp = partly & (sides > 0) & (beside == 2.0).any(axis=0)
+    alongside = np.array([around[1:-1, :-2], around[1:-1, 2:], around[:-2, 1:-1], around[2:, 1:-1]])
+    sides, partly = (alongside == 0.0).sum(axis=0), (whole > 0.0) & (whole < 2.0)
+    sharp = partly & (sides > 0) & (alongside == 2.0).any(axis=0)
     long = min(LX / nx, LY / ny) / max(LX / nx, LY / ny)
     excess = SIDE if 1 in (nx, ny) else SIDE * long**0.1
     taken = (1.0 - whole[sharp] / 2.0).sum() + excess * sides[partly & ~sharp].sum()

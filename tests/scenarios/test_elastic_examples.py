@@ -69,8 +69,8 @@ def test_hertz_area_corrected() -> None:
     """
     counted, corrected = [], []
     cell = 1.5e-3 / 64
-    for force, beside in itertools.product((0.05, 0.07, 0.1, 0.15, 0.2), ([0.0, 0.0], [0.31, 0.17])):
-        centre = [0.75e-3 + share * cell for share in beside]
+    for force, alongside in itertools.product((0.05, 0.07, 0.1, 0.15, 0.2), ([0.0, 0.0], [0.31, 0.17])):
+        centre = [0.75e-3 + share * cell for share in alongside]
         sphere = {"shape": "sphere", "radius": SPHERE[1], "center": centre}
         _, rows = marched(
             {

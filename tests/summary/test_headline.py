@@ -284,8 +284,8 @@ def test_a_run_that_ended_with_its_contact_has_one() -> None:
     """The load after the last row was held by nothing."""
     rows = table(*NEAR, (-2.0, -1e-6, 0.2), (-2.25, -1e-6, 0.2))
     assert find(rows, detached=True) == [PullOff(5, -2.25, 0.25, 6, MESH)]
-    (told,) = describe_pull_off(rows, 1.0, 1e-9, detached=True)
-    assert told.endswith("its error is 280 mN, and nothing held the next load")
+    (reported,) = describe_pull_off(rows, 1.0, 1e-9, detached=True)
+    assert reported.endswith("its error is 280 mN, and nothing held the next load")
 
 
 def test_nothing_is_said_without_a_pull() -> None:

@@ -88,8 +88,8 @@ def test_the_certificate_is_that_of_the_operator(free: bool, control: Approach |
     weight, wrong = abs(found.p) + abs(c), abs(operators.operator.apply(c, slab.zeros()))
     mean = 10.0 * (weight * wrong)[c != 0.0].sum() / weight.sum()
     assert_allclose(found.certificate.complementarity, mean / found.certificate.length, rtol=1e-6)
-    beside = max(2.0 * abs(c).sum(), 5.0 * abs(c.sum()))
-    assert_allclose(found.certificate.load, beside / weight.sum(), rtol=1e-6, atol=1e-14)
+    alongside = max(2.0 * abs(c).sum(), 5.0 * abs(c.sum()))
+    assert_allclose(found.certificate.load, alongside / weight.sum(), rtol=1e-6, atol=1e-14)
 
 
 def test_nothing_holds_a_load_that_pulls_too_much() -> None:
