@@ -12,7 +12,7 @@ and `C` = subtract the mean over it, one iteration is:
 2. The residual is `r = C R g`, preconditioned `z = C R E' K E r`. K is close to the inverse of A, and E extends r
    beyond the set (`preconditioner`).
 3. The direction is `t = C R (z + beta t)`. Here beta makes t conjugate to the last direction and corrects an inexact
-   last step. t = z where the former is a much smaller descent, or where much of the last step was cut off.
+   last step. t = z if this is a much smaller descent than z, or if much of the last step was cut off.
 4. `p <- p - alpha t`, limited to the bounds of p. Load that this adds is removed near by if it is large
    (`local_load`), and p is scaled to the mean P0. If the hardness is far below the stiffness, alpha is limited, so
    that few points change from one bound to the other.
@@ -223,8 +223,8 @@ class ContactSolver:
     def _descend(
         self, problem: Problem, old_p: Array, old: Iterate, usual: float | None, slope: float, p: Array
     ) -> tuple[Iterate, float]:
-        """Make a step of length `usual`, or the exact step if it is None, from `old_p` to p. The old displacement
-        becomes the other one.
+        """Make a step of length `usual`, or the exact step if it is None, from `old_p` to p. The old displacement is
+        kept in the other displacement of the workspace.
 
         Return the new iterate and the share of its load that was cut off at the bounds, infinite if the step was
         halved.

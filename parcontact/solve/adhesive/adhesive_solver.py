@@ -1,6 +1,7 @@
 """Contact with adhesion for the body of a run, periodic or free.
 
-The solver of gaps needs the inverse of its operator. The operator A of a free body has none that the FFT gives. The
+The solver of gaps needs the inverse of its operator. For the operator A of a free body, the FFT does not
+give it. The
 operator B of a periodic body, with the same Green's function up to half the box, replaces it
 (`HalfSpace.gap_operators`), and the difference is lagged: the next pass has the heights `h - (A - B) p` of the last
 p. One or two passes are usual.
@@ -136,8 +137,8 @@ class AdhesiveSolver:
     def _compare(
         self, heights: Array, control: Control, gap: Array, found: GapSolution, out: Array
     ) -> tuple[GapSolution, Array, float]:
-        """Put the pressure into `out`. Return the solution with this error in its certificate, the displacement of the
-        free body minus that of the solution, and its size; collective."""
+        """Put the pressure into `out`; collective. Return the solution with its error on the free body in the
+        certificate, the displacement of the free body minus that of the solution, and the size of this difference."""
         assert self.free is not None
         out[...] = found.p
         change = self.free.apply(out, self.workspace.displacement) - (heights + gap)

@@ -61,9 +61,12 @@ def pressure_residual(g, q, sigma, mean, working, c):
 
 @loop
 def certificate_sums(working, g, h, q, mean, sigma, z):
-    """Return sums for `certify_gap`. With `p = q + mean`, `c = p + sigma` on the working set and 0 elsewhere, `u = g +
-    h` and the weight `|p| + |c|`: of the weight, of weight u and weight u^2, of weight |z| over the set, of |c| and
-    of c."""
+    """Return the sums for `certify_gap`: of w, w u, w u^2 over all points, of w |z| over the working set, of |c| and of
+    c.
+
+    Here `p = q + mean`, `c = p + sigma` on the working set and 0 elsewhere, `u = g + h`, and the weight `w = |p| +
+    |c|`.
+    """
     load, first, second, wrong, spurious, net = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(g.shape[0]):
         row_load, row_first, row_second, row_wrong, row_spurious, row_net = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

@@ -21,8 +21,8 @@ is crossed deliberately, so that the history decides the branch. One iteration:
 4. The way is `w = max(g - alpha t, 0) - g`, with the alpha that the last step should have had.
 5. `g <- g + theta w` with Newton's step, `theta = -<c, w>/(<w, K w> - <w, (-sigma') w>)`. Where this curvature is
    not clearly positive, the majorized step `-<c, w>/<w, K w>` lowers E, as gamma is concave; under a load, K then
-   gets a small stiffness of mean values. theta is limited by the gaps. A way that closes gaps is gone to its end,
-   theta = 1, if Newton's step nearly does so. If limiting has made a way that raises E, a shorter one is tried.
+   gets a small stiffness of mean values. theta is limited by the gaps. A way that closes gaps is made in full, theta
+   = 1, if Newton's step is at least WHOLE. If limiting has made a way that raises E, a shorter one is tried.
 6. E must not rise. Otherwise the step is halved.
 
 An iteration applies two operators: `A c`, which also gives the certificate, and `K w`, as the pressure changes by
@@ -48,15 +48,15 @@ from .law import Law
 # tuning
 LEAST_CURVATURE = 0.02  # least curvature of E over the elastic one for Newton's step
 LOOSE = 0.01  # stiffness of mean values in majorized steps under a load, over that under an approach
-WHOLE = 0.75  # least Newton step, as a share of a way that closes gaps, with which it is gone to its end
+WHOLE = 0.75  # least Newton step for which a way that closes gaps is made in full, theta = 1
 SHORTER = 0.1  # factor on the length of a way that raises E
 MAX_TRIES = 12  # limit on shorter ways, and on halvings of a step that raises E
 MAX_STALLED_ITERATIONS = 120  # limit on iterations without a smaller certificate
 LEAST_DESCENT = 0.1  # least slope along t over that along z; below it the last direction is forgotten
 # accuracy
 ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # share of the terms of a change of E that is rounding
-HELD = 0.5  # share of a tensile load; if all points are open and attract less, the surfaces have detached
-FAR = 4.0  # least gap over the range beyond which any missing attraction means that the surfaces have detached
+HELD = 0.5  # least attraction of open surfaces that still hold, over the tensile load
+FAR = 4.0  # gap over the range beyond which surfaces that attract less than the load have detached
 
 
 class GapSolver:
@@ -185,7 +185,7 @@ class GapSolver:
         return None
 
     def _precondition(self, it: GapIterate, g: Array, z: Array) -> Certificate:
-        """Put `z = A c` into z, with c in the map of the way. Return the certificate that z gives; collective."""
+        """Put `A c` into z, with c in the map of the way. Return the certificate that z gives; collective."""
         it.operators.operator.apply(self._way, z)
         return certify_gap(self.slab, it, self._working, g, self._q, self._sigma, z)
 

@@ -1,9 +1,9 @@
 """Contact with a law of the interface, in steady sliding or at rest, by Douglas-Rachford splitting.
 
 Find p >= 0 with given mean P0 or given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`solve.interface_law`). A is
-diagonal in Fourier space and c in real space, so that each is inverted exactly. With J_A = (1 + gamma A)^-1 under
-the mean P0, or applied to its argument plus gamma d, with J_c the pressure of `interface_law.resolve`, and with a
-map s,
+diagonal in Fourier space and c in real space, so that each is inverted exactly. With J_A(x) = (1 + gamma A)^-1 x
+scaled to the mean P0, or (1 + gamma A)^-1 (x + gamma d), with J_c the pressure of `interface_law.resolve`, and with
+a map s,
 
     p = J_c(s),    y = J_A(2 p - s),    s <- s + y - p
 
@@ -94,7 +94,7 @@ class Splitting:
             np.subtract(control.value, gamma * h, out=s)
 
     def _loads(self, p: Array, control: Control) -> bool:
-        """Scale a pressure to a given mean that it nearly has. Return False if it is too far from it; collective."""
+        """Scale a pressure to the given mean if it nearly has it, else return False; collective."""
         if isinstance(control, Approach):
             return True
         (load,) = self.slab.sum(kernels.sum_of(p))
