@@ -30,9 +30,9 @@ class RunProperties:
 
     `points` of the grid; `cell`: its sides [m]; `cells_per_wave`: longer sides of a cell per shortest wave of a
     rough surface, or None; `measured`: the surface has a map, which may lack waves on a coarse grid;
-    `edges_follow_grid`: edges of contact do; `identical_contacts`: as those of waves; `free`: the box is; `prony`:
-    relaxation function, None for an elastic body; `folded`: bound on the error of folded branches; `exponential`:
-    the integrator is.
+    `edges_follow_grid`: edges of contact follow it; `identical_contacts`: as those of waves; `free`: the box is
+    free; `prony`: relaxation function, None for an elastic body; `folded`: bound on the error of folded branches;
+    `exponential`: the integrator is exponential.
     """
 
     points: int

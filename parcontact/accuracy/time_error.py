@@ -54,7 +54,7 @@ from .observation import RunProperties, StepObservation, radius_of
 PASSING_LOSS = 0.19  # accuracy: relative error of the loss in a linear step over x
 SLOW = 1e-3  # rounding: z below which L is computed by its series
 LEAST_POWER = 0.25  # accuracy: least difference of the orders of error and of a linear pair
-FULL_POWER = 4  # accuracy: power of the area that is the share of the error in full contact
+FULL_POWER = 4  # accuracy: power of the contact area that weights the error in full contact
 FIXED_EDGES = 0.9  # accuracy: share of the error of a linear pair that edges cause
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 LEAST_SNAP = 1e-4  # accuracy: least loss in a snap over the energies of the step
 FORCE_DOUBT = 0.3  # accuracy: relative error of the tangential force
-SURFACES, PUSHED, JUMPS = "surface_energy", "work_of_load", "leaves_equilibrium"  # numbers of the law
+SURFACES, PUSHED, JUMPS = "surface_energy", "work_of_load", "leaves_equilibrium"  # names of numbers of the law
 
 
 class AdhesiveEnergies(NamedTuple):

@@ -217,7 +217,9 @@ class AdhesiveLaw:
         if isinstance(control, MeanPressure):
             closes = control.value >= 0.0 and before.contact_area == 0.0
             return LoadPath(0.0 if closes else pressure, control, past.approach, pressure, closes)
-        approach = past.approach if past.last.alpha else min(past.approach, control.value)  # nothing came nearer
+        approach = (
+            past.approach if past.last.alpha else min(past.approach, control.value)
+        )  # the surfaces were not closer before
         return LoadPath(approach, control, approach, pressure)
 
     def _start(

@@ -37,9 +37,8 @@ FURTHER = 2  # tuning: number of pressures kept for starts, from three and four 
 class State:
     """A run after a step. `make_step` returns a new one and leaves this one unchanged.
 
-    `memories` are those of the parts of the run, by name (`parts_of`). Two states share most maps, and the oldest
-    maps of a state are reused in the next but one: a state is valid until a step begins from its successor. Maps are
-    in the run's units.
+    `memories` are those of the parts of the run, by name (`parts_of`). A state shares most maps with its successor,
+    which reuses its oldest ones: it is valid until a step begins from the successor. Maps are in the run's units.
     """
 
     memories: Memories

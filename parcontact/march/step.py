@@ -2,7 +2,7 @@
 
 A step begins the body, solves the contact, measures, commits the body, estimates errors, and updates effects. A step
 that is rejected or fails is dropped; nothing has to be undone. No map is copied for this: the new pressure is in the
-spare map of the state, and the new displacement in one of the solver's workspace, which gets the map of the old
+spare map of the state, and the new displacement in a map of the solver's workspace, which gets the map of the old
 displacement in exchange. Operations in place come last, when nothing can fail.
 """
 

@@ -76,7 +76,7 @@ class BodyMemory:
 
 @dataclass(frozen=True)
 class Trial:
-    """A step of a body that has begun; it is dropped without further calls.
+    """A step of a body that has begun; it may be dropped without any call.
 
     Its contact problem is that of an elastic body of modulus `alpha` under the `effective` heights, a map that is
     valid until the next step begins. `advance` has the coefficients of the branches over the step.
@@ -113,7 +113,7 @@ class ElasticBody:
     def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
         """Begin a step under the heights themselves; local to this rank.
 
-        The displacement of `memory` is in a map of the solver, which the next solve overwrites, and is dropped.
+        The displacement of `memory` is dropped: it is in a map of the solver, which the next solve overwrites.
         """
         memory.displacement = None
         if heights.offset == 0:

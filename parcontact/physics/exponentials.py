@@ -42,7 +42,7 @@ class Exponentials:
 def fit_exponentials(shortest: float, longest: float, error: float) -> Exponentials:
     """Return the sum for times from `shortest` to `longest` [s] with a relative error of at most `error` < 1/10."""
     h = np.pi**2 / (2.0 * np.log(4.0 * np.sqrt(2.0) / error))  # half of the error
-    below = np.exp(-h * np.arange(1.0, 40.0 / h))  # m/m_0 of the waves that become one
+    below = np.exp(-h * np.arange(1.0, 40.0 / h))  # m/m_0 of the waves below m_0, which are combined
     share, rate = below.sum(), (below**3).sum() / below.sum()
     spread = np.sqrt(np.pi) / np.pi * h * ((below**5).sum() - rate**2 * share)  # of the error, over (m_0^2 t)^(5/2)
     first = float((0.25 * error / spread) ** 0.2 / np.sqrt(longest))

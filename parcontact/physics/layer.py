@@ -38,8 +38,8 @@ SERIES_BELOW = 1.0  # accuracy: y below which sinh(y) - y is a series, exact to 
 
 @dataclass(frozen=True)
 class LongWaves:
-    """Compliance `c0 + c2 q^2` that long waves on a layer lack compared with the softest wave, in a box of `size`;
-    lengths have one unit."""
+    """Compliance `c0 + c2 q^2` that corrects a preconditioner in which long waves on a layer are as soft as its softest
+    wave, in a box of `size`; lengths have one unit."""
 
     c0: float
     c2: float

@@ -142,9 +142,9 @@ def measure_yielded(p, u, h, above, below, cyclic, highest):
 
 @loop
 def embedded(branches, decay, increment, gain, before, past, p, u, heights, offset, first, stride):
-    """Return sums over every `stride`-th row, from `first` on: of p, of p e^2 with `e = sum decay_k h_k + gain
-    increment + past before`, of p u^2, of p times the squared difference of the heights h = `heights(i - offset)` on
-    both sides, of p h, of p h^2 and of p increment^2.
+    """Return sums over every `stride`-th row, from `first` on: of p, p e^2, p u^2, p (difference of h on both sides)^2,
+    p h, p h^2 and p increment^2, with `e = sum decay_k h_k + gain increment + past before` and h = `heights(i -
+    offset)`.
 
     Points without pressure are skipped; each run of points with pressure is summed on its own.
     """

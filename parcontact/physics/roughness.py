@@ -19,7 +19,7 @@ from .convolution import wavenumbers
 from .lowest import rows_of
 
 BEYOND = 0.01  # accuracy: share of the mean square slope in waves that `shortest_wave` ignores
-BIN = 0.01  # accuracy: bins of log wavenumber; the error of a shortest wave is half of it
+BIN = 0.01  # accuracy: width of bins in log wavenumber; the error of a shortest wave is half of it
 EDGE = 1.0 - 1e-9  # accuracy: factor on limits of wavenumbers, against rounding
 
 

@@ -33,10 +33,7 @@ from .point import Point
 from .stiffness import loses_most, soft_stripes
 
 COARSE_TOLERANCE = 0.02  # tuning: tolerance on the certificate on all grids but the finest
-LOOSE, AS_RIGHT = (
-    1e-3,
-    0.6,
-)  # accuracy: so much of a tolerance above LOOSE leaves the contact area as right as in a march
+LOOSE, AS_RIGHT = 1e-3, 0.6  # accuracy: factor AS_RIGHT on tolerances above LOOSE, for areas as accurate as in marches
 GIVE_UP = 250  # tuning: limit on linear steps of the usual solver on a grid with stripes
 NEAR = 1.1  # tuning: largest ratio of a velocity to the last one for a start from the last state
 Vector = tuple[float, float]
@@ -55,10 +52,10 @@ Make = Callable[[SteadyLevel, Vector], tuple[SteadySolver | Proximal, Convolutio
 
 
 class SteadySliding:
-    """Steady states of one job's surface and body; making and calling it are collective.
+    """Steady states of one job's surface and body; the constructor and the methods are collective.
 
-    Started from coarser grids, or from the last state where that is very near. The tolerance on certificates follows
-    from that of the job, and is `most` at most.
+    Solves start from coarser grids, or from the last state if its velocity is nearly the same. The tolerance on
+    certificates follows from that of the job and is at most `most`.
     """
 
     def __init__(self, setup: Setup, most: float = math.inf) -> None:
@@ -72,7 +69,7 @@ class SteadySliding:
         self._known = properties_of(setup.job, setup.shortest)
         self.contact: SteadyContact | None = None
         self._rise: Array | None = None
-        self._speed = self._pressure = 0.0  # the speed times the shift factor: that is what a state depends on
+        self._speed = self._pressure = 0.0  # speed times shift factor, on which a state depends
         self.temperature, self._own_temperature = math.nan, temperature_of(setup.job.material)
         self._feedback = Feedback()
 
