@@ -51,7 +51,7 @@ class Bounds:
 
 
 def most_cells(job: Planned) -> int:
-    """Return the largest number of cells slid in a step, a power of two: a quarter of the shortest wave.
+    """Return the largest number of cells slid in a step: the largest power of two up to a quarter of the shortest wave.
 
     It is one cell if a quarter wave is shorter, or if a file may have any wave.
     """

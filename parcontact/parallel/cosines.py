@@ -100,7 +100,7 @@ def _turn(waves: NDArray[np.complexfloating], factors: NDArray[np.complexfloatin
 def _weigh(
     block: NDArray[np.complexfloating], turn: NDArray[np.complexfloating], symbol: NDArray[np.complexfloating]
 ) -> None:
-    """Transform from transforms along y to series, multiply by the symbol, and transform back; waves l and my - l are
+    """Convert transforms along y to series, multiply these by the symbol, and convert back; waves l and my - l are
     coupled."""
     count, half = block.shape[0], block.dtype.type(0.5)
     for low in range(count // 2 + 1):

@@ -19,7 +19,7 @@ from .rows import RowsBeside
 from .slab import Slab
 
 Shape = tuple[int, int]  # points of a cell along x and y: 1 or 2
-FEW = 8  # tuning: points of a rank per cell of the grid, from which every rank has all cells
+FEW = 8  # tuning: every rank has all cells of a grid with fewer cells than points of a rank over FEW
 
 
 def pyramid_steps(slab: Slab, pairs: int = 0) -> list["PyramidStep"]:

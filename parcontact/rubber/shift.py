@@ -3,7 +3,7 @@
 WLF         log10 a_T = -C1 (T - T_ref)/(C2 + T - T_ref)      (M. L. Williams, R. F. Landel, J. D. Ferry,
                                                                J. Am. Chem. Soc. 77 (1955) 3701)
 Arrhenius   log10 a_T = E/(R ln 10) (1/T - 1/T_ref)           temperatures in K
-table       log10 a_T given at some temperatures, linear between them and nowhere beyond
+table       log10 a_T given at some temperatures, linear between them, undefined outside
 
 Moduli are b_T times those at the reference:
 

@@ -1,18 +1,20 @@
-"""A rigid rough surface in full contact with a viscoelastic half-space that it slides on: exact, because it is linear.
+"""A rigid rough surface in full contact with a viscoelastic half-space on which it slides. The problem is linear, so
+that the solution is exact.
 
-The surface is a sum of waves with distinct wave vectors, h(x, y) = sum Re[A exp(i (kx x + ky y))], displaced by s(t).
-Each wave has a transfer modulus M: the complex modulus G*(omega) at omega = kx vx + ky vy in steady sliding, a function
-of time after a change of velocity, and a function of the time step for a code that takes such. With k = |(kx, ky)|:
+The surface is a sum of waves with distinct wave vectors, h(x, y) = sum Re[A exp(i (kx x + ky y))], displaced by
+s(t). Each wave has a transfer modulus M: the complex modulus G*(omega) at omega = kx vx + ky vy in steady sliding, a
+function of time after a change of velocity, and also a function of the time step for a time-stepping code. With k =
+|(kx, ky)|:
 
     pressure    p = p0 + sum Re[2 k A conj(M) exp(i (kx (x - sx) + ky (y - sy)))]
     traction    <p grad h> = -sum k |A|^2 (kx, ky) Im M        force on the surface per nominal area
     friction    mu = -traction . v/(|v| p0)
 
-valid while the pressure is positive everywhere. The pressure of a wave runs ahead of it by the angle of M.
+valid while the pressure is positive everywhere. The pressure of a wave is ahead of it by the phase of M.
 
 Source: Eqs. (5) and (10) of the paper "Transient frictionless contact of a rough rigid surface on a viscoelastic
-half-space" with u = h; for the steady state also B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840.
-Wave arguments (`amplitude` in m, maybe complex, `kx`, `ky` in rad/m) have one entry per wave and broadcast; SI units.
+half-space" with u = h; for the steady state also B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840. Wave arguments
+(`amplitude` in m, maybe complex, `kx`, `ky` in rad/m) have one entry per wave and broadcast; SI units.
 """
 
 from typing import NamedTuple
@@ -25,7 +27,7 @@ from .arrays import Array, ComplexArray, ComplexValues, Values
 
 
 class Waves(NamedTuple):
-    """Complex amplitudes (m) and wave vectors (rad/m) of real waves; of two opposite wave vectors one is listed."""
+    """Complex amplitudes [m] and wave vectors [rad/m] of real waves; one of two opposite wave vectors is listed."""
 
     amplitude: ComplexArray
     kx: Array
@@ -33,10 +35,11 @@ class Waves(NamedTuple):
 
 
 def waves(heights: ArrayLike, length_x: float, length_y: float) -> Waves:
-    """The waves of a map of heights (m), shape (ny, nx), on a periodic rectangle of sides length_x and length_y (m).
+    """Return the waves of a map of heights [m], shape (ny, nx), on a periodic rectangle of sides length_x and length_y
+    [m].
 
-    Its mean does not matter and is left out. Raises ValueError if there is a wave of two points per period, whose slope
-    is not defined by its heights.
+    The mean is left out. Raises ValueError for a wave of two points per period, whose slope its heights do not
+    define.
     """
     heights = np.asarray(heights, float)
     ny, nx = heights.shape
@@ -51,7 +54,7 @@ def waves(heights: ArrayLike, length_x: float, length_y: float) -> Waves:
 
 
 def frequency(kx: Values, ky: Values, vx: Values, vy: Values) -> Array:
-    """omega = kx vx + ky vy in rad/s, the rate at which a point of the body goes through the phases of a wave."""
+    """Return omega = kx vx + ky vy [rad/s], the frequency of a wave at a point of the body."""
     return np.asarray(kx * vx + ky * vy)
 
 
@@ -59,12 +62,14 @@ def frequency(kx: Values, ky: Values, vx: Values, vy: Values) -> Array:
 
 
 def pressure_amplitude(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexValues) -> ComplexArray:
-    """2 k A conj(M) in Pa: size and phase of each wave of pressure relative to the moving surface; `modulus` is M."""
+    """Return 2 k A conj(M) [Pa]: amplitude and phase of each wave of pressure relative to the moving surface; `modulus`
+    is M."""
     return 2 * np.hypot(kx, ky) * amplitude * np.conj(modulus)
 
 
 def traction(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexValues) -> Array:
-    """<p grad h> = -sum k |A|^2 (kx, ky) Im M in Pa, shape (..., 2); the last axis of `modulus` (M) holds the waves."""
+    """Return <p grad h> = -sum k |A|^2 (kx, ky) Im M [Pa], shape (..., 2); the last axis of `modulus` (M) holds the
+    waves."""
     strength = np.hypot(kx, ky) * np.abs(amplitude) ** 2 * np.imag(modulus)
     return -np.stack([np.sum(strength * kx, axis=-1), np.sum(strength * ky, axis=-1)], axis=-1)
 
@@ -75,7 +80,7 @@ def traction(amplitude: ComplexValues, kx: Values, ky: Values, modulus: ComplexV
 def friction_coefficient(
     mean_pressure: Values, amplitude: ComplexValues, kx: Values, ky: Values, vx: float, vy: float, *material: *Moduli
 ) -> Array:
-    """mu = sum k |A|^2 omega G''(omega)/(|v| p0) of all waves together in steady sliding at (vx, vy) m/s, not 0."""
+    """Return mu = sum k |A|^2 omega G''(omega)/(|v| p0) of all waves in steady sliding at (vx, vy) [m/s], not 0."""
     modulus = complex_modulus(frequency(kx, ky, vx, vy), *material)
     return _friction(traction(amplitude, kx, ky, modulus), vx, vy, mean_pressure)
 

@@ -1,16 +1,16 @@
 """A rigid sphere on a viscoelastic half-space, without sliding (Lee and Radok; Ting).
 
-While the contact grows, the elastic solution holds with its products turned into histories (J creep compliance, G
-relaxation function, R radius of the sphere, a contact radius, d approach, W force):
+While the contact grows, the elastic solution holds with its products replaced by history integrals (J creep
+compliance, G relaxation function, R radius of the sphere, a contact radius, d approach, W force):
 
     a^2 = R d,   a^3(t) = (3 R/16) int J(t-s) dW(s),   W(t) = (16/(3 R)) int G(t-s) d a^3(s),
     p(r, t) = (8/(pi R)) int G(t-s) d sqrt(a^2(s) - r^2)_+
 
-When it shrinks, at time t, it has the radius it had at the earlier time t1(t) given by int_{t1}^t G(t-s) d'(s) ds = 0,
-and the integral for W ends at t1; contact is lost when t1 = 0.
+While it shrinks, its radius at the time t is that at the earlier time t1(t), given by int_{t1}^t G(t-s) d'(s) ds =
+0, and the integral for W ends at t1; contact is lost when t1 = 0.
 
-Source: E. H. Lee, J. R. M. Radok, J. Appl. Mech. 27 (1960) 438; T. C. T. Ting, J. Appl. Mech. 33 (1966) 845. The body
-is incompressible and virgin at t = 0. Arguments are in SI units; only times and distances may be arrays.
+Source: E. H. Lee, J. R. M. Radok, J. Appl. Mech. 27 (1960) 438; T. C. T. Ting, J. Appl. Mech. 33 (1966) 845. The
+body is incompressible and at rest before t = 0. Arguments are in SI units; only times and distances may be arrays.
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ from .arrays import Array
 
 
 def triangle_force(t: ArrayLike, peak_approach: float, rise_time: float, radius: float, *material: *Moduli) -> Array:
-    """W(t) in N at times t >= 0 (s, any shape); zero from lift-off on.
+    """Return W(t) [N] at times t >= 0 [s], any shape; 0 after lift-off.
 
     W = 8 sqrt(R) (peak_approach/rise_time)^(3/2) int_0^{t1} G(t-s) sqrt(s) ds, where every term of the Prony series
     gives (2/3) t1^(3/2) exp(-(t - t1)/tau) M(1, 5/2, -t1/tau) with Kummer's function M.
@@ -39,7 +39,7 @@ def triangle_force(t: ArrayLike, peak_approach: float, rise_time: float, radius:
 
 
 def triangle_lift_off_time(rise_time: float, *material: *Moduli) -> float:
-    """When contact is lost, in s: int_0^t G = 2 int_0^{t - rise_time} G, whatever the sphere and the depth."""
+    """Return the time at which contact is lost [s]: int_0^t G = 2 int_0^{t - rise_time} G, for any sphere and depth."""
     series = normal_form(*material)
 
     def excess(t: float) -> float:
@@ -50,7 +50,7 @@ def triangle_lift_off_time(rise_time: float, *material: *Moduli) -> float:
 
 
 def _time_of_equal_radius(t: ArrayLike, rise_time: float, *material: *Moduli) -> Array:
-    """The time during the rise at which the contact was as large as at t; 0 after lift-off.
+    """Return the time during the rise at which the contact was as large as at t; 0 after lift-off.
 
     After the rise it is t minus the age x that solves int_0^x G = 2 int_0^{t - rise_time} G.
     """
