@@ -88,8 +88,8 @@ def estimate_steady(run: RunProperties, observed: StepObservation) -> ErrorBudge
 
 
 def _estimate(sources: Sequence[ErrorSource], run: RunProperties, observed: StepObservation) -> ErrorBudget:
-    """Return the errors of the sources. That of friction is relative to the sum of body and interface; the interface
-    has the relative error of the area."""
+    """Return the errors of the sources. The error of friction is relative to the sum of body and interface; the
+    interface has the relative error of the area."""
     body = abs(observed.friction - observed.interface)
     pairs = {source.name: source.error(run, replace(observed, friction=body)) for source in sources}
     missing = dict.fromkeys(("solver", "time", "folded", "mesh"), 0.0)
@@ -143,7 +143,7 @@ class ErrorSums:
 
     @classmethod
     def restored(cls, saved: Saved) -> "ErrorSums":
-        """Return the sums of a checkpoint, or new ones if its parts are those of another version."""
+        """Return the sums of a checkpoint, or new ones if another version has written them."""
         own = cls()
         found = np.asarray(saved.get(SUMS, own.sums))
         return cls(found.reshape(own.sums.shape)) if found.size == own.sums.size else own

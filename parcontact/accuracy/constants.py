@@ -1,7 +1,7 @@
 """The fitted constants of the error budget; the manual's page `coverage` shows how well they hold.
 
 Each was fitted to true errors by the script named. `scatter` is the ratio of estimate to true error: its median and
-the range of 90 % of the cases, or what is known. That of friction and area belongs to the sum of all sources.
+the range of 90 % of the cases, or what is known. For friction and area it belongs to the sum of all sources.
 """
 
 from dataclasses import dataclass

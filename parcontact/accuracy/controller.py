@@ -39,7 +39,7 @@ from .budget import ErrorBudget, ErrorParts
 from .shares import AREA, FRICTION, SOLVER_MEDIAN, TIME_MEDIAN
 from .time_error import order_of_time_error
 
-MOST = 8.0  # accuracy: largest tolerance of a solve over that of the job
+MOST = 8.0  # accuracy: largest tolerance of a solve over the tolerance of the job
 LOOSEST = 0.05  # accuracy: largest tolerance of a solve
 CLOSE = 2.5e-4  # accuracy: largest tolerance before a change of velocity or load
 FIRST = 0.01  # accuracy: largest tolerance in the first and the last step of a stage
@@ -59,7 +59,7 @@ SAME_LEVEL = 1e-6  # rounding: relative tolerance on a length
 
 @dataclass(frozen=True)
 class StepTolerance:
-    """Memory of the tolerance of steps: mean over the last ones of log2 of its ratio to that of the job."""
+    """Memory of the tolerance of steps: mean over the last ones of log2 of the ratio to the tolerance of the job."""
 
     mean: float = 0.0
 
@@ -96,13 +96,13 @@ class Controller:
 
     @property
     def follows(self) -> bool:
-        """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen that of the job, and
-        stages have steps. Contacts with adhesion are solved to the job's tolerance."""
+        """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen the tolerance of the
+        job, and stages have steps. Contacts with adhesion are solved to the job's tolerance."""
         return "tolerance" in self.job.numerics.chosen and self.timeline.lasts and not self.adhesive
 
     def tolerance(self, memory: StepTolerance, step: Step) -> float | None:
-        """Return the tolerance of the solve of a step, None for that of the job, as in a jump. It is smaller before a
-        change and in the first and last step of a stage."""
+        """Return the tolerance of the solve of a step, None for the tolerance of the job, as in a jump. It is smaller
+        before a change and in the first and last step of a stage."""
         own = self.job.numerics.tolerance
         if step.dt == 0.0:
             return None

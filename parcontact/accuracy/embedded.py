@@ -32,7 +32,7 @@ MISSED = 0.5  # accuracy: relative error of the load of a sample above which all
 @dataclass(frozen=True)
 class IntegratorDifference:
     """Relative `difference` of the pair; rms `slope` along x of the surface under the pressure, in the unit of heights
-    over that of lengths; `order`, the power of the step length with which the difference grows; `angle`, the rms
+    over the unit of lengths; `order`, the power of the step length with which the difference grows; `angle`, the rms
     change of the displacement in the step over the standard deviation of heights, both under the pressure: in full
     contact the angle by which a wave turns."""
 
@@ -59,7 +59,8 @@ class EmbeddedPair:
         share: float,
         growth: float = 0.0,
     ) -> IntegratorDifference:
-        """Compare the integrators in a step; `memory` is that of the body after it. One or two messages; collective.
+        """Compare the integrators in a step; `memory` is the memory of the body after it. One or two messages;
+        collective.
 
         `pressure` has the sum `load` over all ranks, on a `share` of the points; `displacement` is `A p/alpha`.
         `growth` is dt over the length of the step before.

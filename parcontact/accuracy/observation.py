@@ -5,7 +5,7 @@ share A touches, their mean radius in cells is
 
     r = (8/pi) min(A, 1 - A) n/S,
 
-or that of the gaps between them if these are smaller. Contacts of waves, cylinders and flats are identical: they
+or the radius of the gaps between them if these are smaller. Contacts of waves, cylinders and flats are identical: they
 have the same position on the grid and count as one.
 """
 

@@ -25,7 +25,7 @@ counts, for errors not caused by edges. Backward Euler is of first order: its er
 difference.
 
 Friction that changes from step to step is delayed by at most <L> of the change, CURVED_RISE of it in quadratic steps
-(`error_of_rise`). Right after a jump of the load friction is that of an elastic body, 0 up to mesh errors, so that
+(`error_of_rise`). Right after a jump of the load friction is 0 up to mesh errors, as for an elastic body, so that
 the next change is unknown. The error of the area is a share of that of friction, which falls with the open area.
 """
 

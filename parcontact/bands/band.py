@@ -166,7 +166,7 @@ def _make_waves(cut: Cut, number: int, seed: int, fft: FFT, side: float) -> Spec
     """Return the transform of the heights [m] of a band on a box with this side [m].
 
     Each wave of the box has the mean square slope of the spectrum in its cell of wavenumbers, as far as the cell is
-    within the band; phases are random, those of `physics.roughness`.
+    within the band; phases are random, as in `physics.roughness`.
     """
     step, line = 2.0 * np.pi / side, fft.my == 1
     low, high = float(cut.edges[number]), float(cut.edges[number + 1])
@@ -187,7 +187,7 @@ def _make_waves(cut: Cut, number: int, seed: int, fft: FFT, side: float) -> Spec
 
 
 def _seed(job: Job, number: int, sample: int) -> int:
-    """Return the seed of a surface: that of the job for the first one of the coarsest band; the others
+    """Return the seed of a surface: the seed of the job for the first one of the coarsest band; the others
     follow from it."""
     seed = next((part.seed for part in job.surface if hasattr(part, "seed")), 0)
     if number == sample == 0:

@@ -97,7 +97,7 @@ class Cascade:
         return ((section and section.distance) or self.cut.box) / math.hypot(*self.velocity)
 
     def set_temperatures(self, temperatures: Sequence[float]) -> None:
-        """Set the temperatures [deg C] of the bands; NaN for that of the material."""
+        """Set the temperatures [deg C] of the bands; NaN for the temperature of the material."""
         for (number, _), band in self._bands.items():
             if temperatures[number] != self._temperatures[number]:
                 band.set_temperature(temperatures[number])

@@ -32,7 +32,7 @@ class Cut:
 
     `edges` [rad/m]; points along x and y of each band; number of longest waves along its box; `samples`, the
     surfaces of each band, or 0 for as many as the accuracy needs. With a `measured` map this is the coarsest band,
-    and `spectrum` that of all others.
+    and `spectrum` is the spectrum of all others.
     """
 
     spectrum: WaveSpectrum

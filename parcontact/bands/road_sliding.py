@@ -165,7 +165,7 @@ class RoadSliding:
         """Find the fixed point of the temperatures of all bands, with one surface per band, and set them in the
         cascade. Raises RunError if it is not found.
 
-        Rounds use Aitken's relaxation. The first is that of cold bands, the second starts from the temperatures of
+        Rounds use Aitken's relaxation. The first is for cold bands, the second starts from the temperatures of
         the last state.
         """
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature

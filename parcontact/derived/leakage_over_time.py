@@ -67,7 +67,7 @@ class SolvedLeak(NamedTuple):
 
 
 class Gaps:
-    """Saved gaps of a run, 0 in contact, of all instants or one; `drop` is that of a fluid."""
+    """Saved gaps of a run, 0 in contact, of all instants or one; `drop` is the pressure drop of a fluid."""
 
     def __init__(self, directory: Path, at: str = "", drop: PressureDrop | None = None) -> None:
         self.drop = drop

@@ -50,10 +50,10 @@ class PredictedInstant(NamedTuple):
 
 
 def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[PredictedInstant]:
-    """Yield the rows for a job, the initial state first; `slab` must be that of one rank.
+    """Yield the rows for a job, the initial state first; `slab` must have one rank.
 
-    The waves are those of the job's spectrum on an unbounded surface (`continuum`), or those of its heights in the
-    box (`lattice`). Stages that choose their steps have those of the run in the job's directory; before a run, steps
+    The waves represent the job's spectrum on an unbounded surface (`continuum`), or its heights in the box
+    (`lattice`). Stages that choose their steps have the steps of the run in the job's directory; before a run, steps
     double up to one cell (`history.chosen`). Raises InputError for jobs outside the theory.
     """
     _refuse_unknown(job)

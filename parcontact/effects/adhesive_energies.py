@@ -2,7 +2,7 @@
 
 In a step in which body and surfaces gain energy, the load does work along its path, by the trapezoidal rule, `F dd -
 F_t ds`. A difference is lost in a snap if the load could not have supplied it on any path between the two states.
-Otherwise it is an error of the rule, and the work is that of the energies.
+Otherwise it is an error of the rule, and the work is taken from the energies.
 
 Surfaces that detach under a load, or that a load closes again, pass through states without equilibrium. The work of
 the load on this path depends on inertia, which the model does not have. From the last equilibrium on it is taken as

@@ -54,8 +54,8 @@ class PastGap(NamedTuple):
 class AdhesiveMemory:
     """Memory of a contact with adhesion: the last gaps, the newest first, a spare map and a backup of the gap.
 
-    `free_correction` is that of a free body (`adhesive_solver`) per pressure, for the modulus `modulus`, None for a
-    periodic one. `end` has time and load of the detachment, None before.
+    `free_correction` is the correction for a free body (`adhesive_solver`) per pressure, for the modulus `modulus`,
+    None for a periodic one. `end` has time and load of the detachment, None before.
     """
 
     pasts: tuple[PastGap, PastGap]
@@ -328,7 +328,7 @@ class AdhesiveLaw:
         return {**found, "free correction": Entry(memory.free_correction, units.height, "m")}
 
     def restored(self, memory: AdhesiveMemory, saved: Saved) -> AdhesiveMemory:
-        """Return the memory of a checkpoint, whose maps have been read into those of `memory`."""
+        """Return the memory of a checkpoint, whose maps have been read into `memory`."""
         now, before = (
             PastGap(past.gap, _place(saved[f"{age}position"]), bool(saved[f"{age}gap is known"]))
             for age, past in zip(("", "earlier "), memory.pasts, strict=True)

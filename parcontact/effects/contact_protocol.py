@@ -57,10 +57,10 @@ class PreviousContacts:
 class SolvedContact(Generic[Remembered]):
     """The contact of a step, the memory of the law after it, and a map that is not 0 where the surfaces touch.
 
-    `numbers` are those of the law, by name; `pull` is the force of all tension [N]. Loads up to `least_load` [N] are
-    errors of the solver. `end`: the contact is in `equilibrium`; or `detached`; or it was `opened` after detachment,
-    as the run continues with the surfaces far from each other, and then stays `open`. `snapped`: it passed through
-    states without equilibrium. `remark` is a sentence for run.log, or ''.
+    `numbers` are further results of the law, by name; `pull` is the force of all tension [N]. Loads up to
+    `least_load` [N] are errors of the solver. `end`: the contact is in `equilibrium`; or `detached`; or it was
+    `opened` after detachment, as the run continues with the surfaces far from each other, and then stays `open`.
+    `snapped`: it passed through states without equilibrium. `remark` is a sentence for run.log, or ''.
     """
 
     contact: Contact
@@ -111,7 +111,8 @@ class ContactLaw(Protocol[Memory]):
         tolerance: float | None,
     ) -> SolvedContact[Memory]:
         """Solve a step of the body, with the memory, contacts and measures of the step before, and put the pressure
-        into the spare map. A `tolerance` of None is that of the job. A contact that was not solved has a `failure`."""
+        into the spare map. A `tolerance` of None means the tolerance of the job. A contact that was not solved has a
+        `failure`."""
 
     def motion(self, solved: SolvedContact[Memory], before: Measures, now: Measures) -> EdgeMotion:
         """Return the motion of the contact in a step from its measures before and after it."""

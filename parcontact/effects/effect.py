@@ -57,12 +57,12 @@ class Sheared:
 class Instant:
     """A step just made, in the run's units unless stated; maps are valid until the next step begins.
 
-    The pressure on this rank's rows is `modulus pressure`, `displacement` is that of the body, and `touching` is not
-    0 where the surfaces touch; their shape is (ny_loc, nx). `before` and `measures` belong to the step before and to
-    this one. In this step the surface moved by `moved` [m], and the stored plus dissipated energy of the body
-    changed by `gained` [J], NaN without energies. Edges of an adhesive contact moved by `front` half process zones;
-    `untouched` if nothing touched or was under tension before and after the step. `error_friction` is the estimated
-    relative error of friction, infinite without friction.
+    The pressure on this rank's rows is `modulus pressure`, `displacement` is the displacement of the body, and
+    `touching` is not 0 where the surfaces touch; their shape is (ny_loc, nx). `before` and `measures` belong to the
+    step before and to this one. In this step the surface moved by `moved` [m], and the stored plus dissipated energy
+    of the body changed by `gained` [J], NaN without energies. Edges of an adhesive contact moved by `front` half
+    process zones; `untouched` if nothing touched or was under tension before and after the step. `error_friction` is
+    the estimated relative error of friction, infinite without friction.
     """
 
     step: Step
@@ -193,7 +193,7 @@ class Effect(Protocol[Memory]):
     def restored(self, memory: Memory, saved: Saved) -> Memory:
         """Return the memory of a checkpoint, in the run's units, numbers as arrays.
 
-        Maps have been read into those of `entries`.
+        Maps have been read into the maps of `entries`.
         """
         return memory
 

@@ -146,7 +146,7 @@ def _rubs(job: Any, shears: Sequence[Shear]) -> bool:
 class ThermalColumns(Effect[ThermalMemory]):
     """Columns: the mean temperature rise of the contact, weighted by heat, and the highest rise of the surface [K].
 
-    At rest the weights are those of the last sliding.
+    At rest the weights are taken from the last sliding.
     """
 
     section: ClassVar[type[Part]] = Thermal
@@ -228,8 +228,8 @@ class ThermalColumns(Effect[ThermalMemory]):
         return cold._replace(relaxation_times=cold.relaxation_times * self.time_factor(memory))
 
     def time_factor(self, memory: ThermalMemory) -> float:
-        """Return relaxation times at the flash temperature over those of the job, if the job has feedback. Raises
-        RunError."""
+        """Return relaxation times at the flash temperature over the relaxation times of the job, if the job has
+        feedback. Raises RunError."""
         if not (self._feeds_back and memory.warmed):
             return 1.0
         try:

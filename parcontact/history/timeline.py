@@ -120,7 +120,7 @@ class Timeline:
     """All steps of a history, numbered from 1; step 0 is the initial state. Only stages are stored, not their steps.
 
     If the history ends before `until`, its last stage continues with its last time step, velocity and load, to the
-    first step that reaches it; a stage of a single solve cannot continue. `pressure` [Pa] is that of the initial
+    first step that reaches it; a stage of a single solve cannot continue. `pressure` [Pa] belongs to the initial
     state, None at rest.
 
     `chosen` has the steps of stages that choose their own, and grows during a run; further steps are estimated. If
@@ -231,7 +231,7 @@ class Timeline:
         return any(span.moves for span in self.spans)
 
     def first_reaching(self, time: float) -> int:
-        """Return the number of the first step that reaches a time [s], or that of the last step."""
+        """Return the number of the first step that reaches a time [s], or the number of the last step."""
         return min(1 + bisect_left(range(1, len(self) + 1), True, key=lambda n: reached(self[n].time, time)), len(self))
 
     def shared(self, other: "Timeline") -> int:

@@ -69,7 +69,7 @@ def solve_flow(gap: Map, size: tuple[float, float], axis: str = "x", periodic_si
 
 
 def _resistances(gap: Map, constriction: float, periodic_sides: bool) -> Map:
-    """Return 1/g^3 over that of the constriction; infinite in cells that are not used."""
+    """Return 1/g^3 over 1/g^3 of the constriction; infinite in cells that are not used."""
     least = min(LEAST_GAP * float(gap.max()), LEAST_OF_CONSTRICTION * constriction)
     wet = connected_from_end_to_end(gap >= least, periodic_sides)
     found = np.full(gap.shape, np.inf)
@@ -81,7 +81,7 @@ def flow_mesh_error(
     gap: Map, flow: Flow, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True
 ) -> float:
     """Return the relative change of K if only every second point of its gap is used, starting with the first or the
-    second, whichever changes it more; NaN if contact closes the gap. The other arguments are those of `solve_flow`."""
+    second, whichever changes it more; NaN if contact closes the gap. The other arguments are as in `solve_flow`."""
     if not flow.percolates:
         return math.nan
     found = []

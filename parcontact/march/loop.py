@@ -100,7 +100,7 @@ class March:
         """Return the rows of this rank of `pressure` [Pa], `displacement`, `gap` or `height` [m], or of the rise of
         `temperature` [K], as a new array; collective. Raises InputError for a temperature that is not computed.
 
-        `height` is that of the rigid surface at its present position, so that `gap = displacement - height -
+        `height` belongs to the rigid surface at its present position, so that `gap = displacement - height -
         approach`.
         """
         scene, state, units = self.scene, self.state, self.scene.units

@@ -37,8 +37,9 @@ FURTHER = 2  # tuning: number of pressures kept for starts, from three and four 
 class State:
     """A run after a step. `make_step` returns a new one and leaves this one unchanged.
 
-    `memories` are those of the parts of the run, by name (`parts_of`). A state shares most maps with its successor,
-    which reuses its oldest ones: it is valid until a step begins from the successor. Maps are in the run's units.
+    `memories` has the memories of the parts of the run, by name (`parts_of`). A state shares most maps with its
+    successor, which reuses its oldest ones: it is valid until a step begins from the successor. Maps are in the
+    run's units.
     """
 
     memories: Memories
@@ -211,7 +212,7 @@ class _ChosenStepsPart:
 
 
 def first_state(scene: Scene, body: BodyMemory | None = None) -> State:
-    """Return the state before the first step; all maps are new, except those of a given `body`."""
+    """Return the state before the first step; all maps are new, except the maps of a given `body`."""
     parts = parts_of(scene)
     given = {} if body is None else {"material": body}
     return completed(scene, State({name: part.at_rest() for name, part in parts.items() if name not in given} | given))
@@ -241,7 +242,7 @@ def energies_of(
 ) -> tuple[float, float, float, tuple[float, ...]]:
     """Return work, stored and dissipated energy [J], and the dissipation of each branch; NaN without energies.
 
-    The work is that on the body, unless an effect computes that of the load.
+    It is the work on the body, unless an effect computes the work of the load.
     """
     if scene.energy is None or memory is None:
         return math.nan, math.nan, math.nan, ()

@@ -28,8 +28,9 @@ class StepErrors:
     """Errors of a step.
 
     `budget` is None if nothing touches. `step` is the error of the step's length alone, which decides about chosen
-    steps. `friction` is that of the body, infinite after a jump; its change in the next step is an error source.
-    `lasting` is the budget without the temporary error of rising friction; it sets the tolerance of the next solves.
+    steps. `friction` is the friction of the body, infinite after a jump; its change in the next step is an error
+    source. `lasting` is the budget without the temporary error of rising friction; it sets the tolerance of the next
+    solves.
     """
 
     budget: ErrorBudget | None
@@ -95,8 +96,8 @@ class BudgetPart:
 
 
 def estimate_errors(scene: Scene, friction: float, solved: SolvedStep) -> StepErrors:
-    """Return the errors of a step; `friction` is that of the body in the step before, infinite if unknown or after a
-    jump. Collective."""
+    """Return the errors of a step; `friction` is the friction of the body in the step before, infinite if unknown or
+    after a jump. Collective."""
     step, measures = solved.step, solved.measures
     branches = scene.material.branched
     prony = None if branches is None else branches.prony
@@ -177,10 +178,10 @@ def _compare_views(scene: Scene, solved: SolvedStep) -> float:
 
 
 def _viscous(velocity: tuple[float, float], measures: Measures) -> tuple[tuple[float, float], float]:
-    """Return a unit direction, and friction along it without that of the interface.
+    """Return a unit direction, and friction along it without the interface.
 
-    The direction is that of sliding, or opposite to the force at rest and if the force is mainly across, as for
-    ridges that slide along themselves.
+    The direction is the direction of sliding, or opposite to the force at rest and if the force is mainly across, as
+    for ridges that slide along themselves.
     """
     (x, y), (force_x, force_y) = velocity, (measures.force_x, measures.force_y)
     if abs(force_x * y - force_y * x) >= abs(force_x * x + force_y * y):

@@ -8,7 +8,7 @@ points first, followed by the odd ones backwards, and V the transform of these n
     V(k) = (exp(i theta)/2) (C(k) - i C(n - k)),              C(n) = 0.
 
 For a row, whose points are real, `C(k) - i C(n - k) = 2 exp(-i theta) V(k)`: the half spectrum has the wave k as its
-real part and n - k as its imaginary part. So messages, blocks and memory are those of the transform.
+real part and n - k as its imaginary part. So messages, blocks and memory are as for the transform.
 """
 
 import numpy as np

@@ -165,7 +165,7 @@ class FFT:
         self.execute_rows(source, waves)
 
     def execute_rows(self, rows: Array, waves: Spectrum) -> None:
-        """Transform rows in place, such as those of the `row_block`."""
+        """Transform rows in place, such as the rows of the `row_block`."""
         plan = self._x_forward[len(waves)]
         plan.update_arrays(rows, waves)
         plan.execute()
@@ -278,7 +278,7 @@ class FFT:
 @loop
 def _multiply(spectrum: NDArray[np.complexfloating], symbol: NDArray[np.inexact]) -> None:
     """Multiply a spectrum by a symbol, faster than numpy, which would convert a real symbol to complex numbers. Rows
-    that the symbol lacks are those of -q_y."""
+    that the symbol lacks are the rows of -q_y."""
     count = spectrum.shape[0]
     for j in range(count):
         factors = symbol[j] if j < symbol.shape[0] else symbol[count - j]

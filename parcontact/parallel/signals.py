@@ -28,7 +28,7 @@ class Signals:
     def noted(self) -> Iterator["Signals"]:
         """Record signals within this context; outside it, they end the process at once.
 
-        An outer context, such as that of a sweep, keeps recording. Signals are recorded in the main thread only.
+        An outer context, such as the context of a sweep, keeps recording. Signals are recorded in the main thread only.
         """
         outer = getattr(signal.getsignal(SAVE), "__self__", None)
         if isinstance(outer, Signals) or threading.current_thread() is not threading.main_thread():

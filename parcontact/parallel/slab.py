@@ -46,7 +46,7 @@ class Slab:
     """This rank's rows of `ny x nx` maps, and the collective operations on them.
 
     Every method whose docstring says "collective" must be called by all ranks of `comm`. `rows_of(rank)` returns the
-    rows of a rank, by default those of `deal`.
+    rows of a rank, by default as `deal` returns them.
     """
 
     def __init__(

@@ -270,7 +270,7 @@ class ZenerBody:
         return {**surface, "frozen": Entry(frozen), **branches}
 
     def restored(self, memory: BodyMemory, saved: Saved) -> BodyMemory:
-        """Return the memory of a checkpoint, whose maps have been read into those of `memory`.
+        """Return the memory of a checkpoint, whose maps have been read into `memory`.
 
         A branch without a map in `saved` starts as `G_k u` if it was frozen, else as 0.
         """

@@ -87,8 +87,8 @@ class Convolution:
 class MirroredConvolution:
     """A linear operator on maps that continue mirrored at their edges, by its real symbol on `cosines`.
 
-    `part(rows)` returns the symbol of the real parts of the spectrum as its real part, and that of the imaginary
-    parts.
+    `part(rows)` returns the symbol of the real parts of the spectrum as its real part, and the symbol of the
+    imaginary parts as its imaginary part.
     """
 
     def __init__(self, cosines: Cosines, part: Callable[[slice], NDArray[np.complexfloating]]) -> None:
@@ -178,7 +178,7 @@ def table_transform(fft: FFT, inside: bool) -> FFT:
 
 
 def _symmetric(coefficient: Callable[..., Array], distances: NDArray[np.int64], step: float) -> Array:
-    """Return coefficients of square cells: those of x >= y, copied to the others."""
+    """Return coefficients of square cells: only x >= y is computed and copied to the others."""
     count = len(distances)
     quadrant = np.empty((count, count))
     for rows in deal(count, PARTS):

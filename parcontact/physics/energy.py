@@ -12,7 +12,7 @@ dt/tau` and the bend `c = kappa/2 (du - r du_before)`,
     a = (1 - exp(-z s))/z,     b = int_0^s exp(-z (s - x)) (2 x - 1) dx.
 
 The error of the motion itself appears in the difference of this work to that of the forces on the surface, the
-integral of `W dd - F ds`. Backward Euler defines no motion within a step: its work is that of the trapezoidal rule,
+integral of `W dd - F ds`. Backward Euler defines no motion within a step: its work follows from the trapezoidal rule,
 its dissipation that at the end of the step, and the balance closes to first order in the time step.
 """
 
@@ -131,7 +131,7 @@ def motion_at_nodes(z: Array) -> tuple[Array, Array, Array]:
 
 
 class ElasticEnergy:
-    """Energies of a body without memory, which stores all work. `unit` [J] is that of all energies."""
+    """Energies of a body without memory, which stores all work. `unit` [J] is the unit of all energies."""
 
     bodies: tuple[ZenerBody, ...] = ()  # that relax
 
@@ -226,13 +226,13 @@ class ElasticPressure:
         return self.body.memory_entries(memory, strain, "1", units.modulus * strain, "Pa")
 
     def restored(self, memory: BodyMemory | None, saved: Saved) -> BodyMemory:
-        """Return the memory of a checkpoint, whose maps have been read into those of `memory`."""
+        """Return the memory of a checkpoint, whose maps have been read into `memory`."""
         assert memory is not None
         return self.body.restored(memory, saved)
 
 
 class ZenerEnergy:
-    """Energies of a `ZenerBody`; `unit` [J] is that of all energies."""
+    """Energies of a `ZenerBody`; `unit` [J] is the unit of all energies."""
 
     def __init__(
         self, slab: Slab, material: ZenerBody, inverse: AppliedInverse | ElasticPressure, unit: float = 1.0
@@ -304,7 +304,7 @@ class ZenerEnergy:
         }
 
     def restored(self, memory: EnergyMemory, saved: Saved) -> EnergyMemory:
-        """Return the energies of a checkpoint, whose maps have been read into those of `memory`."""
+        """Return the energies of a checkpoint, whose maps have been read into `memory`."""
         work, stored, spring, increment = (float(saved[name]) for name in ("work", "stored", "spring", "increment"))
         names = "dissipated", "branches", "crossed"
         dissipated, branches, crossed = (np.array(saved[name], dtype=np.float64) for name in names)

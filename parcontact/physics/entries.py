@@ -54,7 +54,7 @@ class RunPart(Protocol[Memory]):
         """Return the entries of a memory by the part's own names; maps are not copied."""
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:
-        """Return the memory of a checkpoint, whose maps have been read into those of `memory`; numbers are arrays in
+        """Return the memory of a checkpoint, whose maps have been read into `memory`; numbers are arrays in
         the run's units."""
 
 

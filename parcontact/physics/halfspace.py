@@ -60,8 +60,8 @@ class HalfSpace:
 
     With `free`, nothing surrounds the box, and the coefficients are Love's; with `repeats_along_x` the box is
     periodic along x only (`physics.strip`). Otherwise the box is periodic, with the `kernel`. `fft` parameters of
-    methods are transforms of maps; operators compute in their precision, and symbols have their shape or that of the
-    requested rows. A free half space makes its own padded transform for each operator.
+    methods are transforms of maps; operators compute in their precision, and symbols have their shape, or the shape
+    of the requested rows. A free half space makes its own padded transform for each operator.
     """
 
     size: Vector
@@ -111,9 +111,10 @@ class HalfSpace:
     def inverse_symbol(self, fft: FFT, rows: slice = ALL) -> Array:
         """Return pressure over displacement of each wave, `|q|/(1 - nu)`, without the kernel.
 
-        At q = 0, where a periodic half space has no inverse, it is that of the smallest wavenumber, which keeps it
-        positive. Waves on a layer that are longer than its softest one get the stiffness of this one: they would
-        join patches of contact. Their higher stiffness within patches is left to `solve.preconditioner.long_waves`.
+        At q = 0, where a periodic half space has no inverse, it has the value of the smallest wavenumber, which
+        keeps it positive. Waves on a layer that are longer than its softest one get the stiffness of this one: they
+        would join patches of contact. Their higher stiffness within patches is left to
+        `solve.preconditioner.long_waves`.
         """
         q = np.hypot(*wavenumbers(fft, self.size, rows))
         q[q == 0.0] = 2 * np.pi / max(self.size)
@@ -142,7 +143,8 @@ class HalfSpace:
         return (1.0 - self.poisson) * max(self.size) / (2 * np.pi)
 
     def own_lengths(self, points: tuple[int, int]) -> tuple[int, int] | None:
-        """Return the lengths of the padded transform of an operator on `points`; None if it uses that of the maps."""
+        """Return the lengths of the padded transform of an operator on `points`; None if it uses the transform of the
+        maps."""
         if not self.free:
             return None
         lengths = padded_lengths(*points)
@@ -178,7 +180,7 @@ class HalfSpace:
         """Return the operator from displacement to pressure.
 
         It is exact for the periodic half space with the spectral kernel, except for the mean; otherwise, and for a
-        layer, it is a preconditioner. That of a free box continues displacements mirrored at its edges, so that they
+        layer, it is a preconditioner. The one of a free box continues displacements mirrored at its edges, so that they
         have no jump there.
         """
         if self.free and not self.repeats_along_x:

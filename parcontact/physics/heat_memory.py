@@ -105,7 +105,7 @@ class HeatMemory:
         """Advance by a step dt [s] to these maps of rubbing and pressure, and put the temperature rise of the surface
         [K] into `out`. Return the mean rise [K] at the depths where the body releases heat, weighted by this heat.
 
-        `pressed` is a spectrum, that of the transform or a copy; `scales` give both maps the mean 1.
+        `pressed` is a spectrum, the buffer of the transform or a copy; `scales` give both maps the mean 1.
         """
         known, fft = self.sum, self.fft
         now, fresh = pressed, np.zeros((0, fft.shape[1]), fft.complex)

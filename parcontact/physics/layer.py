@@ -106,9 +106,9 @@ class Layer:
     def coefficients(self, x: Array, y: Array, dx: float, dy: float, of_half_space: Array) -> Array:
         """Return the displacements at distances (x, y) from a `dx x dy` cell under unit pressure.
 
-        `of_half_space` are those of a half space (Love's). The difference is smooth on the scale of the thickness:
-        `(1 - nu)/(2 pi) int (S(q d) - 1) J0(q r) dq`, averaged over the cell by Simpson's rule. Beyond FAR it is cut
-        off.
+        `of_half_space` has the displacements of a half space (Love's). The difference is smooth on the scale of the
+        thickness: `(1 - nu)/(2 pi) int (S(q d) - 1) J0(q r) dq`, averaged over the cell by Simpson's rule. Beyond
+        FAR it is cut off.
         """
         correction = self._correction()
         mean = np.zeros(np.broadcast_shapes(x.shape, y.shape))

@@ -61,7 +61,7 @@ def over_cell(x, y, dx, dy):  # type: ignore[no-untyped-def]  # numba finds the 
 def cell_factor(fft: FFT, size: tuple[float, float], rows: slice = ALL) -> Array:
     """Return the compliance of cell-constant pressure over that of a sampled wave, for each wavenumber; to 14 digits.
 
-    `size` is that of the box, `rows` are those of a spectrum. A wave of cell-constant pressures contains all aliases
+    `size` is the size of the box, `rows` are rows of a spectrum. A wave of cell-constant pressures contains all aliases
     of its wavenumber, each with the form factor of the cell: `|q| sum_Q sinc((qx+Qx) dx/2) sinc((qy+Qy) dy/2) /
     |q+Q|` over the reciprocal lattice Q of the grid. With
 

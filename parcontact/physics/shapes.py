@@ -24,7 +24,7 @@ def _paraboloid(r2: Array, radius: float) -> tuple[Array, Array]:
 
 
 def _circle(r2: Array, radius: float) -> tuple[Array, Array]:
-    """Return height and slope factor of a circle; beyond the radius the height stays at that of the equator."""
+    """Return height and slope factor of a circle; beyond the radius the height is the height of the equator."""
     inside = np.minimum(r2, radius**2)
     rest = np.sqrt(radius**2 - inside)
     inverse = np.divide(-1.0, rest, out=np.zeros_like(rest), where=rest > 0.0)

@@ -343,7 +343,7 @@ def _of_one_temperature(path: Path, at: Array, temperatures: Array) -> Iterator[
             yield from numbers
         elif high - low >= NEAR:
             raise InputError(
-                f"{path}: its temperatures from {low:.4g} to {high:.4g} C cannot be told apart: those of one sweep "
+                f"{path}: its temperatures from {low:.4g} to {high:.4g} C cannot be separated: those of one sweep "
                 f"must be one number, or lie {NEAR:g} degrees and more from those of the next"
             )
         else:

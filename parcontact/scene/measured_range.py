@@ -61,8 +61,8 @@ def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
 
 
 def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedBand]:
-    """Return the frequencies that a job excites at each temperature of a friction curve, or at that of the material;
-    none if the surface does not move."""
+    """Return the frequencies that a job excites at each temperature of a friction curve, or at the temperature of the
+    material; none if the surface does not move."""
     if (band := excited_band(job)) is None:
         return []
     body = _body(job)
@@ -76,7 +76,7 @@ def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedB
 def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
     """Yield warnings about frequencies and temperatures at which the material was not measured.
 
-    `temperatures` [deg C] are those of a friction curve; without them that of the material counts.
+    `temperatures` [deg C] belong to a friction curve; without them the temperature of the material counts.
     """
     if (body := _body(job)) is None:
         return

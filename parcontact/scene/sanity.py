@@ -102,7 +102,7 @@ def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
 
 
 def refuse_approaches(setup: Setup) -> None:
-    """Raise JobError for stages whose approach exceeds that of full contact."""
+    """Raise JobError for stages whose approach exceeds the approach at full contact."""
     mistakes = []
     for index, stage in enumerate(setup.job.history if has_full_contact(setup) else ()):
         most = max(stage.load.start, stage.load.end)

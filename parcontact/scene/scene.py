@@ -103,7 +103,7 @@ class Setup:
 
 @dataclass
 class Scene:
-    """Everything a march needs. `law` is the contact law of an effect, or None for that of the constraint."""
+    """Everything a march needs. `law` is the contact law of an effect, or None for the law of the constraint."""
 
     setup: Setup
     motion: Motion
@@ -314,7 +314,8 @@ def _operators(setup: Setup, operator_type: type[np.floating]) -> Operators:
 def _body_and_energy(
     setup: Setup, folded: FoldedBranches, inverse: AppliedInverse
 ) -> tuple[Body, ElasticEnergy | ZenerEnergy | None]:
-    """Make the body, and its energies if the job asks for them; `inverse` is used if it is that of the operator."""
+    """Make the body, and its energies if the job asks for them; `inverse` is used if it is the inverse of
+    the operator."""
     chosen, slab, integrator = setup.choices, setup.slab, setup.choices.numerics.integrator
     unit = setup.units.pressure * setup.units.height * setup.grid.dx * setup.grid.dy
     if not chosen.viscoelasticity.on:

@@ -117,8 +117,8 @@ class ContactSolver:
         """Solve from the admissible pressure `start`, which is overwritten by the solution; collective.
 
         Under load control the start is scaled to the load, or replaced by a uniform pressure if it is 0 everywhere.
-        `tolerance` replaces that of the solver. If it is not reached, `failure` states why, and the maps hold the
-        last iterate.
+        `tolerance` replaces the tolerance of the solver. If it is not reached, `failure` states why, and the maps
+        hold the last iterate.
         """
         mean = problem.mean
         if mean is not None and 0.0 <= mean < LEAST_LOAD:
@@ -199,7 +199,7 @@ class ContactSolver:
     def _turn(self, problem: Problem, level: float, slope: float, members: float, free: Array) -> tuple[float, float]:
         """Make the new search direction. Return its slope `<r, t>`, and the exact step over the last step made.
 
-        The residual is `u - h - level` on the working set. `slope` is that of the last direction; 0 forgets it. The
+        The residual is `u - h - level` on the working set. `slope` belongs to the last direction; 0 forgets it. The
         map `free` is overwritten.
         """
         work, h = self.workspace, problem.heights

@@ -76,7 +76,7 @@ def certify(
     """Mark the working set of a pressure p with the image u. Return its size, its sum of gaps, and the certificate;
     collective.
 
-    `mean` is the prescribed mean pressure, None with a given approach; `height` is that of the surface.
+    `mean` is the prescribed mean pressure, None with a given approach; `height` is the height of the surface.
     """
     *sums, deepest = constraint.mark_working_set(p, u, h, iterate.d, working)
     wrong, members, excess, held, deepest = slab.reduce(sums, [deepest])

@@ -85,7 +85,7 @@ def _pressures(job: Job) -> tuple[float, ...]:
 class States(Protocol):
     """Steady states of a job, one velocity and pressure after the other; collective.
 
-    `setup` is that of the states. `table` is the name of an additional table with its columns, or None; `rows` are
+    `setup` is the setup of the states. `table` is the name of an additional table with its columns, or None; `rows` are
     its lines for the last state at a velocity [m/s]. Intermediate results may be stored by `keep_in` a directory,
     until `forget` is called after the state is written.
     """

@@ -43,8 +43,8 @@ def find_temperatures(
 ) -> tuple[Flash, Array]:
     """Return the temperatures of a steady state, and this rank's rows of the map of rises [K]; collective.
 
-    `pressure` is a map in the run's units, `touching` is not 0 where the surfaces touch, and `friction` is that of
-    the body, without the interface.
+    `pressure` is a map in the run's units, `touching` is not 0 where the surfaces touch, and `friction` is the
+    friction of the body, without the interface.
     """
     slab, fft, size, speed = setup.slab, setup.fft, setup.grid.size, math.hypot(*velocity)
     if not speed:  # no dissipation
@@ -74,7 +74,7 @@ def find_temperatures(
 
 
 class Feedback:
-    """The fixed point of the temperature. The first round is that of the cold body; the second starts from the last
+    """The fixed point of the temperature. The first round is for the cold body; the second starts from the last
     fixed point if only the velocity differs."""
 
     def __init__(self) -> None:

@@ -55,7 +55,7 @@ class SteadySliding:
     """Steady states of one job's surface and body; the constructor and the methods are collective.
 
     Solves start from coarser grids, or from the last state if its velocity is nearly the same. The tolerance on
-    certificates follows from that of the job and is at most `most`.
+    certificates follows from the tolerance of the job and is at most `most`.
     """
 
     def __init__(self, setup: Setup, most: float = math.inf) -> None:
@@ -208,7 +208,7 @@ class SteadySliding:
         """Yield pressures on the finest grid to start from, None for coarser grids from a uniform pressure, each with
         the function that makes its solver.
 
-        The usual solver comes first, that of proximal points last, or first for a body with a very large loss
+        The usual solver comes first, the solver of proximal points last, or first for a body with a very large loss
         tangent. The last state is the better start only at nearly the same velocity. Extrapolating it is no better,
         as contact spots appear and vanish.
         """
@@ -318,6 +318,6 @@ def tolerance_of(asked: float) -> float:
 
 
 def _direction(velocity: Vector) -> tuple[float, float]:
-    """Return the unit vector of a velocity; that of x at rest."""
+    """Return the unit vector of a velocity; the unit vector of x at rest."""
     speed = math.hypot(*velocity)
     return (velocity[0] / speed, velocity[1] / speed) if speed > 0.0 else (1.0, 0.0)

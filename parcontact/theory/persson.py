@@ -16,7 +16,7 @@ none) corrects the friction.
 Source: B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840; with time B. N. J. Persson and A. I. Volokitin, Phys. Rev.
 B 65 (2002) 134106; for gamma M. Scaraggi and B. N. J. Persson, J. Phys.: Condens. Matter 27 (2015) 105102, as in
 Sec. 3.1 of the paper "Transient frictionless contact of a rough rigid surface on a viscoelastic half-space". That
-paper prints no formula of the theory. The steady form above is the published one; with time, M is that of full
+paper prints no formula of the theory. The steady form above is the published one; with time, M is taken from full
 contact, and P is taken at the present time. A theory with P inside the integral over the past would differ in
 transients of partial contact only.
 

@@ -43,7 +43,7 @@ def test_temperatures_near_to_each_other_are_sets_of_their_own(tmp_path: Path, s
 
 def test_temperatures_that_waver_and_touch_are_refused(tmp_path: Path) -> None:
     rows = [FREQUENCY, STORAGE, LOSS, np.linspace(20.0, 25.0, FREQUENCY.size)]
-    with pytest.raises(InputError, match="temperatures from 20 to 25 C cannot be told apart"):
+    with pytest.raises(InputError, match="temperatures from 20 to 25 C cannot be separated"):
         measured_moduli.read_moduli(sweep(tmp_path / "rubber.csv", "f[Hz],G'[MPa],G''[MPa],T[C]", rows))
 
 

@@ -29,7 +29,7 @@ from .gap_solver import GapSolver
 from .law import Law
 
 MAX_PASSES = 12  # tuning: limit on passes of a free body before A itself is used; one to three are usual
-LEFT = 0.8  # accuracy: tolerance of a solve with A, over that of the run; the rest is for the inverse
+LEFT = 0.8  # accuracy: tolerance of a solve with A over the tolerance of the run; the rest is for the inverse
 DIGITS = 0.01  # accuracy: relative error of the inverse of A, over the tolerance
 UNSETTLED = "did not settle in a free box"
 LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: limits on the share of a change of the lagged part that is made
@@ -56,8 +56,8 @@ class AdhesiveSolver:
     ) -> tuple[Contact, bool]:
         """Solve from `gap`, which is overwritten by the solution, and put the pressure into `out`; collective.
 
-        `free_correction` is `(A - B) p` of a free body and is updated. The tolerance is `loose` times that of the
-        run. Return the contact, and whether the surfaces have detached.
+        `free_correction` is `(A - B) p` of a free body and is updated. The tolerance is `loose` times the tolerance
+        of the run. Return the contact, and whether the surfaces have detached.
         """
         tolerance = loose * self.tolerance
         if self.free is None or free_correction is None:

@@ -1,6 +1,6 @@
 """Fused loops for contact with adhesion, over the rows of this rank; each returns partial sums for one Allreduce.
 
-The attraction sigma is that of a `Law`; q is the pressure K (g + h), to which a mean is added.
+The attraction sigma follows a `Law`; q is the pressure K (g + h), to which a mean is added.
 """
 
 import numpy as np

@@ -77,7 +77,7 @@ class GapSolver:
         tolerance: float,
         operators: GapOperators | None = None,
     ) -> GapSolution:
-        """Solve from `gap`, which is overwritten by the solution. `operators` replace those of the solver;
+        """Solve from `gap`, which is overwritten by the solution. `operators` replace the operators of the solver;
         collective."""
         it = self._begin(law, heights, control, gap, operators or self.operators)
         g, other = gap, self._gap
@@ -190,7 +190,7 @@ class GapSolver:
         return certify_gap(self.slab, it, self._working, g, self._q, self._sigma, z)
 
     def _turn(self, it: GapIterate, members: float, scale: float, z: Array) -> float:
-        """Make the new direction from z. Return `<c, z>`; `scale` is that of the last direction, 0 forgets it.
+        """Make the new direction from z. Return `<c, z>`; `scale` belongs to the last direction, 0 forgets it.
         Collective."""
         working = self._working
         step = it.share, self._image, self._other_sigma, it.change

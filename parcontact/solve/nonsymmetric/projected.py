@@ -39,7 +39,7 @@ class Projected:
     """Projected steps on one grid. It holds DIRECTIONS maps t, their images w, and the maps of
     `ExtendedPreconditioner`.
 
-    `pairs` doublings make cells square. `least_cut` is that of `LocalLoad` on squares, as a share of the load; the
+    `pairs` doublings make cells square. `least_cut` is LEAST_CUT of `LocalLoad` on squares, as a share of the load; the
     smaller cells of `pairs` reduce it.
     """
 
