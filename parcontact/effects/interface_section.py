@@ -27,8 +27,9 @@ def _whole_bell(velocity: float | None, width: float | None) -> Iterator[Fault]:
 def _coefficient(coefficient: float | None, velocity: float | None, stick: bool) -> Iterator[Fault]:
     if coefficient is not None and not stick:
         yield Fault("needs stick: true", ("coefficient",))
-    if coefficient is not None and velocity is not None:
-        yield Fault("goes with shear_stress: leave it out, a coefficient does not depend on it", ("velocity",))
+    if stick and velocity is not None:
+        sentence = "does not go with stick: a strength that falls with velocity has more than one solution of a step"
+        yield Fault(sentence, ("velocity",))
 
 
 def _incompressible(interface: Any, material: Any) -> Iterator[Fault]:

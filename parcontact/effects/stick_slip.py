@@ -66,9 +66,9 @@ class StickMemory:
     """Memory of stick and slip; maps in the run's units, of two components stacked but for bounds.
 
     `body` is that of the displacements along the surface, `last` the tractions of the last step, with the modulus
-    `alpha`; `spare` has room for the next ones. `target` is where points end that stick. `share` is the mean traction
-    over the mean bound. `energy` is that of the body, None where none is asked for, `lost` what slip has lost [J].
-    `columns` are those of the last row but `slip_loss`.
+    `alpha`, and `spare` those of the step before that, whose place is that of the next ones. `target` is where points
+    end that stick. `share` is the mean traction over the mean bound. `energy` is that of the body, None where none is
+    asked for, `lost` what slip has lost [J]. `columns` are those of the last row but `slip_loss`.
     """
 
     body: BodyMemory
@@ -127,9 +127,11 @@ class StickSlip(InterfaceEffect[StickMemory]):
     def _start(self, instant: Instant, memory: StickMemory) -> BoundedTraction:
         """Return the bounds of a step and tractions to start from, in the spare maps; local."""
         (t, bound), last = memory.spare, memory.last
-        t[...] = last.traction
         self._fill_bound(instant, bound)
-        discs.carry_over(*components(t), last.bound, memory.alpha / instant.modulus, bound, *memory.share)
+        scale = memory.alpha / instant.modulus, instant.step.growth
+        discs.extrapolate_tractions(
+            *components(last.traction), last.bound, *scale, bound, *memory.share, *components(t)
+        )
         return memory.spare
 
     def _fill_bound(self, instant: Instant, bound: Array) -> None:
@@ -191,6 +193,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         pressure = units.height / units.length
         both = {
             "traction": Entry(memory.last.traction, pressure),
+            "earlier traction": Entry(memory.spare.traction, pressure),
             "target": Entry(memory.target, units.height, "m"),
             **self._body.memory_entries(memory.body, units.height, "m", units.modulus * units.height, "Pa m"),
         }

@@ -1,6 +1,7 @@
 """Stick and slip: closed forms of Cattaneo and Mindlin, full slip, energies, ranks and restarts."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from marched_jobs import marched
 from mpi4py import MPI
 
 from parcontact.job import Job
+from parcontact.python.simulation import Simulation
 
 G, RADIUS, FORCE, MU = 1e6, 1e-2, 1e-3, 0.5
 A = (3.0 * FORCE * RADIUS / (16.0 * G)) ** (1.0 / 3.0)  # Hertz, one body that is incompressible
@@ -38,13 +40,13 @@ def sphere(stops: Any, points: int = 64, tolerance: float = 1e-4, **more: Any) -
     )
 
 
-def rough(stick: Any, material: Any = RUBBER, points: int = 32, **more: Any) -> dict[str, Any]:
+def rough(stick: Any, material: Any = RUBBER, points: int = 48, **more: Any) -> dict[str, Any]:
     """A rough surface that begins to slide over a box that repeats."""
-    surface = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 1.25e-4, "seed": 3}
+    surface = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "short_wavelength": 1.7e-4, "seed": 3}
     slide = {"pressure": 1e5, "velocity": [0.02, 0.005], "duration": 1e-4, "time_step": 1e-5}
     return {
         "grid": {"points": points, "size": 1e-3},
-        "surface": {**surface, "rolloff_wavelength": 5e-4, "rms_slope": 0.1},
+        "surface": {**surface, "rolloff_wavelength": 2.5e-4, "rms_slope": 0.1},
         "material": material,
         "interface": stick,
         "history": [{"pressure": 1e5, "duration": 1e-3, "time_step": 2.5e-4}, slide],
@@ -73,3 +75,75 @@ def test_ranks_agree(comm: MPI.Intracomm) -> None:
     assert together.added == pytest.approx(alone.added, rel=1e-6)
     assert together.measures.force_x == pytest.approx(alone.measures.force_x, rel=1e-6)
     assert 0.0 < alone.added[2] < alone.measures.contact_area
+
+
+def test_loops_of_mindlin_and_deresiewicz() -> None:
+    """What slip loses in a cycle between the shares 0.9 and -0.9, to 1 % with 16 cells in the radius; the work of the
+    force is the same to what the trapezoidal rule makes of ten steps, and the balance closes but for rounding."""
+    share, far = 0.9, mindlin(0.9)
+    down = np.linspace(far, -far, 21)[1:]
+    rows = marched(sphere([far, *down, *-down], output={"energy": True}))[1][2:]
+    lost = rows[-1].added[3] - rows[0].added[3]
+    part = 1.0 - (1.0 - share) ** (5.0 / 3.0) - 5.0 * share / 6.0 * (1.0 + (1.0 - share) ** (2.0 / 3.0))
+    assert lost == pytest.approx(4.8 * part * MU * FORCE * mindlin(1.0), rel=1e-2)
+    forces, stops = [-row.measures.force_x for row in rows], [far, *down, *-down]
+    pairs = zip(forces[1:], forces[:-1], np.diff(stops), strict=True)
+    assert sum(0.5 * (new + old) * way for new, old, way in pairs) == pytest.approx(lost, rel=5e-3)
+    last = rows[-1]
+    assert last.work == pytest.approx(last.stored + last.dissipated + last.added[3], rel=1e-12)
+
+
+def test_full_slip_is_friction_of_the_interface() -> None:
+    """Where all slips, tractions by a shear stress have the force of the same stress without stick, along the sliding
+    to the squares of the angles between slip and sliding."""
+    slide = {"pressure": 1e5, "velocity": 0.5, "distance": 2e-4, "cells_per_step": 1}
+    more: dict[str, Any] = {"history": [{"pressure": 1e5}, slide], "numerics": {"tolerance": 1e-4}}
+    plain, stuck = (marched(rough({"shear_stress": 1e4, **way}, **more))[1][-1] for way in ({}, {"stick": True}))
+    assert stuck.added[2] == 0.0
+    assert stuck.measures.contact_area == plain.measures.contact_area
+    assert stuck.measures.force_x == pytest.approx(plain.measures.force_x, rel=1e-4)
+
+
+@pytest.mark.parametrize("coefficient", [1e-9, 1e9])
+def test_limits_of_the_coefficient(coefficient: float) -> None:
+    """With hardly any friction all slips, and the tractions add up to the coefficient. With much all that touches
+    sticks, and a sphere that is moved in one step has the force of a bonded punch, `8 G a u/(2 - nu)`, to 3 % with 16
+    cells in the radius."""
+    way = 1e-8
+    row = marched(sphere([way], interface={"coefficient": coefficient, "stick": True}))[1][-1]
+    if coefficient < 1.0:
+        assert row.measures.friction_interface == pytest.approx(coefficient, rel=1e-9)
+        assert row.added[2] == 0.0
+    else:
+        assert row.added[2] == row.measures.contact_area
+        assert -row.measures.force_x == pytest.approx(16.0 * G * A * way / 3.0, rel=3e-2)
+
+
+def test_energies_of_rubber_that_begins_to_slide() -> None:
+    """Work is stored, dissipated or lost in slip, to rounding; all three grow."""
+    last = marched(rough({"coefficient": 0.3, "stick": True}, output={"energy": True}))[1][-1]
+    lost = last.added[3]
+    assert min(last.stored, last.dissipated, lost) > 0.0
+    assert last.work == pytest.approx(last.stored + last.dissipated + lost, rel=1e-10)
+
+
+def test_restart_is_exact(tmp_path: Path) -> None:
+    """A run that goes on from a checkpoint has the bits of one that was not stopped."""
+    data = rough({"coefficient": 0.3, "stick": True}, output={"energy": True})
+    whole = Simulation(data)
+    for row in whole.steps():
+        if row.step == 9:
+            whole.save(tmp_path / "state.h5")
+    again = Simulation.restore(tmp_path / "state.h5")
+    last = again.run()
+    for name in ("force_x", "friction", "stick_area", "slip_loss", "work", "stored", "dissipated"):
+        assert getattr(last, name) == getattr(row, name)
+    for name in ("traction_x", "traction_y"):
+        assert np.array_equal(again.field(name), whole.field(name))
+
+
+def test_without_stick_nothing_is_made() -> None:
+    """An interface without stick has the counts of none at all."""
+    plain, shear = (marched(rough(section))[0].scene for section in (None, {"shear_stress": 1e5}))
+    assert shear.slab.tally == plain.slab.tally
+    assert shear.further_bodies == []

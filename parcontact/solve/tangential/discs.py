@@ -21,19 +21,23 @@ def shorten_to_bounds(bound, x, y):
 
 
 @loop
-def carry_over(x, y, old_bound, factor, bound, mean_x, mean_y):
-    """Make a start of the tractions (x, y) of the step before: those that slipped stay at their bounds, which may
-    differ, others are `factor` times what they were, and new ones the mean share (mean_x, mean_y) of their bounds."""
+def extrapolate_tractions(last_x, last_y, last_bound, factor, growth, bound, mean_x, mean_y, x, y):
+    """Make a start in the place of the tractions (x, y) of two steps ago, from the last ones.
+
+    Tractions that slipped stay at their bounds, others are `factor` times what they were, both with `growth` times
+    their last change; new ones have the mean share (mean_x, mean_y) of their bounds.
+    """
     for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
-            size, scale = math.hypot(x[j, i], y[j, i]), factor
-            if old_bound[j, i] <= 0.0:
+            if last_bound[j, i] <= 0.0:
                 x[j, i], y[j, i] = mean_x * bound[j, i], mean_y * bound[j, i]
                 continue
-            if size >= AT_BOUND * old_bound[j, i]:
-                scale = bound[j, i] / size
-            x[j, i] *= scale
-            y[j, i] *= scale
+            a, b = last_x[j, i], last_y[j, i]
+            slipped = math.hypot(a, b) >= AT_BOUND * last_bound[j, i]
+            a, b = a + growth * (a - x[j, i]), b + growth * (b - y[j, i])
+            size = math.hypot(a, b)
+            scale = bound[j, i] / size if slipped and size > 0.0 else factor
+            x[j, i], y[j, i] = scale * a, scale * b
 
 
 @loop
@@ -78,6 +82,20 @@ def slip_of(free, u, e, r):
 
 
 @loop
+def turn_products(bound, free, d, u, u_old):
+    """Sums of d d and of `d (u - u_old)` where points slip, of one component."""
+    square, work = 0.0, 0.0
+    for j in range(d.shape[0]):
+        row_square, row_work = 0.0, 0.0
+        for i in range(d.shape[1]):
+            if bound[j, i] > 0.0 and not free[j, i]:
+                row_square += d[j, i] * d[j, i]
+                row_work += d[j, i] * (u[j, i] - u_old[j, i])
+        square, work = square + row_square, work + row_work
+    return square, work
+
+
+@loop
 def direction_products(free, u, u_old, e, z, d):
     """Over free points, with the slip `w = e - u`, which fell by `c = u - u_old` in the last step along d: sums of w z,
     c z, w d and c d, of one component."""
@@ -105,8 +123,8 @@ def redirect(free, z, beta, d):
 
 @loop
 def move_tractions(bound, free, step, d_x, d_y, turn, u_x, u_y, e_x, e_y, x, y):
-    """Move tractions within their bounds: free ones by `step d`, those that slip by `turn w`. Returns sums of their
-    sizes, and of what was cut off those that were free."""
+    """Move tractions within their bounds: free ones by `step d`, those that slip by `turn w`, where d becomes by what
+    they moved, over the step. Returns sums of their sizes, and of what was cut off those that were free."""
     size, cut = 0.0, 0.0
     for j in range(bound.shape[0]):
         row_size, row_cut = 0.0, 0.0
@@ -124,6 +142,8 @@ def move_tractions(bound, free, step, d_x, d_y, turn, u_x, u_y, e_x, e_y, x, y):
                 a, b = a * (most / here), b * (most / here)
                 row_cut += here - most if free[j, i] else 0.0
                 here = most
+            if not free[j, i]:
+                d_x[j, i], d_y[j, i] = (a - x[j, i]) / step, (b - y[j, i]) / step
             x[j, i], y[j, i] = a, b
             row_size += here
         size, cut = size + row_size, cut + row_cut

@@ -36,6 +36,7 @@ from . import discs
 
 STEP = 0.55  # tuning: of free tractions: waves along q are half as stiff as K takes them, those across q as stiff
 TURN = 2.0  # tuning: of slipping ones; from 4 on many iterations raise J
+MOST = 4.0  # tuning: times the last step of slipping tractions is the next one at most
 LARGE_CUT = 0.003  # tuning: of the sum of tractions: if more is cut off, the next direction begins anew
 LEAST_DESCENT = 0.5  # tuning: over that without the last direction
 ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # accuracy: of <t, A t>/2: a smaller rise is none
@@ -78,6 +79,7 @@ class TangentialSolver:
             return self._rest(bound)
         self._operator.apply(t, self._u)
         best, energy, iteration, begins = (math.inf, 0), math.inf, 0, True
+        touching = self.slab.sum(float(np.count_nonzero(bound > 0.0)))[0]
         step, turn = STEP, TURN * kappa
         while True:
             found = discs.examine(bound, t_x, t_y, *components(self._u), *e, kappa, self.free)
@@ -89,6 +91,8 @@ class TangentialSolver:
                 return Tractions(self._u, certificate, iteration, round(stuck), failure)
             if now > energy + ENERGY_ROUNDING * work:
                 step, turn, begins = 0.5 * step, 0.5 * turn, True
+            if iteration and stuck < touching:
+                turn = self._turn_again(bound, step, turn)
             energy, iteration = now, iteration + 1
             if stuck:
                 self._redirect(e, begins)
@@ -97,6 +101,14 @@ class TangentialSolver:
             begins = cut > LARGE_CUT * size or not stuck
             self._u, self._other = self._other, self._u
             self._operator.apply(t, self._u)
+
+    def _turn_again(self, bound: Array, step: float, turn: float) -> float:
+        """Return the step of tractions that slip, by the compliance that they had in the last one; collective."""
+        sums = np.zeros(2)
+        for d, u, old in zip(*(components(one) for one in (self._d, self._u, self._other)), strict=True):
+            sums += discs.turn_products(bound, self.free, d, u, old)
+        square, work = self.slab.sum(*sums)
+        return min(step * square / work, MOST * turn) if work > 0.0 else turn
 
     def _redirect(self, e: tuple[Array, Array], begins: bool) -> None:
         """Make the next direction of free tractions; one that `begins` forgets the last; collective."""
