@@ -14,8 +14,8 @@ from ..job.text.fault import Fault
 from ..physics.entries import Memory
 from .effect import Decision, Effect
 
-SAME = 1e-9  # rounding: of Poisson's ratio
-LEAST_POISSON = 0.49  # physics: below it shear moves the surface, and the solve would have to be coupled
+SAME = 1e-9  # rounding: tolerance on Poisson's ratio
+LEAST_POISSON = 0.49  # physics: least Poisson's ratio for which shear hardly moves the surface along its normal
 
 
 def _whole_bell(velocity: float | None, width: float | None) -> Iterator[Fault]:

@@ -1,20 +1,20 @@
-"""Tractions along the surface of a half space -> displacements of its surface along itself.
+"""Operator from tractions along the surface of a half space to the displacements along it.
 
 A wave of tractions t, two components, moves the surface of an elastic half space of shear modulus 1 by
 
     u^(q) = 1/|q| (I - nu q q^T/q^2) t^(q).
 
-A wave along q is as compliant as one of pressure, `(1 - nu)/|q|`, one across it is `1/|q|`. In an incompressible half
-space (nu = 1/2) tractions do not move the surface along its normal, nor do pressures along itself (K. L. Johnson,
-Contact Mechanics, 1985, section 3.6).
+Tractions along q have the compliance of a pressure, `(1 - nu)/|q|`, tractions across q the compliance `1/|q|`. In an
+incompressible half space (nu = 1/2) tractions do not move the surface along its normal, and pressures do not move it
+along itself (K. L. Johnson, Contact Mechanics, 1985, section 3.6).
 
-The mean displacement of a periodic half space is 0. In a box with nothing around the tractions are constant on cells,
-and the displacement at a distance (x, y) from the middle of a cell is the integral over it of Cerruti's solution
+The mean displacement of a periodic half space is 0. In a free box tractions are constant on each cell, and the
+displacement at a distance (x, y) from the centre of a cell is the integral over it of Cerruti's solution
 
-    u_x = t_x ((1 - nu)/r + nu x^2/r^3)/(2 pi) + t_y nu x y/r^3/(2 pi)
+    u_x = t_x ((1 - nu)/r + nu x^2/r^3)/(2 pi) + t_y nu x y/r^3/(2 pi),
 
-and the same with x and y exchanged. With the integral of 1/r over the cell (`love.over_cell`) it is known from those of
-`x^2/r^3`, whose primitive is `y asinh(x/|y|)`, and of `x y/r^3`, whose primitive is -r.
+and u_y with x and y exchanged. It follows from the integrals over the cell of 1/r (`love.over_cell`), of `x^2/r^3`,
+with the primitive `y asinh(x/|y|)`, and of `x y/r^3`, with the primitive -r.
 """
 
 from collections.abc import Callable
@@ -41,14 +41,14 @@ def _twice(rows: slice) -> slice:
 
 
 def components(field: Array) -> tuple[Array, Array]:
-    """Return the maps of both components of a stacked one, in its memory."""
+    """Return the maps of both components of a stacked map, in its memory."""
     rows = len(field) // 2
     return field[:rows], field[rows:]
 
 
 class ShearOperator:
-    """Tractions -> displacements on a half space of shear modulus 1, loaded inside a box of a `size` [any unit of
-    length]; `free`: there is nothing around the box. Making and applying it are collective."""
+    """Operator from tractions to displacements on a half space of shear modulus 1, loaded inside a box of `size` [any
+    unit of length]; with `free`, nothing surrounds the box. The constructor and `apply` are collective."""
 
     def __init__(self, fft: FFT, size: Vector, poisson: float, free: bool) -> None:
         slab = fft.slab
@@ -73,7 +73,7 @@ class ShearOperator:
             symbol += 1.0 / q
 
     def apply(self, field: Array, out: Array) -> Array:
-        """Return the displacements of stacked tractions, in the map `out`; collective. It counts as two operators."""
+        """Put the displacements of stacked tractions into `out`; collective. It counts as two operators."""
         self.fft.slab.tally["operator"] += 2
         (t_x, t_y), (u_x, u_y) = components(field), components(out)
         first: Spectrum = self._other
@@ -86,8 +86,8 @@ class ShearOperator:
 
 
 def _coefficients(poisson: float) -> tuple[Callable[..., Array], ...]:
-    """Return the displacements at a distance (x, y) from a cell under a unit traction: along x by one along x, along y
-    by one along y, and along y by one along x."""
+    """Return three functions for the displacement at a distance (x, y) from a cell under a unit traction: along x by a
+    traction along x, along y by one along y, and along y by one along x."""
     along = partial(_along, poisson=poisson)
     return along, lambda x, y, dx, dy: along(y, x, dy, dx), partial(_across, poisson=poisson)
 
@@ -110,7 +110,7 @@ def _across(x: Array, y: Array, dx: float, dy: float, poisson: float) -> Array:
 
 @loop
 def _mix(first, second, along_x, along_y, across):  # type: ignore[no-untyped-def]  # numba finds the types itself
-    """Put the spectra of displacements in the places of those of tractions."""
+    """Replace the spectra of tractions by the spectra of displacements."""
     for j in range(first.shape[0]):
         for i in range(first.shape[1]):
             x, y = first[j, i], second[j, i]
