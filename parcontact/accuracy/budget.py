@@ -102,9 +102,11 @@ def _estimate(sources: Sequence[ErrorSource], run: RunProperties, observed: Step
 
 
 def add_shear(budget: ErrorBudget, body: float, shear: float, whole: float, solver: float, share: float) -> ErrorBudget:
-    """Return the budget of a friction `whole` of what the `body` makes, for which a budget is known, and of `shear` by
-    tractions that were solved for. These have the relative error `solver` of their solve, and a `share` of them that of
-    the area."""
+    """Return the budget of friction `whole`, the sum of the part of the `body`, with its `budget`, and of `shear` by
+    tractions.
+
+    The tractions have the relative error `solver` of their solve, and a `share` of them has the error of the area.
+    """
     if whole <= 0.0:
         return replace(budget, friction=None)
     of_body = budget.friction or ErrorParts(*(0.0 for _ in NAMES))

@@ -42,9 +42,9 @@ class Decision:
 
 @dataclass(frozen=True)
 class Sheared:
-    """What tractions along the surface make of a step: its measures with them, their force [N] on the rigid surface,
-    and the energy that slip has lost in it [J]. They are wrong by the relative `error` of their solve, and a `share` of
-    them by as much as the area is."""
+    """Effect of tractions along the surface in a step: the measures including them, their force [N] on the rigid
+    surface, and the energy lost in slip [J]. `error` is the relative error of their solve, and a `share` of them has
+    the error of the area."""
 
     measures: Measures
     force: Vector
@@ -182,8 +182,8 @@ class Effect(Protocol[Memory]):
         return None
 
     def further_energies(self, memory: Memory) -> "tuple[EnergyMemory, float] | None":
-        """Return energies of the body, in the unit of the scene, that join those under pressures, and what else the
-        work has been lost in [J]; None where there are none."""
+        """Return energies of the body, in the unit of the scene, to be added to those under pressure, and further
+        losses of work [J]; None without such energies."""
         return None
 
     def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:

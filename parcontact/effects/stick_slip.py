@@ -1,27 +1,28 @@
-"""Stick and slip of the contact area: how a body is sheared before it slides, and while parts of it slide.
+"""Stick and slip of the contact area: shear of a body before it slides, and while parts of the contact slide.
 
 The rigid surface moves by D along itself, the points of the body by u under tractions t that are bounded,
 
-    |t| <= f,    f = mu p (Coulomb) or a shear strength on all that touches.
+    |t| <= f,    f = mu p (Coulomb) or a shear strength at all points in contact.
 
-A point that touches slips by `s = D - u`: its slip grows along t where `|t| = f`, and not at all where `|t| < f`. In an
-incompressible half space tractions and pressures move the surface independently of each other
-(`physics.shear_operator`), so that the tractions of a step follow once its pressures are known. The body obeys the law
-of `physics.body` in both components,
+A point in contact slips by `s = D - u`: its slip grows along t where `|t| = f`, and is constant where `|t| < f`. In
+an incompressible half space tractions and pressures move the surface independently of each other
+(`physics.shear_operator`), so that the tractions of a step follow from its pressures. The body obeys the law of
+`physics.body` in both components,
 
     A t = G_inf u + sum_k h_k,
 
-and so a step to the tractions `alpha t` is the problem of `solve.tangential`: a point that sticks ends at its `target`
-g, where it was before plus what D has grown by, and
+so that a step to the tractions `alpha t` is the problem of `solve.tangential`. A point that sticks ends at its
+`target` g, its last displacement plus the increment of D, and
 
     e = g + r/alpha,    w = e - A t = g - u.
 
-Points of the body stay where they are on the grid, as in the normal march: u, t and the branches belong to them, and
-nothing is shifted. The surface moves over them; it carries the bounds f, which follow from the pressure of each step. A
-point that is not touched has g = u, so that its slip counts from the step in which it is touched. Targets of points
-that stick are not renewed from u: the residual of a solve does not add up to a creep over many steps.
+Points of the body keep their positions on the grid, as in a march without stick: u, t and the branches belong to
+them, and nothing is shifted. The surface moves over them and carries the bounds f, which follow from the pressure of
+each step. A point without contact has g = u, so that its slip counts from its first contact. Targets of points that
+stick are not reset to u, so that residuals of solves do not add up over many steps.
 
-With output.energy the work of the tractions on the body joins that of the pressures, and what slip loses is
+With output.energy the work of the tractions on the body is added to the work of the pressures, and the loss in slip
+is
 
     sum (t_old + t)/2 (s - s_old),
 
@@ -55,7 +56,7 @@ from .interface_section import InterfaceEffect
 
 
 class BoundedTraction(NamedTuple):
-    """Tractions `alpha traction`, stacked, and what bounds them, `alpha bound`."""
+    """Tractions `alpha traction`, stacked, and their bounds, `alpha bound`."""
 
     traction: Array
     bound: Array
@@ -83,7 +84,7 @@ class StickMemory:
 
 
 class StickSlip(InterfaceEffect[StickMemory]):
-    """The tractions of a contact that sticks and slips, and the columns that follow from them."""
+    """Tractions of a contact that sticks and slips, and the columns that follow from them."""
 
     columns: ClassVar[tuple[str, ...]] = (*added_by("interface"), *added_by("interface.stick"))
     fields: ClassVar[tuple[str, ...]] = ("traction_x", "traction_y")
@@ -174,8 +175,8 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return stuck / touching if self._law.coefficient is not None and touching > 0.0 else 1.0
 
     def values(self, memory: StickMemory) -> Sequence[float]:
-        """Return the parts of friction, the share of the box that sticks, and what slip has lost [J], NaN where no
-        energies are asked for."""
+        """Return the parts of friction, the share of the box that sticks, and the energy lost in slip [J], NaN without
+        energies."""
         return *memory.columns, math.nan if memory.energy is None else memory.lost
 
     def field(self, memory: StickMemory, name: str) -> Array:
@@ -208,7 +209,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return found
 
     def restored(self, memory: StickMemory, saved: Saved) -> StickMemory:
-        """Return the memory of a checkpoint, whose maps have been read into those of this one."""
+        """Return the memory of a checkpoint, whose maps have been read into `memory`."""
         joined = {name.removesuffix(" x"): value for name, value in saved.items()}
         energy = memory.energy
         if self._energy is not None and energy is not None:

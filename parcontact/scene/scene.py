@@ -150,7 +150,7 @@ class Scene:
 
     def body_for_shear(self, slab: Slab) -> tuple[ZenerBody, ElasticEnergy | ZenerEnergy | None]:
         """Make the same body again for displacements along the surface, on the slab of these, and their energies if the
-        job asks for them. It relaxes as this one from now on."""
+        job asks for them. Its relaxation follows this one."""
         chosen, folded, prony = self.choices, self.folded, self.setup.prony
         integrator = chosen.numerics.integrator
         body = ZenerBody(slab, prony, integrator, folded.memoryless, folded.frozen)

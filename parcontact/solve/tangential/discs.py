@@ -9,7 +9,7 @@ AT_BOUND = 1.0 - 1e-12  # rounding: share of its bound from which a traction is 
 
 @loop
 def shorten_to_bounds(bound, x, y):
-    """Shorten the tractions (x, y) to their bounds; without a bound above 0 there is none."""
+    """Shorten the tractions (x, y) to their bounds; a bound of 0 gives no traction."""
     for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
             size, most = math.hypot(x[j, i], y[j, i]), bound[j, i]
@@ -42,10 +42,13 @@ def extrapolate_tractions(last_x, last_y, last_bound, factor, growth, bound, mea
 
 @loop
 def examine(bound, x, y, u_x, u_y, e_x, e_y, kappa, free):
-    """Mark the points that are `free`: they touch and do not slip, as the traction is below its bound or the slip
-    `w = e - u` is against it. Returns sums: of |t|, of |P(t + kappa w)|, of `|P(t + kappa w) - t|`, with P(t) the
-    traction shortened to its bound; of `<t, u>/2 - <t, e>` and of `<t, u>/2`; and the number of free points."""
-    size, moved, apart, energy, work, count = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    """Mark the `free` points, which touch and do not slip: the traction is below its bound, or the slip `w = e - u` is
+    against it.
+
+    Return sums of |t|, of |P(t + kappa w)|, of `|P(t + kappa w) - t|`, with P(t) the traction shortened to its
+    bound, of `<t, u>/2 - <t, e>` and of `<t, u>/2`; and the number of free points.
+    """
+    size, moved, residual, energy, work, count = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(bound.shape[0]):
         sums = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
         for i in range(bound.shape[1]):
@@ -68,14 +71,14 @@ def examine(bound, x, y, u_x, u_y, e_x, e_y, kappa, free):
             sums[3] += half - a * e_x[j, i] - b * e_y[j, i]
             sums[4] += half
             sums[5] += 1.0 if free[j, i] else 0.0
-        size, moved, apart = size + sums[0], moved + sums[1], apart + sums[2]
+        size, moved, residual = size + sums[0], moved + sums[1], residual + sums[2]
         energy, work, count = energy + sums[3], work + sums[4], count + sums[5]
-    return size, moved, apart, energy, work, count
+    return size, moved, residual, energy, work, count
 
 
 @loop
 def slip_of(free, u, e, r):
-    """`r = e - u` where points are free, 0 elsewhere, of one component."""
+    """Put `e - u` at free points, 0 elsewhere, into r, for one component."""
     for j in range(r.shape[0]):
         for i in range(r.shape[1]):
             r[j, i] = e[j, i] - u[j, i] if free[j, i] else 0.0
@@ -115,7 +118,7 @@ def direction_products(free, u, u_old, e, z, d):
 
 @loop
 def redirect(free, z, beta, d):
-    """`d <- z + beta d` where points are free, 0 elsewhere, of one component."""
+    """Put `z + beta d` at free points, 0 elsewhere, into d, for one component."""
     for j in range(d.shape[0]):
         for i in range(d.shape[1]):
             d[j, i] = z[j, i] + beta * d[j, i] if free[j, i] else 0.0
@@ -152,8 +155,8 @@ def move_tractions(bound, free, step, d_x, d_y, turn, u_x, u_y, e_x, e_y, x, y):
 
 @loop
 def settle(free, t, alpha, t_old, alpha_old, u, target):
-    """Put u into the place of `target` where points are not free, of one component. Returns sums: over these points
-    of `(alpha t + alpha_old t_old)/2 (target - u)`, and of t."""
+    """Replace `target` by u where points are not free, for one component. Return the sums of `(alpha t + alpha_old
+    t_old)/2 (target - u)` over these points, and of t."""
     lost, total = 0.0, 0.0
     for j in range(t.shape[0]):
         row_lost, row_total = 0.0, 0.0

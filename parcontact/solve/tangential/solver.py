@@ -1,26 +1,26 @@
-"""Tractions of a contact that sticks and slips: projected, preconditioned conjugate gradients on discs.
+"""Tractions of a contact that sticks and slips, by projected, preconditioned conjugate gradients on discs.
 
 With A the operator of the body, from tractions to displacements, and bounds f of the tractions, find t with
 
     |t| <= f,     w = e - A t,     w = 0 where |t| < f,     w along t where |t| = f.
 
-w is the slip in a step whose end displaces a point that sticks by e. This is the minimum of the convex function
-`J(t) = <t, A t>/2 - <t, e>` over the product of discs |t| <= f. One iteration:
+w is the slip in a step in which a point that sticks ends at the displacement e. The solution minimizes the convex
+function `J(t) = <t, A t>/2 - <t, e>` over the product of discs |t| <= f. One iteration:
 
-1. points are free where |t| < f or w points inwards; others slip;
-2. free points: with K close to the inverse of A, and E carrying w on beyond them (`preconditioner.extension`), the
-   direction `d = E' K E w + beta d`, beta such that it is conjugate to the last one, by what the last step has changed
-   in w;
-3. free tractions move by STEP d, and those that slip by `TURN kappa w`, both shortened to their discs. kappa is a
-   stiffness of the contact as a whole; where slip is large against f/kappa this turns a traction into its direction.
+1. Points are free where |t| < f or w points inwards; the others slip.
+2. At free points the direction is `d = E' K E w + beta d`. K is close to the inverse of A, and E extends w beyond
+   these points (`preconditioner.extension`); beta makes d conjugate to the last direction, from the change of w in
+   the last step.
+3. Free tractions move by STEP d, and slipping ones by `TURN kappa w`, both shortened to their discs. kappa is a
+   stiffness of the contact as a whole. If slip is large against f/kappa, this turns a traction into the direction of
+   slip.
 
-Where J rises, both steps are halved from then on. The certificate compares a traction with what the slip w makes of
-it:
+If J rises, both steps are halved. The certificate compares a traction with the traction that the slip w gives:
 
     sum |P(t + kappa w) - t| / sum |t|,     P(t) = t shortened to its disc.
 
-It is 0 for the solution alone: the relative error of tractions whose waves are as stiff as kappa. For the related
-constraint p >= 0 the method is that of `solve.contact`.
+It is 0 for the solution alone, and the relative error of tractions whose waves have the stiffness kappa. For the
+related constraint p >= 0 the method is that of `solve.contact`.
 """
 
 import math
@@ -34,20 +34,21 @@ from ..preconditioner.extension import ExtendedPreconditioner, Grids
 from ..problem import Operator
 from . import discs
 
-STEP = 0.55  # tuning: of free tractions: waves along q are half as stiff as K takes them, those across q as stiff
-TURN = 2.0  # tuning: of slipping ones; from 4 on many iterations raise J
-MOST = 4.0  # tuning: times the last step of slipping tractions is the next one at most
-LARGE_CUT = 0.003  # tuning: of the sum of tractions: if more is cut off, the next direction begins anew
-LEAST_DESCENT = 0.5  # tuning: over that without the last direction
-ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # accuracy: of <t, A t>/2: a smaller rise is none
-MAX_STALLED = 60  # tuning: iterations without a better certificate
+STEP = 0.55  # tuning: step of free tractions; waves along q have half the stiffness that K assumes
+TURN = 2.0  # tuning: step of slipping tractions; with 4 or more, many iterations raise J
+MOST = 4.0  # tuning: largest step of slipping tractions over the last one
+LARGE_CUT = 0.003  # tuning: share of the sum of tractions; if more is cut off, the direction is forgotten
+LEAST_DESCENT = 0.5  # tuning: least slope along d over that along z; below it the last direction is forgotten
+ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # accuracy: share of <t, A t>/2 that is rounding
+MAX_STALLED = 60  # tuning: limit on iterations without a smaller certificate
 
 
 @dataclass(frozen=True)
 class Tractions:
-    """Solved tractions: in the caller's map; `displacement = A t` is the solver's, valid until its next solve.
+    """Solved tractions, in the caller's map. `displacement = A t` belongs to the solver and is valid until its next
+    solve.
 
-    `failure` is empty, or says what the solve did instead of reaching the tolerance.
+    `failure` is empty, or states why the tolerance was not reached.
     """
 
     displacement: Array
@@ -58,7 +59,8 @@ class Tractions:
 
 
 class TangentialSolver:
-    """Solver on one grid, with the body's `operator` for stacked tractions and a `preconditioner` for one component."""
+    """Solver on one grid, with the `operator` of the body for stacked tractions and a `preconditioner` for one
+    component."""
 
     def __init__(
         self, slab: Slab, operator: Operator, preconditioner: Operator, grids: Grids, tolerance: float, limit: int
@@ -71,8 +73,9 @@ class TangentialSolver:
         self.free = slab.zeros(np.bool_)
 
     def solve(self, bound: Array, aim: Array, kappa: float, t: Array) -> Tractions:
-        """Solve for bounds f and stacked displacements e of points that stick, from the tractions t, in whose place
-        the solution will be; collective. `kappa` is a stiffness of the contact, in the unit of t over that of e."""
+        """Solve for bounds f and stacked displacements e of points that stick, from the tractions t, which are
+        overwritten by the solution; collective. `kappa` is a stiffness of the contact, in the unit of t over the
+        unit of e."""
         (t_x, t_y), e = components(t), components(aim)
         discs.shorten_to_bounds(bound, t_x, t_y)
         if self._is_at_rest(bound, aim, t):
@@ -83,8 +86,8 @@ class TangentialSolver:
         step, turn = STEP, TURN * kappa
         while True:
             found = discs.examine(bound, t_x, t_y, *components(self._u), *e, kappa, self.free)
-            size, moved, apart, now, work, stuck = self.slab.sum(*found)
-            certificate = apart / (max(size, moved) or 1.0)
+            size, moved, residual, now, work, stuck = self.slab.sum(*found)
+            certificate = residual / (max(size, moved) or 1.0)
             best = min(best, (certificate, iteration))
             failure = self._verdict(certificate, iteration, best)
             if failure is not None:
@@ -111,7 +114,7 @@ class TangentialSolver:
         return min(step * square / work, MOST * turn) if work > 0.0 else turn
 
     def _redirect(self, e: tuple[Array, Array], begins: bool) -> None:
-        """Make the next direction of free tractions; one that `begins` forgets the last; collective."""
+        """Make the next direction of free tractions; if it `begins`, the last one is forgotten; collective."""
         sums = np.zeros(4)
         u, old, z, d = (components(one) for one in (self._u, self._other, self._z, self._d))
         for each in range(2):
@@ -128,7 +131,7 @@ class TangentialSolver:
             discs.redirect(self.free, z[each], beta, d[each])
 
     def _verdict(self, certificate: float, iteration: int, best: tuple[float, int]) -> str | None:
-        """None: go on; empty: solved; else what happened instead."""
+        """Return None to continue, an empty string if solved, else why the solve has failed."""
         if certificate <= self.tolerance:
             return ""
         asked = f"{certificate:.3g} where {self.tolerance:.3g} was asked for"
@@ -139,14 +142,14 @@ class TangentialSolver:
         return None
 
     def _is_at_rest(self, bound: Array, aim: Array, t: Array) -> bool:
-        """Return whether nothing pulls at any point that touches; collective."""
+        """Return whether tractions and displacements are 0 at all points in contact; collective."""
         touching = bound > 0.0
         parts = *components(aim), *components(t)
         largest = max(float(np.abs(part).max(where=touching, initial=0.0)) for part in parts)
         return self.slab.reduce((), [largest])[0] == 0.0
 
     def _rest(self, bound: Array) -> Tractions:
-        """Return no tractions, of points that all stick; collective."""
+        """Return the result without tractions, in which all points stick; collective."""
         np.greater(bound, 0.0, out=self.free)
         self._u.fill(0.0)
         return Tractions(self._u, 0.0, 0, round(self.slab.sum(float(np.count_nonzero(self.free)))[0]))
