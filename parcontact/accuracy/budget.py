@@ -49,11 +49,8 @@ class ErrorParts(NamedTuple):
 
     @property
     def of_friction(self) -> float:
-        """The stated error of friction: at least 1 if it exceeds UNKNOWN.
-
-        Such a friction is the small difference of large forces, and its error is known to an order of magnitude
-        only.
-        """
+        """The stated error of friction: at least 1 if it exceeds UNKNOWN. Such a friction is the small difference of
+        large forces, and its error is known to an order of magnitude only."""
         return max(self.total, 1.0) if self.total > UNKNOWN else self.total
 
     def plain(self) -> dict[str, float]:

@@ -225,8 +225,8 @@ class Controller:
     def _to_a_multiple(self, span: Span, now: float, dt: float) -> float:
         """Return the time until the surface is at a multiple of the way of such a step: at least LEAST_WAY of it.
 
-        From half a multiple it is half a step, so that a step that has just grown is not three times as long as the
-        one before.
+        After half a multiple the step is a half, so that a step that has just grown is not three times as long as
+        the last one.
         """
         if span.stage.velocity[1]:
             return dt

@@ -1,7 +1,7 @@
 """Sources of error: estimates for the solver, time steps, folded branches and the mesh, of friction and contact area.
 
-Each estimates a relative error from numbers of a step; its constants are fitted to true errors (`constants`). c is
-the counted minus the corrected area, over the latter, and N is the number of spots of contact.
+Each estimates a relative error from numbers of a step; its constants are fitted to true errors (`constants`). c is the
+counted minus the corrected area, over the latter, and N is the number of spots of contact.
 
 solver: proportional to the `complementarity` C of the certificate (`solve.certificate`) for friction, and smaller
 for many
@@ -22,11 +22,10 @@ c/N^(1/4) while the surface slides and errors of its positions average out, STIL
 
 Loss at edges: the pressure rises from an edge of contact as the root of the distance, so that the mean square of its
 waves of wavenumber q across the edge falls as q^-3. In steady sliding these lose power in proportion to q^-3 sin
-delta(q v), with the loss angle delta of the body at the frequency with which they pass. For Hertzian contacts of a
-body whose loss angle grows with the frequency, all waves together lose as much as this law gives from a wavenumber
-q0 on: q0 = 2/(pi a) for a strip of half width a, q0 = 3/(pi a) for a circle of radius a, from the integrals of
-J1(x)^2/x and j1(x)^2. A mesh of cells of length dx has waves up to Q = pi/dx. The share of the loss in shorter waves
-is
+delta(q v), with the loss angle delta of the body at the frequency with which they pass. For Hertzian contacts of a body
+whose loss angle grows with the frequency, all waves together lose as much as this law gives from a wavenumber q0 on: q0
+= 2/(pi a) for a strip of half width a, q0 = 3/(pi a) for a circle of radius a, from the integrals of J1(x)^2/x and
+j1(x)^2. A mesh of cells of length dx has waves up to Q = pi/dx. The share of the loss in shorter waves is
 
     s m = (q0/Q)^2 M(Q v)/M(q0 v),      M(w) = int_0^1 2 t sin delta(w/t) dt,      s = q0/Q.
 
@@ -64,7 +63,7 @@ AT, WEIGHTS = np.polynomial.legendre.leggauss(NODES)
 STRAIGHT_POWER = 0.5  # accuracy: power of m along edges that follow the grid
 GAPS = 2.0  # accuracy: factor on the open share; above half contact radii are those of gaps
 FEW_CELLS = 3.0  # accuracy: cells per shortest wave below which a map lacks waves
-ROUNDING = 1e-12  # rounding: least friction over the slope of the surface
+ROUNDING = 1e-12  # rounding: least complementarity in errors by NOISE, and in steady sliding
 
 
 @dataclass(frozen=True)

@@ -1,32 +1,30 @@
 """The error of friction by the length of a time step, estimated in two ways.
 
-A linear step takes the displacement as linear in time. For a harmonic wave that turns by an angle theta in a step,
-the force of a branch with z = dt/tau then has an error of theta^2/12 of its loss if the branch is slow, theta^2/6 if
-it is fast, and is delayed by L/2 of a step,
+A linear step takes the displacement as linear in time. For a harmonic wave that turns by an angle theta in a step, the
+force of a branch with z = dt/tau then has an error of theta^2/12 of its loss if the branch is slow, theta^2/6 if it is
+fast, and is delayed by L/2 of a step,
 
     L(z) = coth(z/2) - 2/z,      z/6 for small z, 1 for large ones.
 
-In full contact friction is the loss, with the error theta^2 (1 + <L>)/12, where <L> = sum w L/sum w over the shares
-of friction of the branches, w = G omega tau/(1 + (omega tau)^2). theta is the angle of a wave with the height and
-the change of the surface; shorter waves contribute more to friction, so that the error of many waves is 1.5 times as
-large (LINEAR_TURNING). Where contact spots of radius a pass by x = (way of the step)/a, delayed forces move their
-edges:
+In full contact friction is the loss, with the error theta^2 (1 + <L>)/12, where <L> = sum w L/sum w over the shares of
+friction of the branches, w = G omega tau/(1 + (omega tau)^2). theta is the angle of a wave with the height and the
+change of the surface; shorter waves contribute more to friction, so that the error of many waves is 1.5 times as large
+(LINEAR_TURNING). Where contact spots of radius a pass by x = (way of the step)/a, delayed forces move their edges:
 
     E = LINEAR_PASSING (1 - A^4) x (<L> + PASSING_LOSS x),      omega = x/dt.
 
-A quadratic step also follows the bend of the motion. In full contact the error of its loss is 0.25 to 0.33 of
-theta^2 <L> plus theta^4/75 (`prony.discrete_modulus`); TURNING and TURNING_4 are 1.5 times as large. Edges leave an
-error of third order, PASSING x^3.
+A quadratic step also follows the bend of the motion. In full contact the error of its loss is 0.25 to 0.33 of theta^2
+<L> plus theta^4/75 (`prony.discrete_modulus`); TURNING and TURNING_4 are 1.5 times as large. Edges leave an error of
+third order, PASSING x^3.
 
-The embedded pair (`embedded`) shows jumps, changes of load, and creep. The error of a quadratic step is its
-difference to a linear one. The pair of a linear step differs in second order if all branches are slow, and in first
-order if some are fast; the accumulated error of linear steps has the order 1.7. In a slide PAIR_SHARE of the pair
-counts, for errors not caused by edges. Backward Euler is of first order: its error varies as the root of the
-difference.
+The embedded pair (`embedded`) shows jumps, changes of load, and creep. The error of a quadratic step is its difference
+to a linear one. The pair of a linear step differs in second order if all branches are slow, and in first order if some
+are fast; the accumulated error of linear steps has the order 1.7. In a slide PAIR_SHARE of the pair counts, for errors
+not caused by edges. Backward Euler is of first order: its error varies as the root of the difference.
 
 Friction that changes from step to step is delayed by at most <L> of the change, CURVED_RISE of it in quadratic steps
-(`error_of_rise`). Right after a jump of the load friction is 0 up to mesh errors, as for an elastic body, so that
-the next change is unknown. The error of the area is a share of that of friction, which falls with the open area.
+(`error_of_rise`). Right after a jump of the load friction is 0 up to mesh errors, as for an elastic body, so that the
+next change is unknown. The error of the area is a share of that of friction, which falls with the open area.
 """
 
 import math

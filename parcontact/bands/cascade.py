@@ -1,14 +1,13 @@
 """The upward pass, from the finest band to the coarsest, and the downward pass back.
 
-Upward each band is solved on the rungs of its ladder, with the closing of all finer bands as the law of its
-interface; its own approach is the law of the next coarser one. Downward the distribution of pressure passes through
-the bands,
+Upward each band is solved on the rungs of its ladder, with the closing of all finer bands as the law of its interface;
+its own approach is the law of the next coarser one. Downward the distribution of pressure passes through the bands,
 
     P_0 = delta(p - p0),    P_k(p') = sum_j W_j F_k(p'|p_j),    W_j = int P_(k-1)(p) w_j(p) dp,
     mu = (1/p0) sum_k sum_j W_j tau_k(p_j),    area = sum_j W_j a_K(p_j),
 
-with the friction stress tau_k and the share of contact a_k of band k under p_j, the distribution F_k of pressure
-within it, and the weights w_j of `ladder`. Contacts of one pass are independent: ranks solve different ones.
+with the friction stress tau_k and the share of contact a_k of band k under p_j, the distribution F_k of pressure within
+it, and the weights w_j of `ladder`. Contacts of one pass are independent: ranks solve different ones.
 """
 
 import math

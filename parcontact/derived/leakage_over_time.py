@@ -32,11 +32,10 @@ MOST_CELLS = 4e6  # tuning: largest map of which every rank solves one; 2048 x 2
 class LeakInstant(NamedTuple):
     """One row of leak.csv.
 
-    `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` their ratios to K of the surface
-    that just touches, NaN if unknown; `constriction` [m] is the smallest gap on the widest path of the direction
-    that leaks more; `error_x` and `error_y` are the relative changes of K on half the mesh (`flow.flow_mesh_error`);
-    `flow_rate` [m^3/s] and `mass_flow` [kg/s] are those of a fluid in this direction (`leakage.fluids`), NaN without
-    a fluid.
+    `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` their ratios to K of the surface that
+    just touches, NaN if unknown; `constriction` [m] is the smallest gap on the widest path of the direction that leaks
+    more; `error_x` and `error_y` are the relative changes of K on half the mesh (`flow.flow_mesh_error`); `flow_rate`
+    [m^3/s] and `mass_flow` [kg/s] are those of a fluid in this direction (`leakage.fluids`), NaN without a fluid.
     """
 
     time: float

@@ -104,10 +104,7 @@ def predict_steady(
     job: Job, wanted: Request, gamma: float = persson.GAMMA, shortest: float = 0.0
 ) -> Iterator[SteadyInstant]:
     """Yield the steady states of a curve for the spectrum of the job on an unbounded surface; for bands without waves
-    below the `shortest` [m].
-
-    Raises InputError for jobs outside the theory.
-    """
+    below the `shortest` [m]. Raises InputError for jobs outside the theory."""
     rings = _on_body(job, _continuum(job, 0.0, shortest))
     _, kx, ky = rings.waves
     for speed, pressure, temperature in wanted.points:

@@ -21,10 +21,8 @@ NOT_SELF_AFFINE = "no self-affine range was found"
 def describe_surface(
     job: Job, heights: Array, remarks: list[str], shortest: float | None, picture: Path
 ) -> Iterator[str]:
-    """Draw the picture and yield sentences on the heights [m], shape (ny, nx); root only.
-
-    `shortest` [m] is the shortest wave of a measured surface, else None. Raises InputError and RunError.
-    """
+    """Draw the picture and yield sentences on the heights [m], shape (ny, nx); root only. `shortest` [m] is the
+    shortest wave of a measured surface, else None. Raises InputError and RunError."""
     if picture.suffix[1:] not in style.MARKED:
         raise InputError(f"--out must end in .{', .'.join(style.MARKED)}, got {str(picture)!r}")
     found, part, measured = statistics.surface_statistics(heights, job.grid.size), job.surface[0], None

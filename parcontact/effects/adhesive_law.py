@@ -125,11 +125,8 @@ class AdhesiveLaw:
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[AdhesiveMemory]:
-        """Solve a step from the last gap; see `effects.contact_protocol.ContactLaw.solve`.
-
-        Solves have the tolerance of the job. If the surfaces detach and the job continues, they are moved far from
-        each other.
-        """
+        """Solve a step from the last gap; see `effects.contact_protocol.ContactLaw.solve`. Solves have the tolerance of
+        the job. If the surfaces detach and the job continues, they are moved far from each other."""
         law, path = self.law(trial.alpha), self._path(trial, control, past, before)
         walk = self._walk(law, memory, step, trial, path, past.spare)
         contact, gap = walk.contact, memory.spare
@@ -225,10 +222,8 @@ class AdhesiveLaw:
     def _start(
         self, memory: AdhesiveMemory, step: Step, trial: Trial, path: LoadPath, out: Array, still: bool = False
     ) -> None:
-        """Put the start of a step into a map: the extrapolated gap, or the last one if `still`; collective.
-
-        Before the first step it is the gap of an undeformed body, at the approach, or where the surface touches.
-        """
+        """Put the start of a step into a map: the extrapolated gap, or the last one if `still`; collective. Before the
+        first step it is the gap of an undeformed body, at the approach, or where the surface touches."""
         now, before = memory.pasts
         if not now.known:
             control = path.at(0.0 if still else 1.0)
@@ -277,8 +272,8 @@ class AdhesiveLaw:
         return {"tensile_area": count / self.slab.points, "adhesive_force": pull * unit}
 
     def _least_load(self, law: Law, alpha: float, control: Control, p: Array, pull: float) -> float:
-        """Return the load [N] up to which it is an error of the solver: a share of all tension and of the strength of
-        one point. It is infinite if no point has more pressure or tension than this error; collective."""
+        """Return the largest load [N] that may be an error of the solver; collective. It is a share of all tension and
+        of the strength of one point, and infinite if no point has more pressure or tension than this."""
         largest = self.slab.reduce((), [float(np.abs(p).max(initial=0.0))])[0]
         least = LEAST_LOAD * law.strength
         unloaded = isinstance(control, MeanPressure) and abs(control.value) * self.slab.points <= least

@@ -40,8 +40,7 @@ class PreviousPressure(NamedTuple):
 class PreviousContacts:
     """Memory of earlier contacts: the last pressures, the newest first, and the last approach d.
 
-    A history of single solves stores one pressure, others two or more. The next pressure is written to the map
-    `spare`.
+    A history of single solves stores one pressure, others two or more. The next pressure is written to the map `spare`.
     """
 
     pressures: tuple[PreviousPressure, ...]

@@ -142,10 +142,8 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def touches(job: Any, pressure: Array, gap: Array) -> NDArray[Any] | None:
-        """Return a map that is not 0 where surfaces touch, from saved maps of the pressure [Pa] and of the gap [m].
-
-        It is None without a law. Local.
-        """
+        """Return a map that is not 0 where surfaces touch, from saved maps of the pressure [Pa] and of the gap [m]. It
+        is None without a law. Local."""
         return None
 
     def __init__(self, scene: Any) -> None: ...
@@ -163,10 +161,8 @@ class Effect(Protocol[Memory]):
         ...
 
     def values(self, memory: Memory) -> Sequence[float]:
-        """Return the values of its columns for the last step, the same on every rank; NaN leaves a column empty.
-
-        Local to this rank.
-        """
+        """Return the values of its columns for the last step, the same on every rank; NaN leaves a column empty. Local
+        to this rank."""
         ...
 
     def field(self, memory: Memory, name: str) -> Array:
@@ -191,10 +187,8 @@ class Effect(Protocol[Memory]):
         return {}
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:
-        """Return the memory of a checkpoint, in the run's units, numbers as arrays.
-
-        Maps have been read into the maps of `entries`.
-        """
+        """Return the memory of a checkpoint, in the run's units, numbers as arrays. Maps have been read into the maps
+        of `entries`."""
         return memory
 
 

@@ -42,10 +42,8 @@ def temperature_of(material: Material) -> float:
 
 
 def factor_at(material: Material, rise: float) -> float:
-    """Return relaxation times of a material after a temperature rise [K] over those at its own temperature [-].
-
-    Raises InputError outside the range of its shift.
-    """
+    """Return relaxation times of a material after a temperature rise [K] over those at its own temperature [-]. Raises
+    InputError outside the range of its shift."""
     return time_factor_of(heated(material, temperature_of(material) + rise)) / time_factor_of(material)
 
 

@@ -4,25 +4,24 @@ The rigid surface moves by D along itself, the points of the body by u under tra
 
     |t| <= f,    f = mu p (Coulomb) or a shear strength at all points in contact.
 
-A point in contact slips by `s = D - u`: its slip grows along t where `|t| = f`, and is constant where `|t| < f`. In
-an incompressible half space tractions and pressures move the surface independently of each other
+A point in contact slips by `s = D - u`: its slip grows along t where `|t| = f`, and is constant where `|t| < f`. In an
+incompressible half space tractions and pressures move the surface independently of each other
 (`physics.shear_operator`), so that the tractions of a step follow from its pressures. The body obeys the law of
 `physics.body` in both components,
 
     A t = G_inf u + sum_k h_k,
 
-so that a step to the tractions `alpha t` is the problem of `solve.tangential`. A point that sticks ends at its
-`target` g, its last displacement plus the increment of D, and
+so that a step to the tractions `alpha t` is the problem of `solve.tangential`. A point that sticks ends at its `target`
+g, its last displacement plus the increment of D, and
 
     e = g + r/alpha,    w = e - A t = g - u.
 
-Points of the body keep their positions on the grid, as in a march without stick: u, t and the branches belong to
-them, and nothing is shifted. The surface moves over them and carries the bounds f, which follow from the pressure of
-each step. A point without contact has g = u, so that its slip counts from its first contact. Targets of points that
-stick are not reset to u, so that residuals of solves do not add up over many steps.
+Points of the body keep their positions on the grid, as in a march without stick: u, t and the branches belong to them,
+and nothing is shifted. The surface moves over them and carries the bounds f, which follow from the pressure of each
+step. A point without contact has g = u, so that its slip counts from its first contact. Targets of points that stick
+are not reset to u, so that residuals of solves do not add up over many steps.
 
-With output.energy the work of the tractions on the body is added to the work of the pressures, and the loss in slip
-is
+With output.energy the work of the tractions on the body is added to the work of the pressures, and the loss in slip is
 
     sum (t_old + t)/2 (s - s_old),
 
@@ -64,12 +63,12 @@ class BoundedTraction(NamedTuple):
 
 @dataclass(frozen=True)
 class StickMemory:
-    """Memory of stick and slip; maps in the run's units, of two components stacked but for bounds.
+    """Memory of stick and slip. Maps are in the run's units; all but bounds have two stacked components.
 
-    `body` is that of the displacements along the surface, `last` the tractions of the last step, with the modulus
-    `alpha`, and `spare` those of the step before that, whose place is that of the next ones. `target` is where points
-    end that stick. `share` is the mean traction over the mean bound. `energy` is that of the body, None where none is
-    asked for, `lost` what slip has lost [J]. `columns` are those of the last row but `slip_loss`.
+    `body` is the memory of the displacements along the surface, `last` the tractions of the last step, with the
+    modulus `alpha`; `spare` receives the next ones. `target` is where points that stick end. `share` is the mean
+    traction over the mean bound. `energy` is the memory of the energies, None without them; `lost` is the energy
+    lost in slip [J]. `columns` are the columns of the last row without `slip_loss`.
     """
 
     body: BodyMemory

@@ -52,9 +52,7 @@ class Bounds:
 
 def most_cells(job: Planned) -> int:
     """Return the largest number of cells slid in a step: the largest power of two up to a quarter of the shortest wave.
-
-    It is one cell if a quarter wave is shorter, or if a file may have any wave.
-    """
+    It is one cell if a quarter wave is shorter, or if a file may have any wave."""
     grid, waves = job.grid, [2.0 * MOST_CELLS * WAVE_STEPS]
     cells = [one_cell(stage, grid) * stage.speed for stage in job.history if stage.speed]
     for shape in job.surface:

@@ -53,10 +53,8 @@ class GivenEnds:
 
 
 def divide(stage: Stage, grid: Grid) -> GivenEnds:
-    """Return the steps of a stage: none exceeds the requested length, and an instantaneous stage has none.
-
-    Automatic steps of a body without memory are one cell in sliding, the whole stage at rest, and several on a ramp.
-    """
+    """Return the steps of a stage: none exceeds the requested length, and an instantaneous stage has none. Automatic
+    steps of a body without memory are one cell in sliding, the whole stage at rest, and several on a ramp."""
     if stage.seconds == 0.0:
         return GivenEnds(0, 1.0, 0.0)
     if stage.time_step == AUTO and not stage.load.constant and not stage.speed:

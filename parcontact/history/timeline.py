@@ -22,11 +22,10 @@ SAME_PLACE = 1e-6  # accuracy: deviation from a displacement of whole cells that
 class Step(NamedTuple):
     """One solve: it ends at `time` [s], `dt` [s] after the last, with the surface at `position` [m].
 
-    `dt` = 0 is a jump of the load. `control` names what `load` prescribes (Pa, N or m). `growth` is dt over the dt
-    of the step before, 0 after a jump: the factor for extrapolation. `passed` is the number of further steps that
-    this one replaces. `decide`, for a step that may be too long, gets the error of the step and the motion of the
-    edge of an adhesive contact, in half process zones; it returns the shorter step to make instead, or the record of
-    this one.
+    `dt` = 0 is a jump of the load. `control` names what `load` prescribes (Pa, N or m). `growth` is dt over the dt of
+    the step before, 0 after a jump: the factor for extrapolation. `passed` is the number of further steps that this one
+    replaces. `decide`, for a step that may be too long, gets the error of the step and the motion of the edge of an
+    adhesive contact, in half process zones; it returns the shorter step to make instead, or the record of this one.
     """
 
     number: int
@@ -143,10 +142,8 @@ class Timeline:
 
     @classmethod
     def from_job(cls, job: Planned, until: float = 0.0, chosen: ChosenSteps | None = None) -> "Timeline":
-        """Return all steps of a job; its last stage continues to `until` [s] if that is later than its end.
-
-        `chosen` are the steps that stages have chosen so far; further ones are estimated.
-        """
+        """Return all steps of a job; its last stage continues to `until` [s] if that is later than its end. `chosen`
+        are the steps that stages have chosen so far; further ones are estimated."""
         record = (chosen or ChosenSteps.from_job(job)) if job.remembers else None
         return cls(job.history, job.grid, until, job.initial.pressure, record)
 

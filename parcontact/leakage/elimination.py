@@ -72,11 +72,8 @@ class Balance:
 
 
 def _number_black_cells(resistances: Map) -> NDArray[np.int32]:
-    """Return the numbers of black wet cells, WHITE and DRY elsewhere.
-
-    If the number of columns is odd, two white cells would touch across periodic sides: the last column then has
-    none.
-    """
+    """Return the numbers of black wet cells, WHITE and DRY elsewhere. If the number of columns is odd, two white cells
+    would touch across periodic sides: the last column then has none."""
     ny, nx = resistances.shape
     white = np.add.outer(np.arange(ny), np.arange(nx)) % 2 == 0
     white[:, -1] &= nx % 2 == 0

@@ -38,10 +38,8 @@ def critical_constriction(gap: NDArray[np.float64], periodic_sides: bool) -> tup
 
 @loop
 def _open_until_connected(order, ny, nx, periodic):
-    """Open cells in an order until a path leads from the first row to the last. Return the last one, or -1.
-
-    Open cells that touch form a tree, `parent` leads to its root; both ends are additional cells.
-    """
+    """Open cells in an order until a path leads from the first row to the last. Return the last one, or -1. Open cells
+    that touch form a tree, `parent` leads to its root; both ends are additional cells."""
     first, last = nx * ny, nx * ny + 1
     parent = np.full(nx * ny + 2, -1, np.int64)
     parent[first], parent[last] = first, last

@@ -59,10 +59,7 @@ class DryLaw:
 
     def _retry(self, step: Step, past: PreviousContacts, problem: Problem, failed: Contact) -> tuple[Contact, str]:
         """Retry a failed solve; only in double precision if the job accepts unconverged solves. Raises StepError if all
-        attempts fail.
-
-        Return the contact, and a sentence on the attempt that succeeded; collective.
-        """
+        attempts fail. Return the contact, and a sentence on the attempt that succeeded; collective."""
         scene, would_do = self.scene, failure.accepts(self.scene, failed)
         in_double = (lambda: scene.in_double) if failed.u.dtype == np.float32 else None
         if would_do and in_double is None:

@@ -51,10 +51,8 @@ class March:
         return Timeline.from_job(self.scene.job, until, self.state.chosen)
 
     def steps(self, timeline: Timeline | None = None, until: float | None = None) -> Iterator[Step]:
-        """Yield the steps after the last one made, each decided on demand; collective.
-
-        A step that replaces several ends at the latest with the first step that reaches `until` [s].
-        """
+        """Yield the steps after the last one made, each decided on demand; collective. A step that replaces several
+        ends at the latest with the first step that reaches `until` [s]."""
         timeline = self.timeline() if timeline is None else timeline
         stop = len(timeline) if until is None else timeline.first_reaching(until)
         while self.row.step < len(timeline) and not self.detached:
@@ -100,8 +98,7 @@ class March:
         """Return the rows of this rank of `pressure` [Pa], `displacement`, `gap` or `height` [m], or of the rise of
         `temperature` [K], as a new array; collective. Raises InputError for a temperature that is not computed.
 
-        `height` belongs to the rigid surface at its present position, so that `gap = displacement - height -
-        approach`.
+        `height` belongs to the rigid surface at its present position, so that `gap = displacement - height - approach`.
         """
         scene, state, units = self.scene, self.state, self.scene.units
         last, gap = state.contact.last, choose_contact_law(scene).gap(state.law)

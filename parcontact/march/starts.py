@@ -2,9 +2,8 @@
 
 Pressures change with time and move with the surface. If the surface has moved by whole cells since one of the last
 steps, the pressure of that step is moved by as many cells, without rounding: in steady sliding it is already the
-solution. With steps of a whole cell it is the last pressure, extrapolated with the one before it; with steps of half
-a cell it is the one before; with thirds and quarters it is an earlier one, stored in slides with
-chosen steps.
+solution. With steps of a whole cell it is the last pressure, extrapolated with the one before it; with steps of half a
+cell it is the one before; with thirds and quarters it is an earlier one, stored in slides with chosen steps.
 
 Otherwise the last two pressures are extrapolated in the body's frame.
 """

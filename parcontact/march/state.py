@@ -240,10 +240,8 @@ def completed(scene: Scene, state: State) -> State:
 def energies_of(
     scene: Scene, memory: EnergyMemory | None, of_effects: Memories
 ) -> tuple[float, float, float, tuple[float, ...]]:
-    """Return work, stored and dissipated energy [J], and the dissipation of each branch; NaN without energies.
-
-    It is the work on the body, unless an effect computes the work of the load.
-    """
+    """Return work, stored and dissipated energy [J], and the dissipation of each branch; NaN without energies. It is
+    the work on the body, unless an effect computes the work of the load."""
     if scene.energy is None or memory is None:
         return math.nan, math.nan, math.nan, ()
     unit, dissipated = scene.energy.unit, memory.dissipated
@@ -276,10 +274,8 @@ def save_state(path: Path, scene: Scene, state: State, facts: Facts) -> None:
 
 
 def restored(scene: Scene, state: State, contents: Contents) -> State:
-    """Return the state of a checkpoint, in the maps of `state`; collective.
-
-    Raises InputError for a checkpoint that lacks an entry or belongs to another body.
-    """
+    """Return the state of a checkpoint, in the maps of `state`; collective. Raises InputError for a checkpoint that
+    lacks an entry or belongs to another body."""
     _refuse_lost_branches(scene, contents)
     declared = entries(scene, state)
     wanted = {name: entry for name, entry in declared.items() if not entry.optional or name in contents.units}

@@ -164,10 +164,8 @@ def _compare_integrators(scene: Scene, solved: SolvedStep) -> IntegratorDifferen
 
 
 def _compare_views(scene: Scene, solved: SolvedStep) -> float:
-    """Return the difference of friction by the slopes of the rigid surface and of the body; collective.
-
-    For an elastic body the latter is 0.
-    """
+    """Return the difference of friction by the slopes of the rigid surface and of the body; collective. For an elastic
+    body the latter is 0."""
     step, measures, grid = solved.step, solved.measures, scene.choices.grid
     if scene.material.branched is None or measures.friction == 0.0:
         return max(measures.friction - measures.friction_interface, 0.0)
@@ -178,11 +176,8 @@ def _compare_views(scene: Scene, solved: SolvedStep) -> float:
 
 
 def _viscous(velocity: tuple[float, float], measures: Measures) -> tuple[tuple[float, float], float]:
-    """Return a unit direction, and friction along it without the interface.
-
-    The direction is the direction of sliding, or opposite to the force at rest and if the force is mainly across, as
-    for ridges that slide along themselves.
-    """
+    """Return a unit direction, and friction along it without the interface. The direction is the direction of sliding,
+    or opposite to the force at rest and if the force is mainly across, as for ridges that slide along themselves."""
     (x, y), (force_x, force_y) = velocity, (measures.force_x, measures.force_y)
     if abs(force_x * y - force_y * x) >= abs(force_x * x + force_y * y):
         x, y = -force_x, -force_y

@@ -52,10 +52,8 @@ def fill_grid(source: Source, origin: Origin) -> Origin:
 
 
 def _choose_points(source: Source, origin: Origin) -> Origin:
-    """Replace `points: auto` in the source of a job. Return the origin with a sentence.
-
-    Errors are mistakes at this key; mistakes in other sections are found when the job is validated.
-    """
+    """Replace `points: auto` in the source of a job. Return the origin with a sentence. Errors are mistakes at this
+    key; mistakes in other sections are found when the job is validated."""
     grid = source.data.get("grid") if isinstance(source.data, dict) else None
     if not isinstance(grid, dict) or grid.get("points") != AUTO_POINTS:
         return origin

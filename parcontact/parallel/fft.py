@@ -61,9 +61,8 @@ class FFT:
 
     Parameters: the `slab` of the maps; `lengths = (mx, my)` of the transforms, at least `(nx, ny)`, the default;
     `dtype` float64 or float32 of calculations and messages, for maps of either type; `measured`: FFTW measures which
-    algorithm is fastest, otherwise it estimates, reproducibly; `sharing`: another transform of these lengths in
-    double precision, in whose spectrum one in single precision stores its own. The constructor and the methods are
-    collective.
+    algorithm is fastest, otherwise it estimates, reproducibly; `sharing`: another transform of these lengths in double
+    precision, in whose spectrum one in single precision stores its own. The constructor and the methods are collective.
     """
 
     def __init__(

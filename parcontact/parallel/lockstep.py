@@ -46,10 +46,8 @@ class _Exchange:
 
 
 def wait_for_all(comm: MPI.Intracomm, what: str) -> None:
-    """Wait until all ranks of `comm` are about to do `what`, such as "makes step 3"; collective.
-
-    Raises RunError on all ranks if one of them is about to do something else, or has ended the program.
-    """
+    """Wait until all ranks of `comm` are about to do `what`, such as "makes step 3"; collective. Raises RunError on all
+    ranks if one of them is about to do something else, or has ended the program."""
     if comm.size == 1:
         return
     if not _known:

@@ -23,10 +23,8 @@ FEW = 8  # tuning: every rank has all cells of a grid with fewer cells than poin
 
 
 def pyramid_steps(slab: Slab, pairs: int = 0) -> list["PyramidStep"]:
-    """Return all steps from a grid to a single cell, the finest first; the first `pairs` join pairs.
-
-    A grid that every rank has is on a slab of one rank.
-    """
+    """Return all steps from a grid to a single cell, the finest first; the first `pairs` join pairs. A grid that every
+    rank has is on a slab of one rank."""
     grids, shapes = [slab], []
     for nx, ny, shape, alone in _larger(slab.nx, slab.ny, slab.comm.size, pairs):
         shapes.append(shape)

@@ -15,10 +15,8 @@ T = TypeVar("T")
 
 
 def on_root(comm: MPI.Intracomm, act: Callable[[], T]) -> T:
-    """Return or raise on every rank what `act` returns or raises on root; collective.
-
-    If an exception cannot be pickled, the other ranks raise RunError with its text.
-    """
+    """Return or raise on every rank what `act` returns or raises on root; collective. If an exception cannot be
+    pickled, the other ranks raise RunError with its text."""
     if comm.size == 1:
         return act()
     problem: Exception | None = None

@@ -22,20 +22,14 @@ def roll_rows(slab: Slab, field: Array, count: int, out: Array) -> Array:
 
 
 def before_first(slab: Slab, field: Array, cyclic: bool) -> Array:
-    """Return the row of a map before this rank's first one, shape (nx,); collective.
-
-    The row before the first of the map is the last if the map is `cyclic`, otherwise the first itself. Ranks without
-    rows get zeros.
-    """
+    """Return the row of a map before this rank's first one, shape (nx,); collective. The row before the first of the
+    map is the last if the map is `cyclic`, otherwise the first itself. Ranks without rows get zeros."""
     return _beside(slab, field, [-1], [], cyclic)[0]
 
 
 def around(slab: Slab, field: Array, count: int, cyclic: bool) -> tuple[Array, Array]:
     """Return the rows of a map before this rank's first one and after its last, shape (count, nx), the nearest first;
-    collective.
-
-    A map that is not `cyclic` continues with its first and last row. Ranks without rows get zeros.
-    """
+    collective. A map that is not `cyclic` continues with its first and last row. Ranks without rows get zeros."""
     found = _beside(slab, field, range(-1, -1 - count, -1), range(count), cyclic)
     return found[:count], found[count:]
 

@@ -26,10 +26,8 @@ class Signals:
 
     @contextmanager
     def noted(self) -> Iterator["Signals"]:
-        """Record signals within this context; outside it, they end the process at once.
-
-        An outer context, such as the context of a sweep, keeps recording. Signals are recorded in the main thread only.
-        """
+        """Record signals within this context; outside it, they end the process at once. An outer context, such as the
+        context of a sweep, keeps recording. Signals are recorded in the main thread only."""
         outer = getattr(signal.getsignal(SAVE), "__self__", None)
         if isinstance(outer, Signals) or threading.current_thread() is not threading.main_thread():
             yield outer if isinstance(outer, Signals) else self

@@ -111,10 +111,8 @@ class ElasticBody:
         """Do nothing: the displacement follows from the pressure."""
 
     def begin(self, memory: BodyMemory, dt: float, heights: MovedHeights, growth: float = 0.0) -> Trial:
-        """Begin a step under the heights themselves; local to this rank.
-
-        The displacement of `memory` is dropped: it is in a map of the solver, which the next solve overwrites.
-        """
+        """Begin a step under the heights themselves; local to this rank. The displacement of `memory` is dropped: it is
+        in a map of the solver, which the next solve overwrites."""
         memory.displacement = None
         if heights.offset == 0:
             return Trial(self.modulus, heights.base, heights, NO_BRANCHES)
@@ -226,10 +224,8 @@ class ZenerBody:
         return _Coefficients(dt, growth, alpha, advance, (advance.decay / alpha, total / alpha, past / alpha))
 
     def commit(self, memory: BodyMemory, trial: Trial, displacement: Array, out: Array) -> BodyMemory:
-        """Return the memory after a step, with its displacement in the map `out`; local to this rank.
-
-        `displacement` is `A p/alpha`, the displacement relative to the effective heights.
-        """
+        """Return the memory after a step, with its displacement in the map `out`; local to this rank. `displacement` is
+        `A p/alpha`, the displacement relative to the effective heights."""
         loops.commit(displacement, trial.effective, surface_of(memory), *trial.heights.parts, out)
         return BodyMemory(out, memory.branches, trial.effective, memory.increment, trial.advance)
 
@@ -270,10 +266,8 @@ class ZenerBody:
         return {**surface, "frozen": Entry(frozen), **branches}
 
     def restored(self, memory: BodyMemory, saved: Saved) -> BodyMemory:
-        """Return the memory of a checkpoint, whose maps have been read into `memory`.
-
-        A branch without a map in `saved` starts as `G_k u` if it was frozen, else as 0.
-        """
+        """Return the memory of a checkpoint, whose maps have been read into `memory`. A branch without a map in `saved`
+        starts as `G_k u` if it was frozen, else as 0."""
         for k, branch in zip(self.kept, memory.branches, strict=True):
             if f"branch {k}" not in saved:
                 branch[...] = self.prony.moduli[k] * saved["frozen"][k] * surface_of(memory)

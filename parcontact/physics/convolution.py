@@ -151,9 +151,8 @@ def tabulate(
     """Return the symbol on the padded transform `fft` of `coefficient(x, y, dx, dy)`, the displacement at the distance
     (x, y) [length] from a cell under unit pressure; collective. No rank holds the whole table.
 
-    A coefficient that is `even` in x and y is computed once per distance, and for half of these if it is `symmetric`
-    in x and y on square cells. With `inside`, the symbol uses the memory of the transform and is lost at its next
-    call.
+    A coefficient that is `even` in x and y is computed once per distance, and for half of these if it is `symmetric` in
+    x and y on square cells. With `inside`, the symbol uses the memory of the transform and is lost at its next call.
     """
     transform = table_transform(fft, inside)
     if fft.slab.only_counts:

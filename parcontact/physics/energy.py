@@ -198,8 +198,7 @@ class ElasticPressure:
         A p = G_inf u + sum_k h_k,     dh_k/dt = G_k du/dt - h_k/tau_k,     becomes at every point
           p = G_inf v + sum_k m_k,     dm_k/dt = G_k dv/dt - m_k/tau_k.
 
-    So v is the displacement of a second `ZenerBody`, each point of which responds to the pressure at this point
-    only.
+    So v is the displacement of a second `ZenerBody`, each point of which responds to the pressure at this point only.
     """
 
     def __init__(self, slab: Slab, prony: Prony, integrator: str) -> None:
@@ -259,8 +258,7 @@ class ZenerEnergy:
         """Return the energies after a step from the pressure `before` to `now`; `body` is the memory of the body after
         it. One reduction; collective.
 
-        `growth` is dt over the length of the step before (`physics.body`). The maps of an `elastic` memory are
-        reused.
+        `growth` is dt over the length of the step before (`physics.body`). The maps of an `elastic` memory are reused.
         """
         material, du, moduli = self.material, body.increment, self.material.prony.moduli
         w, elastic = self.inverse.advance(memory.elastic, dt, now.p, du, growth)

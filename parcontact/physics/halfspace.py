@@ -231,18 +231,13 @@ class HalfSpace:
 
     def frequencies(self, fft: FFT, velocity: Vector, rows: slice = ALL) -> Array:
         """Return the angular frequency `q v` of each wave under a surface of this velocity [length/s]; shape
-        `fft.shape`.
-
-        A Nyquist wavenumber counts as 0.
-        """
+        `fft.shape`. A Nyquist wavenumber counts as 0."""
         qx, qy = travelling_wavenumbers(fft, self.size, rows)
         return np.asarray(qx * velocity[0] + qy * velocity[1])
 
     def sliding_modulus(self, fft: FFT, velocity: Vector, prony: Prony, rows: slice = ALL) -> Spectrum:
-        """Return G*(-q v) of each wave; at a Nyquist wavenumber, which has two signs, the mean of both.
-
-        The result broadcasts to the rows of a spectrum: if the surface slides along x, all rows are equal.
-        """
+        """Return G*(-q v) of each wave; at a Nyquist wavenumber, which has two signs, the mean of both. The result
+        broadcasts to the rows of a spectrum: if the surface slides along x, all rows are equal."""
         rows = rows if velocity[1] else slice(0, 1)
         qx, qy = wavenumbers(fft, self.size, rows)
         at_x, at_y = 2 * np.abs(fft.modes[0]) == fft.mx, 2 * np.abs(fft.modes[1][rows]) == fft.my
@@ -254,10 +249,7 @@ class HalfSpace:
 
     def sliding_operator(self, fft: FFT, velocity: Vector, prony: Prony) -> Convolution:
         """Return the operator from pressure to displacement of a viscoelastic body; collective where the half space is
-        free.
-
-        Raises InputError for a free body that flows, as its wake never ends.
-        """
+        free. Raises InputError for a free body that flows, as its wake never ends."""
         if self.free:
             return self._along_wake(fft, velocity, _creep(prony), fft.dtype)
 

@@ -5,11 +5,10 @@ velocity v, causes the steady temperature rise, in the frame of the contact,
 
     T^(k) = q^(k)/(kappa beta),     beta(k) = sqrt(k^2 - i k.v/D),     Re beta > 0                                (1)
 
-(H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.7). The rest of the surface is
-insulated. Heat from the depth z arrives with the factor exp(-beta z). A wave of the wavenumber q on an
-incompressible half space has strains whose squares add up to a constant times `(q z)^2 exp(-2 q z)`, the same under
-crests and troughs. So its heat has the distribution `4 q (q z)^2 exp(-2 q z) dz`, the mean depth `3/(2 q)`, and
-arrives with
+(H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.7). The rest of the surface is insulated.
+Heat from the depth z arrives with the factor exp(-beta z). A wave of the wavenumber q on an incompressible half space
+has strains whose squares add up to a constant times `(q z)^2 exp(-2 q z)`, the same under crests and troughs. So its
+heat has the distribution `4 q (q z)^2 exp(-2 q z) dz`, the mean depth `3/(2 q)`, and arrives with
 
     int 4 q^3 z^2 exp(-(2 q + beta) z) dz = (1 + beta/(2 q))^-3.                                                  (2)
 
@@ -21,8 +20,8 @@ depth, of which this distribution has the share
 heat of the body warms the depths where it is released by `2/(pi kappa) int g^2/(beta^2 + m^2) dm` instead of (1).
 
 A uniform heat has no steady state: after a sliding time t it has warmed a cold body by `2 q sqrt(t/pi)/e`, with the
-effusivity `e = kappa/sqrt(D)`, and each wave by `erf(beta sqrt(D t))` times (1). For an infinite time, temperatures
-in a periodic box are relative to its mean.
+effusivity `e = kappa/sqrt(D)`, and each wave by `erf(beta sqrt(D t))` times (1). For an infinite time, temperatures in
+a periodic box are relative to its mean.
 """
 
 from dataclasses import dataclass

@@ -1,14 +1,13 @@
 """Temperature of the surface of a conducting half space under heat that changes with time: `physics.heat` in time
 steps.
 
-Each wave (j, k) of the sum of exponentials (`physics.exponentials`), along the depth and along the surface,
-satisfies
+Each wave (j, k) of the sum of exponentials (`physics.exponentials`), along the depth and along the surface, satisfies
 
     dc/dt = -(m_j^2 + D k^2) c + q^(k, t) g_j,     T^(k) = sum_j w_j c_j/e,                                       (1)
 
-with the effusivity e. q is linear in time within a step, over which (1) is solved exactly. For heat on the surface g
-= 1; for heat of the body it is the share (3) of `physics.heat` of the wave m_j/sqrt(D) along the depth. The
-temperature at the depths where this heat is released is `sum_j w_j g_j c_j/e`.
+with the effusivity e. q is linear in time within a step, over which (1) is solved exactly. For heat on the surface g =
+1; for heat of the body it is the share (3) of `physics.heat` of the wave m_j/sqrt(D) along the depth. The temperature
+at the depths where this heat is released is `sum_j w_j g_j c_j/e`.
 
 The mean of the box (k = 0) has its own sum, of numbers, exact to 1e-9 at any time, so that no heat is lost.
 """

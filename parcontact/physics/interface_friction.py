@@ -2,10 +2,9 @@
 
     F = -tau A v/|v|,    tau constant, or    tau(v) = tau_0 exp(-(log10(a_T |v|/v_0)/w)^2),
 
-a bell in the logarithm of the velocity with its maximum at v_0, which shifts with temperature like the bulk (B.
-Lorenz, Y. R. Oh, S. K. Nam, S. H. Jeon, B. N. J. Persson, J. Chem. Phys. 142 (2015) 194701, with c = 1/w^2). Shear
-does not move an incompressible half space along its normal (nu = 1/2), so that this friction is added without a
-coupled solve.
+a bell in the logarithm of the velocity with its maximum at v_0, which shifts with temperature like the bulk (B. Lorenz,
+Y. R. Oh, S. K. Nam, S. H. Jeon, B. N. J. Persson, J. Chem. Phys. 142 (2015) 194701, with c = 1/w^2). Shear does not
+move an incompressible half space along its normal (nu = 1/2), so that this friction is added without a coupled solve.
 """
 
 import math

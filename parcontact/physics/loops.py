@@ -115,9 +115,8 @@ def measure_yielded(p, u, h, above, below, cyclic, highest):
     yielded.
 
     They are the excess cells on sharp edges, `sum 1 - p/highest` over points between one that has yielded and one
-    without pressure; the sides between other points below `highest` and points without pressure; the number of
-    points that have yielded, and their sum of `u - h`. `above` and `below` are the rows of p around those of this
-    rank.
+    without pressure; the sides between other points below `highest` and points without pressure; the number of points
+    that have yielded, and their sum of `u - h`. `above` and `below` are the rows of p around those of this rank.
     """
     ny, nx = p.shape
     sharp, sides, count, gaps = 0.0, 0.0, 0.0, 0.0

@@ -20,9 +20,7 @@ GAUSS_NODES, GAUSS_WEIGHTS = (tuple(values / 2) for values in np.polynomial.lege
 
 def love(x: Array, y: Array, dx: float, dy: float, poisson: float = 0.5) -> Array:
     """Return the displacement [length] at (x, y) from the centre of a `dx x dy` cell under unit pressure, for G = 1.
-
-    The relative error is below 2e-14 at any distance.
-    """
+    The relative error is below 2e-14 at any distance."""
     return np.asarray(over_cell(x, y, dx, dy)) * (1.0 - poisson) / (2 * np.pi)
 
 

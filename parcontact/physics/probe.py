@@ -1,14 +1,13 @@
 """Measures of a step, in SI units: load, tangential force, contact area, gaps.
 
-Counted in cells, the contact area is too large, as a cell on the edge of contact counts as a whole. With the length
-S of all edges of contact along the sides of cells of length dx, the area is on average `A - (pi - 1 + ln 2)/24 S dx`
-(V. A. Yastrebov, G. Anciaux, J.-F. Molinari, Tribology International 114 (2017) 161, arXiv:1701.02727). In cells
-this is `SIDE` for each side between a point in contact and one that is not, and less on long cells
-(`measures.excess_of`).
+Counted in cells, the contact area is too large, as a cell on the edge of contact counts as a whole. With the length S
+of all edges of contact along the sides of cells of length dx, the area is on average `A - (pi - 1 + ln 2)/24 S dx` (V.
+A. Yastrebov, G. Anciaux, J.-F. Molinari, Tribology International 114 (2017) 161, arXiv:1701.02727). In cells this is
+`SIDE` for each side between a point in contact and one that is not, and less on long cells (`measures.excess_of`).
 
-This holds if the pressure falls to 0 at the edge. Where a counterbody yields, it ends at the hardness H, and a point
-on the edge carries the share p/H of it: the excess is `1 - p/H` of a cell, and 0 at points that have yielded. Where
-the pressure falls from H to 0 over several cells, the edge is as without yielding.
+This holds if the pressure falls to 0 at the edge. Where a counterbody yields, it ends at the hardness H, and a point on
+the edge carries the share p/H of it: the excess is `1 - p/H` of a cell, and 0 at points that have yielded. Where the
+pressure falls from H to 0 over several cells, the edge is as without yielding.
 """
 
 import math
@@ -68,10 +67,9 @@ class Probe:
     ) -> Measures:
         """Return the measures of the pressure `alpha p` with the gap `u - h - d`; collective.
 
-        The surface has moved by `displacement` [m] and moves with `velocity` [m/s]. `touching` is a map that is not
-        0 where the surfaces touch. Friction is 0 without a compressive load above `least_load` [N], the rounding of
-        two forces that balance. If nothing touches, all pressure is tension, and a load above 0 is an error of the
-        solve.
+        The surface has moved by `displacement` [m] and moves with `velocity` [m/s]. `touching` is a map that is not 0
+        where the surfaces touch. Friction is 0 without a compressive load above `least_load` [N], the rounding of two
+        forces that balance. If nothing touches, all pressure is tension, and a load above 0 is an error of the solve.
         """
         units, points = self.units, self.slab.points
         along_x, along_y = self.surface.periodic

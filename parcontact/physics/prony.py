@@ -62,10 +62,8 @@ class CreepSpectrum(NamedTuple):
 
 
 def normal_form(modulus_inf: float, moduli: ArrayLike, relaxation_times: ArrayLike) -> Prony:
-    """Return the same series with ascending, distinct, positive and finite relaxation times and positive moduli.
-
-    Raises ValueError for numbers that do not define a relaxation function.
-    """
+    """Return the same series with ascending, distinct, positive and finite relaxation times and positive moduli. Raises
+    ValueError for numbers that do not define a relaxation function."""
     terms, times = np.atleast_1d(np.asarray(moduli, float)), np.atleast_1d(np.asarray(relaxation_times, float))
     if terms.shape != times.shape or terms.ndim != 1:
         raise ValueError(f"There are {terms.size} moduli but {times.size} relaxation times.")
@@ -192,9 +190,8 @@ def creep_spectrum(*material: *Moduli) -> CreepSpectrum:
     """Return the creep compliance of a relaxation function, by partial fractions of 1/Gbar.
 
     Gbar(s) = G_inf + sum_j G_j s tau_j/(1 + s tau_j) is zero at s = -1/lambda_i, one lambda_i above every relaxation
-    time (the last one is infinite, a flow, if G_inf = 0), and J_i = -1/(s Gbar'(s)) there. The unknown of each zero
-    is the logarithm of its distance to the nearer pole, so that no digits are lost, however close or far the times
-    are.
+    time (the last one is infinite, a flow, if G_inf = 0), and J_i = -1/(s Gbar'(s)) there. The unknown of each zero is
+    the logarithm of its distance to the nearer pole, so that no digits are lost, however close or far the times are.
     """
     series = normal_form(*material)
     spring, terms, times = series

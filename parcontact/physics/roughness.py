@@ -54,10 +54,8 @@ class Roughness:
         return np.where(inside, np.maximum(k / k_rolloff, 1.0) ** (-2.0 * (1.0 + self.hurst)), 0.0)
 
     def spectrum(self, fft: FFT, size: tuple[float, float]) -> Spectrum:
-        """Return this rank's part of the transform of the heights [m] on a box of `size` [m]; collective.
-
-        Raises InputError if no wave of the box lies within the limits.
-        """
+        """Return this rank's part of the transform of the heights [m] on a box of `size` [m]; collective. Raises
+        InputError if no wave of the box lies within the limits."""
         kx, ky = wavenumbers(fft, size)
         k, (ratio, angle) = np.hypot(kx, ky), self.stretch
         along, across = kx * np.cos(angle) + ky * np.sin(angle), ky * np.cos(angle) - kx * np.sin(angle)

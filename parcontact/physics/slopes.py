@@ -27,11 +27,8 @@ WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 def friction_by_energy(
     slab: Slab, p: Array, u: Array, cell: tuple[float, float], direction: tuple[float, float], cyclic: tuple[bool, bool]
 ) -> float:
-    """Return `-<p, du/ds>/<p, 1>` for the slope along a unit `direction`; collective.
-
-    The result is in the unit of `u` over that of `cell = (dx, dy)`. Where a box is not `cyclic`, its last columns or
-    rows continue beyond the edge.
-    """
+    """Return `-<p, du/ds>/<p, 1>` for the slope along a unit `direction`; collective. The result is in the unit of `u`
+    over that of `cell = (dx, dy)`. Where a box is not `cyclic`, its last columns or rows continue beyond the edge."""
     along_x, along_y = direction[0] / cell[0], direction[1] / cell[1]
     if along_y == 0.0:
         nothing = np.empty((0, slab.nx), u.dtype)

@@ -34,10 +34,8 @@ def strip_coefficients(x: Array, y: Array, dx: float, dy: float, *, size: tuple[
 
 
 def _far_images(x: Array, y: Array, size: tuple[float, float]) -> Array:
-    """Return the sum of 1/r over the images beyond `NEAREST`, minus that of a uniform line at the distance Ly.
-
-    Midpoint rule of Euler and Maclaurin from s = NEAREST + 1/2 on: the integral, + f'/24 - 7 f'''/5760.
-    """
+    """Return the sum of 1/r over the images beyond `NEAREST`, minus that of a uniform line at the distance Ly. Midpoint
+    rule of Euler and Maclaurin from s = NEAREST + 1/2 on: the integral, + f'/24 - 7 f'''/5760."""
     lx, ly = size
     found = 2.0 * np.log(ly) / lx + np.zeros(np.broadcast(x, y).shape)
     for side in (1, -1):

@@ -74,10 +74,8 @@ class Surface:
         return out
 
     def forces(self, pressure: Array, shift: tuple[float, float]) -> list[float]:
-        """Return the sums over all points of pressure times slope along x and y; collective.
-
-        This is Eq. 10 of the paper over the area of a cell; slopes are in the unit of heights over m.
-        """
+        """Return the sums over all points of pressure times slope along x and y; collective. This is Eq. 10 of the
+        paper over the area of a cell; slopes are in the unit of heights over m."""
         along_x, along_y = 0.0, 0.0
         if self.waves is not None:
             transform = self.fft.forward(pressure)

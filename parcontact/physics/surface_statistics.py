@@ -95,8 +95,7 @@ def _along(power: Array, length: float) -> tuple[Array, Array]:
 
 def _fit_hurst(q: Array, psd: Array, number: Array) -> tuple[float, float]:
     """Return the Hurst exponent H from the slope -2 (1 + H) of log C2 over log q in the widest range with a power law,
-    and its standard error. Rings are weighted by their `number` of waves, as the mean over n waves scatters by
-    n^-1/2.
+    and its standard error. Rings are weighted by their `number` of waves, as the mean over n waves scatters by n^-1/2.
 
     Waves that hardly contribute to slopes are excluded: they depend on instruments, filters and edges.
     """

@@ -128,10 +128,8 @@ def free_operator(
     coefficient: Callable[[Array, Array, float, float], Array],
     tally: Tally,
 ) -> TileOperator:
-    """Return the operator from pressure to displacement on tiles of a free box of `size`.
-
-    `coefficient(x, y, dx, dy)` is the displacement at a distance from a cell under unit pressure.
-    """
+    """Return the operator from pressure to displacement on tiles of a free box of `size`. `coefficient(x, y, dx, dy)`
+    is the displacement at a distance from a cell under unit pressure."""
     dx, dy, length, count = _lengths(tiles, size)
     factor = (1.0 - poisson) / (2.0 * np.pi) * dx * dy
 

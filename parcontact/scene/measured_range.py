@@ -43,10 +43,8 @@ def excited_band(job: Job) -> tuple[float, float] | None:
 
 
 def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
-    """Return the wavenumbers [rad/m] of a shape, or the lowest and the highest one; none for a flat surface.
-
-    Round shapes and files may have every wave from the box to two cells.
-    """
+    """Return the wavenumbers [rad/m] of a shape, or the lowest and the highest one; none for a flat surface. Round
+    shapes and files may have every wave from the box to two cells."""
     longest = 2.0 * math.pi / max(grid.size)
     cells = [cell for cell, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1]
     if isinstance(shape, Flat):
@@ -74,10 +72,8 @@ def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedB
 
 
 def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
-    """Yield warnings about frequencies and temperatures at which the material was not measured.
-
-    `temperatures` [deg C] belong to a friction curve; without them the temperature of the material counts.
-    """
+    """Yield warnings about frequencies and temperatures at which the material was not measured. `temperatures` [deg C]
+    belong to a friction curve; without them the temperature of the material counts."""
     if (body := _body(job)) is None:
         return
     degrees = [value for value in temperatures or (body.temperature,) if value is not None]

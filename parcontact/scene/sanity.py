@@ -24,10 +24,10 @@ from .measured_range import doubt_band
 from .scene import Setup
 
 SEAM = 2.0  # accuracy: least jump across the edge, over the largest increment inside, for a warning
-FEW_CELLS = 0.15  # accuracy: least excess of the counted area, as a share of it, for a warning; circles of four cells
+FEW_CELLS = 0.15  # accuracy: least excess of the counted area, as a share of it, for a warning
 FEW_POINTS = 2**22  # tuning: largest number of points whose heights are computed for a check; this takes seconds
 STRICT = "an error with numerics.strict"
-FULL_CONTACT_ROUNDING = 1e-14  # rounding: of a sum of lengths, relative to these
+FULL_CONTACT_ROUNDING = 1e-14  # rounding: relative rounding of a sum of lengths
 
 
 def refuse_impossible(job: Job, timeline: Timeline) -> None:

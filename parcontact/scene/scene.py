@@ -149,8 +149,8 @@ class Scene:
             self.probe = replace(self.probe, shears=[shear.shifted(factor) for shear in shears])
 
     def body_for_shear(self, slab: Slab) -> tuple[ZenerBody, ElasticEnergy | ZenerEnergy | None]:
-        """Make the same body again for displacements along the surface, on the slab of these, and their energies if the
-        job asks for them. Its relaxation follows this one."""
+        """Make a second body for displacements along the surface, on their slab, and its energies if the job asks for
+        them. Its relaxation follows this one."""
         chosen, folded, prony = self.choices, self.folded, self.setup.prony
         integrator = chosen.numerics.integrator
         body = ZenerBody(slab, prony, integrator, folded.memoryless, folded.frozen)
@@ -191,10 +191,8 @@ class Scene:
 
 
 def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:
-    """Return the setup of a job for a march to the end of its history or, if later, to `until` [s]; collective.
-
-    Raises InputError for files that do not fit.
-    """
+    """Return the setup of a job for a march to the end of its history or, if later, to `until` [s]; collective. Raises
+    InputError for files that do not fit."""
     chosen, fft = choices(job, until), FFT(slab)
     surface, remarks = make_surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
@@ -239,10 +237,8 @@ def build_on(setup: Setup) -> Scene:
 def solver_on(
     setup: Setup, slab: Slab, tolerance: float, operator_type: type[np.floating] | None = None
 ) -> tuple[ContactSolver, Operators]:
-    """Make a solver and the operators of the body of a setup on another grid, for a start or a retry; collective.
-
-    Their transforms are planned without measurement, so that a restarted run has the same rounding.
-    """
+    """Make a solver and the operators of the body of a setup on another grid, for a start or a retry; collective. Their
+    transforms are planned without measurement, so that a restarted run has the same rounding."""
     on_slab = replace(setup, slab=slab, fft=FFT(slab, measured=False))
     return _solver(on_slab, tolerance, operator_type or setup.choices.operator_type)
 

@@ -1,7 +1,7 @@
 """Frictionless contact of a body with a rigid surface by projected, preconditioned conjugate gradients.
 
-Find the admissible pressure p, an `ny x nx` map, whose gap `g = A p - h - d` meets the conditions of the constraint.
-A is symmetric and positive; either mean(p) = P0 is given and d unknown, or d is given. For `constraint.NonNegative`:
+Find the admissible pressure p, an `ny x nx` map, whose gap `g = A p - h - d` meets the conditions of the constraint. A
+is symmetric and positive; either mean(p) = P0 is given and d unknown, or d is given. For `constraint.NonNegative`:
 
     p >= 0,   g >= 0,   p g = 0.
 
@@ -18,16 +18,15 @@ and `C` = subtract the mean over it, one iteration is:
    that few points change from one bound to the other.
 5. f must not rise. Otherwise the step is halved, p is only scaled, and the direction is forgotten.
 
-The exact step `<r, t>/<t, A t>` needs one more application of the operator. As K E is nearly the inverse of A, a
-fixed step near 1 replaces it. `A p` of the next iterate gives `<t, A t>`: if the exact step differs by more than
-MAX_STEP_RATIO, or the certificate no longer falls, the rest of the solve makes exact steps. On lines of points and
-on cells much longer than wide, all steps are exact.
+The exact step `<r, t>/<t, A t>` needs one more application of the operator. As K E is nearly the inverse of A, a fixed
+step near 1 replaces it. `A p` of the next iterate gives `<t, A t>`: if the exact step differs by more than
+MAX_STEP_RATIO, or the certificate no longer falls, the rest of the solve makes exact steps. On lines of points and on
+cells much longer than wide, all steps are exact.
 
-With d given, nothing is centred or scaled. With P0 given, d is the mean of `A p - h` over free points, weighted by
-p, so that `<p, g> = 0` and scaling p does not change f to first order. Thus f falls for every sufficiently small
-step (D. P. Bertsekas, SIAM J. Control Optim. 20 (1982) 221, for d given). Without K this is the method of I. A.
-Polonsky and L. M. Keer, Wear 231 (1999) 206; with K the number of iterations hardly depends on the grid. All numbers
-are dimensionless.
+With d given, nothing is centred or scaled. With P0 given, d is the mean of `A p - h` over free points, weighted by p,
+so that `<p, g> = 0` and scaling p does not change f to first order. Thus f falls for every sufficiently small step (D.
+P. Bertsekas, SIAM J. Control Optim. 20 (1982) 221, for d given). Without K this is the method of I. A. Polonsky and L.
+M. Keer, Wear 231 (1999) 206; with K the number of iterations hardly depends on the grid. All numbers are dimensionless.
 """
 
 import math

@@ -60,10 +60,8 @@ def is_block_grid(slab: Slab, finest: Slab) -> bool:
 def choose_tiles(
     blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array, constraint: Constraint
 ) -> Tiles | None:
-    """Return the tiles of a grid that may touch, given the contact `below` on the next coarser grid; collective.
-
-    Return None if there are none, or if they have more than LARGEST_SHARE of the points.
-    """
+    """Return the tiles of a grid that may touch, given the contact `below` on the next coarser grid; collective. Return
+    None if there are none, or if they have more than LARGEST_SHARE of the points."""
     most = LARGEST_SHARE * slab.points / SIDE**2
     p = below.p if below.slab is blocks else regrid.restrict(below.slab, blocks, below.p)
     touching = constraint.touches(p) != 0.0
@@ -128,10 +126,7 @@ class OnTheseTiles:
 
     def check(self, solver: ContactSolver, p: Array) -> Contact | None:
         """Return the contact of the solution p if it satisfies the solver's tolerance at all points, else None;
-        collective.
-
-        Below the tolerance FINEST it is None, too: the operator of the whole grid is needed to check p.
-        """
+        collective. Below the tolerance FINEST it is None, too: the operator of the whole grid is needed to check p."""
         if solver.tolerance < FINEST:
             return None
         self._displace(solver.workspace.displacement)

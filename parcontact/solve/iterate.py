@@ -96,10 +96,7 @@ def form_iterate(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Arra
 
 def _approaches(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array) -> tuple[float, float] | None:
     """Return `Iterate.between` for pressures that are all at a bound; None if one of the bounds has no points;
-    collective.
-
-    Gaps of points at the upper bound must be <= 0, all others >= 0.
-    """
+    collective. Gaps of points at the upper bound must be <= 0, all others >= 0."""
     level, yields = u - h, p >= constraint.bounds[1]
     lowest = float(level.max(where=yields, initial=-np.inf))
     highest = float(level.min(where=~yields, initial=np.inf))

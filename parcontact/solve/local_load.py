@@ -48,10 +48,8 @@ class LocalLoad:
         return load, cut
 
     def restore(self, constraint: Constraint, p: Array, load: float, total: float, near_by: bool) -> None:
-        """Scale p from the sum `load`, as `advance` returned it, to the sum `total`; collective.
-
-        If `near_by`, each cell first loses what was added in it, at most MOST_GIVEN_BACK of its load.
-        """
+        """Scale p from the sum `load`, as `advance` returned it, to the sum `total`; collective. If `near_by`, each
+        cell first loses what was added in it, at most MOST_GIVEN_BACK of its load."""
         loads = np.split(self._sums, 2, axis=1)[0]
         shares = np.zeros_like(loads)
         if near_by:

@@ -23,9 +23,7 @@ def precision_of_directions(tolerance: float, loose: float = LOOSE) -> type[np.f
 
 def reachable_certificate(slab: Slab, lengths: Sequence[Array], p: Array, compliance: float, length: float) -> float:
     """Return the smallest certificate, over `length`, that the rounding of maps of lengths and of p allows; collective.
-
-    An error in the last digit of p moves the body by this digit times the largest `compliance`.
-    """
+    An error in the last digit of p moves the body by this digit times the largest `compliance`."""
     sizes = slab.reduce((), [float(np.abs(each).max(initial=0.0)) for each in (*lengths, p)])
     sizes[-1] *= compliance
     return ROUNDINGS * float(np.finfo(lengths[0].dtype).eps) * max(sizes) / length

@@ -12,12 +12,11 @@ from .precision import precision_of_directions
 class Workspace:
     """A pressure, two displacements, a search direction, and one byte per point.
 
-    The scene makes one and passes it to all that need a map temporarily. A solve overwrites all maps and leaves `A
-    p` in `displacement`, valid until the next one. Read maps as attributes at each use: they may be swapped or
-    replaced.
+    The scene makes one and passes it to all that need a map temporarily. A solve overwrites all maps and leaves `A p`
+    in `displacement`, valid until the next one. Read maps as attributes at each use: they may be swapped or replaced.
 
-    Parameters: `kept`, the type of displacements, single precision if the operator has no more digits; `tolerance`
-    of solves, which decides the precision of directions.
+    Parameters: `kept`, the type of displacements, single precision if the operator has no more digits; `tolerance` of
+    solves, which decides the precision of directions.
     """
 
     def __init__(self, slab: Slab, tolerance: float, kept: type[np.floating] = np.float64) -> None:

@@ -32,11 +32,8 @@ def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = Non
 
 
 def _from_steady_sliding(setup: Setup) -> March:
-    """Return a march in the steady state of its job's `initial` section; collective.
-
-    Maps of the scene are made after those of the steady solver are freed; meanwhile the pressure is in a map of the
-    workspace.
-    """
+    """Return a march in the steady state of its job's `initial` section; collective. Maps of the scene are made after
+    those of the steady solver are freed; meanwhile the pressure is in a map of the workspace."""
     point, contact = _solve(setup)
     scene = build_on(setup)
     workspace, body = scene.solver.workspace, scene.material.at_rest()

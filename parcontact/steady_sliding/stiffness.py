@@ -18,10 +18,8 @@ Vector = tuple[float, float]
 
 
 def soft_stripes(setup: Setup, velocity: Vector) -> int | None:
-    """Return the axis of an array of rows along which the body is far softer than across it at a velocity [m/s].
-
-    It is None if there is no such axis: also on a line of points, in a free box, and for oblique velocities.
-    """
+    """Return the axis of an array of rows along which the body is far softer than across it at a velocity [m/s]. It is
+    None if there is no such axis: also on a line of points, in a free box, and for oblique velocities."""
     moduli = _moduli(setup, velocity)
     if moduli is None or abs(moduli[-1]) < CONTRAST * setup.prony.modulus_inf:
         return None

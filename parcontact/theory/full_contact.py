@@ -1,10 +1,9 @@
 """A rigid rough surface in full contact with a viscoelastic half-space on which it slides. The problem is linear, so
 that the solution is exact.
 
-The surface is a sum of waves with distinct wave vectors, h(x, y) = sum Re[A exp(i (kx x + ky y))], displaced by
-s(t). Each wave has a transfer modulus M: the complex modulus G*(omega) at omega = kx vx + ky vy in steady sliding, a
-function of time after a change of velocity, and also a function of the time step for a time-stepping code. With k =
-|(kx, ky)|:
+The surface is a sum of waves with distinct wave vectors, h(x, y) = sum Re[A exp(i (kx x + ky y))], displaced by s(t).
+Each wave has a transfer modulus M: the complex modulus G*(omega) at omega = kx vx + ky vy in steady sliding, a function
+of time after a change of velocity, and also a function of the time step for a time-stepping code. With k = |(kx, ky)|:
 
     pressure    p = p0 + sum Re[2 k A conj(M) exp(i (kx (x - sx) + ky (y - sy)))]
     traction    <p grad h> = -sum k |A|^2 (kx, ky) Im M        force on the surface per nominal area
@@ -38,8 +37,7 @@ def waves(heights: ArrayLike, length_x: float, length_y: float) -> Waves:
     """Return the waves of a map of heights [m], shape (ny, nx), on a periodic rectangle of sides length_x and length_y
     [m].
 
-    The mean is left out. Raises ValueError for a wave of two points per period, whose slope its heights do not
-    define.
+    The mean is left out. Raises ValueError for a wave of two points per period, whose slope its heights do not define.
     """
     heights = np.asarray(heights, float)
     ny, nx = heights.shape

@@ -46,10 +46,8 @@ def pressure(r: Values, force: Values, radius: Values, shear_modulus: Values, po
 
 
 def displacement(r: Values, force: Values, radius: Values, shear_modulus: Values, poisson: Values = 0.5) -> Array:
-    """Return the normal displacement u(r) of the surface [m], 0 far away (Johnson, Eqs. 3.41a and 3.42a).
-
-    u = d - r^2/(2R) in the contact and ((2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2))/(pi R) outside.
-    """
+    """Return the normal displacement u(r) of the surface [m], 0 far away (Johnson, Eqs. 3.41a and 3.42a). u = d -
+    r^2/(2R) in the contact and ((2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2))/(pi R) outside."""
     a = contact_radius(force, radius, shear_modulus, poisson)
     r = np.maximum(r, 0)
     outer = np.maximum(r, a)

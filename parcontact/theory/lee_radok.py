@@ -50,10 +50,8 @@ def triangle_lift_off_time(rise_time: float, *material: *Moduli) -> float:
 
 
 def _time_of_equal_radius(t: ArrayLike, rise_time: float, *material: *Moduli) -> Array:
-    """Return the time during the rise at which the contact was as large as at t; 0 after lift-off.
-
-    After the rise it is t minus the age x that solves int_0^x G = 2 int_0^{t - rise_time} G.
-    """
+    """Return the time during the rise at which the contact was as large as at t; 0 after lift-off. After the rise it is
+    t minus the age x that solves int_0^x G = 2 int_0^{t - rise_time} G."""
     series = normal_form(*material)
     lift_off = triangle_lift_off_time(rise_time, *series)
 

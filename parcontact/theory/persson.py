@@ -1,9 +1,8 @@
 """Persson's theory: contact area and friction of a rough surface that slides on a viscoelastic half-space.
 
 If waves up to the wavenumber k are included, the pressure in full contact has the variance Var p(k), and its
-distribution spreads from its mean p0; points with tension are not in contact. With the transfer modulus M of each
-wave as in `full_contact` (G* in steady sliding, functions of time in any other history) and <h^2> = int Phi d2q/(4
-pi^2):
+distribution spreads from its mean p0; points with tension are not in contact. With the transfer modulus M of each wave
+as in `full_contact` (G* in steady sliding, functions of time in any other history) and <h^2> = int Phi d2q/(4 pi^2):
 
     Var p(k) = int_{|q| < k} Phi 4 q^2 |M|^2 d2q/(4 pi^2)
     A(k)/A0 = P(k) = erf(p0/sqrt(2 Var p(k)))
@@ -13,15 +12,15 @@ pi^2):
 The theory is exact in full contact, where P = 1. Otherwise it is an approximation, whose empirical factor gamma (1:
 none) corrects the friction.
 
-Source: B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840; with time B. N. J. Persson and A. I. Volokitin, Phys. Rev.
-B 65 (2002) 134106; for gamma M. Scaraggi and B. N. J. Persson, J. Phys.: Condens. Matter 27 (2015) 105102, as in
-Sec. 3.1 of the paper "Transient frictionless contact of a rough rigid surface on a viscoelastic half-space". That
-paper prints no formula of the theory. The steady form above is the published one; with time, M is taken from full
-contact, and P is taken at the present time. A theory with P inside the integral over the past would differ in
-transients of partial contact only.
+Source: B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840; with time B. N. J. Persson and A. I. Volokitin, Phys. Rev. B
+65 (2002) 134106; for gamma M. Scaraggi and B. N. J. Persson, J. Phys.: Condens. Matter 27 (2015) 105102, as in Sec. 3.1
+of the paper "Transient frictionless contact of a rough rigid surface on a viscoelastic half-space". That paper prints
+no formula of the theory. The steady form above is the published one; with time, M is taken from full contact, and P is
+taken at the present time. A theory with P inside the integral over the past would differ in transients of partial
+contact only.
 
-Integrals are sums over waves in `persson_rings.Rings`; `modulus` (M, Pa) has one entry per wave on its last axis,
-and `mean_pressure` (p0, Pa) the shape of the axes before; SI units.
+Integrals are sums over waves in `persson_rings.Rings`; `modulus` (M, Pa) has one entry per wave on its last axis, and
+`mean_pressure` (p0, Pa) the shape of the axes before; SI units.
 """
 
 import numpy as np

@@ -25,10 +25,8 @@ GAP_SHARE = 0.1  # tuning: largest gap on a set to which its linear problem is s
 
 
 def solve(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
-    """Solve as `ContactSolver.solve`, for a load that is not 0; collective.
-
-    `iterations` of the contact counts iterations of the linear problems.
-    """
+    """Solve as `ContactSolver.solve`, for a load that is not 0; collective. `iterations` of the contact counts
+    iterations of the linear problems."""
     search = _Search(solver, problem, start)
     contact, iterations = solver.check(problem, start, ""), 0
     search.begin(contact)

@@ -36,10 +36,8 @@ def prepare_start(
 def start_on_coarse_grids(
     solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: SolverOnTiles | None = None
 ) -> tuple[int, Contact | None]:
-    """Solve loosely on coarser grids and put the resulting start into `start`, 0 if there is none; collective.
-
-    Return the number of grids, and the contact if it was solved on tiles and satisfies the tolerance at all points.
-    """
+    """Solve loosely on coarser grids and put the resulting start into `start`, 0 if there is none; collective. Return
+    the number of grids, and the contact if it was solved on tiles and satisfies the tolerance at all points."""
     levels = nested.coarser_levels(solver.slab, problem.heights)
     descent = _Descent(solver, problem, solver_on, on_tiles)
     nested.descend(levels, descent.solve, start)

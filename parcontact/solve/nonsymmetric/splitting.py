@@ -1,15 +1,14 @@
 """Contact with a law of the interface, in steady sliding or at rest, by Douglas-Rachford splitting.
 
 Find p >= 0 with given mean P0 or given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`solve.interface_law`). A is
-diagonal in Fourier space and c in real space, so that each is inverted exactly. With J_A(x) = (1 + gamma A)^-1 x
-scaled to the mean P0, or (1 + gamma A)^-1 (x + gamma d), with J_c the pressure of `interface_law.resolve`, and with
-a map s,
+diagonal in Fourier space and c in real space, so that each is inverted exactly. With J_A(x) = (1 + gamma A)^-1 x scaled
+to the mean P0, or (1 + gamma A)^-1 (x + gamma d), with J_c the pressure of `interface_law.resolve`, and with a map s,
 
     p = J_c(s),    y = J_A(2 p - s),    s <- s + y - p
 
 (J. Douglas, H. H. Rachford, Trans. Amer. Math. Soc. 82 (1956) 421; P.-L. Lions, B. Mercier, SIAM J. Numer. Anal. 16
-(1979) 964). It converges for every gamma > 0 and every A with a real part >= 0, also for very large loss tangents.
-It ends when the certificate of an admissible pressure, with the displacement `A p + c(p)`, meets the tolerance.
+(1979) 964). It converges for every gamma > 0 and every A with a real part >= 0, also for very large loss tangents. It
+ends when the certificate of an admissible pressure, with the displacement `A p + c(p)`, meets the tolerance.
 """
 
 import math

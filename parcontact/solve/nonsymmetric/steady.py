@@ -115,10 +115,8 @@ class SteadySolver:
         self._linear.hold_all()
 
     def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
-        """Solve for heights h under the mean pressure `mean`; collective.
-
-        The solution overwrites the pressure `start`. A start that is 0 everywhere is replaced by a uniform pressure.
-        """
+        """Solve for heights h under the mean pressure `mean`; collective. The solution overwrites the pressure `start`.
+        A start that is 0 everywhere is replaced by a uniform pressure."""
         try:
             return self._solve(h, mean, start)
         except ZeroDivisionError:  # no load or no points in a set; all ranks have the same sums
@@ -196,10 +194,8 @@ class SteadySolver:
                 np.not_equal(marked, 0.0, out=self._working)
 
     def _load(self, x: Array, mean: float) -> None:
-        """Put x to 0 outside the set, scale its sum to the load, and update its image u.
-
-        The load is made up for by the same pressure on all points of the set, or with stripes in proportion to x.
-        """
+        """Put x to 0 outside the set, scale its sum to the load, and update its image u. The load is made up for by the
+        same pressure on all points of the set, or with stripes in proportion to x."""
         slab, working = self.slab, self._working
         np.copyto(x, 0.0, where=~working)
         total, members = slab.sum(kernels.sum_of(x), float(np.count_nonzero(working)))
