@@ -2,6 +2,7 @@
 
 import itertools
 import re
+import time
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -16,7 +17,7 @@ from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, 
 
 from parcontact.accuracy.controller import cells_per_step
 from parcontact.errors import InputError, RunError
-from parcontact.history.chosen import MadeStep
+from parcontact.history.chosen import RAMP_STEPS, MadeStep
 from parcontact.history.timeline import Step, Timeline
 from parcontact.job import Job
 from parcontact.march.failure import StepError
@@ -340,3 +341,31 @@ def test_what_would_do_is_solved_in_double_precision(comm: MPI.Intracomm, limit:
     assert march.scene.slab.tally["retry"] == 1
     assert (found[-1].certificate.worst <= 1e-3) == solved
     assert found[-1].remark.endswith("with an operator in double precision") == solved
+
+
+# -- the row of a step ------------------------------------------------------------------------------------------------
+
+
+def test_no_errors_are_stated_of_a_contact_that_reaches_the_edge_of_its_box() -> None:
+    """They are known of a light contact in the middle, and of none that the box cuts off."""
+    history = [{"force": force, "duration": 1e-3, "time_step": 1e-3} for force in (1e-4, 10.0)]
+    grid = {"points": 16, "size": 1e-3, "boundary": "free"}
+    _, made = marched({"grid": grid, "surface": SPHERE, "material": ZENER, "history": history})
+    assert [row.measures.at_edge for row in made[1:]] == [False, False, True, True]
+    assert [row.errors is None for row in made[1:]] == [False, False, True, True]
+
+
+def test_steps_take_no_longer_than_the_march() -> None:
+    began = time.perf_counter()
+    _, made = marched({"grid": GRID, "surface": SPHERE, "material": ELASTIC, "history": [PRESS]})
+    assert 0.0 < sum(row.seconds for row in made) < time.perf_counter() - began
+
+
+def test_the_longest_steps_do_where_nothing_touches() -> None:
+    """A ramp far beyond the range of an attraction that ends there is divided as seldom as any ramp."""
+    rubber = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 2e6, "relaxation_time": 1e-3}]}
+    scene = {"grid": {"points": 20, "size": 1e-3}, "surface": SPHERE | {"radius": 2e-3}, "material": rubber}
+    ramp = {"approach": {"from": -9e-6, "to": -8e-6}, "duration": 4e-4}
+    march = begun({**scene, "adhesion": {"work": 0.05, "range": 1e-6, "law": "dugdale"}, "history": [ramp]})
+    times = [march.advance(step).time for step in islice(march.steps(), 4)]
+    np.testing.assert_allclose(times, np.arange(4) * 4e-4 / RAMP_STEPS, rtol=1e-12)
