@@ -16,6 +16,7 @@ from ..columns import added_by
 from ..errors import InputError, RunError
 from ..history.timeline import Timeline
 from ..job import Grid
+from ..job.added_sections import effects_of
 from ..job.checks import limits
 from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Positive
@@ -27,7 +28,6 @@ from ..physics.entries import Entry, Saved
 from ..physics.exponentials import Exponentials, fit_exponentials
 from ..physics.heat import Conductor, Depths, depths_of
 from ..physics.heat_memory import Heating, HeatMemory
-from ..physics.interface_friction import Shear
 from ..physics.prony import Prony
 from ..physics.units import Units
 from .effect import Changes, Decision, Effect, Instant
@@ -137,10 +137,11 @@ class ThermalMemory:
     error: float = math.inf
 
 
-def _rubs(job: Any, shears: Sequence[Shear]) -> bool:
-    """Return whether the contact area itself makes heat."""
-    interface = job.section("interface")
-    return bool(shears) or (interface is not None and interface.stick)
+def _rubs(job: Any) -> bool:
+    """Return whether the contact area itself makes heat, by the shear of any effect or by sticking."""
+    effects, interface = effects_of(type(job).model_fields).values(), job.section("interface")
+    shears = (effect.shear(job) is not None for effect in effects if effect.decide(job).on)
+    return any(shears) or (interface is not None and interface.stick)
 
 
 class ThermalColumns(Effect[ThermalMemory]):
@@ -180,13 +181,13 @@ class ThermalColumns(Effect[ThermalMemory]):
     @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
         """Return the types of the map of temperatures, and of those that hold its spectra in a checkpoint."""
-        count, rubs = 2 + exponentials_of(job).kept, job.section("interface") is not None
-        return [np.float64] * (count + rubs + math.ceil(count / spectra.per_map(job.grid.nx)))
+        count = 2 + exponentials_of(job).kept
+        return [np.float64] * (count + _rubs(job) + math.ceil(count / spectra.per_map(job.grid.nx)))
 
     def __init__(self, scene: Any) -> None:
         self._setup, self._slab, self._job = scene.setup, scene.slab, scene.job
         self._feeds_back = feeds_back(scene.job)
-        self._rubs, self._pulled = _rubs(scene.job, scene.choices.shears), scene.job.section("adhesion") is not None
+        self._rubs, self._pulled = _rubs(scene.job), scene.job.section("adhesion") is not None
 
     def at_rest(self) -> ThermalMemory:
         job, fft = self._job, self._setup.fft

@@ -157,6 +157,9 @@ def test_its_shear_adds_to_that_of_others(shared_path: Path, comm: MPI.Intracomm
     found, expected = (marched(data, comm=comm)[1][-1].measures for data in (both, alone))
     assert found.force_interface == pytest.approx(expected.force_interface, rel=1e-14)
     assert found.friction == pytest.approx(expected.friction, rel=1e-14)
+    hot = {**WEAR, "thermal": {"conductivity": 0.2, "diffusivity": 1e-7}}
+    maps = [entry for entry in marched(hot, comm=comm)[0].entries().values() if entry.is_map]
+    assert memory.saved(Job.model_validate(hot)) == len(maps) * NY * (8 * NX + 4)  # with the spectrum of its heat
     slab = Slab(comm, NX, NY)
     setups = (scene.set_up(Job.model_validate(data), slab) for data in (both, alone))
     one, other = (SteadySliding(setup).solve((0.2, 0.0), 1e5) for setup in setups)
