@@ -154,6 +154,10 @@ def test_decay() -> None:
     assert [law.decay(x) for x in (0.0, 700.0, 1e300, np.inf)] == [1.0, 0.0, 0.0, 0.0]
 
 
+def test_surfaces_touch_where_the_gap_is_closed() -> None:
+    assert law.Law.touches(np.array([0.0, 1e-300, 0.5])).tolist() == [True, False, False]
+
+
 @pytest.mark.parametrize("one", LAWS)
 def test_energy_and_slope_of_the_attraction(one: law.Law) -> None:
     """`d gamma/dg = -sigma` by central differences (second order, 1e-4 of the range), `gamma(0) = s rho`, and sigma's
@@ -164,7 +168,7 @@ def test_energy_and_slope_of_the_attraction(one: law.Law) -> None:
         return law.energy(one, gap, law.attraction(one, gap))
 
     assert_allclose(energy(0.0), S * RHO, rtol=1e-15)
-    for gap in (0.1 * RHO, 0.7 * RHO, 1.2 * RHO, 2.1 * RHO):
+    for gap in (0.1 * RHO, 0.7 * RHO, 1.2 * RHO, 1.5 * RHO, 2.1 * RHO):
         low, high = gap - step, gap + step
         here = law.attraction(one, gap)
         assert_allclose((energy(low) - energy(high)) / (2 * step), here, rtol=1e-7)
