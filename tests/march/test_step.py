@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
 from parcontact.accuracy.controller import cells_per_step
+from parcontact.effects.adhesion import AdhesionColumns, AdhesionMemory
+from parcontact.effects.effect import Changes, Instant
 from parcontact.errors import InputError, RunError
 from parcontact.history.chosen import RAMP_STEPS, MadeStep
 from parcontact.history.timeline import Step, Timeline
@@ -369,3 +371,20 @@ def test_the_longest_steps_do_where_nothing_touches() -> None:
     march = begun({**scene, "adhesion": {"work": 0.05, "range": 1e-6, "law": "dugdale"}, "history": [ramp]})
     times = [march.advance(step).time for step in islice(march.steps(), 4)]
     np.testing.assert_allclose(times, np.arange(4) * 4e-4 / RAMP_STEPS, rtol=1e-12)
+
+
+def test_effects_are_given_the_energy_that_the_body_gains(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is stored and dissipated in all steps adds up to the columns of the row, to rounding of their sums."""
+    follow, gained = AdhesionColumns.follow, list[float]()
+
+    def note(effect: AdhesionColumns, instant: Instant, memory: AdhesionMemory) -> Changes[AdhesionMemory]:
+        gained.append(instant.gained)
+        return follow(effect, instant, memory)
+
+    monkeypatch.setattr(AdhesionColumns, "follow", note)
+    press = {"force": {"from": 0.0, "to": 5e-2}, "duration": 1e-4, "time_step": 2e-5}
+    scene = {"grid": {"points": 20, "size": 1e-3}, "surface": SPHERE, "material": ZENER, "history": [press]}
+    _, made = marched({**scene, "adhesion": {"work": 0.05, "range": 1e-6}, "output": {"energy": True}})
+    assert made[-1].dissipated > 0.01 * made[-1].stored > 0.0
+    sums = [row.stored + row.dissipated for row in made]
+    np.testing.assert_allclose(np.cumsum(gained), np.subtract(sums[1:], sums[0]), rtol=1e-12)
