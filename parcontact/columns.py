@@ -155,7 +155,7 @@ FLASH = (
     ),
     Column(
         *("error_flash", ""),
-        "estimated relative error of `flash_temperature`: 2.5 times that of friction, which makes the heat (with "
+        "estimated relative error of `flash_temperature`: three times that of friction, which makes the heat (with "
         "`thermal`); empty where it is 0",
         lambda point: point.error_flash,
         "thermal",

@@ -161,7 +161,7 @@ def test_a_body_that_flows_becomes_warm() -> None:
 
 @pytest.mark.parametrize(("seed", "speed"), [(1, 0.1), (2, 1.0), (3, 10.0)])
 def test_the_error_of_the_flash_temperature(seed: int, speed: float) -> None:
-    """On 8 cells per shortest wave it covers the difference to four times as many, and is no more than 30 times it."""
+    """On 8 cells per shortest wave it covers the difference to four times as many, and is no more than 40 times it."""
     rough = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 2.5e-4, "rms_slope": 0.1}
     points = []
     for count in (32, 128):
@@ -169,16 +169,16 @@ def test_the_error_of_the_flash_temperature(seed: int, speed: float) -> None:
         points.append(states(made).solve((speed, 0.0), 1e4))
     flash = [point.flash.mean for point in points if point.flash is not None]
     error = next(column for column in STEADY if column.name == "error_flash").value(points[0])
-    assert abs(flash[0] - flash[1]) < error * flash[1] < 30.0 * abs(flash[0] - flash[1])
+    assert abs(flash[0] - flash[1]) < error * flash[1] < 40.0 * abs(flash[0] - flash[1])
 
 
 def test_the_error_of_the_flash_temperature_of_a_march() -> None:
-    """2.5 times that of friction, also at rest after a slide; empty before there is any heat."""
+    """Three times that of friction, also at rest after a slide; empty before there is any heat."""
     rest = {"pressure": PRESSURE, "duration": 1e-2, "time_step": 5e-3}
     _, rows = marched(march_data(surface=PARTIAL, history=[{"pressure": PRESSURE}, SLIDE, rest]))
     slide, after = [row for row in rows if row.distance > 0.0][:-2], rows[-2:]
     assert math.isnan(rows[1].added[2])
-    assert [row.added[2] for row in slide] == [2.5 * row.error_friction for row in slide]
+    assert [row.added[2] for row in slide] == [3.0 * row.error_friction for row in slide]
     assert after[0].added[2] == after[1].added[2] == slide[-1].added[2] > 0.0
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from parcontact.errors import InputError
 from parcontact.job import Case, JobError, load, load_cases, select_cases
+from parcontact.job.sections.spectral_bands import Bands
 
 from . import texts
 from .texts import SMALL, with_material
@@ -100,6 +101,20 @@ def test_overrides_reach_a_lone_surface_by_number_and_without() -> None:
     assert job_of(SMALL, "surface.0.amplitude=2e-6").surface[0].amplitude == 2e-6
     assert job_of(SMALL, "surface.amplitude=2e-6").surface[0].amplitude == 2e-6
     assert job_of(SMALL, "surface.0={shape: flat}").surface[0].shape == "flat"
+
+
+def test_overrides_of_what_is_auto() -> None:
+    """`auto` is a mapping without keys to them; points of a grid have no keys."""
+    lines = (
+        "bands: auto",
+        "surface: {shape: rough, hurst: 0.8, rms_slope: 0.1, long_wavelength: 1e-3, short_wavelength: 1e-5}",
+        "material: {include: synthetic_tyre}",
+        "steady: {velocities: [1.0], pressures: [1e5]}",
+    )
+    bands = job_of("\n".join(lines) + "\n", "bands.cutoff_slope=1.3", "bands.samples=3").bands
+    assert bands == Bands(cutoff_slope=1.3, samples=3)
+    with pytest.raises(InputError, match=r"grid\.points is 'auto' and no mapping of keys, so it has no 0"):
+        job_of(SMALL.replace("points: 64", "points: auto"), "grid.points.0=64")
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,8 @@ def _parse(change: str | tuple[str, Any], source: Source) -> Setting | None:
 def _apply(source: Source, override: Setting) -> None:
     """Put the value of an override where its path leads, making the mappings on the way.
 
-    `surface.0` is also a surface that is one mapping instead of a list.
+    `surface.0` is also a surface that is one mapping instead of a list. `auto` becomes a mapping of the keys that
+    overrides set.
     """
     if not isinstance(source.data, dict):
         return
@@ -107,9 +108,14 @@ def _apply(source: Source, override: Setting) -> None:
         found = (*found, name)
         if index == len(given) - 1:
             source.put(found, override.value, override.key_place, override.place)
-        elif isinstance(node, dict) and node.get(name) is None:
+        elif isinstance(node, dict) and _leaves_open(node.get(name), str(given[index + 1])):
             source.put(found, {}, override.key_place, override.key_place)
         node = node[name]
+
+
+def _leaves_open(value: Any, name: str) -> bool:
+    """Return whether a value gives no keys, so that a mapping with a key of this name can take its place."""
+    return value is None or (value == "auto" and not name.isdecimal())
 
 
 def _dead_end(node: Any, shown: str, name: str) -> str:
