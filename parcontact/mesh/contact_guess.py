@@ -6,9 +6,9 @@ under a mean pressure p on a surface of rms slope h' the share in contact is
     A = erf(sqrt(2) p/(E h')),      E = 2 |G|/(1 - nu),
 
 here with the modulus G at FEW times the frequency with which the shortest wave passes. Sliding surfaces have the
-larger area 1 - (1 - A)^MORE. The phase of the modulus is that at EDGES times this frequency. If the loss angle is
-still proportional to the frequency at FINEST times it, sliding is slow, and edges lose power in waves shorter than
-the cells (`accuracy.sources`).
+larger area 1 - (1 - A)^MORE. The phase of the modulus is taken at EDGES times this frequency. If the loss angle is
+still proportional to the frequency at FINEST times this frequency, sliding is slow, and edges lose power in waves
+shorter than the cells (`accuracy.sources`).
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ Lines of a laboratory may precede the names of the columns. These have one of tw
 * One header row with units in brackets: `f[Hz] E'[MPa] E''[MPa] T[C]`, separated by white space or commas; or words
   with units, `Frequency (Hz), Storage Modulus (MPa), Loss Modulus (MPa)`, separated by commas, semicolons or tabs.
 
-A modulus named by words alone is Young's. If rates are in rad/s, as from rheometers, and for compliances, it is that
-of shear, with a warning. Missing moduli follow from tan delta or the phase angle. Lines that begin with # are
+A modulus named by words alone is Young's. With rates in rad/s, as from rheometers, and for compliances, it is taken as
+shear, with a warning. Missing moduli follow from tan delta or the phase angle. Lines that begin with # are
 comments; columns with other names are ignored. Rows of one temperature are one set; without T all rows are one set,
 and rows of one frequency at many temperatures are one set each.
 """

@@ -2,10 +2,10 @@
 
     G*(w, T) = b_T G*(a_T w, T_ref)
 
-Rates are reduced by a_T and moduli divided by b_T, so that one series fits all sets as closely as possible: least
-squares of its misfit over the constants of both laws, with the series eliminated (variable projection: G. H. Golub,
-V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413). Without b_T, a consequence of the entropy of rubber (J. D. Ferry,
-Viscoelastic Properties of Polymers (1980), chapter 11), constants of a_T have errors of a tenth and more.
+Rates are reduced by a_T and moduli divided by b_T, so that one series describes all sets. The constants of both laws
+minimize the squared misfit of the best series (variable projection: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10
+(1973) 413). Without b_T, a consequence of the entropy of rubber (J. D. Ferry, Viscoelastic Properties of Polymers
+(1980), chapter 11), constants of a_T have errors of a tenth and more.
 """
 
 import itertools

@@ -129,7 +129,7 @@ def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, remarks: Remarks) -> Spect
 def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, remarks: Remarks) -> Spectrum:
     """Return the transform of a map, or of a surface with the spectrum of a line scan, adding to its `remarks`;
     collective."""
-    from ..road import map_files, prepared_map, spectrum  # with much of scipy, which is slow to import
+    from ..road import map_files, prepared_map, spectrum  # imports much of scipy, which is slow
     from . import map_sentences
 
     heights: list[Array] = []
