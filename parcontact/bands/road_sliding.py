@@ -195,7 +195,7 @@ class RoadSliding:
             self.setup = replace(self.setup, choices=choices(finest))
             self._cascade.press(self._cascade.velocity, self._cascade.pressure)
         except InputError as error:
-            raise RunError(f"the flash temperature leaves what the material allows: {error}") from None
+            raise RunError(f"the flash temperature is outside the range of the material's shift: {error}") from None
 
     def _rub(self, results: Results) -> float:
         """Return the shear stress [Pa] of the interface, averaged over the nominal area."""

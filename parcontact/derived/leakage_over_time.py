@@ -100,7 +100,7 @@ class Gaps:
             gap, pressure = file["gap"][index], file["pressure"][index]
         if gap.shape != pressure.shape or not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
             step = int(self.fields.steps[index])
-            raise InputError(f"{self.directory / 'fields.h5'}: the maps after step {step} are no whole maps of numbers")
+            raise InputError(f"{self.directory / 'fields.h5'}: the maps after step {step} are incomplete or not finite")
         return np.where(touching_of(self.job, pressure, gap), 0.0, np.maximum(gap, 0.0))
 
     def bare(self) -> Map:

@@ -228,7 +228,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         memory = AdhesionMemory(energies, memory.snaps + snapped, memory.front_warning_given or warns, columns)
         remark = (
             f"the edge of contact moves by {0.5 * instant.front:.2g} times a process zone, and rates are resolved up "
-            "to half of one: use shorter steps, or time_step: auto; further steps are not looked at"
+            "to half of one: use shorter steps, or time_step: auto; further steps are not checked"
         )
         return Changes(memory, remark if warns else "", not snapped)
 

@@ -236,7 +236,7 @@ class ThermalColumns(Effect[ThermalMemory]):
         try:
             return factor_at(self._job.material, memory.flash)
         except InputError as error:
-            raise RunError(f"the flash temperature leaves what the material allows: {error}") from None
+            raise RunError(f"the flash temperature is outside the range of the material's shift: {error}") from None
 
     def _heat(self, instant: Instant, memory: ThermalMemory) -> tuple[Heating, ThermalMemory]:
         """Return the heat of a step from the forces at both ends, and the memory with those of its end."""

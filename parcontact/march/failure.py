@@ -78,7 +78,7 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, moved: fl
     if "max_iterations" in failed.failure:
         yield f"try numerics.max_iterations above {numerics.max_iterations}"
     if moved > MANY_CELLS:
-        yield f"try smaller steps: in this one the surface moves by {moved:.3g} cells"
+        yield f"try smaller steps: in this step the surface moves by {moved:.3g} cells"
     elif step.dt > 0.0:
         yield "try smaller steps"
     if last.certificate.worst <= USEFUL:

@@ -44,7 +44,8 @@ class March:
             return ""
         time, load = end
         lost = nothing_holds(self.timeline(time).span(row.step + 1).stage.control, load)
-        return f"detached at t = {time:g} s: {lost}; {row.measures.pressure:g} Pa at t = {row.time:g} s was held"
+        last = f"the last equilibrium was at {row.measures.pressure:g} Pa, t = {row.time:g} s"
+        return f"detached at t = {time:g} s: {lost}; {last}"
 
     def timeline(self, until: float = 0.0) -> Timeline:
         """Return all steps of the history (`Timeline.from_job`), with those chosen so far."""

@@ -321,6 +321,6 @@ def _refuse_lost_branches(scene: Scene, contents: Contents) -> None:
             time = scene.setup.prony.relaxation_times[k]
             raise InputError(
                 f"{contents.path} does not have the branch of relaxation time {time:g} s, which relaxed within every "
-                f"step of its run. The steps to come are shorter: without it friction would be wrong by {error:.2g}; "
+                f"step of its run. The next steps are shorter: without it the error of friction would be {error:.2g}; "
                 f"numerics.branch_error is {allowed:g}. Take longer steps, or start afresh (--restart never)"
             )

@@ -23,7 +23,7 @@ TELL_SECONDS = 60.0  # tuning: waiting time after which a rank reports it
 SPIN_SECONDS, NAP_SECONDS = 1e-3, 1e-3  # tuning: waiting time before sleeping, and sleep
 ENDED = "has ended the program"
 ADVICE = "every rank must make the same calls and as many steps: see 'From several ranks' in parcontact manual python. "
-ADVICE += "A rank that works alone (mpi4py.futures) gives comm=MPI.COMM_SELF"
+ADVICE += "A rank that works alone (mpi4py.futures) passes comm=MPI.COMM_SELF"
 
 _known: list[MPI.Intracomm] = []
 
@@ -64,7 +64,7 @@ def wait_for_all(comm: MPI.Intracomm, what: str) -> None:
             time.sleep(NAP_SECONDS)
     found = exchange.found()
     if len(set(found)) > 1:
-        raise RunError(f"the ranks do not do the same: {_ranks_of(found)}; {ADVICE}")
+        raise RunError(f"the ranks make different calls: {_ranks_of(found)}; {ADVICE}")
 
 
 def _ranks_of(found: list[str]) -> str:
@@ -94,7 +94,9 @@ def _leave() -> None:
             break
         else:
             if error is not None and time.monotonic() > deadline:
-                _say(f"rank {MPI.COMM_WORLD.rank} {what}, and other ranks wait for it or go on alone: all are ended")
+                _say(
+                    f"rank {MPI.COMM_WORLD.rank} {what}, and other ranks wait for it or continue alone: all are aborted"
+                )
                 sys.stdout.flush()
                 MPI.COMM_WORLD.Abort(1)
             time.sleep(NAP_SECONDS)

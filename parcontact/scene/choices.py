@@ -159,7 +159,7 @@ class Choices:
         if not self.sliding.on:
             return False, "the surface does not move"
         if self.isolated.on:
-            return True, "a free box is not cyclic: the heights are made anew"
+            return True, "a free box is not cyclic: the heights are computed again"
         if self.slides_along_x and self.further_starts.on:
             return True, "chosen steps may be parts of a cell"
         if (step := self.timeline.first_between_cells()) is None:

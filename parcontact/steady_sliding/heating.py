@@ -109,7 +109,8 @@ class Feedback:
             rise = found if low < found < high else middle
         raise RunError(
             f"steady sliding at {speed:.4g} m/s under {place[0]:.4g} Pa: the flash temperature did not settle in "
-            f"{MOST_ROUNDS} rounds: rubber {last[0]:.4g} K warmer makes {last[0] + last[1]:.4g} K. Try feedback: none"
+            f"{MOST_ROUNDS} rounds: a rise of {last[0]:.4g} K gives a rise of {last[0] + last[1]:.4g} K. "
+            "Try feedback: none"
         )
 
 

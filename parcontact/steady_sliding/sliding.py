@@ -107,7 +107,7 @@ class SteadySliding:
             try:
                 self._set_material(cold + rise)
             except InputError as error:
-                raise RunError(f"the flash temperature leaves what the material allows: {error}") from None
+                raise RunError(f"the flash temperature is outside the range of the material's shift: {error}") from None
             return self._solve(velocity, pressure)
 
         tolerance = self.setup.choices.numerics.tolerance

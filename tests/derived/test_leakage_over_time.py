@@ -171,7 +171,7 @@ def test_a_gap_that_is_no_number_is_refused_by_all_ranks(
     comm.Barrier()
     assert __main__.main(["leak", str(out)]) == 2
     stated = capsys.readouterr().err
-    assert comm.rank > 0 or "maps after step 2 are no whole maps of numbers" in stated
+    assert comm.rank > 0 or "maps after step 2 are incomplete or not finite" in stated
     assert not (out / "leak.csv").exists()
 
 
