@@ -26,7 +26,7 @@ WORLD = MPI.COMM_WORLD
 REFEREE = WORLD.Dup()  # what ranks tell each other about tests must not meet the messages of the tests
 UNSEEN = io.StringIO()  # what pytest says on the other ranks
 outside = load_script("runs")
-MOST_RANKS = 3  # that scripts/test starts
+MOST_RANKS = 4  # that scripts/test starts
 MAX_SECONDS_APART = 20.0  # seconds in which the other ranks must end a test that failed here
 
 # All ranks must see the same examples, and a first example waits for the compiler.
@@ -149,12 +149,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def elsewhere(item: pytest.Item) -> bool:
     """Whether a test is for other numbers of ranks than this one: it names its own, or makes groups of all smaller ones
-    from the most that tests run on, or runs on two or three ranks, as its name has it."""
+    from the most that tests run on, or runs on two, three or four ranks as its name has it."""
     mark = item.get_closest_marker("mpi")
     if mark is None:
         return False
     groups = "communicators" in getattr(item, "fixturenames", ())
-    own = MOST_RANKS if groups else 2 + zlib.crc32(item.nodeid.encode()) % 2
+    own = MOST_RANKS if groups else 2 + zlib.crc32(item.nodeid.encode()) % 3
     return WORLD.size not in (mark.args or (own,))
 
 

@@ -81,7 +81,7 @@ def test_full_contact_is_the_closed_form(count: int) -> None:
     assert point.measures.contact_area == pytest.approx(1.0, abs=1e-5)  # of the interpolation between rungs
 
 
-@pytest.mark.mpi(3)
+@pytest.mark.mpi(2, 3)
 def test_ranks_agree() -> None:
     """Whole contacts on other ranks: friction and area to the last digits but those of transforms."""
     changes = {"bands": {"count": 2, "samples": 2}, "numerics": {"tolerance": 5e-2}}

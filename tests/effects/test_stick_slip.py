@@ -67,7 +67,7 @@ def test_cattaneo_and_mindlin() -> None:
         assert sticking == pytest.approx(A * (1.0 - share) ** (1.0 / 3.0), abs=cell)
 
 
-@pytest.mark.mpi(3)
+@pytest.mark.mpi(2, 4)
 def test_ranks_agree(comm: MPI.Intracomm) -> None:
     """Forces, sticking areas and energies are those of one rank, to the digits that sums in other orders leave."""
     job = rough({"shear_stress": 2e5, "stick": True}, output={"energy": True})

@@ -166,7 +166,7 @@ def test_a_run_in_pieces_has_the_same_steps(
     assert pieces == whole
 
 
-@pytest.mark.mpi(3)
+@pytest.mark.mpi(4)
 def test_steps_do_not_depend_on_the_number_of_ranks(shared_path: Path, communicators: list[MPI.Intracomm]) -> None:
     """The instants are the same to the last bit, friction to some roundings of search directions, 6e-8, of its largest:
     at rest it is noise."""

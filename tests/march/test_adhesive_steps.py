@@ -37,7 +37,7 @@ def adhesive(bench: Bench, name: str) -> dict[str, Any]:
     return bench.job(scene, **{"adhesion": STICK, **changes})
 
 
-@pytest.mark.mpi(2)
+@pytest.mark.mpi(2, 3)
 @pytest.mark.parametrize("name", SCENES)
 def test_cut_in_the_middle(bench: Bench, name: str) -> None:
     """What a run makes after a restart is what it makes at once, to the last bit; also where it detaches."""

@@ -48,7 +48,7 @@ def moody(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ContactSolver, "solve", refuse)
 
 
-@pytest.mark.mpi(2)
+@pytest.mark.mpi(2, 3)
 @pytest.mark.usefixtures("moody")
 @pytest.mark.parametrize("name", ["viscoelastic", "free"])
 def test_retried_steps_restart_bit_for_bit(bench: Bench, name: str) -> None:

@@ -18,7 +18,7 @@ from parcontact.plan.trial_grids import choose_grid
 from .planned import JOBS, ROUGH, Json, job
 
 
-@pytest.mark.mpi(3)
+@pytest.mark.mpi(2, 3)
 @pytest.mark.parametrize("name", JOBS)
 def test_memory(comm: MPI.Intracomm, name: str) -> None:
     """What each rank holds after a run, and what a checkpoint has in maps, to the byte."""

@@ -26,7 +26,7 @@ def test_stages_not_tried_are_like_the_others() -> None:
     assert seen.total("never counted") == 0.0
 
 
-@pytest.mark.mpi(3)
+@pytest.mark.mpi(2, 3)
 @pytest.mark.parametrize("name", ["elastic, static", "viscoelastic", "free, energies"])
 def test_a_short_job_is_tried_whole(comm: MPI.Intracomm, name: str) -> None:
     """Its counts, put together from shares, are those of a run to rounding."""
@@ -93,7 +93,7 @@ def test_a_tiny_scene_has_all_that_runs(name: str) -> None:
 CURVE: Json = {"velocities": [1e-3, 1e-2, 0.1, 1.0], "pressures": [1e4, 3e4]}
 
 
-@pytest.mark.mpi(3)
+@pytest.mark.mpi(2, 3)
 def test_steady_states_are_tried_as_they_are_solved(comm: MPI.Intracomm) -> None:
     """All of them, in another order: the states and transforms are those of the verb, as each starts from nothing."""
     planned = job(material=TWO, history=[], steady=CURVE)

@@ -60,7 +60,7 @@ def path(shared_path: Path, comm: MPI.Intracomm) -> Path:
     return path
 
 
-@pytest.mark.mpi(3)
+@pytest.mark.mpi(4)
 @pytest.mark.parametrize("grid", GRIDS)
 def test_fields_do_not_depend_on_the_ranks(path: Path, communicators: list[MPI.Intracomm], grid: str) -> None:
     alone = solved(path, MPI.COMM_SELF, *GRIDS[grid])

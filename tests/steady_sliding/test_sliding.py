@@ -107,7 +107,7 @@ steady: {velocities: [0.1], pressures: [1.0e+5]}
     assert point.friction == pytest.approx((q * 1e-6) ** 2 * loss / pressure, rel=1e-9)
 
 
-@pytest.mark.mpi(3)
+@pytest.mark.mpi(4)
 def test_ranks_agree(shared_path: Path, communicators: list[MPI.Intracomm]) -> None:
     """To ten times the tolerance of the certificate, 1e-5: each rank count stops elsewhere within it."""
     frictions = [sphere_at(shared_path, comm, 1.0, 64).measures.friction for comm in communicators]
