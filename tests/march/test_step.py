@@ -198,7 +198,7 @@ def test_advice_on_long_steps() -> None:
     with pytest.raises(
         StepError,
         match=r"step 2 .*; try numerics\.max_iterations above \d+, or try smaller steps: in this "
-        r"one the surface moves by 2\.\d+ cells$",
+        r"step the surface moves by 2\.\d+ cells$",
     ):
         run_steps(march, [lambda now: setattr(now.scene.solver, "max_iterations", now.row.step == 0 and 500)])
 
