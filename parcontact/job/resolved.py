@@ -19,6 +19,7 @@ SHOWN = (
     "history",
     "steady",
     "adhesion",
+    "interface",
     "bands",
 )  # others differ by version
 LAST = "checkpoint"  # section of a job with every default

@@ -38,7 +38,10 @@ LOOKS = {
     "displacement": Look("m", "viridis"),
     "height": Look("m", "cividis", note=" (up is into the body)"),
     "temperature": Look("K", "hot", note=" rise"),
+    "traction": Look("Pa", "inferno"),
+    "slip": Look("", "viridis", note=" (1) and stick: traction over its bound"),
 }
+TRACTIONS = ("traction_x", "traction_y")
 TENSION = "RdBu_r"  # colours of pressures that pull at some points
 STRIP = 8  # points across: a map as narrow as this is drawn as a line
 TICKS = 5  # intervals at most; were it left to the room there is, ticks would change after the layout, and be cut off
@@ -65,8 +68,10 @@ def map_panels(run: PlottedRun, at: str = "") -> tuple[list[style.Panel], list[s
 
 
 def _panels(run: PlottedRun, fields: Fields) -> Iterator[style.Panel]:
-    found = {name: fields.read(name) for name in LOOKS}
-    pressure = found["pressure"]
+    found = {name: fields.read(name) for name in (*LOOKS, *TRACTIONS)}
+    pressure, (x, y) = found["pressure"], (found.pop(name) for name in TRACTIONS)
+    if pressure is not None and x is not None and y is not None:
+        found["traction"], found["slip"] = stick_maps(np.hypot(x, y), pressure, run.job)
     if found["gap"] is not None:
         del found["displacement"]  # one of both says enough
     instant = run.instant(int(fields.steps[fields.chosen]), float(fields.times[fields.chosen]))
@@ -100,6 +105,15 @@ def mask(name: str, values: Array, pressure: Array | None, job: Job) -> Array:
         closed = values <= 0.0 if pressure is None else touching_of(job, pressure, values)
         return np.where(closed, np.nan, np.maximum(values, 0.0))
     return values
+
+
+def stick_maps(traction: Array, pressure: Array, job: Job) -> tuple[Array, Array]:
+    """Return the sizes of tractions where there is pressure, and over their bounds: 1 where points slip. A shear
+    strength is the largest traction."""
+    touching, coefficient = pressure > 0.0, job.section("interface").coefficient
+    bound = np.full(pressure.shape, traction.max()) if coefficient is None else coefficient * pressure
+    share = np.divide(traction, bound, out=np.zeros_like(traction), where=bound > 0.0)
+    return np.where(touching, traction, np.nan), np.where(touching, share, np.nan)
 
 
 def _find_window(pressure: Array | None) -> Window:
