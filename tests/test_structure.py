@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import parcontact
+from parcontact.columns import MEASURES, PER_BRANCH
 
 HOUSE = Path(parcontact.__file__).parent
 ROOT = Path(__file__).parents[1]
@@ -205,3 +206,8 @@ def test_functions_have_a_name_of_their_own() -> None:
         for name in (name for name in functions if not name.startswith("_") and room(module) not in FOR_USERS):
             found.setdefault(name, []).append(module)
     assert {name: modules for name, modules in found.items() if len(modules) > 1} == {}
+
+
+def test_rows_are_annotated_with_every_column() -> None:
+    """In the order of the registry: a new column of measures.csv needs its annotation in `python.row.Row`."""
+    assert list(parcontact.Row.__annotations__) == [each.name for each in MEASURES if each.name != PER_BRANCH]

@@ -41,6 +41,8 @@ class Row(Mapping[str, float]):
     error_area: float
     friction_viscous: float
     friction_interface: float
+    stick_area: float
+    slip_loss: float
     tensile_area: float
     adhesive_force: float
     surface_energy: float
