@@ -9,8 +9,8 @@ from dataclasses import astuple, dataclass
 from ..job.sections.calculation import BRANCH_SHARE
 
 SOLVER_MEDIAN = 2.0  # fitted: median of estimate over error of the solver
-TIME_MEDIAN = 2.67  # fitted: the same of marches with chosen steps
-FOLDED_MEDIAN = 2.0  # accuracy: bound of the folded branches over their error, usually more
+TIME_MEDIAN = 2.67  # tuning: steps have 0.8 of the accuracy; 1.0 to 3.4, 1.7 in the median of six chosen marches
+FOLDED_MEDIAN = 2.0  # accuracy: bound of the folded branches over their error, at least: 4 and 6 in two marches
 
 
 @dataclass(frozen=True)
