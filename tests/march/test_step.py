@@ -15,8 +15,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
-from parcontact.accuracy.controller import cells_per_step
+from parcontact.accuracy.controller import RELAXING, SNAP_SHARE, cells_per_step
 from parcontact.effects.adhesion import AdhesionColumns, AdhesionMemory
+from parcontact.effects.adhesive_law import AdhesiveLaw
 from parcontact.effects.effect import Changes, Instant
 from parcontact.errors import InputError, RunError
 from parcontact.history.chosen import RAMP_STEPS, MadeStep
@@ -24,6 +25,7 @@ from parcontact.history.timeline import Step, Timeline
 from parcontact.job import Job
 from parcontact.march.failure import StepError
 from parcontact.march.loop import March, run_steps
+from parcontact.physics.body import Trial
 from parcontact.solve.contact import Contact, ContactSolver
 from parcontact.solve.fallback import active_set
 
@@ -388,3 +390,25 @@ def test_effects_are_given_the_energy_that_the_body_gains(monkeypatch: pytest.Mo
     assert made[-1].dissipated > 0.01 * made[-1].stored > 0.0
     sums = [row.stored + row.dissipated for row in made]
     np.testing.assert_allclose(np.cumsum(gained), np.subtract(sums[1:], sums[0]), rtol=1e-12)
+
+
+def test_steps_that_fail_are_shortened_as_far_as_a_snap_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Down to a share of the longest step and of the shortest relaxation time; no step is tried after the first one
+    that is as short."""
+    tried = list[float]()
+
+    def fail(law: AdhesiveLaw, trial: Trial, step: Step, *others: Any) -> None:
+        tried.append(step.dt)
+        raise StepError("is refused")
+
+    press = {"force": {"from": 0.0, "to": 5e-2}, "duration": 1e-2}
+    scene = {"grid": {"points": 20, "size": 1e-3}, "surface": SPHERE, "material": ZENER, "history": [press]}
+    march = begun({**scene, "adhesion": {"work": 0.05, "range": 1e-6}})
+    steps = march.steps()
+    for step in islice(steps, 8):
+        march.advance(step)
+    monkeypatch.setattr(AdhesiveLaw, "solve", fail)
+    with pytest.raises(StepError, match="is refused"):
+        march.advance(next(steps))
+    snap = min(SNAP_SHARE * 1e-2 / RAMP_STEPS, RELAXING * march.scene.material.shortest_time)
+    assert tried[-1] <= snap < min(tried[:-1])
