@@ -6,7 +6,7 @@
     for row in run.steps():
         print(row.time, row.friction, row.contact_area)
 
-What is named here loads when it is first used.
+Public names are imported when they are first used.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""The program `parcontact`: a command line in, an exit code out."""
+"""Entry point of the program `parcontact`: runs a command line and returns its exit code."""
 
 import errno
 import gc
@@ -22,8 +22,8 @@ from .parallel.signals import STOP
 from .storage import files
 from .streams import describe_loss, tolerant_streams
 
-STAGGER_SECONDS = 0.5  # for which other ranks let root report an error that all of them have
-WAIT_SECONDS = 5.0  # for which a rank that ends with an error waits for the others to do so too
+STAGGER_SECONDS = 0.5  # delay of the other ranks before they print, so that root prints a common error first [s]
+WAIT_SECONDS = 5.0  # longest time that a failing rank waits for the others to fail with the same error [s]
 AGAIN = 3  # exit code: stopped early, run again
 LEAVE_FILES = {
     "run",
@@ -35,23 +35,23 @@ LEAVE_FILES = {
     "plot",
     "report",
     "leak",
-}  # what they print is also there
-REFUSALS = {  # of the system, for a file that a user can choose or make room for
+}  # verbs whose output is also in files: they succeed even if standard output is lost
+REFUSALS = {  # errors of the system about a file that a user can correct: permission, kind, name, free space
     *(errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT, errno.EFBIG),
     *(errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG),
 }
-UNCOLLECTED_OBJECTS = 20_000  # that Python may make before it looks for cycles among them; imports make far more
+UNCOLLECTED_OBJECTS = 20_000  # new objects after which Python searches for reference cycles
 
 
 def program() -> int:
-    """Run the command line of this process; returns the exit code.
+    """Run the command line of this process, and return the exit code.
 
-    A quarter of a short run would go into Python's search for cycles of objects, at the start among what is being
-    imported and at the end among what ends with the process anyway. Steps leave none.
+    Python's garbage collector is slowed down and not run at the end: it would take a quarter of a short run, and steps
+    leave no reference cycles.
     """
     gc.set_threshold(UNCOLLECTED_OBJECTS)
     for number in STOP:
-        if signal.getsignal(number) == signal.SIG_DFL:  # neither Ctrl-C nor what nohup ignores
+        if signal.getsignal(number) == signal.SIG_DFL:  # excludes Ctrl-C and signals that nohup ignores
             signal.signal(number, _end_by_signal)
     try:
         return main()
@@ -60,15 +60,15 @@ def program() -> int:
 
 
 def _end_by_signal(number: int, frame: FrameType | None) -> None:
-    """Say that a signal has come while no run noted it, and end by it as without this."""
-    if all(os.environ.get(name, "0") == "0" for name in ranks.RANKS):  # MPI may just be starting: it is not asked
+    """Report a signal that arrives outside of a run, and end the process by its default action."""
+    if all(os.environ.get(name, "0") == "0" for name in ranks.RANKS):  # not by MPI, which may just be starting
         os.write(2, f"parcontact: ended by {signal.Signals(number).name}, with nothing to save\n".encode())
     signal.signal(number, signal.SIG_DFL)
     signal.raise_signal(number)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line `argv`; returns the exit code."""
+    """Run the command line `argv`, by default that of this process, and return the exit code."""
     with tolerant_streams():
         return _run(list(sys.argv[1:] if argv is None else argv))
 
@@ -79,7 +79,7 @@ def _run(words: list[str]) -> int:
         options = parse_arguments(words)
         code = int(options.act(options))
         return _leave_code(code if options.verb in LEAVE_FILES else code or _judge_output(), words)
-    except SystemExit as asked:  # of --help and --version
+    except SystemExit as asked:  # raised by --help and --version
         if asked.code or _judge_output() == DONE:
             raise
         return BAD_INPUT
@@ -98,12 +98,12 @@ def _refuse_lost_directory() -> None:
     try:
         os.getcwd()
     except OSError as error:
-        text = f"the working directory cannot be found ({error.strerror}): change to one that is there"
+        text = f"the working directory does not exist ({error.strerror}): change to another directory"
         raise InputError(text) from None
 
 
 def _judge_output() -> int:
-    """Return the exit code of what has done its work: not 0 if its output could not be written."""
+    """Return the exit code of a verb that succeeded: BAD_INPUT if its output could not be written."""
     reason = describe_loss() if ranks.is_root() else ""
     if reason:
         print(f"parcontact: cannot write to standard output: {reason}", file=sys.stderr, flush=True)
@@ -123,7 +123,7 @@ def _leave_code(code: int, words: Sequence[str] = ()) -> int:
 
 
 def _end_together(text: str, code: int) -> int:
-    """End with an error that every rank has, which root prints. A rank that is alone with it says so and ends all."""
+    """Print an error on root and return the exit code; abort all ranks if only some of them have the error."""
     root, world = ranks.is_root(), ranks.started()
     if root:
         print(text, file=sys.stderr, flush=True)
@@ -133,14 +133,14 @@ def _end_together(text: str, code: int) -> int:
     while not arrival.Test():
         if time.monotonic() > deadline:
             if not root:
-                print(f"{text} (on rank {world.rank} of {world.size} alone)", file=sys.stderr, flush=True)
+                print(f"{text} (on rank {world.rank} of {world.size} only)", file=sys.stderr, flush=True)
             world.Abort(code)
         time.sleep(1e-3)
     return _leave_code(code)
 
 
 def _end_all(error: BaseException) -> NoReturn:
-    """End all ranks where one cannot go on, which says why."""
+    """Print why this rank cannot continue, and end all ranks."""
     world = ranks.started()
     if not ranks.is_root():
         time.sleep(STAGGER_SECONDS)
@@ -158,22 +158,22 @@ def _end_all(error: BaseException) -> NoReturn:
 
 
 def _describe_refusal(error: OSError) -> str:
-    """Return which file the system does not let the program open or write, and why; '' for any other error."""
+    """Return a sentence about a file that cannot be opened or written, or '' for other errors."""
     if error.errno not in REFUSALS or not isinstance(error.filename, str | Path):
         return ""
     return f"{files.without_mark(Path(error.filename))} cannot be opened or written: {os.strerror(error.errno)}"
 
 
 def _describe_surroundings(error: BaseException) -> str:
-    """Return what is wrong around the program, where that has ended it, and what to do; '' for any other error."""
+    """Return a sentence about memory, open files or Matplotlib's settings if they caused the error, or ''."""
     limited = resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
     if isinstance(error, MemoryError) or (limited and isinstance(error, ImportError | SystemError)):
-        return "out of memory; free some, allow more by ulimit -v, or take fewer points"
+        return "out of memory; free memory, raise the limit (ulimit -v), or use fewer points"
     if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
-        return "out of open files; allow more by ulimit -n"
+        return "too many open files; raise the limit (ulimit -n)"
     frames = (frame for frame, _ in traceback.walk_tb(error.__traceback__) if frame.f_code.co_name == "<module>")
     if any(frame.f_globals["__name__"] == "matplotlib" for frame in frames):
-        return "Matplotlib cannot start; mend MPLBACKEND, or matplotlibrc in the working directory"
+        return "Matplotlib cannot start; correct MPLBACKEND, or matplotlibrc in the working directory"
     return ""
 
 

@@ -1,7 +1,7 @@
-"""The columns of all tables: their names, SI units, meanings, and numbers in a row; and how tables are written.
+"""Columns of all tables (name, SI unit, meaning, value in a row), and writing of tables as csv.
 
-The tables are the csv files of the page `outputs`, whose lists of columns are written from here, the rows of a run in
-Python, and the maps in `fields.h5`. A column with `when` is there only where a job has that section or asks for it.
+Tables are the csv files, the rows of a run in Python, and the maps in `fields.h5`. The lists of columns on the manual's
+page `outputs` are generated from here. A column with `when` exists only if the job has that section or option.
 """
 
 import csv
@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import Any
 
-PER_BRANCH = "dissipated_K"  # stands for a column of each branch
+PER_BRANCH = "dissipated_K"  # replaced by a column for each branch K = 0, 1, ...
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table: its name, SI unit (`""` of a ratio or a number), and meaning in the words of the manual.
+    """A column of a table: its name, SI unit (`""` if dimensionless), and meaning as printed in the manual.
 
-    `of` reads its number from a row, by default from the attribute of its name; `when` names what a job needs for it.
+    `of` returns the value from a row (default: the attribute `name`); `when` is the section or option it requires.
     """
 
     name: str
@@ -29,7 +29,7 @@ class Column:
     when: str = ""
 
     def value(self, row: Any) -> Any:
-        """Return the number that a row has in this column."""
+        """Return the value of this column in a row."""
         return (self.of or attrgetter(self.name))(row)
 
 
@@ -37,7 +37,7 @@ Table = Sequence[Column]
 
 
 def choose_columns(table: Table, branches: int = 0, when: Collection[str] = ()) -> list[Column]:
-    """Return the columns of a table for a body of so many branches and a job that has what `when` names."""
+    """Return the columns of a table for a material of `branches` branches and a job with the sections `when`."""
     chosen = list[Column]()
     for column in table:
         if column.name == PER_BRANCH:
@@ -57,17 +57,17 @@ def names_of(table: Table) -> tuple[str, ...]:
 
 
 def added_names(table: Table, section: str) -> tuple[str, ...]:
-    """Return the names of the columns that a table has only in jobs with this section."""
+    """Return the names of the columns that a table has only for jobs with the given section."""
     return tuple(column.name for column in table if column.when == section)
 
 
 def added_by(section: str) -> tuple[str, ...]:
-    """Return the names of the columns that an effect of this section adds to measures.csv."""
+    """Return the names of the columns that the effect of a section adds to measures.csv."""
     return added_names(MEASURES, section)
 
 
 def cells(values: Iterable[Any]) -> list[str]:
-    """Return the cells of a line: numbers with all their digits, `""` for NaN and None, words as they are."""
+    """Return the cells of a line: floats with all digits, `""` for NaN and None, other values as text."""
     return [_cell(value) for value in values]
 
 
@@ -78,12 +78,12 @@ def _cell(value: Any) -> str:
 
 
 def values_of(table: Table, row: Any) -> list[Any]:
-    """Return the numbers that a row has in the columns of a table."""
+    """Return the values of a row in the columns of a table."""
     return [column.value(row) for column in table]
 
 
 def to_csv(names: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
-    """Return the text of a csv file: the names of its columns, and a line for each row."""
+    """Return the text of a csv file: a line with the names of the columns, and a line per row."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerows((names, *map(cells, rows)))
@@ -104,7 +104,7 @@ def _measured(name: str, unit: str, meaning: str) -> Column:
     return Column(name, unit, meaning, attrgetter(f"measures.{name}"))
 
 
-PRESSURE, AREA = "mean over the box", "points in contact as a share of all"
+PRESSURE, AREA = "mean over the box", "number of points in contact over the number of all points"
 FORCES = (
     _measured("force_x", "N", "on the rigid surface along x; negative for sliding along +x over a lossy body"),
     _measured("force_y", "N", "on the rigid surface along y"),
@@ -112,37 +112,38 @@ FORCES = (
 GAPS = (
     _measured(
         *("approach", "m"),
-        "rigid displacement d in u = h + d at contact: below the undeformed surface (free), or over the mean surface "
-        "of the body (periodic)",
+        "rigid displacement d in u = h + d in contact, measured from the undeformed surface (free) or from the mean "
+        "surface of the body (periodic)",
     ),
     _measured(
         *("mean_gap", "m"),
-        "mean of the gap u - h - d, 0 where a counterbody yields; at no load the surface just touches the body, also "
-        "before the first step",
+        "mean of the gap u - h - d, which is 0 at points where a counterbody yields; without load, and before the "
+        "first step, the surface just touches the body",
     ),
     _measured("max_pressure", "Pa", "highest pressure"),
 )
 CERTIFIED = (
     Column(
         *("residual", ""),
-        "how well the solve meets the contact conditions: the largest of the errors of load, gap under pressure and "
-        "penetration ({doc}`method`); at most `numerics.tolerance` if that is given",
+        "largest relative error of the contact conditions: load, gap where pressure acts, penetration "
+        "({doc}`method`); at most `numerics.tolerance` if that is given",
         attrgetter("certificate.worst"),
     ),
     Column(
         *("penetration", ""),
-        "deepest penetration over the length of the contact that `residual` is relative to",
+        "deepest penetration, relative to the same length as `residual`",
         attrgetter("certificate.penetration"),
     ),
 )
 CORRECTED = _measured(
     *("contact_area_corrected", ""),
-    "`contact_area` without the excess by cells on the edge of contact; at least the pressure over a hardness",
+    "`contact_area` without the excess of cells at the edges of contact; at least pressure over hardness if a "
+    "hardness is given",
 )
 FLASH = (
     Column(
         *("flash_temperature", "K"),
-        "mean rise of the temperature of the contact, weighted by heat, at rest by pressure (with `thermal`, "
+        "mean temperature rise of the contact, weighted by heat flux, or by pressure at rest (with `thermal`, "
         "{doc}`heat`)",
         lambda point: _worst(point, "mean"),
         "thermal",
@@ -155,16 +156,16 @@ FLASH = (
     ),
     Column(
         *("error_flash", ""),
-        "estimated relative error of `flash_temperature`: three times that of friction, which makes the heat (with "
-        "`thermal`); empty where it is 0",
+        "estimated relative error of `flash_temperature`, three times the error of friction, the source of heat (with "
+        "`thermal`); empty where the rise is 0",
         lambda point: point.error_flash,
         "thermal",
     ),
 )
 ERROR_FRICTION = Column(
     *("error_friction", ""),
-    "estimated relative error of friction ({doc}`accuracy`); 1 or more where friction cannot be told from 0, empty "
-    "where it is 0",
+    "estimated relative error of friction ({doc}`accuracy`); 1 or more where friction cannot be distinguished from 0, "
+    "empty where it is 0",
 )
 ERROR_AREA = Column("error_area", "", "estimated relative error of the corrected contact area")
 
@@ -175,8 +176,7 @@ MEASURES: Table = (
     _measured("pressure", "Pa", PRESSURE),
     *FORCES,
     _measured(
-        *("friction", ""),
-        "tangential force over normal force; 0 where no load presses (none, or tension): see `force_x` then",
+        *("friction", ""), "tangential force over normal force; 0 if the load is zero or tensile (see `force_x`)"
     ),
     _measured("contact_area", "", AREA),
     *GAPS,
@@ -196,14 +196,14 @@ MEASURES: Table = (
     ERROR_AREA,
     Column(
         *("friction_viscous", ""),
-        "`friction` less `friction_interface` (with `interface`): the force of the body in the direction of the whole "
+        "`friction` minus `friction_interface` (with `interface`): component of the viscoelastic force along the total "
         "force, over the load",
         when="interface",
     ),
     Column(
         *("friction_interface", ""),
-        "the same of the shear of the corrected contact area; negative where that is against the whole force, as a "
-        "weak one may be after a reversal",
+        "component of the shear force on the corrected contact area along the total force, over the load; it may be "
+        "negative after a reversal",
         when="interface",
     ),
     Column(
@@ -219,13 +219,14 @@ MEASURES: Table = (
     ),
     Column(
         *("tensile_area", ""),
-        "share of all points that are pulled by more than 1 % of the largest attraction (with `adhesion`)",
+        "share of all points with a tension above 1 % of the largest attraction (with `adhesion`)",
         when="adhesion",
     ),
     Column("adhesive_force", "N", "sum of all tension (with `adhesion`)", when="adhesion"),
     Column(
         *("surface_energy", "J"),
-        "energy of the surfaces, 0 far apart and negative where they stick (with `adhesion` and `output.energy`)",
+        "energy of adhesion: 0 for separated surfaces, negative for attracting ones (with `adhesion` and "
+        "`output.energy`)",
         when="adhesion",
     ),
     Column(
@@ -244,7 +245,7 @@ MEASURES: Table = (
     Column("flow_y", "m³", "conductivity of the gap along y (with `leakage`)", when="leakage"),
     Column(
         *("constriction", "m"),
-        "smallest gap on the widest path, of the direction that leaks more (with `leakage`)",
+        "smallest gap on the widest path, in the direction that leaks more (with `leakage`)",
         when="leakage",
     ),
     *FLASH,
@@ -255,7 +256,7 @@ FIELDS: Table = (
     Column("pressure", "Pa", "contact pressure"),
     Column("displacement", "m", "of the surface of the body, along z"),
     Column("gap", "m", "between body and rigid surface, 0 in contact"),
-    Column("height", "m", "the rigid surface where it is at that instant"),
+    Column("height", "m", "of the rigid surface in its position at that instant"),
     Column("temperature", "K", "rise of the temperature of the body's surface (with `thermal`, {doc}`heat`)"),
     Column("traction_x", "Pa", "traction on the body along x (with `interface.stick`)"),
     Column("traction_y", "Pa", "traction on the body along y"),
@@ -265,17 +266,17 @@ FIELDS: Table = (
     Column("step", "", "steps of the maps"),
 )
 
-STEADY: Table = (  # of `steady_sliding.point.Point`
+STEADY: Table = (  # rows are `steady_sliding.point.Point`
     Column("velocity", "m/s", "speed", attrgetter("speed")),
     _measured("pressure", "Pa", PRESSURE),
     *FORCES,
-    Column("friction", "", "dissipated power over velocity and load ({doc}`accuracy`), and what an interface adds"),
+    Column("friction", "", "dissipated power over velocity and load ({doc}`accuracy`), plus `friction_interface`"),
     _measured("contact_area", "", AREA),
     *GAPS,
     *CERTIFIED,
     Column(
         *("operator_calls", ""),
-        "applications of the operator, those on coarser grids by their share",
+        "applications of the operator; on coarser grids they count by their share of points",
         lambda point: round(float(point.operator_calls), 2),
     ),
     Column("seconds", "s", "wall time", lambda point: round(point.seconds, 3)),
@@ -296,24 +297,24 @@ STEADY: Table = (  # of `steady_sliding.point.Point`
     ),
     Column(
         *("friction_interface", ""),
-        "part of friction from the corrected contact area itself (with `interface`)",
+        "part of friction from the shear of the corrected contact area (with `interface`)",
         attrgetter("measures.friction_interface"),
         "interface",
     ),
     *FLASH,
     Column(
         *("lower_temperature", "K"),
-        "a quarter of the heat goes where the rise is smaller (with `thermal`)",
+        "rise below which a quarter of the heat is generated (with `thermal`)",
         lambda point: _worst(point, "lower"),
         "thermal",
     ),
     Column(
         *("upper_temperature", "K"),
-        "a quarter of the heat goes where the rise is larger (with `thermal`)",
+        "rise above which a quarter of the heat is generated (with `thermal`)",
         lambda point: _worst(point, "upper"),
         "thermal",
     ),
-    Column("friction_cold", "", "friction without feedback (with `feedback` of `thermal`)", when="feedback"),
+    Column("friction_cold", "", "friction without feedback (with `thermal.feedback`)", when="feedback"),
     Column(
         *("flash_shift", ""),
         "relaxation times at the flash temperature over those at the reference (with `feedback`)",
@@ -325,11 +326,11 @@ STEADY: Table = (  # of `steady_sliding.point.Point`
     replace(ERROR_AREA, of=attrgetter("errors.area.total")),
     Column(
         *("friction_slopes", ""),
-        "tangential force over normal force, from the slopes of the rigid surface. The force across the sliding counts "
-        "here, as in `friction` of `measures.csv`; it does no work, so `friction` has none of it. Times "
-        "`abs(force_x)/hypot(force_x, force_y)` (of a slide along x) it differs from `friction` by errors of the mesh. "
-        "The factor was 0.97 to 1 with five rough surfaces (`tests/scenarios/test_two_views.py`). For waves in full "
-        "contact it is the cosine of their angle with the sliding",
+        "tangential force over normal force, from the slopes of the rigid surface. As in `measures.csv` it includes "
+        "the force across the sliding direction, which does no work and is not in `friction`. For sliding along x, "
+        "`friction_slopes` times `abs(force_x)/hypot(force_x, force_y)` differs from `friction` by errors of the mesh "
+        "only. This factor was 0.97 to 1 for five rough surfaces (`tests/scenarios/test_two_views.py`); for a wave in "
+        "full contact it is the cosine of the angle between wave vector and sliding direction",
         attrgetter("measures.friction"),
     ),
 )
@@ -337,21 +338,21 @@ STEADY_WAVES: Table = (
     Column("velocity", "m/s", "speed"),
     Column("pressure", "Pa", PRESSURE),
     Column("wavelength", "m", "of a band of waves"),
-    Column("share", "", "of friction that comes from it"),
+    Column("share", "", "of friction that comes from the band"),
 )
 BANDS: Table = (
     Column("velocity", "m/s", "speed"),
-    Column("pressure", "Pa", "mean of the whole"),
-    Column("temperature", "°C", "of the rubber; empty where the curve asks for none"),
+    Column("pressure", "Pa", "nominal mean pressure"),
+    Column("temperature", "°C", "of the rubber; empty if the curve has no temperatures"),
     Column("band", "", "number of the band, 0 for the coarsest"),
     Column("long_wavelength", "m", "longest wave of the band"),
     Column("short_wavelength", "m", "shortest wave of the band"),
-    Column("friction", "", "of the waves of the band; that of an `interface` is in the finest"),
-    Column("contact_area", "", "share in contact as this band and all coarser ones show it"),
+    Column("friction", "", "of the waves of the band; the finest band includes the friction of an `interface`"),
+    Column("contact_area", "", "share in contact with the waves of this and all coarser bands"),
     Column("rms_slope", "", "of the waves of the band"),
-    Column("flash_temperature", "K", "rise that the band feels; empty without `thermal`"),
-    Column("load_lost", "", "share of the load that is above the ladder of the band"),
-    Column("rms_slope_to", "", "of this band and all coarser ones"),
+    Column("flash_temperature", "K", "temperature rise of the rubber in this band; empty without `thermal`"),
+    Column("load_lost", "", "share of the load at pressures above the highest one solved for the band"),
+    Column("rms_slope_to", "", "of this and all coarser bands"),
     Column("strain_to", "", "rms strain of these waves in full contact, at the depth where it is largest"),
 )
 
@@ -359,16 +360,16 @@ THEORY: Table = (
     Column("time", "s", "instant of the job"),
     Column("distance", "m", "slid"),
     Column("pressure", "Pa", PRESSURE),
-    Column("friction", "", "after Persson's theory"),
-    Column("contact_area", "", "after Persson's theory"),
+    Column("friction", "", "by Persson's theory"),
+    Column("contact_area", "", "by Persson's theory"),
 )
 STEADY_THEORY: Table = (
     Column("velocity", "m/s", "speed"),
     Column("pressure", "Pa", PRESSURE),
-    Column("temperature", "°C", "of the point, empty for that of the job"),
+    Column("temperature", "°C", "of the point; empty: the temperature of the job"),
     Column("shift_factor", "", "relaxation times over those at the reference"),
-    Column("friction", "", "after Persson's theory"),
-    Column("contact_area", "", "after Persson's theory"),
+    Column("friction", "", "by Persson's theory"),
+    Column("contact_area", "", "by Persson's theory"),
 )
 
 LEAK: Table = (
@@ -379,21 +380,21 @@ LEAK: Table = (
     Column("flow_y", "m³", "conductivity K of the gap along y"),
     Column("percolates_x", "", "1 where a path leads from end to end along x, else 0"),
     Column("percolates_y", "", "the same along y"),
-    Column("constriction", "m", "smallest gap on the widest path, of the direction that leaks more"),
+    Column("constriction", "m", "smallest gap on the widest path, in the direction that leaks more"),
     Column(
         *("share_x", ""),
-        "K along x over that of the undeformed surface that just touches; empty where its file of heights is gone",
+        "K along x over K of the undeformed surface that just touches; empty if its file of heights no longer exists",
     ),
     Column("share_y", "", "the same along y"),
     Column("constriction_x", "m", "smallest gap on the widest path along x, 0 where contact closes"),
     Column("constriction_y", "m", "the same along y"),
     Column(
         *("error_x", ""),
-        "by what share K along x differs if only every second point of the gap counts; empty where contact closes",
+        "relative change of K along x if only every second point of the gap is used; empty where contact closes",
     ),
     Column("error_y", "", "the same along y"),
     Column(
-        *("flow_rate", "m³/s", "flow of the fluid of `--fluid` at the low side, in the direction that leaks more"),
+        *("flow_rate", "m³/s", "flow of the `--fluid` at the low pressure, in the direction that leaks more"),
         when="--fluid",
     ),
     Column(*("mass_flow", "kg/s", "the same flow as a mass, empty where no density is known"), when="--fluid"),
@@ -405,16 +406,16 @@ def _from_theory(name: str, unit: str) -> Column:
 
 
 def _in_row(column: Column) -> Column:
-    """Return the column as rows that are mappings have it; what they do not have is empty."""
+    """Return the column for rows that are mappings; missing values are empty."""
     return replace(column, of=lambda row: row.get(column.name))
 
 
 SWEEP_RESULTS: Table = (
-    Column("mu_max", "", "highest friction of the slide, the last stretch at one velocity"),
-    Column("mu_max_distance", "m", "from the start of the slide to it"),
+    Column("mu_max", "", "highest friction of the slide (the last part of the history at one velocity)"),
+    Column("mu_max_distance", "m", "distance from the start of the slide to `mu_max`"),
     Column("mu_dyn", "", "mean friction over the last three quarters of the slide"),
-    Column("contact_area", "", "mean over the same; without a slide that of the last row"),
-    Column("contact_area_corrected", "", "the same of that column"),
+    Column("contact_area", "", "mean over the same part; without a slide, its last value"),
+    Column("contact_area_corrected", "", "the same for the column `contact_area_corrected`"),
 )
 SWEEP: Table = tuple(
     _in_row(column)
@@ -424,23 +425,23 @@ SWEEP: Table = tuple(
         *SWEEP_RESULTS,
         Column("mu_max_error", "", "estimated error of `mu_max`, in the same unit"),
         Column("mu_dyn_error", "", "estimated error of `mu_dyn`, in the same unit"),
-        Column("residual", "", "the worst of the case"),
+        Column("residual", "", "largest `residual` of the case"),
         Column(
             *("error_friction", ""),
-            "relative, the mean over the distance slid as the end of the run tells it; empty without a slide",
+            "relative error, mean over the distance slid, as printed at the end of the run; empty without a slide",
         ),
-        Column("error_area", "", "the same of the corrected contact area; without a slide that of the last row"),
+        Column("error_area", "", "the same for the corrected contact area; without a slide, its last value"),
         Column("seconds", "s", "wall time of all steps"),
         *(_from_theory(one.name, one.unit) for one in SWEEP_RESULTS if one.name != "contact_area_corrected"),
         Column(
             *("pull_off", "N"),
-            "with adhesion: force of the last pull-off, empty where contact holds ({doc}`adhesion`)",
+            "with adhesion: force of the last pull-off; empty if contact is never lost ({doc}`adhesion`)",
             when="adhesion",
         ),
-        Column(*("pull_off_error", "N"), "error of it by steps, solves and mesh", when="adhesion"),
-        Column("pull_off_approach", "m", "approach at it", when="adhesion"),
+        Column(*("pull_off_error", "N"), "error of `pull_off` by steps, solves and mesh", when="adhesion"),
+        Column("pull_off_approach", "m", "approach at the last pull-off", when="adhesion"),
         Column("dissipated", "J", "with `output.energy`: dissipated energy in the end", when="output.energy"),
-        Column("flow_x", "m³", "with `leakage`: K along x, the last one that was calculated", when="leakage"),
+        Column("flow_x", "m³", "with `leakage`: last calculated K along x", when="leakage"),
         Column("flow_y", "m³", "the same along y", when="leakage"),
         Column("constriction", "m", "the critical constriction at the same step", when="leakage"),
     )
@@ -451,27 +452,25 @@ STUDY: Table = (
     Column("mesh", "", "points along x"),
     Column(
         *("cells_per_step", ""),
-        "cells slid in a step; `auto` where the stages of the slide choose their steps and there is no ladder",
+        "cells slid in a step; `auto` if the stages choose their steps and the study varies none",
     ),
     Column("integrator", "", "integrator"),
     Column("mu_max", "", "highest friction"),
     Column(
         *("mu_end", ""),
-        "friction in the end: the mean over the last quarter of the last stage that slides. (`mu_dyn` of runs is the "
-        "mean over three quarters of the slide.)",
+        "mean friction over the last quarter of the last sliding stage (`mu_dyn` of runs: over the last three quarters "
+        "of the slide)",
     ),
-    Column("area", "", "mean contact area over the same"),
-    Column("area_corrected", "", "mean corrected area over the same"),
+    Column("area", "", "mean contact area over the same part"),
+    Column("area_corrected", "", "mean corrected area over the same part"),
     Column("steps", "", "steps made"),
     Column("operator_calls", "", "applications of the operator"),
-    Column("transform_work", "", "transforms times N log2 N of their N points"),
+    Column("transform_work", "", "sum of N log2 N over all transforms of N points"),
     Column("cpu_seconds", "s", "of all ranks"),
-    Column(
-        *("error_mu_max", ""), "relative, over the extrapolated limit; empty where nothing slides, as `error_mu_end`"
-    ),
-    Column("error_mu_end", "", "relative, over the extrapolated limit"),
-    Column("error_area", "", "relative, over the extrapolated limit"),
-    Column("error_area_corrected", "", "relative, over the extrapolated limit"),
+    Column(*("error_mu_max", ""), "relative to the extrapolated limit; empty where nothing slides, as `error_mu_end`"),
+    Column("error_mu_end", "", "relative to the extrapolated limit"),
+    Column("error_area", "", "relative to the extrapolated limit"),
+    Column("error_area_corrected", "", "relative to the extrapolated limit"),
 )
 
 BANDS_THEORY: Table = (*BANDS[:6], *THEORY[-2:])

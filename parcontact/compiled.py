@@ -1,7 +1,7 @@
-"""Compiled loops: one decorator for those over rows, one for functions of points.
+"""Decorators that compile loops over rows and functions of points, by numba.
 
-Sums may be reordered to use vector units; NaN and infinity keep their meaning, so that a solver sees them. Machine code
-is kept in a private directory, so that only a first run waits for the compiler; where there is none, every run does.
+Sums may be reordered to use vector units; NaN and infinity keep their meaning. Machine code is kept in a private
+directory, so that only the first run waits for the compiler; without such a directory every run compiles.
 """
 
 import hashlib
@@ -30,22 +30,21 @@ def loop(function: Function) -> Function:
 
 
 def pointwise(function: Function) -> Function:
-    """Compile a function of numbers for all points of arrays."""
+    """Compile a function of numbers to act on all points of arrays."""
     return cast(Function, _compiled(lambda kept: numba.vectorize(cache=kept)(function)))
 
 
 def cache_path(compiled: Any) -> Path | None:
-    """The directory in which machine code of a compiled function is kept, if any."""
+    """Return the directory in which machine code of a compiled function is kept, or None."""
     kept = _cache_of(compiled)
     return Path(kept.cache_path) if kept and kept.cache_path else None
 
 
 def _save_data_first(files: Any, key: Any, data: Any) -> None:
-    """Keep the machine code for some types in numba's `files` of a function, under a name of its own, then its index.
+    """Write machine code to a file named by a hash of source and types, then the index of numba's cache `files`.
 
-    numba writes the index first, and numbers its files. So a process that reads meanwhile gets what was in a file
-    before: code of an older source, or of the types that another process keeps at the same time. Here two processes
-    that write at once lose an entry of the index at most, and compile once more.
+    numba writes the index first and numbers its files, so another process may read code of an older source or of
+    other types. Here two processes that write at the same time lose at most an entry of the index, and compile again.
     """
     base = files._index_name.removesuffix(".nbi")
     name = hashlib.sha256(repr((files._source_stamp, key)).encode()).hexdigest()[:16]
@@ -54,22 +53,22 @@ def _save_data_first(files: Any, key: Any, data: Any) -> None:
     files._save_index(kept)
     for path in Path(files._cache_path).glob(f"{escape(base)}.*.nbc"):
         if path.name not in kept.values():
-            path.unlink(missing_ok=True)  # of an older source
+            path.unlink(missing_ok=True)  # code of an older source
 
 
 def _cache_of(compiled: Any) -> Any:
-    """The cache of a compiled function; None if compiling is off."""
-    dispatcher = getattr(compiled, "_dispatcher", compiled)  # of a function of points, or of a loop
+    """Return numba's cache of a compiled function; None if compiling is switched off."""
+    dispatcher = getattr(compiled, "_dispatcher", compiled)  # functions of points have a dispatcher, loops are one
     return getattr(dispatcher, "_cache", None) or getattr(dispatcher, "cache", None)
 
 
 def _compiled(compiler: Callable[[bool], Any]) -> Any:
-    """Make a function by `compiler(kept)`, with its machine code kept if there is a private place for it."""
+    """Return the function made by `compiler(kept)`; `kept` is True if a private directory can hold its code."""
     place = private.directory("compiled")
     if place is None:
         return compiler(False)
     config: Any = numba.config
-    others, config.CACHE_DIR = config.CACHE_DIR, str(place)  # where numba looks first while it decorates
+    others, config.CACHE_DIR = config.CACHE_DIR, str(place)  # numba reads it while it decorates
     try:
         compiled = compiler(True)
     except RuntimeError:
@@ -78,19 +77,18 @@ def _compiled(compiler: Callable[[bool], Any]) -> Any:
         config.CACHE_DIR = others
     path = cache_path(compiled)
     if not path or not path.is_relative_to(place):
-        return compiler(False)  # numba has other places, for all
+        return compiler(False)  # numba chose a directory that others may write to
     files = _cache_of(compiled)._cache_file
     files.save = partial(_save_data_first, files)
     return compiled
 
 
 def _import_numba_arrays() -> None:
-    """Import what numba has for loops over arrays, without scipy.linalg.
+    """Import numba's functions of arrays without scipy.linalg.
 
-    numba imports that only to see whether there is a BLAS, which takes a fifth of a second of every short run. There is
-    one if scipy is there, and a loop that multiplies matrices still imports it.
+    numba imports scipy.linalg only to check that a BLAS exists, which takes 0.2 s; an installed scipy is check enough.
     """
-    with suppress(ImportError, AttributeError):  # another numba, which asks otherwise
+    with suppress(ImportError, AttributeError):  # a version of numba with another check
         algebra: Any = import_module("numba.np.linalg")
         asks, algebra.ensure_blas = algebra.ensure_blas, _find_scipy
         try:
@@ -102,7 +100,7 @@ def _import_numba_arrays() -> None:
 
 def _find_scipy() -> None:
     if find_spec("scipy") is None:
-        raise ImportError("there is no scipy")
+        raise ImportError("scipy is not installed")
 
 
 @cache

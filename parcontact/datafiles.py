@@ -1,4 +1,4 @@
-"""Numbers in files of others: .npy files, opened without reading what a damaged header claims, and lines of text."""
+"""Reading of .npy files and tables of text that users give; damaged files raise InputError."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-HEADER_BYTES = 1_000_000
+HEADER_BYTES = 1_000_000  # largest header of an .npy file [bytes]
 TEXTS = (".txt", ".xyz", ".csv", ".dat", ".asc")
-OWN_FORMATS = (".npy", *TEXTS)  # of maps; others are read by SurfaceTopography
-LOWEST, HIGHEST = 1e-70, 1e70  # accuracy: of the largest height [m], whose fourth power is still a number
-LARGEST_TEXT = 50_000_000  # bytes
+OWN_FORMATS = (".npy", *TEXTS)  # formats of maps; SurfaceTopography reads others
+LOWEST, HIGHEST = 1e-70, 1e70  # rounding: range of the largest height [m] whose fourth power does not overflow
+LARGEST_TEXT = 50_000_000  # largest text file that is read [bytes]
 
 
 def open_numbers(path: Path) -> NDArray[Any]:
-    """A file's array, mapped into memory. Raises InputError for what holds no real numbers, and what numpy raises."""
-    import numpy as np  # slow, for those who read text only
+    """Return the array of an .npy file, mapped into memory. Raises InputError, and errors of numpy."""
+    import numpy as np  # slow import, not needed to read text
 
     with path.open("rb") as file:
         start = file.read(12)
     if not start:
         raise InputError(f"{path} cannot be read: it is empty")
-    if start[6:7] in (b"\2", b"\3") and int.from_bytes(start[8:12], "little") > HEADER_BYTES:  # numpy would read them
-        raise InputError(f"{path} cannot be read: its header claims to be larger than {HEADER_BYTES / 1e6:g} MB")
+    if start[6:7] in (b"\2", b"\3") and int.from_bytes(start[8:12], "little") > HEADER_BYTES:  # numpy would read it all
+        raise InputError(f"{path} cannot be read: its header has more than {HEADER_BYTES / 1e6:g} MB")
     try:
         values = np.lib.format.open_memmap(path, mode="r")
     except ValueError as error:
@@ -44,19 +44,19 @@ def open_numbers(path: Path) -> NDArray[Any]:
 
 
 def refuse_extreme(what: Path | str, largest: float) -> None:
-    """Raise InputError for maps whose largest height or gap [m] overflows, or vanishes, in what follows from it."""
+    """Raise InputError for a map whose largest height or gap [m] would overflow or underflow in calculations."""
     if largest and not LOWEST <= largest <= HIGHEST:
-        raise InputError(f"{what}: its largest value is {largest:.3g} m, which cannot be computed with")
+        raise InputError(f"{what}: its largest value is {largest:.3g} m; {LOWEST:g} to {HIGHEST:g} m were expected")
 
 
 def refuse_no_numbers(path: Path, kind: np.dtype[Any]) -> None:
-    """Raise InputError for values that are no real numbers."""
+    """Raise InputError unless the values of a file are real numbers."""
     if kind.kind not in "iuf":
-        raise InputError(f"{path} holds values of type {kind}, which are no heights")
+        raise InputError(f"{path} holds values of type {kind}; real numbers were expected")
 
 
 def foreign_numbers(path: Path) -> str:
-    """Return why a file of text is no map that can be read, and what to do; '' where nothing is seen at its start."""
+    """Return why a text file is not a readable map, from its first bytes, and the remedy; '' if nothing is wrong."""
     with path.open("rb") as file:
         start = file.read(1000)
     if path.suffix.lower() not in (".txt", ".csv", ".dat", ".asc"):
@@ -70,7 +70,7 @@ def foreign_numbers(path: Path) -> str:
 
 
 def has_decimal_commas(line: str) -> bool:
-    """Return whether a line holds several numbers like 0,1 with something else than commas between them."""
+    """Return True if a line holds several numbers with decimal commas (0,1), separated by blanks or semicolons."""
     parts = [part for part in re.split(r"[;\s]+", line) if part]
     return (
         len(parts) > 1 and "," in line and all(re.fullmatch(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?", part) for part in parts)
@@ -78,10 +78,9 @@ def has_decimal_commas(line: str) -> bool:
 
 
 def read_lines(path: Path, expected: str) -> list[tuple[int, str]]:
-    """Return the lines of a text file that hold more than a comment, with their numbers.
+    """Return the number and text of each line of a file that is neither blank nor a comment.
 
-    Texts are UTF-8, UTF-16 with its mark, or Latin-1, as instruments write them. Raises InputError, also where no such
-    line is.
+    Files are UTF-8, UTF-16 with a byte-order mark, or Latin-1. Raises InputError, also for a file without such lines.
     """
     try:
         if not path.is_file():
@@ -106,9 +105,9 @@ def read_lines(path: Path, expected: str) -> list[tuple[int, str]]:
 
 
 def split_cells(line: str) -> list[str]:
-    """Return the cells of a line, between semicolons, tabs or commas, whichever comes first in this list, or blanks.
+    """Return the cells of a line, separated by semicolons, else tabs, else commas, else blanks.
 
-    A cell may be quoted; a quote inside a cell, as in G", belongs to it.
+    A cell may be quoted; a quote inside a cell, as in G", belongs to the cell.
     """
     mark = next((mark for mark in (";", "\t", ",") if mark in line), None)
     if mark is None:

@@ -1,6 +1,6 @@
-"""Warnings as data: what is doubtful, where, and its numbers; and the sentences in which users read them.
+"""Warnings as data (kind, place, numbers), and the sentences that users read.
 
-Whoever judges a job, a surface or a contact makes a `Doubt`. Nothing compares or parses the sentences.
+Code that checks a job, a surface or a contact returns `Doubt`s. No code compares or parses the sentences.
 """
 
 import math
@@ -14,8 +14,8 @@ from .printed import per_cent, quantity
 
 @dataclass(frozen=True)
 class Doubt:
-    """Something that is allowed but will probably disappoint: its `kind` (a name in SENTENCES), its `place`, such as a
-    key of the job, and the numbers and names of its sentence, in SI units."""
+    """A warning: its `kind` (a key of SENTENCES), its `place` (such as a key of the job), and the numbers (SI units)
+    and names in its sentence."""
 
     kind: str
     place: str
@@ -23,7 +23,7 @@ class Doubt:
 
     @property
     def body(self) -> str:
-        """The sentence without its place."""
+        """Return the sentence without the place."""
         return FORMATTER.vformat(SENTENCES[self.kind], (), self.numbers)
 
     def __str__(self) -> str:
@@ -31,8 +31,7 @@ class Doubt:
 
     @property
     def subject(self) -> tuple[str, ...]:
-        """Return kind, place and names, but `where` it was seen: two doubts with one subject differ in numbers
-        alone."""
+        """Return kind, place and names except `where`: doubts with the same subject differ in numbers only."""
         names = (value for name, value in self.numbers.items() if isinstance(value, str) and name != "where")
         return self.kind, self.place, *names
 
@@ -73,8 +72,8 @@ class _WarningText(str):
 
 
 class _Formatter(string.Formatter):
-    """Formats like `str.format`; `!p` is a share in per cent, `!m` a length in m with its unit in four digits, `!M` in
-    three, `!t` how many times."""
+    """Formats like `str.format`, and with `!p` (a share in per cent), `!m` and `!M` (a length with its unit in four and
+    three digits) and `!t` (a multiple)."""
 
     def convert_field(self, value: Any, conversion: Any) -> Any:
         if conversion == "p":
@@ -88,34 +87,37 @@ class _Formatter(string.Formatter):
 
 FORMATTER = _Formatter()
 SENTENCES = {
-    # whole sentences: of effects of others, and of the tables of moduli from which a material is fitted
+    # whole sentences, from plug-ins and from tables of measured moduli
     "said": "{text}",
     # a job: slopes, strains, relaxation
     "steep": (
-        "its rms slope is {slope:.3g}, and the theory is one of small slopes, {most:g} at most: heights and lengths "
-        "are in m; heights in um need a factor of 1e-6 (scale: 1.0e-6 of a file, unit: um of a topography), and "
-        "missing points are nan"
+        "its rms slope is {slope:.3g}; the theory assumes small slopes, up to {most:g}. Are heights and lengths in m? "
+        "Heights in um need scale: 1.0e-6 (shape: file) or unit: um (shape: topography), and missing points must be "
+        "nan"
     ),
     "soft": (
-        "its shear modulus at once is {modulus:.3g} Pa, softer than {least:g} Pa, as gels are; moduli are in Pa: "
-        "{modulus:.3g} MPa would be {in_mega:.3g}"
+        "its instantaneous shear modulus is {modulus:.3g} Pa, below {least:g} Pa and as soft as a gel. Moduli are in "
+        "Pa: {modulus:.3g} MPa would be {in_mega:.3g}"
     ),
-    "hard": "its shear modulus at once is {modulus:.3g} Pa, above {most:g} Pa, harder than diamond",
+    "hard": (
+        "its instantaneous shear modulus is {modulus:.3g} Pa, above {most:g} Pa and harder than diamond; moduli are in "
+        "Pa"
+    ),
     "strain at once": (
-        "a mean pressure of {pressure:.3g} Pa is above 2 G/(1 - nu) = {modulus:.3g} Pa, where strains are far beyond "
-        "linear theory; pressures and moduli are both in Pa"
+        "a mean pressure of {pressure:.3g} Pa exceeds 2 G/(1 - nu) = {modulus:.3g} Pa, where strains are far beyond "
+        "linear theory; are pressures and moduli both in Pa?"
     ),
     "strain in time": (
-        "a mean pressure of {pressure:.3g} Pa is above 2 G/(1 - nu) = {modulus:.3g} Pa after {seconds:.3g} s under "
-        "it, where strains are far beyond linear theory; pressures and moduli are both in Pa"
+        "a mean pressure of {pressure:.3g} Pa, held for {seconds:.3g} s, exceeds 2 G/(1 - nu) = {modulus:.3g} Pa of "
+        "the relaxed body, where strains are far beyond linear theory; are pressures and moduli both in Pa?"
     ),
     "light": (
-        "under {pressure:.3g} Pa, the largest load, {touching:.2g} points of the grid would touch, and 1 is the "
-        "least; use a larger load. Pressures are in Pa: {pressure:.3g} MPa is {in_mega:.3g}"
+        "under the largest load, {pressure:.3g} Pa, only {touching:.2g} points of the grid would touch, less than 1; "
+        "use a larger load. Pressures are in Pa: {pressure:.3g} MPa is {in_mega:.3g}"
     ),
     "at an instant": (
-        "its {stages} stages last no time, and the rubber is at its stiffest in all of them, with a shear modulus of "
-        "{modulus:.3g} Pa; give them a duration [s] to let it relax to {relaxed:.3g} Pa"
+        "its {stages} stages have no duration, so the rubber keeps its instantaneous shear modulus of {modulus:.3g} "
+        "Pa; give them a duration [s] to let it relax to {relaxed:.3g} Pa"
     ),
     "elastic": (
         "sliding excites {low:.3g} to {high:.3g} rad/s, all more than {times:g} times {how} than the branches, which "
@@ -123,31 +125,31 @@ SENTENCES = {
         "m/s, lengths in m and relaxation times in s?"
     ),
     "imprint": (
-        "after {way:.3g} m of its {length:.3g} m the surface is back within {near:.3g} m of where it began, once "
-        "round the periodic box, and slides over its own imprint, which the body remembers for {memory:.3g} s. From "
-        "there on friction and mu_dyn depend on the box; use a shorter distance or a larger grid.size"
+        "after {way:.3g} m of its {length:.3g} m the surface has crossed the periodic box, returns to within "
+        "{near:.3g} m of its start, and slides over its own imprint, which the body remembers for {memory:.3g} s. "
+        "Beyond this distance friction and mu_dyn depend on the box; use a shorter distance or a larger grid.size"
     ),
     # a job: spheres
     "large contact": (
-        "the contact would have a radius of {contact:.3g} m or more, larger than that of the sphere, {radius:g} m; "
-        "the theory is one of small slopes: use a smaller load"
+        "the contact would have a radius of {contact:.3g} m or more, above the radius of the sphere, {radius:g} m; the "
+        "theory assumes small slopes: use a smaller load"
     ),
     "out of the box": (
         "the contact has a radius of {contact:.3g} m or more and leaves the box of {lx:g} x {ly:g} m; use a "
-        "larger grid.size, less load or a shorter way"
+        "larger grid.size, a smaller load or a shorter distance"
     ),
     "slides out of the box": (
-        "the contact, centred at ({x:.4g}, {y:.4g}) m in the end, has a radius of {contact:.3g} m or more and leaves "
-        "the box of {lx:g} x {ly:g} m; use a larger grid.size, less load or a shorter way"
+        "the contact ends at ({x:.4g}, {y:.4g}) m with a radius of {contact:.3g} m or more, and leaves the box of "
+        "{lx:g} x {ly:g} m; use a larger grid.size, a smaller load or a shorter distance"
     ),
     "images": (
         "its images in the periodic box of {lx:g} x {ly:g} m change the load at a given radius of contact by "
-        "{change!p} or more; {most!p} passes: use a grid.size {times:.3g} times as large, or boundary: free"
+        "{change!p} or more (limit: {most!p}); use a grid.size {times:.3g} times as large, or boundary: free"
     ),
     # a job: the mesh and the steps
     "few long waves": (
-        "only {waves:.3g} of the longest waves fit into the box along {axis}, and a representative surface has at "
-        "least {least}; use a grid.size of {size:.4g} m or a long_wavelength of {wave:.4g} m"
+        "only {waves:.3g} of the longest waves fit into the box along {axis}; a representative surface needs at least "
+        "{least}: use a grid.size of {size:.4g} m or a long_wavelength of {wave:.4g} m"
     ),
     "large box": (
         "a side of {length:g} m, {times:.4g} times {key}, {wave:g} m; is it in m? {length:g} mm would be {in_milli:g}"
@@ -162,89 +164,89 @@ SENTENCES = {
         "which a topography is interpolated (resample an array yourself), or heights without waves shorter than "
         "{wave:.4g} m"
     ),
-    "slides in no time": "nothing slides in a stage without duration or distance; its velocity has no effect",
+    "slides in no time": "a stage without duration or distance does not slide; its velocity has no effect",
     "long steps": (
-        "time steps up to {step:.3g} s are longer than the shortest relaxation time {shortest:.3g} s, which "
-        "backward-euler does not resolve; shorten the steps or use integrator: exponential"
+        "time steps of up to {step:.3g} s exceed the shortest relaxation time, {shortest:.3g} s, which backward-euler "
+        "must resolve; use shorter steps or integrator: exponential"
     ),
     "skipped waves": (
-        "the surface slides {slid:.3g} m in one step, {share:.2g} of its shortest wave; use time steps up to "
-        "{step:.3g} s (cells_per_step up to {cells:.3g})"
+        "the surface slides {slid:.3g} m in one step, {share:.2g} of its shortest wave; use time steps of at most "
+        "{step:.3g} s (cells_per_step of at most {cells:.3g})"
     ),
     # a job: a layer
     "thin": (
-        "{thickness:g} m is thinner than {least:g} cells of {cell:.3g} m, and the edges of contacts are not resolved; "
-        "use {more}, or a smaller grid.size"
+        "{thickness:g} m is thinner than {least:g} cells of {cell:.3g} m, so edges of contacts are not resolved; use "
+        "{more}, or a smaller grid.size"
     ),
     "high for a layer": (
-        "the surface is {height:.3g} m high or more, above a third of the layer ({thickness:g} m), where strains are "
-        "not small; use a thicker layer, or a lower surface"
+        "the surface is {height:.3g} m high or more, above a third of the layer ({thickness:g} m), so strains are not "
+        "small; use a thicker layer, or a lower surface"
     ),
     "deep for a layer": (
-        "{approach:.3g} m is more than a third of the layer ({thickness:g} m), where strains are not small; use a "
-        "smaller approach, or a thicker layer"
+        "{approach:.3g} m is more than a third of the layer ({thickness:g} m), so strains are not small; use a smaller "
+        "approach, or a thicker layer"
     ),
     "incompressible": (
-        "waves of {wave:.3g} m are more than {times:g} times as long as the layer is thick ({thickness:g} m), and "
-        "rubber yields to them by its compressibility; {poisson:g} leaves that out: use 0.4995"
+        "waves of {wave:.3g} m are more than {times:g} times as long as the layer is thick ({thickness:g} m); rubber "
+        "yields to them by its compressibility, which a Poisson's ratio of {poisson:g} excludes: use 0.4995"
     ),
     # a job: memory and disk
     "memory": (
-        "{nx} x {ny} points need at least {needed:.3g} GB of memory on all ranks together, and {machines} {has:.3g} "
+        "{nx} x {ny} points need at least {needed:.3g} GB of memory on all ranks together, but {machines} {has:.3g} "
         "GB; use fewer points, or {count} such machines"
     ),
     "disk": (
-        "{instants:.4g} instants need {needed:.3g} GB, and {directory} has {free:.3g} GB left; use a larger "
-        "output.every than {every}, or fewer fields"
+        "{instants:.4g} instants need {needed:.3g} GB, but {directory} has {free:.3g} GB left; use an output.every "
+        "above {every}, or fewer fields"
     ),
     # a job: adhesion
     "work": (
-        "adhesion.work is {work:g} J/m^2 and the range {range:.3g} m: to part dry surfaces takes {most:g} J/m^2 at "
-        "most, of rubber some 0.05; what a body dissipates comes beside it, from its material"
+        "adhesion.work is {work:g} J/m^2 and the range {range:.3g} m: dry surfaces have a work of adhesion of at most "
+        "{most:g} J/m^2, rubber about 0.05; the material adds what the body dissipates"
     ),
     "strained edges": (
-        "strains at the edges of contact are some work/(E* range) = {strain:.2g}, and the theory is for small ones, "
-        "at most {most:g}: adhesion.work is {work:g} J/m^2 and the range {range:.3g} m; use a longer range, or less "
+        "strains at the edges of contact are about work/(E* range) = {strain:.2g}; the theory assumes small strains, "
+        "up to {most:g}. adhesion.work is {work:g} J/m^2 and the range {range:.3g} m; use a longer range or a smaller "
         "work"
     ),
     "long range": (
-        "adhesion.work is {work:g} J/m^2 and the range {range:.3g} m, more than {most:g} of the box: points then "
-        "attract more than what lies opposite, which the law does not know; use a shorter range"
+        "adhesion.work is {work:g} J/m^2 and the range {range:.3g} m, more than {most:g} of the box: points then also "
+        "attract points that are not opposite, which the law neglects; use a shorter range"
     ),
     "coarse tip": (
-        "a cell, {cell:.3g} m, is {ratio:.2g} times sqrt(radius range), how far {sphere} is attracted around its tip: "
-        "{most:g} times makes the sum over points wrong by 3 %, more is worse; use cells of {fine:.3g} m, or a range "
-        "of {enough:.3g} m"
+        "a cell, {cell:.3g} m, is {ratio:.2g} times sqrt(radius range), the radius within which {sphere} is attracted; "
+        "at {most:g} times the sum over points is wrong by 3 %; use cells of {fine:.3g} m, or a range of {enough:.3g} m"
     ),
     "small sphere": (
-        "it attracts out to sqrt(2 radius range), more than its radius, {radius:g} m, and the theory is one of small "
-        "slopes; use an adhesion.range up to {most:.3g} m"
+        "it attracts out to sqrt(2 radius range), more than its radius, {radius:g} m; the theory assumes small slopes: "
+        "use an adhesion.range of at most {most:.3g} m"
     ),
     "cut attraction": (
         "{share!p} of its attraction over an adhesion.range of {range:.3g} m comes from beyond {room:.3g} m, where "
-        "the box ends; {most!p} passes: use a range up to {shorter:.3g} m, or {more:.3g} m of room around the sphere"
+        "the box ends (limit: {most!p}); use a range of at most {shorter:.3g} m, or {more:.3g} m of room around the "
+        "sphere"
     ),
     "attraction at an edge": (
         "{share!p} of its attraction over an adhesion.range of {range:.3g} m comes from beyond {room:.3g} m, where "
-        "the box ends; {most!p} passes: use {more:.3g} m of room around the sphere"
+        "the box ends (limit: {most!p}); use {more:.3g} m of room around the sphere"
     ),
     "coarse process zone": (
-        "a cell, {cell:.3g} m, is {ratio:.2g} times as long as the process zone, and the forces at edges of contact "
-        "are not resolved: 1.2 times makes pull-off wrong by 4 %, 1.8 times by 23 %; use a range of {enough:.3g} m or "
-        "more, or cells of {zone:.3g} m"
+        "a cell, {cell:.3g} m, is {ratio:.2g} times as long as the process zone, so the forces at edges of contact are "
+        "not resolved: pull-off is wrong by 4 % at 1.2 times and by 23 % at 1.8 times; use a range of {enough:.3g} m "
+        "or more, or cells of {zone:.3g} m"
     ),
     "range beyond heights": (
         "the range, {range:.3g} m, is more than the {span:.3g} m from the lowest to the highest point of the surface, "
-        "which then attracts nearly equally everywhere: adhesion is hardly more than a pressure of work/range; use a "
-        "shorter range (range: auto follows the cells)"
+        "so the attraction is nearly uniform and adhesion acts as a pressure of work/range; use a shorter range "
+        "(range: auto follows the cells)"
     ),
     "range follows cells": (
-        "auto follows cells, work and modulus, from {least:.4g} to {most:.4g} m in these cases, which are different "
-        "physics; to compare them give one range to all: the cells of each resolve {most:.4g} m"
+        "auto depends on cells, work and modulus, and gives {least:.4g} to {most:.4g} m in these cases, which are "
+        "different physics; to compare them give all one range: {most:.4g} m is resolved by the cells of each"
     ),
     # measured moduli
     "temperatures": (
-        "{degrees} C is beyond the {low:g} to {high:g} C of its measurement: the shift is an extrapolation there"
+        "{degrees} C is outside of the measured {low:g} to {high:g} C: the shift is an extrapolation there"
     ),
     "frequencies": (
         "the job excites {low:.3g} to {high:.3g} Hz, reduced to the reference temperature, {decades:.1f} decades "
@@ -253,42 +255,41 @@ SENTENCES = {
     # heights
     "seam": (
         "the heights at the two ends along {axis} of the periodic box differ by {jump:.3g} m (rms), {times!t} the "
-        "largest step between neighbours inside. Such a step makes friction of its own; cut it where it fits, or let "
-        "it fade to its mean towards the edge"
+        "largest step between neighbours inside. Such a step adds friction; cut the map where its ends fit, or let "
+        "heights fade to their mean towards the edges"
     ),
     "tilt": (
         "the heights at the two ends along {axis} of the periodic box differ by {jump:.3g} m (rms), {times!t} the "
-        "largest step between neighbours inside. Such a step makes friction of its own; it is tilted by {tilt:.3g}: "
+        "largest step between neighbours inside. Such a step adds friction; the surface is tilted by {tilt:.3g}: "
         "subtract its mean plane"
     ),
     "steep waves": (
-        "its rms slope is {slope:.3g} (rms strain {strain:.2g}), and linear theory has small slopes: waves shorter "
-        "than {steep:.3g} m go beyond a slope of {most:g}"
+        "its rms slope is {slope:.3g} (rms strain {strain:.2g}); linear theory assumes small slopes, and waves shorter "
+        "than {steep:.3g} m exceed a slope of {most:g}"
     ),
     "steep waves, cut-off": (
-        "its rms slope is {slope:.3g} (rms strain {strain:.2g}), and linear theory has small slopes: waves shorter "
-        "than {steep:.3g} m go beyond a slope of {most:g}; waves shorter than {usual:.3g} m are usually left out: "
+        "its rms slope is {slope:.3g} (rms strain {strain:.2g}); linear theory assumes small slopes, and waves shorter "
+        "than {steep:.3g} m exceed a slope of {most:g}. Waves shorter than {usual:.3g} m are usually left out: give "
         "bands.cutoff_slope: {cutoff:g}"
     ),
     "no waves of the map": (
-        "the spectrum begins at {longest!M}, and of the map only longer waves are taken, hardly any of its {side!M}; "
-        "give the spectrum long_wavelength: {seam:.2g} or so, {points} points of the map"
+        "the spectrum begins at {longest!M}, and only longer waves are taken from the map, which is {side!M} long and "
+        "has hardly any; give the spectrum a long_wavelength of about {seam:.2g} m ({points} points of the map)"
     ),
     # measured maps
     "large map": "{file}: the map is {lx:.4g} x {ly:.4g} m; are lengths in m?",
-    "near points": "{file}: points of the map are {dx!m} apart, less than atoms; are lengths in this unit?",
+    "near points": "{file}: the spacing of points is {dx!m}, less than the size of atoms; is the unit right?",
     "flat map": (
         "{file}: the map is {lx!m} x {ly!m}, and its heights differ by {span!M} only; do heights and lengths have the "
         "right units?"
     ),
     "oblong points": (
-        "{file}: points of the map are {dx!m} apart along x and {dy!m} along y; is the order of x and y right?"
+        "{file}: the spacing of points is {dx!m} along x and {dy!m} along y; is the order of x and y right?"
     ),
     "outliers": (
-        "{count} points of the map stick out of their neighbours by more than {deviations:g} times the median "
+        "{count} points of the map differ from their neighbours by more than {deviations:g} times the median "
         "deviation{repeated}. Its rms slope is {slope:.3g} with them and {without:.3g} without, and they carry load; "
-        "where they are no part of the surface, give outliers: clip, or nodata: NUMBER if one number marks missing "
-        "points"
+        "if they are no part of the surface, give outliers: clip, or nodata: NUMBER if one number marks missing points"
     ),
     # friction curves
     "unsolved point": "{where}",
@@ -304,10 +305,10 @@ SENTENCES = {
     # contacts
     "edge": (
         "{where}: the contact reaches the edge of the box and is cut off there, so its results are wrong; use a "
-        "larger grid.size, less load or a shorter way"
+        "larger grid.size, a smaller load or a shorter distance"
     ),
     "cells": (
-        "{where}: spots of contact are only a few cells wide: contact_area is about {excess!p} too large (more than "
-        "{most!p} gets this warning); use {more}, a smaller grid.size or a larger load"
+        "{where}: spots of contact are only a few cells wide: contact_area is about {excess!p} too large (limit: "
+        "{most!p}); use {more}, a smaller grid.size or a larger load"
     ),
 }

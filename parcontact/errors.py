@@ -1,26 +1,26 @@
-"""Errors that a user can put right."""
+"""Errors that a user can correct."""
 
 from collections.abc import Sequence
 
 
 class InputError(Exception):
-    """Bad input, said in one sentence: the program ends with exit code 2 and writes nothing."""
+    """Bad input, described in one sentence: the program ends with exit code 2 and writes nothing."""
 
 
 class JobError(InputError):
-    """A job that cannot be run; `mistakes` are sentences, each beginning with file:line:column or the name of a key."""
+    """A job with mistakes; each of `mistakes` is a sentence that begins with file:line:column or the name of a key."""
 
     def __init__(self, mistakes: Sequence[str]) -> None:
         super().__init__("\n".join(mistakes))
         self.mistakes = list(mistakes)
 
     def __reduce__(self) -> tuple[type["JobError"], tuple[list[str]]]:
-        return JobError, (self.mistakes,)  # as it travels between ranks
+        return JobError, (self.mistakes,)  # for pickling, between ranks
 
 
 class InUseError(InputError):
-    """The output directory is that of another program that runs now."""
+    """The output directory is in use by another running program."""
 
 
 class RunError(Exception):
-    """A run that cannot go on, said in one sentence: exit code 1."""
+    """A run that cannot continue, described in one sentence: exit code 1."""

@@ -1,21 +1,21 @@
-"""Numbers as an engineer writes them: prefixes of units, shares in per cent, as many digits as the error allows.
+"""Numbers formatted for readers: prefixes of units, shares in per cent, as many digits as the error allows.
 
-What is read has ± and µ everywhere; `streams` replaces them on terminals that cannot show them.
+Texts contain ± and µ; `streams` replaces them on terminals that cannot show them.
 """
 
 import math
 
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 TIMES = {"years": 365.25 * 86400.0, "days": 86400.0, "h": 3600.0, "min": 60.0}  # [s]
-LONG_TIME = 2.0  # of a unit of time, from which on it is used
-MOST_DIGITS = 6  # of a number with an error
+LONG_TIME = 2.0  # smallest number of minutes, hours, days or years that is printed in this unit
+MOST_DIGITS = 6  # limit on the digits of a number with an error
 
 
 def prefixed(unit: str, largest: float) -> tuple[str, float]:
-    """Return the unit with the prefix that suits the largest value, and its size in the unit without one.
+    """Return the unit with the prefix that suits the largest value, and the size of the prefixed unit in `unit`.
 
-    Squares, m², go up by a million; they keep the larger unit down to a thousandth of it. No unit, degrees and
-    cubes have no prefix. Times of two minutes or more are in minutes, hours, days or years.
+    Prefixes of m² change by factors of a million, and values down to a thousandth keep the larger unit. °C, m³ and
+    dimensionless values have no prefix. Times of two minutes or more are in minutes, hours, days or years.
     """
     if unit == "s" and abs(largest) >= LONG_TIME * TIMES["min"]:
         return next((name, size) for name, size in TIMES.items() if abs(largest) >= LONG_TIME * size)
@@ -37,13 +37,13 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
 
 
 def span(low: float, high: float, unit: str, digits: int = 3) -> str:
-    """Return two numbers in one unit, in as many digits as tell them apart: 1.05 and 1.10 MPa."""
+    """Return two numbers in one unit, with enough digits to distinguish them: 1.05 and 1.10 MPa."""
     largest = max(abs(low), abs(high))
     shown, size = prefixed(unit, largest)
     if low == high or abs(low) < 0.01 * largest:
         return f"{quantity(low, unit, digits)} and {quantity(high, unit, digits)}"
-    apart = min(largest / 10 ** (digits - 1), abs(high - low)) / size
-    places = max(0, -math.floor(math.log10(apart) + 1e-9))
+    step = min(largest / 10 ** (digits - 1), abs(high - low)) / size
+    places = max(0, -math.floor(math.log10(step) + 1e-9))
     ends = [f"{end / size:.{places}f}" for end in (low, high)]
     while all("." in end and end[-1] in "0." for end in ends):
         ends = [end[:-1] for end in ends]
@@ -57,14 +57,14 @@ def per_cent(share: float, digits: int = 2) -> str:
 
 
 def stated_error(error: float, digits: int = 2) -> str:
-    """Return an estimated relative error in per cent; beyond 100 % it says no more than that it is not known."""
+    """Return an estimated relative error in per cent, or "unknown" above 100 %."""
     return per_cent(error, digits) if error <= 1.0 else "unknown"
 
 
 def with_error(value: float, error: float) -> str:
-    """Return a number and its error: two digits of the error, and the number as far as these: 0.01483 ± 0.00036.
+    """Return a number and its error with two digits of the error: 0.01483 ± 0.00036.
 
-    Four digits where no error is known; at most MOST_DIGITS where it is small.
+    The number has four digits if no error is known, and at most MOST_DIGITS.
     """
     if not 0.0 < error < math.inf:
         return f"{value:.4g}"
@@ -78,5 +78,5 @@ def with_error(value: float, error: float) -> str:
 
 
 def _exponent(value: float) -> int:
-    """Return the power of ten of the first of two digits."""
+    """Return the power of ten of the first digit, after rounding to two digits."""
     return int(f"{value:.1e}".partition("e")[2])

@@ -1,7 +1,7 @@
-"""Files that are kept for a user from one run to the next: compiled loops, transform plans.
+"""Directories for files that a user keeps between runs: compiled loops, transform plans.
 
-Both are handed to the machine as they are read, so they are kept only where nobody else can have put them: in a
-directory of this user with mode 0700, in the user's cache directory. Where there is no such place nothing is kept.
+These files are executed or trusted unread, so no other user may be able to write them: they are kept in a directory of
+mode 0700 in the user's cache directory, or not at all.
 """
 
 import os
@@ -13,7 +13,7 @@ OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def directory(name: str) -> Path | None:
-    """The directory `name` of this program in the user's cache directory, made if need be; None if it is not safe."""
+    """Return the program's directory `name` in the user's cache directory, made if missing; None if it is not safe."""
     with suppress(OSError, RuntimeError):
         home = Path.home()
         given = Path(os.environ.get("XDG_CACHE_HOME") or "")
@@ -27,7 +27,7 @@ def directory(name: str) -> Path | None:
 
 
 def _private(place: Path) -> bool:
-    """Whether a directory is this user's, nobody else may write to it, and nobody else can put another in its place."""
+    """Return True if the directory belongs to this user and no other user can write to it or replace it."""
     found = place.lstat()
     if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & OTHERS_WRITE:
         return False
@@ -39,9 +39,9 @@ def _private(place: Path) -> bool:
 
 
 def _keeps_its_entries(parent: Path) -> bool:
-    """Whether only root and this user can replace what lies in a directory.
+    """Return True if only root and this user can replace entries of a directory.
 
-    Also one that a group may write to if that is the user's own group, which by custom has the user's number.
+    A group may write to the directory if it is the user's private group, which has the same number as the user.
     """
     found, own = parent.stat(), os.geteuid()
     if found.st_uid not in (0, own):

@@ -1,4 +1,4 @@
-"""Progress of long work: a bar on a terminal, with how much is done and the time left; nothing elsewhere."""
+"""Progress bars with the time left, on terminals only."""
 
 import sys
 from collections.abc import Iterator, Sequence
@@ -8,7 +8,7 @@ T = TypeVar("T")
 
 
 class Bar:
-    """A bar below what is printed, if errors go to a terminal. It stands at once, before the first step is done."""
+    """A progress bar below the printed lines, if standard error is a terminal."""
 
     def __init__(self, total: int, what: str, unit: str = "step", wanted: bool = True) -> None:
         self._bar = None
@@ -18,12 +18,12 @@ class Bar:
             self._bar = tqdm(total=total, desc=what, unit=unit, leave=False)
 
     def step(self) -> None:
-        """One more is done."""
+        """Advance the bar by one."""
         if self._bar is not None:
             self._bar.update()
 
     def print(self, text: str) -> None:
-        """A line above the bar."""
+        """Print a line above the bar."""
         if self._bar is not None:
             self._bar.write(text, file=sys.stdout)
         else:
@@ -35,7 +35,7 @@ class Bar:
 
 
 def with_bar(items: Sequence[T], what: str, unit: str = "step") -> Iterator[T]:
-    """The items, with a bar that counts those that were dealt with."""
+    """Yield the items, with a bar that counts the finished ones."""
     bar = Bar(len(items), what, unit)
     try:
         for item in items:

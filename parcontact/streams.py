@@ -1,4 +1,4 @@
-"""Streams that take every text, whoever reads them: printing must not end the program."""
+"""Output streams that never fail: printing must not end the program."""
 
 import io
 import os
@@ -13,19 +13,19 @@ CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u20
 
 
 def printable(text: str) -> str:
-    """A text in which characters that would command a terminal, or turn its lines around, are spelt out."""
+    """Return the text with control characters and characters that reverse lines replaced by their codes."""
     return CONTROLS.sub(lambda found: f"\\u{ord(found[0]):04x}" if ord(found[0]) > 255 else repr(found[0])[1:-1], text)
 
 
 class TolerantStream(io.TextIOBase):
-    """A stream in front of another, which may be closed, full, or know fewer letters: then less is shown.
+    """A stream that writes to another one, and drops text if that is closed or full, or lacks characters.
 
-    `plain`: control characters are spelt out, but for tabs and ends of lines; a progress bar needs them.
+    `plain`: control characters except tabs and ends of lines are replaced; a progress bar needs them.
     """
 
     def __init__(self, stream: TextIO | None, plain: bool) -> None:
         self._stream, self._plain, self.gone = stream, plain, False
-        self.lost = "" if stream else "it is closed"  # why not all was written, but for a reader who has left
+        self.lost = "" if stream else "it is closed"  # why text was lost, except to a closed pipe
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -59,7 +59,7 @@ class TolerantStream(io.TextIOBase):
         return False
 
     def drop_the_rest(self) -> None:
-        """Drop what the stream still holds and cannot write, so that it does not fail when Python ends."""
+        """Drop unwritten text of a failed stream, so that Python does not fail when it ends."""
         self.flush()
         if self.gone and self._stream is not None:
             with suppress(OSError, ValueError):
@@ -70,7 +70,7 @@ class TolerantStream(io.TextIOBase):
 
 @contextmanager
 def tolerant_streams() -> Iterator[None]:
-    """Make standard output and standard error tolerant meanwhile."""
+    """Make standard output and standard error tolerant within the context."""
     before = sys.stdout, sys.stderr
     out, err = TolerantStream(before[0], True), TolerantStream(before[1], False)
     sys.stdout, sys.stderr = out, err
@@ -83,6 +83,6 @@ def tolerant_streams() -> Iterator[None]:
 
 
 def describe_loss() -> str:
-    """Return why what was printed could not be written; '' if it was, or if its reader has left before the end."""
+    """Return why printed text could not be written; '' if it was written, or if the reader closed the pipe."""
     sys.stdout.flush()
     return sys.stdout.lost if isinstance(sys.stdout, TolerantStream) else ""

@@ -41,7 +41,7 @@ def test_each_kind_has_a_sentence_and_each_sentence_a_kind() -> None:
 def test_numbers_in_sentences() -> None:
     """Shares in per cent, lengths with units, and how many times, also beyond all numbers."""
     contact = {"where": "step 3", "excess": 0.2031, "most": 0.15, "more": "128 points"}
-    assert "about 20 % too large (more than 15 % gets" in str(Doubt("cells", "", contact))
+    assert "about 20 % too large (limit: 15 %" in str(Doubt("cells", "", contact))
     text = str(Doubt("flat map", "surface", {"file": "a.npy", "lx": 1.23456e-3, "ly": 0.5, "span": 2.3456e-6}))
     assert text.startswith("surface: a.npy: the map is 1.235 mm x 500 mm, and its heights differ by 2.35 µm only")
     seam = {"axis": "x", "jump": 1e-6, "times": 3.14159, "tilt": 0.0}

@@ -1,1 +1,1 @@
-"""The command line: what its words mean, what each verb does, who speaks, and how the program ends."""
+"""The command line: arguments, verbs, and the ranks that print."""

@@ -14,21 +14,21 @@ from ..errors import InputError
 from . import ranks, values, verbs
 
 FIRST = """\
-a job is needed: a YAML file that says what is pressed on what. From a clone, jobs/slide.yaml is one to begin with:
+a job is needed: a YAML file that describes surface, material and loads. A clone has examples, such as jobs/slide.yaml:
 
-  parcontact check jobs/slide.yaml          list its mistakes, or all that it says with every default
-  mpirun -n 2 parcontact jobs/slide.yaml    run it on two cores, or go on with it
-  parcontact plot out/slide                 draw what came out, into out/slide/picture.png
-  parcontact report out/slide               write one HTML page of it, to send
+  parcontact check jobs/slide.yaml          list its mistakes, or all its keys with every default
+  mpirun -n 2 parcontact jobs/slide.yaml    run it on two cores, or continue it
+  parcontact plot out/slide                 draw the results, into out/slide/picture.png
+  parcontact report out/slide               write the results as one HTML page
   parcontact manual start                   read how to write a job of your own in five minutes
 
 parcontact --help lists all verbs, parcontact VERB --help the options of one, parcontact manual all pages"""
 CODES = """\
-exit codes: 0 as asked; 1 the run failed; 2 bad job or bad input, nothing was written; 3 stopped early with a good
+exit codes: 0 success; 1 the run failed; 2 bad job or bad input, nothing was written; 3 stopped early with a good
 checkpoint, run again"""
 
 
-Add = Callable[..., Any]  # argparse's add_argument of one verb
+Add = Callable[..., Any]  # the method add_argument of a verb's parser
 
 
 def _job(add: Add, text: str = "job file (YAML)", out: tuple[str, str] = ("DIR", "output directory")) -> None:
@@ -45,110 +45,111 @@ def _quiet(add: Add) -> None:
 
 def _run(add: Add) -> None:
     text = (
-        "go on from the newest good checkpoint if there is one (auto, the default), start afresh and replace what is "
-        "there (never), or go on from the checkpoint PATH"
+        "continue from the newest good checkpoint if there is one (auto, the default), start from the beginning and "
+        "replace the results (never), or continue from the checkpoint PATH"
     )
     add("--restart", metavar="auto|never|PATH", default="auto", help=text)
     text = (
-        "stop after the first step that reaches the time T [s] of the history; one that ends before goes on with its "
-        "last stage"
+        "stop after the first step that reaches the time T [s]; a history that ends earlier is continued with its last "
+        "stage"
     )
     add("--until", metavar="T", type=values.seconds, help=text)
-    text = "stop early, with a checkpoint, to end within this wall time"
+    text = "stop early with a checkpoint, so that the run ends within this wall time"
     add("--wall", metavar="HH:MM:SS", type=values.wall, help=text)
 
 
 def _steady(add: Add) -> None:
     for name, unit in (("velocities", "m/s"), ("pressures", "Pa")):
-        text = f"{name} [{unit}]: N from A to B, equally spaced in the logarithm, or a list A,B,..."
+        text = f"{name} [{unit}]: N values from A to B, equally spaced in the logarithm, or a list A,B,..."
         add(f"--{name}", metavar="A:B:N", type=values.spaced_numbers, default=(), help=text)
-    text = "temperatures [deg C], T,T,... (negative ones first: --temperatures=-20,0); the material needs a shift"
+    text = "temperatures [deg C], T,T,... (if the first is negative: --temperatures=-20,0); the material needs a shift"
     add("--temperatures", metavar="T,...", type=values.degrees, default=(), help=text)
-    text = "add the points that are missing (auto, the default), or start afresh and replace what is there (never)"
+    text = "add missing points (auto, the default), or start from the beginning and replace the results (never)"
     add("--restart", metavar="auto|never", choices=("auto", "never"), default="auto", help=text)
 
 
 def _plan(add: Add) -> None:
-    text = "numbers of ranks for which memory is counted, N,N,... (default: 1, those that plan, and the cores here)"
+    text = "numbers of ranks for which memory is estimated, N,N,... (default: 1, the ranks started, and all cores)"
     add("--ranks", metavar="N,...", type=values.counts, default=(), help=text)
-    add("--seconds", metavar="T", type=values.seconds, default=10.0, help="for how long the job is tried [s]")
+    add("--seconds", metavar="T", type=values.seconds, default=10.0, help="time for trial steps [s] (default: 10)")
 
 
 def _theory(add: Add) -> None:
-    text = "factor that corrects friction in partial contact, 0 to 1 (1: not at all; default: 0.45)"
+    text = "factor that corrects friction in partial contact, 0 to 1 (1: no correction; default: 0.45)"
     add("--gamma", metavar="G", type=values.share, default=0.45, help=text)
-    text = "waves of the job's spectrum (continuum, the default), or those of the surface in its box (lattice)"
+    text = "waves of the job's spectrum (continuum, the default), or waves of the surface in its box (lattice)"
     add("--waves", choices=("continuum", "lattice"), default="continuum", help=text)
 
 
 def _fit(add: Add) -> None:
-    add("table", type=Path, help="measured moduli: a table with the names and units of its columns")
+    add("table", type=Path, help="table of measured moduli, with names and units of its columns")
     add("--out", metavar="FILE", type=Path, help="material file (default: the table's name with .yaml)")
-    text = "temperature [deg C] at which relaxation times are given (default: the middle one of those measured)"
+    text = "temperature [deg C] of the relaxation times (default: the median of the measured temperatures)"
     add("--reference", metavar="T", type=float, help=text)
     text = (
-        "how times depend on temperature: wlf (default) or arrhenius with fitted constants, free factors, or given "
-        "ones: wlf:C1,C2 or arrhenius:J/mol or a file with the columns T[C] and log_aT, and perhaps log_bT"
+        "how relaxation times depend on temperature: wlf (default) or arrhenius with fitted constants; free (a factor "
+        "per temperature); or given: wlf:C1,C2, arrhenius:J/mol, or a file with columns T[C], log_aT and optionally "
+        "log_bT"
     )
     add("--shift", metavar="LAW", default="wlf", help=text)
     text = (
-        "how moduli depend on temperature: density (times temperature), free factors, none, or auto (default): the "
-        "density law, unless the sweeps fit better without"
+        "how moduli depend on temperature: density (density times temperature), free factors, none, or auto (default): "
+        "density, unless the sweeps fit better with none"
     )
     add("--vertical", choices=("auto", "density", "free", "none"), default="auto", help=text)
-    text = "largest relative error of both moduli that a small number of branches may add (default: 0.02)"
+    text = "limit on the relative error of both moduli by the number of branches (default: 0.02)"
     add("--error", metavar="E", type=values.positive, default=0.02, help=text)
-    text = "which moduli the fit meets, where storage and loss contradict each other (default: both)"
+    text = "moduli that the fit follows where storage and loss moduli contradict each other (default: both)"
     add("--weight", choices=("both", "storage", "loss"), default="both", help=text)
     add("--poisson", metavar="NU", type=values.poisson, default=0.5, help="Poisson's ratio (default: 0.5)")
-    add("--job", metavar="JOB", help="a job whose frequencies are shaded in the picture")
+    add("--job", metavar="JOB", help="job whose frequencies are shaded in the picture")
 
 
 def _surface(add: Add) -> None:
-    text = "job file (YAML), or a measured map; of one without unit: --set surface.unit=um ..."
-    _job(add, text, ("FILE", "the picture: .png, .pdf or .svg"))
-    add("--job", dest="start", metavar="FILE", type=Path, help="write a job to start from (of a map)")
+    text = "job file (YAML), or a measured map; a map without unit needs --set surface.unit=um ..."
+    _job(add, text, ("FILE", "picture: .png, .pdf or .svg"))
+    add("--job", dest="start", metavar="FILE", type=Path, help="write a job for the measured map to this file")
 
 
 def _plot(add: Add) -> None:
     add("directories", metavar="OUT", nargs="+", type=Path, help="output directory of a run or curve")
-    add("--format", choices=("png", "pdf", "svg"), default="", help="default: that of --out, else png")
+    add("--format", choices=("png", "pdf", "svg"), default="", help="format (default: by the name of --out, else png)")
     names = "friction,area,approach,gap,pressure,load,energy,leakage,steady,maps"
-    text = f"which panels, in this order: {names} (default: all)"
+    text = f"panels, in this order: {names} (default: all)"
     add("--panels", metavar="NAME,...", type=values.comma_names, default=(), help=text)
-    text = "what is along the x axis (default: as the job suggests)"
+    text = "quantity on the x axis (default: chosen by the job)"
     add("--over", choices=("time", "distance", "velocity", "load", "approach"), default="", help=text)
     add("--log", metavar="x,y", type=values.comma_names, default=(), help="logarithmic axes: x, y, x,y or none")
-    add("--compare", action="store_true", help="several directories in one picture, comparison.png")
+    add("--compare", action="store_true", help="draw several directories in one picture, comparison.png")
     text = (
-        "a movie of this map over its saved instants instead: pressure, displacement, gap or height; a GIF, and an MP4"
+        "draw a movie of this map instead: pressure, displacement, gap or height; a GIF, and an MP4 if ffmpeg is "
+        "installed"
     )
-    text += " where ffmpeg is"
     add("--movie", metavar="FIELD", default="", help=text)
-    text = "draw the maps saved after this step (a whole number), or nearest to this time [s]; default: the last ones"
+    text = "draw the maps saved after this step (a whole number) or nearest to this time [s] (default: the last ones)"
     add("--at", metavar="TIME|STEP", type=values.instant, help=text)
-    add("--out", metavar="FILE", type=Path, help="the picture (default: picture.png in the directory)")
+    add("--out", metavar="FILE", type=Path, help="picture (default: picture.png in the directory)")
 
 
 def _info(add: Add) -> None:
-    add("file", type=Path, nargs="+", help="a file, or the output directory of a run")
+    add("file", type=Path, nargs="+", help="file or output directory of a run")
 
 
 def _leak(add: Add) -> None:
-    add("directories", metavar="OUT", nargs="+", type=Path, help="output directory of a run that has saved its gaps")
-    text = "only the gap after this step (a whole number), or nearest to this time, as 2.5 [s] (default: all)"
+    add("directories", metavar="OUT", nargs="+", type=Path, help="output directory of a run with saved gaps")
+    text = "only the gap after this step (a whole number) or nearest to this time [s], such as 2.5 (default: all)"
     add("--at", metavar="TIME|STEP", type=values.instant, help=text)
-    text = "what is along the x axis (default: pressure, or time if the pressure stays)"
+    text = "quantity on the x axis (default: pressure, or time if the pressure is constant)"
     add("--over", choices=("pressure", "time"), default="", help=text)
-    text = "a fluid, by its name (water, air, nitrogen, helium) or viscosity [Pa s]: adds its flow to the table"
+    text = "fluid whose flow is added to the table: water, air, nitrogen, helium, or a viscosity [Pa s]"
     add("--fluid", metavar="FLUID", type=values.fluid, help=text)
-    text = "pressures of the fluid at both ends [Pa], absolute ones of a gas"
+    text = "pressures of the fluid at both ends [Pa]; absolute pressures for a gas"
     add("--pressures", metavar="HIGH:LOW", type=values.pressure_drop, help=text)
 
 
 def _report(add: Add) -> None:
-    add("directories", metavar="OUT", nargs="+", type=Path, help="an output directory")
-    add("--out", metavar="FILE", type=Path, help="default: report.html in the first directory")
+    add("directories", metavar="OUT", nargs="+", type=Path, help="output directory")
+    add("--out", metavar="FILE", type=Path, help="report (default: report.html in the first directory)")
 
 
 def _doctor(add: Add) -> None:
@@ -156,14 +157,14 @@ def _doctor(add: Add) -> None:
 
 
 def _manual(add: Add) -> None:
-    add("page", nargs="?", default="", help="the name of a page (default: list them)")
+    add("page", nargs="?", default="", help="name of a page (default: list all pages)")
 
 
 def _cite(add: Add) -> None:
     add("directory", metavar="OUT", type=Path, help="output directory of a run or curve")
 
 
-VERBS: dict[Callable[[argparse.Namespace], int], tuple[Callable[[Add], None], ...]] = {  # and their arguments
+VERBS: dict[Callable[[argparse.Namespace], int], tuple[Callable[[Add], None], ...]] = {  # verb: groups of arguments
     verbs.run: (_job, _run, _quiet),
     verbs.steady: (_job, _steady, _quiet),
     verbs.check: (_job,),
@@ -186,7 +187,7 @@ NAMES = tuple(verb.__name__ for verb in VERBS)
 
 
 def parse_arguments(words: Sequence[str]) -> argparse.Namespace:
-    """The options of a command line; `act` is its verb. Raises InputError or SystemExit for what cannot be meant."""
+    """Return the options of a command line; `act` is its verb. Raises InputError or SystemExit for mistakes."""
     if not words:
         raise InputError(FIRST)
     first, *rest = words
@@ -207,7 +208,7 @@ def without_restart(words: Sequence[str]) -> list[str]:
 
 
 def _refuse_misspelt(word: str) -> None:
-    """Raise InputError for a word that is no file, does not look like a job and is close to a verb."""
+    """Raise InputError for a word that resembles a verb and neither is nor looks like a file."""
     path = Path(word)
     close = difflib.get_close_matches(word.lower(), (*NAMES, "help"), n=1)
     if close and not path.suffix and path.name == word and not path.exists():
@@ -215,17 +216,17 @@ def _refuse_misspelt(word: str) -> None:
 
 
 class _PrintCompletion(argparse.Action):
-    """Prints what a shell needs to complete verbs, options and files, and ends the program."""
+    """Prints a shell's completion script, and ends the program."""
 
     def __call__(self, parser: argparse.ArgumentParser, namespace: Any, shell: Any, option: str | None = None) -> None:
-        import shtab  # for this alone
+        import shtab  # used here only
 
         print(shtab.complete(parser, shell=shell))
         parser.exit()
 
 
 class _Parser(argparse.ArgumentParser):
-    """Speaks on root only, and ends the other ranks well unless MPI ends them together."""
+    """Prints on root only; other ranks exit with code 0 unless MPI has started."""
 
     def _print_message(self, message: str, file: Any = None) -> None:
         if ranks.is_root():
@@ -236,15 +237,15 @@ class _Parser(argparse.ArgumentParser):
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The parser of the whole command line."""
+    """Return the parser of the whole command line."""
     parser = _Parser(
         prog="parcontact",
         description="Transient contact of a rough rigid surface on a viscoelastic half space.",
-        epilog=f"A first argument that is no verb is a job: mpirun -n 2 parcontact job.yaml\n\n{CODES}",
+        epilog=f"Without a verb, a job is run: mpirun -n 2 parcontact job.yaml\n\n{CODES}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"parcontact {__version__}")
-    text = "print what the shell needs to complete verbs and options (see parcontact manual install)"
+    text = "print a script that completes verbs and options in the shell (see parcontact manual install)"
     parser.add_argument(COMPLETION, choices=("bash", "zsh", "tcsh"), action=_PrintCompletion, help=text)
     found = parser.add_subparsers(dest="verb", required=True, metavar="verb")
     for verb in VERBS:

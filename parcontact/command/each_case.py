@@ -1,4 +1,4 @@
-"""The job, or the cases of the job, that a command line is about, and doing something with each."""
+"""Apply a verb to the job, or to the chosen cases of its sweep."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ OF_A_CURVE = ("velocities", "pressures", "temperatures")
 
 
 def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs: bool = True) -> int:
-    """Do something with a job, or with all cases of its sweep, or with the one that is asked for; collective.
+    """Apply `act` to a job, to all cases of its sweep, or to the case that is asked for; collective.
 
-    Only beginning and end are printed of cases that are done side by side.
+    Cases that run at the same time print only their beginning and end.
     """
     from ..parallel.slab import Slab
     from ..storage.console import always
@@ -39,33 +39,33 @@ def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs:
     from ..run import sweep, sweep_warnings, watch
 
     on_root(world, lambda: sweep.refuse_foreign_sweep(cases))
-    told = on_root(world, lambda: sweep_warnings.warn_once(chosen)) if runs and len(chosen) > 1 else ()
+    shown = on_root(world, lambda: sweep_warnings.warn_once(chosen)) if runs and len(chosen) > 1 else ()
     afresh = getattr(options, "restart", "") == "never" or not runs
     groups = Groups(world, on_root(world, lambda: count_side_by_side(sweep.to_do(chosen, afresh), world.size)))
     limit = watch.limit(getattr(options, "wall", None))
     own = argparse.Namespace(**vars(options))
     stop = on_root(world, lambda: sweep.stop_file(cases))
     own.quiet, own.sweep_stop_file = options.quiet or groups.count > 1, stop
-    whole = sweep.SweepRun(cases, groups, partial(act, own), stop, options.quiet, limit, told, runs)
+    whole = sweep.SweepRun(cases, groups, partial(act, own), stop, options.quiet, limit, shown, runs)
     return whole.run(chosen)
 
 
 def cases_of(options: argparse.Namespace) -> tuple[Sequence[Case], Sequence[Case]]:
-    """All cases of a job, and those that the command line is about."""
+    """Return all cases of a job, and the cases that the command line selects."""
     from .. import job as jobs
     from .. import mesh
 
     cases = mesh.load_cases(options.job, job_overrides(options))
     if getattr(options, "until", None) is not None and not cases[0].job.history:
-        raise InputError("--until: a friction curve has no time to go on to; leave it out")
+        raise InputError("--until: a friction curve has no time; leave it out")
     return cases, jobs.select_cases(cases, options.case)
 
 
 def job_overrides(options: argparse.Namespace) -> list[str]:
-    """Return the changes that the command line makes to a job.
+    """Return the changes of the job by the command line, as texts KEY=VALUE.
 
-    The name of a directory is taken as it is, whatever YAML would read. Velocities, pressures and temperatures of a
-    friction curve are keys of the job, which then needs no history.
+    The name of a directory is escaped, so that YAML reads it as text. Velocities, pressures and temperatures of a
+    friction curve become keys of the job.
     """
     name = "".join(f"\\U{ord(letter):08x}" for letter in options.out or "")
     asked = {key: getattr(options, key, ()) for key in OF_A_CURVE}

@@ -1,4 +1,4 @@
-"""A measured map without a job: as a job to look at, and one to start from."""
+"""Jobs made from a measured map: one to describe it, and one for the user to start from."""
 
 import math
 import os
@@ -14,23 +14,23 @@ from ..job.sections.listing import plain_data
 from ..job.text import yamltext
 from ..storage import files, hdf5
 
-JOBS = (".yaml", ".yml", ".json", "")  # how names of jobs end: others are those of measured maps
-MANY_POINTS = 2**20  # tuning: of a job to start from, at most
-UNSAID = ("give unit", "give size")  # in messages about maps that do not say all
-OF_POSITIONS = "units: {xy: UNIT"  # in those about maps that say their size, but not in which unit
+JOBS = (".yaml", ".yml", ".json", "")  # suffixes of jobs; files with other suffixes are measured maps
+MANY_POINTS = 2**20  # tuning: largest number of points in a job to start from
+UNSAID = ("give unit", "give size")  # parts of messages about maps without unit or size
+OF_POSITIONS = "units: {xy: UNIT"  # part of messages about maps that give their size without its unit
 HOW = "on the command line: --set surface.unit=um"
 HOW_SIZE = f"{HOW} --set surface.size=[1e-3,1e-3]"
-ACCURACIES = (0.01, 0.02, 0.05, 0.1, 0.2)  # tuning: of a job to start from, the first that its points keep
+ACCURACIES = (0.01, 0.02, 0.05, 0.1, 0.2)  # tuning: a job to start from gets the first that its points can keep
 LOAD = {"pressure": 1.0e5}
 
 
 def is_map(path: Path) -> bool:
-    """Tell whether a name is that of a measured map, not of a job."""
+    """Return True if the path names a measured map, not a job."""
     return path.suffix.lower() not in JOBS
 
 
 def load_map(path: Path, overrides: Sequence[str]) -> Job:
-    """The job of a whole map on its own points, with some keys changed. Raises InputError."""
+    """Return a job of a whole map on its own points, with the overrides. Raises InputError."""
     try:
         return mesh.load(_job_of(str(path)), overrides)
     except InputError as error:
@@ -40,13 +40,13 @@ def load_map(path: Path, overrides: Sequence[str]) -> Job:
 
 
 def refuse_taken(target: Path | None) -> None:
-    """Raise InputError where there is a file of the name of a job to start from already."""
+    """Raise InputError if the file of the job to start from exists."""
     if target is not None and os.path.lexists(target):
-        raise InputError(f"--job: {target} is there already; give another name")
+        raise InputError(f"--job: {target} already exists; give another name")
 
 
 def start_job(job: Job, path: Path, target: Path | None) -> Iterator[str]:
-    """Write a job to start from to a file, or say it; maps of very many points are thinned out. Raises InputError."""
+    """Write a job to start from to `target`, or yield its text, with at most MANY_POINTS points. Raises InputError."""
     directory, grid = (target or Path("job.yaml")).absolute().parent, job.grid
     found = _job_of(os.path.relpath(path, directory))
     found["surface"] |= {key: value for key, value in plain_data(job.surface[0]).items() if key != "path"}
@@ -57,7 +57,7 @@ def start_job(job: Job, path: Path, target: Path | None) -> Iterator[str]:
     accuracy, why = _accuracy(job, found | {"surface": found["surface"] | {"path": str(path)}})
     text = yamltext.dump(found | {"numerics": {"accuracy": accuracy}}).rstrip() + f"{why}\n"
     if target is None:
-        yield f"\na job to start from, which --job FILE writes:\n\n{text.rstrip()}"
+        yield f"\na job to start from (--job FILE writes it to a file):\n\n{text.rstrip()}"
         return
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -68,17 +68,17 @@ def start_job(job: Job, path: Path, target: Path | None) -> Iterator[str]:
 
 
 def _accuracy(job: Job, data: dict[str, Any]) -> tuple[Any, str]:
-    """Return the accuracy of the command line, or one that the points of the job to start from, `data`, keep with a
-    comment that says so."""
+    """Return the accuracy of `job` if given, else the accuracy that the points of the job `data` can keep, and a
+    comment."""
     accuracy = job.numerics.accuracy
     if "accuracy" in job.numerics.model_fields_set:
         return accuracy, ""
     try:
         whole = mesh.load(data)
         kept = [a for a in ACCURACIES if all(map(le, mesh.points_for(whole, a), whole.grid.points))]
-    except InputError:  # nothing is known before of heights without a shortest wave
+    except InputError:  # heights without a shortest wave
         return accuracy, ""
-    return (kept[0], "  # what these points keep, by a guess") if kept else (accuracy, "  # needs more points")
+    return (kept[0], "  # estimate for these points") if kept else (accuracy, "  # needs more points")
 
 
 def _job_of(path: str) -> dict[str, Any]:

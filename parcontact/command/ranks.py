@@ -1,7 +1,7 @@
-"""The ranks of this program, which a launcher may have started: which is root, and MPI for verbs that need it.
+"""The ranks of this program: which one is root, and the start of MPI for verbs that need it.
 
-Who is root is known from the environment before MPI has started, so that what needs no MPI answers at once. Where MPI
-has not started, the other ranks say nothing and end well: the exit code of root is that of all.
+Root is known from the launcher's environment variables, so verbs without MPI start at once; the other ranks then print
+nothing and exit with code 0.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 
     Verb = Callable[[argparse.Namespace], int]
 
-BLANK = " \0"  # what may follow the name of an MPI library
-LEAST_FILES, LEAST_MEMORY = 32, 520e6  # tuning: open files and bytes without which MPI does not start
-RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")  # say which rank a process is
-LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # how many were started
+BLANK = " \0"  # characters that may follow the name of an MPI library
+LEAST_FILES, LEAST_MEMORY = 32, 520e6  # tuning: open files, and memory [bytes], that MPI needs to start
+RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")  # variables that hold the rank
+LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # ... number of ranks
 
 
 def is_root() -> bool:
-    """Tell whether this is the rank that prints."""
+    """Return True on the rank that prints."""
     return rank() == 0
 
 
 def rank() -> int:
-    """The rank of this process, by MPI if that has started, else by the launcher."""
+    """Return the rank of this process, by MPI if it has started, else by the launcher."""
     if (world := started()) is not None:
         return world.rank
     return next((int(text) for name in RANKS if (text := os.environ.get(name, "")).isdecimal()), 0)
@@ -52,28 +52,28 @@ def launched() -> int:
 
 
 def started() -> MPI.Intracomm | None:
-    """All ranks, if MPI has started."""
+    """Return the communicator of all ranks if MPI has started, else None."""
     module = sys.modules.get("mpi4py.MPI")
     return None if module is None else module.COMM_WORLD
 
 
 def start_ranks() -> MPI.Intracomm:
-    """All ranks; starts MPI. Raises InputError where that must fail, and for a rank that is alone but should not be."""
+    """Start MPI, and return the communicator of all ranks. Raises InputError if the launcher belongs to another MPI."""
     _refuse_surroundings()
     from ..parallel.mpi import MPI
 
     world, count = MPI.COMM_WORLD, launched()
     if world.size == 1 and count > 1:
         raise InputError(
-            f"{count} ranks were started but each finds itself alone: the launcher belongs to another MPI than "
-            f"mpi4py ({MPI.Get_library_version().splitlines()[0].strip(BLANK)}). Use the mpirun beside this parcontact "
-            "(see parcontact manual install)."
+            f"{count} ranks were started but each is alone: the launcher belongs to another MPI than mpi4py "
+            f"({MPI.Get_library_version().splitlines()[0].strip(BLANK)}). Use the mpirun in the directory of this "
+            "parcontact (see parcontact manual install)."
         )
     return world
 
 
 def _refuse_surroundings() -> None:
-    """Raise InputError for limits and settings of the shell under which MPI ends without a sentence."""
+    """Raise InputError for limits and settings of the shell that would make MPI abort without a message."""
     files, memory = (resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_NOFILE, resource.RLIMIT_AS))
     if 0 <= files < LEAST_FILES:
         raise InputError(f"only {files} files may be open: set a limit of {LEAST_FILES} or more, by ulimit -n")
@@ -82,7 +82,7 @@ def _refuse_surroundings() -> None:
             os.makedirs(scratch, exist_ok=True)  # as MPI does
         except OSError as error:
             text = (
-                f"TMPDIR is {scratch}, which cannot be made ({error.strerror}): name a directory in which you may write"
+                f"TMPDIR is {scratch}, which cannot be created ({error.strerror}): give a directory that you may write"
             )
             raise InputError(text) from None
     if 0 <= memory < LEAST_MEMORY:
@@ -90,7 +90,7 @@ def _refuse_surroundings() -> None:
 
 
 def root_alone(verb: Verb) -> Verb:
-    """A verb that root does alone: without MPI where there is one rank; several start it, as what root imports may."""
+    """Return a verb that only root executes; MPI starts if there are several ranks, as imports on root may start it."""
 
     @wraps(verb)
     def act(options: argparse.Namespace) -> int:

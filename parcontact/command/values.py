@@ -1,4 +1,4 @@
-"""Values of options: text -> value, or an argparse.ArgumentTypeError that says what is expected."""
+"""Conversion of the text of an option to its value; raises argparse.ArgumentTypeError with what was expected."""
 
 import argparse
 from collections.abc import Callable
@@ -10,7 +10,7 @@ INFINITE = float("inf")
 
 
 def checked(convert: Callable[[str], T], accepts: Callable[[T], bool], expected: str) -> Callable[[str], T]:
-    """Make a function that converts a text and refuses what is not as expected."""
+    """Return a function that converts a text, and raises ArgumentTypeError unless `accepts` the value."""
 
     def value_of(text: str) -> T:
         try:
@@ -29,7 +29,7 @@ def _floats(text: str) -> tuple[float, ...]:
 
 
 def wall_seconds(text: str) -> float:
-    """Seconds of [[HH:]MM:]SS, or with days in front as in Slurm, D-HH:MM:SS; 0 for other text."""
+    """Return the seconds in a text [[HH:]MM:]SS or D-HH:MM:SS; 0 for other texts."""
     days, dash, rest = text.rpartition("-")
     fields = rest.split(":")
     try:
@@ -54,7 +54,7 @@ degrees = checked(_floats, bool, "a list of temperatures [deg C]")
 
 
 def instant(text: str) -> str:
-    """A step, as digits, or a time as the text of a number."""
+    """Return the text of a step (digits) or of a time [s]."""
     checked(float, lambda value: 0.0 <= value < INFINITE, "a step, as a whole number, or a time [s]")(text)
     return text.strip()
 
@@ -62,7 +62,7 @@ def instant(text: str) -> str:
 def output_directory(text: str) -> str:
     if not text:
         raise argparse.ArgumentTypeError("must name a directory, got ''")
-    return str(Path.cwd() / text) if text.startswith("~") else text  # a shell has said all there is to say of homes
+    return str(Path.cwd() / text) if text.startswith("~") else text  # the shell has expanded home directories
 
 
 def comma_names(text: str) -> tuple[str, ...]:
@@ -70,7 +70,7 @@ def comma_names(text: str) -> tuple[str, ...]:
 
 
 def spaced_numbers(text: str) -> tuple[float, ...]:
-    """Numbers equally spaced in their logarithm, `first:last:count`, or a list `a,b,c`."""
+    """Return numbers equally spaced in the logarithm, from `first:last:count`, or from a list `a,b,c`."""
     try:
         return _spaced(text) if ":" in text else _floats(text)
     except ValueError:
@@ -82,7 +82,7 @@ def _spaced(text: str) -> tuple[float, ...]:
 
     first, last, number = text.split(":")
     if min(float(first), float(last)) <= 0.0:
-        reason = "is spaced equally in the logarithm, so it must begin and end above 0"
+        reason = "is equally spaced in the logarithm; first and last must be above 0"
         raise argparse.ArgumentTypeError(f"a range first:last:count {reason}, got {text!r}")
     if int(number) < 2 and first != last:
         raise argparse.ArgumentTypeError(f"a range first:last:count must have a count of 2 or more, got {text!r}")
@@ -90,7 +90,7 @@ def _spaced(text: str) -> tuple[float, ...]:
 
 
 def fluid(text: str) -> Any:
-    """A fluid of a name, or of a viscosity [Pa s]."""
+    """Return the fluid with a name, or with a viscosity [Pa s]."""
     from ..leakage.fluids import FLUIDS, Fluid
 
     if text in FLUIDS:
@@ -100,7 +100,7 @@ def fluid(text: str) -> Any:
 
 
 def pressure_drop(text: str) -> tuple[float, float]:
-    """Two pressures [Pa], the higher one first."""
+    """Return two pressures [Pa] from HIGH:LOW."""
     try:
         high, low = map(float, text.split(":"))
     except ValueError:

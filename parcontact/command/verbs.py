@@ -1,4 +1,4 @@
-"""Verbs of the command line: options -> exit code. Each imports what it needs when it runs: all begin at once."""
+"""Verbs of the command line, from options to exit code. Each imports its modules when it runs, to start quickly."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from ..parallel.slab import Slab
     from .each_case import Shows
 
-DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes; the runner has another one: stopped early, run again
+DONE, FAILED, BAD_INPUT = 0, 1, 2  # exit codes; the runner has a fourth: stopped early, run again
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run a job, or go on with it (the default verb)."""
+    """Run a job, or continue it (the default verb)."""
     return each_case(options, ranks.start_ranks(), _run)
 
 
@@ -32,13 +32,13 @@ def _run(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int
 
     if not job.history:
         return _curve(options, job, slab, shows)
-    sweep_stop_file = getattr(options, "sweep_stop_file", None)  # of a sweep
+    sweep_stop_file = getattr(options, "sweep_stop_file", None)
     chosen = (options.quiet, options.restart, options.until, options.wall)
     return runner.run_job(job, slab, Options(*chosen, sweep_stop_file=sweep_stop_file, shows=shows))
 
 
 def steady(options: argparse.Namespace) -> int:
-    """Solve steady sliding directly: a friction curve."""
+    """Calculate a friction curve: steady sliding, solved directly."""
     return each_case(options, ranks.start_ranks(), _curve)
 
 
@@ -50,7 +50,7 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
     asked = [getattr(options, name, ()) for name in OF_A_CURVE]
     wanted = curve.request(job, *asked)
     if options.restart not in ("auto", "never"):
-        raise InputError(f"--restart: a friction curve goes on (auto) or starts afresh (never), got {options.restart}")
+        raise InputError(f"--restart: auto or never was expected for a friction curve, got {options.restart}")
     sweep_stop_file = getattr(options, "sweep_stop_file", None)
     code = curve.run_curve(job, slab, wanted, options.quiet, options.restart, shows, sweep_stop_file, make_states)
     if code == DONE and prediction.has_spectrum(job):
@@ -60,7 +60,7 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
 
 @ranks.root_alone
 def check(options: argparse.Namespace) -> int:
-    """List all mistakes of a job, or what it says with every default."""
+    """List all mistakes of a job, or all its keys with every default."""
     from .. import job as jobs
     from ..history.chosen import describe_steps
     from ..run.sweep_warnings import sentences_of
@@ -77,14 +77,14 @@ def check(options: argparse.Namespace) -> int:
     for warning in doubts:
         print(f"warning: {warning}")
     if cases[0].settings:
-        print("\nsweep; the above is its first case" if len(chosen) > 1 else "\nsweep")
+        print("\nsweep; its first case is shown above" if len(chosen) > 1 else "\nsweep")
         print("\n".join(map(str, chosen)))
     return DONE
 
 
 def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
-    """Return the doubts about a job, also those that only a look at heights and measured moduli raises; append what the
-    look shows of measured maps and spectra to `notes`."""
+    """Return the warnings about a job, its heights and its measured moduli; append a list of remarks on measured maps
+    and spectra to `notes`."""
     notes.append([])
     degrees = (job.steady.temperatures if job.steady else None) or ()
     if job.bands is not None:
@@ -108,7 +108,7 @@ def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
 
 
 def plan(options: argparse.Namespace) -> int:
-    """Say what a job will do, and what it costs; writes nothing."""
+    """Estimate the steps, time, memory and disk of a job; writes nothing."""
     from ..run import watch
 
     started = watch.age()
@@ -138,21 +138,21 @@ def plan(options: argparse.Namespace) -> int:
 
 
 def theory(options: argparse.Namespace) -> int:
-    """Predict friction and area by Persson's theory, into theory.csv."""
+    """Predict friction and contact area by Persson's theory, into theory.csv."""
     return each_case(options, ranks.start_ranks(), _predict, runs=False)
 
 
 def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
     from ..derived import prediction
 
-    told = on_root(slab.comm, lambda: prediction.foretell(job, options.gamma, options.waves))
+    lines = on_root(slab.comm, lambda: prediction.foretell(job, options.gamma, options.waves))
     if slab.root and not options.quiet:
-        print(*told, sep="\n", flush=True)
+        print(*lines, sep="\n", flush=True)
     return DONE
 
 
 def _on_one_grid(job: Job) -> Job:
-    """Return a job with one grid for all of its waves."""
+    """Return a job in bands as a job with one grid for all its waves."""
     if job.bands is None:
         return job
     from ..bands.choice import cut_bands, on_one_grid_of_all
@@ -162,7 +162,7 @@ def _on_one_grid(job: Job) -> Job:
 
 @ranks.root_alone
 def fit(options: argparse.Namespace) -> int:
-    """Fit a compound to measured moduli: a material file and a picture."""
+    """Fit a material to measured moduli; write a material file and a picture."""
     from .. import mesh
     from ..plotting import compound_files as files
     from ..rubber import compound
@@ -181,7 +181,7 @@ def fit(options: argparse.Namespace) -> int:
 
 
 def study(options: argparse.Namespace) -> int:
-    """Run a job on finer and finer settings: what accuracy costs; goes on after a stop."""
+    """Run a job on finer and finer meshes and steps, for error against cost; continues after a stop."""
     world = ranks.start_ranks()
     from ..parallel.slab import Slab
     from ..study import study as whole_study
@@ -195,7 +195,7 @@ def study(options: argparse.Namespace) -> int:
 
 @ranks.root_alone
 def surface(options: argparse.Namespace) -> int:
-    """Say what the surface of a job, or a measured map, is like; draw it."""
+    """Describe and draw the surface of a job, or a measured map."""
     from pathlib import Path
 
     from ..derived.surface_summary import describe_surface
@@ -214,15 +214,15 @@ def surface(options: argparse.Namespace) -> int:
     doubts = [doubt for doubt in job.doubts if doubt.place.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)
     heights = base.surface.heights((0.0, 0.0), base.slab.empty())
-    told = describe_surface(job, heights, base.remarks.notes, base.shortest, picture)
+    lines = describe_surface(job, heights, base.remarks.notes, base.shortest, picture)
     started = measured_maps.start_job(job, given, options.start) if alone else ()
-    print("\n".join([*told, *(f"warning: {doubt}" for doubt in doubts), *started]))
+    print("\n".join([*lines, *(f"warning: {doubt}" for doubt in doubts), *started]))
     return DONE
 
 
 @ranks.root_alone
 def info(options: argparse.Namespace) -> int:
-    """Describe checkpoints, files of fields and output directories, and check that they are sound."""
+    """Describe checkpoints, field files and output directories, and check them for damage."""
     from ..summary import info as about
 
     text, sound = about.describe_all(options.file)
@@ -232,7 +232,7 @@ def info(options: argparse.Namespace) -> int:
 
 @ranks.root_alone
 def plot(options: argparse.Namespace) -> int:
-    """Draw pictures of runs and friction curves, compare them, make a movie."""
+    """Draw runs and friction curves, compare several, or make a movie."""
     from ..plotting import plots
 
     names = ("format", "panels", "over", "log", "compare", "movie", "at", "out")
@@ -243,7 +243,7 @@ def plot(options: argparse.Namespace) -> int:
 
 
 def leak(options: argparse.Namespace) -> int:
-    """Calculate what leaks through the gaps of a run, into leak.csv; draw it."""
+    """Calculate the leakage through the gaps of a run, into leak.csv; draw it."""
     world = ranks.start_ranks()
     from ..derived.leakage_over_time import write_leakage
     from ..leakage.fluids import PressureDrop
@@ -252,14 +252,14 @@ def leak(options: argparse.Namespace) -> int:
         raise InputError("--fluid and --pressures HIGH:LOW [Pa] go together: give both, or none")
     drop = PressureDrop(options.fluid, *options.pressures) if options.fluid else None
     for directory in options.directories:
-        said = write_leakage(directory, options.at or "", options.over, world, drop)
-        print(*said, sep="\n", end="\n" if world.rank == 0 else "")
+        lines = write_leakage(directory, options.at or "", options.over, world, drop)
+        print(*lines, sep="\n", end="\n" if world.rank == 0 else "")
     return DONE
 
 
 @ranks.root_alone
 def report(options: argparse.Namespace) -> int:
-    """Write one HTML file to send: what was asked, results, data, origin."""
+    """Write one HTML file with job, results, data and versions."""
     from ..report import page
 
     print(f"report: {page.write_report(options.directories, options.out)}")
@@ -267,7 +267,7 @@ def report(options: argparse.Namespace) -> int:
 
 
 def doctor(options: argparse.Namespace) -> int:
-    """Check this installation: exact cases, ranks, files and times."""
+    """Check this installation: exact solutions, ranks, files and times."""
     world = ranks.start_ranks()
     from pathlib import Path
 
@@ -275,24 +275,24 @@ def doctor(options: argparse.Namespace) -> int:
     from ..doctor.bench import Bench
     from ..doctor.installation_checks import CHECKS, markdown, run_check
 
-    def tell(text: str) -> None:
+    def show(text: str) -> None:
         if world.rank == 0:
             print(text, flush=True)
 
     for line in machine.describe_machine(world, Path.cwd()):
-        tell(line)
+        show(line)
     results = [(check, run_check(check, Bench(world, options.precision))) for check in CHECKS]
-    tell("\n" + markdown(results))
-    tell("\n" + machine.prepare_loops(world))
+    show("\n" + markdown(results))
+    show("\n" + machine.prepare_loops(world))
     wrong = [f"{check.name}: {text}" for check, bench in results for text in bench.wrong]
     wrong += filter(None, [machine.find_broken_files(world, Path.cwd())])
-    tell("\n".join(wrong) or "all is well")
+    show("\n".join(wrong) or "all is well")
     return FAILED if wrong else DONE
 
 
 @ranks.root_alone
 def manual(options: argparse.Namespace) -> int:
-    """Print a page of the manual, or say which there are."""
+    """Print a page of the manual, or list all pages."""
     import shutil
 
     from ..manual import texts
@@ -315,14 +315,14 @@ def schema(options: argparse.Namespace) -> int:
 
     unknown = (f"{added_sections.whose(name)} {reason}" for name, reason in job_schema.without_schema().items())
     for text in (*added_sections.unusable(), *unknown):
-        print(f"warning: {text}; the schema is without it", file=sys.stderr)
+        print(f"warning: {text}; the schema does not include it", file=sys.stderr)
     print(json.dumps(job_schema.json_schema(), indent=1))
     return DONE
 
 
 @ranks.root_alone
 def cite(options: argparse.Namespace) -> int:
-    """Say what to cite for a run."""
+    """List the publications to cite for a run."""
     from ..summary import citations
 
     print(citations.describe_citations(options.directory))
@@ -330,7 +330,7 @@ def cite(options: argparse.Namespace) -> int:
 
 
 def _load(options: argparse.Namespace, changes: Sequence[str] = ()) -> Job:
-    """The job that the command line is about, with some more changes."""
+    """Return the job of the command line, with further changes."""
     from .. import mesh
 
     return mesh.load(options.job, [*job_overrides(options), *changes], options.case)

@@ -1,1 +1,1 @@
-"""Checks of an installation: exact answers, ranks, files, and times."""
+"""Checks of an installation: exact solutions, ranks, files, and times."""

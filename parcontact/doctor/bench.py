@@ -1,4 +1,4 @@
-"""A bench for checks: it marches small jobs and notes what came out beside what should."""
+"""A bench for checks: it runs small jobs and compares results with exact values."""
 
 import math
 from collections.abc import Callable
@@ -24,7 +24,7 @@ Watch = Callable[[March], None]
 
 @dataclass(frozen=True)
 class Finding:
-    """One number that came out, what it should be, and how far off it may be (absolute)."""
+    """A result, its exact value, and the allowed absolute error."""
 
     what: str
     found: float
@@ -33,7 +33,7 @@ class Finding:
 
     @property
     def share(self) -> float:
-        """The error over what is allowed: at most 1 if all is well; infinite for what is not a number."""
+        """Return the error over the allowed error; infinite for NaN."""
         error = abs(self.found - self.expected)
         if math.isnan(error):
             return math.inf
@@ -50,7 +50,7 @@ class Finding:
 
 
 class Bench:
-    """Marches jobs on the ranks of `comm` in one precision. Of each thing found it keeps the worst."""
+    """Runs jobs on the ranks of `comm` in one precision, and keeps the worst finding of each name."""
 
     def __init__(self, comm: "MPI.Intracomm", precision: str = "double") -> None:
         self.comm, self.precision = comm, precision
@@ -59,19 +59,18 @@ class Bench:
 
     @property
     def wrong(self) -> list[str]:
-        """Sentences on what is not as it should be; none if all is well."""
+        """Return the findings beyond their limits as texts."""
         return [*filter(None, [self.failure]), *(str(found) for found in self.findings.values() if not found.ok)]
 
     @property
     def nearest(self) -> str:
-        """The finding that is nearest to its limit, or beyond."""
+        """Return the finding with the largest `share`."""
         return self.failure or str(max(self.findings.values(), key=lambda found: found.share))
 
     # -- running ------------------------------------------------------------------------------------------------------
 
     def begin(self, data: Json) -> March:
-        """A march at the start of a job, which is solved to 1e-10 and with all branches unless it says otherwise;
-        collective."""
+        """Return a march at the start of a job, by default with a tolerance of 1e-10 and all branches; collective."""
         numerics = {"tolerance": 1e-10, "branch_error": 0.0, **data.get("numerics", {}), "precision": self.precision}
         job = Job.model_validate({**data, "numerics": numerics})
         march = start.first(job, Slab(self.comm, *job.grid.points))
@@ -79,7 +78,7 @@ class Bench:
         return march
 
     def march(self, data: Json, *watches: Watch) -> tuple[March, list[StepRow]]:
-        """A march at the end of a job, and the row of every instant, the initial one first; collective."""
+        """Return a march at the end of a job, and the rows of all instants including the initial one; collective."""
         march = self.begin(data)
         job, rows = march.scene.job, [march.row]
         for step in Timeline.from_job(job):
@@ -90,7 +89,7 @@ class Bench:
         return march, rows
 
     def whole(self, march: March, name: str) -> Array:
-        """A field of all ranks, on every rank; collective."""
+        """Return a field of all ranks, shape (ny, nx), on every rank; collective."""
         return np.concatenate(march.scene.slab.from_all(march.field(name)))
 
     def amplitude(self, march: March) -> float:
@@ -104,7 +103,7 @@ class Bench:
     # -- what is expected ---------------------------------------------------------------------------------------------
 
     def expect(self, what: str, found: float, expected: float, within: float, scale: float | None = None) -> None:
-        """Note a number that may be off by `within` times `scale`, which is its expected size unless given."""
+        """Record a result with an allowed error of `within` times `scale` (default: the exact value)."""
         allowed = within * (abs(float(expected)) if scale is None else scale)
         finding = Finding(what, float(found), float(expected), allowed)
         known = self.findings.get(what)
@@ -112,7 +111,7 @@ class Bench:
             self.findings[what] = finding
 
     def expect_all(self, what: str, found: ArrayLike, expected: ArrayLike, within: float) -> None:
-        """Note many numbers, each of which may be off by `within` times the largest expected one."""
+        """Record many results with an allowed error of `within` times the largest exact value."""
         found, expected = np.broadcast_arrays(np.asarray(found, float), np.asarray(expected, float))
         largest = float(np.abs(expected).max())
         for one, other in zip(found.ravel(), expected.ravel(), strict=True):

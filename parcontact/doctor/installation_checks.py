@@ -1,4 +1,4 @@
-"""Checks of an installation that have exact answers, and the table of what came out."""
+"""Checks of an installation against exact solutions, and the table of results."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from ..theory import full_contact, lee_radok, persson, persson_rings, westergaar
 from .bench import Bench
 from .small_jobs import GLASSY, HEIGHT, PRONY, RADIUS, RELAXATION, WAVELENGTH, K, sphere, wave, zener
 
-ITERATIONS = 60  # tuning: a contact may take this many at most
+ITERATIONS = 60  # tuning: limit on the iterations of a contact solve
 RUBBER = zener(GLASSY, [], [])
-WAVES = ((1, 0, 1.0), (2, 1, 0.5), (0, 2, 0.4), (1, -3, 0.3), (4, 3, 0.1), (-5, 4, 0.1))  # and their heights
+WAVES = ((1, 0, 1.0), (2, 1, 0.5), (0, 2, 0.4), (1, -3, 0.3), (4, 3, 0.1), (-5, 4, 0.1))  # nx, ny, height/HEIGHT
 
 
 @dataclass(frozen=True)
 class Check:
-    """A small calculation with an exact answer: `run` makes it on a bench and tells the bench what is expected."""
+    """A small calculation with an exact solution: `run` performs it on a bench, and records results there."""
 
     name: str
     expected: str
@@ -26,7 +26,7 @@ class Check:
 
 
 def run_check(check: Check, bench: Bench) -> Bench:
-    """Run a check on a bench of its own, and return that; collective. A solve that fails is a finding too."""
+    """Run a check on a bench, and return the bench; collective. A failed solve is recorded as its failure."""
     try:
         check.run(bench)
     except RunError as error:
@@ -35,8 +35,8 @@ def run_check(check: Check, bench: Bench) -> Bench:
 
 
 def markdown(results: Iterable[tuple[Check, Bench]]) -> str:
-    """Return the table of results, numbered from 1."""
-    head = ("", "case", "expected", "came out, nearest to its limit [SI]", "residual", "iterations", "")
+    """Return the table of results in Markdown."""
+    head = ("", "case", "expected", "result nearest to its limit [SI]", "residual", "iterations", "")
     lines: list[tuple[str, ...]] = [head]
     for number, (check, bench) in enumerate(results, start=1):
         cost = f"{bench.residual:.0e}", str(bench.iterations)
@@ -48,7 +48,7 @@ def markdown(results: Iterable[tuple[Check, Bench]]) -> str:
 
 
 def nearly_full(bench: Bench) -> None:
-    """Westergaard's wave at 0.99, 1 and 1.01 of the load that closes the last gap."""
+    """Check Westergaard's wave at 0.99, 1 and 1.01 of the load of full contact."""
     for share in (0.99, 1.0, 1.01):
         mean = share * float(westergaard.full_contact_pressure(HEIGHT, WAVELENGTH, GLASSY))
         job = wave([{"pressure": mean}, {"pressure": mean}], points=(256, 1), material=RUBBER)
@@ -62,8 +62,8 @@ def nearly_full(bench: Bench) -> None:
 
 
 def closed_by_load(bench: Bench) -> None:
-    """Many waves in full contact, sliding: the force is the sum over them, in closed form, steady and of steps, and
-    after Persson for any gamma."""
+    """Check sliding in full contact of many waves: steady and stepped forces are sums over waves in closed form, and
+    the steady friction is that of Persson's theory for any gamma."""
     velocity, points = 0.3 * WAVELENGTH / RELAXATION, 16
     surface = [
         {"shape": "wave", "amplitude": share * HEIGHT, "waves": [x, y], "phase": 1.0 * x} for x, y, share in WAVES
@@ -87,7 +87,7 @@ def closed_by_load(bench: Bench) -> None:
 
 
 def retraction(bench: Bench) -> None:
-    """Ting: a sphere pressed in and pulled back lets go while it is still deep; its force is never negative."""
+    """Check a sphere pressed in and pulled back (Ting): contact ends while its approach is still positive."""
     depth, rise, steps = 5e-5, 1e-3, 25
     ramps = ((0.0, depth), (depth, 0.0))
     history = [{"approach": {"from": a, "to": b}, "duration": rise, "time_step": rise / steps} for a, b in ramps]
@@ -104,6 +104,6 @@ def retraction(bench: Bench) -> None:
 
 CHECKS = (
     Check("0.99, 1 and 1.01 of full contact", "Westergaard; 60 iterations", nearly_full),
-    Check("sphere pulled back", "Ting: lift-off while still deep", retraction),
+    Check("sphere pulled back", "Ting: lift-off before approach 0", retraction),
     Check("full contact of many waves, sliding", "sum over the waves", closed_by_load),
 )

@@ -1,4 +1,4 @@
-"""This machine as a run finds it: ranks, libraries, whether files come back as they were, and where it is slow."""
+"""Checks of the machine: ranks, libraries, speed, and files that a run writes and reads."""
 
 import os
 import shutil
@@ -27,15 +27,15 @@ from .small_jobs import GLASSY, Json, crossed, sphere, zener
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-POINTS = 512  # tuning: along each side of the contact that is timed
-SLOW = 4.0  # tuning: times the usual time of an operator call
-SLOW_DISK = 50e6  # tuning: bytes per second
-SAME = 1e-6  # accuracy: of the largest pressure
-STEPS = 4  # tuning: of the run whose files are read again
+POINTS = 512  # tuning: points along each side of the contact that is timed
+SLOW = 4.0  # tuning: time of an operator call above which a warning is given, over the usual time
+SLOW_DISK = 50e6  # tuning: writing rate below which a warning is given [bytes/s]
+SAME = 1e-6  # accuracy: limit on the difference of pressures, over the largest pressure
+STEPS = 4  # tuning: steps of the run whose files are read back
 
 
 def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:
-    """Lines on ranks, libraries and times, and warnings where it is slow; collective, all ranks must take all."""
+    """Yield lines on ranks, libraries and times, and warnings; collective: all ranks must exhaust the iterator."""
     yield from header.lines(comm)
     yield f"HDF5 {h5py.version.hdf5_version}"
     cores = len(os.sched_getaffinity(0))
@@ -46,13 +46,13 @@ def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:
     loads = [{"pressure": 1e4}, {"pressure": 1.1e4}]
     _, rows = bench.march(crossed(loads, POINTS, material=zener(GLASSY, [], []), numerics={"tolerance": 1e-6}))
     seconds, usual = rows[-1].seconds / rows[-1].operator_calls, PER_POINT * POINTS**2 / comm.size
-    yield f"{POINTS} x {POINTS} points: {1e3 * seconds:.3g} ms for an operator call with all that belongs to it"
+    yield f"{POINTS} x {POINTS} points: {1e3 * seconds:.3g} ms per operator call"
     if seconds > SLOW * usual:
-        yield f"warning: that is slow, {1e3 * usual:.2g} ms are usual; are other programs at work, or too many threads?"
+        yield f"warning: this is slow, {1e3 * usual:.2g} ms is usual; do other programs run, or too many threads?"
     rate = comm.bcast(measure_write_rate(where))
     yield f"files: {rate / 1e6:.3g} MB/s in {where}"
     if rate < SLOW_DISK:
-        yield "warning: that is slow; save fewer fields and checkpoints, or write to another disk"
+        yield f"warning: this is slow, {SLOW_DISK / 1e6:g} MB/s is usual; save fewer fields, or write to another disk"
 
 
 def prepare_loops(comm: "MPI.Intracomm") -> str:
@@ -81,7 +81,7 @@ def prepare_loops(comm: "MPI.Intracomm") -> str:
 
 
 def find_broken_files(comm: "MPI.Intracomm", where: Path) -> str:
-    """Run a small job in two parts below a directory and read its fields; what is wrong, or ''. Collective."""
+    """Run a small job in two parts in a directory and compare its fields; return a message or ''. Collective."""
     place = Path(comm.bcast(tempfile.mkdtemp(prefix="doctor-", dir=where) if comm.rank == 0 else None))
     try:
         stage = {"pressure": 1e4, "duration": 1e-3, "time_step": 1e-3 / STEPS}
@@ -99,7 +99,7 @@ def find_broken_files(comm: "MPI.Intracomm", where: Path) -> str:
             found = file["pressure"][-1]
         sound = np.allclose(found, expected, rtol=0.0, atol=SAME * expected.max())
         return (
-            "" if comm.bcast(bool(sound)) else "fields.h5 of a run that was stopped and went on is not as it should be"
+            "" if comm.bcast(bool(sound)) else f"pressures in fields.h5 of a continued run are wrong; is {where} sound?"
         )
     finally:
         comm.Barrier()

@@ -1,4 +1,4 @@
-"""A job: what is simulated and how, from a YAML file or a mapping into frozen sections. The door of its room."""
+"""A job: the description of a simulation, read from a YAML file or a mapping into frozen sections."""
 
 from ..errors import JobError
 from .model import Job, describe_job

@@ -1,12 +1,12 @@
-"""Sections that effects add to a job: found by their name, and only when a job has a section that the program has not.
+"""Sections that effects add to a job.
 
-An effect is registered by an entry point of an installed package, this one's own effects too,
+An effect, also of this package, is registered under the name of its section by an entry point that names its class
+(`effects.effect`):
 
     [project.entry-points."parcontact.effects"]
     wear = "tread_wear:Wear"
 
-which names the class of an effect (`effects.effect`) under the name of its section. Nothing is imported, or looked
-for, for a job without such a section.
+Effects are imported only for jobs that have their sections.
 """
 
 from __future__ import annotations
@@ -25,15 +25,12 @@ GROUP = "parcontact.effects"
 
 
 def find_effects() -> dict[str, Any]:
-    """Return every registered effect that can be used, by the name of its section."""
+    """Return all usable registered effects, by the name of their section."""
     return {section: _load(section) for section in _registered() if not why_unusable(section)}
 
 
 def effects_of(sections: Iterable[str]) -> dict[str, Any]:
-    """Return the effects that have registered one of some sections, by the name of the section.
-
-    Raises ValidationError for one that cannot be used.
-    """
+    """Return the effects registered for some sections, by section. Raises ValidationError for an unusable effect."""
     found = [section for section in sections if section in _registered()]
     for section in found:
         if reason := why_unusable(section):
@@ -43,8 +40,7 @@ def effects_of(sections: Iterable[str]) -> dict[str, Any]:
 
 @contextmanager
 def naming_effect(section: str) -> Iterator[None]:
-    """Name the effect of a section where its code fails, whatever it raises, also to end the program. Raises
-    RunError."""
+    """Raise RunError with the name of the effect if its code fails within the context, or tries to end the program."""
     try:
         yield
     except (InputError, RunError):
@@ -54,17 +50,17 @@ def naming_effect(section: str) -> Iterator[None]:
 
 
 def whose(section: str) -> str:
-    """Return the name of the effect of a section, and where its class is."""
+    """Return the name of the effect of a section, and the entry point of its class."""
     return f"the effect {section} ({_registered()[section].value})"
 
 
 def is_ours(section: str) -> bool:
-    """Return whether a section is added by an effect of this package."""
+    """Return True if an effect of this package adds the section."""
     return section in own_sections()
 
 
 def unusable() -> list[str]:
-    """Return sentences on the registered effects that cannot be used."""
+    """Return a sentence for each registered effect that cannot be used."""
     return [f"{section} {reason}" for section in _registered() if (reason := why_unusable(section))]
 
 
@@ -74,7 +70,7 @@ def _registered() -> dict[str, EntryPoint]:
 
 
 def _is_ours(entry: EntryPoint) -> bool:
-    """Return whether an effect is one of this package, which no other one replaces."""
+    """Return True for an effect of this package; such effects are sorted last, so that no other one replaces them."""
     return entry.value.startswith(f"{__package__.partition('.')[0]}.")
 
 
@@ -93,10 +89,11 @@ def why_unusable(section: str) -> str:
     """Return why the effect of a section cannot be used; '' if it can."""
     try:
         effect = _load(section)
-        reason = "" if issubclass(effect.section, Part) else f"its section is no {Part.__module__}.{Part.__name__}"
+        base = f"{Part.__module__}.{Part.__name__}"
+        reason = "" if issubclass(effect.section, Part) else f"its section is not a subclass of {base}"
         if not _are_names(effect.columns):
             reason = f"its columns must be a tuple of different names, of letters, digits and _, got {effect.columns!r}"
-    except (Exception, SystemExit) as error:  # whatever the code of somebody else does
+    except (Exception, SystemExit) as error:  # code of other packages may raise anything
         reason = f"{type(error).__name__}: {error}"
     return reason and f"belongs to the effect {_registered()[section].value}, which cannot be used: {reason}"
 

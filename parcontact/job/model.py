@@ -1,8 +1,4 @@
-"""A job: what is simulated and how, as frozen sections.
-
-`Job.resolved` is the job as YAML with every default filled in; `describe` is a table of it to read. SI units
-everywhere. No MPI and no maps here.
-"""
+"""The model of a job: frozen sections, in SI units. It needs no MPI and reads no maps."""
 
 from __future__ import annotations
 
@@ -29,17 +25,17 @@ from .text.overrides import Included
 from .text.python_data import is_array
 from .text.yamltext import dump
 
-OF_A_SECTION = {  # keys that newcomers look for at the top of a job
+OF_A_SECTION = {  # keys that are often written at the top of a job by mistake
     **dict.fromkeys(("load", "pressure", "force", "velocity"), Instead("give it to the stages of history")),
     "temperature": Instead("give it to the material"),
 }
 
 
-NO_GRID = {"points": 1, "size": 1.0}  # of a job in bands, each of which has a grid of its own
+NO_GRID = {"points": 1, "size": 1.0}  # grid of a job with bands, which have their own grids
 
 
 class Job(Part):
-    """A whole job. Sections have the names of the job file; equal jobs may come from different files."""
+    """A whole job, whose sections are named as in the job file. Jobs are equal if all their keys are equal."""
 
     title: str = Field(default="", description="text (put numbers in quotes)")
     grid: Grid = Field(description="a mapping with points and size")
@@ -98,7 +94,7 @@ class Job(Part):
     @model_validator(mode="wrap")
     @classmethod
     def _with_sections_of_effects(cls, data: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
-        """Let a model that knows the sections of effects read a job that has such sections."""
+        """Validate a job that has sections of effects by the model extended with them."""
         if cls is Job and isinstance(data, dict):
             others = [key for key, value in data.items() if key not in cls.model_fields and value is not None]
             if added := added_sections.effects_of(others):
@@ -111,7 +107,7 @@ class Job(Part):
 
     @classmethod
     def words(cls) -> tuple[str, ...]:
-        """Return the sections, those of our effects too, and the sweep, which is gone once a case is read."""
+        """Return the names of all sections, including those of this package's effects and `sweep`."""
         return (*dict.fromkeys((*super().words(), *added_sections.own_sections())), "sweep")
 
     def __eq__(self, other: object) -> bool:
@@ -125,29 +121,29 @@ class Job(Part):
         return self._origin
 
     def with_origin(self, origin: Origin) -> Job:
-        """Return the same job, from elsewhere."""
+        """Return the same job with another origin."""
         copy = self.model_copy()
         copy._origin = origin
         return copy
 
     @property
     def path(self) -> Path:
-        """The job file (absolute)."""
+        """Return the absolute path of the job file."""
         return self._origin.path
 
     @property
     def included(self) -> Included | None:
-        """The file from which the material comes, if it is not in the job file."""
+        """Return the file of an included material, or None."""
         return self._origin.included
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The sentences of `doubts`."""
+        """Return the sentences of `doubts`."""
         return tuple(map(str, self.doubts))
 
     @property
     def doubts(self) -> tuple[Doubt, ...]:
-        """Doubts about what is allowed but will probably disappoint; errors with `numerics.strict`."""
+        """Return all warnings about the job; they are errors with `numerics.strict`."""
         of_fit = self.material.doubts if isinstance(self.material, Dma) else ()
         of_effects = [
             each if isinstance(each, Doubt) else Doubt("said", "", {"text": str(each)}) for each in self._said("doubts")
@@ -165,7 +161,7 @@ class Job(Part):
 
     @property
     def facts(self) -> tuple[str, ...]:
-        """At which temperature the material is, and sentences of effects about what their sections mean in this job."""
+        """Return sentences on the temperature of the material, and on what the sections of effects mean in this job."""
         return tuple(filter(None, (describe_temperature(self.material), *self._said("facts"))))
 
     def _said(self, what: str) -> Iterator[Any]:
@@ -178,19 +174,19 @@ class Job(Part):
 
     @property
     def directions(self) -> list[tuple[float, float]]:
-        """The directions (unit vectors) in which the surface slides, each once, but for their signs."""
+        """Return the different sliding directions (unit vectors); opposite directions count once."""
         return cells.directions_of(self.history, self.initial, self.steady)
 
     @property
     def measured(self) -> bool:
-        """True if the material says at which frequencies or temperatures it was measured."""
+        """Return True if the material states its measured frequencies or temperatures."""
         body = self.material.fitted
         return isinstance(body, Zener) and (body.band is not None or body.temperatures is not None)
 
     @property
     def depends_on_heights(self) -> bool:
-        """True if doubts about the job need the heights of its surface: they are not given by numbers, or an approach
-        or the range of an adhesion is compared with them."""
+        """Return True if warnings need the heights of the surface: to find its slope, or to compare them with an
+        approach or the range of adhesion."""
         compared = self.section("adhesion") is not None or any(stage.control == "approach" for stage in self.history)
         return compared or not meaning.says_all(self.surface)
 
@@ -202,29 +198,29 @@ class Job(Part):
         return ("grid",) if self.bands is not None else ()
 
     def section(self, name: str) -> Any:
-        """Return the section that an effect has added, None if this job has not given it."""
+        """Return the section of an effect, or None if the job does not have it."""
         return getattr(self, name, None)
 
     @property
     def remembers(self) -> bool:
-        """True if the body has a memory, and time steps an error: an elastic one has neither, but where it sticks."""
+        """Return True if the result depends on the history: relaxing branches, or adhesion."""
         return bool(self.material.fitted.branches) or self.section("adhesion") is not None
 
     def resolved(self) -> str:
-        """YAML text with every default filled in; it loads back to an equal job, where the files that it names are.
+        """Return YAML text with every default, which loads back to an equal job.
 
-        What `numerics.accuracy` has chosen is a comment, as it is not given.
+        Values that `numerics.accuracy` chose are in a comment only, so that it chooses them again.
         """
         chosen = ", ".join(f"{name} {value!r}" for name, value in self.numerics.chosen.items())
         return dump(listing.plain_data(self)) + (f"# chosen by numerics.accuracy: {chosen}\n" if chosen else "")
 
 
-SEPARATOR = ":"  # of sections in the name of an extended job, by which other ranks find its class
+SEPARATOR = ":"  # separates the sections in the class name of an extended job, by which other ranks find the class
 
 
 @cache
 def extended_model(sections: tuple[str, ...]) -> type[Job]:
-    """Return the model of a job that may have these sections of effects too."""
+    """Return the model of a job extended by sections of effects."""
     effects = added_sections.effects_of(sections)
     fields: dict[str, Any] = {
         name: (effect.section | None, Field(default=None, description="a mapping of keys"))
@@ -242,7 +238,7 @@ def extended_model(sections: tuple[str, ...]) -> type[Job]:
 
 
 def _named_rule(section: str, rule: Rule) -> Rule:
-    """Return a rule that names the effect of its section where it fails."""
+    """Return a rule that raises RunError with the name of its effect if it fails."""
 
     def check(*values: Any) -> Iterator[Fault]:
         with added_sections.naming_effect(section):
@@ -253,7 +249,7 @@ def _named_rule(section: str, rule: Rule) -> Rule:
 
 
 def __getattr__(name: str) -> Any:
-    """Return the class of an extended job, where a job of another rank arrives."""
+    """Return the class of an extended job by its name, for unpickling on other ranks."""
     head, *sections = name.split(SEPARATOR)
     if head == "Job" and sections:
         return extended_model(tuple(sections))
@@ -261,7 +257,7 @@ def __getattr__(name: str) -> Any:
 
 
 def prepared(data: dict[str, Any]) -> dict[str, Any]:
-    """Return the sections of a job with a list of shapes, and with names of all stages."""
+    """Return the data of a job with `surface` as a list of shapes, and with names of all stages."""
     data = dict(data)
     if isinstance(data.get("surface"), dict | list) or is_array(data.get("surface")):
         data["surface"] = height_arrays.with_shapes(data["surface"])
@@ -281,7 +277,7 @@ def _default(data: dict[str, Any], section: str, key: str, value: Any) -> None:
 
 
 def describe_job(job: Job) -> str:
-    """Return a table of the job with every default and its unit; times and cells that follow from it come last."""
+    """Return a table of the job with every default and unit, followed by its cells and its duration."""
     rows = list(listing.rows(job))
     if job.bands is not None:
         return listing.layout(rows)

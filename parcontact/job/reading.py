@@ -1,4 +1,4 @@
-"""From a job file to jobs: one, or the cases of a sweep; every mistake is named with file, line and column."""
+"""Reading of job files: one job, or the cases of a sweep; mistakes are reported with file, line and column."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from .text.places import NOWHERE, UNREADABLE, Mistake, Place, Source
 from .text.python_data import source_of
 from .text.sweep_cases import Sweep
 
-MANY_MISTAKES = 40  # tuning: more are not shown one by one
-SHOWN_MISTAKES = 20  # tuning: of so many
+MANY_MISTAKES = 40  # tuning: largest number of mistakes that are all shown
+SHOWN_MISTAKES = 20  # tuning: number of mistakes that are shown if there are more
 STRICT = "an error with numerics.strict"
 Given = str | os.PathLike[str] | Mapping[str, Any]
 Changes = Sequence[str] | Mapping[str, Any]
 FillGrid = Callable[[Source, Origin], Origin]
-CASES = "cases"  # where in the output directory of a job its cases have theirs
+CASES = "cases"  # directory of all cases in the output directory of a job
 
 
 class Case(NamedTuple):
-    """One case of a sweep: its number, what distinguishes it, and its job, with an output directory of its own.
+    """A case of a sweep: its number, its settings of the swept keys, and its job, with an output directory of its own.
 
-    The only case of a job without a sweep has no settings, and the output directory of the job.
+    A job without a sweep is one case without settings, with the output directory of the job.
     """
 
     number: int
@@ -43,17 +43,17 @@ class Case(NamedTuple):
 
 
 def leave_grid(source: Source, origin: Origin) -> Origin:
-    """Leave words of the grid, such as `points: auto`, in the source: they are mistakes then."""
+    """Leave words such as `points: auto` in the source, where they count as mistakes."""
     return origin
 
 
 def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill_grid: FillGrid = leave_grid) -> Job:
-    """Read a job file, or take a mapping like one, whose files are looked for from the working directory.
+    """Read a job file, or a mapping with the same keys, whose paths are relative to the working directory.
 
-    `overrides` are texts like `grid.points=512`, or values by such keys. `fill_grid` puts numbers for words of the grid
-    into the source (`mesh.load` does that). Raises JobError with every mistake.
+    `overrides` are texts like `grid.points=512`, or a mapping of such keys to values. `fill_grid` replaces words of the
+    grid by numbers (see `mesh.load`). Raises JobError with all mistakes.
 
-    Of a job with a sweep it reads one `case`, and raises InputError if none is chosen or there is no such case.
+    For a job with a sweep `case` selects the case; raises InputError if there is none, or if none is selected.
     """
     if case is not None:
         return select_cases(load_cases(given, overrides, fill_grid=fill_grid), case)[0].job
@@ -68,7 +68,7 @@ def load(given: Given, overrides: Changes = (), case: int | None = None, *, fill
 
 
 def load_cases(given: Given, overrides: Changes = (), *, fill_grid: FillGrid = leave_grid) -> tuple[Case, ...]:
-    """Read all cases of a job, one if it has no sweep; else as `load`. A mistake names the first case that has it."""
+    """Read all cases of a job (one without a sweep), as `load`. A mistake names the first case that has it."""
     first, mistakes, sweep = _read(given, overrides, 0, fill_grid)
     if not sweep:
         if first is None:
@@ -83,7 +83,7 @@ def load_cases(given: Given, overrides: Changes = (), *, fill_grid: FillGrid = l
 
 
 def select_cases(cases: Sequence[Case], number: int | None) -> Sequence[Case]:
-    """Return all cases, or the one of a number; raises InputError if there is none."""
+    """Return all cases, or the one with a number; raises InputError if there is none."""
     if number is None:
         return cases
     if not cases[0].settings:
@@ -94,7 +94,7 @@ def select_cases(cases: Sequence[Case], number: int | None) -> Sequence[Case]:
 
 
 def _in_case(mistake: Mistake, index: int, sweep: Sweep, common: bool) -> Mistake:
-    """Return a mistake with the case that has it, unless all have it or it points at the sweep itself."""
+    """Return a mistake with the number of its case, unless all cases have it or its place is in the sweep."""
     settings = sweep.case(index)
     if common or any(mistake.place in (one.place, one.key_place) for one in settings):
         return mistake
@@ -104,7 +104,7 @@ def _in_case(mistake: Mistake, index: int, sweep: Sweep, common: bool) -> Mistak
 def _read(
     given: Given, overrides: Changes, index: int, fill_grid: FillGrid
 ) -> tuple[Case | None, list[Mistake], Sweep | None]:
-    """Return a case, or its mistakes; and the sweep that it belongs to, if that is sound."""
+    """Return a case, or None; its mistakes; and its sweep, or None if the sweep has mistakes."""
     _refuse_no_job(given, overrides)
     from_python = isinstance(given, Mapping)
     path = Path("job.yaml" if isinstance(given, Mapping) else given)
@@ -135,19 +135,21 @@ def _read(
 
 
 def _locate(source: Source, key: str) -> Place:
-    """Return the place of a key such as `surface.0.amplitude`; that of `numerics.strict` where there is none."""
+    """Return the place of a key such as `surface.0.amplitude`, or of `numerics.strict` without a key."""
     steps = tuple(int(step) if step.isdigit() else step for step in key.split("."))
     return source.locate(steps if key else ("numerics", "strict")).place
 
 
 def _refuse_no_job(given: Any, overrides: Any) -> None:
-    """Raise JobError for arguments from Python that are no job, or no changes of one."""
+    """Raise JobError for arguments from Python of a wrong type."""
     if not isinstance(given, str | os.PathLike | Mapping):
         raise JobError([f"the job must be the path of a file or a mapping, got {shorten(repr(given), 60)}"])
     if not isinstance(overrides, Sequence | Mapping) or isinstance(overrides, str):
         raise JobError([f"set must be a mapping of keys and values, got {shorten(repr(overrides), 60)}"])
     if wrong := [key for key in overrides if not isinstance(key, str)]:
-        raise JobError([f"set has a key that is no word, {shorten(repr(wrong[0]), 60)}; give words like 'grid.points'"])
+        raise JobError(
+            [f"set has a key that is not a text, {shorten(repr(wrong[0]), 60)}; use keys like 'grid.points'"]
+        )
 
 
 def _case(job: Job, index: int, sweep: Sweep | None) -> Case:
@@ -159,7 +161,7 @@ def _case(job: Job, index: int, sweep: Sweep | None) -> Case:
 
 
 def _job_error(given: Given, mistakes: list[Mistake]) -> JobError:
-    """Return the error with all mistakes in the order of the file, those elsewhere last; many are cut short."""
+    """Return the error with the mistakes in the order of the file, those in other files last; a long list is cut."""
     own = "" if isinstance(given, Mapping) else str(Path(given))
     ordered = sorted(mistakes, key=lambda mistake: (mistake.place.origin != own, mistake.place))
     sentences = list(dict.fromkeys(map(str, ordered)))
@@ -169,7 +171,7 @@ def _job_error(given: Given, mistakes: list[Mistake]) -> JobError:
 
 
 def _mistakes(source: Source, error: ValidationError) -> Iterator[Mistake]:
-    """Yield the faults that the sections found, at their places; not those about data that could not be read."""
+    """Yield the faults of the sections with their places, except for data that could not be read."""
     for fault in faults_of(error):
         found = source.locate(fault.path)
         if found.readable:

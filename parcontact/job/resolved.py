@@ -1,4 +1,4 @@
-"""The job that a run has left in its directory with every default: as far as pictures and texts show it."""
+"""Reading of the resolved job in an output directory, as far as pictures and texts need it."""
 
 from pathlib import Path
 
@@ -21,23 +21,23 @@ SHOWN = (
     "adhesion",
     "interface",
     "bands",
-)  # others differ by version
-LAST = "checkpoint"  # section of a job with every default
+)  # sections that pictures and texts need; others may differ between versions
+LAST = "checkpoint"  # last section of a job with every default
 FILES = ("file", "topography")  # shapes that come from files
 
 
 def shown_job(path: Path) -> Job:
-    """Return what pictures show of the resolved job; its files of heights need not be there any more."""
+    """Return the resolved job with flat shapes in place of files, which may no longer exist."""
     try:
         text = path.read_bytes()
         data = yamltext.parse(text, str(path)).data
         if not text.endswith(b"\n") or not isinstance(data, dict) or LAST not in data:
-            raise InputError(f"{path} is cut off: it lacks its section {LAST}; put the whole file in its place")
+            raise InputError(f"{path} is incomplete: it lacks the section {LAST}; restore the whole file")
         data = {name: data[name] for name in SHOWN if name in data}
         data["surface"] = [
             {"shape": "flat"} if shape["shape"] in FILES or "spectrum" in shape else shape for shape in data["surface"]
         ]
-        if data.pop("bands", None) is not None:  # pictures of it are of its tables
+        if data.pop("bands", None) is not None:  # pictures show tables only
             data["grid"], data["surface"] = NO_GRID, [{"shape": "flat"}]
         return Job.model_validate(data)
     except (OSError, KeyError, TypeError, ValidationError) as error:

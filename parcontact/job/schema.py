@@ -1,7 +1,7 @@
-"""A JSON Schema (draft 2020-12) of job files, for editors, and a table of all keys, from the types of the sections.
+"""The JSON Schema (draft 2020-12) of job files, for editors, and a table of all keys, from the types of the sections.
 
-It says of each key what the types say: words, numbers and their ranges, which keys exclude each other, defaults. What
-needs several sections at once (resolution, files, loads that belong to a grid) only `parcontact check` knows.
+The schema has the words, ranges, exclusions and defaults of each key. Rules between sections (resolution, files, loads)
+are checked by `parcontact check` only.
 """
 
 from __future__ import annotations
@@ -31,25 +31,25 @@ from .text.fault import list_words
 Schema = dict[str, Any]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 RANGE: Schema = {"type": "string", "pattern": "^[^:]+:[^:]+:[0-9]+$", "description": "first:last:count"}
-LIMITS: dict[Any, float] = {bounded: LARGEST, countable: MOST}  # the size of a number at most
+LIMITS: dict[Any, float] = {bounded: LARGEST, countable: MOST}  # largest magnitude that a validator accepts
 BOUNDS = {
     "exclusiveMinimum": "above {:g}",
     "minimum": "{:g} or more",
     "exclusiveMaximum": "below {:g}",
     "maximum": "at most {:g}",
 }
-SHORT = (both, along_x, listed, expand_range)  # validators that let one value stand for several
+SHORT = (both, along_x, listed, expand_range)  # validators that accept one value in place of several
 
 
 class SchemaOfKeys(GenerateJsonSchema):
-    """Pydantic's generator, with the short forms in which values may be written."""
+    """Pydantic's generator of schemas, extended by the short forms of values."""
 
     def field_title_should_be_set(self, schema: ModelField | TypedDictField | ComputedField | Any) -> bool:
-        """Keys have no titles beside their names."""
+        """Return False: keys have no titles."""
         return False
 
     def function_before_schema(self, schema: BeforeValidatorFunctionSchema) -> Schema:
-        """Return the forms of a list: one of its values, the list itself, a range of numbers."""
+        """Return the schema of a list and its short forms: a single value, or a range of numbers."""
         found, function = self.generate_inner(schema["schema"]), schema["function"]["function"]
         if function not in SHORT:
             return found
@@ -60,7 +60,7 @@ class SchemaOfKeys(GenerateJsonSchema):
         return {"anyOf": [one_value, array, *ranges]}
 
     def function_after_schema(self, schema: AfterValidatorFunctionSchema) -> Schema:
-        """Return the range of a number, as large as any may be where its type leaves that open."""
+        """Return the schema of a number with its range; open ends become the limits of all numbers."""
         found, most = super().function_after_schema(schema), LIMITS.get(schema["function"]["function"])
         if most is None:
             return found
@@ -69,18 +69,18 @@ class SchemaOfKeys(GenerateJsonSchema):
 
 
 def without_schema() -> dict[str, str]:
-    """Return why sections of effects have no schema, by their names."""
+    """Return the reasons why sections of effects have no schema, by section."""
     reasons = {}
     for name, effect in added_sections.find_effects().items():
         try:
             effect.section.model_json_schema(schema_generator=SchemaOfKeys)
-        except (Exception, SystemExit) as error:  # whatever the code of somebody else does
+        except (Exception, SystemExit) as error:  # code of other packages may raise anything
             reasons[name] = f"has no JSON schema: {type(error).__name__}: {str(error).splitlines()[0]}"
     return reasons
 
 
 def json_schema() -> Schema:
-    """Return the schema of a whole job, with the sections of all effects that are installed and have one."""
+    """Return the schema of a whole job, with the sections of all installed effects that have a schema."""
     kind = extended_model(tuple(name for name in added_sections.find_effects() if name not in without_schema()))
     found = kind.model_json_schema(schema_generator=SchemaOfKeys)
     properties = found["properties"]
@@ -101,7 +101,7 @@ def _sweep() -> Schema:
 
 
 def _included(definitions: Schema) -> Schema:
-    """Return the schema of a material from a file: any key beside `include` replaces that of the file."""
+    """Return the schema of an included material: keys other than `include` replace those of the file."""
     properties: Schema = {"include": {"type": "string", "description": "the name of a material file"}}
     for kind in (Elastic, Zener, Dma):
         for word, value in definitions[kind.__name__]["properties"].items():
@@ -114,7 +114,7 @@ def _included(definitions: Schema) -> Schema:
 
 @dataclass(frozen=True)
 class Key:
-    """One key of a section: what it must be, with its unit, the range of its numbers and its default, '' for none."""
+    """A key of a section: a description of its values, its unit, range and default ('' if none)."""
 
     word: str
     must_be: str
@@ -126,7 +126,7 @@ class Key:
 
 @dataclass(frozen=True)
 class SectionSchema:
-    """A part of a job, where it stands in it ('surface', 'material.branches'), and its keys."""
+    """A part of a job, its place in the job ('surface', 'material.branches'), and its keys."""
 
     place: str
     part: type[Part]
@@ -134,7 +134,7 @@ class SectionSchema:
 
 
 def sections() -> list[SectionSchema]:
-    """Return every part of a job, in the order of the job, with those of the effects of this package."""
+    """Return all parts of a job in the order of the job, including the effects of this package."""
     found: dict[type[Part], SectionSchema] = {Job: SectionSchema("", Job, tuple(_keys(Job)))}
     for name, field in Job.model_fields.items():
         _collect(name, field, found)
@@ -144,7 +144,7 @@ def sections() -> list[SectionSchema]:
 
 
 def _parts_of(annotation: Any) -> Iterator[type[Part]]:
-    """Yield the parts that an annotation or a field names, or a validator takes, in their order."""
+    """Yield the parts that an annotation, a field or a validator names, in order."""
     kind = getattr(annotation, "annotation", getattr(annotation, "json_schema_input_type", annotation))
     if isinstance(kind, type) and issubclass(kind, Part):
         yield kind
@@ -173,7 +173,7 @@ def _keys(part: type[Part]) -> Iterator[Key]:
 
 
 def _bounds(schema: Any) -> Iterator[tuple[str, float]]:
-    """Yield the bounds of the numbers in all forms of a value, without those of all numbers."""
+    """Yield the bounds of the numbers in all forms of a value, except the limits of all numbers."""
     for name, value in schema.items() if isinstance(schema, dict) else enumerate(schema):
         if name in BOUNDS and abs(value) not in (LARGEST, MOST):
             yield name, value

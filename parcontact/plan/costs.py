@@ -1,4 +1,4 @@
-"""Costs of a job on the ranks that have tried it: time and memory, scaled from a coarser grid where need be."""
+"""Costs of a job by a trial: time and memory, scaled if the trial was on a coarser grid."""
 
 import math
 import os
@@ -14,14 +14,14 @@ from ..scene import choices
 from . import memory
 from .sample import Sample
 
-TRIED_BYTES = 32 << 20  # tuning: written to see how fast that is
-SLOW_WRITE = 100e6  # tuning: bytes per second, where that cannot be seen
+TRIED_BYTES = 32 << 20  # tuning: size of the file that is written to measure the rate [bytes]
+SLOW_WRITE = 100e6  # tuning: writing rate that is assumed if it cannot be measured [bytes/s]
 
 
 @dataclass(frozen=True)
 class Costs:
-    """Costs of a job: a `sample` of it, whose stages have the steps of this job but may have been tried on a coarser
-    grid, and the bytes per second that reach the disk."""
+    """Costs of a job: a `sample` with the steps of this job, perhaps tried on a coarser grid, and the writing rate
+    [bytes/s]."""
 
     job: Job
     sample: Sample
@@ -29,8 +29,8 @@ class Costs:
 
     @property
     def held(self) -> float:
-        """Return the bytes that a rank holds in maps at once: those of steps, to the byte, or more while a first
-        contact or steady state is found on nested grids, which was seen when the job was tried."""
+        """Return the largest memory of a rank in maps [bytes]: in steps, or in the first contact or steady state on
+        nested grids, as measured by the trial."""
         ranks = self.sample.ranks
         known = (
             max(memory.total_bytes(self.job, ranks), memory.steady_start(self.job, ranks)) if self.job.history else 0
@@ -44,33 +44,33 @@ class Costs:
 
     @property
     def resident(self) -> float:
-        """Return the bytes that the system counts for a rank."""
+        """Return the resident memory of a rank [bytes]."""
         return self.held + self.sample.resident + self.instant_bytes // self.sample.ranks
 
     @property
     def finer(self) -> float:
-        """Return how many times the work of the sample's grid that of the job's is, N log N."""
+        """Return the work N log N on the grid of the job over that on the grid of the sample."""
         mine, tried = _points(self.job), _points(self.sample.job)
         return mine * math.log(mine + 1) / (tried * math.log(tried + 1))
 
     @property
     def step(self) -> float:
-        """Return the seconds of a step, on average over the job."""
+        """Return the mean time of a step of the job [s]."""
         return self.sample.total("seconds") * self.finer / max(self.sample.steps, 1)
 
     @property
     def marching(self) -> float:
-        """Return the seconds of all steps, or steady states."""
+        """Return the time of all steps, or steady states [s]."""
         return self.sample.steps * self.step
 
     @property
     def building(self) -> float:
-        """Return the seconds in which the scene is made."""
+        """Return the time in which the scene is set up [s]."""
         return self.sample.building * self.finer
 
     @property
     def writing(self) -> float:
-        """Return the seconds of all checkpoints and fields."""
+        """Return the time to write all checkpoints and fields [s]."""
         if not self.job.history:
             return 0.0
         rules, count = self.job.checkpoint, self.sample.steps
@@ -82,17 +82,17 @@ class Costs:
 
     @property
     def case(self) -> float:
-        """Return the seconds of a run without the start of the program."""
+        """Return the time of a run without the start of the program [s]."""
         return self.building + self.marching + self.writing
 
     @property
     def whole(self) -> float:
-        """Return the seconds of the whole run."""
+        """Return the time of the whole run [s]."""
         return self.sample.starting + self.case
 
     @property
     def instants(self) -> int:
-        """Return how often fields are saved."""
+        """Return the number of instants at which fields are saved."""
         saved = self.job.history and choices(self.job).fields.on
         return -(-self.sample.steps // self.job.output.every) if saved else 0
 
@@ -102,7 +102,7 @@ class Costs:
 
 
 def costs_of(job: Job, sample: Sample, write_rate: float) -> Costs:
-    """Costs of a job from a sample of it, perhaps on a coarser grid, where stages may have fewer steps."""
+    """Return the costs of a job from a sample, whose grid may be coarser and whose stages may have fewer steps."""
     if job.grid == sample.job.grid or not job.history:
         return Costs(job, sample, write_rate)
     spans = Timeline.from_job(job).spans
@@ -115,7 +115,7 @@ def _points(job: Job) -> int:
 
 
 def measure_write_rate(directory: Path) -> float:
-    """Bytes per second that reach the disk of the nearest directory that there is; a file without a name is written."""
+    """Return the writing rate [bytes/s] in the directory or its nearest existing parent, by a temporary file."""
     place = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
     with suppress(OSError), TemporaryFile(dir=place) as file:
         data = os.urandom(TRIED_BYTES)

@@ -1,6 +1,6 @@
-"""Bytes that a rank holds in maps, and bytes of a checkpoint: from the job alone, exactly.
+"""Exact memory of a rank in maps, and size of a checkpoint [bytes], from the job.
 
-What a run makes is made on a slab that only counts (`parallel.slab.Slab.planned`).
+The constructors of a run are called on a slab that counts memory without allocating it (`parallel.slab.Slab.planned`).
 """
 
 import math
@@ -25,10 +25,10 @@ from ..solve.dilute_contact import BLOCKS, LARGEST_SHARE, LEAST, SHARE
 from ..solve.fallback.cold_start import WORTHWHILE
 from ..steady_sliding.sliding import SteadySliding
 
-FREE_SHARE = 0.7  # tuning: of the memory that is free, which jobs may take
+FREE_SHARE = 0.7  # tuning: share of the free memory that jobs may take
 MEMINFO = Path("/proc/meminfo")
-MOST_POINTS = 2**20  # tuning: of a small case, which gains little from several ranks
-SPARE = 2.0  # tuning: times the maps of steps: what a first contact or steady state on nested grids may hold besides
+MOST_POINTS = 2**20  # tuning: largest number of points of a case that runs on one rank of a sweep
+SPARE = 2.0  # tuning: memory of the first contact or steady state on nested grids, over the memory of steps
 NESTED = 2.5  # accuracy: maps that a first solve on coarser grids holds besides those of steps, at most
 FAILED_SETS = 1.25  # accuracy: times the maps of a steady state with sets, at most, after these have failed
 SPECTRUM = "surface spectrum"
@@ -39,10 +39,10 @@ NAMES = {"contact": "pressures", "material": "body", "energy": "memory of energi
 
 
 def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int]:
-    """Return the bytes of all maps and transform buffers of a rank in a run of a job, by their purpose.
+    """Return the memory of a rank in maps and transform buffers [bytes], by purpose.
 
-    By default it is the last rank, which has the most of all but the waves of the surface: of these the most that a
-    rank has are counted.
+    The default rank is the last one, which has the most, except for the spectrum of the surface, for which the largest
+    memory of all ranks is returned.
     """
     slab = _slab(job, ranks, rank)
     scene = build_on(outline(job, slab))
@@ -61,11 +61,11 @@ def total_bytes(job: Job, ranks: int = 1, rank: int | None = None) -> int:
 
 
 def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool = False) -> int:
-    """Bytes of all maps of a rank while the steady state is found from which a run starts, before those of `holdings`
-    are made: as a rule, or where the solver changes `sets` of points. 0 for a run that starts from another state.
+    """Return the memory of a rank in maps [bytes] during the initial steady state, before `holdings` exist; 0 for a run
+    without it. `sets`: with the solver that changes sets of points.
 
-    In a free box the table of the wake, made before that, may take more for a moment; so may, up to a quarter more than
-    with sets, what is tried when these have failed.
+    The table of the wake of a free box may briefly take more; so may the fallback after a failure of sets, up to a
+    quarter more.
     """
     if not choices(job).steady_start.on:
         return 0
@@ -86,8 +86,8 @@ def most_bytes(job: Job, ranks: int) -> int:
 
 
 def on_tiles(job: Job) -> int:
-    """Bytes that rank 0 holds at most, beside those of `holdings`, while a dilute first contact is solved on tiles; 0
-    for a run that does not try that."""
+    """Return the largest additional memory of rank 0 [bytes] while a dilute first contact is solved on tiles; 0 for a
+    run without tiles."""
     chosen, (nx, ny) = choices(job), job.grid.points
     cold = bool(job.history) and not chosen.steady_start.on and chosen.adhesion is None
     large = nx * ny >= WORTHWHILE and max(nx, ny) > BLOCKS
@@ -106,8 +106,8 @@ def on_tiles(job: Job) -> int:
 
 
 def saved(job: Job) -> int:
-    """Bytes of the maps in a checkpoint, with the four of the checksum of each row. Effects say their maps themselves:
-    some are made for a checkpoint alone."""
+    """Return the size of the maps in a checkpoint [bytes], with a checksum of 4 bytes per row. Effects declare their
+    own maps, some of which exist in checkpoints only."""
     (nx, ny), scene = job.grid.points, build_on(outline(job, _slab(job, 1, 0)))
     memories = _completed(scene)
     parts = {name: part for name, part in parts_of(scene).items() if name not in scene.effects}
@@ -119,14 +119,14 @@ def saved(job: Job) -> int:
 
 
 def _slab(job: Job, ranks: int, rank: int | None) -> Slab:
-    """Return the slab of a rank, without one that of the last one, which only counts."""
+    """Return the counting slab of a rank, by default of the last one."""
     return Slab.planned(*job.grid.points, ranks, ranks - 1 if rank is None else rank)
 
 
 def _completed(scene: Scene) -> dict[str, Any]:
-    """Return the memories of all parts at rest, and make what the first step makes of the scene."""
+    """Return the states of all parts at rest, after the allocations of the first step."""
     scene.slab.tally.purpose = "operators"
-    for operator in scene.operators if scene.law is None else scene.operators[:1]:  # a law of its own has its inverse
+    for operator in scene.operators if scene.law is None else scene.operators[:1]:  # laws of effects use one operator
         assert isinstance(operator, Convolution | MirroredConvolution)
         _ = operator.symbols
     memories = {}
@@ -137,14 +137,14 @@ def _completed(scene: Scene) -> dict[str, Any]:
 
 
 def _most_waves(job: Job, ranks: int) -> int:
-    """Return the bytes of the waves of a surface on the rank that has the most of them."""
+    """Return the largest memory of a rank for the spectrum of the surface [bytes]."""
     count = job.grid.nx // 2 + 1
     rows, columns = shape_of(highest_waves(job), job.grid.points, slice(0, -(-count // min(ranks, count))))
     return rows * columns * np.dtype(np.complex128).itemsize
 
 
 def free_bytes() -> int:
-    """Bytes of memory that are free, as far as that is known."""
+    """Return the free memory [bytes], `sys.maxsize` if unknown."""
     try:
         facts = dict(line.split(":") for line in MEMINFO.read_text().splitlines())
         return int(facts["MemAvailable"].split()[0]) << 10
@@ -153,8 +153,7 @@ def free_bytes() -> int:
 
 
 def count_side_by_side(jobs: Sequence[Job], ranks: int) -> int:
-    """Return the number of cases to run at a time on so many ranks: small ones one on each, as they gain little from
-    several; 1 where they are not small, or where so many do not fit into the memory."""
+    """Return the number of cases to run at the same time: one per rank if small and within memory, else 1."""
     at_once = min(ranks, len(jobs))
     if at_once < 2:
         return 1

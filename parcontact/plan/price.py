@@ -1,4 +1,4 @@
-"""Price of accuracy: mesh, steps, memory and time of a job at other accuracies, from the errors seen in a trial.
+"""Price of accuracy: mesh, steps, memory and time of a job at other accuracies, from the errors in a trial.
 
 Errors fall with the orders of their fits (`accuracy.constants`) until each is its share (`accuracy.shares`). Meshes of
 surfaces with a shortest wave are those of `points: auto`.
@@ -21,20 +21,20 @@ from .printed_plan import duration_text, unit_of
 from .sample import Sample
 
 ACCURACIES = (0.05, 0.01, 3e-3, 1e-3)
-CHOSEN = 2.1  # accuracy: error of steps that stages choose over their share: 0.8 of what they are allowed (TIME_MEDIAN)
-CALLS = 0.18  # tuning: power of the accuracy with which calls grow: 1.4 to 1.7 times for a tenth in eight scenes
-MOST = 16.0  # times finer or coarser than the trial, at most
+CHOSEN = 2.1  # accuracy: error of chosen steps over their share: 0.8 of the allowed error (TIME_MEDIAN)
+CALLS = 0.18  # tuning: power of 1/accuracy with which calls grow: 1.4 to 1.7 times for a tenth in eight scenes
+MOST = 16.0  # tuning: largest ratio of a mesh or of steps to those of the trial, either way
 
 
 def error_of(sample: Sample, name: str, source: str) -> float:
-    """Return the error of friction or area that the `mesh` or `time` steps of a trial make, 0 where it is unknown."""
+    """Return the error of friction or area by the `mesh` or `time` steps of a trial, 0 if unknown."""
     weight = sample.total(f"{name} weight")
     return sample.total(f"{name} {source} error") / weight if weight else 0.0
 
 
 def refine(sample: Sample, source: str, share: float, *orders: float) -> float:
-    """Return how many times finer than in the trial `mesh` or `time` steps are when their error of friction is its
-    share, or that of the area where friction is unknown. `orders` are those of friction and area."""
+    """Return the factor by which `mesh` or `time` steps must be finer than in the trial for an error `share` of
+    friction, or of the area if friction is unknown. `orders` are the orders of convergence of friction and area."""
     for name, order in zip(("friction", "area"), orders, strict=True):
         if 0.0 < (error := error_of(sample, name, source)) < 1.0:
             return min(max((error / share) ** (1.0 / order), 1.0 / MOST), MOST)
@@ -42,7 +42,7 @@ def refine(sample: Sample, source: str, share: float, *orders: float) -> float:
 
 
 def points_at(costs: Costs, whole: Job, accuracy: float) -> tuple[int, int]:
-    """Return the points along x and y at an accuracy, of `costs` of the `whole` job or a part of it."""
+    """Return the points along x and y at an accuracy, from the costs of the `whole` job or of a part of it."""
     try:
         return points_for(whole, accuracy)
     except InputError:  # the surface has one mesh, or no shortest wave
@@ -54,7 +54,7 @@ def points_at(costs: Costs, whole: Job, accuracy: float) -> tuple[int, int]:
 
 
 def steps_at(costs: Costs, accuracy: float, points: tuple[int, int]) -> int:
-    """Return the steps at an accuracy; those that the job gives become no longer in cells."""
+    """Return the steps at an accuracy; steps given by the job do not become longer in cells."""
     job, sample = costs.job, costs.sample
     if not any(stage.seconds for stage in job.history):  # single solves, or steady states
         return sample.steps

@@ -10,9 +10,9 @@ from ..scene import choices
 from . import memory
 from .costs import Costs
 
-SUMS_PER_STEP = 1  # that a run makes besides those of its march: whether to stop
-DAY, YEAR = 86400.0, 365.25 * 86400.0  # seconds
-LARGE = 1e10  # bytes from which on GB are the unit
+SUMS_PER_STEP = 1  # sums over ranks per step outside of the march, to decide whether to stop
+DAY, YEAR = 86400.0, 365.25 * 86400.0  # [s]
+LARGE = 1e10  # size from which on the unit is GB [bytes]
 OF_STEADY_STATES = (
     *("viscoelasticity", "isolated contact", "layer", "surface spectrum", "preconditioner in single precision"),
     *("interface", "thermal"),
@@ -23,7 +23,7 @@ STEADY_STARTS = (("steady start, before", False), ("steady start, with sets", Tr
 
 
 def effects(job: Job) -> Iterator[str]:
-    """Every effect, on or off, and why; of a friction curve alone, those that a steady state can have."""
+    """Yield a line for each effect, on or off, and why; for a friction curve only effects of steady states."""
     found = [effect for effect in choices(job).decisions if job.history or effect.name in OF_STEADY_STATES]
     width = max(len(effect.name) for effect in found)
     yield "effects"
@@ -55,7 +55,7 @@ def maps(job: Job, ranks: Sequence[int], program: int) -> Iterator[str]:
 
 
 def steps(costs: Costs) -> Iterator[str]:
-    """Lines on the number of steps, or steady states, and on the work of one."""
+    """Yield lines on the number of steps, or steady states, and on the work of each."""
     job, sample = costs.job, costs.sample
     word = "step" if job.history else "state"
     if job.steady and not job.history:
@@ -68,37 +68,37 @@ def steps(costs: Costs) -> Iterator[str]:
         yield f"{most}{sample.steps} steps: {', '.join(names)}"
     calls, transforms, sums = (sample.total(name) / sample.steps for name in ("operator", "fft", "allreduce"))
     sums += SUMS_PER_STEP
-    yield f"a {word} has {calls:.3g} operator calls, {transforms:.3g} transforms and {sums:.3g} sums over all ranks"
+    yield f"per {word}: {calls:.3g} operator calls, {transforms:.3g} transforms and {sums:.3g} sums over all ranks"
     if costs.instants:
         yield f"fields are saved {costs.instants} times, {_bytes(costs.instant_bytes)} each"
     tried = sample.job.grid.points
     grid = "" if tried == job.grid.points else f" ({tried[0]} x {tried[1]} points instead)"
     where = f"on {ranks_text(sample.ranks)}{grid}"
-    rest = "" if sample.tried >= sample.steps else "; the others are assumed to be like them"
+    rest = "" if sample.tried >= sample.steps else "; the others are assumed to cost the same"
     yield f"tried: {sample.tried} {word}s {where} in {sample.took:.3g} s{rest}"
 
 
 def times(costs: Costs) -> Iterator[str]:
-    """Seconds and memory on the ranks of this trial; a warning where other programs have disturbed it."""
+    """Yield lines on time and memory on the ranks of the trial, with a warning if other programs disturbed it."""
     sample = costs.sample
     if sample.disturbed:
         load = f"load {os.getloadavg()[0]:.2g} on {len(os.sched_getaffinity(0))} cores"
         yield (
-            f"warning: this machine is busy with other programs ({load}), and each rank of the trial had only "
+            f"warning: other programs use this machine ({load}), and each rank of the trial had only "
             f"{per_cent(sample.share)} of a core; the times below are too long"
         )
     word = "step" if costs.job.history else "state"
-    parts = (("to start", sample.starting), ("to make the scene", costs.building), ("to write files", costs.writing))
+    parts = (("to start", sample.starting), ("to set up the scene", costs.building), ("to write files", costs.writing))
     shares = ", ".join(f"{seconds:.2g} s {what}" for what, seconds in parts)
     yield (
-        f"time on {ranks_text(sample.ranks)}: {costs.step:.3g} s a {word}, "
-        f"{duration_text(costs.whole)} in all, of it {shares}"
+        f"time on {ranks_text(sample.ranks)}: {costs.step:.3g} s per {word}, "
+        f"{duration_text(costs.whole)} in all, including {shares}"
     )
-    yield f"memory of a rank: {_bytes(costs.held)} in maps at most, {_bytes(costs.resident)} resident"
+    yield f"memory of a rank: at most {_bytes(costs.held)} in maps, {_bytes(costs.resident)} resident"
 
 
 def unit_of(most: float) -> tuple[str, float]:
-    """Return a unit for up to so many bytes: its name and its bytes."""
+    """Return the name and the size [bytes] of the unit for values up to `most` [bytes]."""
     return ("GB", 1e9) if most >= LARGE else ("MB", 1e6)
 
 
@@ -108,12 +108,12 @@ def _bytes(count: float) -> str:
 
 
 def ranks_text(count: int) -> str:
-    """So many ranks, in words."""
+    """Return the number of ranks as text."""
     return "1 rank" if count == 1 else f"{count} ranks"
 
 
 def duration_text(seconds: float) -> str:
-    """A time as people tell it."""
+    """Return a time [s] as text in s, hours and minutes, days or years."""
     if seconds < 600.0:
         return f"{seconds:.3g} s"
     if seconds < DAY:

@@ -1,7 +1,7 @@
-"""A job tried out: some of its steps are made in memory, the rest are taken to be like them.
+"""Trials of jobs: some steps are made in memory, and the others are assumed to cost the same.
 
-Each stage has an equal share of the time. Its steps are made as a run makes them until that is used up; one long step
-then goes to the end of the stage. The first steps of a stage, where the load may jump, stand for themselves alone.
+Each stage has an equal share of the time. When it is used up, one long step leads to the end of the stage. The first
+steps of a stage, where the load may jump, are not used for the others.
 """
 
 import resource
@@ -27,17 +27,16 @@ from ..steady_sliding.sliding import SteadySliding
 from .trial_grids import make_tiny
 
 T = TypeVar("T")
-FIRST = 2  # tuning: steps of a stage that stand for themselves alone
-FEWEST = 8  # tuning: steps of a stage that are made before a long one ends it
-KILO = 1024  # bytes in what the system counts resident memory in
-UNDISTURBED = 0.9  # tuning: of the time a rank has a core, where nothing else is at work
-LATE = 2.0  # tuning: times the time given, after which no more steps are made
+FIRST = 2  # tuning: first steps of a stage that are not used for the cost of others
+FEWEST = 8  # tuning: least steps of a stage before a long one ends it
+KILO = 1024  # unit of resident memory in `getrusage` [bytes]
+UNDISTURBED = 0.9  # tuning: least share of the time that a rank has a core if no other programs run
+LATE = 2.0  # tuning: limit on the time of a trial, over the given time
 
 
 @dataclass
 class StageCost:
-    """Cost of the steps of a stage: their number, how many were tried, sums over the FIRST of these and over later
-    ones."""
+    """Cost of a stage: numbers of steps and of tried steps, and sums over the FIRST tried steps and over later ones."""
 
     steps: int
     tried: int = 0
@@ -51,7 +50,7 @@ class StageCost:
             sums[name] = sums.get(name, 0.0) + value
 
     def total(self, name: str) -> float:
-        """Sum over all steps; 0 where none was tried."""
+        """Return the sum over all steps; 0 if none was tried."""
         first, later = min(self.tried, FIRST), max(self.tried - FIRST, 0)
         sums = self.later if later else self.first
         each = sums.get(name, 0.0) / max(later or first, 1)
@@ -60,11 +59,11 @@ class StageCost:
 
 @dataclass(frozen=True)
 class Sample:
-    """A job as it was tried on some ranks: its stages, and how long all of it took [s].
+    """Results of a trial of a job: costs of its stages, or of its steady states as one stage.
 
-    `starting` the program, `building` the scene; `resident` is the memory of root that is not in maps, `held` that in
-    maps at most [bytes]. `share` is how much of its time a rank had a core, at least: less than all of it where other
-    programs are at work. Where the job has no history, its steady states stand in place of steps.
+    Times [s]: `starting` the program, `building` the scene, `took` for the whole trial. Memory [bytes]: `resident`
+    memory of root outside of maps, largest memory in maps `held`. `share` is the smallest share of the time that a rank
+    had a core; it falls if other programs run.
     """
 
     job: Job
@@ -79,7 +78,7 @@ class Sample:
 
     @property
     def disturbed(self) -> bool:
-        """Tell that other programs have taken so much of the machine that times say little."""
+        """Return True if other programs made the times unreliable."""
         return self.share < UNDISTURBED
 
     @property
@@ -91,16 +90,16 @@ class Sample:
         return sum(stage.tried for stage in self.stages)
 
     def total(self, name: str) -> float:
-        """Sum of `seconds`, or of a count by its name in the tally, over all steps; untried stages are like others."""
+        """Return the sum of `seconds`, or of a count in the tally, over all steps; untried stages cost the mean."""
         tried = [stage for stage in self.stages if stage.tried]
         steps = sum(stage.steps for stage in tried)
         return sum(stage.total(name) for stage in tried) * self.steps / steps if steps else 0.0
 
 
 def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sample:
-    """Try a job for about so long; `starting` [s] has passed before. Collective.
+    """Try a job for about `seconds` [s], after `starting` [s] for the start of the program; collective.
 
-    Raises InputError for files that do not fit.
+    Raises InputError for files that do not match the job.
     """
     _warm_up(job, slab)
     began, worked = time.perf_counter(), time.process_time()
@@ -127,7 +126,7 @@ def measure_program(job: Job, slab: Slab) -> int:
 
 
 def _warm_up(job: Job, slab: Slab) -> None:
-    """Make the first steps, or the first steady state, of a tiny scene: compiling is no part of what a job costs."""
+    """Make the first steps, or a steady state, of a tiny scene, so that the trial includes no compilation."""
     small = make_tiny(job)
     if small is None:
         return
@@ -143,16 +142,16 @@ def _warm_up(job: Job, slab: Slab) -> None:
 
 
 def _march(job: Job, slab: Slab, seconds: float) -> tuple[float, list[StageCost]]:
-    """Seconds that the scene took, and the stages of the history; collective."""
+    """Return the time to set up the scene [s], and the costs of the stages; collective."""
     began = time.perf_counter()
-    numerics = job.numerics.model_copy(update={"accept_unconverged": True})  # a long step may start from far away
+    numerics = job.numerics.model_copy(update={"accept_unconverged": True})  # a long step may not converge
     march = start.first(job.model_copy(update={"numerics": numerics}), slab)
     building = time.perf_counter() - began
     return building, _try(march, seconds)
 
 
 def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[StageCost]]:
-    """Seconds that the scene took, and the steady states, some far apart tried, as one stage; collective."""
+    """Return the time to set up the scene [s], and the costs of some steady states as one stage; collective."""
     began = time.perf_counter()
     sliding = SteadySliding(scene.set_up(job, slab))
     building = time.perf_counter() - began
@@ -171,21 +170,21 @@ def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[S
 
 
 def _solve(sliding: SteadySliding, velocity: tuple[float, float], pressure: float) -> Point | None:
-    """The state; one that cannot be solved costs what it has cost."""
+    """Return the steady state, or None if the solver fails: its cost counts all the same."""
     with suppress(RunError):
         return sliding.solve(velocity, pressure)
     return None
 
 
 def _spread(count: int) -> list[int]:
-    """The numbers below a count, in an order in which the first ones are already spread over all (van der Corput)."""
+    """Return the numbers below `count` in van der Corput's order, whose first ones are spread over the whole range."""
     digits = max(count - 1, 1).bit_length()
     turned = (int(f"{index:0{digits}b}"[::-1], 2) for index in range(1 << digits))
     return [index for index in turned if index < count]
 
 
 def _try(march: March, seconds: float) -> list[StageCost]:
-    """Try all stages; root's clock decides for all ranks."""
+    """Return the costs of all stages; root's clock decides for all ranks."""
     slab, began, timeline = march.scene.slab, time.perf_counter(), march.timeline()
     stages = [StageCost(span.jumps + span.count) for span in timeline.spans]
     for step in march.steps(timeline):
@@ -201,22 +200,22 @@ def _try(march: March, seconds: float) -> list[StageCost]:
         stage.steps -= step.passed
         stage.add(_make(march, step))
     for stage, span in zip(stages, timeline.spans, strict=True):
-        if timeline.chooses and span.stage.chooses:  # what was chosen by now, and a guess of those to come
+        if timeline.chooses and span.stage.chooses:  # steps chosen so far, and an estimate of the others
             stage.steps = span.jumps + span.count
     return stages
 
 
 def _make(march: March, step: Step) -> dict[str, float]:
-    """Make a step; what it cost, and how wrong it is."""
+    """Make a step; return its costs and its errors."""
     _, cost = _cost(march.scene.slab, partial(march.advance, step))
     far = weight_of(march.scene.job.history[step.stage].speed * step.dt, step.dt)
-    friction = march.row.measures.friction if march.scene.job.directions else 0.0  # which is noise where nothing slides
+    friction = march.row.measures.friction if march.scene.job.directions else 0.0  # without sliding it is noise
     return cost | dict(_errors(march.row.errors, far, friction))
 
 
 def _errors(errors: ErrorBudget | None, far: float, friction: float) -> Iterator[tuple[str, float]]:
-    """The parts of the errors of friction and area that time steps and mesh make, and what they weigh in a mean, as in
-    that of a run."""
+    """Yield the errors of friction and area by time steps and mesh, times their weights in the mean over a run, and the
+    weights."""
     for name, weight in (("friction", far * friction), ("area", far)):
         if (parts := getattr(errors, name, None)) is not None:
             yield f"{name} weight", weight
@@ -225,7 +224,7 @@ def _errors(errors: ErrorBudget | None, far: float, friction: float) -> Iterator
 
 
 def _cost(slab: Slab, call: Callable[[], T]) -> tuple[T, dict[str, float]]:
-    """Return what a call returns, and its seconds and counts."""
+    """Return the result of a call, and its time [s] and counts."""
     before, began = slab.tally.copy(), time.perf_counter()
     found = call()
     seconds = time.perf_counter() - began

@@ -1,4 +1,4 @@
-"""Grids on which a job can be tried in little time: its own, or a coarser one."""
+"""Grids on which a job can be tried in a short time: its own, or a coarser one."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -10,21 +10,21 @@ from ..job.sections.listing import plain_data
 from ..scene import choices
 from . import memory
 
-PER_POINT = 1.2e-8  # tuning: seconds of an operator call per point, enough to choose a grid by
-PADDED = 3.0  # tuning: times that in an isolated contact
-CALLS = 200  # tuning: operator calls that a trial makes at least
-STEADY_START = 150  # tuning: and those of the steady state from which a job begins
-FEW, FLAT = 16, 1e-3  # points along each side of a tiny scene; its wave over its length
-WAVE = 2.0  # cells that the shortest wave needs
+PER_POINT = 1.2e-8  # tuning: time of an operator call per point, to choose a grid [s]
+PADDED = 3.0  # tuning: factor of this time in an isolated contact
+CALLS = 200  # tuning: least operator calls of a trial
+STEADY_START = 150  # tuning: operator calls of an initial steady state
+FEW, FLAT = 16, 1e-3  # tiny scene: most points along a side; amplitude of its wave over the side
+WAVE = 2.0  # least cells of the shortest wave on a coarser grid
 
 
 def choose_grid(job: Job, ranks: int, seconds: float) -> Job | None:
-    """The job, or the same on a coarser grid, that can be tried by so many ranks here; None if there is none."""
+    """Return the job on a grid that `ranks` ranks can try in about `seconds` [s]; None if it is too large."""
     return next((each for each in _coarser(job) if _feasible(each, ranks, seconds)), None)
 
 
 def make_tiny(job: Job) -> Job | None:
-    """The job with a single wave, or a sphere, on the fewest points: all that runs is the same, and costs nothing."""
+    """Return the job with a single wave, or a sphere, on few points; None if not possible."""
     data: dict[str, Any] = plain_data(job)
     free, long = choices(job).isolated.on, max(job.grid.size)
     data["grid"]["points"] = [min(n, FEW) for n in job.grid.points]
@@ -45,7 +45,7 @@ def _feasible(job: Job, ranks: int, seconds: float) -> bool:
 
 
 def _coarser(job: Job) -> Iterator[Job]:
-    """The job with 1, 2, 4, ... times its cells, as long as its surface can be put on them."""
+    """Yield the job with 1, 2, 4, ... times its cells, as long as the surface allows it."""
     yield job
     data: dict[str, Any] = plain_data(job)
     while all(n % 2 == 0 for n in data["grid"]["points"]) and min(data["grid"]["points"]) > 64:
@@ -58,5 +58,5 @@ def _coarser(job: Job) -> Iterator[Job]:
                 shape["short_wavelength"] = max(shape["short_wavelength"], WAVE * cell)
         try:
             yield Job.model_validate(data)
-        except ValidationError:  # waves that a coarser grid does not have
+        except ValidationError:  # the grid is too coarse for its waves
             return

@@ -1,1 +1,1 @@
-"""Every picture, panel by panel."""
+"""Pictures of runs, friction curves, surfaces, sweeps and studies."""

@@ -1,6 +1,7 @@
-"""Pictures of a curve in bands: friction of each band over velocity, area over magnification, temperature by band.
+"""Pictures of a friction curve in bands: friction of each band over velocity, area over magnification, temperature by
+band.
 
-Persson's theory for the same spectrum is drawn beside them where `bands_theory.csv` is there.
+Persson's theory for the same spectrum is drawn if `bands_theory.csv` exists.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,12 +18,12 @@ from .plotted_run import read_table
 
 TABLE, THEORY = "bands.csv", "bands_theory.csv"
 NEEDED = ("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength")
-SHOWN = 4  # of velocities, as lines
-THIN = 1.0  # tuning: width of the lines of the theory
+SHOWN = 4  # number of velocities that are drawn as lines
+THIN = 1.0  # tuning: width of the lines of the theory [points]
 
 
 def chart_bands(directory: Path) -> list[Chart]:
-    """Return panels of a table of bands: of its first pressure and temperature, where there are several."""
+    """Return panels of a table of bands, for its first pressure and temperature."""
     if not (directory / TABLE).is_file():
         return []
     whole = read_table(directory / TABLE, (*NEEDED, "friction", "contact_area", "flash_temperature"))
@@ -41,7 +42,7 @@ def chart_bands(directory: Path) -> list[Chart]:
 
 
 def _describe_first(columns: dict[str, Array]) -> str:
-    """Return the first pressure and temperature, as far as there are others."""
+    """Return the first pressure and temperature as text, if the table has several."""
     firsts = [(name, columns[name][0], unit) for name, unit in (("pressure", "Pa"), ("temperature", "°C"))]
     several = [one for one in firsts if np.unique(columns[one[0]].round(9)).size > 1]
     return ", ".join(prefixes.quantity(float(value), unit) for _, value, unit in several)
@@ -59,7 +60,8 @@ def _choose(columns: dict[str, Array]) -> dict[str, Array]:
 
 
 def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Chart:
-    """Return friction of each band, stacked from the coarsest, over velocity; the sum of the theory as a line."""
+    """Return a chart of the friction of each band over velocity, stacked from the coarsest, with the theory's sum as a
+    line."""
     series = []
     for band in np.unique(columns["band"]):
         rows = _sorted(columns, columns["band"] == band)
@@ -76,7 +78,7 @@ def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Cha
 
 
 def _over_bands(columns: dict[str, Array], theory: dict[str, Array] | None, name: str) -> Chart:
-    """Return area over magnification, or the temperature over the wavelength of bands, for some velocities."""
+    """Return a chart of area over magnification, or of temperature over wavelength, for some velocities."""
     area, longest = name == "contact_area", float(columns["long_wavelength"].max())
     x = Axis("magnification") if area else Axis("shortest wave of the band", "m")
     series = []

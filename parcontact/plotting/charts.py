@@ -1,4 +1,4 @@
-"""Charts: what is drawn over something, as numbers, and how it is drawn. Runs and friction curves both give charts."""
+"""Charts of runs and friction curves: their numbers, and how they are drawn."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -12,25 +12,25 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from ..parallel.slab import Array
 from . import prefixes, style
 
-SPIKE_SHARE = 0.02  # of the abscissa, at its beginning: what stands out there only does not set the limits
-SPIKE_HEIGHT = 1.5  # over the highest of the rest: less is no spike
-AXES_SHARE = 0.72  # of the width of a panel, about: the rest is for labels
-NAMES, LINE = 9, 12  # size of the names of stages, and of their lines [points]
-MAX_NAME = 24  # letters of the name of a stage: longer ones would leave no room for the curve
-LEVELS = 3  # of names above each other, before they are turned
-FEW_NAMES, MANY_NAMES = 2, 4  # of lines, for which a legend finds room among them: always, and in half the width
-SMALL, NAMES_BESIDE = 5.0, 2  # width of a small picture [inch], and the names in a row under it
-HEADROOM, PEAK_ROOM = 1.08, 1.25  # of a panel over its highest point, and over one that the legend names
+SPIKE_SHARE = 0.02  # first part of the abscissa, whose spikes do not set the limits
+SPIKE_HEIGHT = 1.5  # least height of a spike over the highest other value
+AXES_SHARE = 0.72  # width of the axes over the width of a panel
+NAMES, LINE = 9, 12  # size of the names of stages, and height of their lines [points]
+MAX_NAME = 24  # most letters of the name of a stage
+LEVELS = 3  # most rows of horizontal names of stages
+FEW_NAMES, MANY_NAMES = 2, 4  # most lines for a legend inside a narrow and a wide panel
+SMALL, NAMES_BESIDE = 5.0, 2  # width of a small picture [inch]; names per row in its legend
+HEADROOM, PEAK_ROOM = 1.08, 1.25  # upper limit over the highest value, without and with its name in the legend
 FRACTION = "contact area /\nnominal area"
-BAR_SHARE = 0.8  # of the room of a bar, in the logarithm
-LEAST = 0.99  # of a value, which its bar of errors leaves at most
-ZERO_ROW = 0.05  # of the height of a panel, for the marks of a line that is 0
-FEW_DECADES = 1.5  # of a logarithmic axis, on which more than powers of ten are told
+BAR_SHARE = 0.8  # width of a bar over the distance of bars, in the logarithm
+LEAST = 0.99  # largest downward error bar over the value
+ZERO_ROW = 0.05  # height of the row of marks at 0, over that of the panel
+FEW_DECADES = 1.5  # decades of a logarithmic axis below which minor ticks have labels
 
 
 @dataclass(frozen=True)
 class ChartLine:
-    """One line: its name, or '', and numbers in SI, with their errors as shares of them if these are known."""
+    """A line: its name (or ''), values in SI units, and their relative errors if known."""
 
     name: str
     x: Array
@@ -49,10 +49,12 @@ class Axis:
 
 @dataclass(frozen=True)
 class Chart:
-    """One panel. `key` is how users ask for it; `spikes`: whether one at the beginning may leave the picture; `stages`
-    are names, starts and ends over `x`, `named` whether their names are shown; `peak`: whether the highest point is
-    named, and so stays in the picture; `zeros`: what a value of 0 means, if the vertical axis is logarithmic; the
-    first `stacked` series are bars on top of each other."""
+    """A panel, chosen by its `key`.
+
+    `spikes`: a spike at the beginning may be cut off. `stages`: names, starts and ends over `x`, shown if `named`.
+    `peak`: the legend names the highest point. `zeros`: label of values of 0 on a logarithmic axis. The first `stacked`
+    series are stacked bars.
+    """
 
     key: str
     x: Axis
@@ -70,8 +72,8 @@ class Chart:
 
 
 def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
-    """Draw a chart; `log` names the axes of logarithmic scale. The legend of many lines is beside a panel that has the
-    whole width."""
+    """Draw a chart; `log` names its logarithmic axes. A legend of many lines is drawn outside of a panel of full
+    width."""
     log_x, log_y = (
         "none" not in log and (chart.log_x or "x" in log),
         "none" not in log and bool(chart.zeros or "y" in log),
@@ -99,7 +101,7 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
 
 
 def _place_legend(axes: Axes, names: int) -> dict[str, Any]:
-    """Return where the legend of so many lines goes: among them, or beside, above or below the panel."""
+    """Return the place of a legend of `count` lines: inside the panel, or at its side, above or below."""
     small = axes.figure.bbox.width / axes.figure.dpi < SMALL
     if names > (MANY_NAMES if small else FEW_NAMES) and _panels_beside(axes) == 1:
         return style.BELOW | {"ncols": NAMES_BESIDE} if small else style.BESIDE
@@ -107,7 +109,7 @@ def _place_legend(axes: Axes, names: int) -> dict[str, Any]:
 
 
 def _draw_bars(axes: Axes, series: Sequence[ChartLine]) -> None:
-    """Draw bars at common places, the first series at the bottom, as wide as most of what is between two places."""
+    """Draw stacked bars at common places, the first series at the bottom."""
     x = series[0].x
     half = (float(np.diff(np.log(x)).min()) if x.size > 1 else 1.0) * BAR_SHARE / 2.0
     left, width, bottom = x * np.exp(-half), x * (np.exp(half) - np.exp(-half)), np.zeros_like(x)
@@ -117,15 +119,15 @@ def _draw_bars(axes: Axes, series: Sequence[ChartLine]) -> None:
 
 
 def _drop_hidden_points(one: ChartLine, log_x: bool, log_y: bool) -> ChartLine:
-    """Return a line without the points that logarithmic axes cannot show."""
+    """Return a line without points that logarithmic axes cannot show."""
     x, y = np.asarray(one.x, dtype=float), np.asarray(one.y, dtype=float)
     there = np.isfinite(x) & ((x > 0.0) | (not log_x)) & ((y > 0.0) | (not log_y))
     return replace(one, x=np.where(there, x, np.nan), y=np.where(there, y, np.nan))
 
 
 def _mark_zeros(axes: Axes, chart: Chart) -> None:
-    """Mark at the lower edge where a line is 0, a row of marks for each line."""
-    label = chart.zeros  # once: colours tell the lines apart
+    """Mark zeros of the lines at the lower edge, with one row of marks per line."""
+    label = chart.zeros  # one label for all lines
     for row, one in enumerate(chart.series):
         zeros = np.asarray(one.x)[np.asarray(one.y) == 0.0]
         if zeros.size:
@@ -136,14 +138,14 @@ def _mark_zeros(axes: Axes, chart: Chart) -> None:
 
 
 def _draw_errors(axes: Axes, one: ChartLine, share: Array) -> None:
-    """Draw bars of the errors that are known; one of more than all of a value goes down to next to nothing."""
+    """Draw bars of the known errors; a bar of more than the value ends just above 0."""
     size = np.where(np.isfinite(share), np.abs(share * one.y), 0.0)
     look: dict[str, Any] = {"ecolor": one.look["color"], "elinewidth": 1.0, "capsize": 2.5, "alpha": 0.7}
     axes.errorbar(one.x, one.y, yerr=[np.minimum(size, LEAST * np.abs(one.y)), size], fmt="none", **look)
 
 
 def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
-    """Give an axis its name, unit and scale, with few ticks, so that their labels do not touch."""
+    """Set name, unit and scale of an axis, with few ticks so that labels do not overlap."""
     axis, few = axes.xaxis if which == "x" else axes.yaxis, True
     if log:
         axes.set(**{f"{which}scale": "log"})
@@ -162,7 +164,7 @@ def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
 
 
 def _set_limits(axes: Axes, chart: Chart, series: Sequence[ChartLine], log_x: bool) -> None:
-    """Show zero, and room above bars of errors up to the whole of a value; leave out a spike, whose height is told."""
+    """Set limits that include 0 and error bars up to the value; cut off a spike, and print its height."""
     whole = np.sum([one.y for one in series[: chart.stacked]], axis=0) if chart.stacked else np.zeros(0)
     ys = np.concatenate([whole, *(one.y for one in series)])
     highest = _highest(ys)
@@ -170,33 +172,33 @@ def _set_limits(axes: Axes, chart: Chart, series: Sequence[ChartLine], log_x: bo
         bars = [one.y * (1.0 + np.nan_to_num(np.minimum(one.error, 1.0))) for one in series if one.error is not None]
         axes.set_ylim(0.0, (PEAK_ROOM if chart.peak else HEADROOM) * max(highest, *map(_highest, bars), 0.0) or 1.0)
         if not highest:
-            axes.set_yticks([0.0])  # a scale would be made up
+            axes.set_yticks([0.0])  # there are no values for a scale
     if chart.spikes and not log_x:
         xs = np.concatenate([one.x for one in series])
         late = xs > np.nanmin(xs) + SPIKE_SHARE * (np.nanmax(xs) - np.nanmin(xs))
         rest = _highest(ys[late])
         if 0.0 < SPIKE_HEIGHT * rest < highest:
             axes.set_ylim(top=1.25 * rest)
-            told = f"↑ {prefixes.quantity(highest, chart.y.unit)}"
-            axes.text(0.12, 0.97, told, transform=axes.transAxes, va="top", color=style.RED, fontsize=9)
+            label = f"↑ {prefixes.quantity(highest, chart.y.unit)}"
+            axes.text(0.12, 0.97, label, transform=axes.transAxes, va="top", color=style.RED, fontsize=9)
 
 
 def _highest(values: Array) -> float:
-    """Return the highest of what is positive and known."""
+    """Return the highest positive value, or 0."""
     return float(values[np.isfinite(values)].max(initial=0.0))
 
 
 def _name_peak(axes: Axes, one: ChartLine, unit: str) -> None:
-    """Name the highest point of a line in the legend, if it is inside and the line has come down from it."""
+    """Name the highest point of a line in the legend, if it is inside the range and the line falls after it."""
     height = np.nan_to_num(np.abs(one.y))
     at = int(np.argmax(height))
     if 0 < at < height.size - 1 and height[at] > 1.02 * height[-1]:
-        told = f"{one.y[at]:.3g} at {prefixes.quantity(one.x[at], unit)}"
-        axes.plot(one.x[at], one.y[at], "o", color=style.RED, label=told, scalex=False, scaley=False)
+        label = f"{one.y[at]:.3g} at {prefixes.quantity(one.x[at], unit)}"
+        axes.plot(one.x[at], one.y[at], "o", color=style.RED, label=label, scalex=False, scaley=False)
 
 
 def _mark_stages(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -> None:
-    """Show where stages begin, and their names above: on several levels where they would touch, else turned."""
+    """Mark the starts of stages, with names above in several rows, or turned if there are too many."""
     for _, start, _ in stages[1:]:
         axes.axvline(start, color=style.GREY, lw=0.8, ls=":", zorder=0)
     if not named or len(stages) < 2:
@@ -209,7 +211,7 @@ def _mark_stages(axes: Axes, stages: Sequence[tuple[str, float, float]], named: 
     widths = [TextPath((0, 0), name, size=NAMES).get_extents().width + NAMES / 2 for name in names]
     levels = _choose_levels(middles, widths)
     turned = max(levels) >= LEVELS
-    if turned:  # those of the longest stages, as near to them as they may be without touching
+    if turned:  # names of the longest stages, as near to them as possible
         longest = np.sort(np.argsort(ends[:, 0] - ends[:, 1], kind="stable")[: int(width / LINE)])
         names, offsets = [names[k] for k in longest], LINE * np.arange(longest.size)
         middles = np.maximum.accumulate(middles[longest] - offsets) + offsets
@@ -226,7 +228,7 @@ def _panels_beside(axes: Axes) -> int:
 
 
 def _choose_levels(middles: Array, widths: Sequence[float]) -> list[int]:
-    """Return the lowest levels on which texts of given middles and widths, in order, do not touch."""
+    """Return the lowest rows in which texts of given middles and widths, in order, do not overlap."""
     ends: list[float] = []
     levels = []
     for middle, width in zip(middles, widths, strict=True):
@@ -237,7 +239,7 @@ def _choose_levels(middles: Array, widths: Sequence[float]) -> list[int]:
 
 
 def compare(runs: Sequence[tuple[str, Sequence[Chart]]]) -> list[Chart]:
-    """Return charts of several runs: the same measures in one, the lines of each run in its colour, named after it."""
+    """Return charts that compare several runs: the lines of each run have its colour and its name."""
     found: dict[tuple[str, Axis, Axis], Chart] = {}
     for number, (name, charts) in enumerate(runs):
         for chart in charts:

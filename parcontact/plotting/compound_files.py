@@ -1,6 +1,6 @@
-"""The files of a fitted compound: a material file that jobs include, and a picture.
+"""Files of a fitted material: a material file that jobs include, and a picture.
 
-The picture has the moduli moved to the reference temperature beside the fit, what the fit misses, branches and shift.
+The picture shows moduli at the reference temperature with the fit, residuals, branches and shift factors.
 """
 
 import math
@@ -19,23 +19,23 @@ from ..rubber.superposition import log_factors
 from ..storage import files, hdf5
 from . import style
 
-COLORS = (style.BLUE, style.RED)  # of storage and loss
-POINTS = 400  # of a line
+COLORS = (style.BLUE, style.RED)  # colours of storage and loss moduli
+POINTS = 400  # number of points of a line
 
 
 def refuse_foreign(target: Path) -> None:
-    """Raise InputError for a file that is there and was not written by a fit: it is never replaced."""
+    """Raise InputError for an existing file that was not written by a fit."""
     if target.suffix not in (".yaml", ".yml"):
         raise InputError(f"--out must end in .yaml, got {str(target)!r}")
     try:
         if target.exists() and not target.read_text(errors="replace").startswith(TITLE):
-            raise InputError(f"{target} is there and was not written by parcontact fit; choose another --out")
+            raise InputError(f"{target} exists and was not written by parcontact fit; choose another --out")
     except OSError as error:
         raise InputError(f"{target} cannot be read: {error}") from error
 
 
 def write_compound(compound: Compound, target: Path, job_band: tuple[float, float] | None) -> Iterator[str]:
-    """Write both files and say so, line by line; `job_band` [Hz] are the frequencies of a job. Raises InputError."""
+    """Write both files, and yield messages; `job_band` [Hz] are the frequencies of a job. Raises InputError."""
     text, picture = compound.text(), target.with_suffix(".png")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -71,7 +71,7 @@ def draw_compound(compound: Compound, path: Path, job_band: tuple[float, float] 
 
 
 def _reduced(compound: Compound) -> Iterator[tuple[Array, list[Array]]]:
-    """Yield of each set frequencies [rad/s] or times [s], and moduli [Pa], as they are at the reference."""
+    """Yield for each set the frequencies [rad/s] or times [s], and the moduli [Pa], at the reference temperature."""
     kind = compound.measured.kind
     for each in compound.measured.sets:
         shift, temperature = compound.shift, each.temperature
@@ -81,7 +81,7 @@ def _reduced(compound: Compound) -> Iterator[tuple[Array, list[Array]]]:
 
 
 def _draw_moduli(top: Axes, bottom: Axes, compound: Compound) -> None:
-    """Draw the moduli as the table has them, Young's or of shear, the fit, and below by how much they differ."""
+    """Draw the measured moduli (Young's or shear), the fit, and their relative difference."""
     measured, sets = compound.measured, list(_reduced(compound))
     letter, kind, size = ("E", "Young's", 2.0 * (1.0 + compound.poisson)) if measured.tension else ("G", "shear", 1.0)
     frequency = measured.kind == "frequency"

@@ -1,5 +1,5 @@
-"""The chart of the conductivity of a gap: how much leaks over pressure or time, where contact closes, and where the
-constriction is too narrow for a fluid to be a continuum."""
+"""Chart of the conductivity of a gap over pressure or time, with marks where contact closes, or where the constriction
+is too narrow for continuum flow."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,13 +10,13 @@ from ..parallel.slab import Array
 from . import style
 from .charts import Axis, Chart, ChartLine
 
-CONTINUUM = 1e-8  # physics: gap [m] that some thirty molecules of water fill; in a narrower one no viscosity is known
+CONTINUUM = 1e-8  # physics: gap of about thirty molecules of water, the least for continuum flow [m]
 THIN = "constriction\nunder 10 nm"
 THIN_LOOK: dict[str, Any] = {"color": style.GREY, "linestyle": "none", "marker": "o", "mfc": "none", "ms": 8}
 
 
 def is_thin(constriction: Any) -> Any:
-    """Return whether a fluid flows through a constriction [m], or through each of them, but not as a continuum."""
+    """Return True if a constriction [m] (or each of several) is open but too narrow for continuum flow."""
     return (constriction > 0.0) & (constriction < CONTINUUM)
 
 

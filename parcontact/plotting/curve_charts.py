@@ -1,6 +1,6 @@
-"""Friction curves: what steady.csv holds, over velocity, or over pressure where that is what changes.
+"""Charts of friction curves (steady.csv) over velocity, or over pressure if only that varies.
 
-At several temperatures there is a line for each, and friction over a_T v besides, where the lines of all are one.
+Several temperatures are separate lines; friction over a_T v shows them on one master curve.
 """
 
 from collections.abc import Iterator
@@ -16,13 +16,13 @@ from .plotted_run import find_free_area, read_table, to_contact_area, to_load
 
 TABLE, THEORY = "steady.csv", "steady_theory.csv"
 NEEDED = ("velocity", "pressure", "friction", "contact_area")
-THIN = 1.0  # tuning: width of lines beside those of the simulation
+THIN = 1.0  # tuning: width of lines of the theory [points]
 COLD = "friction_cold"  # friction without feedback from heat
-DIGITS = 6  # in which values agree that are the same but for rounding
+DIGITS = 6  # significant digits of values that count as equal
 
 
 def chart_steady(directory: Path, over: str = "") -> list[Chart]:
-    """Return panels of a table of steady states; none if it holds no state yet, or is not to be drawn over `over`."""
+    """Return panels of a table of steady states; none without states, or if `over` is not possible."""
     columns, area = read_table(directory / TABLE, NEEDED), find_free_area(directory)
     if over in ("time", "distance") or not columns["velocity"].size:
         return []
@@ -47,7 +47,7 @@ def chart_steady(directory: Path, over: str = "") -> list[Chart]:
     if "flash_temperature" in columns:
         panels.append(("steady flash", x, "flash_temperature", ""))
     theory = {}
-    if x == "velocity" and COLD not in columns and (directory / THEORY).is_file():  # the theory knows of no feedback
+    if x == "velocity" and COLD not in columns and (directory / THEORY).is_file():  # the theory has no feedback
         theory = read_table(directory / THEORY, (*NEEDED, "shift_factor"))
         _add_derived(theory, area)
     found = []
@@ -61,7 +61,7 @@ def chart_steady(directory: Path, over: str = "") -> list[Chart]:
 
 
 def steady_title(directory: Path) -> str:
-    """Return the title of the job, with the pressure or force if there is one for all points."""
+    """Return the title of the job, with the pressure or force if it is the same at all points."""
     job = shown_job(directory / STEADY_RESOLVED) if (directory / STEADY_RESOLVED).is_file() else None
     axis, loads = to_load(read_table(directory / TABLE, ("pressure",))["pressure"], find_free_area(directory))
     name = (job.title if job else "") or "steady sliding"
@@ -69,7 +69,7 @@ def steady_title(directory: Path) -> str:
 
 
 def _add_derived(columns: dict[str, Array], area: float) -> None:
-    """Add what is drawn to the columns of a table: loads, areas as corrected, and speeds at the reference."""
+    """Return the columns of a table with loads, corrected areas, and speeds at the reference temperature."""
     columns["load"] = to_load(columns["pressure"], area)[1]
     columns["area"] = to_contact_area(columns.get("contact_area_corrected", columns["contact_area"]), area)[1]
     if "shift_factor" in columns:
@@ -88,7 +88,7 @@ def _make_lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -
 
 
 def _make_theory(columns: dict[str, Array], x: str, y: str, by: str) -> Iterator[ChartLine]:
-    """Yield thin lines of Persson's theory: as many as there are of the simulation, one over a_T v."""
+    """Yield thin lines of Persson's theory, one per line of the simulation, or one over a_T v."""
     one = {"one": np.zeros_like(columns[x])} if x == "reduced" else {}
     yield from _make_thin(columns | one, x, y, "one" if one else by, "theory", ":", style.GREY if one else "")
 
@@ -96,7 +96,7 @@ def _make_theory(columns: dict[str, Array], x: str, y: str, by: str) -> Iterator
 def _make_thin(
     columns: dict[str, Array], x: str, y: str, by: str, label: str, dashes: str, color: str = ""
 ) -> Iterator[ChartLine]:
-    """Yield thin lines beside those of the simulation, of the same or of another color; the first has the label."""
+    """Yield thin lines in addition to those of the simulation; the first has the label."""
     for number, line in enumerate(_make_lines(columns, x, y, by, "")):
         own = {"color": color or style.line(number)["color"], "linestyle": dashes, "linewidth": THIN}
         yield ChartLine("" if number else label, line.x, line.y, own)
@@ -107,5 +107,5 @@ def _round(values: Array) -> Array:
 
 
 def _count(values: Array) -> int:
-    """Return how many values there are, but for rounding."""
+    """Return the number of values that differ by more than rounding."""
     return np.unique(_round(values)).size

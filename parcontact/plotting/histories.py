@@ -1,4 +1,4 @@
-"""Histories: what was measured in a run, over time, distance, velocity or load."""
+"""Charts of a run over time, distance, velocity, load or approach."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from . import conductivity, prefixes, style
 from .charts import Axis, Chart, ChartLine
 from .plotted_run import PlottedRun
 
-EARLY = 0.05  # of the time that is shown: as long as half of the rows lie within it, a linear axis is hardly used
+EARLY = 0.05  # share of the time within which half of the rows make a linear axis useless
 FEW_ROWS = 8
 FLASH = "flash_temperature"
 ENERGIES = {
@@ -24,14 +24,14 @@ ENERGIES = {
     "surfaces": "surface_energy",
     "snaps": "snap_loss",
 }
-FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # of a run that has calculated its leakage
+FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # columns of a run with leakage
 VISCOUS = "friction_viscous"  # friction without that of the interface; in the table of a run with one
 
 
 @dataclass(frozen=True)
 class Abscissa:
-    """The horizontal axis: values in SI of some rows or all, stages, and whether each row has a mark; `loop`:
-    whether values come back, as loads and approaches do."""
+    """The horizontal axis: SI values of all or some rows, stages, and whether rows have marks. `loop`: values return,
+    as loads and approaches do."""
 
     axis: Axis
     values: Array
@@ -41,7 +41,7 @@ class Abscissa:
     loop: bool = False
 
     def series(self, lines: dict[str, Array]) -> list[ChartLine]:
-        """Return lines by their names; the only one has none."""
+        """Return lines with their names; a single line has no name."""
         mark = {"marker": "o"} if self.marked else {}
         looks = [style.line(number) | mark for number in range(len(lines))]
         rows = slice(None) if self.rows is None else self.rows
@@ -50,7 +50,7 @@ class Abscissa:
 
 
 def chart_histories(run: PlottedRun, over: str = "") -> list[Chart]:
-    """Return panels of what was measured; none of a single solve. Raises InputError where nothing can be drawn."""
+    """Return panels of the measures of a run; none for a single solve. Raises InputError if nothing can be drawn."""
     if not run.curves:
         return []
     along = _choose_abscissa(run, over)
@@ -61,7 +61,7 @@ def chart_histories(run: PlottedRun, over: str = "") -> list[Chart]:
 
 
 def _steps_grow(times: Array) -> bool:
-    """Whether most rows are so early that only a logarithmic axis tells them apart."""
+    """Return True if most rows are so early that only a logarithmic axis separates them."""
     later = times[times > 0.0]
     return later.size > FEW_ROWS and bool(max(np.median(later), later[0]) < EARLY * later[-1])
 
@@ -82,9 +82,9 @@ def _add_theory(chart: Chart, run: PlottedRun) -> Chart:
 
 
 def _find_charts(run: PlottedRun, along: Abscissa) -> Iterator[Chart]:
-    """Yield the panels that a run has: key, measure, lines by name, and whether there is something to see."""
+    """Yield the panels of a run: key, measure, lines by name, and whether it shows anything."""
     columns, free = run.columns, run.free
-    signed = run.backwards and not along.marked  # over the speed, no direction is told
+    signed = run.backwards and not along.marked  # the axis of speed has no direction
     friction = "friction coefficient" + "\nalong x" * signed
     load_axis, load = run.load
     area_axis, area = run.in_contact
@@ -93,7 +93,7 @@ def _find_charts(run: PlottedRun, along: Abscissa) -> Iterator[Chart]:
             "friction",
             Axis(friction),
             {"": columns["friction_x" if signed else "friction"]},
-            run.slides and bool(columns["friction"].any()),  # it is 0 where no load presses
+            run.slides and bool(columns["friction"].any()),  # friction is 0 without a load
         ),
         ("area", area_axis, {"": area}, True),
         (
@@ -130,13 +130,13 @@ def _find_charts(run: PlottedRun, along: Abscissa) -> Iterator[Chart]:
             yield found if along.marked or along.loop else replace(found, peak=peak, spikes=not peak)
     if "flow_x" in columns and max(np.nanmax(columns[name], initial=0.0) for name in FLOWS) > 0.0:
         rows = slice(None) if along.rows is None else along.rows
-        flows = {told: columns[name][rows] for name, told in FLOWS.items()}
+        flows = {label: columns[name][rows] for name, label in FLOWS.items()}
         narrowest = dict.fromkeys(flows, columns["constriction"][rows])
         yield conductivity.chart(along.axis, along.values, flows, narrowest)
 
 
 def describe_solve(run: PlottedRun) -> str:
-    """Return what the last solve has found, in words."""
+    """Return the results of the last solve as text."""
     axis, load = run.load
     fraction = run.columns["contact_area_corrected"][-1]
     area = prefixes.quantity(fraction * run.area, "m²", 4) if run.free else f"{fraction:.4g} of the nominal"
@@ -148,7 +148,7 @@ def describe_solve(run: PlottedRun) -> str:
 
 
 def _choose_abscissa(run: PlottedRun, over: str) -> Abscissa:
-    """Return what was asked for, else the distance if the surface slides whenever time passes, else time, else load."""
+    """Return the given axis, else distance if the surface slides whenever time passes, else time, else load."""
     if not over:
         slides = run.slides and all(stage.speed > 0.0 for stage in run.job.history if stage.seconds)
         over = ("distance" if slides else "time") if run.lasts else "load"
@@ -158,8 +158,8 @@ def _choose_abscissa(run: PlottedRun, over: str) -> Abscissa:
         return _choose_velocity(run)
     axis, values = Axis("distance slid" if over == "distance" else over, UNITS[over]), run.columns[over]
     if not np.ptp(values):
-        told = f"{over}, which stays {values[-1]:g} {axis.unit}"
-        raise InputError(f"{run.directory}: there is nothing to draw over {told}")
+        constant = f"{over}, which is constant at {values[-1]:g} {axis.unit}"
+        raise InputError(f"{run.directory}: nothing can be drawn over {constant}")
     if over == "approach":
         return Abscissa(axis, values, loop=True)
     stages = []
@@ -169,10 +169,10 @@ def _choose_abscissa(run: PlottedRun, over: str) -> Abscissa:
 
 
 def _choose_velocity(run: PlottedRun) -> Abscissa:
-    """Return the last row of each stage that slides, over its speed."""
+    """Return the axis of speed, with the last row of each sliding stage."""
     ends = [(run.job.history[number].speed, rows[-1]) for number, rows in run.rows_of_stages.items()]
     sliding = sorted((speed, row) for speed, row in ends if speed > 0.0)
     if not sliding:
-        raise InputError(f"{run.directory}: there is nothing to draw over velocity, the surface slides in no stage")
+        raise InputError(f"{run.directory}: nothing can be drawn over velocity, no stage slides")
     speeds, rows = zip(*sliding, strict=True)
     return Abscissa(Axis("sliding velocity", "m/s"), np.array(speeds), np.array(rows), marked=True)

@@ -1,4 +1,4 @@
-"""A picture of leakage: where the fluid flows through the gap, and how much over load or time."""
+"""Picture of leakage: the flow through the gap, and conductivity over load or time."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -14,10 +14,10 @@ from ..leakage.flow import Flow, Map
 from . import charts, conductivity, prefixes, style
 from .style import Panel
 
-DECADES = 3  # of the flow that are told apart by colour
-SAME = 1e-6  # rounding: relative: pressures this close are one
-KINDS = ("flow", "constriction")  # of the columns of a direction
-LONG = 100.0  # ratio of times, beyond which their axis is logarithmic
+DECADES = 3  # decades of the flow on the colour scale
+SAME = 1e-6  # rounding: relative difference below which pressures are the same
+KINDS = ("flow", "constriction")  # kinds of columns per direction
+LONG = 100.0  # ratio of times above which their axis is logarithmic
 
 
 def draw_leakage(
@@ -48,9 +48,9 @@ def draw_leakage(
 
 
 def chart_of(rows: Sequence[Any], over: str) -> charts.Chart:
-    """Return the chart of K `over` pressure or time: without a choice over time if a pressure comes more than once.
+    """Return the chart of K `over` pressure or time (default: time if a pressure occurs more than once).
 
-    Over pressure the last one of instants that follow each other at one pressure stands for all of them.
+    Over pressure, the last of consecutive instants at one pressure is drawn.
     """
     columns = {name: np.array([getattr(row, name) for row in rows]) for name in rows[0]._fields}
     pressure, time = columns["pressure"], columns["time"]
@@ -66,12 +66,12 @@ def chart_of(rows: Sequence[Any], over: str) -> charts.Chart:
 
 
 def _draw_flow(axes: Axes, size: tuple[float, float], gap: Map, flow: Flow, flux: Map) -> None:
-    """Draw where a fluid flows through a gap, as a share of the largest flow, and circle the constriction."""
+    """Draw the flow through a gap over its largest value, and circle the constriction."""
     axes.set_facecolor("k")
     look: dict[str, Any] = {"extent": (0.0, size[0], 0.0, size[1]), "origin": "lower", "interpolation": "nearest"}
     axes.imshow(np.where(gap > 0.0, gap, np.nan), cmap="Greys_r", alpha=0.5, **look)
     if flow.position is not None:
-        most = float(np.nanpercentile(flux, 99.9)) or 1.0  # fewer cells than that may carry all
+        most = float(np.nanpercentile(flux, 99.9)) or 1.0  # all the flow may be in fewer cells
         drawn = axes.imshow(flux / most, cmap="viridis", norm=LogNorm(10.0**-DECADES, 1.0), **look)
         axes.figure.colorbar(drawn, ax=axes, shrink=0.7, label="flow over its largest")
         row, column = flow.position
@@ -83,13 +83,13 @@ def _draw_flow(axes: Axes, size: tuple[float, float], gap: Map, flow: Flow, flux
 
 
 def flux(gap: Map, pressure: Map, size: tuple[float, float]) -> Map:
-    """Return the magnitude of g^3 grad p in wet cells, NaN elsewhere, over the largest; in single precision."""
+    """Return the magnitude of g^3 grad p in open cells over the largest, NaN elsewhere; in single precision."""
     slopes = []
     for axis, length in ((0, size[1]), (1, size[0])):
-        faces = np.nan_to_num(np.diff(pressure, axis=axis)) * (pressure.shape[axis] / length)  # none into a wall
+        faces = np.nan_to_num(np.diff(pressure, axis=axis)) * (pressure.shape[axis] / length)  # no flow into walls
         none = np.zeros_like(np.take(pressure, [0], axis))
         slopes.append(0.5 * (np.concatenate([none, faces], axis) + np.concatenate([faces, none], axis)))
-    shape = gap / (np.nanmax(gap, initial=0.0) or 1.0)  # the cube of a small gap [m] is below all numbers
+    shape = gap / (np.nanmax(gap, initial=0.0) or 1.0)  # the cube of a small gap [m] underflows
     found = np.where(np.isfinite(pressure), shape**3 * np.hypot(*slopes), np.nan)
     most = np.nanmax(found, initial=0.0)
     return np.asarray(found / most if most > 0.0 else found, dtype=np.float32)

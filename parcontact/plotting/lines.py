@@ -1,4 +1,4 @@
-"""Pressures on a line: along a narrow map, or through the axis of a sphere or cylinder."""
+"""Charts of pressure along a line: of a narrow map, or through the axis of a sphere or cylinder."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -14,16 +14,16 @@ from ..theory import hertz
 from . import prefixes, style
 from .plotted_run import Fields, PlottedRun
 
-INSTANTS = 5  # at most so many lines in one panel
-MANY_LINES: dict[str, Any] = {"fontsize": 8, "labelspacing": 0.2}  # of a legend: not to end below its panel
-MOST_LETTERS = 16  # of the name of a stage in a legend
-RANGE = 1.3  # that is shown over that of the contact
+INSTANTS = 5  # most lines in a panel
+MANY_LINES: dict[str, Any] = {"fontsize": 8, "labelspacing": 0.2}  # small legend that fits into a panel
+MOST_LETTERS = 16  # most letters of the name of a stage in a legend
+RANGE = 1.3  # shown range over the radius of contact
 
-Curve = tuple[str, Array, Array]  # its name, and pressures [Pa] on a line [m]
+Curve = tuple[str, Array, Array]  # name, positions [m] and pressures [Pa]
 
 
 def line_panels(run: PlottedRun, fields: Fields, narrow: bool) -> Iterator[style.Panel]:
-    """Yield the panel of a narrow map, or of the only shape of a surface if that is round."""
+    """Yield the panel of a narrow map, or of a surface that is a single round shape."""
     shape = run.job.surface[0]
     if narrow:
         yield _make_strip(run, fields)
@@ -32,7 +32,8 @@ def line_panels(run: PlottedRun, fields: Fields, narrow: bool) -> Iterator[style
 
 
 def _choose_instants(run: PlottedRun, fields: Fields) -> tuple[list[tuple[int, str]], str]:
-    """Return some saved instants, evenly, and what tells them apart; and the load of all if it is one, for a title."""
+    """Return some evenly spaced saved instants with their labels, and the load for the title if it is the same at
+    all."""
     indices = sorted({fields.shown[int(k)] for k in np.linspace(0, len(fields.shown) - 1, INSTANTS)})
     instants = [(index, int(fields.steps[index]), float(fields.times[index])) for index in indices]
     loads = {run.pressed(step) for _, step, _ in instants}
@@ -48,7 +49,7 @@ def _choose_instants(run: PlottedRun, fields: Fields) -> tuple[list[tuple[int, s
 def _draw_pressures(
     axes: Axes, curves: Sequence[Curve], along: str, title: str, theory: Sequence[Curve] = (), reach: float = 0.0
 ) -> None:
-    """Draw pressures on lines up to `reach` on both sides, if it is given, beside theory."""
+    """Draw pressures on lines up to `reach` on both sides, if given, with the theory."""
     shades = np.linspace(0.0, 0.85, len(curves)) if len(curves) > 1 else [0.45]
     for (name, x, pressure), shade in zip(curves, shades, strict=True):
         axes.plot(x, pressure, color=colormaps[style.SEQUENCE](shade), label=name)
@@ -77,7 +78,7 @@ def _make_strip(run: PlottedRun, fields: Fields) -> style.Panel:
 
 
 def _make_profile(run: PlottedRun, fields: Fields, shape: Sphere | Cylinder) -> style.Panel:
-    """Return a panel of pressures on a line through the axis, seen from it, beside Hertz's under the last load."""
+    """Return a panel of pressures on a line through the axis, with Hertz's pressure under the last load."""
     across = isinstance(shape, Cylinder) and shape.axis == "x"
     centre = shape.center or (run.job.grid.lx / 2, run.job.grid.ly / 2)
     chosen, load = _choose_instants(run, fields)

@@ -1,4 +1,4 @@
-"""Maps of saved instants: panels of one, and frames of all for films and reports."""
+"""Maps of saved instants: panels of one instant, and frames of all for movies and reports."""
 
 import io
 from collections.abc import Callable, Iterator, Mapping
@@ -24,7 +24,7 @@ Window = tuple[slice, slice]
 
 
 class Look(NamedTuple):
-    """How a map is drawn: its unit, its colours, and that of points which have no value."""
+    """Style of a map: its unit, its colours, and the colour of points without a value."""
 
     unit: str
     colors: str
@@ -42,17 +42,17 @@ LOOKS = {
     "slip": Look("", "viridis", note=" (1) and stick: traction over its bound"),
 }
 TRACTIONS = ("traction_x", "traction_y")
-TENSION = "RdBu_r"  # colours of pressures that pull at some points
-STRIP = 8  # points across: a map as narrow as this is drawn as a line
-TICKS = 5  # intervals at most; were it left to the room there is, ticks would change after the layout, and be cut off
-BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile and ratio to it, above which points do not set the range of colours
+TENSION = "RdBu_r"  # colours of pressures of both signs
+STRIP = 8  # most points across of a map that is drawn as a line
+TICKS = 5  # most intervals of ticks, fixed so that the layout does not change
+BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile, and the ratio to it above which points do not set the colour range
 
 
 def map_panels(run: PlottedRun, at: str = "") -> tuple[list[style.Panel], list[style.Panel]]:
-    """Return panels of pressures on a line, and maps of one instant; none of what was not saved.
+    """Return panels of pressures on a line, and of the saved maps of one instant.
 
-    The instant is the one that is asked for, else the last, or where the surfaces came off that of the pull-off or of
-    the largest load. Raises InputError where nothing is saved at the instant that is asked for.
+    The default instant is the last one; for contacts that end in detachment, that of the pull-off or of the largest
+    load. Raises InputError if nothing is saved at the instant `at`.
     """
     try:
         with hdf5.open_results(run.directory / "fields.h5") as file:
@@ -62,8 +62,8 @@ def map_panels(run: PlottedRun, at: str = "") -> tuple[list[style.Panel], list[s
             return pressures, [] if narrow or not fields.saved else list(_panels(run, fields))
     except (OSError, KeyError):
         if at:
-            told = f"--at {at}: {run.directory} holds no maps; output: {{fields: [...]}} saves them"
-            raise InputError(told) from None
+            message = f"--at {at}: {run.directory} has no maps; save them by output: {{fields: [...]}}"
+            raise InputError(message) from None
         return [], []
 
 
@@ -73,7 +73,7 @@ def _panels(run: PlottedRun, fields: Fields) -> Iterator[style.Panel]:
     if pressure is not None and x is not None and y is not None:
         found["traction"], found["slip"] = stick_maps(np.hypot(x, y), pressure, run.job)
     if found["gap"] is not None:
-        del found["displacement"]  # one of both says enough
+        del found["displacement"]  # displacement and gap show the same
     instant = run.instant(int(fields.steps[fields.chosen]), float(fields.times[fields.chosen]))
     for name, values in found.items():
         if values is not None:
@@ -95,9 +95,10 @@ def _panel(fields: Fields, name: str, values: Array, instant: str, window: Windo
 
 
 def mask(name: str, values: Array, pressure: Array | None, job: Job) -> Array:
-    """Return a map as it is drawn: pressures where there are any, gaps, none negative, where the surfaces do not touch.
+    """Return a map for drawing, NaN at points without a value.
 
-    Pressures of contacts that stick may be below 0, and are drawn everywhere. Without pressures all gaps above 0 are.
+    Pressures are drawn where they are positive, with adhesion everywhere; gaps outside of contact, or where they are
+    positive if there are no pressures.
     """
     if name == "pressure":
         return values if (values < 0.0).any() else np.where(values > 0.0, values, np.nan)
@@ -117,7 +118,7 @@ def stick_maps(traction: Array, pressure: Array, job: Job) -> tuple[Array, Array
 
 
 def _find_window(pressure: Array | None) -> Window:
-    """Return the rows and columns around a contact that fills only a part of the box; else all of them."""
+    """Return the rows and columns around a contact that fills only part of the box; else all."""
     whole = slice(None), slice(None)
     if pressure is None or not (pressure > 0.0).any() or (pressure < 0.0).any():
         return whole
@@ -130,10 +131,10 @@ def _find_window(pressure: Array | None) -> Window:
 
 
 def find_range(values: Array) -> tuple[float, float]:
-    """Return the range of the colours: from 0 if nothing is negative; few very high points do not darken all others.
+    """Return the range of the colours; a few very high values do not extend it.
 
-    Where pressures pull at some points and push at others, both sides are seen: the high points are those above 0.
-    Where no point has a value the range is empty, from inf to -inf.
+    It begins at 0 if no value is negative, and is symmetric if pressures have both signs. It is (inf, -inf) if no point
+    has a value.
     """
     finite = values[np.isfinite(values)]
     if not finite.size:
@@ -146,9 +147,9 @@ def find_range(values: Array) -> tuple[float, float]:
 def _draw_map(
     axes: Axes, name: str, points: tuple[Array, Array], limits: tuple[float, float], **bar: Any
 ) -> Callable[[Array], None]:
-    """Draw an empty map in colours; returns what fills it. Colours of one number have one tick, of none no scale."""
+    """Draw an empty colour map, and return a function that fills it. The scale of a single value has one tick."""
     look, (low, high) = LOOKS[name], limits
-    if name == "pressure" and low < 0.0:  # white where nothing pulls or pushes
+    if name == "pressure" and low < 0.0:  # white at pressure 0
         look, low, high = look._replace(colors=TENSION), min(low, -high), max(-low, high)
     width = 1.0 if high < low else (high - low or abs(high) or 1.0)
     norm = Normalize(low, low + width) if low <= high else Normalize(0.0, width)
@@ -171,13 +172,13 @@ def _draw_map(
 def _draw_line(
     axes: Axes, name: str, points: tuple[Array, Array], limits: tuple[float, float]
 ) -> Callable[[Array], None]:
-    """Draw an empty map that is so narrow that it is a line; returns what fills it."""
+    """Draw an empty line for a narrow map, and return a function that fills it."""
     lies = points[0].size > points[1].size
     along, (low, high) = points[0] if lies else points[1], limits
     (line,) = axes.plot(along, np.zeros_like(along), color=style.BLUE)
     if high > low:
         axes.set_ylim(low, low + 1.05 * (high - low))
-    else:  # a scale would be made up
+    else:  # there are no values for a scale
         axes.set_yticks([low if high == low else 0.0])
     prefixes.label(axes.xaxis, "x" if lies else "y", "m")
     prefixes.label(axes.yaxis, name, LOOKS[name].unit)
@@ -185,7 +186,7 @@ def _draw_line(
 
 
 def dataset_of(file: h5py.File, name: str) -> str:
-    """Return the data set of a map in a file, '' if there is none: temperatures of states are there under two names."""
+    """Return the name of the data set of a map in a file, '' if there is none; temperatures may have two names."""
     return next((key for key in (f"{name}_map", name) if key in file and file[key].ndim > 1), "")
 
 
@@ -212,7 +213,7 @@ def draw_frames(
     for index, label in labels.items():
         fill(read(index))
         axes.set_title(f"{name}, {label}")
-        if figure.get_layout_engine() is not None:  # once: the first frame has the place of all others
+        if figure.get_layout_engine() is not None:  # the layout of the first frame is kept for all
             figure.draw_without_rendering()
             figure.set_layout_engine("none")
         png = io.BytesIO()

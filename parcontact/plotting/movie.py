@@ -1,4 +1,4 @@
-"""Movies of a map over its saved instants: a GIF, and an MP4 where `ffmpeg` is on the path."""
+"""Movies of a map over its saved instants: a GIF, and an MP4 if `ffmpeg` is on the path."""
 
 import shutil
 import subprocess
@@ -13,17 +13,17 @@ from ..storage import files, hdf5
 from . import maps
 from .plotted_run import PlottedRun, choose_evenly, label_frames
 
-FRAMES = 200  # of a movie at most: instants in between are left out
-SECONDS = 8.0  # for which a movie plays, unless its frames are too few
-FASTEST, SLOWEST = 20, 2  # frames per second
+FRAMES = 200  # most frames of a movie; other instants are left out
+SECONDS = 8.0  # duration of a movie with enough frames [s]
+FASTEST, SLOWEST = 20, 2  # limits on the frames per second
 FFMPEG, KINDS = "ffmpeg", (".gif", ".mp4")
 
 
 def write_movie(directory: Path, name: str, out: Path | None = None) -> list[Path]:
-    """Write all saved instants of the map `name`, with one range of colours; returns the paths of the movies.
+    """Write a movie of the map `name` over all saved instants, with one range of colours; returns the paths.
 
-    They are NAME.gif in the directory, and NAME.mp4 where ffmpeg is; or `out` alone. Raises InputError for another
-    kind of file, an MP4 without ffmpeg, and a map that was not saved.
+    Without `out` they are NAME.gif in the directory, and NAME.mp4 if ffmpeg exists. Raises InputError for another kind
+    of file, an MP4 without ffmpeg, and a map that was not saved.
     """
     targets = [out] if out else [directory / f"{name}{kind}" for kind in KINDS if kind == ".gif" or _find_ffmpeg()]
     if targets[0].suffix not in KINDS:
@@ -44,14 +44,14 @@ def _find_ffmpeg() -> str | None:
 
 
 def _draw(directory: Path, name: str) -> tuple[list[Image.Image], int]:
-    """Return the frames, and how many are shown in a second."""
+    """Return the frames, and their rate [1/s]."""
     path = directory / "fields.h5"
     with hdf5.open_results(path) as file:
         run = PlottedRun(directory)
         labels = label_frames(run, file)
         there = [key for key in maps.LOOKS if key in file]
         if name not in there or not labels:
-            raise InputError(f"{path} holds no map of {name}; it holds {', '.join(there) or 'none'}")
+            raise InputError(f"{path} has no map of {name}; it has {', '.join(there) or 'none'}")
         chosen = choose_evenly(labels, FRAMES)
         rate = int(np.clip(round(len(chosen) / SECONDS), SLOWEST, FASTEST))
         return list(maps.draw_frames(file, name, chosen, run.job)), rate
@@ -60,12 +60,12 @@ def _draw(directory: Path, name: str) -> tuple[list[Image.Image], int]:
 def _write_gif(target: Path, frames: Sequence[Image.Image], rate: int) -> None:
     first, *others = frames
     with files.replaced(target, files.is_marked) as movie:
-        duration, comment = int(1000 / rate), files.MARK.encode()  # of a frame [ms]
+        duration, comment = int(1000 / rate), files.MARK.encode()  # duration of a frame [ms]
         first.save(movie, "GIF", save_all=True, append_images=others, duration=duration, loop=0, comment=comment)
 
 
 def _write_mp4(target: Path, frames: Sequence[Image.Image], rate: int) -> None:
-    """Hand the frames to ffmpeg, in the codec it prefers; players want an even number of points along each side."""
+    """Encode the frames by ffmpeg, with even numbers of points along each side, as players require."""
     width, height = (2 * (side // 2) for side in frames[0].size)
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(rate), "-i", "-"]
     look = ["-pix_fmt", "yuv420p", "-metadata", f"comment={files.MARK}", "-movflags", "+faststart", "-f", "mp4"]
@@ -74,5 +74,5 @@ def _write_mp4(target: Path, frames: Sequence[Image.Image], rate: int) -> None:
         pictures = b"".join(frame.crop((0, 0, width, height)).tobytes() for frame in frames)
         done = subprocess.run(command, input=pictures, capture_output=True, check=False)
         if done.returncode:
-            why = (done.stderr.decode(errors="replace").strip().splitlines() or ["it says nothing"])[-1]
-            raise InputError(f"{FFMPEG} has failed to write {target}: {why}")
+            why = (done.stderr.decode(errors="replace").strip().splitlines() or ["no message"])[-1]
+            raise InputError(f"{FFMPEG} cannot write {target}: {why}")

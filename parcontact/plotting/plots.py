@@ -1,7 +1,7 @@
-"""Pictures of runs, finished or not, and of friction curves: what was measured, and maps of one instant.
+"""Pictures of runs, also unfinished ones, and of friction curves: charts, and maps of one instant.
 
-Which panels there are follows from the job: friction if the surface slides, energies if they were asked for, curves
-over the load if all stages are single solves, pressures along a line through a sphere beside Hertz's.
+The job determines the panels: friction if the surface slides, energies if they were requested, curves over the load if
+all stages are single solves, pressures along a line with Hertz's for a sphere.
 """
 
 import os
@@ -28,8 +28,8 @@ MEASURES = "measures.csv"
 
 @dataclass(frozen=True)
 class PlotOptions:
-    """Options of a picture; '' and () leave the choice to what the directories hold. `out` is a file, `at` a step
-    or a time [s], whose maps are drawn."""
+    """Options of a picture; '' and () mean: chosen by the contents of the directories. `out` is a file, `at` a step or
+    a time [s] of the maps."""
 
     format: str = ""
     panels: Sequence[str] = ()
@@ -46,13 +46,13 @@ class PlotOptions:
         if unknown := [name for name in self.log if name not in ("x", "y", "none")]:
             raise InputError(f"--log: there is no axis {unknown[0]!r}; give x, y, x,y or none")
         if self.at and (self.movie or self.compare):
-            raise InputError("--at chooses the maps of one picture, and goes with neither --movie nor --compare")
+            raise InputError("--at chooses the maps of one picture; leave it out with --movie or --compare")
 
     def wants(self, key: str) -> bool:
         return not self.panels or key in self.panels
 
     def choose(self, found: Sequence[Chart]) -> list[Chart]:
-        """Return the charts that are asked for, in that order."""
+        """Return the requested charts in the requested order."""
         return [chart for name in self.panels for chart in found if chart.key == name] if self.panels else list(found)
 
     def to_panels(self, found: Sequence[Chart]) -> list[style.Panel]:
@@ -60,9 +60,9 @@ class PlotOptions:
 
 
 def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> list[Path]:
-    """Draw what is in each directory, or compare them in one picture; returns the pictures' paths.
+    """Draw each directory, or compare all in one picture; returns the paths of the pictures.
 
-    Raises InputError where there is nothing to draw.
+    Raises InputError if there is nothing to draw.
     """
     if options.out and len(directories) > 1 and not options.compare:
         raise InputError("--out names one picture: give one directory, or --compare several in one")
@@ -75,7 +75,7 @@ def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> l
 
 
 def draw_steady(table: Path) -> Path:
-    """Draw steady.csv alone, beside it; returns the picture's path."""
+    """Draw steady.csv into its directory; returns the path of the picture."""
     with style.drawing():
         title, panels = (
             _wrap(curve_charts.steady_title(table.parent)),
@@ -92,7 +92,7 @@ def _save(figure: Figure, stem: Path, options: PlotOptions = PlotOptions()) -> P
     target = options.out or stem.with_name(f"{stem.name}.{options.format or 'png'}")
     kind = options.format or target.suffix.lstrip(".")
     if kind not in style.MARKED:
-        raise InputError(f"{target}: pictures are {', '.join(style.MARKED)}; say which with --format")
+        raise InputError(f"{target} must end in .{', .'.join(style.MARKED)}; or give --format")
     try:
         return style.save_figure(figure, target, kind)
     except OSError as error:
@@ -111,7 +111,7 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
         titles.append(found if run.curves else f"{found}\n{histories.describe_solve(run)}")
         groups.append(options.to_panels(options.choose(histories.chart_histories(run, options.over))))
     elif options.at:
-        raise InputError(f"--at {options.at}: {directory} holds no run, and so no maps of one")
+        raise InputError(f"--at {options.at}: {directory} has no run, and therefore no maps")
     if has_curve and options.wants("steady"):
         titles.append(_wrap(curve_charts.steady_title(directory)))
         groups.append(options.to_panels(curve_charts.chart_steady(directory, options.over)))
@@ -123,9 +123,9 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
         groups += [options.to_panels([chart]) for chart in options.choose(sweep_charts.chart_sweep(directory))]
     if not (has_run or has_curve or has_sweep):
         if not directory.exists():
-            raise InputError(f"{directory} is no directory")
-        lacking = f"it has no {MEASURES} and no {curve_charts.TABLE}{_suggest(directory)}"
-        raise InputError(f"{directory} holds no run and no friction curve: {lacking}")
+            raise InputError(f"{directory} is not a directory")
+        lacking = f"it has neither {MEASURES} nor {curve_charts.TABLE}{_suggest(directory)}"
+        raise InputError(f"{directory} has neither a run nor a friction curve: {lacking}")
     if options.panels and not any((*groups, fields)):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
     title = "\n".join(filter(None, (*titles[:1], theory_settings.describe_settings(directory))))
@@ -133,9 +133,9 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
 
 
 def _suggest(path: Path) -> str:
-    """Return which directory may have been meant: the first below it that holds something, or that of a job file."""
+    """Return a suggestion: the first directory below with results, or the output directory of a job file."""
     if path.is_file():
-        return "; give the output directory of a run, as out/job"
+        return "; give the output directory of a run, such as out/job"
     found = [
         table.parent
         for name in (MEASURES, curve_charts.TABLE, sweep_charts.TABLE)
@@ -148,12 +148,12 @@ def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figur
     """Draw the lines of all directories in one picture."""
     for directory in directories:
         if not _find_charts(directory, options):
-            raise InputError(f"{directory} holds nothing to compare")
+            raise InputError(f"{directory} has nothing to compare")
     return style.figure_of("", [options.to_panels(compare_charts(directories, options))], legend=True)
 
 
 def compare_charts(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> list[Chart]:
-    """Return charts with the lines of all directories that have any."""
+    """Return charts with the lines of all directories."""
     found = [_find_charts(directory, options) for directory in directories]
     return charts.compare([each for each in zip(_name_directories(directories), found, strict=True) if each[1]])
 
@@ -168,7 +168,7 @@ def _find_charts(directory: Path, options: PlotOptions) -> list[Chart]:
 
 
 def _name_directories(directories: Sequence[Path]) -> list[str]:
-    """Return what tells directories apart: of cases of one sweep their keys, else the last parts of paths."""
+    """Return labels of directories: the swept keys of cases of one sweep, else the last parts of paths that differ."""
     if named := _name_cases(directories):
         return named
     paths = [directory.absolute() for directory in directories]
@@ -178,7 +178,8 @@ def _name_directories(directories: Sequence[Path]) -> list[str]:
 
 
 def _name_cases(directories: Sequence[Path]) -> list[str]:
-    """Return the keys in which cases of one sweep differ, as `velocity 1 m/s, seed 2`; nothing for others."""
+    """Return the keys in which cases of one sweep differ, such as `velocity 1 m/s, seed 2`; [] for other
+    directories."""
     paths = [directory.absolute() for directory in directories]
     table = paths[0].parent.parent / sweep_charts.TABLE if paths else Path()
     if {path.parent for path in paths} != {table.parent / CASES} or not table.is_file():
@@ -192,6 +193,6 @@ def _name_cases(directories: Sequence[Path]) -> list[str]:
 
 
 def _name_value(key: str, value: Any) -> str:
-    """Return a key of a sweep and its value, as `velocity 100 mm/s`."""
+    """Return a key of a sweep and its value as text, such as `velocity 100 mm/s`."""
     shown = prefixes.quantity(value, sweep_charts.UNITS.get(key, ""), 4) if isinstance(value, float) else value
     return f"{key} {shown}"

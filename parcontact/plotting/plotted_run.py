@@ -1,4 +1,4 @@
-"""The results of a run that its picture is drawn from."""
+"""The results of a run, for pictures."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -22,11 +22,11 @@ MEASURED = (
     *("step", "time", "distance", "pressure", "friction", "friction_x", "contact_area", "contact_area_corrected"),
     *("approach", "mean_gap", "max_pressure", "work", "stored", "dissipated"),
 )
-NEAREST = 3  # steps with maps that a message names
+NEAREST = 3  # number of nearest steps with maps in a message
 
 
 class PlottedRun:
-    """A run's job and rows. The rows before the first load of a body at rest are left out: nothing has happened yet."""
+    """The job and the rows of a run, without the unloaded rows at the beginning."""
 
     def __init__(self, directory: Path) -> None:
         self.directory, self.job = directory, shown_job(directory / RESOLVED)
@@ -34,7 +34,7 @@ class PlottedRun:
         self.free = self.job.grid.boundary == "free"
         self._all = read_table(directory / "measures.csv", MEASURED)
         if not self._all["step"].size:
-            raise InputError(f"{directory} holds no step yet")
+            raise InputError(f"{directory} has no step yet")
         first = int(self._all["pressure"][0] == 0.0 and self._all["step"].size > 1)
         self.columns = {name: values[first:] for name, values in self._all.items()}
         self.lasts, self.slides = self._all["time"][-1] > 0.0, self._all["distance"][-1] > 0.0
@@ -45,29 +45,30 @@ class PlottedRun:
 
     @property
     def in_contact(self) -> tuple[Axis, Array]:
-        """The contact area as corrected for the cells on its edge."""
+        """Return the contact area corrected for cells at its edges."""
         return to_contact_area(self.columns["contact_area_corrected"], self.area * self.free)
 
     @property
     def backwards(self) -> bool:
-        """Whether the surface moves along x only, and towards -x in a stage: the magnitude of friction has a cusp."""
+        """Return True if the surface moves along x only and reverses, where the magnitude of friction would have a
+        cusp."""
         velocities = [stage.velocity for stage in self.job.history]
         return any(x < 0.0 for x, _ in velocities) and not any(y for _, y in velocities)
 
     @property
     def curves(self) -> bool:
-        """Whether there is anything to draw over time or load: a single solve is a few numbers."""
+        """Return True if there is more than one solve, so that there is a history to draw."""
         return bool(self.lasts) or len(set(self.columns["pressure"])) > 1
 
     @cached_property
     def timeline(self) -> Timeline:
-        """The stage of the job that each step is in."""
+        """Return the stage of each step."""
         steps, times = self._all["step"].astype(int).tolist(), self._all["time"].tolist()
         return Timeline.from_job(self.job, times[-1]).follow(dict(zip(steps, times, strict=True)))
 
     @property
     def telling_step(self) -> int:
-        """The step whose maps show the contact: the last one, or where the surfaces came off that of the pull-off or of
+        """Return the step whose maps show the contact: the last one, or after a detachment that of the pull-off or of
         the largest load."""
         columns = {name: values.tolist() for name, values in self._all.items()}
         row = pull_off.choose_row(columns, bool(marker.detached(self.directory)))
@@ -75,7 +76,7 @@ class PlottedRun:
 
     @property
     def rows_of_stages(self) -> dict[int, list[int]]:
-        """The rows of each stage, by its number; the initial state belongs to the first."""
+        """Return the rows of each stage, by its index; the initial state belongs to the first stage."""
         found: dict[int, list[int]] = {}
         for row, step in enumerate(self.columns["step"].astype(int).tolist()):
             if (stage := self._stage(step)) >= 0:
@@ -83,17 +84,17 @@ class PlottedRun:
         return found
 
     def _stage(self, step: int) -> int:
-        """Return the stage of a step, -1 where the job knows of none."""
+        """Return the stage of a step, -1 if the job does not have this step."""
         step = max(step, 1)
         return self.timeline.span(step).index if step <= len(self.timeline) else -1
 
     def instant(self, step: int, time: float) -> str:
-        """Return when a map was saved and what pressed then: `2.1 ms, 100 kPa`, `150 mN`, `2.1 ms, approach 20 µm`."""
+        """Return time and load of a saved map as text: `2.1 ms, 100 kPa`, `150 mN`, `2.1 ms, approach 20 µm`."""
         when = prefixes.quantity(time, "s", 4) if self.lasts else ""
         return ", ".join(filter(None, (when, self.pressed(step))))
 
     def pressed(self, step: int) -> str:
-        """Return what presses after a step, as its stage prescribes it; '' where no row tells."""
+        """Return the load after a step as text, as its stage prescribes it; '' if the step has no row."""
         rows, stage = np.flatnonzero(self._all["step"] == step), self._stage(step)
         if not rows.size:
             return ""
@@ -103,21 +104,21 @@ class PlottedRun:
         return prefixes.quantity(loads[rows[-1]], axis.unit)
 
     def name_stage(self, step: int) -> str:
-        """Return the name that the job gives to the stage of a step; '' where it gives none."""
+        """Return the name of the stage of a step; '' if it has none."""
         stage = self._stage(step)
         name = self.job.history[stage].name if stage >= 0 else ""
         return "" if name == f"stage {stage + 1}" else name
 
     def moved(self, step: int) -> tuple[float, float]:
-        """Return where the surface is after a step [m]; where it began if the job does not know of that step."""
+        """Return the position of the surface after a step [m]; the initial one if the job does not have this step."""
         return self.timeline[step].position if 1 <= step <= len(self.timeline) else (0.0, 0.0)
 
 
 class Fields:
-    """The saved maps of a run. `shown` are the instants to draw: the one that was asked for, else all; `chosen` is the
-    one of these whose maps are drawn, the last by default.
+    """The saved maps of a run: `shown` are the instants to draw, `chosen` is the one whose maps are drawn (default: the
+    last).
 
-    `at` is a step, as a whole number, or a time [s]: of a step the maps must be saved, of a time they are the nearest.
+    `at` is a step (a whole number), whose maps must be saved, or a time [s], for which the nearest maps are taken.
     """
 
     def __init__(self, file: h5py.File, at: str = "", until: int | None = None) -> None:
@@ -131,12 +132,12 @@ class Fields:
         self.chosen = (before or self.shown or [-1])[-1]
 
     def read(self, name: str) -> Array | None:
-        """Return the map of a name at the chosen instant, if it was saved."""
+        """Return the named map at the chosen instant, or None."""
         field = self.file[name][self.chosen] if name in self.file and self.shown else None
         return field if field is not None and np.isfinite(field).all() else None
 
     def _index(self, at: str) -> int:
-        """Return the instant that is asked for; raises InputError where no map is saved then."""
+        """Return the index of the instant `at`; raises InputError if no map is saved then."""
         if not self.saved:
             raise InputError(f"--at {at}: no map is saved yet")
         steps, times = self.steps[self.saved], self.times[self.saved]
@@ -150,21 +151,21 @@ class Fields:
 
 
 def choose_evenly(labels: dict[int, str], most: int) -> dict[int, str]:
-    """Return at most so many instants, evenly, the first and the last among them."""
+    """Return at most `count` evenly spaced instants, including the first and the last."""
     indices = list(labels)
     kept = np.linspace(0, len(indices) - 1, min(len(indices), most)).astype(int)
     return {indices[k]: labels[indices[k]] for k in kept}
 
 
 def label_frames(run: PlottedRun, file: h5py.File) -> dict[int, str]:
-    """Return when each map of a run was saved, and what pressed then, by its index."""
+    """Return time and load of each map of a run as text, by its index."""
     fields = Fields(file)
-    told = ((k, int(fields.steps[k]), float(fields.times[k])) for k in fields.saved)
-    return {k: f"{run.instant(step, time)} (step {step})".lstrip() for k, step, time in told}
+    saved = ((k, int(fields.steps[k]), float(fields.times[k])) for k in fields.saved)
+    return {k: f"{run.instant(step, time)} (step {step})".lstrip() for k, step, time in saved}
 
 
 def read_table(path: Path, names: Sequence[str]) -> dict[str, Array]:
-    """Return columns of a table by name; raises InputError where one of those that are needed is missing."""
+    """Return columns of a table by name; raises InputError if a needed one is missing."""
     columns = {name: np.array(values, dtype=float) for name, values in read_back.read_results(path).items()}
     if missing := [name for name in names if name not in columns]:
         raise InputError(f"{path} has no column {', '.join(missing)}")
@@ -172,7 +173,7 @@ def read_table(path: Path, names: Sequence[str]) -> dict[str, Array]:
 
 
 def find_curve_job(directory: Path) -> Job | None:
-    """Return the job of the friction curve in a directory, None where no job is left there."""
+    """Return the job of the friction curve in a directory, None if no job is stored there."""
     found = (directory / name for name in (STEADY_RESOLVED, RESOLVED))
     return next((shown_job(path) for path in found if path.is_file()), None)
 
@@ -184,10 +185,10 @@ def find_free_area(directory: Path) -> float:
 
 
 def to_load(pressure: Array, area: float) -> tuple[Axis, Array]:
-    """Return what presses: the force on the box of a free scene of this area, else the mean pressure."""
+    """Return the load: the force on the box of a free scene of area `box` [m^2], else the mean pressure."""
     return (Axis("force", "N"), pressure * area) if area else (Axis("pressure", "Pa"), pressure)
 
 
 def to_contact_area(fraction: Array, area: float) -> tuple[Axis, Array]:
-    """Return the contact area of a free scene, whose box has this area, else its fraction of the nominal one."""
+    """Return the contact area of a free scene, whose box has this area, else the nominal fraction."""
     return (Axis("contact area", "m²"), fraction * area) if area else (Axis(FRACTION), fraction)

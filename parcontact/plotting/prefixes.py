@@ -1,4 +1,4 @@
-"""Units with the prefix that suits the numbers on an axis: 1.04 kPa, not 0.00104167 MPa."""
+"""Units of axes with the prefix that suits their numbers: 1.04 kPa, not 0.00104167 MPa."""
 
 import math
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from ..printed import LONG_TIME, TIMES, prefixed, quantity
 __all__ = ["label", "label_log_times", "prefixed", "quantity"]
 
 MARKS = {"1 ns": 1e-9, "1 µs": 1e-6, "1 ms": 1e-3, "1 s": 1.0, "1 min": 60.0, "1 h": 3600.0}
-MARKS |= {"1 day": TIMES["days"], "1 year": TIMES["years"]}  # of a logarithmic axis [s]
-LETTER = 0.085  # width of a letter of a tick [inch]
-FEW_MARKS = 3  # less leave a reader without a scale
+MARKS |= {"1 day": TIMES["days"], "1 year": TIMES["years"]}  # ticks of a logarithmic axis [s]
+LETTER = 0.085  # width of a letter of a tick label [inch]
+FEW_MARKS = 3  # least number of ticks
 
 
 def label(axis: Axis, name: str, unit: str) -> None:
-    """Name an axis of SI values, and show its ticks in the unit that suits the range of the axis."""
+    """Set the label of an axis of SI values, with ticks in the unit that suits its range."""
     shown, size = prefixed(unit, max(map(abs, axis.get_view_interval())))
     if shown in TIMES and axis.get_scale() == "linear":
         axis.set_major_locator(_RoundTimes(size))
@@ -27,7 +27,8 @@ def label(axis: Axis, name: str, unit: str) -> None:
 
 
 def label_log_times(axis: Axis, name: str) -> bool:
-    """Name a logarithmic axis of long times, with a tick at a second, a minute, an hour; return whether it is one."""
+    """Set the label of a logarithmic axis of long times with ticks at 1 s, 1 min, 1 h, ...; return False for other
+    axes."""
     low, high = axis.get_view_interval()
     marks = {size: mark for mark, size in MARKS.items() if low <= size <= high}
     if high < LONG_TIME * TIMES["min"] or len(marks) < FEW_MARKS:
@@ -41,7 +42,7 @@ def label_log_times(axis: Axis, name: str) -> bool:
 
 
 def _thin_out(marks: dict[float, str], width: float) -> dict[float, str]:
-    """Return marks of a logarithmic axis of a `width` [inch] that do not touch, from the longest time on."""
+    """Return the ticks of a logarithmic axis of a `width` [inch] that do not overlap, from the longest time on."""
     kept, scale = dict[float, str](), width / math.log(max(marks) / min(marks))
     for size, mark in sorted(marks.items(), reverse=True):
         nearest = min(kept, default=math.inf)

@@ -1,4 +1,4 @@
-"""Pictures of a study: how errors fall with mesh and time (the paper's Fig. 6)."""
+"""Pictures of a study: convergence with mesh and time step (as Fig. 6 of the paper), and error over cost."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,13 +17,13 @@ from . import style
 NAMES = {"mu_max": "largest friction", "mu_end": "friction in the end", "area_corrected": "contact area, corrected"}
 MARKS = {"mesh and time together": "o-", "mesh with auto steps": "o-", "mesh alone": "s--", "time alone": "^:"}
 INTEGRATORS = {"exponential": style.BLUE, "exponential-linear": style.GREEN, "backward-euler": style.RED}
-BAND = 5.0  # times the upper edge of the grey band over its lower one
-LEAST = 1e-7  # smaller errors are drawn here
+BAND = 5.0  # ratio of the edges of the grey band
+LEAST = 1e-7  # smallest error on the axis; smaller ones are drawn there
 
 
 @dataclass(frozen=True)
 class StudyCurve:
-    """Errors of one quantity along one ladder; sizes over that of the box."""
+    """Errors of one quantity along one ladder of sizes (over the size of the box)."""
 
     quantity: str
     integrator: str
@@ -35,7 +35,7 @@ class StudyCurve:
 def plot_study(directory: Path, curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Path | None:
     """Draw `convergence.png` and return its path; None if nothing is refined.
 
-    `doubts` are the relative uncertainties of the references, shown as grey bands: what lies in them is not known.
+    `doubts` are the relative uncertainties of the references; errors below them are in grey bands.
     """
     drawn = [curve for curve in curves if any(0.0 < error < math.inf for error in curve.errors)]
     if not drawn:
@@ -53,14 +53,14 @@ def _convergence(curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> F
 
 
 def _draw_ladders(axes: Axes, name: str, curves: Sequence[StudyCurve], doubt: float) -> None:
-    """Draw errors of a quantity over how many times as fine a mesh or a step is as the coarsest."""
+    """Draw errors of a quantity over the refinement of mesh or step with respect to the coarsest."""
     for curve in curves:
         x = [max(curve.sizes) / size for size in curve.sizes]
         label, color = f"{curve.ladder}, {curve.integrator}", INTEGRATORS[curve.integrator]
         axes.plot(x, _per_cent(curve.errors), MARKS[curve.ladder], color=color, label=label)
     axes.set(xscale="log", xlabel="refinement, coarsest = 1", ylabel=f"{NAMES[name]}:\nerror [%]")
     _scale_errors(axes, [error for curve in curves for error in curve.errors if math.isfinite(error)])
-    if 0.0 < doubt < math.inf:  # grey from below up to what is not known of the reference
+    if 0.0 < doubt < math.inf:  # grey up to the uncertainty of the reference
         low, high = axes.get_ylim()
         low = min(max(low, 100 * doubt / BAND), 100 * doubt)
         axes.axhspan(low, 100 * doubt, color="0.92", zorder=0)

@@ -1,4 +1,4 @@
-"""How all pictures look: readable when printed 8 cm wide, in colours that colour-blind readers can tell apart."""
+"""Style of all pictures: readable at a width of 8 cm, in colours for colour-blind readers."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,10 +19,10 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#00
 DASHES = ("-", "--", "-.", ":")  # with the colours, for black and white prints
 BLUE, RED, GREEN, *_ = COLORS
 GREY = "0.4"
-SEQUENCE = "viridis"  # of lines in an order, like instants
-WIDTH, HEIGHT = 5.8, 2.25  # of a picture and of a row of panels [inch]: 10 points are 5.4 when printed 8 cm wide
-COLUMNS = 2  # panels beside each other
-LINE = 68  # letters of a title
+SEQUENCE = "viridis"  # colour map for lines in an order, such as instants
+WIDTH, HEIGHT = 5.8, 2.25  # width of a picture, height of a row of panels [inch]
+COLUMNS = 2  # panels per row
+LINE = 68  # most letters in a line of a title
 LEGEND_LINE = 0.2  # height of each line of a legend [inch]
 DPI = 200
 RC: dict[Any, Any] = {
@@ -44,31 +44,35 @@ RC: dict[Any, Any] = {
     "svg.fonttype": "none",
     "pdf.fonttype": 42,
 }
-ABOVE: dict[str, Any] = {  # where that of a panel of half the width is
+ABOVE: dict[str, Any] = {  # legend of a panel of half the width
     "loc": "lower center",
     "bbox_to_anchor": (0.5, 1.0),
     "ncols": 3,
     "columnspacing": 1.0,
     "handlelength": 1.4,
 }
-BESIDE: dict[str, Any] = {  # where the legend of a panel is that leaves it no room
+BESIDE: dict[str, Any] = {  # legend at the right of a full panel
     "loc": "upper left",
     "bbox_to_anchor": (1.0, 1.0),
     "borderaxespad": 0.0,
     "handlelength": 1.8,
 }
-BELOW: dict[str, Any] = {  # where that of a small picture is
+BELOW: dict[str, Any] = {  # legend of a small picture
     "loc": "upper center",
     "bbox_to_anchor": (0.5, -0.22),
     "columnspacing": 1.0,
     "handlelength": 1.8,
 }
-MARKED = {"png": "Software", "pdf": "Creator", "svg": "Creator"}  # where pictures name the program
+MARKED = {
+    "png": "Software",
+    "pdf": "Creator",
+    "svg": "Creator",
+}  # key of the metadata that names the program, by format
 
 
 @contextmanager
 def drawing(settings: Mapping[Any, Any] = RC) -> Iterator[None]:
-    """Draw with these settings, and otherwise with Matplotlib's own: a matplotlibrc of others has no say."""
+    """Draw with these settings and Matplotlib's defaults; a user's matplotlibrc is ignored."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(settings)
@@ -76,27 +80,28 @@ def drawing(settings: Mapping[Any, Any] = RC) -> Iterator[None]:
 
 
 def save_figure(figure: Figure, path: Path, kind: str = "png", dpi: int = DPI) -> Path:
-    """Write a png, pdf or svg that is known as one of this program, and may replace such a one; returns its path."""
+    """Write a png, pdf or svg with the name of this program in its metadata, and return its path; replaces such files
+    only."""
     with files.replaced(path, files.is_marked) as file:
         figure.savefig(file, dpi=dpi, format=kind, metadata={MARKED[kind]: files.MARK})
     return path
 
 
 def plain(text: str, most: int = 1000) -> str:
-    """Return a text of at most so many letters, without formulas: a dollar would begin one."""
+    """Return a text shortened to `most` letters, with dollar signs escaped."""
     return (text if len(text) <= most else text[: most - 1] + "…").replace("$", r"\$")
 
 
 def line(number: int) -> dict[str, Any]:
-    """Return colour and dashes of the line of this number, from 0."""
+    """Return colour and dashes of the line with this index."""
     return {"color": COLORS[number % len(COLORS)], "linestyle": DASHES[number % len(DASHES)]}
 
 
 def figure_of(
     title: str, groups: Sequence[Sequence[Panel]], legend: bool = False, maps: Sequence[Panel] = ()
 ) -> Figure:
-    """Draw groups of panels below each other, each in even rows, and `maps` in places of one size, of which the last
-    may stay empty; with `legend` one for all panels, under the title."""
+    """Draw groups of panels below each other in even rows, then `maps` in places of one size; with `legend` one for all
+    panels, under the title."""
     parts = [(row, 1, len(row)) for group in groups for row in _split_rows(group)]
     parts += [(maps, -(-len(maps) // COLUMNS), COLUMNS)] if maps else []
     heights = [rows for _, rows, _ in parts]
@@ -120,15 +125,15 @@ def _split_rows(group: Sequence[Panel]) -> list[Sequence[Panel]]:
 
 
 def _find_look(handle: Any) -> tuple[str, ...]:
-    """Return what tells the mark of a legend from others: its colour, dashes and marker."""
+    """Return colour, dashes and marker of a legend entry, to compare entries."""
     if hasattr(handle, "get_linestyle"):
         return to_hex(handle.get_color()), str(handle.get_linestyle()), str(handle.get_marker())
     return (to_hex(handle.patches[0].get_facecolor()),) if hasattr(handle, "patches") else (repr(handle),)
 
 
 def _put_legend_above(figure: Figure, title: str) -> None:
-    """Replace the legends of all panels by one above them, whose title is that of the figure; leave them where two
-    names have the same look."""
+    """Replace the legends of all panels by one above them, with the title of the figure, unless two names look the
+    same."""
     found: dict[str, Artist] = {}
     for axes in figure.axes:
         found |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}

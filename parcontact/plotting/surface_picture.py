@@ -1,4 +1,4 @@
-"""A picture of a rigid surface: its map, the distribution of its heights, and its spectra with the grid's limits."""
+"""Picture of a rigid surface: its map, the distribution of its heights, and its spectra with the limits of the grid."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,17 +13,20 @@ from ..physics.surface_statistics import Statistics
 from . import prefixes, style
 
 BINS = 60
-FEW, OUTLYING = 1e-3, 1.5  # share of the points on either side that may stick out, and how far all are drawn
-RESOLVED = 8  # cells that a wave needs to be resolved in a contact
-COARSEST = 800  # points of a map along a side: a finer one is drawn from every second, third, ... point
-ROUNDING = 1e-20  # rounding: powers below this share of the largest are not drawn
-LEGEND = 8  # size of letters [points]
+FEW, OUTLYING = (
+    1e-3,
+    1.5,
+)  # share of outlying points on either side, and the range that is drawn over that of the others
+RESOLVED = 8  # cells of a wave that is resolved in a contact
+COARSEST = 800  # most points of the drawn map along a side
+ROUNDING = 1e-20  # rounding: smallest power over the largest that is drawn
+LEGEND = 8  # size of letters of the legend [points]
 
 
 @dataclass(frozen=True)
 class Sketch:
-    """Heights [m] of shape (ny, nx) on a box of `size` [m], and what they are like; `measured` has the spectrum of the
-    map that they come from, if they do."""
+    """Heights [m] of shape (ny, nx) on a box of `size` [m], with their statistics; `measured` is the spectrum of the
+    original map, if any."""
 
     heights: Array
     size: tuple[float, float]
@@ -54,7 +57,7 @@ def _draw_map(axes: Axes, sketch: Sketch) -> None:
 
 
 def _find_ends(heights: Array) -> tuple[float, float]:
-    """Return the range of heights that is drawn, which does not follow a few points that stick out."""
+    """Return the range of heights that is drawn, which ignores a few outliers."""
     low, most, highest, high = (float(end) for end in np.quantile(heights, [0.0, FEW, 1.0 - FEW, 1.0]))
     middle = 0.5 * (most + highest)
     low, high = max(low, middle - OUTLYING * (middle - most)), min(high, middle + OUTLYING * (highest - middle))
@@ -76,7 +79,7 @@ def _draw_distribution(axes: Axes, sketch: Sketch) -> None:
 
 
 def _draw_spectra(axes: Axes, sketch: Sketch, spectra: list[tuple[str, Array, Array, int]], name: str) -> None:
-    """Draw spectra, each with its name, wavenumbers, powers and number, beside the limits of the grid."""
+    """Draw spectra, each with name, wavenumbers, powers and number, and the limits of the grid."""
     for label, q, power, number in spectra:
         drawn = power > ROUNDING * power.max(initial=0.0)
         axes.loglog(q[drawn], power[drawn], label=label, **style.line(number))

@@ -1,9 +1,8 @@
-"""Pictures of the results of a sweep: friction and contact area over the swept key, beside theory if it is there.
+"""Pictures of the results of a sweep: friction and contact area over the swept key, with theory if available; sweeps of
+friction curves over velocity, or over another quantity that varies within curves.
 
-Those of a sweep of friction curves are over velocity, or what else has several values in each curve.
-
-Points are cases, lines their means over seeds alone: each value of another key has a line of its own. A colour is a
-value of the first of these keys, in all panels, dashes are those of further keys.
+Points are cases, lines their means over seeds. Each value of another key has its own line: values of the first such key
+have colours, values of further keys dashes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,12 +24,12 @@ TABLE = sweep_table.TABLE
 UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N", "size": "m", "distance": "m"}
 UNITS |= {"duration": "s", "work": "J/m²", "range": "m", "shear_modulus": "Pa", "modulus_inf": "Pa"}
 UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m"}
-MARKERS, DASHES = ("o", "s"), ("--", ":")  # of means and theories of the first and the second column of a panel
-STYLES = ("-", "--", ":", "-.")  # of lines, by what differs besides the key that has the colours
-WIDE = 10.0  # ratio of the largest to the smallest number from which on an axis is logarithmic
+MARKERS, DASHES = ("o", "s"), ("--", ":")  # markers of means, dashes of theories, by column of a panel
+STYLES = ("-", "--", ":", "-.")  # dashes of lines, by the values of further keys
+WIDE = 10.0  # ratio of the largest to the smallest number above which an axis is logarithmic
 Panels = tuple[tuple[str, Axis, dict[str, str]], ...]
 FRICTION, AREA = Axis("friction coefficient"), Axis(FRACTION)
-PANELS: Panels = (  # measures and their columns by the names of lines
+PANELS: Panels = (  # panels: columns by the names of lines
     ("friction", FRICTION, {"highest": "mu_max", "dynamic": "mu_dyn"}),
     ("area", AREA, {"simulation": CORRECTED}),
     ("pull-off", Axis("pull-off force", "N"), {"pull-off": "pull_off"}),
@@ -41,14 +40,16 @@ CURVE_PANELS: Panels = (
     ("friction", FRICTION, {"steady sliding": "friction"}),
     ("area", AREA, {"steady sliding": CORRECTED}),
 )
-SHARES = {"friction": "error_friction", CORRECTED: "error_area"}  # columns of relative errors of columns
-SIZES = {name: f"{name}_error" for name in ("mu_max", "mu_dyn", "pull_off")}  # those of errors in the unit of these
+SHARES = {"friction": "error_friction", CORRECTED: "error_area"}  # columns with the relative error of a column
+SIZES = {
+    name: f"{name}_error" for name in ("mu_max", "mu_dyn", "pull_off")
+}  # columns with the absolute error of a column
 
 Rows = Sequence[dict[str, Any]]
 
 
 def chart_sweep(directory: Path) -> list[Chart]:
-    """Return panels of a sweep; none if no case has a number to draw, or no key with numbers is swept."""
+    """Return panels of a sweep; none without results, or without a swept key of numbers."""
     table = sweep_table.results(directory)
     rows, panels = sweep_table.read_cases(table), PANELS
     keys = _find_keys(rows)
@@ -69,10 +70,10 @@ def chart_sweep(directory: Path) -> list[Chart]:
                 color = style.line(list(hues).index(hue) if len(lines) > 1 else k)["color"]
                 look = {"color": color, "linestyle": STYLES[len(dashes) % len(STYLES)]}
                 theory = f"theory, {name}" if len(columns) > 1 else "theory"
-                told = ", ".join([*([name] if len(columns) > 1 else []), *filter(None, [hue, *rest])]) or name
-                series += _make_lines((told, theory), own, column, key, look, k)
+                label = ", ".join([*([name] if len(columns) > 1 else []), *filter(None, [hue, *rest])]) or name
+                series += _make_lines((label, theory), own, column, key, look, k)
             dashes.append(", ".join(rest))
-        if any(one.y.any() for one in series):  # surfaces that come off have no friction and no area in the end
+        if any(one.y.any() for one in series):  # after detachment there is neither friction nor area
             series = list(_name_once(series))
             values = np.concatenate([one.x for one in series])
             wide = bool(values.min() > 0.0 and values.max() >= WIDE * values.min())
@@ -81,26 +82,27 @@ def chart_sweep(directory: Path) -> list[Chart]:
 
 
 def sweep_title(directory: Path) -> str:
-    """Return the title of the job, as its cases have it; '' if there is none."""
+    """Return the title of the job from its cases; '' if there is none."""
     jobs = sorted(directory.glob(f"cases/*/{RESOLVED}")) + sorted(directory.glob(f"cases/*/{STEADY_RESOLVED}"))
     return shown_job(jobs[0]).title if jobs else ""
 
 
 def _find_keys(rows: Rows) -> list[str]:
-    """Return the keys that have several numbers and choose no sample, the first of those that move together."""
+    """Return the keys with several numbers, except those that choose a sample; of keys that change together the
+    first."""
     keys = _tell_apart(rows, _swept(rows))
     return [name for name in keys if all(isinstance(row[name], float) for row in rows)]
 
 
 def _swept(rows: Rows) -> list[str]:
-    """Return the keys of a sweep that choose no sample."""
+    """Return the keys of a sweep except those that choose a sample, such as seeds."""
     names = list(rows[0]) if rows else ["case", "state"]
     keys = names[names.index("case") + 1 : names.index("state")]
     return [name for name in keys if name.split(".")[-1] not in SAMPLES]
 
 
 def _tell_apart(rows: Rows, names: Sequence[str]) -> list[str]:
-    """Return the names with several values, the first of those that move together."""
+    """Return the names with several values; of names that change together the first."""
     found: dict[tuple[int, ...], str] = {}
     for name in names:
         first: dict[str, int] = {}
@@ -111,8 +113,8 @@ def _tell_apart(rows: Rows, names: Sequence[str]) -> list[str]:
 
 
 def _split(rows: Rows, key: str) -> dict[tuple[str, ...], Rows]:
-    """Return the rows of each line by the values of the other keys: rows that agree in all but `key`, what moves
-    together with it, and what chooses a sample."""
+    """Return the rows of each line by the values of the other keys, except `key`, the keys that change with it, and
+    those that choose a sample."""
     places = [name for name in sweep_table.PLACES if name in rows[0]]
     others = [name for name in _tell_apart(rows, [key, *places, *_swept(rows)]) if name != key]
     lines: dict[tuple[str, ...], list[dict[str, Any]]] = {}
@@ -122,8 +124,7 @@ def _split(rows: Rows, key: str) -> dict[tuple[str, ...], Rows]:
 
 
 def _named(key: str, value: Any) -> str:
-    """Return a value with its unit, after the name of its key unless that is clear: a pressure, a temperature, a word
-    or a file."""
+    """Return a value with its unit, and the name of its key unless the unit or word is clear."""
     word = key.split(".")[-1].removesuffix("s")
     if not isinstance(value, float):
         return Path(str(value)).stem
@@ -134,7 +135,7 @@ def _named(key: str, value: Any) -> str:
 def _make_lines(
     names: tuple[str, str], rows: Rows, column: str, key: str, look: dict[str, Any], number: int
 ) -> Iterator[ChartLine]:
-    """Yield means as a line with its points, all cases as small dots, and the theory, of the column of a number."""
+    """Yield the means as a line with points, all cases as small dots, and the theory, of a column."""
     theirs = "contact_area" if column == CORRECTED else column
     x, y, theory = (_read_column(rows, wanted) for wanted in (key, column, f"theory_{theirs}"))
     if (there := np.isfinite(y)).any():
@@ -149,7 +150,7 @@ def _make_lines(
 
 
 def _name_once(series: Sequence[ChartLine]) -> Iterator[ChartLine]:
-    """Yield lines of which only the first with a name has it: dots and theories are alike but for their colours."""
+    """Yield lines; of lines with the same name only the first keeps it."""
     known = set[str]()
     for one in series:
         yield replace(one, name="" if one.name in known else one.name)
@@ -162,7 +163,7 @@ def _average(x: Array, y: Array) -> tuple[Array, Array]:
 
 
 def _read_errors(rows: Rows, column: str, values: Array) -> Array:
-    """Return the errors of a column as shares of its values, NaN where they are not known."""
+    """Return the relative errors of a column, NaN if unknown."""
     if column in SHARES:
         return _read_column(rows, SHARES[column])
     with np.errstate(divide="ignore", invalid="ignore"):

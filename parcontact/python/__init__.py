@@ -1,1 +1,1 @@
-"""The public Python interface, of which `parcontact` itself names every part."""
+"""The public Python interface; `parcontact` exports its parts."""

@@ -34,19 +34,18 @@ Values = str | float | Sequence[float] | Array | None
 
 @dataclass(frozen=True)
 class Curve:
-    """Steady states, point by point: arrays of shape (points,), of each temperature all velocities under each pressure.
+    """Steady states: arrays of shape (points,), for each temperature all velocities under each pressure.
 
-    `velocity` [m/s], `pressure` [Pa, mean], `friction` [-, by energy: dissipated power over load and velocity, and what
-    an interface adds], `friction_slopes` [-, by the slopes of the rigid surface], `error_friction`, `error_area` [-,
-    relative, of friction and of the corrected area], `contact_area`, `contact_area_corrected` [share of the nominal,
-    as counted and corrected by its edges], `force_x`, `force_y`
-    [N, on the rigid surface], `approach`, `mean_gap` [m], `max_pressure` [Pa], `residual` [-, of the solve];
-    `power` [W] of shape (points, branches): what each branch of the material dissipates, none for a free scene;
-    `temperature` [deg C, NaN if none was asked for], `shift_factor` [-, relaxation times over those of the reference];
-    `flash_temperature`, `max_temperature` [K, rise in the mean over the contact and the highest one; NaN without
-    `thermal`], `error_flash` [-, relative, of the former].
+    `velocity` [m/s], `pressure` [Pa, mean], `friction` [-, dissipated power over load and velocity, plus interface
+    friction], `friction_slopes` [-, by the slopes of the rigid surface], `error_friction`, `error_area` [-, relative
+    errors of friction and of the corrected area], `contact_area`, `contact_area_corrected` [share of the nominal area,
+    counted and corrected at edges], `force_x`, `force_y` [N, on the rigid surface], `approach`, `mean_gap` [m],
+    `max_pressure` [Pa], `residual` [-, of the solve]; `power` [W, shape (points, branches), dissipated by each branch;
+    none for a free scene]; `temperature` [deg C, NaN if not requested], `shift_factor` [-, relaxation times over those
+    at the reference]; `flash_temperature`, `max_temperature` [K, mean rise in the contact and highest rise; NaN without
+    `thermal`], `error_flash` [-, relative error of the mean rise].
 
-    A point that could not be solved is NaN, and `failures` says why.
+    Points that could not be solved are NaN, with the reason in `failures`.
     """
 
     velocity: Array
@@ -80,20 +79,21 @@ def steady(
     set: Mapping[str, Any] | None = None,
     comm: MPI.Intracomm | None = None,
 ) -> Curve:
-    """Steady sliding of a job's surface at velocities [m/s] under mean pressures [Pa], on every rank; collective.
+    """Solve steady sliding at velocities [m/s] under mean pressures [Pa], and return the curve on every rank;
+    collective.
 
     `job` and `set` as for `Simulation`; velocities and pressures as lists or as texts `first:last:count`, equally
-    spaced in the logarithm (default: those of the job's `steady` section, and the pressure of its first loaded stage);
-    `temperatures` [deg C] as a list, of a material that has a shift (default: those of that section). Raises JobError,
-    and InputError where velocities or pressures lack; warns (ParcontactWarning, on root) of points that failed
-    and of what is allowed but means little. Nothing is written.
+    spaced in the logarithm (default: the job's `steady` section, and the pressure of its first loaded stage);
+    `temperatures` [deg C] as a list, for a material with a shift (default: that section). Raises JobError, and
+    InputError for missing velocities or pressures; warns (ParcontactWarning, on root) about failed points and
+    implausible values. Nothing is written.
     """
     asked = {
         "velocities": _numbers("velocities", velocities),
         "pressures": _numbers("pressures", pressures),
         "temperatures": _numbers("temperatures", temperatures, ranges=False),
     }
-    keys = {f"steady.{name}": list(values) for name, values in asked.items() if values}  # a job needs no history then
+    keys = {f"steady.{name}": list(values) for name, values in asked.items() if values}  # the job needs no history
     found = read_job_here(job, {**set, **keys} if isinstance(set, Mapping) else set or keys, comm)
     slab = Slab(all_ranks(comm), *found.grid.points)
     with python_words():
@@ -127,7 +127,7 @@ def steady(
 
 
 def _curve(wanted: Sequence[Wanted], points: Sequence[Point | None], failures: tuple[str, ...]) -> Curve:
-    """Return the columns of steady.csv by their names, as arrays; where a point is, it was asked for."""
+    """Return the columns of steady.csv as arrays; failed points have their requested coordinates."""
     places = {"velocity": "speed", "pressure": "pressure", "temperature": "temperature"}
     found = {name: np.array([getattr(at, place) for at in wanted]) for name, place in places.items()}
     wanted_names = {each.name for each in fields(Curve)} - {*places, "power", "failures"}

@@ -1,4 +1,4 @@
-"""Jobs as they come from Python: a file or a mapping, found sound by root, the same on every rank."""
+"""Jobs given in Python as a file or a mapping: read on root, and sent to all ranks."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from ..scene import Setup, sanity
 from .wording import python_words
 
 Given = str | os.PathLike[str] | Mapping[str, Any] | Job
-SOMEWHERE = {"points": 2, "size": 1.0}  # a grid for what needs none
+SOMEWHERE = {"points": 2, "size": 1.0}  # grid of a job that needs none
 ANYTHING = {"model": "elastic", "shear_modulus": 1.0e6}
 A_TOUCH = [{"pressure": 1.0}]
-DEEPEST = 50  # mappings and lists in each other
-SHOWN = 60  # characters of a value in a message
+DEEPEST = 50  # deepest nesting of mappings and lists
+SHOWN = 60  # most characters of a value in a message
 PACKAGE = str(Path(__file__).parents[1]) + os.sep
 
 
 def read_job_here(given: Given, changes: Mapping[str, Any] | None = None, comm: MPI.Intracomm | None = None) -> Job:
-    """The job of a file or mapping with some keys changed, on every rank of `comm`; collective.
+    """Return the job of a file or mapping with changed keys, on every rank of `comm`; collective.
 
-    Raises JobError, also where ranks give different jobs, and InputError for a run that cannot begin here.
+    Raises JobError, also if ranks give different jobs, and InputError for a run that cannot begin.
     """
     world = all_ranks(comm)
     agree(world, given, changes)
@@ -47,7 +47,7 @@ def read_job_here(given: Given, changes: Mapping[str, Any] | None = None, comm: 
 
     with python_words():
         sent = on_root(world, load)
-    return made[0] if made else sent  # root's has the arrays of heights, which are not sent
+    return made[0] if made else sent  # only root's job has arrays of heights
 
 
 def _sound(job: Job) -> Job:
@@ -56,14 +56,14 @@ def _sound(job: Job) -> Job:
 
 
 def all_ranks(comm: MPI.Intracomm | None) -> MPI.Intracomm:
-    """The communicator to work on. Raises InputError for what is none."""
+    """Return the communicator (default: all ranks). Raises InputError for other objects."""
     if comm is not None and not isinstance(comm, MPI.Intracomm):
         raise InputError(f"comm must be a communicator of mpi4py, got {comm!r:.60}")
     return MPI.COMM_WORLD if comm is None else comm
 
 
 def agree(comm: MPI.Intracomm, given: object, changes: object = None) -> None:
-    """Raise JobError unless all ranks give the same; collective."""
+    """Raise JobError unless all ranks give the same job; collective."""
     if comm.size == 1:
         return
     wait_for_all(comm, "gives a job")
@@ -80,7 +80,7 @@ def agree(comm: MPI.Intracomm, given: object, changes: object = None) -> None:
 
 
 def _flat(value: Any, key: str, depth: int = 0) -> Iterator[tuple[str, str]]:
-    """The values of a job by the keys that lead to them, as text."""
+    """Yield key and value of all values of a job as text."""
     if isinstance(value, Job):
         value = value.resolved()
     if isinstance(value, np.ndarray) and value.dtype != object:
@@ -99,27 +99,27 @@ def _flat(value: Any, key: str, depth: int = 0) -> Iterator[tuple[str, str]]:
 
 
 def path_of(path: object) -> Path:
-    """Return a path. Raises InputError for what is none."""
+    """Return a path. Raises InputError for other objects."""
     if not isinstance(path, str | os.PathLike):
         raise InputError(f"a path must be a text or a pathlib.Path, got {path!r:.60}")
     return Path(path)
 
 
 def of_parts(**parts: Any) -> Job:
-    """A job of which some sections matter, on this rank alone. Raises JobError."""
+    """Return a job from some sections, on this rank only. Raises JobError."""
     rest = {"grid": SOMEWHERE, "surface": {"shape": "flat"}, "material": ANYTHING, "history": A_TOUCH}
     return _sound(mesh.load(rest | parts))
 
 
 def warn_of(setup: Setup, temperatures: Sequence[float] = ()) -> None:
-    """Warn, on root, of what is allowed but means little, also at temperatures [deg C]; collective."""
+    """Warn on root about implausible values, also at `temperatures` [deg C]; collective."""
     for doubt in sanity.find_doubts(setup, temperatures):
         if setup.slab.root:
             warn(doubt)
 
 
 def warn(doubt: Doubt) -> None:
-    """Warn at the line of the user's script that called this package."""
+    """Issue a warning at the line of the user's script that called this package."""
     level, frame = 1, inspect.currentframe()
     while frame is not None and frame.f_code.co_filename.startswith(PACKAGE):
         level, frame = level + 1, frame.f_back

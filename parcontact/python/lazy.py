@@ -1,6 +1,6 @@
-"""Maps of a file of fields that xarray reads piece by piece.
+"""Maps of a field file that xarray reads piece by piece.
 
-The file is open only while a piece is read: an open one would keep a run that still goes on from writing it.
+The file is open only during a read, as an open file would block a running run.
 """
 
 from pathlib import Path

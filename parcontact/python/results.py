@@ -1,4 +1,4 @@
-"""Results of a run as an xarray.Dataset, read when they are used."""
+"""Results of a run as an xarray.Dataset, read when needed."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ NO_XARRAY = "parcontact.open needs xarray, which is not installed: pip install x
 
 
 def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
-    """Return what a run has measured and saved, also one that still goes on.
+    """Return the results of a run, also of a running one, as a dataset.
 
-    The columns of measures.csv by their names, along `step` and with the coordinate `time` [s]; each map of fields.h5
-    as `pressure_map`, `gap_map`, ..., of shape (t, y, x), read from the file where and when it is used, with the
-    coordinates `t` [s] and `map_step`: `friction.sel(step=map_step)` is that of each map. Variables have their `units`,
-    `1` for ratios and counts; columns of effects of others have none. What was not asked for is NaN. Raises InputError
-    for a directory without results, ImportError where xarray is not installed.
+    The columns of measures.csv along `step`, with the coordinate `time` [s]; maps of fields.h5 as `pressure_map`,
+    `gap_map`, ..., of shape (t, y, x), read when used, with the coordinates `t` [s] and `map_step`:
+    `friction.sel(step=map_step)` is the friction of each map. Variables have `units`, `1` if dimensionless; columns of
+    other packages' effects have none. Values that were not requested are NaN. Raises InputError for a directory without
+    results, ImportError without xarray.
     """
     try:
         import xarray
@@ -36,7 +36,7 @@ def open(directory: str | os.PathLike[str]) -> xarray.Dataset:
         raise ImportError(NO_XARRAY) from error
     path = path_of(directory)
     if not (path / "measures.csv").is_file():
-        raise InputError(f"{path} holds no measures.csv: it is no output directory of a run")
+        raise InputError(f"{path} has no measures.csv: it is not the output directory of a run")
     columns = read_back.read_results(path / "measures.csv")
     steps, times = np.array(columns["step"], dtype=int), columns["time"]
     found: dict[str, Any] = {name: ("step", values, _units(name)) for name, values in columns.items()}

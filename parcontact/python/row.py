@@ -1,4 +1,4 @@
-"""Measures of a step, by the names of the columns of measures.csv."""
+"""Measures of a step, by the names of columns of measures.csv."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from ..storage import step_row as recorded
 
 
 class Row(Mapping[str, float]):
-    """One instant of a run: `row.friction` and `row["friction"]` are a column of measures.csv, in the same units.
+    """An instant of a run: `row.friction` and `row["friction"]` are the column of measures.csv, in the same unit.
 
-    Energies [J] that the job does not ask for (`output.energy`) are NaN. `dict(row)` is a mapping of all. Type checkers
-    know every column of the page `outputs` as an attribute; columns of branches and of other effects are
+    Energies [J] that the job does not request (`output.energy`) are NaN. `dict(row)` has all columns. Type checkers
+    know the columns of the page `outputs` as attributes; columns of branches and of other effects are
     `row["dissipated_0"]`. A column that the job does not have raises AttributeError.
     """
 
@@ -60,13 +60,13 @@ class Row(Mapping[str, float]):
 
     @classmethod
     def from_record(cls, row: recorded.StepRow, added: tuple[str, ...] = ()) -> Row:
-        """A recorded row; `added` names the columns of effects."""
+        """Return a recorded row; `added` are the names of columns of effects."""
         branches = len(row.branch_dissipation)
         return cls(dict(zip(recorded.columns(branches, added), recorded.row_numbers(row, branches), strict=True)))
 
     @classmethod
     def from_line(cls, line: str, added: tuple[str, ...] = ()) -> Row:
-        """A row as a line of measures.csv has it, of as many branches as there is room for."""
+        """Return the row in a line of measures.csv; the number of branches follows from its length."""
         cells = [int(cell) if cell.isdecimal() else float(cell or "nan") for cell in line.split(",")]
         branches = len(cells) - len(recorded.columns(0, added))
         return cls(dict(zip(recorded.columns(branches, added), cells, strict=True)))
@@ -74,12 +74,12 @@ class Row(Mapping[str, float]):
     def __getitem__(self, name: str) -> float:
         return self._numbers[name]
 
-    if not TYPE_CHECKING:  # else any misspelt column would have a type
+    if not TYPE_CHECKING:  # type checkers must not accept misspelt columns
 
         def __getattr__(self, name: str) -> Any:
             known = self.__dict__.get("_numbers", {})
             if name not in known:
-                raise AttributeError(f"measures have no {name!r}; there are {', '.join(known)}")
+                raise AttributeError(f"measures have no {name!r}; known names:  {', '.join(known)}")
             return known[name]
 
     def __dir__(self) -> list[str]:

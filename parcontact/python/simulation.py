@@ -1,4 +1,4 @@
-"""A job in this process: its steps one by one, its fields, its state."""
+"""Running a job in this process, step by step, with access to its fields and state."""
 
 from __future__ import annotations
 
@@ -37,15 +37,14 @@ from .wording import python_words
 
 
 class Simulation:
-    """A job, run from Python on the ranks of `comm`; every method is collective.
+    """A job, run from Python on the ranks of `comm`; all methods are collective.
 
-    Parameters: `job`, the path of a job file or a mapping like one; `set`, values by keys like `grid.points` that
-    replace those of the job; `comm`, an MPI communicator (default: all ranks). Raises JobError for a job with
-    mistakes, InputError for files that do not fit it; warns (ParcontactWarning, on root) of what is allowed
-    but means little.
+    Parameters: `job`, the path of a job file or a mapping with the same keys; `set`, values by keys like `grid.points`
+    that replace those of the job; `comm`, an MPI communicator (default: all ranks). Raises JobError for a job with
+    mistakes, InputError for files that do not match it; warns (ParcontactWarning, on root) about implausible values.
 
-    Nothing is written unless the job, or `set`, names `output.directory`, and then only by `run`. Files that a mapping
-    names are looked for from the working directory.
+    Files are written by `run` only, and only if the job, or `set`, gives `output.directory`. Paths in a mapping are
+    relative to the working directory.
     """
 
     def __init__(self, job: Given, set: Mapping[str, Any] | None = None, comm: MPI.Intracomm | None = None) -> None:
@@ -56,17 +55,17 @@ class Simulation:
         self._slab = Slab(self.comm, *self.job.grid.points)
         self._saved: Contents | None = None
         self._march_made: March | None = None
-        self._began = False  # whether the row of the initial state has been handed out
-        self._stepped = False  # whether steps are made in memory
+        self._began = False  # True after the row of the initial state was yielded
+        self._stepped = False  # True after steps in memory
 
     # -- running ------------------------------------------------------------------------------------------------------
 
     def steps(self) -> Iterator[Row]:
-        """Yield the row of the initial state, then one after each step, made when it is asked for; in memory.
+        """Yield the row of the initial state, then one after each step, which is made on demand in memory.
 
-        Called again it goes on after the last step made. Raises RunError for a step that could not be made; the state
-        is then that before it. All ranks make each step: one that leaves the loop, by `break` or an exception of its
-        own, makes the others raise RunError.
+        A second call continues after the last step. Raises RunError for a failed step, after which the state is that
+        before the step. All ranks must make each step: if one leaves the loop by `break` or an exception, the others
+        raise RunError.
         """
         march, self._stepped = self._march, True
         timeline = march.timeline()
@@ -86,12 +85,12 @@ class Simulation:
             yield self.row
 
     def run(self, restart: str | os.PathLike[str] = "auto", quiet: bool = True) -> Row:
-        """Go on to the end of the history; the last row.
+        """Run to the end of the history; returns the last row.
 
-        A job that names an output directory runs as on the command line, with the files that it asks for: from the
-        newest checkpoint there, afresh (`restart="never"`), or from a checkpoint by its path; `quiet=False` prints a
-        line per step. It may stop early, when a signal or a stop file asks for it: see `finished`; called again it goes
-        on. Raises RunError for a step that could not be made, InputError for a directory that is not its own.
+        A job with an output directory runs as on the command line: from the newest checkpoint, from the beginning
+        (`restart="never"`), or from the path of a checkpoint; `quiet=False` prints a line per step. A signal or a stop
+        file may stop it early (see `finished`); a second call continues. Raises RunError for a failed step, InputError
+        for a foreign directory.
         """
         if not self.job.origin.names_directory:
             for _ in self.steps():
@@ -104,14 +103,14 @@ class Simulation:
         with _in_a_file(self.job, self._slab) as job, python_words():
             ended = runner.run_to_end(job, self._slab, Options(quiet, at, shows=self._warns))
         if ended.march is None and ended.contents is None:
-            raise InputError(f"{self.job.output.directory} holds a run that has finished, and none of its states")
+            raise InputError(f"{self.job.output.directory} has a finished run without a checkpoint")
         self._march_made, self._saved, self._began = ended.march, ended.contents, True
-        self.__dict__.pop("_contacts", None)  # of the march before
+        self.__dict__.pop("_contacts", None)  # belongs to the previous march
         return self.row
 
     @property
     def row(self) -> Row:
-        """The measures of the last step, also one before a restart; of the initial state before the first."""
+        """Return the measures of the last step, also before a restart; initially those of the initial state."""
         march, saved = self._march, self._saved
         added = columns_of(march.scene.effects)
         if saved is not None and saved.table.last and march.row.step == saved.step:
@@ -120,49 +119,49 @@ class Simulation:
 
     @property
     def finished(self) -> bool:
-        """Whether all steps of the history are made, or surfaces that stick have come off under their load."""
+        """Return True if all steps are made, or if the surfaces have detached under their load."""
         return bool(self.detached) or self._march.row.step >= len(self._march.timeline())
 
     @property
     def detached(self) -> str:
-        """When and why surfaces that stick have come off under their load, which ends the history; empty otherwise."""
+        """Return when and why the surfaces detached under their load, which ends the history; '' otherwise."""
         return self._march.detached
 
     @property
     def errors(self) -> dict[str, dict[str, float]]:
-        """Estimated relative errors so far, which the end of a run says: of `friction` and `contact_area_corrected`, as
-        far as they are known, by what makes them and in all (`total`). Rows have those of their instant."""
+        """Return the known estimated relative errors so far, as printed at the end of a run: of `friction` and
+        `contact_area_corrected`, by source and in total (`total`). Rows have the errors of their instant."""
         return {name: dict(parts) for name, parts in self._march.state.errors.facts(None).items() if name != "accuracy"}
 
     # -- fields -------------------------------------------------------------------------------------------------------
 
     @property
     def rows(self) -> slice:
-        """The rows of a map (along y) that this rank has."""
+        """Return the slice of rows (along y) of a map on this rank."""
         return self._slab.rows
 
     def field(self, name: str) -> Array:
-        """Return this rank's rows of a map, shape (ny_loc, nx), a new array: `pressure` [Pa], `displacement` [m] of the
-        body, `height` [m] of the rigid surface where it is now, or `gap` [m] between both.
+        """Return this rank's rows of a map as a new array, shape (ny_loc, nx): `pressure` [Pa], `displacement` [m] of
+        the body, `height` [m] of the rigid surface in its present position, or `gap` [m] between both.
 
         Raises InputError for another name.
         """
         if name not in UNITS:
-            raise InputError(f"there is no field {name!r}; there are {', '.join(UNITS)}")
+            raise InputError(f"there is no field {name!r}; known fields: {', '.join(UNITS)}")
         self._wait_for_all(f"takes the map {name}")
         return self._march.field(name)
 
     def gather(self, name: str) -> Array | None:
-        """Return the whole map, shape (ny, nx), on root; None on the other ranks. Units and errors as for `field`."""
+        """Return the whole map, shape (ny, nx), on root, None on other ranks; units and errors as for `field`."""
         return self._slab.to_root(self.field(name))
 
     # -- state --------------------------------------------------------------------------------------------------------
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a checkpoint, which `restore` and `parcontact --restart PATH` go on from, on any number of ranks.
+        """Write a checkpoint for `restore` and `parcontact --restart PATH`, on any number of ranks.
 
-        Heights that are an array are written beside it. Raises RunError where that cannot be, InputError for what is no
-        path.
+        Heights given as an array are written into the same directory. Raises RunError if this fails, InputError for a
+        wrong path.
         """
         file, march, slab = path_of(path), self._march, self._slab
         self._wait_for_all(f"saves {file}")
@@ -176,10 +175,10 @@ class Simulation:
     def restore(
         cls, path: str | os.PathLike[str], set: Mapping[str, Any] | None = None, comm: MPI.Intracomm | None = None
     ) -> Simulation:
-        """Go on from a checkpoint, in memory unless `set` names `output.directory`.
+        """Return a simulation that continues from a checkpoint, in memory unless `set` gives `output.directory`.
 
-        `set` may change what is to come (the stages ahead, tolerances), not what has been. Raises InputError for a
-        file that is no sound checkpoint, or not of such a job.
+        `set` may change the future (later stages, tolerances), not the past. Raises InputError for a damaged file, or
+        one of another job.
         """
         world, file = all_ranks(comm), path_of(path)
         agree(world, file, set)
@@ -188,7 +187,7 @@ class Simulation:
         job = read_job_here(
             on_root(world, lambda: heights.located(parse(text, str(file)).data, file, elsewhere)), set, world
         )
-        if not any(key.startswith("output") for key in set or {}):  # `read` has found its keys to be words
+        if not any(key.startswith("output") for key in set or {}):  # keys were checked by reading the job
             job = job.with_origin(job.origin._replace(names_directory=False))
         simulation = cls(job, comm=world)
         slab = simulation._slab
@@ -202,7 +201,7 @@ class Simulation:
 
     @property
     def _march(self) -> March:
-        """The march, made when it is first asked for."""
+        """Return the march, created on first use."""
         if self._march_made is None:
             self._wait_for_all("begins")
             saved = self._saved
@@ -214,23 +213,23 @@ class Simulation:
 
     @cached_property
     def _contacts(self) -> ContactWatch:
-        """Return the watch that warns of contacts which mean little."""
+        """Return the watch that warns about implausible contacts."""
         return ContactWatch(self.job.numerics.strict, self._march.timeline(), more=more_points(self.job.grid))
 
     def _warns(self, doubt: Doubt) -> bool:
-        """Warn, on root, in the place of whoever would show the doubt."""
+        """Issue a warning on root."""
         if self._slab.root:
             warn(doubt)
         return False
 
     def _wait_for_all(self, what: str) -> None:
-        """Wait for all ranks to do `what`; collective. Raises RunError if one does something else or has ended."""
+        """Wait until all ranks do `what`; collective. Raises RunError if a rank does something else or has ended."""
         wait_for_all(self.comm, f"{what} of {self!r}")
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(
-            "a Simulation cannot be pickled or copied: it belongs to the memory and the ranks of this process; "
-            "save(path) keeps it, and Simulation.restore(path) makes another one of that"
+            "a Simulation cannot be pickled or copied: it belongs to the ranks of this process;  "
+            "use save(path) and Simulation.restore(path)"
         )
 
     def __repr__(self) -> str:
@@ -240,7 +239,7 @@ class Simulation:
 
 @contextmanager
 def _in_a_file(job: Job, slab: Slab) -> Iterator[Job]:
-    """Give a job a file, if only for a moment: a mapping is written to one; collective."""
+    """Yield a job that has a file; a mapping is written to a temporary one; collective."""
     if job.origin.from_file:
         yield job
         return

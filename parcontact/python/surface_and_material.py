@@ -1,4 +1,4 @@
-"""A surface and a material by themselves."""
+"""Surfaces and materials without a simulation."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ Surface = Mapping[str, Any] | NDArray[Any] | Sequence[Mapping[str, Any] | NDArra
 
 
 def surface(surface: Surface, grid: Mapping[str, Any]) -> Array:
-    """Heights [m] of the rigid surface that a job's `surface` means on its `grid`, shape (ny, nx), up into the body.
+    """Return the heights [m] of a job's `surface` on its `grid`, shape (ny, nx), positive into the body.
 
-    An array is a surface, too. On this rank alone, whatever others do. Raises JobError for mistakes, InputError for
-    files that do not fit.
+    The surface may be an array. Works on this rank only. Raises JobError for mistakes, InputError for files that do not
+    match.
     """
     job = of_parts(surface=surface, grid=grid)
     base = set_up(job, Slab.alone(*job.grid.points))
@@ -32,7 +32,7 @@ def surface(surface: Surface, grid: Mapping[str, Any]) -> Array:
 
 
 def material(material: Mapping[str, Any]) -> Material:
-    """The material that a job's section means. Raises JobError for mistakes."""
+    """Return the material of a job's section. Raises JobError for mistakes."""
     job = of_parts(material=material)
     spring, moduli, times = relaxation_of(job.material)
     return Material(spring, tuple(moduli.tolist()), tuple(times.tolist()), job.material.poisson)
@@ -40,9 +40,9 @@ def material(material: Mapping[str, Any]) -> Material:
 
 @dataclass(frozen=True)
 class Material:
-    """A linear viscoelastic material: `G(t) = modulus_inf + sum moduli exp(-t/relaxation_times)`, in Pa and s.
+    """A linear viscoelastic material, `G(t) = modulus_inf + sum moduli exp(-t/relaxation_times)` [Pa, s].
 
-    All moduli are shear moduli; `poisson` is Poisson's ratio, the same at all times.
+    All moduli are shear moduli; `poisson` is constant in time.
     """
 
     modulus_inf: float
@@ -51,15 +51,16 @@ class Material:
     poisson: float
 
     def complex_modulus(self, omega: ArrayLike) -> NDArray[np.complex128]:
-        """Storage and loss modulus [Pa], as real and imaginary part, at angular frequencies [rad/s] of any shape."""
+        """Return storage and loss modulus [Pa] as real and imaginary part at angular frequencies [rad/s] of any
+        shape."""
         return prony.complex_modulus(omega, *self._series)
 
     def relaxation(self, t: ArrayLike) -> Array:
-        """The relaxation modulus G(t) [Pa] at times t >= 0 [s] of any shape."""
+        """Return the relaxation modulus G(t) [Pa] at times t >= 0 [s] of any shape."""
         return prony.relaxation(t, *self._series)
 
     def creep(self, t: ArrayLike) -> Array:
-        """The creep compliance J(t) [1/Pa] at times t >= 0 [s] of any shape."""
+        """Return the creep compliance J(t) [1/Pa] at times t >= 0 [s] of any shape."""
         return prony.creep(t, *self._series)
 
     @property

@@ -1,4 +1,4 @@
-"""Advice of errors in the words of Python: arguments and keys instead of options of the command line."""
+"""Advice in errors for Python users: arguments and keys instead of options of the command line."""
 
 import re
 from collections.abc import Iterator
@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from ..errors import InputError, JobError, RunError
 
 NO_SWEEP = 'set={"sweep": None}'
-WORDS = {  # patterns, each with what replaces it, in this order
+WORDS = {  # patterns and their replacements, applied in this order
     r"choose one of them \(--case\) or leave it out \(--set sweep=null\)": f"leave it out ({NO_SWEEP})",
     r"change the sweep instead, like --set '.*'": f"leave the sweep out ({NO_SWEEP})",
     r"--set material=\{include: (.*?)\}": r'set={"material": {"include": "\1"}}',
@@ -22,7 +22,7 @@ WORDS = {  # patterns, each with what replaces it, in this order
 
 @contextmanager
 def python_words() -> Iterator[None]:
-    """Put what errors advise into the words of Python."""
+    """Reword errors raised within the context for Python users."""
     try:
         yield
     except (InputError, RunError) as error:

@@ -1,1 +1,1 @@
-"""A report to send: one page, in one file, of what was asked, what came out, what it cost and where it comes from."""
+"""A report in one HTML file: job, results, costs and provenance."""

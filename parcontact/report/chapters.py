@@ -1,4 +1,4 @@
-"""One chapter for each output directory: of a run, a friction curve, a sweep or a study, or of several of these."""
+"""Chapters of a report, one per output directory with a run, a friction curve, a sweep or a study."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ from ..summary import headline, sweep_table
 from . import log, material, origin, result_sections, road_section
 from .page_parts import Chapter, ReportSection, ReportTable, draw_chart, embed_file
 
-KINDS = {  # by the table that each of them has
+KINDS = {  # kinds of results, by their table
     "measures.csv": ("run", result_sections.describe_run),
     "steady.csv": ("friction curve", result_sections.describe_curve),
     "sweep.csv": ("sweep", result_sections.describe_sweep),
@@ -25,14 +25,14 @@ MORE_TABLES = (
     *("leak.csv", "theory.csv", "steady_waves.csv", "steady_theory.csv", "bands.csv", "bands_theory.csv"),
     *("sweep_mean.csv", "sweep_curves.csv", "sweep_curves_mean.csv"),
 )
-ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys that other sections show
+ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys that are shown in other sections
 
 
 def describe_directory(directory: Path) -> Chapter:
-    """Tell all about a directory. Raises InputError where it holds no results."""
+    """Return the chapter about a directory. Raises InputError if it has no results."""
     there = [name for name in KINDS if (directory / name).is_file()]
     if not there:
-        raise InputError(f"{directory} holds no results: it has none of {', '.join(KINDS)}")
+        raise InputError(f"{directory} has no results: it has none of {', '.join(KINDS)}")
     sections = [KINDS[name][1](directory) for name in there]
     found, title, cited, places = (
         log.read_logs(directory),
@@ -42,7 +42,9 @@ def describe_directory(directory: Path) -> Chapter:
     )
     of_cases = (path for name in (RESOLVED, STEADY_RESOLVED) for path in sorted(directory.glob(f"cases/*/{name}")))
     jobs_there = [*(directory / name for name in JOBS), *of_cases]
-    if resolved := next((path for path in jobs_there if path.is_file()), None):  # of a sweep that of its first case
+    if resolved := next(
+        (path for path in jobs_there if path.is_file()), None
+    ):  # for a sweep, the job of its first case
         job, warnings = _read_job(resolved)
         title, places = job.title, [*_places(job), *places]
         asked = _describe_job(job, resolved.with_name(JOBS[resolved.name]))
@@ -56,8 +58,8 @@ def describe_directory(directory: Path) -> Chapter:
         cited = origin.list_citations(job)
         sections.append(ReportSection("Warnings", found.warnings or warnings or ["There was no warning."]))
     data = [embed_file(directory / name) for name in (*KINDS, *MORE_TABLES) if (directory / name).is_file()]
-    said = "The tables, in SI units and with all digits, are inside this file:"
-    sections += [origin.origin_section(directory, found), cited, ReportSection("Data", [said], downloads=data)]
+    text = "The tables, in SI units and with all digits, are stored in this file:"
+    sections += [origin.origin_section(directory, found), cited, ReportSection("Data", [text], downloads=data)]
     kinds = " and ".join(KINDS[name][0] for name in there)
     shown = [one.without(sorted(places, key=len, reverse=True)) for one in sections if one]
     here, there_is = Path.cwd(), directory.absolute()
@@ -66,7 +68,7 @@ def describe_directory(directory: Path) -> Chapter:
 
 
 def compare_directories(directories: Sequence[Path]) -> Iterator[Chapter]:
-    """Yield what several directories have in common, in one picture each: lines of a directory have one colour."""
+    """Yield a chapter that compares several directories in common pictures, with one colour per directory."""
     if len(directories) > 1:
         found = plots.compare_charts(directories)
         shared = [chart for chart in found if len({one.look["color"] for one in chart.series}) > 1]
@@ -77,7 +79,7 @@ def compare_directories(directories: Sequence[Path]) -> Iterator[Chapter]:
 
 
 def _read_job(resolved: Path) -> tuple[Job, Sequence[str]]:
-    """Return the job that an output directory was made by and its warnings; of a job whose files are gone none."""
+    """Return the job of an output directory and its warnings, which are omitted if its files no longer exist."""
     try:
         job = jobs.load(resolved)
         return job, job.warnings
@@ -86,22 +88,22 @@ def _read_job(resolved: Path) -> tuple[Job, Sequence[str]]:
 
 
 def _places(job: Job) -> list[str]:
-    """Return the directories of this machine that a job names: who reads a report has others."""
+    """Return the directories of this machine in a job, to be omitted in the report."""
     parts = [value for part in (*job.surface, job.material) for _, value in listing.items(part)]
     return [f"{path.parent}/" for path in (job.path, *parts) if isinstance(path, Path) and path.is_absolute()]
 
 
 def _describe_swept(directory: Path) -> str:
-    """Return what differs between the cases of a sweep."""
+    """Return a sentence on the swept keys and their values."""
     rows = sweep_table.read_cases(directory / "sweep.csv")
     names = list(rows[0]) if rows else ["case", "state"]
     swept = {name: dict.fromkeys(str(row[name]) for row in rows) for name in names[1 : names.index("state")]}
     values = "; ".join(f"{name} ({', '.join(found)})" for name, found in swept.items())
-    return f"There are {len(rows)} cases. They differ in {values}."
+    return f"The sweep has {len(rows)} cases, with {values}."
 
 
 def _describe_job(job: Job, given: Path) -> ReportSection:
-    """Return a table of all keys with every default, and the job file as it was given, if it is there."""
+    """Return a table of all keys with every default, and the original job file, if it exists."""
     rows = [row for row in listing.rows(job) if not row[0].startswith(ELSEWHERE)]
-    texts = [("the job file as it was given", given.read_text(errors="replace"))] if given.is_file() else []
-    return ReportSection("What was asked", tables=[ReportTable(("key", "value", "unit"), rows)], texts=texts)
+    texts = [("the original job file", given.read_text(errors="replace"))] if given.is_file() else []
+    return ReportSection("Job", tables=[ReportTable(("key", "value", "unit"), rows)], texts=texts)

@@ -11,13 +11,13 @@ from ..storage.curve_points import LOG
 LOGS = ("run.log", LOG)
 COUNTS = "counts on root: "
 ESTIMATE = "estimated error of "
-MACHINE = re.compile(r"parcontact |machine: |batch job: |\d+ ranks?, ")  # how lines about it begin
+MACHINE = re.compile(r"parcontact |machine: |batch job: |\d+ ranks?, ")  # beginnings of lines about the machine
 
 
 @dataclass(frozen=True)
 class Log:
-    """Warnings, each once and in their order; sentences on the errors of the last run; counts of the last run; lines
-    about the program and machine."""
+    """Contents of a log: different warnings in order; sentences on errors and counts of the last run; lines on program
+    and machine."""
 
     warnings: list[str]
     estimates: list[str]
@@ -26,7 +26,7 @@ class Log:
 
 
 def read_logs(directory: Path) -> Log:
-    """Return what the logs of a directory say; nothing where there is none."""
+    """Return the contents of the logs of a directory; empty without a log."""
     lines = [line for name in LOGS for line in log_lines(directory / name)]
     warnings = [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]
     counted = [line.removeprefix(COUNTS) for line in lines if line.startswith(COUNTS)]  # allreduce 12, fft 64x64 3

@@ -1,4 +1,4 @@
-"""The section about the rubber: its moduli, its branches, its shift with temperature, and the band that is excited."""
+"""The section on the material: moduli, branches, temperature shift, and the excited frequencies."""
 
 import math
 from collections.abc import Iterator
@@ -17,21 +17,21 @@ from ..plotting import prefixes, style
 from ..scene.measured_range import excited_band, excited_bands
 from .page_parts import ReportSection, ReportTable, draw_panel
 
-DECADES = 1.5  # that a picture shows beyond the relaxation times
-POINTS = 400  # of a line
+DECADES = 1.5  # range of a picture beyond the relaxation times [decades]
+POINTS = 400  # number of points of a line
 CAPTION = "moduli and loss tangent over frequency, at the temperature of the job"
 
 
 def material_section(job: Job) -> ReportSection:
-    """Return the section about the material of a job at its temperature."""
+    """Return the section on the material of a job at its temperature."""
     if job.bands is not None:
-        with suppress(InputError):  # its files are gone
+        with suppress(InputError):  # its files no longer exist
             job = on_one_grid_of_all(job, cut_bands(job))
     series = relaxation_of(job.material)
     instant = series.modulus_inf + float(np.sum(series.moduli))
     rows = [
-        ("shear modulus in the long run", prefixes.quantity(series.modulus_inf, "Pa", 4)),
-        ("shear modulus at once", prefixes.quantity(instant, "Pa", 4)),
+        ("long-term shear modulus", prefixes.quantity(series.modulus_inf, "Pa", 4)),
+        ("instantaneous shear modulus", prefixes.quantity(instant, "Pa", 4)),
         ("Poisson's ratio", f"{job.material.poisson:g}"),
         ("relaxing branches", str(series.moduli.size)),
         *_describe_temperature(job),
@@ -65,19 +65,19 @@ def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:
         if found.shift.vertical is not None:
             yield "vertical shift factor b_T", f"{found.modulus_factor:.4g}"
     if found.band is not None:
-        yield "measured at, as at the reference", _write_band(found.band)
+        yield "measured frequencies, reduced to the reference", _write_band(found.band)
     if found.temperatures is not None:
-        yield "measured from", f"{found.temperatures[0]:g} to {found.temperatures[1]:g} °C"
+        yield "measured temperatures", f"{found.temperatures[0]:g} to {found.temperatures[1]:g} °C"
 
 
 def _list_bands(job: Job) -> ReportTable:
-    """Return which frequencies the waves of the surface excite at each temperature, if they move."""
+    """Return a table of the frequencies that sliding excites at each temperature."""
     found = excited_bands(job, (job.steady.temperatures if job.steady else None) or ())
     degrees = ("–" if one.temperature is None else f"{one.temperature:g} °C" for one in found)
     ranges = ((f"{one.factor:.3g}", _write_band(one.band), _write_band(one.reduced)) for one in found)
     rows = [(degree, *others) for degree, others in zip(degrees, ranges, strict=True)]
-    told = "frequencies with which the waves of the surface pass, at all velocities of the job"
-    return ReportTable(("temperature", "a_T", "excited by the job", "as at the reference"), rows, told)
+    caption = "frequencies of the passing waves of the surface, at all velocities of the job"
+    return ReportTable(("temperature", "a_T", "excited by the job", "reduced to the reference"), rows, caption)
 
 
 def _write_band(band: tuple[float, float]) -> str:
@@ -96,10 +96,10 @@ def _draw_moduli(axes: Axes, job: Job) -> None:
     axes.set(xlabel="frequency [Hz]", ylabel="shear modulus [Pa]")
     if band := excited_band(job):
         axes.axvspan(*band, color=style.GREY, alpha=0.2, lw=0, label="excited by the job")
-    beside = axes.twinx()
-    beside.semilogx(frequency, value.imag / value.real, label="tan δ", **style.line(2))
-    beside.set_ylabel("tan δ")
-    beside.set_ylim(bottom=0.0)
-    beside.grid(False)
-    (handles, names), (more, other) = axes.get_legend_handles_labels(), beside.get_legend_handles_labels()
-    beside.legend([*handles, *more], [*names, *other], fontsize=8)
+    loss_axes = axes.twinx()
+    loss_axes.semilogx(frequency, value.imag / value.real, label="tan δ", **style.line(2))
+    loss_axes.set_ylabel("tan δ")
+    loss_axes.set_ylim(bottom=0.0)
+    loss_axes.grid(False)
+    (handles, names), (more, other) = axes.get_legend_handles_labels(), loss_axes.get_legend_handles_labels()
+    loss_axes.legend([*handles, *more], [*names, *other], fontsize=8)

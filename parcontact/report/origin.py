@@ -1,4 +1,4 @@
-"""The sections about where results come from: errors and costs, program, machine and runs, what to cite."""
+"""Sections on errors and costs, program, machine and runs, and references to cite."""
 
 import json
 import math
@@ -17,13 +17,13 @@ FRICTION = ERRORS[0]
 
 
 def costs(table: Path, found: log.Log, job: Job) -> Iterator[ReportSection]:
-    """Yield the errors of a run or a curve of a job, given by its table, then wall time, operator calls and counts."""
+    """Yield the errors of a run or a curve with this table, then wall time, operator calls and counts."""
     columns = read_results(table)
     yield describe_errors(columns, found, job, table.name == "steady.csv")
     calls = [value for value in columns["operator_calls"] if value == value]
     rows = [
         ("steps or points", str(len(columns["seconds"]))),
-        ("wall time of all of them", f"{math.fsum(columns['seconds']):.4g} s"),
+        ("total wall time", f"{math.fsum(columns['seconds']):.4g} s"),
         ("operator calls", f"{math.fsum(calls):.6g}"),
     ]
     tables = [ReportTable(("cost", "value"), rows)]
@@ -33,21 +33,21 @@ def costs(table: Path, found: log.Log, job: Job) -> Iterator[ReportSection]:
 
 
 def describe_errors(columns: Mapping[str, Sequence[float]], found: log.Log, job: Job, of_curve: bool) -> ReportSection:
-    """Return the errors of a friction curve at its worst and best point, or those of a run in the end, with the
-    sentences of its log; friction only where something slides. The section is empty for a table without errors."""
+    """Return the errors of a friction curve at its worst and best point, or of a run at its end, with the sentences of
+    its log; friction only if something slides. The section is empty for a table without errors."""
     rows = []
     for column, name, asked in zip(ERRORS, ("friction", "contact area"), job.numerics.asked.both, strict=True):
         known = [error for error in columns.get(column, ()) if error == error]
         if known and (of_curve or job.directions or column != FRICTION):
             errors = (max(known), min(known)) if of_curve else (known[-1],)
             rows.append((name, *(f"{100 * error:.3g} %" for error in errors), f"{100 * asked:g} %"))
-    ends = ("at the worst point", "at the best point") if of_curve else ("in the end",)
+    ends = ("at the worst point", "at the best point") if of_curve else ("at the end",)
     tables = [ReportTable(("estimated error of", *ends, "numerics.accuracy"), rows)] if rows else []
     return ReportSection("Error budget", [f"{text}." for text in found.estimates] if rows else (), tables)
 
 
 def origin_section(directory: Path, found: log.Log) -> ReportSection:
-    """Return what the newest file in a directory that knows it says about its origin."""
+    """Return the provenance by the newest file of a directory that has it."""
     there = [directory / name for name in ("fields.h5", "steady.h5") if (directory / name).is_file()]
     there += sorted(directory.glob("checkpoint/step-*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
     for path in there:
@@ -72,5 +72,7 @@ def origin_section(directory: Path, found: log.Log) -> ReportSection:
 
 
 def list_citations(job: Job | None) -> ReportSection:
-    """Return what a paper that uses the results of a job should cite."""
-    return ReportSection("What to cite", [provenance.PROGRAM, *(provenance.cite_lines(plain_data(job)) if job else ())])
+    """Return the references to cite for the results of a job."""
+    return ReportSection(
+        "References to cite", [provenance.PROGRAM, *(provenance.cite_lines(plain_data(job)) if job else ())]
+    )

@@ -1,4 +1,4 @@
-"""The page: all chapters in one HTML file that loads nothing from elsewhere."""
+"""The HTML page of a report, which loads no other files."""
 
 import re
 import stat
@@ -16,14 +16,14 @@ from ..storage.provenance import PROGRAM
 from .chapters import compare_directories, describe_directory
 
 NAME, TEMPLATE = "report.html", "page.html.jinja"
-LONG_WORD = re.compile(r"\S{14,}")  # does not fit a column of a phone
+LONG_WORD = re.compile(r"\S{14,}")  # word that is wider than a column on a phone
 SMALL_NUMBER = re.compile(r"-?\d[\d.]*e-\d+")
-BREAKS = re.compile(r"(?<=[_./,=:])(?=\w)")  # where a long word may go on in the next line
+BREAKS = re.compile(r"(?<=[_./,=:])(?=\w)")  # positions at which a long word may be broken
 NUMBER = re.compile(r"(?<=\d) (?=±|%|°C|(?:[nµmkMG]?(?:Pa|N|m|s|J|Hz)|h|min|days|years)\b)|(?<=±) |(?<==) (?=[\d-])")
 
 
 def write_report(directories: Sequence[Path], out: Path | None = None) -> Path:
-    """Write the report of these output directories; returns its path: report.html in the first, unless `out` is given.
+    """Write the report of output directories, and return its path (default: report.html in the first one).
 
     Raises InputError for a directory without results, and for a file that cannot be written.
     """
@@ -32,7 +32,7 @@ def write_report(directories: Sequence[Path], out: Path | None = None) -> Path:
         raise InputError(f"--out must end in .html, got {str(target)!r}")
     for directory in directories:
         if not directory.is_dir():
-            raise InputError(f"{directory} is no directory")
+            raise InputError(f"{directory} is not a directory")
         _refuse_links(directory)
     text = render(directories)
     try:
@@ -45,12 +45,12 @@ def write_report(directories: Sequence[Path], out: Path | None = None) -> Path:
 
 
 def _refuse_links(directory: Path) -> None:
-    """Raise InputError for what a report would read that is no file of the directory: it would publish another one."""
+    """Raise InputError for links in a directory, which would publish files from elsewhere."""
     for path in (path for pattern in ("*", "checkpoint/*", "cases/*", "cases/*/*") for path in directory.glob(pattern)):
         kind = path.lstat().st_mode
         if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
-            told = "a symbolic link" if stat.S_ISLNK(kind) else "no regular file"
-            raise InputError(f"{path} is {told}, which a report does not read; put the file itself in its place")
+            kind_name = "a symbolic link" if stat.S_ISLNK(kind) else "not a regular file"
+            raise InputError(f"{path} is {kind_name}, which a report does not read; replace it by the file itself")
 
 
 def render(directories: Sequence[Path]) -> str:
@@ -64,12 +64,11 @@ def render(directories: Sequence[Path]) -> str:
 
 
 def breakable(text: str, mark: str = "<wbr>") -> Markup:
-    """Return a text whose long words, as names of columns and paths, may break after their parts and nowhere else; a
-    browser would break 1e-05 at its hyphen."""
+    """Return a text whose long words may be broken after `_./,=:` only; browsers would break 1e-05 at its hyphen."""
     parts = LONG_WORD.sub(lambda word: BREAKS.sub(mark, word[0]), str(escape(text)))
     return Markup(SMALL_NUMBER.sub(r'<span class="n">\g<0></span>', parts))
 
 
 def whole_numbers(text: str) -> str:
-    """Return a sentence in which no line ends between a number, its error and its unit."""
+    """Return a sentence without line breaks between a number, its error and its unit."""
     return NUMBER.sub("\N{NO-BREAK SPACE}", text)

@@ -1,4 +1,4 @@
-"""The parts of a report: texts, tables, pictures, maps to browse and data, all of it inside the page."""
+"""Parts of a report: texts, tables, pictures, browsers of maps and data, all stored in the page."""
 
 import base64
 import io
@@ -12,18 +12,18 @@ from matplotlib.figure import Figure
 
 from ..plotting import charts, style
 
-NAME_HEIGHT = 0.19  # of a row of a legend [inch]
-SIZE = (4.2, 2.9)  # of the picture of a chart [inch]: two beside each other on a laptop, one on a phone
-RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes: a page looks the same on every machine
+NAME_HEIGHT = 0.19  # height of a row of a legend [inch]
+SIZE = (4.2, 2.9)  # size of a chart, half the width of a laptop's screen [inch]
+RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes, independent of fonts
 
-Picture = tuple[str, str]  # its data: URI, and what it shows
-Browser = tuple[str, Sequence[Picture], int]  # a map by its name, its pictures, and which is shown first
-Download = tuple[str, str, int]  # a file inside the page: its name, its data: URI and its bytes
+Picture = tuple[str, str]  # data URI, and caption
+Browser = tuple[str, Sequence[Picture], int]  # name of a map, its pictures, and the index of the first shown
+Download = tuple[str, str, int]  # a file stored in the page: its name, data URI and size [bytes]
 
 
 @dataclass(frozen=True)
 class ReportTable:
-    """Rows of cells under the names of columns, both as texts."""
+    """A table: names of columns, and rows of texts."""
 
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -32,7 +32,7 @@ class ReportTable:
 
 @dataclass(frozen=True)
 class ReportSection:
-    """One heading of a report and all that is under it, in this order; `texts` are shown as they are."""
+    """A section of a report: heading and contents, shown in the order of the fields; `texts` are shown verbatim."""
 
     title: str
     sentences: Sequence[str] = ()
@@ -43,11 +43,11 @@ class ReportSection:
     downloads: Sequence[Download] = ()
 
     def __bool__(self) -> bool:
-        """Whether there is anything to show."""
+        """Return True if the section has contents."""
         return any((self.sentences, self.tables, self.pictures, self.browsers, self.texts, self.downloads))
 
     def without(self, places: Sequence[str]) -> "ReportSection":
-        """Return the section without these directories in its sentences and tables: files are named alone."""
+        """Return the section with the directories `places` removed from paths in its sentences and tables."""
 
         def shorten(text: str) -> str:
             for place in places:
@@ -60,7 +60,7 @@ class ReportSection:
 
 @dataclass(frozen=True)
 class Chapter:
-    """All about one output directory; `headline` says its results in a sentence."""
+    """A chapter on one output directory; `headline` is a sentence with its results."""
 
     title: str
     directory: Path
@@ -81,18 +81,18 @@ def draw_panel(panel: style.Panel, caption: str) -> Picture:
         axes = figure.subplots()
         panel(axes)
         names = len(axes.get_legend_handles_labels()[1])
-        if names > charts.MANY_NAMES:  # the legend is below the panel, and takes no room from it
+        if names > charts.MANY_NAMES:  # a legend below the panel enlarges the picture
             figure.set_figheight(SIZE[1] + NAME_HEIGHT * math.ceil(names / charts.NAMES_BESIDE))
         figure.savefig(file, format="svg", dpi=style.DPI, metadata={"Date": None})
     return to_uri(file.getvalue(), "image/svg+xml"), caption
 
 
 def embed_file(path: Path) -> Download:
-    """Return a table to be downloaded from the page."""
+    """Return a table as a download in the page."""
     data = path.read_bytes()
     return path.name, to_uri(data, "text/csv"), len(data)
 
 
 def to_uri(data: bytes, kind: str) -> str:
-    """Return data as a URI: nothing has to be loaded from elsewhere."""
+    """Return data as a data URI."""
     return f"data:{kind};base64,{base64.b64encode(data).decode()}"

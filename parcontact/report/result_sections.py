@@ -1,4 +1,4 @@
-"""The sections about results of a run, a friction curve, a sweep or a study, and their maps to browse over time."""
+"""Sections on results of a run, a friction curve, a sweep or a study, with browsers of their maps."""
 
 import csv
 import io
@@ -39,17 +39,17 @@ POINTS = (
     *("velocity", "temperature", "pressure", "friction", "error_friction", *INTERFACE),
     *("contact_area_corrected", "error_area", "mean_gap", "max_pressure"),
 )
-PLACE = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C"}  # of a point of a curve in bands
+PLACE = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C"}  # coordinates of a point of a curve in bands
 DIGITS = 5
-MOST_ROWS = 200  # of a table: the whole is in the data
-MOST_MAPS = 24  # pictures of one map: instants in between are left out
+MOST_ROWS = 200  # most rows of a table
+MOST_MAPS = 24  # most pictures of one map
 MAP_DPI = 100
-COLORS = 256  # of a picture: less than half of the bytes that true colours need, and one does not see it
-MAP_SIZE = (4.2, 3.5)  # [inch]
+COLORS = 256  # colours of a picture, with less than half the bytes of true colours
+MAP_SIZE = (4.2, 3.5)  # size of the picture of a map [inch]
 
 
 def describe_run(directory: Path) -> ReportSection:
-    """Return histories, the largest and last values, and the maps over time."""
+    """Return the section on a run: histories, extreme and last values, and maps over time."""
     run, columns = PlottedRun(directory), read_back.read_results(directory / "measures.csv")
     known = {name: [value for value in columns.get(name, ()) if value == value] for name in SHOWN}
     rows = [
@@ -57,9 +57,9 @@ def describe_run(directory: Path) -> ReportSection:
         for name, values in known.items()
         if values and (run.job.directions or not name.startswith("friction"))
     ]
-    numbers = ReportTable(("measure", "in the end", "smallest", "largest", "unit"), rows)
+    numbers = ReportTable(("measure", "last", "smallest", "largest", "unit"), rows)
     box = run.job.grid.lx * run.job.grid.ly
-    told = [
+    sentences = [
         *slide.describe_slide(run.job.history, run.job.initial, run.job.grid.dx, columns),
         *pull_off.describe_pull_off(columns, box, run.job.numerics.tolerance, bool(marker.detached(directory))),
         *leak_stop.describe_leak_stop(directory),
@@ -67,19 +67,19 @@ def describe_run(directory: Path) -> ReportSection:
         theory_settings.describe_settings(directory),
     ]
     pictures = [draw_chart(chart) for chart in histories.chart_histories(run)] + _leakage(directory)
-    return ReportSection("Results of the run", list(filter(None, told)), [numbers], pictures, browse_run(run))
+    return ReportSection("Results of the run", list(filter(None, sentences)), [numbers], pictures, browse_run(run))
 
 
 def _leakage(directory: Path) -> list[tuple[str, str]]:
-    """Return the picture of `parcontact leak`, where there is one."""
+    """Return the picture of `parcontact leak`, if it exists."""
     picture = directory / "leak.png"
     if not picture.is_file() or picture.is_symlink():
         return []
-    return [(to_uri(picture.read_bytes(), "image/png"), "where fluid flows through the gap, and how much")]
+    return [(to_uri(picture.read_bytes(), "image/png"), "flow through the gap, and conductivity")]
 
 
 def describe_curve(directory: Path) -> ReportSection:
-    """Return the points of a friction curve, and their maps."""
+    """Return the section on a friction curve: its points and their maps."""
     columns = read_back.read_results(directory / "steady.csv")
     names = [name for name in POINTS if name in columns]
     units_of = {column.name: column.unit for column in STEADY}
@@ -94,7 +94,7 @@ def describe_curve(directory: Path) -> ReportSection:
 
 
 def _list_main_bands(directory: Path) -> list[ReportTable]:
-    """Return which band makes most of the friction at each point of a curve in bands."""
+    """Return a table of the band with most friction at each point of a curve in bands."""
     if not (directory / "bands.csv").is_file():
         return []
     columns = read_back.read_results(directory / "bands.csv")
@@ -111,20 +111,23 @@ def _list_main_bands(directory: Path) -> list[ReportTable]:
         found.append((*place, waves, share))
     head = [f"{_to_words(name)} [{unit}]" for name, unit in PLACE.items() if name in names]
     table = _shorten([*head, "waves", "share of friction"], found)
-    told = filter(None, ["the band that makes most of the friction", table.caption])
-    return [replace(table, caption="; ".join(told))]
+    captions = filter(None, ["the band with most of the friction", table.caption])
+    return [replace(table, caption="; ".join(captions))]
 
 
 def describe_sweep(directory: Path) -> ReportSection:
     rows = sweep_table.read_cases(sweep_table.results(directory))
     used = [name for name in (rows[0] if rows else ()) if any(format_cell(row[name]) not in ("", "–") for row in rows)]
     table = _shorten(list(map(_add_unit, used)), [[row[name] for name in used] for row in rows])
-    told = list(filter(None, [theory_settings.describe_settings(directory)]))
-    return ReportSection("Sweep", told, [table], [draw_chart(chart) for chart in sweep_charts.chart_sweep(directory)])
+    sentences = list(filter(None, [theory_settings.describe_settings(directory)]))
+    return ReportSection(
+        "Sweep", sentences, [table], [draw_chart(chart) for chart in sweep_charts.chart_sweep(directory)]
+    )
 
 
 def _add_unit(name: str) -> str:
-    """Return a column of a sweep, or a key of its job, with its unit: `pull_off [N]`, `history.0.velocity [m/s]`."""
+    """Return the name of a column of a sweep, or a key of its job, with its unit: `pull_off [N]`, `history.0.velocity
+    [m/s]`."""
     known = (
         {column.name: column.unit for column in (*SWEEP, *STEADY)}
         | sweep_charts.UNITS
@@ -135,20 +138,20 @@ def _add_unit(name: str) -> str:
 
 
 def describe_study(directory: Path) -> ReportSection:
-    """Return settings, their errors and costs."""
+    """Return the section on a study: settings, errors and costs."""
     read_back.refuse_cut(directory / "study.csv")
     with (directory / "study.csv").open(newline="") as file:
         names, *rows = list(csv.reader(file)) or [[]]
     kept = [k for k, name in enumerate(names) if name != "fingerprint"]
     table = _shorten([names[k] for k in kept], [[_parse_number(row[k]) for k in kept] for row in rows])
-    told = directory / "study.txt"
-    sentences = told.read_text(errors="replace").splitlines() if told.is_file() else ["The study is not finished."]
+    text = directory / "study.txt"
+    sentences = text.read_text(errors="replace").splitlines() if text.is_file() else ["The study is not finished."]
     pictures = [
         (to_uri((directory / name).read_bytes(), "image/png"), caption)
         for name, caption in STUDY_PICTURES.items()
         if (directory / name).is_file()
     ]
-    return ReportSection("What accuracy costs", sentences, [table], pictures)
+    return ReportSection("Cost of accuracy", sentences, [table], pictures)
 
 
 def _to_words(name: str) -> str:
@@ -156,13 +159,13 @@ def _to_words(name: str) -> str:
 
 
 def _shorten(head: Sequence[str], rows: Sequence[Sequence[object]]) -> ReportTable:
-    """Return a table that can be read: its first rows, if there are too many."""
+    """Return a table with at most MOST_ROWS rows."""
     more = f"the first {MOST_ROWS} of {len(rows)} rows; all are in the data" if len(rows) > MOST_ROWS else ""
     return ReportTable(head, [[format_cell(value) for value in row] for row in rows[:MOST_ROWS]], more)
 
 
 def format_cell(value: object) -> str:
-    """Return a number in few digits, a dash for what is not known, or a word."""
+    """Return a number in few digits, a dash for NaN, or a word."""
     if isinstance(value, float):
         return "–" if math.isnan(value) else f"{value:.{DIGITS}g}"
     return str(value)
@@ -176,15 +179,15 @@ def _parse_number(text: str) -> object:
 
 
 def browse_run(run: PlottedRun) -> list[Browser]:
-    """Return all maps that a run has saved, over time."""
+    """Return browsers of all saved maps of a run over time."""
     return _browse_file(run.directory / "fields.h5", partial(label_frames, run), run.job, run.telling_step)
 
 
 def _browse_file(
     path: Path, label: Callable[[h5py.File], dict[int, str]], job: Job, step: int | None = None
 ) -> list[Browser]:
-    """Return maps, first shown as after a `step`, or the last ones; none where the file is missing. Raises InputError
-    for a damaged one."""
+    """Return browsers of maps, which start after a `step` or with the last map; none without the file. Raises
+    InputError for a damaged file."""
     try:
         with hdf5.open_results(path) as file, style.drawing(RC):
             labels = choose_evenly(label(file), MOST_MAPS)
@@ -203,7 +206,7 @@ def _browse_map(file: h5py.File, name: str, labels: dict[int, str], job: Job, ch
 
 
 def to_small_png(image: Image.Image) -> bytes:
-    """Return a picture with so few colours that all of it, also what is rare, has nearly its own."""
+    """Return a PNG with COLORS colours, chosen so that rare colours are kept."""
     png = io.BytesIO()
     few = image.quantize(COLORS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     few.save(png, "png", optimize=True)
@@ -211,7 +214,7 @@ def to_small_png(image: Image.Image) -> bytes:
 
 
 def _label_states(area: float, file: h5py.File) -> dict[int, str]:
-    """Return speeds and loads of the states that are saved: forces on the box of a free scene of this `area` [m^2]."""
+    """Return speeds and loads of the saved states as text: forces on the box of a free scene of this `area` [m^2]."""
     speeds = file["velocity"][...]
     axis, loads = to_load(file["load"][...], area)
     warm = [f", {t:g} °C" for t in file["temperature"][...]] if "temperature" in file else [""] * speeds.size

@@ -1,4 +1,4 @@
-"""The section about the rigid surface of a job."""
+"""The section on the rigid surface of a job."""
 
 from functools import partial
 
@@ -18,20 +18,23 @@ from ..printed import with_error
 from ..scene import rigid_surface
 from .page_parts import Picture, ReportSection, ReportTable, draw_panel
 
-MOST_POINTS = 2**22  # of a surface that is made anew for a report
+MOST_POINTS = 2**22  # most points of a surface that is computed for a report
 
 
 def road_section(job: Job) -> ReportSection:
-    """Describe the surface of a job, made anew; where its files are gone or it is too large, as the job says."""
+    """Return the section on the surface of a job, computed again; if its files no longer exist or it is too large, its
+    keys only."""
     shapes = ReportTable(
         ("shape",), [(listing.listed_line(part),) for part in job.surface], "shapes, whose heights add up"
     )
     if job.bands is not None:
         return _describe_bands(job, shapes)
-    if job.grid.nx * job.grid.ny == 1:  # a job in bands of which only the rest could be read
-        return ReportSection("Surface", ["The surface cannot be made anew: the files of the job are not there."])
+    if job.grid.nx * job.grid.ny == 1:  # a job in bands without its files
+        return ReportSection("Surface", ["The surface cannot be computed again: the files of the job do not exist."])
     if job.grid.nx * job.grid.ny > MOST_POINTS:
-        return ReportSection("Surface", ["The surface has too many points to be made anew for a report."], [shapes])
+        return ReportSection(
+            "Surface", ["The surface has too many points to be computed again for a report."], [shapes]
+        )
     slab = Slab.alone(*job.grid.points)
     try:
         made, remarks = rigid_surface.make_surface(job, FFT(slab))
@@ -47,7 +50,7 @@ def road_section(job: Job) -> ReportSection:
 
 
 def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
-    """Describe the bands of a job, and the surface of the coarsest one."""
+    """Return the section on the bands of a job, and the surface of the coarsest one."""
     try:
         cut = cut_bands(job)
         setup = Band(job, cut, 0, 0).setup
@@ -57,7 +60,7 @@ def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
     for band in range(cut.count):
         ends = " to ".join(prefixes.quantity(end, "m") for end in cut.wavelengths(band))
         rows.append((ends, f"{cut.rms_slope(band):.3g}", f"{cut.rms_slope(band, 0):.3g}"))
-    bands = ReportTable(("waves", "rms slope", "with all longer waves"), rows, "bands, each on a grid of its own")
+    bands = ReportTable(("waves", "rms slope", "with all longer waves"), rows, "bands, each on its own grid")
     heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
     found = statistics.surface_statistics(heights, setup.grid.size)
     pictures = _draw(surface_picture.Sketch(heights, setup.grid.size, found), ", coarsest band")

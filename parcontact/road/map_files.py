@@ -19,11 +19,11 @@ from ..parallel.slab import Array
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 UNITS |= {"km": 1e3, "cm": 1e-2, "Å": 1e-10, "A": 1e-10, "pm": 1e-12, "in": 0.0254}
 TO_GIVE = "m | mm | um | nm"  # as a job writes them; files may have the others
-OF_NUMPY = ("npy", "npz")  # which SurfaceTopography reads with the first direction along x
-LARGEST_FILE = 4_000_000_000  # tuning: bytes
-LONGEST_HEAD = 200  # tuning: lines before the first number of a text
-IRREGULAR = 0.1  # accuracy: largest difference between steps over a step, of positions that are rounded
-FEWEST = 4  # tuning: points along a direction
+OF_NUMPY = ("npy", "npz")  # formats that SurfaceTopography reads with the first axis along x
+LARGEST_FILE = 4_000_000_000  # tuning: largest file of a map [bytes]
+LONGEST_HEAD = 200  # tuning: most lines before the first number of a text
+IRREGULAR = 0.1  # accuracy: largest relative difference between steps of rounded positions
+FEWEST = 4  # tuning: least points along a direction
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class Map:
 
 @dataclass(frozen=True)
 class MapContents:
-    """Numbers of a file, shape (ny, nx) or (nx,), and what it says: their unit [m], the size of the map along x and y,
-    or of the line, and its unit [m]."""
+    """Heights in a file, shape (ny, nx) or (nx,), with their unit [m], the size of the map along x and y (or of the
+    line), and the unit of the size [m], as far as the file gives them."""
 
     values: Array
     unit: float | None = None
@@ -51,8 +51,7 @@ class MapContents:
 
 
 def read_map(part: Topography) -> Map:
-    """Read a map. The job must give units and size for files that do not have them, and only for those. Raises
-    InputError, in one sentence."""
+    """Read a map. The job must give units and size if the file does not, and must not otherwise. Raises InputError."""
     path = part.path
     try:
         if not path.is_file():
@@ -80,7 +79,7 @@ def _in_metres(part: Topography, found: MapContents) -> Map:
     """Return the map in m, with missing points as NaN."""
     path, given = part.path, UNITS.get(part.unit_of_heights or "")
     if found.unit is not None and given not in (None, found.unit):
-        raise InputError(f"{path} has a unit of its own: give no unit")
+        raise InputError(f"{path} gives its own unit: leave out unit")
     if (unit := found.unit or given) is None:
         both = found.size is not None
         whose, more = ("positions and heights", ", or units: {xy: UNIT, z: UNIT}") if both else ("heights", "")
@@ -90,7 +89,7 @@ def _in_metres(part: Topography, found: MapContents) -> Map:
         raise InputError(f"{path} has {values.ndim} dimensions; a map of two, or a line, was expected")
     if found.size is not None:
         if part.size or part.pixel:
-            raise InputError(f"{path} has a size of its own: give no {'size' if part.size else 'pixel'}")
+            raise InputError(f"{path} gives its own size: leave out {'size' if part.size else 'pixel'}")
         unit_xy = found.unit_xy or (UNITS[part.units.xy] if part.units else unit)
         lx, ly = float(found.size[0] * unit_xy), float(found.size[-1] * unit_xy)
     elif given_size := part.size_of(values.shape[::-1]):
@@ -98,7 +97,7 @@ def _in_metres(part: Topography, found: MapContents) -> Map:
     else:
         raise InputError(f"{path} does not say how large its map is: give size: [lx, ly], or pixel [m]")
     if not (0.0 < lx < np.inf and 0.0 < ly < np.inf):
-        raise InputError(f"{path}: its map would be {lx:g} x {ly:g} m, which is no size")
+        raise InputError(f"{path}: the map would be {lx:g} x {ly:g} m; two positive lengths were expected")
     heights = np.where(values == part.nodata, np.nan, values) * unit
     largest = float(np.abs(heights, where=np.isfinite(heights), out=np.zeros_like(heights)).max(initial=0.0))
     datafiles.refuse_extreme(path, largest)
@@ -110,8 +109,8 @@ def _array(part: Topography) -> MapContents:
 
 
 def _text(part: Topography) -> MapContents:
-    """Read a matrix of heights, rows of x, y, z, an ESRI grid, or a line (rows of x, z or z); text with another header
-    is read as one of an instrument."""
+    """Read a matrix of heights, rows of x, y, z, an ESRI grid, or a line (rows of x, z or z); a text with any other
+    header is read by SurfaceTopography."""
     with part.path.open(encoding="latin-1") as file:
         start = [*islice(file, LONGEST_HEAD)]
     first = next((number for number, line in enumerate(start) if _numbers(line)), None)
@@ -126,7 +125,7 @@ def _text(part: Topography) -> MapContents:
         return _instrument(part)
     mark = next((mark for mark in ";," if mark in start[first]), None)
     table = np.loadtxt(part.path, delimiter=mark, skiprows=first, ndmin=2, usecols=range(columns), encoding="latin-1")
-    if "cellsize" in said:  # of ESRI, whose first row is the northernmost
+    if "cellsize" in said:  # an ESRI grid, whose first row has the largest y
         missing, (cell,) = said.get("nodata_value") or [np.nan], said["cellsize"]
         return MapContents(np.where(table == missing, np.nan, table)[::-1], None, (cell * columns, cell * len(table)))
     if columns > 3 or columns == 1:
@@ -137,7 +136,7 @@ def _text(part: Topography) -> MapContents:
 
 
 def _numbers(line: str) -> list[float]:
-    """Return the numbers of a line, none of one that holds anything else."""
+    """Return the numbers of a line; none if it holds anything else."""
     try:
         return [float(word) for word in re.split(r"[,;\s]+", line.strip(" ,;\t\r\n"))]
     except ValueError:
@@ -146,7 +145,7 @@ def _numbers(line: str) -> list[float]:
 
 def _positions(path: Path, table: Array, unit_xy: float | None, unit: float | None) -> MapContents:
     """Return a map from rows of x, y, z, or a line from rows of x, z, in any order; positions without a row are
-    missing. They are equally spaced, to the digits to which they are rounded."""
+    missing. Positions may be rounded, but must be equally spaced."""
     axes = [np.unique(column, return_inverse=True) for column in table.T[:-1]]
     for name, (places, _) in zip("xy", axes, strict=False):
         if places.size < FEWEST:
@@ -173,7 +172,7 @@ def _instrument(part: Topography) -> MapContents:
         reader = SurfaceTopography.open_topography(str(path))
     except (CannotDetectFileFormat, CorruptFile, UnknownFileFormat) as error:
         raise InputError(
-            f"{path} cannot be read: it is damaged, or of no format that SurfaceTopography knows"
+            f"{path} cannot be read: it is damaged, or in a format that SurfaceTopography does not know"
         ) from error
     if reader.format() in OF_NUMPY:
         raise InputError(f"{path} may have x or y first; save its array by numpy.save as .npy, whose rows are along x")
@@ -196,7 +195,7 @@ def _instrument(part: Topography) -> MapContents:
 
 
 def _scale(path: Path, unit: Any) -> float:
-    """Return a unit in m."""
+    """Return the size of a unit [m]."""
     if unit not in UNITS:
-        raise InputError(f"{path}: its unit {unit} is no length that is known")
+        raise InputError(f"{path}: its unit is {unit}; one of {', '.join(UNITS)} was expected")
     return UNITS[unit]

@@ -10,13 +10,13 @@ from ..parallel.slab import Array
 from . import map_files, treatment
 from .treatment import Treated
 
-SLACK = 1e-6  # accuracy: of a length: a box this much longer than the map is as long
+SLACK = 1e-6  # rounding: relative excess of the box over the map that is ignored
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """Heights [m] on the grid, shape (ny, nx), without mean; the part of a job, the map that it names, and the part of
-    the map in the box, with its size [m], as cut and as treated."""
+    """Heights [m] on the grid, shape (ny, nx), of zero mean; the section of the job, the whole map, and the part of the
+    map in the box as cut and as treated, with its size [m]."""
 
     heights: Array
     part: Topography
@@ -44,18 +44,18 @@ def prepare(part: Topography, grid: Grid, found: map_files.Map) -> Prepared:
 
 
 def _range(part: Topography, axis: int, length: float, available: float, count: int, points: int) -> slice:
-    """Return the points of the map around its centre that are as long as the box, which has `points` of its own."""
+    """Return the range of points of the map along an axis that is as long as the box with its `points`."""
     name = "xy"[axis]
     if length > available * (1.0 + SLACK):
         raise InputError(
-            f"{part.path}: the box is {length:.6g} m along {name}, the map only {available:.6g} m; make the box "
-            "smaller, or give periodic: mirror, which needs half of it"
+            f"{part.path}: the box is {length:.6g} m along {name}, but the map only {available:.6g} m; use a smaller "
+            "grid.size, or periodic: mirror, which needs half the length"
         )
     wanted = min(count, max(1, round(count * length / available)))
     if wanted < 2 <= points:
         raise InputError(
-            f"{part.path}: the box is {length:.3g} m along {name}, and points of the map are {available / count:.3g} m "
-            "apart: it would be flat; make the box larger (grid.size), or take a finer map"
+            f"{part.path}: the box is {length:.3g} m along {name}, below the spacing of points of the map, "
+            f"{available / count:.3g} m; use a larger grid.size, or a finer map"
         )
     if part.centre is None:
         first = (count - wanted) // 2
@@ -63,7 +63,7 @@ def _range(part: Topography, axis: int, length: float, available: float, count: 
     first = round(part.centre[axis] / available * count - wanted / 2)
     if not 0 <= first <= count - wanted:
         raise InputError(
-            f"{part.path}: a box of {length:.6g} m around {part.centre[axis]:.6g} m along {name} leaves the map, which "
-            f"has {available:.6g} m; {length / 2:.6g} to {available - length / 2:.6g} m would do"
+            f"{part.path}: a box of {length:.6g} m around {part.centre[axis]:.6g} m along {name} leaves the map of "
+            f"{available:.6g} m; a centre of {length / 2:.6g} to {available - length / 2:.6g} m was expected"
         )
     return slice(first, first + wanted)

@@ -1,7 +1,7 @@
 """Measured isotropic spectra: a table of C1D or C2D over wavenumbers, and the density of waves that follows from it.
 
-The names of the columns say which spectrum it is, and their units: `q[1/m] C2D[m^4]` or `q[1/m] C1D[m^3]`, and the same
-in mm, um or nm. As in `physics.surface_statistics`, q = 2 pi/wavelength, and C1D is that of profiles, one-sided:
+The columns are `q[1/m] C2D[m^4]` or `q[1/m] C1D[m^3]`, or the same in mm, um or nm. As in `physics.surface_statistics`,
+q = 2 pi/wavelength, and C1D is the one-sided spectrum of profiles:
 
     <h^2> = int C2D d2q = int_0^inf C1D dq,        Phi = 4 pi^2 C2D, the density of `physics.roughness`,
     C2D(k) = -1/(2 pi) int_k^inf C1D'(q)/sqrt(q^2 - k^2) dq       (Abel's equation, with q = k cosh t)
@@ -9,8 +9,8 @@ in mm, um or nm. As in `physics.surface_statistics`, q = 2 pi/wavelength, and C1
 SurfaceTopography and contact.engineering write pi C1D and 4 pi^2 C2D (T. D. B. Jacobs, T. Junge, L. Pastewka, Surf.
 Topogr.: Metrol. Prop. 5 (2017) 013001): `normalisation: surface_topography` divides by these factors.
 
-Between its points a spectrum is a power law. For Abel's integral, C1D goes on beyond its last point: with the given
-Hurst exponent, as q^-(1 + 2 hurst), or else as the power law of its last decade.
+Between its points a spectrum is a power law. For Abel's integral, C1D is extrapolated beyond its last point as
+q^-(1 + 2 hurst) with the given Hurst exponent, or else by the power law of its last decade.
 """
 
 import re
@@ -26,30 +26,30 @@ from ..parallel.slab import Array
 from . import treatment
 from .map_files import UNITS, Map
 
-POWERS = {"C1D": 3, "C2D": 4}  # of a length, in the unit of a spectrum
-LARGER = {3: np.pi, 4: 4 * np.pi**2}  # factors of spectra written by SurfaceTopography, by the same power
-BINS = 10  # tuning: per decade of wavenumbers of a line scan
-FEWEST_OF_LINE = 32  # tuning: points
-FEWEST = 3  # accuracy: rows of numbers
-ABEL_POINTS = 20_001  # accuracy: of Abel's integral, whose integrand jumps between power laws
-ABEL_DECADES = 4.0  # accuracy: beyond the last point, where C1D' has fallen by more than 8
-NOTHING = 1e-20  # accuracy: of the largest C2D, whose square root is the precision of a height
-EDGE = 1e-9  # accuracy: relative: wavelengths that differ by this are the same
+POWERS = {"C1D": 3, "C2D": 4}  # power of the length in the unit of a spectrum
+LARGER = {3: np.pi, 4: 4 * np.pi**2}  # factors in SurfaceTopography's spectra, by the power of their unit
+BINS = 10  # tuning: bins per decade of wavenumbers of a line scan
+FEWEST_OF_LINE = 32  # tuning: least points of a line scan
+FEWEST = 3  # accuracy: least rows of a spectrum
+ABEL_POINTS = 20_001  # accuracy: points of the trapezoidal rule for Abel's integral
+ABEL_DECADES = 4.0  # accuracy: decades of q beyond the last point, over which C1D' falls by more than 8 decades
+NOTHING = 1e-20  # rounding: smallest C2D, over the largest one: (relative rounding error of heights)^2
+EDGE = 1e-9  # rounding: relative difference below which wavelengths are the same
 HEADER = re.compile(r"q\[1/([^\]]+)\] (C1D|C2D)\[([^\]^]+)\^(\d)\]")
 FORMS = "the columns q[1/m] C1D[m^3] or q[1/m] C2D[m^4] (or mm, um, nm)"
 
 
 @dataclass(frozen=True)
 class MeasuredSpectrum:
-    """An isotropic spectrum: Phi [m^4], shape (n,), at rising wavenumbers `q` [rad/m]; beyond them as q^-`fall`, or
-    nothing where that is 0."""
+    """An isotropic spectrum Phi [m^4], shape (n,), at rising wavenumbers `q` [rad/m]; beyond the last one it falls as
+    q^-`fall`, or is 0 if `fall` is 0."""
 
     q: Array
     phi: Array
     fall: float
 
     def __call__(self, k: Array) -> Array:
-        """Phi [m^4] at wavenumbers [rad/m]."""
+        """Return Phi [m^4] at wavenumbers `k` [rad/m]."""
         inside = (k >= self.q[0] * (1 - EDGE)) & ((k <= self.q[-1] * (1 + EDGE)) | (self.fall > 0.0))
         with np.errstate(divide="ignore"):
             log = np.interp(np.log(k), np.log(self.q), np.log(self.phi))
@@ -58,7 +58,7 @@ class MeasuredSpectrum:
 
 
 def read_spectrum(part: RoughSpectrum) -> tuple[MeasuredSpectrum, tuple[float, float]]:
-    """The spectrum of a job's surface, and its longest and shortest wavelengths [m]. Raises InputError."""
+    """Return the spectrum of a job's surface, and its longest and shortest wavelengths [m]. Raises InputError."""
     q, values, power = _read(part.spectrum)
     if part.normalisation == "surface_topography":
         values = values / LARGER[power]
@@ -68,21 +68,23 @@ def read_spectrum(part: RoughSpectrum) -> tuple[MeasuredSpectrum, tuple[float, f
     longest, shortest = 2 * np.pi / q[0], 2 * np.pi / q[-1]
     wanted = part.long_wavelength or longest, part.short_wavelength or shortest
     if wanted[0] > longest * (1 + EDGE):
-        raise InputError(f"{part.spectrum}: long_wavelength is {wanted[0]:.6g} m, the data end at {longest:.6g} m")
+        raise InputError(f"{part.spectrum}: long_wavelength is {wanted[0]:.6g} m, but the data end at {longest:.6g} m")
     if wanted[1] < shortest * (1 - EDGE) and part.hurst is None:
         raise InputError(
-            f"{part.spectrum}: short_wavelength is {wanted[1]:.6g} m, the data end at {shortest:.6g} m; give hurst to "
-            "continue them by a power law"
+            f"{part.spectrum}: short_wavelength is {wanted[1]:.6g} m, but the data end at {shortest:.6g} m; give hurst "
+            "to extrapolate them by a power law"
         )
     return MeasuredSpectrum(q, 4 * np.pi**2 * values, fall), wanted
 
 
 def of_line(part: Topography, line: Map) -> tuple[MeasuredSpectrum, tuple[float, float]]:
-    """Return the spectrum of an isotropic surface whose profiles have the C1D of a line scan, with its longest and
-    shortest wavelengths [m]: levelled, through Hann's window, in means over BINS bins a decade. Raises InputError."""
+    """Return the spectrum of an isotropic surface from a line scan, and its longest and shortest wavelengths [m].
+
+    C1D of the levelled scan is taken with Hann's window, and averaged in BINS bins per decade. Raises InputError.
+    """
     heights, length = line.heights, line.size[0]
     if heights.size < FEWEST_OF_LINE or np.nanmin(heights) == np.nanmax(heights):
-        raise InputError(f"{part.path}: a line scan of at least {FEWEST_OF_LINE} points that is not flat was expected")
+        raise InputError(f"{part.path}: a line scan of at least {FEWEST_OF_LINE} points, not flat, was expected")
     level = treatment.remove_trend(heights, np.isfinite(heights), part.detrend)[0]
     known = np.isfinite(level)
     places = np.arange(level.size)
@@ -90,7 +92,7 @@ def of_line(part: Topography, line: Map) -> tuple[MeasuredSpectrum, tuple[float,
     window = np.sin(np.pi * (places + 0.5) / level.size) ** 2
     level -= np.average(level, weights=window)
     power = np.abs(np.fft.rfft(level * window) / level.size) ** 2 / np.mean(window**2)
-    waves = np.arange(2, (level.size + 1) // 2)  # one wave in the window is not told from none
+    waves = np.arange(2, (level.size + 1) // 2)  # the window does not distinguish one wave from the mean
     bins = np.floor(BINS * np.log10(waves / 2)).astype(int)
     q, c1 = (
         (np.bincount(bins, values) / np.maximum(np.bincount(bins), 1))[np.unique(bins)]
@@ -104,7 +106,7 @@ def of_line(part: Topography, line: Map) -> tuple[MeasuredSpectrum, tuple[float,
 
 
 def _read(path: Path) -> tuple[Array, Array, int]:
-    """Return wavenumbers [rad/m], the spectrum in SI units, and the power of m in its unit."""
+    """Return wavenumbers [rad/m], the spectrum [m^3 or m^4], and the power of m in its unit."""
     (number, head), *lines = [
         (number, re.split(r"[,;\s]+", line.strip())) for number, line in read_lines(path, f"a table with {FORMS}")
     ]
@@ -131,19 +133,21 @@ def _numbers(path: Path, number: int, cells: list[str]) -> tuple[float, float]:
 
 
 def _over_directions(path: Path, q: Array, c1: Array, hurst: float | None) -> tuple[Array, Array]:
-    """Return C2D at the wavenumbers of C1D from its first to its last positive value. Where C1D rises, or scatter makes
-    C2D negative between them, C2D is NOTHING times its maximum: profiles have no power of waves there."""
+    """Return wavenumbers and C2D from C1D, between the first and the last positive value of C2D.
+
+    Where C2D is negative between them (C1D rises or scatters) it is set to NOTHING times its maximum.
+    """
     log_q, log_c = np.log(q), np.log(c1)
     last = log_q >= log_q[-1] - np.log(10.0)
     last[-2:] = True
     fall = 1.0 + 2.0 * hurst if hurst is not None else -float(np.polyfit(log_q[last], log_c[last], 1)[0])
     if fall <= 0.0:
-        raise InputError(f"{path}: C1D rises in its last decade; such profiles are not those of an isotropic surface")
+        raise InputError(f"{path}: C1D rises in its last decade; profiles of isotropic surfaces have a falling C1D")
     slopes = np.append(np.diff(log_c) / np.diff(log_q), -fall)
     c2 = np.array([_abel(k, log_q, log_c, slopes) for k in log_q])
     good = c2 > 0.0
     if good.sum() < FEWEST:
-        raise InputError(f"{path}: C1D does not fall with q; such profiles are not those of an isotropic surface")
+        raise InputError(f"{path}: C1D does not fall with q; profiles of isotropic surfaces have a falling C1D")
     used = slice(np.flatnonzero(good)[0], np.flatnonzero(good)[-1] + 1)
     return q[used], np.where(good, c2, NOTHING * c2.max())[used]
 

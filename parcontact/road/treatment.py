@@ -8,9 +8,9 @@ from scipy import fft, ndimage
 
 from ..parallel.slab import Array
 
-OUTLIER = 16.0  # accuracy: times the median deviation of heights from their neighbours: further off gets a warning
-SWEEPS = 200  # accuracy: of the relaxation that fills holes smoothly
-TERMS = {"none": 0, "mean": 1, "tilt": 3, "curvature": 6}  # of 1, x, y, x^2, x y, y^2
+OUTLIER = 16.0  # accuracy: deviation of a height from its neighbours that makes an outlier, over the median deviation
+SWEEPS = 200  # accuracy: most sweeps of the relaxation that fills missing points
+TERMS = {"none": 0, "mean": 1, "tilt": 3, "curvature": 6}  # number of terms of 1, x, y, x^2, x y, y^2
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,8 @@ class Treated:
 
 
 def treat(heights: Array, detrend: str, periodic: str, clip: bool = False) -> Treated:
-    """Level, fill, on request clip outliers, and make periodic: `smooth`, `mirror` (the map becomes twice as long along
-    both directions) or `none`."""
+    """Level and fill a map, optionally clip outliers, and make it periodic by `smooth`, by `mirror` (doubles its length
+    along both directions) or not (`none`)."""
     known = np.isfinite(heights)
     filled = fill(remove_trend(heights, known, detrend), known)
     odd, around = find_outliers(filled)
@@ -46,8 +46,8 @@ def remove_trend(heights: Array, known: NDArray[np.bool_], detrend: str) -> Arra
 
 
 def fill(heights: Array, known: NDArray[np.bool_]) -> Array:
-    """Fill missing points by the harmonic surface through those around them, relaxed from the nearest known height: a
-    hole of n points across takes some n^2 sweeps."""
+    """Fill missing points by the harmonic surface through their neighbours, relaxed from the nearest known height in
+    about n^2 sweeps for a hole n points wide."""
     if known.all():
         return heights
     depth, nearest = ndimage.distance_transform_edt(~known, return_indices=True)
@@ -58,8 +58,8 @@ def fill(heights: Array, known: NDArray[np.bool_]) -> Array:
 
 
 def find_outliers(heights: Array) -> tuple[NDArray[np.bool_], Array]:
-    """Return which points differ from the median of their neighbours by more than OUTLIER median deviations, and these
-    medians; slopes go on beyond the edges."""
+    """Return the mask of points that differ from the median of their neighbours by more than OUTLIER median deviations,
+    and these medians; beyond the edges slopes are extrapolated."""
     around = ndimage.median_filter(np.pad(heights, 1, mode="reflect", reflect_type="odd"), 3)[1:-1, 1:-1]
     deviation = np.abs(heights - around)
     typical = float(np.median(deviation[deviation > 0.0])) if deviation.any() else np.inf
@@ -67,9 +67,10 @@ def find_outliers(heights: Array) -> tuple[NDArray[np.bool_], Array]:
 
 
 def make_periodic(heights: Array) -> Array:
-    """Return the periodic part of a map: without the smoothest map that has the same jumps across its edges.
+    """Return the map minus the smoothest map with the same jumps across its edges.
 
-    This harmonic part is large at the edges only: slopes inside stay. (L. Moisan, J. Math. Imaging Vis. 39 (2011) 161.)
+    This harmonic part is large at the edges only, so slopes inside stay (L. Moisan, J. Math. Imaging Vis. 39 (2011)
+    161).
     """
     jumps = np.zeros_like(heights)
     for edges, rows in ((jumps, heights), (jumps.T, heights.T)):
@@ -84,10 +85,11 @@ def make_periodic(heights: Array) -> Array:
 def resample(
     heights: Array, shape: tuple[int, int], joined: bool = True, most: tuple[float, float] | None = None
 ) -> Array:
-    """Return a map on a grid of (ny, nx) points by its Fourier series, without waves that the grid does not have, and
-    without those outside of the ellipse of `most` waves along y and x. Nothing is left at the Nyquist wavenumber of an
-    even grid, where a wave has no direction. The harmonic part of a map that is not `joined` at its edges is resampled
-    by splines."""
+    """Return a map on a grid of (ny, nx) points by its Fourier series.
+
+    Waves that the grid does not resolve, Nyquist waves of an even grid, and waves beyond the ellipse of `most` waves
+    along y and x are removed. The harmonic part of a map that is not `joined` at its edges is resampled by splines.
+    """
     old = heights.shape
     if old == shape and most is None:
         return heights

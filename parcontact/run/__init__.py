@@ -1,1 +1,1 @@
-"""A run that survives: from a job to its output directory, restarts, signals and time limits."""
+"""Runs of jobs in output directories, with restarts, signals and time limits."""

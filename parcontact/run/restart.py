@@ -1,4 +1,4 @@
-"""The beginning of a run: at the start, or after the newest sound checkpoint that belongs to its job."""
+"""The beginning of a run: at the start, or from the newest sound checkpoint of its job."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -21,13 +21,13 @@ from ..storage.directory import ADVICE, Directory
 from ..storage.marker import Claim
 
 NUMERICS = tuple(f"numerics.{key}" for key in ("integrator", "kernel", "precision", "slope"))
-SAME = (*marker.SCENE, *marker.EFFECTS, "initial", *NUMERICS)  # sections and keys that must not change
-SAME_STEP = 1e-9  # accuracy: relative: steps of two histories this close are the same
+SAME = (*marker.SCENE, *marker.EFFECTS, "initial", *NUMERICS)  # sections and keys that must not change before a restart
+SAME_STEP = 1e-9  # rounding: relative difference below which steps of two histories are the same
 
 
 @dataclass(frozen=True)
 class RestartPoint:
-    """A sound checkpoint to go on from; `own` if it lies in the run's own output directory."""
+    """A sound checkpoint from which a run continues; `own` if it is in the run's output directory."""
 
     contents: Contents
     own: bool
@@ -36,10 +36,10 @@ class RestartPoint:
 def choose_origin(
     job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str
 ) -> tuple[RestartPoint | None, list[str]]:
-    """Return where to begin, and warnings about checkpoints that were skipped; collective.
+    """Return the checkpoint to continue from, or None, and warnings about skipped checkpoints; collective.
 
     `plain` is the job as plain data, on root; `restart` is `auto`, `never` or the path of a checkpoint. Raises
-    InputError when there are checkpoints and none will do, or when results would be lost.
+    InputError if no existing checkpoint is usable, or if results would be lost.
     """
     directory.refuse_foreign(job.path, plain, restart == "never")
     if restart == "never":
@@ -51,7 +51,7 @@ def choose_origin(
         found = sound(path, job, plain, slab)
         if isinstance(found, Contents):
             own = on_root(slab.comm, partial(_is_own, found, directory))
-            return RestartPoint(found, own), [f"passed over: {text}" for text in problems]
+            return RestartPoint(found, own), [f"skipped: {text}" for text in problems]
         problems.append(found)
     if problems:
         raise InputError("\n".join(problems) + ("" if given else f"; {ADVICE}"))
@@ -60,7 +60,7 @@ def choose_origin(
 
 
 def claim(plain: Mapping[str, Any], origin: RestartPoint | None) -> Claim:
-    """Return what a run says of itself in the marker: its id stays as long as it goes on in its own directory."""
+    """Return the claim of a run for the marker; its id is kept if it continues in its own directory."""
     new = Claim(marker.kept(plain))
     return replace(new, id=origin.contents.run or new.id, saved=True) if origin and origin.own else new
 
@@ -68,7 +68,7 @@ def claim(plain: Mapping[str, Any], origin: RestartPoint | None) -> Claim:
 def finished_before(
     job: Job, plain: Mapping[str, Any], slab: Slab, directory: Directory, restart: str, timeline: Timeline
 ) -> str:
-    """Return what to say of a run of this job that has finished and was to keep no checkpoint, or ''; collective."""
+    """Return a message if a run of this job has finished without keeping a checkpoint, or ''; collective."""
 
     def look() -> str:
         claim = directory.claim
@@ -79,15 +79,15 @@ def finished_before(
         other = any(marker.differences(claim.job, plain, SAME))
         if other or not whole or not (directory.path / "measures.csv").exists():
             return ""
-        return f"finished before, at t = {at:g} s, without a checkpoint (--restart never: run it afresh)"
+        return f"finished before, at t = {at:g} s, without a checkpoint (--restart never: run it again)"
 
     return on_root(slab.comm, look)
 
 
 def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Contents | str:
-    """Return a checkpoint from which a job can go on, without its maps, or why it cannot; collective.
+    """Return the contents of a checkpoint from which a job can continue, or why it cannot; collective.
 
-    Raises InputError for a job whose history was another one up to there.
+    Raises InputError if the history before the checkpoint differs.
     """
     found = on_root(slab.comm, lambda: _attempt(path, plain))
     if isinstance(found, str):
@@ -95,35 +95,37 @@ def sound(path: Path, job: Job, plain: Mapping[str, Any], slab: Slab) -> Content
     if problem := checkpoint.verify(found, slab):
         return problem
     if difference := on_root(slab.comm, lambda: find_changed_step(found, job)):
-        other = "to go on otherwise, end the running stage where it is and add another; or"
-        raise InputError(f"{path}: {difference}; {other} {ADVICE}, --restart PATH goes on from an earlier checkpoint")
+        other = "to change what follows, end the running stage at this time and add another; or"
+        raise InputError(
+            f"{path}: {difference}; {other} {ADVICE}, give --restart PATH to continue from an earlier checkpoint"
+        )
     return found
 
 
 def _is_own(contents: Contents, directory: Directory) -> bool:
-    """Return whether a checkpoint is of the run in the directory: by its id, or as one of its files under any name.
+    """Return True if a checkpoint belongs to the run in the directory, by its id or its file.
 
-    Raises InputError for that of another run, if the directory holds results; root only.
+    Raises InputError for a checkpoint of another run if the directory has results; root only.
     """
     if directory.claim is not None and contents.run:
         own = contents.run == directory.claim.id
     else:
         own = any(contents.path.samefile(path) for _, path in directory.saved())
     if not own and (found := directory.results()):
-        there = f"{directory.path}, which holds {', '.join(found[:3])}"
-        raise InputError(f"{contents.path} is of another run than {there}; --out chooses another directory")
+        there = f"{directory.path}, which has {', '.join(found[:3])}"
+        raise InputError(f"{contents.path} belongs to another run than {there}; give --out for another directory")
     return own
 
 
 def _refuse_loss(directory: Directory, plain: Mapping[str, Any]) -> None:
-    """Raise InputError for results that a new run would replace, though no checkpoint can make them; root only.
+    """Raise InputError for results that a new run would replace although no checkpoint can restore them; root only.
 
-    A run of this job that ended before its first checkpoint has nothing that this one does not make again.
+    Results of a run of this job that ended before its first checkpoint may be replaced.
     """
     claim, found = directory.claim, directory.results()
     if claim is None or not found:
         return
-    there = f"{directory.path} holds {', '.join(found)}"
+    there = f"{directory.path} has {', '.join(found)}"
     if different := marker.list_differences(marker.differences(claim.job, plain, SAME)):
         raise InputError(f"{there} of another job: {different}; {ADVICE}")
     if claim.saved:
@@ -132,7 +134,7 @@ def _refuse_loss(directory: Directory, plain: Mapping[str, Any]) -> None:
 
 
 def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
-    """Return a checkpoint without its maps, or why it will not do; root only."""
+    """Return the contents of a checkpoint, or why it cannot be used; root only."""
     try:
         contents = checkpoint.inspect(path)
         if found := marker.list_differences(marker.differences(contents.job, plain, SAME)):
@@ -143,7 +145,7 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
 
 
 def find_changed_step(contents: Contents, job: Job) -> str:
-    """Return which of the steps already made would be another one in this job, or ''; those to come may be others."""
+    """Return a message on the first completed step that differs in this job, or ''; later steps may differ."""
     number, until = contents.step, contents.time
     history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
     old, new = (
@@ -153,18 +155,18 @@ def find_changed_step(contents: Contents, job: Job) -> str:
     count = min(number, len(old), len(new))
     for step in range(old.shared(new) + 1, count + 1):
         if difference := next(_apart(old[step], new[step]), ""):
-            return f"step {step} of the {number} already made {difference}"
-    return f"{number} steps were made, and the job has {count} up to t = {until:g} s" if count < number else ""
+            return f"step {step} of the {number} completed ones {difference}"
+    return f"{number} steps were completed, but the job has {count} up to t = {until:g} s" if count < number else ""
 
 
 def _apart(old: Step, new: Step) -> Iterator[str]:
-    """Yield in what two steps differ."""
+    """Yield the differences of two steps."""
     size = math.hypot(*old.position)
     if old.jump != new.jump:
-        yield "was a jump of the load, and is none now" if old.jump else "was no jump of the load, and is one now"
+        yield "was a jump of the load, but is not now" if old.jump else "was not a jump of the load, but is now"
     if not math.isclose(old.time, new.time, rel_tol=SAME_STEP):
-        yield f"ended at t = {old.time!r} s, ends at {new.time!r} s"
+        yield f"ended at t = {old.time!r} s, but ends at {new.time!r} s"
     if old.control != new.control or not math.isclose(old.load, new.load, rel_tol=SAME_STEP):
-        yield f"had {old.control} {old.load!r}, has {new.control} {new.load!r}"
+        yield f"had {old.control} {old.load!r}, but has {new.control} {new.load!r}"
     if math.dist(old.position, new.position) > SAME_STEP * size:
-        yield f"ended with the surface at {old.position} m, ends at {new.position} m"
+        yield f"ended with the surface at {old.position} m, but ends at {new.position} m"

@@ -1,4 +1,4 @@
-"""A run: a march through its timeline that is recorded and saved, and stops if it is asked to."""
+"""A run: a march through a timeline with records, checkpoints and early stops."""
 
 import time
 from collections.abc import Callable
@@ -27,15 +27,15 @@ from ..storage.stopfile import StopFile
 from ..summary import pull_off, slide
 from .watch import Watch
 
-DONE, STOPPED_EARLY = 0, 3  # exit codes: as asked; stopped early with a good checkpoint, run again
+DONE, STOPPED_EARLY = 0, 3  # exit codes: success; stopped early with a good checkpoint, run again
 
 
 @dataclass(frozen=True)
 class Options:
-    """Options beside a job: where to begin, `until` in s of the history, `wall` in s of this program.
+    """Options of a run: `restart`, `until` [s of the history], `wall` [s since the start of the program].
 
-    `sweep_stop_file` is a stop file shared by all cases of a sweep; it is not removed. Doubts about a scene for which
-    `shows` is False go into run.log only.
+    `sweep_stop_file` is a stop file shared by all cases of a sweep; it is not removed. Warnings for which `shows` is
+    False go into run.log only.
     """
 
     quiet: bool = False
@@ -47,9 +47,9 @@ class Options:
 
 
 class Run:
-    """A march on its way to the end of its history, with its files; methods are collective.
+    """A march through its history, with its files; methods are collective.
 
-    `facts` are what its checkpoints say of it.
+    `facts` are stored in its checkpoints.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Run:
         self.began, self.saving = time.monotonic(), 0.0
 
     def go(self, saved: Contents | None) -> int:
-        """Go to the end, from the start or from a checkpoint; returns the exit code. Raises RunError."""
+        """Run to the end, from the start or from a checkpoint; returns the exit code. Raises RunError."""
         self._log_start(saved)
         if saved:
             self.recorder.catch_up(self.march.row, self.march.field)
@@ -91,7 +91,7 @@ class Run:
     # -- after every step -------------------------------------------------------------------------------------------
 
     def record(self, march: March) -> None:
-        """Write the row of the last step, and its maps if they are due; warn of what is doubtful about its contact."""
+        """Write the row of the last step, and its maps if they are due, and warn about its contact."""
         row = march.row
         if row.remark:
             self.console.say(row.remark)
@@ -109,7 +109,7 @@ class Run:
             self.recorder.renew(provenance)
 
     def decide(self, march: March) -> bool:
-        """Save if it is time to; whether the run ends."""
+        """Save if a checkpoint is due; return True if the run ends."""
         row = march.row
         verdict = self.watch.decide(row.step, row.step > self.first, self.recorder.problem)
         if verdict.problem:
@@ -123,7 +123,7 @@ class Run:
     # -- saving -----------------------------------------------------------------------------------------------------
 
     def save(self, last: bool = False) -> None:
-        """Write a checkpoint; results that were lost, or cannot be written, end the run when its state is saved."""
+        """Write a checkpoint; raises RunError if results were lost or cannot be written."""
         self._write(last)
         self._refuse_lost_results()
 
@@ -132,7 +132,7 @@ class Run:
             raise RunError(problem + self._leave_checkpoint())
 
     def _leave_checkpoint(self) -> str:
-        """Leave a checkpoint of the last good step; returns what to say of it."""
+        """Write a checkpoint of the last good step; returns a message."""
         try:
             if self.saved != self.march.row.step:
                 self._write(last=True)
@@ -141,9 +141,9 @@ class Run:
         return self._newest()
 
     def _write(self, last: bool) -> None:
-        """Write a checkpoint; one failure is only warned of, two in a row, or one at the end, are a RunError.
+        """Write a checkpoint. One failure gives a warning; two in a row, or one at the end, raise RunError.
 
-        What was recorded is synchronised first, so that no checkpoint is ahead of it.
+        Records are flushed first, so that no checkpoint is ahead of them.
         """
         began, step = time.monotonic(), self.march.row.step
         self._sync()
@@ -153,7 +153,7 @@ class Run:
             if last or self.failed:
                 raise RunError(f"{error}{self._newest()}") from error
             self.failed = True
-            self.console.warn(f"no checkpoint after step {step}: {error}; the run ends if the next fails too")
+            self.console.warn(f"no checkpoint after step {step}: {error}; the run ends if the next one fails too")
             return
         self.saved, self.failed = step, False
         if self.slab.root:
@@ -165,7 +165,7 @@ class Run:
         self.console.log(f"checkpoint after step {step} in {seconds:.3g} s")
 
     def _sync(self) -> None:
-        """Bring what was recorded to the disk, with the error budget so far."""
+        """Flush all records to disk, with the error budget so far."""
         budget = self.march.state.errors.facts(plain_data(self.job.numerics.accuracy))
         self.facts = replace(self.facts, provenance=replace(self.facts.provenance, budget=budget))
         self.recorder.sync(self.facts.provenance)
@@ -187,7 +187,7 @@ class Run:
         for fact in scene.describe_scene(self.march.scene):
             self.console.say(fact)
         if saved:
-            self.console.say(f"goes on after step {self.first} from {saved.path}")
+            self.console.say(f"continues after step {self.first} from {saved.path}")
 
     def _log_counts(self) -> None:
         spent = time.monotonic() - self.began
@@ -196,7 +196,7 @@ class Run:
         self.console.log(f"counts on root: {counts}")
 
     def _log_summary(self) -> int:
-        """Say how the run has ended and how wrong it is, and note it in its directory; returns the exit code."""
+        """Report the end of the run and its errors, and note the end in its directory; returns the exit code."""
         row, console, errors = self.march.row, self.console, self.march.state.errors
         adhesion: AdhesionMemory | None = self.march.state.memories.get("adhesion")
         slides = any(stage.speed for stage in self.job.history)
@@ -204,10 +204,10 @@ class Run:
         if self.slab.root and (slides or adhesion is not None) and not self.stop:
             grid, tolerance = self.job.grid, self.job.numerics.tolerance
             box = grid.lx * grid.ly
-            with suppress(OSError, InputError):  # a table that cannot be read now ends no run
+            with suppress(OSError, InputError):  # an unreadable table does not end a run
                 rows = tables.read_columns(self.directory.path / "measures.csv")
-                told = slide.describe_slide(self.job.history, self.job.initial, grid.dx, rows)
-                for text in (*told, *pull_off.describe_pull_off(rows, box, tolerance, bool(self.march.detached))):
+                sentences = slide.describe_slide(self.job.history, self.job.initial, grid.dx, rows)
+                for text in (*sentences, *pull_off.describe_pull_off(rows, box, tolerance, bool(self.march.detached))):
                     console.say(text)
         for line in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
             console.say(line)
@@ -216,10 +216,10 @@ class Run:
             console.say(text)
         if "edge" in self.contacts.seen:
             console.say(
-                "no error is stated of steps whose contact reaches the edge of the box: their results are wrong"
+                "no error is stated for steps whose contact reaches the edge of the box: their results are wrong"
             )
         if adhesion is not None and adhesion.snaps:
-            console.say(f"the contact snapped in {adhesion.snaps} of the steps: no error is stated across them")
+            console.say(f"the contact snapped in {adhesion.snaps} of the steps; no error is stated for them")
         if self.stop:
             of = f"at least {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
             console.say(f"stopped after step {row.step} of {of}: {self.stop}; run again to go on")
@@ -228,16 +228,15 @@ class Run:
         finished = row.step >= len(self.timeline) or bool(detached)
         if self.slab.root and finished:
             self.directory.note(saved=True, finished=(row.step, row.time), detached=detached)
-        how = detached or "done" if finished else f"stopped at t = {row.time:g} s as asked for, run again to go on"
+        how = detached or "done" if finished else f"stopped at t = {row.time:g} s as requested; run again to go on"
         console.say(f"{how}: results in {self.directory.path}")
         return DONE
 
 
 def chosen_by_accuracy(job: Job) -> set[str]:
-    """Return the parts of the error budget that a smaller `numerics.accuracy` makes smaller, as it has chosen the
-    settings behind them.
+    """Return the parts of the error budget that a smaller `numerics.accuracy` reduces, because it chose their settings.
 
-    Of time it is so where all stages of a slide choose their steps; without a slide, all that last.
+    Time is such a part if all stages of the slide (without a slide, all stages with a duration) choose their steps.
     """
     numerics = job.numerics
     lasting = [stage for stage in job.history if stage.seconds > 0.0]

@@ -1,4 +1,4 @@
-"""From a job to a run in its output directory: it begins, or goes on from a checkpoint."""
+"""Runs of a job in its output directory, from the start or from a checkpoint."""
 
 from contextlib import suppress
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ from .watch import Watch
 
 @dataclass(frozen=True)
 class Ended:
-    """End of a run: its exit code, and where it was left; or the checkpoint at which there was nothing to do."""
+    """End of a run: its exit code and its last march, or the checkpoint if there was nothing to do."""
 
     code: int
     march: March | None
@@ -41,12 +41,12 @@ class Ended:
 
 
 def run_job(job: Job, slab: Slab, options: Options) -> int:
-    """Run a job; collective. Returns the exit code. Nothing is written before the whole job has proved sound."""
+    """Run a job; collective. Returns the exit code. Nothing is written before the whole job is checked."""
     return run_to_end(job, slab, options).code
 
 
 def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
-    """Run a job, as `run`; returns what can be gone on from in memory."""
+    """Run a job, as `run_job`; returns its end, from which it can continue in memory."""
     directory = Directory(job.output.directory, slab)
     with directory.claimed():
         plain = listing.plain_job(job) if slab.root else {}
@@ -83,7 +83,7 @@ def run_to_end(job: Job, slab: Slab, options: Options) -> Ended:
 def _find_origin(
     job: Job, plain: dict[str, Any], directory: Directory, options: Options
 ) -> tuple[RestartPoint | None, list[str], str]:
-    """Find where to begin: a checkpoint or None, what to warn of, and why there is nothing to do, or ''; collective."""
+    """Return the checkpoint to continue from, or None; warnings; and why there is nothing to do, or ''; collective."""
     slab, until = directory.slab, options.until
     timeline = Timeline.from_job(job, until or 0.0)
     reason = restart.finished_before(job, plain, slab, directory, options.restart, timeline)
@@ -94,24 +94,24 @@ def _find_origin(
         )
     if until is not None and not reached(timeline.end, until):
         raise InputError(
-            f"--until {until:g} is beyond the end of the history, t = {timeline.end:g} s, and its last stage is one "
-            "solve: there is no time step to go on with"
+            f"--until {until:g} is beyond the end of the history, t = {timeline.end:g} s, but its last stage is one "
+            "solve without a time step to continue"
         )
     sanity.refuse_impossible(job, timeline)
     if origin and origin.contents.step >= len(timeline):
         when = f"at t = {origin.contents.time:g} s"
-        reason = f"finished before, {when} (--restart never: run it afresh; --until T: go on)"
+        reason = f"finished before, {when} (--restart never: run it again; --until T: continue it)"
     elif origin and (end := end_of(job, part_of("law", origin.contents.numbers))):
-        reason = f"detached before, at t = {end.time:g} s (--restart never: run it afresh)"
+        reason = f"detached before, at t = {end.time:g} s (--restart never: run it again)"
     elif origin and until is not None and reached(origin.contents.time, until):
-        reason = f"is at t = {origin.contents.time:g} s already, and --until {until:g} is not later"
+        reason = f"has already reached t = {origin.contents.time:g} s, and --until {until:g} is not later"
     if reason:
         on_root(slab.comm, lambda: _refuse_damaged(directory.path))
     return origin, warnings, reason
 
 
 def _refuse_damaged(directory: Path) -> None:
-    """Raise InputError for results of a run with nothing to do that are not whole."""
+    """Raise InputError if the results of a finished run are incomplete."""
     if lost := read_back.find_lost_rows(directory):
         raise InputError(lost)
     with suppress(FileNotFoundError):
@@ -119,7 +119,7 @@ def _refuse_damaged(directory: Path) -> None:
 
 
 def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[str, ...] = ()) -> Provenance:
-    """Return where the files of a run come from that begins, or goes on from a checkpoint."""
+    """Return the provenance of the files of a run that begins or continues from a checkpoint."""
     link = Link(job.resolved(), slab.comm.size, saved.step if saved else 0)
     seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough | RoughSpectrum))
     chain = extend_chain(saved.chain if saved else (), link)
@@ -130,10 +130,10 @@ def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[st
 def _open_files(
     march: March, directory: Directory, claim: Claim, facts: Facts, origin: RestartPoint | None, options: Options
 ) -> Recorder:
-    """Make the output directory ready, and the files in it; collective."""
+    """Prepare the output directory, and open its files; collective."""
     job, slab, added = march.scene.job, march.scene.slab, columns_of(march.scene.effects)
     timeline = march.timeline(options.until or 0.0)
-    step_row.columns(0, added)  # refuses names that are taken
+    step_row.columns(0, added)  # raises InputError for repeated names
     directory.make(job.path, job.resolved(), claim)
     heights.store(job.surface, directory.path, slab)
     if origin and origin.own:

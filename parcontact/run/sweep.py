@@ -1,4 +1,4 @@
-"""The cases of a sweep, one after the other or side by side; those that have finished are skipped."""
+"""The cases of a sweep, one after the other or at the same time; finished ones are skipped."""
 
 import sys
 import time
@@ -27,7 +27,7 @@ from .run import DONE, STOPPED_EARLY
 from .sweep_warnings import SweepWarnings, name_cases
 
 FAILED = 1
-ELSEWHERE = -1  # no exit code: of a case that another program runs
+ELSEWHERE = -1  # in place of an exit code: another program runs the case
 ENDS = {DONE: "done", STOPPED_EARLY: "stopped early", FAILED: "failed", ELSEWHERE: "passed over"}
 
 Shows = Callable[[Doubt], bool]
@@ -36,11 +36,11 @@ Act = Callable[[Job, Slab, Shows], int]
 
 @dataclass(frozen=True)
 class SweepRun:
-    """A sweep of `cases`, with each of which `act` is done; making one and its methods are collective.
+    """A sweep of `cases`, to each of which `act` is applied; the constructor and all methods are collective.
 
-    Several groups of ranks take the cases by turns, each group one at a time. `act` has a job, the slab of the group,
-    and what says whether a warning is shown. `limit` is until when at most, in the time of `time.monotonic`; `shown`
-    are the doubts that were shown before. Unless it `runs` its cases, their failures are not noted.
+    Groups of ranks take cases in turn, one at a time. `act` gets a job, the slab of the group, and a function that
+    tells if a warning is shown. `limit` is the latest end (time of `time.monotonic`); `shown` are warnings that were
+    already shown. Failures are recorded if it `runs` its cases.
     """
 
     cases: Sequence[Case]
@@ -54,19 +54,19 @@ class SweepRun:
 
     @cached_property
     def doubts(self) -> SweepWarnings:
-        """The warnings of this group of ranks."""
+        """Return the warnings of this group of ranks."""
         return SweepWarnings(self.shown, at_once=self.groups.count == 1)
 
     def run(self, chosen: Sequence[Case]) -> int:
-        """Do the chosen cases, and collect what all have come to. Returns the exit code.
+        """Run the selected cases and collect the results of all cases; returns the exit code.
 
-        A case that fails does not stop the others: the code is 1 in the end. One that another program runs is skipped,
-        like those that have finished; if it is the only one, InUseError is raised. One that stops early with a
-        checkpoint stops the sweep, with its code, and the cases beside it, but no other program: the same command goes
-        on with them. So do signals, the file `stop`, which stops other programs too, and the end of the wall time. The
-        file stays: others may not have seen it yet, and it stops no later one.
+        A failed case does not stop the others, but gives exit code 1. Finished cases, and those that another program
+        runs, are skipped; if only such a running case is selected, InUseError is raised. A case that stops early with a
+        checkpoint stops the sweep and the cases at the same time, but no other program; so do signals, the end of the
+        wall time, and the file `stop`, which also stops other programs and is not removed. The same command continues
+        the sweep.
         """
-        with Signals().noted() as signals:  # also by ranks that wait: one that ends would end the others with it
+        with Signals().noted() as signals:  # also on waiting ranks, whose end would end the others
             code = self._take(_deal(chosen, self.groups), signals)
             found = self.groups.from_all((code, self.doubts.kinds))
         codes = [one for one, _ in found]
@@ -79,11 +79,11 @@ class SweepRun:
             elif self.groups.count > 1 and not self.quiet:
                 print_line("stopped early; run again to go on")
             if self.runs and STOPPED_EARLY not in codes and len(chosen) > 1:
-                self._tell_errors(chosen)
+                self._report_errors(chosen)
         return STOPPED_EARLY if STOPPED_EARLY in codes else max(codes)
 
-    def _tell_errors(self, chosen: Sequence[Case]) -> None:
-        """Say how wrong the results are at most, and warn of cases that are more so than they ask for; root only."""
+    def _report_errors(self, chosen: Sequence[Case]) -> None:
+        """Print the largest estimated errors, and warn about cases whose errors exceed their accuracy; root only."""
         asked = {case.number: case.job.numerics.asked.both for case in chosen}
         for k, found in enumerate(sweep_table.sweep_errors(chosen)):
             if not found:
@@ -92,11 +92,11 @@ class SweepRun:
             if not self.quiet:
                 print_line(f"largest estimated error of {what}: {per_cent(found[worst], 3)}, in case {worst}")
             if beyond := [number for number, error in found.items() if exceeds(error, asked[number][k])]:
-                more = f"the estimated error of {what} is more than numerics.accuracy asks for in {name_cases(beyond)}"
-                print_line(f"warning: {more}; the log of each says what would make it smaller", sys.stderr)
+                more = f"the estimated error of {what} exceeds numerics.accuracy in {name_cases(beyond)}"
+                print_line(f"warning: {more}; the log of each case says how to reduce it", sys.stderr)
 
     def _take(self, own: Sequence[Case], signals: Signals) -> int:
-        """Do the cases of the group; returns the exit code. If it stops early, so do the others."""
+        """Run the cases of this group; returns the exit code. If it stops early, the other groups stop too."""
         code, side_by_side = DONE, self.groups.count > 1
         for case in own:
             slab = Slab(self.groups.comm, *case.job.grid.points)
@@ -118,7 +118,7 @@ class SweepRun:
         return code
 
     def _collect(self) -> int:
-        """Write the tables of the sweep; returns the exit code, FAILED where that cannot be. Root only."""
+        """Write the tables of the sweep; returns the exit code, FAILED if they cannot be written. Root only."""
         directory = _directory(self.cases)
         try:
             sweep_table.write_sweep_tables(directory, self.cases)
@@ -131,7 +131,7 @@ class SweepRun:
         return DONE
 
     def _reason_to_stop(self, slab: Slab, signals: Signals) -> str:
-        """Return why no further case is begun, or ''; any rank may have been sent a signal; collective."""
+        """Return why no further case begins, or ''; signals may reach any rank; collective."""
         if slab.reduce((), [float(signals.stop)])[0]:
             return watch.REASONS[watch.SIGNAL]
         used_up = self.limit is not None and time.monotonic() + watch.RESERVE_SECONDS > self.limit
@@ -144,7 +144,7 @@ class SweepRun:
         return STOPPED_EARLY
 
     def _attempt(self, case: Case, slab: Slab, alone: bool) -> int:
-        """Return the code with which a case ends; raises InUseError if another program runs it and it is `alone`."""
+        """Run a case and return its exit code; raises InUseError if another program runs it and it is `alone`."""
         self.doubts.begin(case.number)
         reason = ""
         try:
@@ -165,13 +165,12 @@ class SweepRun:
 
 
 def print_line(text: str, file: TextIO | None = None) -> None:
-    """Print a line at once: those of several groups do not mingle."""
+    """Print and flush a line, so that lines of several groups do not mix."""
     print(f"{text}\n", end="", file=file, flush=True)
 
 
 def _deal(chosen: Sequence[Case], groups: Groups) -> Sequence[Case]:
-    """Return the cases of the group of this rank: every group has as many of those that have not finished as the
-    others, give or take one; collective."""
+    """Return the cases of this rank's group; unfinished cases are divided evenly among groups; collective."""
     if groups.count == 1:
         return chosen
     order: list[int] = groups.agree(unfinished_first(chosen) if groups.root else [])
@@ -179,23 +178,23 @@ def _deal(chosen: Sequence[Case], groups: Groups) -> Sequence[Case]:
 
 
 def unfinished_first(chosen: Sequence[Case]) -> list[int]:
-    """Return the places of cases in a list of them, first of those that have not finished; root only."""
+    """Return the indices of cases, unfinished ones first; root only."""
     finished = [sweep_table.state(case) == "done" for case in chosen]
     return sorted(range(len(chosen)), key=lambda index: (finished[index], index))
 
 
 def to_do(chosen: Sequence[Case], afresh: bool) -> list[Job]:
-    """Return the jobs of all cases that something is to be done for; root only."""
+    """Return the jobs of all cases to be run; root only."""
     return [case.job for case in chosen if afresh or sweep_table.state(case) != "done"]
 
 
 def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
-    """Raise InputError where the files of others, or of another job, are in the directory of a sweep, or a link in
-    place of the directory of a case; root only."""
+    """Raise InputError if the directory of a sweep has foreign files or files of another job, or a link in place of a
+    case's directory; root only."""
     directory, first = _directory(cases), cases[0]
     for path in (directory / CASES, *(case.job.output.directory for case in cases)):
         if path.is_symlink():
-            raise InputError(f"{path} is a link, through which no case is written: remove it, or give --out")
+            raise InputError(f"{path} is a symbolic link, which is not followed: remove it, or give --out")
     try:
         claims = marker.read_claims(directory)
         entries = [path.name for path in directory.iterdir()] if directory.is_dir() else []
@@ -210,7 +209,7 @@ def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
 
 
 def stop_file(cases: Sequence[Case]) -> StopFile:
-    """Return what stops a sweep, and the cases that run, from now on."""
+    """Return the stop file of a sweep."""
     return StopFile.from_now_on(_directory(cases) / stopfile.NAME)
 
 

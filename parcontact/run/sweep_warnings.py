@@ -1,4 +1,4 @@
-"""Warnings of the cases of a sweep: each kind is shown once, with the cases that it holds for."""
+"""Warnings of the cases of a sweep: each subject is shown once, with its cases."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -6,23 +6,23 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from ..doubts import Doubt
 from ..job import Case, Job
 
-# the first doubt of each subject, and the numbers of the cases that have it
+# first warning of each subject, and the numbers of its cases
 Kinds = dict[tuple[str, ...], tuple[Doubt, list[int]]]
 
 
 class SweepWarnings:
-    """Doubts by their subjects. Those of the subjects `shown` before are not shown; others `at_once`, or at the end."""
+    """Warnings by subject; subjects `shown` before are not shown again, others `at_once` or at the end."""
 
     def __init__(self, shown: Sequence[Doubt] = (), at_once: bool = True) -> None:
         self._shown, self._at_once, self._case = frozenset(doubt.subject for doubt in shown), at_once, -1
         self.kinds: Kinds = {}
 
     def begin(self, case: int) -> None:
-        """Take what follows to be of this case."""
+        """Set the case of the following warnings."""
         self._case = case
 
     def shows(self, doubt: Doubt) -> bool:
-        """Note a doubt; whether it is to be shown now."""
+        """Record a warning; return True if it is shown now."""
         if doubt.subject in self._shown:
             return False
         _, cases = self.kinds.setdefault(doubt.subject, (doubt, []))
@@ -32,8 +32,8 @@ class SweepWarnings:
         return new and self._at_once
 
     def summary(self, of_groups: Sequence[Kinds]) -> list[str]:
-        """Return what is to be said at the end of what all groups of ranks have noted: what was not shown yet, or is
-        not of one case alone."""
+        """Return the messages at the end, from the records of all groups of ranks: warnings not yet shown, or shared by
+        several cases."""
         whole: Kinds = {}
         for kinds in of_groups:
             for subject, (doubt, cases) in kinds.items():
@@ -43,8 +43,8 @@ class SweepWarnings:
 
 
 def sentences_of(cases: Sequence[Case], doubts: Callable[[Job], Iterable[Doubt]]) -> list[str]:
-    """Return the sentences of the doubts about the jobs of cases, each subject once; of several with the cases that
-    they hold for."""
+    """Return the warnings about the jobs of cases as sentences, one per subject, with the cases if there are
+    several."""
     if len(cases) == 1:
         return list(dict.fromkeys(map(str, doubts(cases[0].job))))
     noted = SweepWarnings(at_once=False)
@@ -56,10 +56,10 @@ def sentences_of(cases: Sequence[Case], doubts: Callable[[Job], Iterable[Doubt]]
 
 
 def _doubt_ranges(cases: Sequence[Case]) -> Iterator[Doubt]:
-    """Yield a doubt about cases that have different ranges of adhesion, though none is given."""
+    """Yield a warning about cases that have different ranges of adhesion although none is given."""
     if not any(case.job.section("adhesion") for case in cases):
         return
-    from ..effects.adhesion import chosen_range  # not for what checks jobs without adhesion
+    from ..effects.adhesion import chosen_range  # not needed for jobs without adhesion
 
     reaches = {reach for case in cases if (reach := chosen_range(case.job)) is not None}
     if len(reaches) > 1:
@@ -67,14 +67,14 @@ def _doubt_ranges(cases: Sequence[Case]) -> Iterator[Doubt]:
 
 
 def warn_once(cases: Sequence[Case]) -> list[Doubt]:
-    """Warn of what is doubtful about the jobs of cases, each subject once; root only. Returns all doubts."""
+    """Print the warnings about the jobs of cases, one per subject; root only. Returns all warnings."""
     for text in sentences_of(cases, lambda job: job.doubts):
         print(f"warning: {text}", file=sys.stderr, flush=True)
     return [doubt for case in cases for doubt in case.job.doubts]
 
 
 def name_cases(numbers: Sequence[int]) -> str:
-    """Return ascending numbers as `cases 0, 2-5`."""
+    """Return ascending numbers as text: `cases 0, 2-5`."""
     starts = [number for number in numbers if number - 1 not in numbers]
     ends = [number for number in numbers if number + 1 not in numbers]
     pairs = zip(starts, ends, strict=True)

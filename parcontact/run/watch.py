@@ -1,6 +1,6 @@
-"""Reasons to stop a run early, or to save: signals, a stop file, limits of wall time.
+"""Reasons to stop a run early or to save: signals, a stop file, limits of wall time.
 
-Every rank may be sent a signal; all else is known to root. One small message per step decides for all.
+Any rank may receive a signal; root knows the rest. One small message per step makes the decision common.
 """
 
 import os
@@ -17,18 +17,18 @@ from ..parallel.slab import Slab
 from ..storage import stopfile
 from ..storage.stopfile import StopFile
 
-LOOK_SECONDS = 0.2  # tuning: between two looks for the stop file
-RESERVE_SECONDS = 5.0  # tuning: of wall time for what is not measured: ending MPI, closing files
-FIRST_WRITE = 50e6  # tuning: bytes per second: how fast the first checkpoint is expected to be written
-RECENT = 50  # tuning: steps whose longest is expected of the next one
+LOOK_SECONDS = 0.2  # tuning: least time between checks for the stop file [s]
+RESERVE_SECONDS = 5.0  # tuning: wall time reserved for the end of MPI and of files [s]
+FIRST_WRITE = 50e6  # tuning: expected writing rate of the first checkpoint [bytes/s]
+RECENT = 50  # tuning: number of recent steps, the longest of which is expected for the next one
 
-GO, WALL, FILE, SIGNAL = range(4)  # the largest one that any rank sees decides
-REASONS = {WALL: "the wall time is nearly used up", FILE: "the stop file was found", SIGNAL: "a signal asked for it"}
+GO, WALL, FILE, SIGNAL = range(4)  # the largest reason on any rank decides
+REASONS = {WALL: "the wall time is nearly used up", FILE: "the stop file was found", SIGNAL: "a signal was received"}
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Decision of all ranks after a step: `stop` says why the run ends early, `problem` what makes it fail; or ''."""
+    """Common decision after a step: why the run stops early (`stop`) or fails (`problem`), or ''."""
 
     stop: str = ""
     save: bool = False
@@ -37,7 +37,7 @@ class Verdict:
 
 @dataclass
 class Watch:
-    """Asked after every step. `limit` is the time (of `time.monotonic`) at which the run must have ended, if any;
+    """Decides after every step. `limit` is the time (of `time.monotonic`) at which the run must have ended, if any;
     `sweep_stop_file` is shared by all cases of a sweep; it is not removed."""
 
     slab: Slab
@@ -55,7 +55,8 @@ class Watch:
     _steps: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))
 
     def decide(self, step: int, began: bool, problem: str = "") -> Verdict:
-        """Decide after a step; collective. `began`: a step was made in this run; `problem`: what root could not do."""
+        """Return the decision after a step; collective. `began`: this run has made a step; `problem`: a failure on
+        root."""
         now = time.monotonic()
         if began:
             self._steps.append(now - self._last)
@@ -73,7 +74,7 @@ class Watch:
         return Verdict(REASONS.get(int(stop), ""), bool(save))
 
     def saved(self, seconds: float) -> None:
-        """Tell that a checkpoint was written, and how long that took."""
+        """Record that a checkpoint was written in `seconds` [s]."""
         self._write = seconds
         self._saved = self._last = time.monotonic()
 
@@ -95,17 +96,17 @@ class Watch:
 
     @property
     def reserve(self) -> float:
-        """Wall time [s] to keep for one more step and a checkpoint, both twice as long as seen so far."""
+        """Return the wall time [s] for one more step and a checkpoint, each twice as long as seen so far."""
         write = self._write if self._write >= 0.0 else self.state_bytes / FIRST_WRITE
         return RESERVE_SECONDS + 2.0 * (max(self._steps, default=0.0) + write)
 
 
 def limit(wall: float | None, environment: Mapping[str, str] = os.environ) -> float | None:
-    """Return when a run must have ended, in the time of `time.monotonic`: after `wall` seconds, or with its batch job.
+    """Return the time (of `time.monotonic`) by which a run must end: after `wall` seconds, or with its batch job.
 
-    The end of a job is SLURM_JOB_END_TIME or PARCONTACT_END_TIME, in seconds since 1970; PBS (Torque) says how long it
-    may last, PBS_WALLTIME, which is counted from the start of this program: a little too late. An end before that start
-    is that of another job, whose environment was handed on. The clock of the day is read once: it may be set later.
+    The end of a batch job is SLURM_JOB_END_TIME or PARCONTACT_END_TIME [s since 1970], or PBS_WALLTIME after the start
+    of this program, slightly too late. An end before that start belongs to another job and is ignored. The clock is
+    read once, as it may be changed later.
     """
     now = time.monotonic()
     born, epoch = now - age(), now - time.time()
@@ -118,7 +119,7 @@ def limit(wall: float | None, environment: Mapping[str, str] = os.environ) -> fl
 
 
 def age() -> float:
-    """Return for how many seconds this process has been there."""
+    """Return the age of this process [s]."""
     try:
         ticks = int(Path("/proc/self/stat").read_text().rpartition(")")[2].split()[19])
         return max(time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK"), 0.0)

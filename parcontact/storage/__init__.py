@@ -1,1 +1,1 @@
-"""Every file that a program writes, reads or shares with others: HDF5, csv, log, job copies, directories."""
+"""Files of results: HDF5, csv, logs, copies of jobs, directories and their locks."""

@@ -1,11 +1,11 @@
-"""Checkpoints: all that a run remembers at one instant, in an HDF5 file that proves itself whole.
+"""Checkpoints: the complete state of a run at one instant, in an HDF5 file with checksums.
 
-Maps are global datasets `part/name` of shape (ny, nx), so that any number of ranks reads its rows; numbers are small
+Maps are global datasets `part/name` of shape (ny, nx), so any number of ranks can read its rows; numbers are small
 datasets. Both are in the units of the run, which are powers of two: the attribute `unit` is the SI value of 1.
 
-Every row of every map has its CRC-32 in the group `checksums`. All bytes that are not in a map have theirs in the seal,
-which is text in front of what HDF5 reads (its user block) and is written last: HDF5 itself never sees a damaged file,
-which it may not survive. The file has another name until all of it is on the disk.
+Each row of a map has its CRC-32 in the group `checksums`. All bytes outside of maps are covered by the checksum in the
+seal, a text in front of the HDF5 data (its user block) that is written last. Damaged files are recognised before HDF5,
+which may crash on them, opens them. The file has a temporary name until it is complete.
 """
 
 import json
@@ -30,13 +30,13 @@ from .provenance import Link, Provenance, read_chain
 
 FORMAT = 2
 TITLE = "parcontact checkpoint, format "
-SEAL = 4096  # tuning: bytes set aside for it
+SEAL = 4096  # tuning: size of the seal [bytes]
 SUMS = "checksums"
 
 
 @dataclass(frozen=True)
 class TableMark:
-    """The state of measures.csv: how many rows it has, and the last one."""
+    """State of measures.csv: its number of rows, and the last row."""
 
     rows: int = 0
     last: str = ""
@@ -44,7 +44,8 @@ class TableMark:
 
 @dataclass(frozen=True)
 class Contents:
-    """Content of a sound checkpoint: `numbers` and their `units` by name; types of maps, checksums of their rows."""
+    """Contents of a sound checkpoint: `numbers` and their `units` by name; types of maps and checksums of their
+    rows."""
 
     path: Path
     step: int
@@ -62,9 +63,9 @@ class Contents:
 
 @dataclass(frozen=True)
 class Facts:
-    """Facts about a checkpoint: its job as plain data, where the file comes from, and where the run is.
+    """Facts about a checkpoint: its job as plain data, the provenance of the file, and the position of the run.
 
-    `run` is the id of the run that wrote it, the same in all that one directory holds; `table` is of its measures.
+    `run` is the id of the run, equal in all files of a directory; `table` is the state of its measures.csv.
     """
 
     job: Mapping[str, Any]
@@ -82,7 +83,7 @@ class Facts:
 
 
 def write_checkpoint(path: Path, slab: Slab, facts: Facts, entries: Mapping[str, Entry]) -> None:
-    """Write a checkpoint; collective. On an error nothing of it is left, and what had the name before still has it."""
+    """Write a checkpoint; collective. After an error an existing file of this name is unchanged."""
     maps = _maps(entries)
     part = slab.agree(files.unused(path))
 
@@ -108,7 +109,7 @@ def write_checkpoint(path: Path, slab: Slab, facts: Facts, entries: Mapping[str,
         everyone = slab.from_all({name: row_sums(rows) for name, rows in maps.items()})
         hdf5.write_on_root(slab, finish, f"cannot write {part}")
         hdf5.sync(part, slab)
-        hdf5.write_on_root(slab, lambda: _publish(part, path), f"cannot make {path}")
+        hdf5.write_on_root(slab, lambda: _publish(part, path), f"cannot create {path}")
     except RunError:
         if slab.root:
             with suppress(OSError):
@@ -132,7 +133,7 @@ def row_sums(rows: Array) -> NDArray[np.uint32]:
 
 
 def inspect(path: Path) -> Contents:
-    """Read all but the maps, which are not checked here; raises InputError, in one sentence, for what is not sound."""
+    """Read everything but the maps, which `verify` checks; raises InputError for a damaged file."""
     try:
         if problem := _broken(path):
             raise InputError(f"{path} {problem}")
@@ -143,7 +144,7 @@ def inspect(path: Path) -> Contents:
 
 
 def is_one(path: Path) -> bool:
-    """Return whether a file says that it is a checkpoint; raises OSError."""
+    """Return True if a file has the title of a checkpoint; raises OSError."""
     with path.open("rb") as file:
         return file.read(len(TITLE)) == TITLE.encode()
 
@@ -159,14 +160,14 @@ def _seal(path: Path) -> None:
 
 
 def _broken(path: Path) -> str:
-    """Return what the seal says is wrong with the file, or ''."""
+    """Return the damage of a file by its seal, or ''."""
     with path.open("rb") as file:
         title, facts, *_ = [*file.read(SEAL).split(b"\n"), b""]
         if not title.startswith(TITLE.encode()):
             return "is incomplete or damaged: it has no seal"
         if (version := int(title[len(TITLE) :])) != FORMAT:
             other = "a newer" if version > FORMAT else "an older"
-            return f"is of format {version}, written by {other} parcontact, and this one reads format {FORMAT} only"
+            return f"has format {version} of {other} parcontact; format {FORMAT} was expected"
         try:
             wanted, regions, checksum = itemgetter("bytes", "maps", "checksum")(json.loads(facts))
         except (ValueError, KeyError, TypeError):
@@ -174,12 +175,12 @@ def _broken(path: Path) -> str:
         if (size := file.seek(0, os.SEEK_END)) != wanted:
             return f"is damaged: it has {size} bytes instead of {wanted}"
         if _outside(file, size, regions) != checksum:
-            return "is damaged: what is not in its maps does not match its checksum"
+            return "is damaged: the bytes outside of its maps do not match their checksum"
     return ""
 
 
 def _outside(file: BinaryIO, size: int, regions: Sequence[tuple[int, int]]) -> int:
-    """Return the CRC-32 of all bytes that are neither in the seal nor in a map."""
+    """Return the CRC-32 of all bytes outside of the seal and of the maps."""
     total, start = 0, SEAL
     for first, last in [*regions, (size, size)]:
         total, start = zlib.crc32(os.pread(file.fileno(), first - start, start), total), last
@@ -187,7 +188,7 @@ def _outside(file: BinaryIO, size: int, regions: Sequence[tuple[int, int]]) -> i
 
 
 def find_regions(file: h5py.File) -> list[tuple[int, int]]:
-    """Return where in a file its maps are, from byte to byte, in order; those next to each other as one."""
+    """Return the byte ranges of the maps in a file in order, with adjacent ranges merged."""
     maps = [item for item in _datasets(file).values() if item.ndim > 1]
     places = [(item.id.get_offset(), item.nbytes) for item in maps if item.id.get_offset() is not None]
     merged: list[tuple[int, int]] = []
@@ -218,7 +219,7 @@ def _contents(path: Path, file: h5py.File) -> Contents:
 
 
 def verify(contents: Contents, slab: Slab) -> str:
-    """Check this file's maps against their checksums, every rank its rows; collective. Returns what is wrong, or ''."""
+    """Check the maps against their checksums, each rank its own rows; collective. Returns the damage, or ''."""
     rows = np.empty(0)
     try:
         for name, dtype in contents.maps.items():
@@ -234,7 +235,7 @@ def verify(contents: Contents, slab: Slab) -> str:
 
 
 def read_maps(contents: Contents, slab: Slab, entries: Mapping[str, Entry]) -> None:
-    """Read the maps of a checkpoint into those of `entries`, in their units; collective. Numbers are in `contents`."""
+    """Read the maps of a checkpoint into `entries`, in their units; collective."""
     maps = _maps(entries)
     hdf5.read_rows(contents.path, slab, [hdf5.Slice(name, (), rows) for name, rows in maps.items()])
     for name, rows in maps.items():

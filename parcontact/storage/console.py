@@ -18,8 +18,8 @@ from .step_row import StepRow
 HEAD = "    step        time [s]    load [Pa] corr.area  friction   iter  residual"
 STAMP = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d[.,]\d+ ")
 WARNING, MESH = "warning: ", "mesh: "
-EVERY_SECONDS = 0.5  # tuning: a bar is redrawn, and lines are shortened to a bar, at most this often
-LEFT_SECONDS = 30.0  # tuning: between two lines with the time left, where there is no terminal for a bar
+EVERY_SECONDS = 0.5  # tuning: least time between updates of a progress bar [s]
+LEFT_SECONDS = 30.0  # tuning: time between lines with the time left, without a terminal [s]
 
 
 def step_line(row: StepRow) -> str:
@@ -32,28 +32,28 @@ def step_line(row: StepRow) -> str:
 
 
 def warnings_of(log: Path) -> list[str]:
-    """Return the warnings in a log, each once and in their order; none where there is no log."""
+    """Return the different warnings in a log, in order; none without a log."""
     return list(dict.fromkeys(line.removeprefix(WARNING) for line in log_lines(log) if line.startswith(WARNING)))
 
 
 def meshes_of(log: Path) -> list[str]:
-    """Return what a log says of meshes that were chosen (`mesh.chosen_mesh`), the last of it; nothing as a rule."""
+    """Return the last message of a log on chosen meshes (`mesh.chosen_mesh`), if any."""
     return [line for line in log_lines(log) if line.startswith(MESH)][-1:]
 
 
 def log_lines(log: Path) -> list[str]:
-    """Return the lines of a log without their stamps; none where there is no log."""
+    """Return the lines of a log without time stamps; none without a log."""
     return [STAMP.sub("", line) for line in log.read_text(errors="replace").splitlines()] if log.is_file() else []
 
 
 def always(doubt: Doubt) -> bool:
-    """Show every doubt."""
+    """Return True: all warnings are shown."""
     return True
 
 
 class Console:
-    """Messages of root to the user and to the log. The console of another rank, without a log, does not speak, so that
-    no caller asks who it is. Making one with a log raises OSError where that cannot be written."""
+    """Messages of root to the user and to the log; the consoles of other ranks are silent. Raises OSError if the log
+    cannot be written."""
 
     def __init__(self, log: Path | None = None, quiet: bool = True, total: int = 0, speaks: bool = True) -> None:
         self._log = files.open_to_append(log) if log is not None else None
@@ -68,25 +68,25 @@ class Console:
             self._write(text)
 
     def log(self, text: str) -> None:
-        """Write a message to the log only, with the time; no run ends for a line that cannot be written."""
+        """Write a message with its time to the log only; errors of writing are ignored."""
         if self._log is not None:
             with suppress(OSError):
                 self._log.write(f"{datetime.now().isoformat(' ', 'milliseconds')} {printable(text)}\n".encode())
 
     def warn(self, text: str, shown: bool = True) -> None:
-        """Log a warning, and show it even to those who asked for quiet if it is to be `shown`."""
+        """Log a warning; if `shown`, print it also in quiet runs."""
         self.log(f"{WARNING}{text}")
         if shown:
             self._write(f"{WARNING}{printable(text)}", sys.stderr)
 
     def step(self, row: StepRow) -> None:
-        """Say the line of a step, and how far the run is."""
+        """Print the line of a step, and update the progress."""
         text = step_line(row)
         self.log(text)
         if self._quiet:
             return
         self._rows += 1
-        if self._rows <= 2:  # the first step makes much that is made once
+        if self._rows <= 2:  # the first step includes allocations
             self._first, self._began = row.step, time.monotonic()
             self._last_time_left = self._began
         if self._rows == 1:
@@ -102,7 +102,7 @@ class Console:
             self._say_time_left(row.step)
 
     def _say_time_left(self, step: int) -> None:
-        """Say now and then how long it takes if steps go on to take as long as they did after the first one."""
+        """Print the time left at intervals, extrapolated from the steps after the first."""
         now = time.monotonic()
         if now - self._last_time_left >= LEFT_SECONDS and self._first < step < self._total:
             self._last_time_left = now
@@ -111,7 +111,7 @@ class Console:
             self._write(f"# step {step} of {self._total}, about {clock} left")
 
     def expect(self, total: int) -> None:
-        """Take note of how many steps there will be, as far as is known by now."""
+        """Set the total number of steps, as far as known."""
         self._total = total
         if self._bar is not None:
             self._bar.total = total

@@ -1,6 +1,6 @@
-"""The output directory of a run: one run at a time, its marker, its job files, its checkpoints.
+"""The output directory of a run: its lock, marker, job files and checkpoints.
 
-The lock is taken first, then it is seen whose the directory is, and only then something is written.
+The lock is taken first; then the ownership of the directory is checked, and only then files are written.
 """
 
 import errno
@@ -22,7 +22,7 @@ from ..parallel.slab import Slab
 from . import checkpoint, curve_points, files, hdf5, marker, stopfile
 from .marker import SCENE, VERBS, Claim
 
-MAX_SECONDS_TO_RELEASE = 3.0  # tuning: seconds: a run that was killed may need a moment to let go
+MAX_SECONDS_TO_RELEASE = 3.0  # tuning: longest wait for the lock of a killed run [s]
 RESULTS = {
     "run": ("measures.csv", "fields.h5", "fields.xdmf", "run.log"),
     "steady": (
@@ -36,7 +36,7 @@ RESULTS = {
     ),
     "study": ("study.csv", "study.txt", "convergence.png"),
 }
-COPIES = {  # of the job: as given, and with every default
+COPIES = {  # copies of the job: as given, and with every default
     "run": ("job.yaml", "job.resolved.yaml"),
     "steady": ("steady.job.yaml", "steady.resolved.yaml"),
     "study": ("study.job.yaml", "study.resolved.yaml"),
@@ -49,13 +49,13 @@ BESIDE = (
     "steady_theory.csv",
     "bands_theory.csv",
 )  # may be there before the first run
-SHOWN = 4  # tuning: names of files that a message lists
+SHOWN = 4  # tuning: most names of files in a message
 NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
-ADVICE = "give --restart never to start afresh, or --out for another directory"
+ADVICE = "give --restart never to start from the beginning, or --out for another directory"
 
 
 class Directory:
-    """A directory of results. Only root touches it; methods whose docstring says "collective" tell all ranks."""
+    """A directory of results. Only root accesses it; collective methods, marked as such, broadcast the result."""
 
     def __init__(self, path: Path, slab: Slab, verb: str = "run") -> None:
         self.path, self.slab, self.verb = path, slab, verb
@@ -73,7 +73,7 @@ class Directory:
 
     @property
     def claim(self) -> Claim | None:
-        """The claim of this verb, on root; None elsewhere."""
+        """Return the claim of this verb on root, None on other ranks."""
         return self.claims.get(self.verb)
 
     def checkpoint(self, step: int) -> Path:
@@ -82,7 +82,7 @@ class Directory:
 
     @contextmanager
     def claimed(self) -> Iterator[None]:
-        """Keep other runs from writing here meanwhile; collective. A new directory that stays empty is removed."""
+        """Lock the directory within the context; collective. A new directory that stays empty is removed."""
         try:
             self._on_root(self._lock_and_read)
             yield
@@ -90,18 +90,19 @@ class Directory:
             self._release()
 
     def refuse_foreign(self, job: Path, data: Mapping[str, Any], afresh: bool) -> None:
-        """Raise InputError where the files of others, or of another job, are; collective. `data`: the job, plain."""
+        """Raise InputError if the directory has foreign files or results of another job; collective. `data`: the job as
+        plain data."""
 
         def look() -> None:
             if not self.claims and not afresh and not self._has_checkpoints():
-                hint = ", or --restart never to write here and put files of these names aside"
+                hint = ", or --restart never to write here and rename files of these names"
                 refuse_files(self.path, (path.name for path in self.path.iterdir() if not _same(path, job)), hint)
             refuse_other_jobs(self.path, {v: claim for v, claim in self.claims.items() if v != self.verb}, data)
 
         self._on_root(look)
 
     def make(self, job: Path, resolved: str, claim: Claim) -> None:
-        """Put the marker and the job into the directory; collective. Raises InputError where it cannot be written."""
+        """Write the marker and the job; collective. Raises InputError if the directory cannot be written."""
 
         def act() -> None:
             self._put_aside_what_is_not_ours(job)
@@ -118,7 +119,7 @@ class Directory:
         self._on_root(act)
 
     def clear(self) -> None:
-        """Remove what earlier runs of this verb wrote; collective. Only after `make`, which has put aside the rest."""
+        """Remove files of earlier runs of this verb; collective. Call it after `make`, which renames foreign files."""
 
         def act() -> None:
             checkpoints = [path for _, path in self.saved()] if self.verb == "run" else []
@@ -128,7 +129,7 @@ class Directory:
         self._on_root(act)
 
     def go_back(self, step: int) -> None:
-        """Put aside the checkpoints after a step, and remove unfinished files; collective."""
+        """Rename the checkpoints after a step, and remove unfinished files; collective."""
 
         def act() -> None:
             for path in self._unfinished():
@@ -141,19 +142,19 @@ class Directory:
 
     def prune(self, keep: int) -> None:
         """Remove all but the newest checkpoints; root only."""
-        with suppress(OSError):  # too many are no harm
+        with suppress(OSError):  # superfluous checkpoints do no harm
             for _, path in self.saved()[keep:]:
                 path.unlink()
 
     def note(self, **facts: Any) -> None:
-        """Change what the marker says of this verb; root only. That it cannot be written ends no run."""
+        """Update this verb's claim in the marker; root only. Errors of writing are ignored."""
         if (claim := self.claim) and (changed := replace(claim, **facts)) != claim:
             self.claims = {**self.claims, self.verb: changed}
             with suppress(OSError):
                 marker.write_claims(self.path, self.claims)
 
     def saved(self) -> list[tuple[int, Path]]:
-        """Return checkpoints and their steps, the newest first; root only."""
+        """Return steps and paths of checkpoints, the newest first; root only."""
         found = [
             (int(match.group(1)), path)
             for path in self.checkpoints.glob("step-*.h5")
@@ -162,29 +163,30 @@ class Directory:
         return sorted(found, reverse=True)
 
     def results(self) -> list[str]:
-        """Return the names of this verb's results that are here; root only."""
+        """Return the names of this verb's existing results; root only."""
         found = [name for name in RESULTS[self.verb][:2] if (self.path / name).exists()]
         return [*found, *(path.name for _, path in self.saved() if self.verb == "run")]
 
     def _unfinished(self) -> list[Path]:
-        """Return the files that a run which was killed had not finished."""
+        """Return the unfinished files of a killed run."""
         return [*self.path.glob("*.part"), *self.checkpoints.glob("*.part")]
 
     # -- whose it is --------------------------------------------------------------------------------------------------
 
     def _has_checkpoints(self) -> bool:
-        """Return whether the directory proves to be ours, as a copy that has lost its marker does."""
+        """Return True if the directory has sound checkpoints, as a copy without its marker has."""
         return any(checkpoint.is_one(path) for _, path in self.saved())
 
     def _put_aside_what_is_not_ours(self, job: Path) -> None:
-        """Put aside files of the names of this verb's where neither the marker nor a checkpoint says that they are."""
+        """Rename files with the names of this verb's results if neither the marker nor a checkpoint proves their
+        origin."""
         if self.claim is None and not (self.verb == "run" and self._has_checkpoints()):
             for name in (*RESULTS[self.verb], *COPIES[self.verb], *(["checkpoint"] if self.verb == "run" else [])):
                 if not _same(self.path / name, job):
                     files.put_aside(self.path / name)
 
     def _on_root(self, act: Callable[[], None]) -> None:
-        """Act on root; collective. Raises InputError on all ranks if that fails."""
+        """Call `act` on root; collective. Raises InputError on all ranks if it fails."""
         hdf5.write_on_root(self.slab, act, f"the output directory {self.path} cannot be written", InputError)
 
     # -- the lock -----------------------------------------------------------------------------------------------------
@@ -196,11 +198,11 @@ class Directory:
             self.claims = marker.read_claims(self.path)
         except ValueError as error:
             raise InputError(
-                f"{error}, so that the owner of {self.path} is unknown; --out chooses another directory"
+                f"{error}, so the owner of {self.path} is unknown; give --out for another directory"
             ) from error
 
     def _take_lock(self) -> None:
-        """Take the lock, which the system gives back however this process ends; raises InUseError."""
+        """Take the lock, which the system releases when this process ends; raises InUseError."""
         deadline = time.monotonic() + MAX_SECONDS_TO_RELEASE
         path = self.path / LOCK
         while True:
@@ -219,9 +221,9 @@ class Directory:
                     continue
             if path.exists() and os.path.samestat(os.fstat(handle), path.stat()):
                 break
-            os.close(handle)  # its last holder has removed it
+            os.close(handle)  # the lock file was removed meanwhile
         self._lock = handle
-        with suppress(OSError):  # only for whom it may concern
+        with suppress(OSError):  # information for users only
             os.ftruncate(handle, 0)
             os.pwrite(handle, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
 
@@ -237,28 +239,28 @@ class Directory:
 
 
 def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
-    """Raise InputError if a directory that is not ours holds files of these names, beside hidden ones and `BESIDE`, or
-    is that of a sweep."""
+    """Raise InputError if a foreign directory has files of these names (except hidden ones and `BESIDE`), or belongs to
+    a sweep."""
     foreign = sorted(name for name in names if not name.startswith(".") and name not in BESIDE)
     if cases := len([*(directory / CASES).glob(f"*/{marker.MARKER}")]):
         raise InputError(
-            f"the output directory {directory} is that of a sweep, with {cases} of its cases; give --out for another "
+            f"the output directory {directory} belongs to a sweep and has {cases} of its cases; give --out for another "
             "directory, or run the job of the sweep, one case of it with --case"
         )
     if foreign:
         shown = ", ".join(foreign[:SHOWN]) + (f" and {len(foreign) - SHOWN} more" * (len(foreign) > SHOWN))
         raise InputError(
-            f"the output directory {directory} is not empty and not of this program: it holds {shown}; give --out for "
-            f"another directory{hint}"
+            f"the output directory {directory} is not empty and was not made by this program: it has {shown}; "
+            f"give --out for another directory{hint}"
         )
 
 
 def refuse_other_jobs(directory: Path, claims: Mapping[str, Claim], data: Mapping[str, Any]) -> None:
-    """Raise InputError if one of the claims of a directory is of another scene than the job `data`, as plain data."""
+    """Raise InputError if a claim of the directory is for another scene than the job `data` (plain data)."""
     for verb, claim in claims.items():
         if found := marker.list_differences(marker.differences(claim.job, data, SCENE)):
             raise InputError(
-                f"the output directory {directory} holds {VERBS[verb]} of another job: {found}; "
+                f"the output directory {directory} has {VERBS[verb]} of another job: {found}; "
                 f"{marker.keep_mesh(claim.job, found)}give --out for another directory"
             )
 

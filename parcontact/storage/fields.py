@@ -1,7 +1,7 @@
-"""fields.h5: saved maps, and fields.xdmf, through which ParaView reads them.
+"""fields.h5: saved maps; and fields.xdmf, by which ParaView reads them.
 
-The file is laid out for all instants of the run before the first: saving one writes numbers into their places and its
-time last, so that a run that dies leaves a readable file. Instants not reached yet have the time NaN.
+The file is laid out for all instants before the first one is saved. Saving an instant writes its maps and then its
+time, so a killed run leaves a readable file. Instants that were not reached have the time NaN.
 """
 
 import time as clock
@@ -22,13 +22,14 @@ from .provenance import Provenance
 MAPS = ("pressure", "displacement", "gap", "height", "temperature", "traction_x", "traction_y")
 UNITS = {column.name: column.unit for column in FIELDS if column.name in MAPS}
 KIND = "parcontact fields"
-XDMF_SECONDS = 10.0  # tuning: at least between two versions of fields.xdmf, which grows with every instant
+XDMF_SECONDS = 10.0  # tuning: least time between updates of fields.xdmf, which grows with every instant [s]
 
 
 class FieldsFile:
-    """Saved maps of shape (t, y, x), with coordinates; every method is collective.
+    """Saved maps of shape (t, y, x), with coordinates; all methods are collective.
 
-    Parameters: where; this rank's rows; the box `size` (lx, ly) [m]; which maps; after which `steps` they are saved.
+    Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; names of maps; `steps` after which they are
+    saved.
     """
 
     def __init__(
@@ -36,18 +37,18 @@ class FieldsFile:
     ) -> None:
         self.path, self.slab, self.size, self.names = path, slab, size, tuple(names)
         self.steps = {step: index for index, step in enumerate(steps)}
-        self.trouble = ""  # with fields.xdmf, which no run ends for; on root
+        self.trouble = ""  # failure to write fields.xdmf, which does not end a run; root only
         self.provenance = Provenance(())
         self._drawn = 0.0
         self._kept: frozenset[int] = frozenset()
 
     def make(self, provenance: Provenance) -> None:
-        """Lay the file out anew; what has its name is replaced."""
+        """Create the file; an existing one is replaced."""
         self.provenance = provenance
         self._replace(None)
 
     def make_place(self, steps: Sequence[int]) -> None:
-        """Lay the file out for other steps to come than were foreseen; what was saved stays, and no more place."""
+        """Lay the file out for other future steps; saved maps are kept."""
         found, _ = _found(self.path, self.slab)
         if found is not None:
             kept = found.reached(max(found.steps, default=0))
@@ -55,9 +56,9 @@ class FieldsFile:
             self._replace(found, kept)
 
     def resume(self, step: int, provenance: Provenance) -> str:
-        """Go on after a step: what was saved up to it stays, whatever else was asked for then.
+        """Continue after a step: maps saved up to it are kept, even if other maps were requested then.
 
-        Returns what is lost, or ''; a file that cannot be read is put aside. Raises InputError for one that is locked.
+        Returns a message about lost maps, or ''; an unreadable file is renamed. Raises InputError for a locked file.
         """
         self.provenance = provenance
         found, problem = _found(self.path, self.slab)
@@ -73,11 +74,11 @@ class FieldsFile:
         return problem
 
     def is_due(self, step: int) -> bool:
-        """Return whether the maps of the step after which a run goes on are due, and were not saved then."""
+        """Return True if the maps of the step from which a run continues are due but not saved."""
         return step in self.steps and step not in self._kept
 
     def renew(self, provenance: Provenance) -> None:
-        """Put what has changed of its origin into the file."""
+        """Update the provenance in the file."""
         self.provenance = provenance
         hdf5.change(self.path, self.slab, provenance.renew)
 
@@ -87,10 +88,7 @@ class FieldsFile:
             self._draw()
 
     def sync(self, provenance: Provenance) -> None:
-        """Wait until all that was saved is on the disk, with what is new of its origin; bring fields.xdmf up to date.
-
-        Raises RunError.
-        """
+        """Flush all saved maps and the provenance to disk, and update fields.xdmf. Raises RunError."""
         self.renew(provenance)
         hdf5.sync(self.path, self.slab)
         self._draw()
@@ -105,7 +103,7 @@ class FieldsFile:
         hdf5.add_maps(file, self.slab, self.size, {name: UNITS[name] for name in self.names}, "t")
 
     def _replace(self, found: "SavedFields | None", kept: Sequence[int] = ()) -> None:
-        """Lay a new file out, and copy the maps of the steps that are `kept`; one that was not saved then is NaN."""
+        """Create a new file with copies of the maps of the steps `kept`; maps that were not saved are NaN."""
         new = self.slab.agree(files.unused(self.path))
         size = len(self.steps) * len(self.names) * self.slab.nx * self.slab.ny * hdf5.DOUBLE
         hdf5.lay_out(new, self.slab, self._build, size)
@@ -141,9 +139,9 @@ class FieldsFile:
 
 
 def cut_back(path: Path, slab: Slab, step: int) -> str:
-    """Take the instants after a step as not reached, in a file to which nothing more is added; collective.
+    """Mark the instants after a step as not reached, in a file that is not continued; collective.
 
-    As for `FieldsFile.resume`, returns what is lost, and raises InputError.
+    Returns a message about lost maps; raises InputError as `FieldsFile.resume`.
     """
     if not slab.agree(path.exists()):
         return ""
@@ -154,7 +152,7 @@ def cut_back(path: Path, slab: Slab, step: int) -> str:
 
 
 class SavedFields:
-    """The maps and instants of a file of fields."""
+    """The maps and instants in a field file."""
 
     def __init__(self, file: h5py.File) -> None:
         self.names = tuple(name for name in UNITS if name in file)
@@ -165,15 +163,15 @@ class SavedFields:
                 raise ValueError(f"{name} has shape {file[name].shape}")
 
     def reached(self, step: int) -> list[int]:
-        """Return the instants that were saved, up to a step."""
+        """Return the indices of saved instants up to a step."""
         pairs = zip(self.steps, self.times, strict=True)
         return [number for number, time in pairs if number <= step and not np.isnan(time)]
 
 
 def _found(path: Path, slab: Slab) -> tuple[SavedFields | None, str]:
-    """Return what a file of fields holds, and what is lost; collective. Raises InputError for one that is locked.
+    """Return the contents of a field file, and a message about lost maps; collective.
 
-    A file that cannot be read is put aside.
+    An unreadable file is renamed. Raises InputError for a locked file.
     """
 
     def look() -> tuple[SavedFields | None, str]:
@@ -194,11 +192,11 @@ def _found(path: Path, slab: Slab) -> tuple[SavedFields | None, str]:
 def xdmf(
     file: str, times: Array, steps: Array, shape: tuple[int, int], size: tuple[float, float], names: tuple[str, ...]
 ) -> str:
-    """Return the XDMF text that describes the saved instants: maps of one layer of points in the plane z = 0.
+    """Return the XDMF text of the saved instants: maps of one layer of points in the plane z = 0.
 
-    XDMF counts z, y, x, the fastest last. Of a mesh of two dimensions ParaView's reader takes the first for z, which
-    puts it into the y-z plane; a mesh of three with one layer has no such choice. Readers show one map per time: where
-    several instants have the same one, as those of loads without duration, the numbers of the steps stand for times.
+    XDMF orders axes z, y, x with x fastest. ParaView puts two-dimensional meshes into the y-z plane, so a
+    three-dimensional mesh of one layer is used. Readers show one map per time: if instants have equal times, as loads
+    without duration do, step numbers are used as times.
     """
     (ny, nx), (lx, ly) = shape, size
     saved = np.flatnonzero(~np.isnan(times))

@@ -1,4 +1,4 @@
-"""Files that are never half-written: a new file has another name until it is whole, what is not ours is put aside."""
+"""Writing of files that are never incomplete (temporary names), and renaming of foreign files."""
 
 import errno
 import os
@@ -11,24 +11,24 @@ from io import FileIO
 from pathlib import Path
 from typing import BinaryIO
 
-MARK = "made by the program parcontact"  # in pages and in pictures, where their kind has a place for it
+MARK = "made by the program parcontact"  # mark in the metadata of pages and pictures
 
 
 def unused(path: Path) -> Path:
-    """Return a name beside `path` for what is to take its place."""
+    """Return a temporary name in the directory of `path`."""
     return path.with_name(f"{path.name}.{secrets.token_hex(6)}.part")
 
 
 def without_mark(path: Path) -> Path:
-    """Return the name that a new file is to have; any other path as it is."""
+    """Return the final name of a temporary file; other paths are unchanged."""
     return path.with_name(re.sub(r"\.[0-9a-f]{12}\.part$", "", path.name))
 
 
 @contextmanager
 def replaced(path: Path, is_ours: Callable[[Path], bool] | None = None) -> Iterator[BinaryIO]:
-    """Open a new file that takes the place of `path` at the end; after an error nothing has changed.
+    """Open a new file that replaces `path` at the end of the context; after an error `path` is unchanged.
 
-    With `is_ours`, what has the name and is not ours is put aside, and standard error says so.
+    With `is_ours`, a foreign file of this name is renamed, with a warning on standard error.
     """
     part = unused(path)
     try:
@@ -44,12 +44,12 @@ def replaced(path: Path, is_ours: Callable[[Path], bool] | None = None) -> Itera
 
 
 def open_to_append(path: Path) -> FileIO:
-    """Open a file of ours at its end, or begin it. Raises OSError, also for a link, which may lead anywhere."""
+    """Open a file to append, or create it. Raises OSError, also for a symbolic link."""
     try:
         handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
     except OSError as error:
         if error.errno == errno.ELOOP:
-            raise OSError(f"{path} is a link, which may lead anywhere; move it away") from None
+            raise OSError(f"{path} is a symbolic link, which is not followed; move it away") from None
         raise
     return FileIO(handle, "ab")
 
@@ -61,22 +61,22 @@ def replace_file(path: Path, text: str) -> None:
 
 
 def is_marked(path: Path) -> bool:
-    """Return whether this program has made a page or a picture; raises OSError."""
+    """Return True if a page or a picture has the mark of this program; raises OSError."""
     return MARK.encode() in path.read_bytes()
 
 
 def make_room(path: Path, is_ours: Callable[[Path], bool]) -> None:
-    """Put aside what has a name, with a warning, unless it is a file of ours and no link."""
+    """Rename an existing file with a warning, unless it is a regular file of this program."""
     with suppress(OSError):
         if path.is_file() and not path.is_symlink() and is_ours(path):
             return
     if aside := put_aside(path):
-        message = f"warning: {path} was there and not written by this program: it is kept as {aside.name}"
+        message = f"warning: {path} existed and was not written by this program: it was renamed to {aside.name}"
         print(message, file=sys.stderr, flush=True)
 
 
 def put_aside(path: Path) -> Path | None:
-    """Rename what has a name to `NAME.aside`, or `NAME.aside-2` ...; returns the new name, if there was anything."""
+    """Rename a file to `NAME.aside`, or `NAME.aside-2` ...; returns the new name, or None without a file."""
     if not os.path.lexists(path):
         return None
     number, target = 1, path.with_name(f"{path.name}.aside")

@@ -1,8 +1,7 @@
-"""Maps in HDF5 files: by MPI-IO where h5py has it, else by the ranks in turn; the file is the same either way.
+"""Maps in HDF5 files, written by MPI-IO if h5py supports it, else by the ranks in turn; files are the same either way.
 
-A file is laid out with places for all maps before the first is written. What is not a map is written once, by root; the
-rows of a map go to their place and change nothing else, so that a run killed while it writes leaves a readable file. An
-error on one rank is raised on all, as a RunError in one sentence.
+A file is laid out for all maps before the first is written, and root writes everything else. Writing rows of maps does
+not change the structure, so a killed run leaves a readable file. An error on one rank is raised on all as RunError.
 """
 
 import errno
@@ -23,12 +22,20 @@ from ..parallel.slab import Array, Slab
 
 T = TypeVar("T")
 MPI_IO = h5py.get_config().mpi  # else ranks act in turn
-FAILURES = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)  # of a damaged file
+FAILURES = (
+    OSError,
+    RuntimeError,
+    KeyError,
+    ValueError,
+    TypeError,
+    MemoryError,
+    OverflowError,
+)  # errors that h5py raises for damaged files
 TOO_LARGE = "file too large for its file system, or for the limit that ulimit -f shows"
-MEND = "put the whole file in its place, or move it away to go on without its maps"
-FULL = 1 << 16  # tuning: bytes: MPI-IO does not say why it failed, but with less than this left the file system is full
-DOUBLE = 8  # bytes of a number in a map
-RESERVE = 1 << 20  # tuning: bytes: more than HDF5 writes of what is not a map; it does not survive a disk that is full
+MEND = "restore the whole file, or move it away to continue without its maps"
+FULL = 1 << 16  # tuning: free space below which a failure of MPI-IO means a full disk [bytes]
+DOUBLE = 8  # size of a number in a map [bytes]
+RESERVE = 1 << 20  # tuning: space tested for data other than maps, as HDF5 crashes on a full disk [bytes]
 
 
 class Slice(NamedTuple):
@@ -50,8 +57,8 @@ def read_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
 
 
 def open_results(path: Path) -> h5py.File:
-    """Open a file of results to read it. Raises InputError where it is damaged, or one of its members is that of
-    another file, which whoever made the file chose, and FileNotFoundError."""
+    """Open a file of results for reading. Raises FileNotFoundError, and InputError if it is damaged or has links to
+    other files."""
     try:
         file = h5py.File(path, "r", locking=False)
     except FileNotFoundError:
@@ -61,7 +68,7 @@ def open_results(path: Path) -> h5py.File:
     for name in file:
         if isinstance(file.get(name, getlink=True), h5py.ExternalLink) or _has_outside_data(file[name]):
             file.close()
-            raise InputError(f"{path}: {name} is stored in another file, which is not read: copy it into this one")
+            raise InputError(f"{path}: {name} is a link to another file, which is not followed; copy it into this file")
     return file
 
 
@@ -70,7 +77,7 @@ def _has_outside_data(item: Any) -> bool:
 
 
 def sync(path: Path, slab: Slab) -> None:
-    """Wait until what any rank has written is on the disk; collective."""
+    """Flush the data of all ranks to disk; collective."""
     problem = ""
     try:
         sync_one(path)
@@ -88,7 +95,8 @@ def sync_one(path: Path) -> None:
 
 
 def write_on_root(slab: Slab, action: Callable[[], T], what: str, kind: type[Exception] = RunError) -> T:
-    """Return what root does; collective. Its failure is an error of this kind on every rank, beginning with `what`."""
+    """Return the result of `action` on root; collective. If it fails, raise `kind` on all ranks, with a message that
+    begins with `what`."""
 
     def attempt() -> T:
         try:
@@ -100,27 +108,27 @@ def write_on_root(slab: Slab, action: Callable[[], T], what: str, kind: type[Exc
 
 
 def raise_first(slab: Slab, problem: str) -> None:
-    """Raise the first rank's problem on all of them; collective."""
+    """Raise RunError with the first rank's problem on all ranks; collective."""
     if problem := next((text for text in slab.from_all(problem) if text), ""):
         raise RunError(problem)
 
 
 def reason(error: BaseException) -> str:
-    """Return the reason of a failure in a few words: HDF5 tells the whole story of its own calls."""
+    """Return the reason of a failure in a few words, without HDF5's stack of calls."""
     text = str(error)
     if found := re.search(r"error message = '([^']+)'", text):
         return found.group(1)
     if found := re.search(r"truncated file: eof = (\d+), sblock->base_addr = (\d+), stored_eof = (\d+)", text):
-        return f"it is cut off: {int(found[1]) + int(found[2])} of its {found[3]} bytes are there"
+        return f"it is incomplete: it has {int(found[1]) + int(found[2])} of {found[3]} bytes"
     if "file signature not found" in text:
-        return "it is no HDF5 file, or cut off"
+        return "it is not an HDF5 file, or incomplete"
     if isinstance(error, OSError) and error.strerror and error.errno:
         return TOO_LARGE if error.errno == errno.EFBIG else os.strerror(error.errno)
     return text.splitlines()[0] if text else type(error).__name__
 
 
 def _move(path: Path, slab: Slab, parts: Sequence[Slice], writes: bool) -> None:
-    """Write or read the rows at their places; collective. One rank that cannot take part is an error of all before."""
+    """Write or read rows at their places; collective. If a rank cannot take part, all ranks raise before any access."""
     what, problem, places = f"cannot {'write' if writes else 'read'} {path}", "", list[int]()
     try:
         os.close(os.open(path, os.O_RDWR if writes else os.O_RDONLY))
@@ -139,7 +147,7 @@ def _move(path: Path, slab: Slab, parts: Sequence[Slice], writes: bool) -> None:
 
 
 def _place(dataset: h5py.Dataset, part: Slice, slab: Slab) -> int:
-    """Return where in the file the rows of this rank begin; raises ValueError if they are of another kind."""
+    """Return the offset of this rank's rows in the file [bytes]; raises ValueError for another type or shape."""
     if (dataset.dtype, dataset.shape[-2:], slab.shape) != (part.rows.dtype, (slab.ny, slab.nx), part.rows.shape):
         kinds = f"{dataset.dtype} {dataset.shape}, not of {part.rows.dtype} {part.rows.shape} and its like"
         raise ValueError(f"{part.name} is of {kinds}")
@@ -150,7 +158,7 @@ def _place(dataset: h5py.Dataset, part: Slice, slab: Slab) -> int:
 
 
 def _by_turns(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[int], writes: bool) -> str:
-    """Let one rank act after the other, those without rows only wait; returns what failed on this rank, or ''."""
+    """Access the file by one rank after the other; returns the failure on this rank, or ''."""
     problem = ""
     for rank in range(slab.comm.size):
         if rank == slab.comm.rank and slab.shape[0]:
@@ -159,7 +167,7 @@ def _by_turns(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[i
                     for part, place in zip(parts, places, strict=True):
                         file.seek(place)
                         if (file.write if writes else file.readinto)(part.rows.data.cast("B")) < part.rows.nbytes:
-                            raise ValueError("it ends early")
+                            raise ValueError("the file ends too early")
             except FAILURES as error:
                 problem = reason(error)
         slab.comm.Barrier()
@@ -167,7 +175,7 @@ def _by_turns(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[i
 
 
 def _together(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[int], writes: bool) -> str:
-    """Let all ranks act at once, by MPI-IO, also after a failure, which is returned."""
+    """Access the file by all ranks at once, by MPI-IO; returns the failure on this rank, or ''."""
     problem = ""
     try:
         file = MPI.File.Open(slab.comm, str(path), MPI.MODE_RDWR if writes else MPI.MODE_RDONLY)
@@ -189,9 +197,9 @@ def _together(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[i
 
 
 def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], size: int, block: int = 0) -> None:
-    """Make the file on root with `build(file)`, after an empty `block` of bytes; collective. The name must be unused.
+    """Create a new file on root with `build(file)`, after an empty `block` [bytes]; collective.
 
-    All maps take `size` bytes. That there is room for the rest of the file, and no limit to its length, is tried first.
+    All maps take `size` bytes. The free space and the limit on file size for everything else are tested first.
     """
 
     def make() -> None:
@@ -205,11 +213,11 @@ def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], size: in
             path.unlink(missing_ok=True)
             raise
 
-    write_on_root(slab, make, f"cannot make {path}")
+    write_on_root(slab, make, f"cannot create {path}")
 
 
 def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
-    """Change attributes of a file, which keep their size, on root with `act(file)`; collective."""
+    """Change attributes of fixed size on root by `act(file)`; collective."""
 
     def apply() -> None:
         with h5py.File(path, "r+", locking=False) as file:
@@ -219,7 +227,7 @@ def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
 
 
 def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
-    """Write whole datasets that are no maps; root only."""
+    """Write whole datasets other than maps; root only."""
     with h5py.File(path, "r", locking=False) as file:
         places = {name: file[name].id.get_offset() for name in values}
         types = {name: file[name].dtype for name in values}
@@ -230,7 +238,7 @@ def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
 
 
 def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], marks: Mapping[str, float]) -> None:
-    """Put maps of one instant or point into their place, and then its coordinates, the `marks`; collective."""
+    """Write the maps of an instant or point, and then its coordinates, the `marks`; collective."""
     write_rows(
         path, slab, [Slice(name, (index,), np.ascontiguousarray(rows, np.float64)) for name, rows in maps.items()]
     )
@@ -238,7 +246,7 @@ def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], mar
 
 
 def set_marks(path: Path, slab: Slab, index: Any, marks: Mapping[str, Any]) -> None:
-    """Set coordinates of instants or points, which tell that their maps are saved (NaN: not saved); collective."""
+    """Set coordinates of instants or points (NaN: maps are not saved); collective."""
 
     def act() -> None:
         with h5py.File(path, "r", locking=False) as file:
@@ -251,12 +259,12 @@ def set_marks(path: Path, slab: Slab, index: Any, marks: Mapping[str, Any]) -> N
 
 
 def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> h5py.Dataset:
-    """Add a dataset whose space is set aside at once, so that writing to it never changes the structure of the file."""
+    """Add a dataset with all its space allocated, so that writing does not change the structure of the file."""
     plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     plist.set_layout(h5py.h5d.CONTIGUOUS)
     plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     plist.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
-    plist.set_obj_track_times(False)  # the same data make the same bytes at any time
+    plist.set_obj_track_times(False)  # files with equal data are equal
     space = h5py.h5s.create_simple(shape)
     group, _, leaf = name.rpartition("/")
     parent = file.require_group(group) if group else file
@@ -274,9 +282,9 @@ def add_coordinate(file: h5py.File, name: str, values: Array, unit: str) -> None
 def add_maps(
     file: h5py.File, slab: Slab, size: tuple[float, float], units: Mapping[str, str], leading: Sequence[str]
 ) -> None:
-    """Add x and y [m] of a box of this `size`, and maps of these `units` by name, of shape (n, y, x).
+    """Add coordinates x and y [m] of a box of this `size`, and maps with `units` by name, of shape (n, y, x).
 
-    `leading` names the coordinates along the first dimension, which are there.
+    `leading` are the existing coordinates along the first axis.
     """
     for axis, length, points in zip("xy", size, (slab.nx, slab.ny), strict=True):
         add_coordinate(file, axis, np.arange(points) * (length / points), "m")

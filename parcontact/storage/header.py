@@ -1,4 +1,4 @@
-"""The beginning of run.log: all that one asks for when a run on another machine is not understood."""
+"""The beginning of run.log: facts about the machine and the program, for diagnosis."""
 
 import os
 import platform

@@ -1,4 +1,4 @@
-"""Heights that a job has from Python, as files beside the jobs and checkpoints that name them."""
+"""Heights given in Python, stored as files in the directories of jobs and checkpoints."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,7 +13,7 @@ from . import files, hdf5
 
 
 def store(surface: Iterable[Any], directory: Path, slab: Slab) -> None:
-    """Write the height files that parts of a surface name, unless they are there; collective. Raises InputError."""
+    """Write the height files of a surface, unless they exist; collective. Raises InputError."""
 
     def write() -> None:
         for heights in (shape.heights for shape in surface if isinstance(shape, HeightArray)):
@@ -26,15 +26,16 @@ def store(surface: Iterable[Any], directory: Path, slab: Slab) -> None:
 
 
 def located(job: dict[str, Any], checkpoint: Path, elsewhere: bool) -> dict[str, Any]:
-    """Return a stored job with the paths of its height files: beside a checkpoint, or one directory up; root only.
+    """Return a stored job with the paths of its height files, in the directory of the checkpoint or its parent; root
+    only.
 
-    Raises InputError for one that is at neither place, unless the caller says that it is `elsewhere`.
+    Raises InputError for a missing file, unless the caller states that it is `elsewhere`.
     """
     for index, shape in enumerate(job["surface"]):
         name = Path(shape.get("path", "/"))
         if not name.is_absolute():
-            beside, above = checkpoint.parent / name, checkpoint.parent.parent / name
-            shape["path"] = str((above if above.is_file() and not beside.is_file() else beside).absolute())
+            here, above = checkpoint.parent / name, checkpoint.parent.parent / name
+            shape["path"] = str((above if above.is_file() and not here.is_file() else here).absolute())
             if not (elsewhere or Path(shape["path"]).is_file()):
                 raise InputError(
                     f"{checkpoint} needs {name}, the heights of its surface, which were written with it: move both "

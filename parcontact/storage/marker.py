@@ -1,6 +1,6 @@
-"""The marker of an output directory: which verbs of this program write there, for which job, under which run id.
+"""The marker of an output directory: the verbs that wrote it, their jobs and run ids.
 
-Only what the marker (or a sealed checkpoint) proves to be ours is ever replaced; all else is refused or put aside.
+Only files that the marker or a sealed checkpoint identifies are replaced; others are refused or renamed.
 """
 
 import json
@@ -17,17 +17,30 @@ from . import files
 MARKER = ".parcontact"
 FORMAT = 1
 VERBS = {"run": "a run", "steady": "a friction curve", "study": "a study"}
-SCENE = ("grid", "bands", "surface", "material", "body")  # sections in which all that shares a directory must agree
-SHOWN = 4  # differences of two jobs in a message
-EFFECTS = ("thermal", "interface", "adhesion.work", "adhesion.range", "adhesion.law")  # keys of steps that were made
-SECTIONS = (*SCENE, "thermal", "interface", "adhesion", "initial", "numerics", "steady")  # what a marker keeps of a job
+SCENE = ("grid", "bands", "surface", "material", "body")  # sections in which all jobs of a directory must agree
+SHOWN = 4  # most differences of two jobs in a message
+EFFECTS = (
+    "thermal",
+    "interface",
+    "adhesion.work",
+    "adhesion.range",
+    "adhesion.law",
+)  # keys that change completed steps
+SECTIONS = (
+    *SCENE,
+    "thermal",
+    "interface",
+    "adhesion",
+    "initial",
+    "numerics",
+    "steady",
+)  # sections of a job that a marker keeps
 
 
 @dataclass(frozen=True)
 class Claim:
-    """The part of a verb in a directory: the `id` of its run, its job, whether it has `saved` a checkpoint, and the
-    step and time after which it has `finished`, of a curve the number of its points; of surfaces that came off, how it
-    has `detached`."""
+    """The claim of a verb: the `id` of its run, its job, and whether it `saved` a checkpoint; the step and time (of a
+    curve: the number of points) after which it `finished`; how surfaces `detached`."""
 
     job: dict[str, Any]
     id: str = field(default_factory=lambda: secrets.token_hex(16))
@@ -37,12 +50,12 @@ class Claim:
 
 
 def kept(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a marker keeps of a job as plain data."""
+    """Return the sections of a job (plain data) that a marker keeps."""
     return {name: data[name] for name in SECTIONS if name in data}
 
 
 def read_claims(directory: Path) -> dict[str, Claim]:
-    """Read the claims of a directory by verb, none where there is no marker; raises OSError, or ValueError."""
+    """Read the claims of a directory by verb, none without a marker; raises OSError or ValueError."""
     path = directory / MARKER
     try:
         text = path.read_bytes()
@@ -59,7 +72,7 @@ def read_claims(directory: Path) -> dict[str, Claim]:
 
 
 def sound_claims(directory: Path) -> dict[str, Claim]:
-    """Return the claims of a directory; raises InputError for a marker that cannot be read."""
+    """Return the claims of a directory; raises InputError for an unreadable marker."""
     try:
         return read_claims(directory)
     except (OSError, ValueError) as error:
@@ -67,13 +80,12 @@ def sound_claims(directory: Path) -> dict[str, Claim]:
 
 
 def claim_of_run(directory: Path) -> Claim | None:
-    """Return the claim of the run in a directory; raises InputError for a marker that cannot be read."""
+    """Return the claim of the run in a directory, or None; raises InputError for an unreadable marker."""
     return sound_claims(directory).get("run")
 
 
 def detached(directory: Path) -> str:
-    """Return how the surfaces of the run in a directory came off for good, empty where they did not; raises
-    InputError."""
+    """Return how the surfaces of a run detached for good, '' if they did not; raises InputError."""
     claim = claim_of_run(directory)
     return "" if claim is None else claim.detached
 
@@ -88,8 +100,8 @@ def write_claims(directory: Path, claims: Mapping[str, Claim]) -> None:
 
 
 def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence[str]) -> Iterator[str]:
-    """Yield in which of the sections (`grid`) or keys (`numerics.kernel`) two jobs as plain data differ, with both
-    values."""
+    """Yield the differences of two jobs (plain data) in the named sections (`grid`) or keys (`numerics.kernel`), with
+    both values."""
     old, new = dict(_leaves("", then)), dict(_leaves("", now))
     for name in names:
         for key in (key for key in {**old, **new} if f"{key}.".startswith(f"{name}.")):
@@ -98,14 +110,14 @@ def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence
 
 
 def list_differences(differences: Iterator[str]) -> str:
-    """Return differences in one line: the first of them, and how many more there are."""
+    """Return the first differences and the number of further ones, in one line."""
     first = list(islice(differences, SHOWN))
     more = sum(1 for _ in differences)
     return "; ".join(first) + (f"; and {more} more" if more else "")
 
 
 def keep_mesh(job: Mapping[str, Any], different: str) -> str:
-    """Return how to keep the mesh of a job, as plain data, where that is among what is `different`; '' elsewhere."""
+    """Return advice to keep the mesh of a job (plain data) if it is among the differences, else ''."""
     if "grid.points" not in different:
         return ""
     points = str(job["grid"]["points"]).replace(" ", "")
@@ -113,7 +125,7 @@ def keep_mesh(job: Mapping[str, Any], different: str) -> str:
 
 
 def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the values of nested mappings, and of lists of these, by their keys: `surface.0.seed`."""
+    """Yield the values in nested mappings and lists by key, such as `surface.0.seed`."""
     if isinstance(value, list) and value and all(isinstance(part, dict) for part in value):
         value = dict(enumerate(value))
     if isinstance(value, Mapping):

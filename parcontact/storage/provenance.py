@@ -1,4 +1,4 @@
-"""The origin of a file: what an HDF5 file says about the runs that made it, and what to cite for them."""
+"""Provenance in HDF5 files: the runs that made a file, and the references to cite."""
 
 import json
 import platform
@@ -18,17 +18,18 @@ from ..datafiles import OWN_FORMATS
 
 PROGRAM = f"parcontact {__version__}"
 LIBRARIES = ("numpy", "pyfftw", "mpi4py", "h5py", "numba")
-REFERENCES = Path(__file__).with_name("references.txt")  # the method, and the work of others
+REFERENCES = Path(__file__).with_name("references.txt")  # references for the method and its parts
 BUDGET = "error_budget"
 LEFT_OUT = "(too long to be kept)"
 WARNING_BYTES = 4_000  # tuning
 BUDGET_BYTES = 1_000  # tuning
-CHAIN_BYTES = 50_000  # tuning: of the text of a chain: an attribute of fixed size can be renewed in place
+CHAIN_BYTES = 50_000  # tuning: largest text of a chain, an attribute of fixed size that can be updated [bytes]
 
 
 @dataclass(frozen=True)
 class Link:
-    """One run of a chain, or several in a row that were alike: its resolved job, and the step from which it went on."""
+    """One run of a chain, or several identical ones in a row: the resolved job, and the step from which it
+    continued."""
 
     job: str
     ranks: int
@@ -40,9 +41,8 @@ class Link:
 
 @dataclass(frozen=True)
 class Provenance:
-    """The origin of a file: the chain of runs up to the present one, the seeds of its roughness, the
-    file that its job includes, the warnings about its scene, the error budget of the run so far, as plain data, and
-    what to cite."""
+    """Provenance of a file: the chain of runs, the seeds of its roughness, its included file, the warnings about its
+    scene, the error budget so far (plain data), and the references to cite."""
 
     chain: tuple[Link, ...]
     seeds: tuple[int, ...] = ()
@@ -70,13 +70,13 @@ class Provenance:
         file.attrs["references"] = "\n".join(self.references)
 
     def renew(self, file: h5py.File) -> None:
-        """Put the longer chain, and what else has changed, into a file that has one; nothing changes its place."""
+        """Update the chain and other changed attributes of a file in place."""
         for name, text in self._renewable(file.attrs["job"]).items():
             if name in file.attrs:
                 file.attrs.modify(name, text)
 
     def _renewable(self, job: str) -> dict[str, NDArray[np.bytes_]]:
-        """Return the attributes that change during a run, of fixed size; `job` is that of the file."""
+        """Return the attributes of fixed size that change during a run; `job` is that of the file."""
         texts = {
             "chain": (_chain_text(self.chain, job), CHAIN_BYTES),
             "warnings": ("\n".join(self.warnings), WARNING_BYTES),
@@ -86,12 +86,12 @@ class Provenance:
 
 
 def read_budget(file: h5py.File) -> dict[str, Any]:
-    """Return the error budget of the run so far, of friction and area by part (relative); empty where there is none."""
+    """Return the error budget of the run so far, relative errors of friction and area by part; {} without one."""
     return dict(json.loads(bytes(file.attrs.get(BUDGET, b"{}"))))
 
 
 def extend_chain(chain: Sequence[Link], link: Link) -> tuple[Link, ...]:
-    """Return the chain with one more run; a run like the last is only counted."""
+    """Return the chain with one more run; a run identical to the last one is only counted."""
     if chain and (chain[-1].job, chain[-1].ranks, chain[-1].program) == (link.job, link.ranks, link.program):
         return (*chain[:-1], replace(chain[-1], runs=chain[-1].runs + 1))
     return (*chain, link)
@@ -103,7 +103,7 @@ def read_chain(file: h5py.File) -> tuple[Link, ...]:
 
 
 def _chain_text(chain: Sequence[Link], job: str) -> str:
-    """Return a chain as JSON: an empty job is that of the file; what does not fit is left out, the oldest first."""
+    """Return a chain as JSON; an empty job is that of the file, and the oldest jobs are left out if it is too long."""
     links = [asdict(replace(link, job="" if link.job == job else link.job)) for link in chain]
     for link in links:
         if len(json.dumps(links)) > CHAIN_BYTES and link["job"]:
@@ -114,14 +114,14 @@ def _chain_text(chain: Sequence[Link], job: str) -> str:
 
 
 def cite_lines(job: dict[str, Any]) -> tuple[str, ...]:
-    """Return the references of a job, as plain data, with what they stand for, one a line."""
+    """Return the references of a job (plain data) with their subjects, one per line."""
     return tuple(f"{reference} ({what})" for reference, what in references_of(job))
 
 
 def references_of(job: dict[str, Any], features: Collection[str] = ()) -> list[tuple[str, str]]:
-    """Return references of a resolved job, as plain data, and what they stand for; with those of further `features`.
+    """Return references of a resolved job (plain data) and further `features`, with their subjects.
 
-    Raises KeyError or TypeError for what is no whole job.
+    Raises KeyError or TypeError for an incomplete job.
     """
     material, numerics = job["material"], job["numerics"]
     shift = material.get("shift", "")

@@ -1,7 +1,7 @@
-"""Tables of results, read back by what shows them: one that was cut off is refused.
+"""Reading of tables of results for display; incomplete tables are refused.
 
-A table that grows has all rows that its run or curve is known to have written: what the marker or a checkpoint says. A
-table that is written at once ends with a whole line.
+A growing table must have all rows that the marker or a checkpoint states. A table written at once must end with a whole
+line.
 """
 
 from collections.abc import Iterator
@@ -15,18 +15,19 @@ from .tables import Columns
 RUN, CURVE = "measures.csv", "steady.csv"
 GROWING = (RUN, CURVE, "bands.csv", "steady_waves.csv")
 THEORY_FILE, OF_THEORY = "theory.csv", ("time", "distance", "friction", "contact_area")
-MEND = "mend it, or move it away"
+MEND = "correct it, or move it away"
 
 
 def read_results(path: Path) -> Columns:
-    """Return the columns of a table of results by name. Raises InputError where it is damaged, of somebody else, or
-    lacks rows."""
-    lasts = list(_find_ends(path))  # before the table, which grows meanwhile
+    """Return the columns of a table of results by name. Raises InputError if it is damaged, foreign or incomplete."""
+    lasts = list(_find_ends(path))  # read before the table, which may grow
     columns = tables.read_columns(path)
     if path.name not in GROWING:
         refuse_cut(path)
     if path.name == THEORY_FILE and (without := [name for name in OF_THEORY if name not in columns]):
-        raise InputError(f"{path} has no column {', '.join(without)}: it is not of `parcontact theory`; move it away")
+        raise InputError(
+            f"{path} has no column {', '.join(without)}: it was not written by `parcontact theory`; move it away"
+        )
     for end, what in lasts:
         count = _last_step(columns) if path.name == RUN else len(columns["velocity"])
         if count < end:
@@ -39,14 +40,14 @@ def read_results(path: Path) -> Columns:
 
 
 def refuse_cut(path: Path) -> None:
-    """Raise InputError for a text that was written at once and does not end with a whole line."""
+    """Raise InputError for a text that does not end with a whole line."""
     if not path.read_bytes().endswith(b"\n"):
-        raise InputError(f"{path} is cut off: it does not end with a whole line; make it again, or move it away")
+        raise InputError(f"{path} is incomplete: it does not end with a whole line; write it again, or move it away")
 
 
 def find_lost_rows(directory: Path) -> str:
-    """Return what to say of a run that has finished, and whose table is damaged or lacks rows, or ''; raises
-    InputError for a marker that cannot be read."""
+    """Return a message if the table of a finished run is damaged or lacks rows, or ''; raises InputError for an
+    unreadable marker."""
     claim = marker.claim_of_run(directory)
     if claim is None or claim.finished is None:
         return ""
@@ -55,7 +56,7 @@ def find_lost_rows(directory: Path) -> str:
         return ""
     return (
         f"{directory / RUN} is damaged: its run has finished with step {claim.finished[0]}, and the table lacks rows; "
-        f"mend it, or move {directory} away to run it afresh"
+        f"correct it, or move {directory} away to run the job again"
     )
 
 
@@ -65,8 +66,8 @@ def _last_step(columns: Columns) -> float:
 
 
 def _find_ends(path: Path) -> Iterator[tuple[float, str]]:
-    """Yield the last step, or the number of points, that a table must have, and why. Raises InputError for a marker
-    that cannot be read."""
+    """Yield the last step, or the number of points, that a table must have, with the reason. Raises InputError for an
+    unreadable marker."""
     verb = {RUN: "run", CURVE: "steady"}.get(path.name, "")
     claim = marker.sound_claims(path.parent).get(verb) if verb else None
     if claim is not None and claim.finished is not None:

@@ -1,4 +1,4 @@
-"""The files that grow with a run: run.log, measures.csv and fields.h5, begun or continued after a step."""
+"""The growing files of a run: run.log, measures.csv and fields.h5, begun or continued."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,8 +17,8 @@ from .step_row import MeasuresFile, StepRow, cut_back_table
 
 @dataclass(frozen=True)
 class Recording:
-    """The outputs of a run of `total` steps, or about so many if `open_ended`: the dissipation of so many `branches`,
-    the columns `added` by effects, and the `maps` of a box of this `size` [m] after `every` so many steps."""
+    """Outputs of a run of `total` steps (an estimate if `open_ended`): dissipation of `branches`, columns `added` by
+    effects, and `maps` of a box of this `size` [m] after `every` steps."""
 
     total: int
     branches: int = 0
@@ -30,16 +30,16 @@ class Recording:
 
     @property
     def map_steps(self) -> list[int]:
-        """The steps after which maps are saved, as far as they are known."""
+        """Return the steps after which maps are saved, as far as known."""
         last = set[int]() if self.open_ended else {self.total}
         return sorted({*range(self.every, self.total + 1, self.every), *last})
 
 
 class Recorder:
-    """Writes what is asked for after every step; making one, and its methods, are collective.
+    """Writes the outputs of every step; the constructor and all methods but `close` are collective.
 
-    A run that goes on from a checkpoint gives what that has, as `saved`. Raises InputError where the files cannot be
-    written. `warnings` says what was lost of an earlier run, `problem` what of the results cannot be written.
+    `saved` is the state in a checkpoint from which the run continues. Raises InputError if files cannot be written.
+    `warnings` are messages on lost results of an earlier run, `problem` is a message on results that cannot be written.
     """
 
     def __init__(
@@ -81,14 +81,14 @@ class Recorder:
 
     @property
     def table(self) -> TableMark:
-        """The state of measures.csv, on root."""
+        """Return the state of measures.csv, on root."""
         return self._measures.table if self._measures else TableMark()
 
     def write(self, row: StepRow, field: Callable[[str], Array], total: int = 0) -> None:
-        """Record an instant; `field(name)` gives this rank's rows of a map. `total` is how many steps an open-ended run
-        will have, as far as is known by now; when the row's step is the last one, its number.
+        """Record an instant; `field(name)` returns this rank's rows of a map. `total` is the expected number of steps
+        of an open-ended run.
 
-        What goes wrong is left in `problem`, for the next decision, which saves the state first.
+        A failure is stored in `problem`, so that the run saves its state before it ends.
         """
         if total:
             self.console.expect(total)
@@ -103,7 +103,7 @@ class Recorder:
 
     @contextmanager
     def _noting_problems(self) -> Iterator[None]:
-        """Leave the first failure in `problem`; of an OSError, which root alone has, it is of measures.csv."""
+        """Store the first failure in `problem`; an OSError, on root only, concerns measures.csv."""
         try:
             yield
         except OSError as error:
@@ -112,7 +112,7 @@ class Recorder:
             self.problem = self.problem or str(error)
 
     def _make_place(self, file: FieldsFile, step: int, total: int) -> None:
-        """Make place for as many instants as an open-ended run has, in the end or when there are more than foreseen."""
+        """Extend the file to the expected number of instants of an open-ended run."""
         every = self._recording.every
         wanted: list[int] = []
         if step >= total:
@@ -123,7 +123,7 @@ class Recorder:
             file.make_place(wanted)
 
     def catch_up(self, row: StepRow, field: Callable[[str], Array]) -> None:
-        """Save the maps of the step after which a run goes on, if they are due and could not be saved then."""
+        """Save the maps of the step from which a run continues, if they are due but not saved."""
         if self._fields and self._fields.is_due(row.step):
             self._save_fields(row, field)
 
@@ -133,14 +133,14 @@ class Recorder:
                 self._fields.save(row.step, row.time, {name: field(name) for name in self._fields.names})
 
     def renew(self, provenance: Provenance) -> None:
-        """Put what has changed of where they come from into the files."""
+        """Update the provenance in the files."""
         if self._fields:
             self._fields.renew(provenance)
 
     def sync(self, provenance: Provenance) -> None:
-        """Wait until all that was recorded is on the disk, with where it comes from.
+        """Flush all records and the provenance to disk.
 
-        What cannot be written is left in `problem`, if results are lost by it, or warned of.
+        A failure is stored in `problem` if results are lost, else in `warnings`.
         """
         with self._noting_problems():
             sync = self._measures.sync if self._measures else lambda: None

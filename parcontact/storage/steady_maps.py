@@ -1,4 +1,4 @@
-"""steady.h5: maps of steady states, one for each speed and pressure whose point was solved."""
+"""steady.h5: maps of steady states, one per solved point of a friction curve."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,15 +12,15 @@ from .fields import UNITS
 from .provenance import Provenance
 
 KIND = "parcontact steady maps"
-AXES = {"velocity": "m/s", "load": "Pa", "temperature": "deg C"}  # of the points; the load is their mean pressure
-DATASETS = {name: f"{name}_map" if name in AXES else name for name in UNITS}  # where each kind of maps is
+AXES = {"velocity": "m/s", "load": "Pa", "temperature": "deg C"}  # coordinates of points; load: mean pressure
+DATASETS = {name: f"{name}_map" if name in AXES else name for name in UNITS}  # data set of each kind of map
 
 
 class SteadyMaps:
-    """Maps of shape (point, y, x), with the velocity and the load of each point, NaN until it is saved; collective.
+    """Maps of shape (point, y, x), with velocity and load of each point, NaN until it is saved; collective.
 
-    Parameters: where; this rank's rows; the box `size` (lx, ly) [m]; which maps; (velocity [m/s], mean pressure [Pa],
-    and perhaps temperature [deg C]) of all points. What an earlier part of the same curve has saved stays.
+    Parameters: path; this rank's rows; `size` of the box (lx, ly) [m]; names of maps; (velocity [m/s], mean pressure
+    [Pa], optionally temperature [deg C]) of all points. Points saved by an earlier part of the curve are kept.
     """
 
     def __init__(
@@ -38,17 +38,17 @@ class SteadyMaps:
             self._make(provenance)
 
     def save(self, index: int, maps: Mapping[str, Array]) -> None:
-        """Put the maps of a point into their place; raises RunError."""
+        """Save the maps of a point; raises RunError."""
         marks = dict(zip(self.axes, self.points[index], strict=True))
         hdf5.save_maps(self.path, self.slab, index, {DATASETS[name]: maps[name] for name in self.names}, marks)
 
     def lacking(self) -> list[int]:
-        """Return the numbers of the points without maps; root only."""
+        """Return the indices of points without maps; root only."""
         with h5py.File(self.path, "r") as file:
             return [number for number, speed in enumerate(file["velocity"][...]) if np.isnan(speed)]
 
     def _fits(self) -> bool:
-        """Return whether the file is laid out for these points and maps; one that is not, is put aside. Root only."""
+        """Return True if the file has these points and maps; another file is renamed. Root only."""
         shape = (len(self.points), self.slab.ny, self.slab.nx)
         try:
             with h5py.File(self.path, "r") as file:

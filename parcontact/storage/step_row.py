@@ -1,4 +1,4 @@
-"""measures.csv: one row per step and one for the initial state, written by root; its columns and their units."""
+"""measures.csv: a row per step and one for the initial state, written by root; its columns and units."""
 
 import math
 import os
@@ -19,10 +19,10 @@ from .tables import MEND, GrowingTable, whole_lines
 
 @dataclass(frozen=True)
 class StepRow:
-    """One instant of a run, as it goes into measures.csv; SI units, energies in J since the start.
+    """An instant of a run, as in measures.csv; SI units, energies [J] since the start.
 
-    `errors` is the budget of the instant, None where nothing touches. `added` is what effects have for columns of their
-    own. `remark` is a sentence for run.log, or '': what was unusual about the step.
+    `errors` is the error budget of the instant, None without contact. `added` are the values of the columns of effects.
+    `remark` is a sentence for run.log about an unusual step, or ''.
     """
 
     step: int = 0
@@ -43,28 +43,28 @@ class StepRow:
 
     @property
     def error_friction(self) -> float:
-        """The estimated relative error of friction; 1 or more if that may be 0, NaN where there is none."""
+        """Return the estimated relative error of friction; 1 or more if friction may be 0, NaN if unknown."""
         return self.errors.friction.of_friction if self.errors and self.errors.friction else math.nan
 
     @property
     def error_area(self) -> float:
-        """The estimated relative error of the contact area, NaN where there is none."""
+        """Return the estimated relative error of the contact area, NaN if unknown."""
         return self.errors.area.total if self.errors else math.nan
 
 
 def columns(branches: int, added: Sequence[str] = ()) -> list[str]:
-    """Return the columns when the dissipation of so many branches is asked for, and effects have added some.
+    """Return the names of the columns, with the dissipation of `branches` and columns `added` by effects.
 
-    Raises InputError for a name that is there twice.
+    Raises InputError for a repeated name.
     """
     names = [*names_of(_always(branches)), *added]
     if twice := {name for name in added if names.count(name) > 1}:
-        raise InputError(f"measures.csv has a column {', '.join(sorted(twice))}: an effect must name its own otherwise")
+        raise InputError(f"measures.csv has a column {', '.join(sorted(twice))}: its effect must give it another name")
     return names
 
 
 def row_numbers(row: StepRow, branches: int) -> list[float]:
-    """Return the numbers of a row, in the order of `columns`; NaN for what was not asked for."""
+    """Return the values of a row in the order of `columns`; NaN if not requested."""
     return [*values_of(_always(branches), row), *row.added]
 
 
@@ -74,15 +74,15 @@ def _always(branches: int) -> list[Column]:
 
 
 class MeasuresFile(GrowingTable):
-    """The growing file of a run; `table` is what it holds."""
+    """The growing measures.csv of a run; `table` is its state."""
 
     def __init__(self, path: Path, table: TableMark, branches: int = 0, added: Sequence[str] = ()) -> None:
-        """Continue the file, which holds this `table`, or begin it."""
+        """Continue the file with the state `table`, or begin it."""
         super().__init__(path, columns(branches, added))
         self.table, self._branches = table, branches
 
     def write(self, row: StepRow) -> None:
-        """Append a row; on an error the file is as it was before, but `table` has the row, which the next run adds."""
+        """Append a row; after an error the file is unchanged, but `table` includes the row, which the next run adds."""
         line = cells(row_numbers(row, self._branches))
         self.table = TableMark(self.table.rows + 1, ",".join(line))
         self.append(line)
@@ -91,17 +91,17 @@ class MeasuresFile(GrowingTable):
 def cut_back_table(
     path: Path, step: int, then: TableMark, branches: int = 0, added: Sequence[str] = ()
 ) -> tuple[TableMark, list[str]]:
-    """Remove the rows after `step`, and one that is incomplete; the columns become those of the present job.
+    """Remove rows after `step`, and an incomplete row; the columns become those of the present job.
 
-    `then` is what the file held when the checkpoint was written: a last row for which the disk had no room is added.
-    Returns what the file holds now, and what is lost. Raises InputError, and changes nothing, for a damaged file.
+    `then` is the state when the checkpoint was written: its last row is added if the disk was full. Returns the new
+    state and messages on lost rows. Raises InputError for a damaged file, which is not changed.
     """
     if not path.exists():
         return TableMark(), [f"{path} is missing: the rows up to step {step} are lost"]
     found, wanted = whole_lines(path), columns(branches, added)
     names = next(found, [])
     if "step" not in names:
-        raise InputError(f"{path}, line 1, does not name the columns, step among them; move it away or mend it")
+        raise InputError(f"{path}, line 1, must name the columns, including step; correct it, or move the file away")
     last, kept, problems = -1, TableMark(), list[str]()
     with files.replaced(path) as new:
         new.write(f"{','.join(wanted)}\n".encode())

@@ -1,4 +1,4 @@
-"""Tables of numbers in csv files: read, also while they grow, and continued line by line."""
+"""Tables of numbers in csv files: reading, also while they grow, and appending."""
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
@@ -9,21 +9,21 @@ from typing import NoReturn
 from ..errors import InputError
 from . import files
 
-MEND = "mend the line, or move the file away to go on without its rows"
+MEND = "correct the line, or move the file away to continue without its rows"
 
 
 class GrowingTable:
-    """A csv table that grows line by line while others read it; a last line without a newline is not finished."""
+    """A csv table that grows while others read it; a last line without newline is incomplete."""
 
     def __init__(self, path: Path, names: Sequence[str]) -> None:
-        """Continue the file, or begin it with the names of the columns; raises OSError."""
+        """Open the file to append, or create it with the names of the columns; raises OSError."""
         self.path = path
         self._file = files.open_to_append(path)
         if self._file.tell() == 0:
             self.append(names)
 
     def append(self, cells: Sequence[str]) -> None:
-        """Add a line; on an error the file is as it was before."""
+        """Append a line; after an error the file is unchanged."""
         rest, size = memoryview(f"{','.join(cells)}\n".encode()), self._file.tell()
         try:
             while rest:
@@ -34,17 +34,17 @@ class GrowingTable:
             raise
 
     def sync(self) -> None:
-        """Wait until all lines are on the disk."""
+        """Flush all lines to disk."""
         os.fsync(self._file.fileno())
 
     def close(self) -> None:
-        """Close the file, whose lines have all been written; raises nothing."""
+        """Close the file; raises nothing."""
         with suppress(OSError):
             self._file.close()
 
 
 def whole_lines(path: Path) -> Iterator[list[str]]:
-    """Yield the cells of each whole line, the names of the columns first, all as many; raises InputError."""
+    """Yield the cells of each whole line, first the names of the columns; raises InputError for unequal lengths."""
     count = 0
     with path.open("rb") as file:
         for number, line in enumerate(file, 1):
@@ -58,25 +58,25 @@ def whole_lines(path: Path) -> Iterator[list[str]]:
 
 
 class Columns(dict[str, list[float]]):
-    """Columns by name; asking for one that the file has not raises InputError."""
+    """Columns by name; a missing column raises InputError."""
 
     def __init__(self, path: Path, found: Iterable[tuple[str, list[float]]]) -> None:
         super().__init__(found)
         self.path = path
 
     def __missing__(self, name: str) -> NoReturn:
-        raise InputError(f"{self.path}, line 1, names no column {name}; mend it, or move the file away")
+        raise InputError(f"{self.path}, line 1, has no column {name}; correct it, or move the file away")
 
 
 def read_columns(path: Path) -> Columns:
-    """Read the columns of a table by name, also of one that still grows; NaN for what was not asked for.
+    """Read the columns of a table by name, also of a growing one; empty cells are NaN.
 
-    Raises InputError, which names the line, for what is no table of numbers.
+    Raises InputError with the line for anything but numbers.
     """
     rows = whole_lines(path)
     names = next(rows, [])
     if not names:
-        raise InputError(f"{path} is empty: it does not even name its columns")
+        raise InputError(f"{path} is empty; a line with the names of columns was expected")
     series: list[list[float]] = [[] for _ in names]
     for number, cells in enumerate(rows, 2):
         for name, text, values in zip(names, cells, series, strict=True):

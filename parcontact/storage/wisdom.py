@@ -1,7 +1,7 @@
-"""FFTW's wisdom, kept: it finds the fastest transforms by trying, and others give other last digits.
+"""FFTW's wisdom (choices of fastest transforms, found by timing), stored so that repeated runs give the same digits.
 
-So that a run repeated on the same machine gives the same digits, the first choice for a kind of run is kept in the
-user's private cache directory; so that a run continued anywhere does, checkpoints carry it too.
+The first choice for a kind of run is kept in the user's private cache directory, and in checkpoints, for continuation
+on other machines.
 """
 
 import hashlib
@@ -33,7 +33,7 @@ def gather(slab: Slab) -> NDArray[np.uint8]:
 
 
 def recall(transforms: Sequence[Any], slab: Slab, saved: NDArray[np.uint8] | None) -> None:
-    """Use the wisdom of a checkpoint, if it is of as many ranks, else that of the first run here with such
+    """Use the wisdom of a checkpoint, if it has as many ranks, else that of the first run on this machine with the same
     `transforms` (`scene.Choices`); collective."""
 
     def kept() -> bytes:
@@ -47,9 +47,9 @@ def recall(transforms: Sequence[Any], slab: Slab, saved: NDArray[np.uint8] | Non
 
 
 def keep(transforms: Sequence[Any], slab: Slab) -> None:
-    """Keep the wisdom of this run for later ones, unless there is some; collective."""
+    """Store the wisdom of this run for later ones, unless there is some; collective."""
     data = gather(slab).tobytes()
-    with suppress(OSError):  # a convenience: a run without a place for it does as well
+    with suppress(OSError):  # a run without stored wisdom works too
         place = _place(transforms, slab) if slab.root else None
         if place and not place.exists():
             with files.replaced(place) as file:
@@ -66,7 +66,7 @@ def _adopt(data: bytes, slab: Slab) -> bool:
 
 
 def _place(transforms: Sequence[Any], slab: Slab) -> Path | None:
-    """Return the file for all runs on this kind of machine whose transforms are the same, if there is a safe place."""
+    """Return the file of wisdom for this kind of machine and these transforms, None without a safe directory."""
     directory = private.directory("plans")
     made_by = b"".join(Path(path).read_bytes() for path in (fft.__file__, cosines.__file__))
     facts = [platform.machine(), processor(), pyfftw.fftw_version, zlib.crc32(made_by)]

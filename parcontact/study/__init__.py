@@ -1,1 +1,1 @@
-"""Studies of accuracy: a job run with coarser and finer settings, the limit that its results go to, and the price."""
+"""Studies of accuracy: a job with coarser and finer settings, the limits of its results, and their costs."""

@@ -1,13 +1,12 @@
-"""Richardson extrapolation: the limit of values on finer and finer meshes, the order found, and how sure it is.
+"""Richardson extrapolation: the limit of values on finer and finer meshes, its order and its uncertainty.
 
 For values `f(h) = f* + c h^p` at three sizes the order p follows from the ratio of their differences, and
 
-    f* = f1 + (f1 - f2)/((h2/h1)^p - 1)
+f* = f1 + (f1 - f2)/((h2/h1)^p - 1)
 
-with f1 at the finest size (paper, Eq. 14, where p = 1.4 was assumed; I. B. Celik et al., J. Fluids Eng. 130 (2008)
-078001 for sizes whose ratios differ). The order is taken as known to a half, and with four sizes the limit from the
-finest three is compared with that from the three before: the larger of what these do to the limit is its uncertainty,
-at least a quarter of the last difference.
+with f1 at the finest size (paper, Eq. 14, with p = 1.4; I. B. Celik et al., J. Fluids Eng. 130 (2008) 078001 for
+different ratios of sizes). The uncertainty is the larger change of the limit if the order changes by DOUBT, or if, with
+four sizes, the finest one is left out; at least LEAST_DOUBT of the last difference.
 """
 
 import math
@@ -16,15 +15,14 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
-LEAST_ORDER, LARGEST_ORDER = 0.3, 6.0  # accuracy: orders outside tell of values that do not converge yet
-DOUBT = 0.5  # accuracy: of the order
-LEAST_DOUBT = 0.25  # accuracy: of the last difference
+LEAST_ORDER, LARGEST_ORDER = 0.3, 6.0  # accuracy: range of orders of converging values
+DOUBT = 0.5  # accuracy: uncertainty of the order
+LEAST_DOUBT = 0.25  # accuracy: least uncertainty of the limit over the last difference
 
 
 @dataclass(frozen=True)
 class Limit:
-    """The limit of a sequence, the order in which it is approached (NaN if none was found), and its uncertainty (NaN if
-    nothing is known of it)."""
+    """The limit of a sequence, its order (NaN if none was found), and its uncertainty (NaN if unknown)."""
 
     value: float
     order: float
@@ -32,16 +30,15 @@ class Limit:
 
     @property
     def doubt(self) -> float:
-        """The uncertainty over the value; 0 where the value is, as the friction of a body that does not slide."""
+        """Return the relative uncertainty; 0 for a value of 0, such as friction at rest."""
         return abs(self.uncertainty / self.value) if self.value else 0.0
 
 
 def extrapolate(sizes: Sequence[float], values: Sequence[float]) -> Limit:
-    """The limit for size 0 of values at decreasing sizes; at least two of them.
+    """Return the limit for size 0 of at least two values at decreasing sizes.
 
-    Two values, or values that do not come nearer to each other from one side, have the finest one as their limit and
-    the larger of the last two differences as its uncertainty: NaN where they do not differ at all, as nothing is then
-    known of their error.
+    If there are two values only, or values do not converge monotonically, the limit is the finest value, and its
+    uncertainty the larger of the last two differences (NaN if they are 0).
     """
     last = abs(values[-1] - values[-2])
     order = _order(sizes[-3:], values[-3:]) if len(values) > 2 else math.nan
@@ -61,7 +58,7 @@ def _limit(sizes: Sequence[float], values: Sequence[float], order: float) -> flo
 
 
 def _order(sizes: Sequence[float], values: Sequence[float]) -> float:
-    """The p for which three values lie on `f* + c h^p`; NaN if there is none in the range of orders."""
+    """Return the order p of three values on `f* + c h^p`; NaN if it is outside of the range of orders."""
     before, after = values[0] - values[1], values[1] - values[2]
     if after == 0.0 or before / after <= 0.0:
         return math.nan

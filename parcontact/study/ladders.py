@@ -1,10 +1,10 @@
-"""The settings of a study: which are combined, and what they change in the job.
+"""The settings of a study: their combinations, and the changes of the job.
 
-All meshes, cells per step and integrators are combined with each other. For each integrator the mesh is also refined
-alone, with the time steps of the finest mesh. A rough surface of one seed has the same waves on every mesh.
+All meshes, cells per step and integrators are combined. For each integrator the mesh is also refined with the time
+steps of the finest mesh. A rough surface of one seed has the same waves on every mesh.
 
-Stages that choose their own steps do so in every case, unless there is a ladder of cells per step: it takes their
-place where the surface slides.
+Stages that choose their steps do so in every case, unless there is a ladder of cells per step, which replaces them in
+sliding stages.
 """
 
 import itertools
@@ -18,7 +18,7 @@ from ..job.checks.cells import one_cell
 
 @dataclass(frozen=True)
 class Settings:
-    """One combination: points along x, cells per step (of its own mesh; None if steps are chosen), and integrator."""
+    """One combination: points along x, cells per step (of its mesh; None for chosen steps), and integrator."""
 
     mesh: int
     cells_per_step: float | None
@@ -26,12 +26,12 @@ class Settings:
 
     @property
     def time_step(self) -> float:
-        """Return the time step in lengths of the box; one cell for steps that are chosen, which are about that."""
+        """Return the time step in lengths of the box; for chosen steps about one cell."""
         return (self.cells_per_step or 1.0) / self.mesh
 
     @property
     def effort(self) -> float:
-        """Roughly in proportion to the work: points times steps."""
+        """Return an estimate of the work, points times steps."""
         return self.mesh**2 / self.time_step
 
     def __str__(self) -> str:
@@ -46,10 +46,10 @@ class Settings:
 
 @dataclass(frozen=True)
 class Ladders:
-    """Ladders of what is refined, from the coarsest to the finest; one value where the job asks for none.
+    """Ladders from the coarsest to the finest setting; a single value without a ladder.
 
-    `shared` is the relative error that all cases may have alike: the accuracy for which steps are chosen, else 0. Where
-    nothing `slides`, friction is not judged.
+    `shared` is the relative error that all cases may have in common: the accuracy of chosen steps, else 0. Unless
+    something `slides`, friction is not assessed.
     """
 
     meshes: tuple[int, ...]
@@ -60,22 +60,22 @@ class Ladders:
     slides: bool = True
 
     def combine(self) -> list[Settings]:
-        """All combinations, each once, the cheapest first."""
+        """Return all different combinations, the cheapest first."""
         found = set(itertools.starmap(Settings, itertools.product(self.meshes, self.cells, self.integrators)))
-        coarse, finest = self.cells[0], self.meshes[-1]  # the mesh alone has the time step of these
+        coarse, finest = self.cells[0], self.meshes[-1]  # time step of the refinement of the mesh alone
         for mesh, integrator in itertools.product(self.meshes, self.integrators):
             found.add(Settings(mesh, coarse and coarse * mesh / finest, integrator))
         return sorted(found, key=lambda case: (case.effort, str(astuple(case))))
 
 
 def _cells_of_time_steps(job: Job) -> float:
-    """The cells that the time step of the first slide with one comes to; 1 where nothing slides so."""
+    """Return the cells per step of the first sliding stage with a given time step; 1 without one."""
     steps = ((stage, stage.time_step) for stage in job.history if stage.speed)
     return next((dt / one_cell(stage, job.grid) for stage, dt in steps if isinstance(dt, float)), 1.0)
 
 
 def ladders(job: Job) -> Ladders:
-    """Return the ladders of a job's study. Raises InputError where there are none, or its surface has one mesh only."""
+    """Return the ladders of a job's study. Raises InputError without ladders, or if its surface has one mesh only."""
     study, numerics = job.study, job.numerics
     if study is None:
         raise InputError("no ladders: add a study section to the job, like study: {mesh: [256, 512, 1024]}")
@@ -85,7 +85,7 @@ def ladders(job: Job) -> Ladders:
         raise InputError("study.mesh: the heights of a file are given on one mesh; leave this ladder out")
     for mesh in study.mesh:
         if job.grid.ny > 1 and mesh * job.grid.ny % job.grid.nx:
-            raise InputError(f"study.mesh: {mesh} points along x are no whole number along y in this box")
+            raise InputError(f"study.mesh: {mesh} points along x give no whole number along y in this box")
     own = next((stage.cells_per_step for stage in job.history if stage.cells_per_step is not None), None)
     if own is None and not _sliding(job):
         own = _cells_of_time_steps(job)
@@ -100,11 +100,11 @@ def ladders(job: Job) -> Ladders:
 
 
 def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
-    """Return the overrides that make a case of the job; time steps of all kinds change in the same proportion."""
+    """Return the overrides for a case of the job; all time steps change in the same proportion."""
     ny = 1 if job.grid.ny == 1 else case.mesh * job.grid.ny // job.grid.nx
     words = [f"grid.points=[{case.mesh}, {ny}]", "output.fields=[]", "output.every=1", "output.energy=false"]
     words += ["output.branch_dissipation=false", f"numerics.integrator={case.integrator}"]
-    words.append(f"numerics.tolerance={job.numerics.tolerance!r}")  # that of the job, also where accuracy chose it
+    words.append(f"numerics.tolerance={job.numerics.tolerance!r}")  # the job's tolerance, also if the accuracy chose it
     words += [f"adhesion.range={reach!r}"] if (reach := chosen_range(job)) is not None else []
     factor = case.time_step / own.time_step
     replaced = _sliding(job) if job.study and job.study.cells_per_step else []
@@ -124,7 +124,7 @@ def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
 
 
 def _sliding(job: Job) -> list[Stage]:
-    """The stages of a slide that choose their own steps."""
+    """Return the sliding stages that choose their steps."""
     return [stage for stage in job.history if stage.chooses and stage.speed]
 
 
@@ -133,7 +133,7 @@ def describe_choices(job: Job) -> list[str]:
     lines, reach = list[str](), chosen_range(job)
     if reach is not None:
         own = f"{job.grid.nx} x {job.grid.ny} points, the job's own mesh"
-        lines.append(f"adhesion.range: {reach:.4g} m in every case, which auto is for {own}")
+        lines.append(f"adhesion.range: {reach:.4g} m in every case, chosen by auto for {own}")
     refined = _sliding(job) if job.study and job.study.cells_per_step else []
     if stages := [stage.name for stage in job.history if stage.chooses and stage not in refined]:
         bound = f"numerics.accuracy = {job.numerics.asked.of_steps:g}"

@@ -1,5 +1,5 @@
-"""Outcomes of the cases of a study, friction, area, seconds, transforms, and their table study.csv: one line per case,
-written when the case is done, with its errors once all are."""
+"""Outcomes of the cases of a study, and their table study.csv: a row per finished case, with errors once all are
+finished."""
 
 import contextlib
 import csv
@@ -23,15 +23,15 @@ from ..storage import files
 from ..storage.step_row import StepRow
 from .ladders import Settings
 
-LAST_SHARE = 0.25  # accuracy: of the last stage that slides (or lasts): its mean is taken for what has settled
+LAST_SHARE = 0.25  # accuracy: last share of the last sliding (or lasting) stage, over which means are taken
 
 
 @dataclass(frozen=True)
 class Outcome:
     """Outcome of a run: the largest friction, means of friction and contact area over the last quarter of the last
-    stage that slides, and what it cost on all ranks.
+    sliding stage, and its costs on all ranks.
 
-    `transform_work` is the number of transforms times `N log2 N` of their N points, which no machine changes.
+    `transform_work` is the sum of `N log2 N` over all transforms of N points, which does not depend on the machine.
     """
 
     mu_max: float
@@ -51,7 +51,7 @@ COUNTS = ("mesh", "steps", "operator_calls")
 
 
 def march_through(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome | None:
-    """March through a job, writing nothing; None if `stopped` says so after a step; collective."""
+    """March through a job without writing files; None if `stopped()` after a step; collective."""
     marching = start.first(job, slab)
     rows: list[StepRow] = []
 
@@ -68,12 +68,12 @@ def march_through(job: Job, slab: Slab, stopped: Callable[[], bool]) -> Outcome 
 
 
 def settled(job: Job, rows: Sequence[StepRow]) -> tuple[float, float, float, float]:
-    """mu_max, mu_end, area and corrected area of a run, from its rows."""
+    """Return mu_max, mu_end, area and corrected area of a run from its rows."""
     end = rows[-1].time
     lasting = [stage for stage in job.history if stage.seconds > 0.0]
     sliding = [stage for stage in lasting if stage.speed > 0.0]
     last = (sliding or lasting or job.history)[-1]
-    for stage in reversed(job.history):  # what comes after the last stage that slides does not count
+    for stage in reversed(job.history):  # later stages are ignored
         if stage is last:
             break
         end -= stage.seconds
@@ -91,7 +91,7 @@ def settled(job: Job, rows: Sequence[StepRow]) -> tuple[float, float, float, flo
 
 
 def transform_work(counted: Tally) -> float:
-    """Transforms times `N log2 N`, from counts like `fft 2048x2048 float64`."""
+    """Return the sum of `N log2 N` over transforms, from counts like `fft 2048x2048 float64`."""
     total = 0.0
     for name, count in counted.items():
         if match := re.match(r"fft (\d+)x(\d+) ", name):
@@ -104,7 +104,7 @@ def transform_work(counted: Tally) -> float:
 
 
 def read_outcomes(path: Path, wanted: Mapping[Settings, str]) -> dict[Settings, Outcome]:
-    """The outcomes of the wanted cases that a table already has, if their jobs have the same fingerprints."""
+    """Return the outcomes of wanted cases from an existing table, if the fingerprints of their jobs agree."""
     found = {}
     with contextlib.suppress(FileNotFoundError), path.open(newline="") as file:
         for row in csv.DictReader(line for line in file if line.endswith("\n")):
@@ -121,7 +121,7 @@ def write_outcomes(
     outcomes: Mapping[Settings, Outcome],
     errors: Mapping[Settings, Mapping[str, float]] | None = None,
 ) -> None:
-    """Put all outcomes into the table, in the place of the old one."""
+    """Write the table of all outcomes."""
     rows = []
     for settings, outcome in outcomes.items():
         given = (AUTO if value is None else value for value in astuple(settings))

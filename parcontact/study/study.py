@@ -1,4 +1,4 @@
-"""`parcontact study`: all cases one after the other, each at once into study.csv; then limits and pictures."""
+"""`parcontact study`: runs all cases in turn, with a row of study.csv for each; then limits and pictures."""
 
 import hashlib
 import os
@@ -21,9 +21,9 @@ MakeJob = Callable[[Sequence[str]], Job]
 
 
 def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
-    """Run a study; collective. `make` gives the job changed by some overrides; returns the exit code.
+    """Run a study; collective. `make` returns the job changed by overrides; returns the exit code.
 
-    All cases are read before the first is run. After a stop the same command goes on with the cases that lack.
+    All jobs are read before the first case runs. After a stop the same command continues with the missing cases.
     """
     refined = ladders(job)
     jobs = {case: make(overrides(job, refined.own, case)) for case in refined.combine()}
@@ -45,7 +45,7 @@ def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
 
 
 class _Study:
-    """The cases, and what has come out of them so far."""
+    """The cases of a study and their outcomes so far."""
 
     def __init__(self, refined: Ladders, jobs: dict[Settings, Job], directory: Directory, quiet: bool) -> None:
         self.refined, self.jobs, self.slab, self.quiet = refined, jobs, directory.slab, quiet
@@ -59,7 +59,7 @@ class _Study:
             print(text, flush=True)
 
     def run(self, stopped: Callable[[], bool]) -> bool:
-        """Run the cases that lack; whether all are there in the end."""
+        """Run the missing cases; return True if all are finished."""
         self.say(f"{len(self.jobs)} cases" + f", {len(self.outcomes)} of them finished before" * bool(self.outcomes))
         self.say(f"  {'case':50}{' friction max' * self.refined.slides} {'area':>9} {'CPU [s]':>8}")
         for case, job in self.jobs.items():
@@ -83,7 +83,7 @@ class _Study:
             raise RunError(f"{case}: {error}") from error
 
     def conclude(self, notes: Sequence[str]) -> None:
-        """Limits, errors, pictures and sentences."""
+        """Write limits, errors, pictures and sentences."""
         if not self.slab.root:
             return
         ordered = {case: self.outcomes[case] for case in self.jobs}
@@ -112,6 +112,6 @@ class _Study:
 
 
 def _fingerprint(job: Job) -> str:
-    """Return a fingerprint of all that the outcome of a case depends on."""
+    """Return a fingerprint of everything that determines the outcome of a case."""
     lasting = job.model_copy(update={"study": None, "output": None, "checkpoint": None, "title": ""})
     return hashlib.sha256(lasting.resolved().encode()).hexdigest()[:12]

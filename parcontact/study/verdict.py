@@ -1,4 +1,4 @@
-"""Results of a study: limits, errors of every case, which settings are worth their price, and sentences about it."""
+"""Results of a study: limits, errors of all cases, the best settings, and sentences about them."""
 
 import math
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from .outcome import QUANTITIES, Outcome
 
 TARGETS = (0.05, 0.03, 0.01, 0.003)
 FRICTION = ("mu_max", "mu_end")
-NEEDED = (*FRICTION, "area_corrected")  # what the sentences hold the settings to
+NEEDED = (*FRICTION, "area_corrected")  # quantities that the sentences assess
 TOGETHER, TIME, CHOSEN = "mesh and time together", "time alone", "mesh with auto steps"  # ladders
 Outcomes = Mapping[Settings, Outcome]
 
@@ -26,18 +26,18 @@ class StudyFinding:
     limit: Limit
 
     def __str__(self) -> str:
-        last = "no order found: the last case, and how much it differs from those before and finer ones"
+        last = "no order found: value of the last case, and its difference to earlier and finer ones"
         order = last if math.isnan(self.limit.order) else f"order {self.limit.order:.2f}"
         name = f"{self.quantity} with {self.integrator}, {self.ladder}"
         if math.isnan(self.limit.uncertainty):
-            return f"{name}: {self.limit.value:.4g} in the last cases, which do not differ: its error is not known"
+            return f"{name}: {self.limit.value:.4g} in the last cases, which do not differ: its error is unknown"
         value = with_error(self.limit.value, abs(self.limit.value) * self.limit.doubt)
         return f"{name}: {value} ({per_cent(self.limit.doubt)}), {order}"
 
 
 def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str, tuple[list[float], list[Settings]]]:
-    """Cases that differ in one thing, from coarse to fine: mesh and time together, mesh alone, time alone; with the
-    sizes that belong to them. With steps that are chosen there is the mesh only."""
+    """Return sizes and cases of each ladder from coarse to fine: mesh and time together, mesh alone, time alone; for
+    chosen steps the mesh only."""
     usual = [case for case in outcomes if case.integrator == integrator]
     coarse, finest = ladders.cells[0], ladders.meshes[-1]
     together = sorted((c for c in usual if _is_same(c.cells_per_step, coarse)), key=lambda case: case.mesh)
@@ -56,17 +56,17 @@ def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str
 
 
 def _is_same(one: float | None, other: float | None) -> bool:
-    """Tell whether cells per step are the same; None for steps that are chosen."""
+    """Return True if cells per step are equal; None means chosen steps."""
     return one == other if one is None or other is None else math.isclose(one, other)
 
 
 def judged(ladders: Ladders) -> list[str]:
-    """Return the quantities whose errors are told: friction only where something slides."""
+    """Return the quantities whose errors are assessed: friction only if something slides."""
     return [name for name in QUANTITIES if ladders.slides or name not in FRICTION]
 
 
 def limits(ladders: Ladders, outcomes: Outcomes) -> list[StudyFinding]:
-    """The limit of every quantity along every ladder."""
+    """Return the limit of every quantity along every ladder."""
     found = []
     for integrator in ladders.integrators:
         for name, (sizes, cases) in sequences(ladders, outcomes, integrator).items():
@@ -77,11 +77,11 @@ def limits(ladders: Ladders, outcomes: Outcomes) -> list[StudyFinding]:
 
 
 def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
-    """The best limit of each quantity: along mesh and time together, with any of the cells per step, the least
-    uncertain one that has an order; without a ladder of meshes along time alone.
+    """Return the best limit of each quantity: along mesh and time together, the least uncertain one with an order;
+    without a ladder of meshes along time alone.
 
-    Without a ladder of either, or where it makes no difference, it is the most expensive case, and nothing is known of
-    its error. Of what all cases share nothing shows in a limit: it is known to `ladders.shared` at best.
+    Without such a ladder, or without differences, it is the most expensive case, with unknown error. Errors that all
+    cases have in common do not show in a limit, so its uncertainty is at least `ladders.shared`.
     """
     found = [one for one in limits(ladders, outcomes) if one.ladder == TIME]
     if len(ladders.meshes) > 1:
@@ -98,7 +98,7 @@ def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
 
 
 def errors(outcome: Outcome, reference: Mapping[str, Limit]) -> dict[str, float]:
-    """Relative error of each quantity; NaN where the reference is 0, as the friction of a body that does not slide."""
+    """Return the relative error of each quantity; NaN if the reference is 0, such as friction at rest."""
     return {
         name: abs(getattr(outcome, name) / limit.value - 1.0) if limit.value else math.nan
         for name, limit in reference.items()
@@ -106,12 +106,12 @@ def errors(outcome: Outcome, reference: Mapping[str, Limit]) -> dict[str, float]
 
 
 def proven(error: Mapping[str, float], reference: Mapping[str, Limit]) -> dict[str, float]:
-    """Errors, but none smaller than what is not known of its reference."""
+    """Return the errors, each at least the uncertainty of its reference."""
     return {name: doubt if value < (doubt := reference[name].doubt) else value for name, value in error.items()}
 
 
 def worst(error: Mapping[str, float]) -> float:
-    """The largest of the errors that settings are held to; NaN if there is none."""
+    """Return the largest of the assessed errors; NaN without any."""
     values = [error[name] for name in NEEDED if not math.isnan(error.get(name, math.nan))]
     return max(values, default=math.nan)
 
@@ -120,7 +120,7 @@ def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) ->
     """Return the cheapest settings that reach each target, with their time, and the error of the reference."""
     error = {case: worst(proven(errors(outcome, reference), reference)) for case, outcome in outcomes.items()}
     if all(map(math.isnan, error.values())):
-        return ["nothing touches: there are no errors to tell"]
+        return ["there is no contact, and no error"]
     needed = [name for name in NEEDED if name in reference]
     on = "1 rank" if ranks == 1 else f"{ranks} ranks"
     lines = [f"the cheapest settings with errors of {', '.join(needed)} within a bound, CPU times on {on}:"]

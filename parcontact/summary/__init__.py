@@ -1,1 +1,1 @@
-"""Results of a run, a sweep or a friction curve in short: figures, tables and references to cite."""
+"""Summaries of a run, a sweep or a friction curve: figures, tables and references to cite."""

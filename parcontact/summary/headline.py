@@ -1,4 +1,4 @@
-"""The headline of a report: one sentence with the results that a job is about, and their errors."""
+"""The headline of a report: a sentence with the main results of a job and their errors."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,7 +12,7 @@ from ..printed import quantity, with_error
 from ..storage import marker, read_back
 from . import leak_stop, pull_off, slide, sweep_table
 
-SWEPT = (  # results of a sweep, from the most telling one on: column, words, unit, and the column of its error
+SWEPT = (  # results of a sweep in order of preference: column, words, unit, column of the error
     ("pull_off", "the pull-off force", "N", "pull_off_error"),
     ("mu_dyn", "the mean friction", "", "mu_dyn_error"),
     ("friction", "friction", "", slide.ERRORS[0]),
@@ -29,7 +29,7 @@ def find_headline(directory: Path) -> str:
 
 
 def _run(directory: Path) -> str:
-    """Return friction, pull-off force, leakage and contact area of a run, as far as its job is about them."""
+    """Return friction, pull-off force, leakage and contact area of a run, as far as its job determines them."""
     if not (directory / RESOLVED).is_file():
         return ""
     job = shown_job(directory / RESOLVED)
@@ -42,7 +42,7 @@ def _run(directory: Path) -> str:
 
 
 def _friction(job: Job, columns: Columns) -> Iterator[str]:
-    """Yield friction of the slide where something slides and friction is defined."""
+    """Yield the friction of the slide, if it is defined."""
     found, errors = slide.measure_slide(job.history, columns), slide.absolute_errors(job.history, columns, job.grid.dx)
     if found is None or math.isnan(found.mu_dyn):
         return
@@ -61,7 +61,7 @@ def _pull_off(job: Job, columns: Columns, detached: bool) -> Iterator[str]:
 
 
 def _leakage(directory: Path, columns: Columns) -> Iterator[str]:
-    """Yield the last conductivities, of `leak.csv` with their errors, else of the run itself."""
+    """Yield the last conductivities, from `leak.csv` with their errors, else from the run."""
     table = directory / "leak.csv"
     columns = read_back.read_results(table) if table.is_file() else columns
     stops = [text for text in leak_stop.describe_leak_stop(directory) if " between " in text]
@@ -81,7 +81,7 @@ def _flow(columns: Columns, row: int, axis: str) -> str:
 
 
 def _area(job: Job, columns: Columns, detached: bool) -> str:
-    """Return the mean contact area of the slide; without one that of the row which shows the contact best."""
+    """Return the mean contact area of the slide; without a slide that of the row chosen by `pull_off.choose_row`."""
     if (found := slide.measure_slide(job.history, columns)) is not None:
         error = slide.absolute_errors(job.history, columns, job.grid.dx).get("contact_area", math.nan)
         return f"the mean contact area is {_size(job, found.contact_area_corrected, error)}"
@@ -94,13 +94,13 @@ def _area(job: Job, columns: Columns, detached: bool) -> str:
 
 
 def _load(job: Job, pressure: float) -> str:
-    """Return what presses: the force on the box of a free scene, else the mean pressure."""
+    """Return the force on the box of a free scene, else the mean pressure, as text."""
     free = job.grid.boundary == "free"
     return quantity(pressure * job.grid.lx * job.grid.ly, "N", 4) if free else quantity(pressure, "Pa", 4)
 
 
 def _size(job: Job, share: float, error: float) -> str:
-    """Return a contact area and its error, from shares of the box: in m² in a free scene, else in per cent."""
+    """Return a contact area and its error as text: in m² in a free scene, else in per cent of the nominal area."""
     if job.grid.boundary != "free":
         return f"{with_error(100.0 * share, 100.0 * error)} % of the nominal area"
     box = job.grid.lx * job.grid.ly
@@ -109,7 +109,7 @@ def _size(job: Job, share: float, error: float) -> str:
 
 
 def _curve(directory: Path) -> str:
-    """Return the highest friction of a friction curve, and where it is; '' without a point."""
+    """Return a sentence on the highest friction of a friction curve; '' without a point."""
     columns = read_back.read_results(directory / "steady.csv")
     if not columns["velocity"]:
         return ""
@@ -121,8 +121,7 @@ def _curve(directory: Path) -> str:
 
 
 def _sweep(directory: Path) -> str:
-    """Return the smallest and the largest of the first of the results `SWEPT` that the cases of a sweep have; ''
-    without any."""
+    """Return a sentence on the range of the first result of `SWEPT` that the cases have; '' without any."""
     rows = sweep_table.read_cases(sweep_table.results(directory))
     for name, words, unit, error in SWEPT:
         known = sorted((row for row in rows if math.isfinite(row.get(name, math.nan))), key=itemgetter(name))
@@ -133,7 +132,7 @@ def _sweep(directory: Path) -> str:
 
 
 def _study(directory: Path) -> str:
-    """Return the first sentence of a study, about its accuracy."""
+    """Return the first sentence of a study, on its accuracy."""
     read_back.refuse_cut(directory / "study.txt")
     return (directory / "study.txt").read_text(errors="replace").partition("\n")[0]
 
@@ -147,7 +146,7 @@ def _with_unit(row: Mapping[str, Any], name: str, unit: str, error: str) -> str:
 
 
 def _error(columns: Columns, name: str, row: int) -> float:
-    """Return an error of a row, nan where the table has none."""
+    """Return an error of a row, NaN if the table has none."""
     return columns[name][row] if name in columns else math.nan
 
 

@@ -1,4 +1,4 @@
-"""Descriptions of the files of a run and of output directories, and whether they are sound."""
+"""Descriptions of files of a run and of output directories, with checks for damage."""
 
 import json
 import math
@@ -24,12 +24,13 @@ from ..storage.provenance import Link, read_budget, read_chain
 from . import leak_stop, pull_off, slide, sweep_table, theory_beside, theory_settings
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
-SHOWN = 20  # tuning: numbers of one name, or failed cases, at most
-NOT_HDF5 = "file signature not found"  # what HDF5 says of another file
+SHOWN = 20  # tuning: most numbers of one name, or failed cases, that are shown
+NOT_HDF5 = "file signature not found"  # message of HDF5 for files of another kind
 
 
 def describe_path(path: Path) -> tuple[str, bool]:
-    """Describe a checkpoint, a file of fields or an output directory, and tell whether it is sound; on one rank."""
+    """Return a description of a checkpoint, a field file or an output directory, and whether it is undamaged; on one
+    rank."""
     if path.is_dir():
         return describe_files(path)
     try:
@@ -42,13 +43,13 @@ def describe_path(path: Path) -> tuple[str, bool]:
         raise InputError(f"{path} does not exist") from None
     except hdf5.FAILURES as error:
         if NOT_HDF5 in str(error):
-            raise InputError(f"{path} is neither a checkpoint nor a file of fields: it is no HDF5 file") from None
+            raise InputError(f"{path} is neither a checkpoint nor a field file: it is not an HDF5 file") from None
         return f"{path} cannot be read: {hdf5.reason(error)}", False
-    raise InputError(f"{path} is neither a checkpoint nor a file of fields")
+    raise InputError(f"{path} is neither a checkpoint nor a field file")
 
 
 def describe_all(paths: Sequence[Path]) -> tuple[str, bool]:
-    """Describe several, one below the other, and tell whether all are sound; of one that is nothing that is said."""
+    """Return descriptions of several paths, and whether all are undamaged; an error is part of the description."""
     found = []
     for path in paths:
         try:
@@ -91,7 +92,7 @@ def _fields(path: Path, file: h5py.File) -> tuple[str, bool]:
         for i in saved
         if not np.isfinite(file[name][i]).all()
     ]
-    lines.append(f"damaged: not finite are {', '.join(bad)}" if bad else "sound: all saved maps are finite")
+    lines.append(f"damaged: values are not finite in {', '.join(bad)}" if bad else "sound: all saved maps are finite")
     return "\n".join(lines), not bad
 
 
@@ -115,13 +116,14 @@ def _short(value: NDArray[Any]) -> str:
 
 
 def describe_files(directory: Path) -> tuple[str, bool]:
-    """Describe a directory, and tell whether all of it can be read; raises InputError where nothing is."""
+    """Return a description of a directory, and whether all of it is readable; raises InputError if it has no
+    results."""
     try:
         claims = marker.read_claims(directory)
     except (OSError, ValueError) as error:
         return f"{directory}: {hdf5.reason(error)}", False
     if not claims and not any((directory / name).exists() for name in ("measures.csv", sweep_table.TABLE)):
-        raise InputError(f"{directory} holds no run: it has no marker, no measures.csv and no {sweep_table.TABLE}")
+        raise InputError(f"{directory} has no results: it has no marker, no measures.csv and no {sweep_table.TABLE}")
     lines, problems = [f"{directory}: {_title(directory)}"], list[str]()
     logs = ("run.log", curve_points.LOG)
     lines += dict.fromkeys(f"  {text}" for log in logs for text in meshes_of(directory / log))
@@ -136,7 +138,7 @@ def describe_files(directory: Path) -> tuple[str, bool]:
 
 
 def _title(directory: Path) -> str:
-    """Return the title of the job, from the first of its copies that there is."""
+    """Return the title of the job, from its first copy."""
     cases = sorted(path.name for path in directory.glob("cases/*"))
     of_a_case = [f"cases/{cases[0]}/{kind}.resolved.yaml" for kind in ("job", "steady")] if cases else []
     for name in ("job.resolved.yaml", "steady.resolved.yaml", "study.resolved.yaml", *of_a_case):
@@ -174,7 +176,7 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
 
 
 def _slides(job: Job | None) -> bool:
-    """Return whether something slides in a job: else friction is noise. Of a job that is not there it may."""
+    """Return True if something slides in a job, or if the job is unknown; without sliding friction is noise."""
     return job is None or bool(job.directions)
 
 
@@ -202,13 +204,13 @@ def _curve(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
         if errors:
             parts = ", ".join(f"{name.removeprefix('error_')} {100 * value:.3g} %" for name, value in errors.items())
             numerics = claims["steady"].job.get("numerics", {}) if "steady" in claims else {}
-            asked = f"; asked for: {_asked(numerics['accuracy'])}" if "accuracy" in numerics else ""
+            asked = f"; requested: {_asked(numerics['accuracy'])}" if "accuracy" in numerics else ""
             yield f"  largest estimated errors of the curve: {parts}{asked}"
         yield from (f"  warning: {text}" for text in warnings_of(table.with_name(curve_points.LOG)))
 
 
 def _asked(accuracy: Any) -> str:
-    """Return the accuracy of a job, given as plain data."""
+    """Return the accuracy of a job (plain data) as text."""
     parts = accuracy if isinstance(accuracy, dict) else {"": accuracy}
     return ", ".join(f"{name} {100 * value:.3g} %".lstrip() for name, value in parts.items())
 
@@ -242,10 +244,12 @@ def _sweep(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
 
 
 def _study(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    yield "  study: what settings cost is in study.txt"
+    yield "  study: errors and costs of settings are in study.txt"
 
 
-PARTS: dict[str, Callable[[Path, dict[str, Claim]], Iterator[str]]] = {  # of an output directory, by a file of each
+PARTS: dict[
+    str, Callable[[Path, dict[str, Claim]], Iterator[str]]
+] = {  # descriptions of the parts of an output directory, by their file
     "measures.csv": _run,
     theory_settings.TABLE: _theory,
     "steady.csv": _curve,

@@ -1,6 +1,6 @@
-"""Where leakage stops: between which pressures, or instants, contact closes the gap along x and along y.
+"""Pressures, or instants, between which contact closes the gap along x and along y.
 
-The conductivities K are those of `leak.csv`, of the gaps that a run has saved, else those of the run's own table.
+Conductivities K are those of `leak.csv`, from saved gaps, else those of measures.csv.
 """
 
 import math
@@ -14,10 +14,10 @@ Columns = Mapping[str, Sequence[float]]
 
 
 def describe_leak_stop(directory: Path) -> list[str]:
-    """Return a sentence for each direction in which the leakage of an output directory is known; one where both agree.
+    """Return a sentence on leakage for each direction with known conductivity; one sentence if both agree.
 
-    A sentence names the pressures of the last instant with a flow and of the first one without, or their times where
-    the pressure stays. Raises InputError for a table that cannot be read.
+    A sentence has the pressures of the last instant with a flow and of the first one without, or their times if the
+    pressure is constant. Raises InputError for an unreadable table.
     """
     table = next((path for name in ("leak.csv", "measures.csv") if (path := directory / name).is_file()), None)
     columns = read_back.read_results(table) if table else {}
@@ -28,8 +28,8 @@ def describe_leak_stop(directory: Path) -> list[str]:
 
 
 def describe_axis(columns: Columns, axis: str) -> str:
-    """Return how leakage along an axis goes over the rows of a table: `stops between 1.05 and 1.10 MPa`; '' where no
-    row has it."""
+    """Return how leakage along an axis changes over the rows of a table: `stops between 1.05 and 1.10 MPa`; '' if
+    unknown."""
     flows, pressures = (columns.get(name, ()) for name in (f"flow_{axis}", "pressure"))
     pairs = enumerate(zip(flows, pressures, strict=False))
     known = [row for row, pair in pairs if not any(map(math.isnan, pair))]
@@ -37,16 +37,16 @@ def describe_axis(columns: Columns, axis: str) -> str:
     if not known:
         return ""
     if stopped is None:
-        return f"does not stop, up to {quantity(max(pressures[row] for row in known), 'Pa')}"
+        return f"does not stop up to {quantity(max(pressures[row] for row in known), 'Pa')}"
     closed = max(place for place, row in enumerate(known) if flows[row] == 0.0)
     opens = f", and begins again {_between(columns, *known[closed : closed + 2])}" if known[closed + 1 :] else ""
     if stopped == 0:
-        return f"has stopped at the first instant, under {quantity(pressures[known[0]], 'Pa')}{opens}"
+        return f"has already stopped at the first instant, under {quantity(pressures[known[0]], 'Pa')}{opens}"
     return f"stops {_between(columns, *known[stopped - 1 : stopped + 1])}{opens}"
 
 
 def _between(columns: Columns, before: int, after: int) -> str:
-    """Return between which pressures two rows are; between which times, where the pressure stays."""
+    """Return the pressures of two rows as text; their times if the pressure is constant."""
     ends = columns["pressure"][before], columns["pressure"][after]
     if ends[0] != ends[1]:
         return f"between {span(min(ends), max(ends), 'Pa')}"

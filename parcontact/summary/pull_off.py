@@ -1,7 +1,7 @@
-"""Pull-offs: the loads at which surfaces that stick came off, from the rows of a run.
+"""Pull-offs: the loads at which adhesive contacts detach, from the rows of a run.
 
-The largest tension lies between steps. With loads that are a and b higher at the times s before and t after the row of
-the lowest load, the vertex of the parabola through the three lies lower than that row by
+The largest tension lies between steps. With loads higher by a and b at the times s before and t after the row of the
+lowest load, the vertex of the parabola through the three points is lower than that row by
 
     e = (b s/t - a t/s)^2/(4 (s + t) (a/s + b/t)).
 
@@ -22,19 +22,18 @@ from numpy.typing import NDArray
 from ..accuracy.constants import PULL_OFF
 from ..printed import quantity
 
-SAME_LOAD = 1e-9  # rounding: relative: loads this close are the same
-SOLVER = 0.25  # accuracy: of the tolerance of the solves, relative error of the load
-SNAP = 0.5  # accuracy: of the largest tension: where more is lost in a step, no parabola is near the loads
-LEAST_PULL = 1e-9  # accuracy: of the highest pressure, below which a mean pressure is what rounding leaves of 0
+SAME_LOAD = 1e-9  # rounding: relative difference below which loads are the same
+SOLVER = 0.25  # accuracy: relative error of the load over the tolerance of the solves
+SNAP = 0.5  # accuracy: change of load in a step, over the largest tension, above which no parabola is used
+LEAST_PULL = 1e-9  # rounding: least mean tension over the highest pressure
 
 Columns = Mapping[str, Sequence[float]]
 Values = NDArray[np.float64]
 
 
 class PullOff(NamedTuple):
-    """The row of the lowest load of a pull, the lowest load and what the steps leave open of it, as mean pressures
-    [Pa], and the first row without contact: the one after the last where the run ended with it, None where contact
-    holds; the relative error by the mesh, NaN where no row has an error of the area."""
+    """A pull-off: the row of its lowest load, the lowest load and its error by steps as mean pressures [Pa], and the
+    first row without contact (one after the last row if the run ended with it, None if the contact holds)."""
 
     row: int
     pressure: float
@@ -48,18 +47,18 @@ class PullOff(NamedTuple):
 
 
 def find(columns: Columns, detached: bool = False) -> list[PullOff]:
-    """Return the pull-offs of a run in their order, from its columns `time`, `pressure`, `max_pressure`, `approach`,
-    `contact_area` and `error_area`; it may have ended as its surfaces `detached`.
+    """Return the pull-offs of a run in order, from its columns `time`, `pressure`, `max_pressure`, `approach` and
+    `contact_area`; the run may have ended because its surfaces `detached`.
 
-    A pull begins where the surfaces of a contact are nearest, or when they last came nearer before it was lost: an
-    earlier pull that it has held is no pull-off. It ends where the surfaces part no more: those that have come off may
-    pull each other harder than before, and what they do when they come near again is not of the pull.
+    A pull begins at the smallest separation, or at the last approach before contact is lost; earlier pulls that the
+    contact survived do not count. It ends when the separation stops growing, as detached surfaces may later attract
+    each other more strongly.
     """
     names = "time", "pressure", "approach", "contact_area"
     time, pressure, approach, area = (np.asarray(columns[name], float) for name in names)
     touching = np.concatenate([[False], area > 0.0, [False]])
     changes = np.flatnonzero(touching[1:] != touching[:-1]).tolist()
-    last = len(area) if detached else len(area) - 1  # row at which a contact was lost at the latest
+    last = len(area) if detached else len(area) - 1  # last row at which a contact may be lost
     pulls = [_find(time, pressure, approach, last, *ends) for ends in zip(changes[::2], changes[1::2], strict=True)]
     least = -LEAST_PULL * np.asarray(columns["max_pressure"], float)
     return [
@@ -76,12 +75,12 @@ def _median_to(values: Sequence[float], row: int) -> float:
 
 
 def _find(time: Values, pressure: Values, approach: Values, last: int, start: int, end: int) -> PullOff:
-    """Return the lowest load of a contact from the row `start` to before the row `end`, lost if that is not after the
-    `last` one."""
+    """Return the pull-off of a contact in rows `start` to `end` (excluded), which is lost if `end` is not after
+    `last`."""
     begin, stop, lost = start + int(np.argmax(approach[start:end])), end, end <= last
     if lost and (nearer := np.flatnonzero(np.diff(approach[begin:end]) > 0.0)).size:
         begin += int(nearer[-1]) + 1
-    while stop < len(approach) and approach[stop] < approach[stop - 1] and pressure[stop]:  # 0 where nothing held
+    while stop < len(approach) and approach[stop] < approach[stop - 1] and pressure[stop]:  # 0 after detachment
         stop += 1
     row = begin + int(np.argmin(pressure[begin:stop]))
     held = end if lost else None
@@ -93,7 +92,7 @@ def _find(time: Values, pressure: Values, approach: Values, last: int, start: in
 
 
 def _below(steps: Values, loads: Values) -> float:
-    """Return by how much the parabola through three loads, of which the second is the lowest, is lower than it."""
+    """Return the depth of the vertex of the parabola through three loads below the second, the lowest one."""
     (before, after), (left, right) = steps, (loads[0] - loads[1], loads[2] - loads[1])
     if min(before, after) <= 0.0 or left + right == 0.0:
         return 0.0
@@ -103,8 +102,8 @@ def _below(steps: Values, loads: Values) -> float:
 
 
 def choose_row(columns: Columns, detached: bool = False) -> int:
-    """Return the row that shows the contact of a run: the last one, unless the surfaces came off by then. In that case
-    it is the row of the last pull-off, or without one the last row of the largest load. Arguments as for `find`."""
+    """Return the row that shows the contact of a run: the last one, or after a detachment that of the last pull-off, or
+    without a pull-off the last row of the largest load. Arguments as for `find`."""
     pressure, area = (np.asarray(columns[name], float) for name in ("pressure", "contact_area"))
     if area[-1] > 0.0 and not detached:
         return len(area) - 1
@@ -113,8 +112,8 @@ def choose_row(columns: Columns, detached: bool = False) -> int:
 
 
 def describe_pull_off(columns: Columns, area: float, tolerance: float, detached: bool = False) -> Iterator[str]:
-    """Yield a sentence for each pull-off, and for the largest pull of a contact that holds; `area` is the box [m^2],
-    solves have the `tolerance`."""
+    """Yield a sentence for each pull-off, and for the largest pull of a contact that holds; `area` is that of the box
+    [m^2], `tolerance` that of the solves."""
     pulls = find(columns, detached)
     many = sum(pull.lost is not None for pull in pulls) > 1
     for number, pull in enumerate(pulls, 1):
@@ -127,7 +126,7 @@ def describe_pull_off(columns: Columns, area: float, tolerance: float, detached:
         if lost is None:
             yield f"largest pull so far: {load}, {where}; contact holds"
             continue
-        after = "nothing held the next load"
+        after = "the next load had no equilibrium"
         if lost < len(columns["time"]):
             after = f"contact was lost by t = {quantity(columns['time'][lost], 's', 4)}"
         yield f"{f'pull-off {number}' if many else 'pull-off'}: {load}, {where}; {within}, and {after}"

@@ -1,8 +1,8 @@
-"""Results of a slide: its highest friction, its dynamic friction, and the contact area meanwhile.
+"""Results of a slide: its highest friction, its dynamic friction, and its contact area.
 
-The slide of a history is its last stretch at one velocity that is not zero, over all stages that have it. After the
-paper (Sec. 3.1), mu_max is the highest friction of the slide, and mu_dyn the mean over the last three quarters of its
-distance. That is not yet the friction of steady sliding, which may take a longer slide (`parcontact steady` finds it).
+The slide of a history is its last part at one non-zero velocity, over all stages with it. As in the paper (Sec. 3.1),
+mu_max is the highest friction of the slide, and mu_dyn the mean over the last three quarters of its distance. Steady
+sliding may need a longer slide (`parcontact steady` solves it directly).
 """
 
 import math
@@ -16,17 +16,17 @@ from numpy.typing import ArrayLike, NDArray
 from ..job import Initial, Ramp, Stage
 from ..printed import quantity, stated_error, with_error
 
-LATE = 0.9  # accuracy: of the distance; a maximum beyond may be none
+LATE = 0.9  # accuracy: share of the distance beyond which a maximum may still rise
 DYNAMIC = 0.75  # physics: share of the distance, counted from its end, over which friction is averaged
-SAME_INSTANT = 1e-9  # accuracy: relative: instants this close are the same
+SAME_INSTANT = 1e-9  # rounding: relative difference below which instants are the same
 CORRECTED = "contact_area_corrected"
 ERRORS = ("error_friction", "error_area")  # columns of the error budget of each row
 
 
 class Slide(NamedTuple):
-    """`mu_max` and the distance [m] from the start of the slide to it; means over the last three quarters of it.
+    """`mu_max` and its distance [m] from the start of the slide; means over the last three quarters of the slide.
 
-    Friction is nan where it is not defined, as no load presses in some steps, the corrected area where it is not known.
+    Friction is NaN if it is undefined (steps without load), the corrected area if it is unknown.
     """
 
     mu_max: float
@@ -37,7 +37,7 @@ class Slide(NamedTuple):
 
 
 def mean_over_end(distance: ArrayLike, values: ArrayLike, share: float = DYNAMIC) -> float:
-    """Return the mean of values over the last share of a distance, by trapezoids; both have shape (n,)."""
+    """Return the mean of values over the last `share` of a distance, by trapezoids; both have shape (n,)."""
     x, y = np.asarray(distance, float), np.asarray(values, float)
     start = x[-1] - share * (x[-1] - x[0])
     inside = x > start
@@ -46,10 +46,10 @@ def mean_over_end(distance: ArrayLike, values: ArrayLike, share: float = DYNAMIC
 
 
 def measure_slide(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> Slide | None:
-    """Measure the slide of a history, from the columns `time`, `distance`, `friction`, `contact_area` of its rows, and
-    `contact_area_corrected` where it is there.
+    """Return results of the slide of a history, from the columns `time`, `distance`, `friction`, `contact_area` of its
+    rows, and `contact_area_corrected` if present.
 
-    None where nothing slides, or has not slid yet.
+    None if nothing slides, or has slid yet.
     """
     rows = _during(history, np.asarray(columns["time"], float))
     unknown = [math.nan] * len(columns["time"])
@@ -67,7 +67,7 @@ def measure_slide(history: Sequence[Stage], columns: Mapping[str, Sequence[float
 
 
 def _without_load(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return those of some rows, but the first, in which a tangential force acts under no load, or under tension."""
+    """Return those of `rows`, except the first, with a tangential force but without load, or under tension."""
     friction = np.asarray(columns["friction"], float)[rows]
     return rows[1:][((friction == 0.0) & (_tangential(columns, rows) > 0.0))[1:]]
 
@@ -80,8 +80,8 @@ def _tangential(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) 
 
 
 def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]], cell: float) -> dict[str, float]:
-    """Return the absolute errors of mu_max, mu_dyn and the corrected contact area of a slide, as far as they are
-    estimated; `cell` is the spacing of the grid along x [m]."""
+    """Return the known absolute errors of mu_max, mu_dyn and the corrected contact area of a slide; `cell` is the
+    spacing of the grid along x [m]."""
     known, slid = slide_errors(history, columns), measure_slide(history, columns)
     rows, found = _during(history, np.asarray(columns["time"], float)), dict[str, float]()
     if slid is None:
@@ -95,8 +95,8 @@ def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[flo
 
 
 def slide_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Return the largest relative errors of friction and contact area in the rows of the slide, or in the last row if
-    nothing has slid, by their columns as far as these are there; nan where none is known."""
+    """Return the largest relative errors of friction and contact area in the rows of the slide, or in the last row
+    without a slide, by existing columns; NaN if unknown."""
     rows = (
         _during(history, np.asarray(columns["time"], float))[1:].tolist() if measure_slide(history, columns) else [-1]
     )
@@ -104,9 +104,9 @@ def slide_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]
 
 
 def mean_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Return the relative errors of friction and contact area that the end of a run tells of its slide: means over the
-    distance slid, of friction in proportion to it. Without a slide that of the area in the last row; nan where no error
-    is known."""
+    """Return the mean relative errors of friction and contact area over the distance slid, as printed at the end of a
+    run; errors of friction are weighted by friction. Without a slide, the error of the area in the last row; NaN if
+    unknown."""
     if measure_slide(history, columns) is None:
         return {ERRORS[1]: columns[ERRORS[1]][-1]} if ERRORS[1] in columns else {}
     rows, found = _during(history, np.asarray(columns["time"], float)), dict[str, float]()
@@ -119,14 +119,15 @@ def mean_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]
 
 
 def largest(values: Iterable[float]) -> float:
-    """Return the largest of those that are known, else nan."""
+    """Return the largest value that is not NaN, or NaN."""
     return max((value for value in values if value == value), default=math.nan)
 
 
 def ripple(distance: ArrayLike, friction: ArrayLike, at: int, cell: float) -> float:
-    """Return by how much friction of the row `at` is above its mean over one cell [m] around it, 0 for steps of a cell.
+    """Return the friction in row `at` minus its mean over one cell [m] around it, 0 for steps of a cell or more.
 
-    Shorter steps meet the points of the grid in turn, and friction goes up and down with them."""
+    Steps shorter than a cell meet the points of the grid in turn, which makes friction oscillate.
+    """
     x, y = np.asarray(distance, float), np.asarray(friction, float)
     near = np.abs(x - x[at]) <= cell / 2 * (1 + SAME_INSTANT)
     if np.count_nonzero(near) < 3 or not x[near][0] < x[at] < x[near][-1]:
@@ -135,8 +136,7 @@ def ripple(distance: ArrayLike, friction: ArrayLike, at: int, cell: float) -> fl
 
 
 def _highest(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cell: float) -> tuple[float, float, float]:
-    """Return the highest friction of some rows, its error, and the part of it that is the ripple on which it sits; the
-    rest of the error is its estimate."""
+    """Return the highest friction of some rows, its error, and the part of the error that is the ripple."""
     friction = np.asarray(columns["friction"], float)[rows]
     at = int(np.argmax(friction[1:])) + 1
     error = float(columns[ERRORS[0]][rows[at]]) * friction[at] if ERRORS[0] in columns else math.nan
@@ -145,7 +145,7 @@ def _highest(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cel
 
 
 def _mean(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str, error: str) -> tuple[float, float]:
-    """Return the mean of a column over the last three quarters, and that of its known errors."""
+    """Return the mean of a column over the last three quarters, and the mean of its known errors."""
     distance, values = (np.asarray(columns[key], float)[rows] for key in ("distance", name))
     within = np.abs(values) * np.nan_to_num(np.asarray(columns.get(error, np.zeros(len(columns[name]))), float)[rows])
     return mean_over_end(distance, values), mean_over_end(distance, within)
@@ -154,10 +154,9 @@ def _mean(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: 
 def describe_slide(
     history: Sequence[Stage], initial: Initial, cell: float, columns: Mapping[str, Sequence[float]]
 ) -> Iterator[str]:
-    """Yield sentences about the slide so far, from the columns of `measure` and of `errors`; none where nothing slid.
+    """Yield sentences on the slide so far, from columns of the run; none before anything slides.
 
-    `cell` is the spacing of the grid along x [m]. As long as the last slide has not begun, the sentences are about the
-    one before it, and say so.
+    `cell` is the spacing of the grid along x [m]. Until the last slide begins, the sentences are about the one before.
     """
     last, begun = _slide(history), _begun(history, columns["time"])
     not_begun = begun <= last.start
@@ -167,14 +166,16 @@ def describe_slide(
         return
     if not_begun:
         ends_with = _slide(so_far).stop - 1
-        yield f"the last slide has not begun; these numbers are of the one before, which ends with history.{ends_with}"
+        yield f"the last slide has not begun; these numbers are of the previous one, ending with history.{ends_with}"
     rows = _during(so_far, np.asarray(columns["time"], float))
     yield from (
-        _tell_friction(found, cell, columns, rows) if found.mu_dyn == found.mu_dyn else _tell_force(columns, rows)
+        _describe_friction(found, cell, columns, rows)
+        if found.mu_dyn == found.mu_dyn
+        else _describe_force(columns, rows)
     )
-    area = f"{found.contact_area:.4g} as counted in points"
+    area = f"{found.contact_area:.4g} by counting points"
     if CORRECTED in columns:
-        area = f"{with_error(*_mean(columns, rows, CORRECTED, ERRORS[1]))} as corrected for its edges, and {area}"
+        area = f"{with_error(*_mean(columns, rows, CORRECTED, ERRORS[1]))} corrected for its edges, and {area}"
     yield f"the mean contact area over the same distance is {area}"
     if "flash_temperature" in columns:
         flash, _ = _mean(columns, rows, "flash_temperature", "")
@@ -191,10 +192,10 @@ def describe_slide(
         yield from _against_start(columns, found.mu_dyn, known.get(ERRORS[0], math.nan))
 
 
-def _tell_friction(
+def _describe_friction(
     found: Slide, cell: float, columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]
 ) -> Iterator[str]:
-    """Yield the highest friction of a slide, its mean, and whether it has settled."""
+    """Yield sentences on the highest and the mean friction of a slide, and on whether it is steady."""
     way = columns["distance"][rows[-1]] - columns["distance"][rows[0]]
     late = ", in its last tenth: friction may still rise" if found.mu_max_distance > LATE * way else ""
     after = f"{quantity(found.mu_max_distance, 'm')} after its start{late}"
@@ -206,12 +207,12 @@ def _tell_friction(
     yield from _unsettled(columns, rows)
 
 
-def _tell_force(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> Iterator[str]:
-    """Yield the tangential force of a slide whose friction is not defined."""
+def _describe_force(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> Iterator[str]:
+    """Yield a sentence on the tangential force of a slide without defined friction."""
     force, steps = _tangential(columns, rows), _without_load(columns, rows).size
     mean = mean_over_end(np.asarray(columns["distance"], float)[rows], force)
-    where = f"in {steps} of {len(rows) - 1} steps of the slide, in which no load presses, and is 0 in the table"
-    size = f"{quantity(force[1:].max(), 'N')} at most, and {quantity(mean, 'N')} in the mean over the last"
+    where = f"in {steps} of {len(rows) - 1} steps of the slide, which have no load, and is 0 in the table"
+    size = f"{quantity(force[1:].max(), 'N')} at most, and {quantity(mean, 'N')} on average over the last"
     yield f"friction is not defined {where}: the tangential force is {size} three quarters of the slide"
 
 
@@ -232,7 +233,7 @@ def _unsettled(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -
 
 
 def _goes_on(initial: Initial, stages: Sequence[Stage], rows: NDArray[np.intp]) -> bool:
-    """Return whether a slide is the steady sliding with which its run began, under the same load."""
+    """Return True if a slide continues the steady sliding with which its run began, under the same load."""
     if initial.state != "steady" or initial.pressure is None or rows[0] != 0:
         return False
     same = initial.velocity, Ramp(initial.pressure, initial.pressure)
@@ -240,8 +241,7 @@ def _goes_on(initial: Initial, stages: Sequence[Stage], rows: NDArray[np.intp]) 
 
 
 def _against_start(columns: Mapping[str, Sequence[float]], mu_dyn: float, error: float) -> Iterator[str]:
-    """Yield a sentence if a steady start and the slide that goes on from it, one state found twice, differ by more than
-    their errors."""
+    """Yield a sentence if the steady start and the slide that continues it differ by more than their errors."""
     start, known = columns["friction"][0], columns.get(ERRORS[0], [math.nan])[0]
     allowed = known * abs(start) + error * abs(mu_dyn)
     if abs(mu_dyn - start) > allowed:
@@ -253,7 +253,7 @@ def _against_start(columns: Mapping[str, Sequence[float]], mu_dyn: float, error:
 
 
 def _begun(history: Sequence[Stage], times: Sequence[float]) -> int:
-    """Return how many stages have begun before the last of the times."""
+    """Return the number of stages that have begun by the last time."""
     starts = np.cumsum([0.0, *(stage.seconds for stage in history[:-1])])
     return int(np.count_nonzero(starts < times[-1] * (1.0 - SAME_INSTANT))) if len(times) else 0
 
@@ -266,7 +266,7 @@ def _slide(history: Sequence[Stage]) -> range:
 
 
 def _during(history: Sequence[Stage], time: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return the rows of the slide: the last one before it begins, and those to its end."""
+    """Return the rows of the slide, from the last row before it to its end."""
     ends = np.cumsum([0.0, *(stage.seconds for stage in history)])
     slide = _slide(history)
     if not slide:

@@ -1,4 +1,4 @@
-"""Tables of a sweep: sweep.csv has a row for each case, sweep_curves.csv one for each point of friction curves.
+"""Tables of a sweep: sweep.csv with a row per case, sweep_curves.csv with a row per point of friction curves.
 
 sweep_mean.csv and sweep_curves_mean.csv have means over seeds.
 """
@@ -23,7 +23,7 @@ from . import pull_off, slide
 
 TABLE = "sweep.csv"
 CURVES = "sweep_curves.csv"
-PLACES = ("velocity", "pressure", "temperature")  # of a point of a curve
+PLACES = ("velocity", "pressure", "temperature")  # coordinates of a point of a curve
 CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
 CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *slide.ERRORS, "residual")
 RESULTS = names_of(SWEEP_RESULTS)
@@ -31,26 +31,24 @@ SECTIONS = {section: added_names(SWEEP, section) for section in ("adhesion", "ou
 FRICTION_ERRORS = ("mu_max_error", "mu_dyn_error")
 THEORY = tuple(name for name in names_of(SWEEP) if name.startswith("theory_"))
 NUMBERS = {*names_of(SWEEP), *CURVE_COLUMNS} - {"state"}
-MEND = "run the sweep again, which writes the table anew"
+MEND = "run the sweep again, which writes the table again"
 MEANS = "mean", "std", "sem"
-SAMPLES = "seed", "centre"  # last words of keys over whose values means are taken: samples of one surface
-FIRST = {"measures.csv": ("step", "time"), "steady.csv": ("velocity", "pressure")}  # columns that tables have
+SAMPLES = "seed", "centre"  # last words of keys that choose samples of one surface, over which means are taken
+FIRST = {"measures.csv": ("step", "time"), "steady.csv": ("velocity", "pressure")}  # first columns of tables
 DAMAGED = "damaged"
-FAILURE = ".failure"  # why a case has failed
+FAILURE = ".failure"  # file with the reason why a case failed
 
 
 def write_sweep_tables(directory: Path, cases: Sequence[Case]) -> None:
-    """Write all tables in the directory of a sweep, from what its cases have left in theirs; root only.
-
-    Several programs, each with a case, may do so at a time.
-    """
+    """Write all tables of a sweep from the results of its cases; root only. Several programs may do so at the same
+    time."""
     with _alone(directory):
         keys, seeded = list(cases[0].settings), any(key.split(".")[-1] in SAMPLES for key in cases[0].settings)
         rows, points = [_row(case) for case in cases], [row for case in cases for row in _points(case)]
         there = {section for case in cases for section in SECTIONS if _asks_for(case, section)}
         more = [name for section in SECTIONS if section in there for name in SECTIONS[section]]
         names = names_of(choose_columns(SWEEP, when=there))[1:]
-        if not any(case.job.history for case in cases):  # results of curves are in the table of their points
+        if not any(case.job.history for case in cases):  # curves have a table of points instead
             names = tuple(name for name in names if any(name in row for row in rows))
         save_cases(directory / TABLE, ["case", *keys, *names], rows)
         if points:
@@ -62,13 +60,12 @@ def write_sweep_tables(directory: Path, cases: Sequence[Case]) -> None:
 
 
 def _asks_for(case: Case, section: str) -> bool:
-    """Return whether a case has a section, or energies."""
+    """Return True if a case has a section, or `output.energy`."""
     return case.job.output.energy if section == "output.energy" else case.job.section(section) is not None
 
 
 def results(directory: Path) -> Path:
-    """Return the table with the results of a sweep: of its cases, or of the points of its friction curves where the
-    cases have none."""
+    """Return the path of the table of a sweep: of its cases, or of the points of its friction curves."""
     curves, table = directory / CURVES, directory / TABLE
     if not curves.is_file() or (
         table.is_file() and any(math.isfinite(row.get("residual", math.nan)) for row in read_cases(table))
@@ -78,16 +75,16 @@ def results(directory: Path) -> Path:
 
 
 def read_cases(path: Path) -> list[dict[str, Any]]:
-    """Read the rows of a table, numbers as such, an empty field as nan; raises InputError for what is no such table."""
+    """Read the rows of a table, empty cells as NaN; raises InputError for a damaged table."""
     try:
         text = path.read_text(encoding="utf-8")
         names, *lines = list(csv.reader(StringIO(text, newline=""))) or [[]]
         if names[:1] != ["case"] or "state" not in names or not text.endswith("\n"):
-            raise ValueError("it must name its columns, from case to state on, and end with a whole line")
+            raise ValueError("it must begin with the names of columns, case and state first, and end with a whole line")
         rows = [dict(zip(names, line, strict=True)) for line in lines]
         begun = [int(one.name) for one in path.parent.glob(f"{CASES}/*") if one.name.isdecimal()]
         if path.name == TABLE and max(begun, default=-1) > max((int(row["case"]) for row in rows), default=-1):
-            raise ValueError(f"it lacks rows: case {max(begun)} has been begun")
+            raise ValueError(f"it lacks rows: case {max(begun)} has begun")
         return [
             {name: float(cell or "nan") if name in NUMBERS else _number(cell) for name, cell in row.items()}
             for row in rows
@@ -97,7 +94,7 @@ def read_cases(path: Path) -> list[dict[str, Any]]:
 
 
 def sweep_errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
-    """Yield of each column of errors the largest one of each case that is done, by its number, as far as known."""
+    """Yield for each column of errors the largest error of each finished case, by its number."""
     rows = [row for case in cases for row in ([_row(case)] if case.job.history else _points(case))]
     for name in slide.ERRORS:
         found: dict[int, float] = {}
@@ -108,7 +105,7 @@ def sweep_errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
 
 
 def fail(case: Case, reason: str) -> None:
-    """Leave in the directory of a case why it has failed, or that it has not; root only."""
+    """Store the reason for the failure of a case in its directory, or remove it if `reason` is ''; root only."""
     path = case.job.output.directory / FAILURE
     with suppress(OSError):
         if reason:
@@ -119,7 +116,7 @@ def fail(case: Case, reason: str) -> None:
 
 
 def why_failed(directory: Path, number: int) -> str:
-    """Return the first sentence of why a case of a sweep has failed, '' if that is not known."""
+    """Return the first sentence of the reason for the failure of a case, '' if unknown."""
     with suppress(OSError):
         return (directory / CASES / f"{number:03d}" / FAILURE).read_text(encoding="utf-8").strip().split("; ")[0]
     return ""
@@ -129,7 +126,7 @@ def _row(case: Case) -> dict[str, Any]:
     head = {"case": case.number, **case.settings}
     try:
         return head | {"state": state(case)} | _results(case)
-    except InputError:  # a table without a column that is read here
+    except InputError:  # the table lacks a column
         return head | {"state": DAMAGED}
 
 
@@ -137,7 +134,7 @@ def _results(case: Case) -> dict[str, Any]:
     directory, row = case.job.output.directory, dict[str, Any]()
     for prefix, name in (("", "measures.csv"), ("theory_", "theory.csv")):
         columns = _columns(directory / name) or {"time": []}
-        if len(columns["time"]) < 2 and not prefix:  # nothing but the start
+        if len(columns["time"]) < 2 and not prefix:  # the initial state only
             continue
         if columns["time"]:
             found = slide.measure_slide(case.job.history, columns)
@@ -157,12 +154,12 @@ def _results(case: Case) -> dict[str, Any]:
 
 
 def _last(values: Sequence[float]) -> float:
-    """Return the last value that is known; NaN without one."""
+    """Return the last value that is not NaN, or NaN."""
     return next((value for value in reversed(values) if value == value), math.nan)
 
 
 def _pull_off(case: Case, columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Return the last pull-off of a case and its error [N], and its approach [m]; nothing where contact holds."""
+    """Return the last pull-off of a case and its error [N], and its approach [m]; {} if the contact holds."""
     lost = [each for each in pull_off.find(columns, bool(marker.detached(case.job.output.directory))) if each.lost]
     if not lost:
         return {}
@@ -172,18 +169,19 @@ def _pull_off(case: Case, columns: Mapping[str, Sequence[float]]) -> dict[str, f
 
 
 def _points(case: Case) -> Iterator[dict[str, Any]]:
-    """Yield the rows of a friction curve as far as it has come."""
+    """Yield the rows of the finished points of a friction curve."""
     if columns := _columns(case.job.output.directory / "steady.csv"):
         head = {"case": case.number, **case.settings, "state": state(case)}
         numbers = [name for name in CURVE_COLUMNS if name in columns and name not in PLACES]
         for k, place in enumerate(curve_points.of_table(columns)):
-            places = {name: float(f"{value:.9g}") for name, value in zip(PLACES, place, strict=True)}  # not of rounding
+            places = {
+                name: float(f"{value:.9g}") for name, value in zip(PLACES, place, strict=True)
+            }  # without rounding errors
             yield head | places | {name: columns[name][k] for name in numbers}
 
 
 def _columns(path: Path) -> dict[str, list[float]]:
-    """Return the columns of a table by name; none where there is no table, or a damaged one: it concerns its case
-    alone, which fails for it."""
+    """Return the columns of a table by name; none for a missing or damaged table, which the case itself reports."""
     with suppress(InputError):
         columns = tables.read_columns(path) if path.is_file() else {}
         return columns if {*columns} >= {*FIRST.get(path.name, ())} else {}
@@ -191,7 +189,7 @@ def _columns(path: Path) -> dict[str, list[float]]:
 
 
 def state(case: Case) -> str:
-    """Return how far a case has come: done | failed | begun | -, or that its table is damaged."""
+    """Return the state of a case: done | failed | begun | damaged | -."""
     directory = case.job.output.directory
     if case.job.history and read_back.find_lost_rows(directory):
         return DAMAGED
@@ -210,7 +208,7 @@ def state(case: Case) -> str:
 
 
 def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]]) -> bool:
-    """Return whether a friction curve lacks points that its job asks for."""
+    """Return True if a friction curve lacks requested points."""
     asked = (
         curve_points.asked(section.velocities, section.pressures or (), section.temperatures or ()) if section else ()
     )
@@ -220,9 +218,9 @@ def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]])
 def _means(
     rows: Sequence[dict[str, Any]], keys: Sequence[str], names: Sequence[str]
 ) -> tuple[list[str], list[dict[str, Any]]]:
-    """Return the columns and rows of the means of some results over the cases that differ by their sample only.
+    """Return columns and rows of means over cases that differ by their sample only,
 
-    With them are the standard deviation of a single case, the standard error of the mean, and the number of cases.
+    with the standard deviation of a single case, the standard error of the mean, and the number of cases.
     """
     kept = [key for key in keys if key.split(".")[-1] not in SAMPLES]
     groups: dict[str, list[dict[str, Any]]] = {}
@@ -253,7 +251,7 @@ def _number(text: str) -> Any:
 
 @contextmanager
 def _alone(directory: Path) -> Iterator[None]:
-    """Let one program write at a time, where the file system has locks: the last one sees what all others left."""
+    """Lock the directory, if the file system has locks, so that the last program sees the results of all."""
     directory.mkdir(parents=True, exist_ok=True)
     with (directory / ".sweep.lock").open("w") as file:
         with suppress(OSError):

@@ -1,4 +1,4 @@
-"""Persson's theory beside a run: highest and dynamic friction and the contact area of both, from their tables."""
+"""Comparison of a run with Persson's theory: highest and dynamic friction and contact area."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -14,7 +14,7 @@ RUN = "measures.csv"
 
 
 class Beside(NamedTuple):
-    """A result [-] of the theory, that of the run, None where there is no run, and its error, nan if not known."""
+    """A result [-] of the theory, the result of the run (None without a run), and its error (NaN if unknown)."""
 
     name: str
     theory: float
@@ -23,11 +23,11 @@ class Beside(NamedTuple):
 
 
 def compare_with_theory(directory: Path, history: Sequence[Stage], cell: float) -> list[Beside]:
-    """Return results of theory.csv and of measures.csv in a directory; nothing without the former;
-    `cell` is the spacing of the grid along x [m].
+    """Return results of theory.csv and of measures.csv in a directory, none without the former; `cell` is the spacing
+    of the grid along x [m].
 
-    They are mu_max, mu_dyn and the mean contact area of the slide (`slide.measure_slide`), the run's as corrected
-    for its edges; without a slide the contact area of the last instant. Raises InputError for damaged tables.
+    Results are mu_max, mu_dyn and the mean contact area of the slide (`slide.measure_slide`), for the run the corrected
+    area; without a slide the contact area of the last instant. Raises InputError for damaged tables.
     """
     predicted, found = (_results(directory / name, history, cell) for name in (theory_settings.TABLE, RUN))
     nothing = None, math.nan
@@ -35,7 +35,7 @@ def compare_with_theory(directory: Path, history: Sequence[Stage], cell: float) 
 
 
 def _results(path: Path, history: Sequence[Stage], cell: float) -> dict[str, tuple[float, float]]:
-    """Return results and their errors, by name."""
+    """Return results and their errors by name."""
     columns = read_back.read_results(path) if path.is_file() else {}
     if not columns.get("time"):
         return {}
@@ -51,7 +51,7 @@ def _results(path: Path, history: Sequence[Stage], cell: float) -> dict[str, tup
 
 
 def describe_theory(directory: Path, history: Sequence[Stage], cell: float) -> Iterator[str]:
-    """Yield a sentence, if there is a theory. Raises InputError for damaged tables."""
+    """Yield a sentence on the predictions, if there is a theory.csv. Raises InputError for damaged tables."""
     results = compare_with_theory(directory, history, cell)
     if results:
         pairs = (f"{one.name} {one.theory:.3g}{_run(one)}" for one in results)

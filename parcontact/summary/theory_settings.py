@@ -1,4 +1,4 @@
-"""theory.yaml: with which settings the predictions in theory.csv beside it were made."""
+"""theory.yaml: the settings of the predictions in theory.csv."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -10,12 +10,12 @@ from ..job.text import yamltext
 from ..storage import files
 
 TABLE, FILE = "theory.csv", "theory.yaml"
-HEAD = "# With which settings `parcontact theory` made theory.csv"
+HEAD = "# Settings of `parcontact theory` for theory.csv"
 TEXT = (
     f"{HEAD}.\n"
     """\
 gamma: {gamma!r}  # corrects friction in partial contact
-waves: {waves}  # continuum: those of the job's spectrum; lattice: those of the surface in its box
+waves: {waves}  # continuum: the job's spectrum; lattice: the waves of the surface in its box
 program: parcontact {version}
 """
 )
@@ -25,30 +25,30 @@ OF_WAVES = {"continuum": "the spectrum of the surface", "lattice": "the waves of
 
 
 class TheorySettings(NamedTuple):
-    """The factor that corrects friction in partial contact, and which waves: continuum or lattice."""
+    """The factor that corrects friction in partial contact, and the kind of waves: continuum or lattice."""
 
     gamma: float
     waves: str
 
     @property
     def sentence(self) -> str:
-        """The settings in words."""
+        """Return the settings as text."""
         return f"gamma {self.gamma:g}, for {OF_WAVES.get(self.waves, self.waves)}"
 
 
 def write_settings(directory: Path, settings: TheorySettings) -> None:
-    """Leave the settings beside the table; raises OSError."""
+    """Write the settings; raises OSError."""
     with files.replaced(directory / FILE, is_our_settings) as file:
         file.write(TEXT.format(**settings._asdict(), version=__version__).encode())
 
 
 def is_our_settings(path: Path) -> bool:
-    """Return whether this program wrote a file of settings; raises OSError."""
+    """Return True if this program wrote a file of settings; raises OSError."""
     return path.read_bytes().startswith(HEAD.encode())
 
 
 def is_own_table(path: Path) -> bool:
-    """Return whether a table, with settings beside it, is one of theory; raises OSError."""
+    """Return True if a table has settings in its directory, and is therefore one of theory; raises OSError."""
     return path.with_name(FILE).is_file() and path.read_bytes().startswith(b"time,distance,pressure,")
 
 

@@ -106,8 +106,8 @@ def test_the_report_shows_bands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert main(["steady", "job.yaml", "--velocities", "0.1", "--temperatures", "20", "--quiet"]) == 0
     assert main(["report", "out/job"]) == 0
     page = re.sub("<[^>]+>", " ", Path("out/job/report.html").read_text())
-    assert "cannot be made anew" not in page
-    assert "the band that makes most of the friction" in page
+    assert "cannot be computed again" not in page
+    assert "the band with most of the friction" in page
     assert "with all longer waves" in page
     mapped = jobs.load(job_of([road_map(tmp_path / "road.npy", 128, 4 * LONG), table]))
     section = road_section.road_section(mapped)

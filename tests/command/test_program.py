@@ -69,17 +69,20 @@ BAD: list[tuple[Sequence[str], str]] = [
     (["job.yaml", "--wall", "soon"], "must be a wall time HH:MM:SS, got 'soon'"),
     (["job.yaml", "--sett", "grid.points=8"], "unrecognized arguments"),
     (["info", "absent.h5"], "absent.h5 does not exist"),
-    (["info", "job.yaml"], "job.yaml is neither a checkpoint nor a file of fields: it is no HDF5 file"),
-    (["plot", "job.yaml"], "it has no measures.csv and no steady.csv; give the output directory of a run, as out/job"),
+    (["info", "job.yaml"], "job.yaml is neither a checkpoint nor a field file: it is no HDF5 file"),
+    (
+        ["plot", "job.yaml"],
+        "it has neither measures.csv nor steady.csv; give the output directory of a run, such as out/job",
+    ),
     ([], "parcontact: a job is needed"),
     (["plt", "out/job"], "'plt' is neither a verb nor a job file; did you mean plot?"),
     (["hlep"], "did you mean help?"),
-    (["steady", "job.yaml", "--velocities", "0:10:5"], "so it must begin and end above 0, got '0:10:5'"),
+    (["steady", "job.yaml", "--velocities", "0:10:5"], "first and last must be above 0, got '0:10:5'"),
     (["steady", "job.yaml", "--velocities", "1:10:1"], "must have a count of 2 or more, got '1:10:1'"),
     (["steady", "job.yaml", "--velocities", "1:10"], "must be first:last:count or a list of numbers, got '1:10'"),
     (["--out", "", "job.yaml"], "must name a directory, got ''"),
     (["heights.yaml"], "heights.npy has shape (3, 4), but the grid has (ny, nx) = (12, 16)"),
-    (["curve.yaml", "--until", "1"], "--until: a friction curve has no time to go on to; leave it out"),
+    (["curve.yaml", "--until", "1"], "--until: a friction curve has no time; leave it out"),
     (["one_solve.yaml", "--until", "1"], "--until 1 is beyond the end of the history, t = 0 s"),
 ]
 
@@ -110,7 +113,7 @@ def test_ranks_that_are_alone(run_parcontact: RunParcontact, outside_mpi: dict[s
     outside_mpi["PMI_SIZE"] = "2"
     alone = run_parcontact(["job.yaml"], ranks=0)
     assert alone.returncode == 2
-    assert "2 ranks were started but each finds itself alone" in alone.stderr
+    assert "2 ranks were started but each is alone" in alone.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["job.yaml"]
 
 
@@ -120,9 +123,9 @@ def test_until(main: Main, tmp_path: Path) -> None:
     out = tmp_path / "out" / "job"
     code, said, _ = main(path, "--until", "6e-4")
     assert code == 0
-    assert "stopped at t = 0.00075 s as asked for" in said
+    assert "stopped at t = 0.00075 s as requested" in said
     assert measures(out)[-1]["time"] == "0.00075"
-    assert "is at t = 0.00075 s already, and --until 0.0006 is not later" in main(path, "--until", "6e-4")[1]
+    assert "has already reached t = 0.00075 s, and --until 0.0006 is not later" in main(path, "--until", "6e-4")[1]
     assert main(path, "--quiet") == (0, "", "")
     assert len(measures(out)) == STEPS + 1
     assert main(path, "--quiet", "--until", "0.005")[0] == 0

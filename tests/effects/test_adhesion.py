@@ -40,7 +40,7 @@ def job(**changes: Any) -> Job:
         ({"adhesion": {"work": 0.05, "range": 1e-7}, "material": RUBBER}, "adhesion.range must be at least 1.98e-07 m"),
         ({"adhesion": {"work": 0.05}, "material": {**RUBBER, "modulus_inf": 0.0}}, "without long-term modulus"),
         ({"material": {"model": "elastic", "shear_modulus": 1e6, "hardness": 1e9}}, "does not go with adhesion"),
-        ({"steady": {"velocities": [1.0], "pressures": [1e3]}}, "steady does not go with adhesion"),
+        ({"steady": {"velocities": [1.0], "pressures": [1e3]}}, "steady cannot be used with adhesion"),
         ({"adhesion": None, "history": [{"pressure": -1e3}]}, "must be a pressure [Pa] of zero or more"),
     ],
 )
@@ -72,8 +72,8 @@ def test_the_range_that_the_mesh_resolves() -> None:
 @pytest.mark.parametrize(
     ("reach", "key", "values", "stated"),
     [
-        ("auto", "grid.points", [32, 64], "from 3.953e-07 to 5.59e-07 m"),
-        ("auto", "adhesion.work", [0.05, 0.0125], "from 1.976e-07 to 3.953e-07 m"),
+        ("auto", "grid.points", [32, 64], "gives 3.953e-07 to 5.59e-07 m"),
+        ("auto", "adhesion.work", [0.05, 0.0125], "gives 1.976e-07 to 3.953e-07 m"),
         ("auto", "surface.radius", [1e-3, 2e-3], ""),
         (4e-7, "adhesion.work", [0.05, 0.0125], ""),
     ],
@@ -106,9 +106,9 @@ def test_a_mesh_that_is_too_coarse(reach: float, warned: bool) -> None:
     ("work", "reach", "size", "sentence"),
     [
         (1.0, 4e-6, 4e-3, ""),
-        (1.01, 4e-6, 4e-3, "1 J/m^2 at most"),
+        (1.01, 4e-6, 4e-3, "at most 1 J/m^2"),
         (0.79, 4e-7, 1e-3, ""),
-        (0.81, 4e-7, 1e-3, "some work/(E* range) = 0.51"),
+        (0.81, 4e-7, 1e-3, "about work/(E* range) = 0.51"),
         (0.05, 7.9e-5, 4e-4, ""),
         (0.05, 8.1e-5, 4e-4, "more than 0.2 of the box"),
     ],
@@ -178,7 +178,7 @@ def test_limits(changes: dict[str, Any], without: dict[str, Any], sentence: str)
 def test_no_range_is_short_enough_for_a_sphere_at_the_edge_of_its_box() -> None:
     sphere = {"shape": "sphere", "radius": R, "center": [0.0, 2e-4]}
     (text,) = (text for text in ball(surface=sphere).warnings if "of its attraction" in text)
-    assert text.endswith("passes: use 6.79e-05 m of room around the sphere")  # sqrt(2 ln(100) R 5e-7)
+    assert text.endswith("use 6.79e-05 m of room around the sphere")  # sqrt(2 ln(100) R 5e-7)
 
 
 def test_a_range_above_the_roughness() -> None:

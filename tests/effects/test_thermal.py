@@ -287,7 +287,7 @@ KEYS = "thermal: {conductivity: 0.2, diffusivity: 1.0e-7"
             f"{KEYS}, counterbody: {{conductivity: 2, diffusivity: 1.0e-6}}}}\nhistory: [{{pressure: 1.0e5}}]",
             "is for friction",
         ),
-        ("output: {fields: [temperature]}", "output.fields has temperature, which needs a thermal section"),
+        ("output: {fields: [temperature]}", "output.fields includes temperature, which needs a thermal section"),
     ],
 )
 def test_mistakes(tmp_path: Any, lines: str, sentence: str) -> None:

@@ -74,7 +74,7 @@ def test_the_rest_works_without_it(main: Main, changed: Callable[[str, str], Non
     assert code == 0
     assert "interface" in json.loads(shown)["properties"]
     assert "wear" not in json.loads(shown)["properties"]
-    assert re.fullmatch(r"warning: wear .*cannot be used: SyntaxError.*; the schema is without it\n", said)
+    assert re.fullmatch(r"warning: wear .*cannot be used: SyntaxError.*; the schema does not include it\n", said)
 
 
 def test_a_section_without_a_schema(main: Main, changed: Callable[[str, str], None]) -> None:
@@ -85,7 +85,7 @@ def test_a_section_without_a_schema(main: Main, changed: Callable[[str, str], No
     assert code == 0
     assert json.loads(printed)["properties"].keys() & {"wear", "interface"} == {"interface"}
     assert said.startswith("warning: the effect wear (tread_wear:Wear) has no JSON schema: PydanticInvalidFor")
-    assert said.endswith("; the schema is without it\n")
+    assert said.endswith("; the schema does not include it\n")
     assert said.count("\n") == 1
 
 
@@ -123,7 +123,7 @@ def test_steady_sliding_has_no_law_of_an_effect(main: Main, changed: Callable[[s
     changed("    def follow(", "    def law(self):\n        return None\n\n    def follow(")
     code, _, said = main("check", "job.yaml", "--set", "steady={velocities: [0.1], pressures: [1e5]}")
     assert code == BAD_INPUT
-    assert "steady does not go with wear: slide into the steady state" in said
+    assert "steady cannot be used with wear: slide into the steady state" in said
     assert main("check", "job.yaml")[0] == 0
 
 

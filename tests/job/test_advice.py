@@ -20,7 +20,7 @@ def test_warning_of_few_long_waves_and_few_cells(tmp_path: Path) -> None:
     assert "needs 8: use 128 points (4 times the memory) or a short_wavelength of 0.000125 m" in short
     stage = "{pressure: 1e5, velocity: 1.0, distance: 1e-4, cells_per_step: 1}"
     _, short, *_ = job_of(tmp_path, replaced(SMALL, surface=ROUGH).replace("{pressure: 1e5}", stage)).warnings
-    assert "128 points (2.9 times the memory, some 5.7 times the time in sliding)" in short
+    assert "128 points (2.9 times the memory, about 5.7 times the time in sliding)" in short
 
 
 def test_where_nothing_slides_friction_asks_for_no_cells(tmp_path: Path) -> None:
@@ -51,7 +51,7 @@ def test_warning_of_backward_euler_with_long_steps(tmp_path: Path) -> None:
     history = "[{pressure: 1, duration: 1, time_step: {first: 1e-5, growth: 1.25}}]"
     text = replaced(SMALL.split("history")[0], material=zener, history=history)
     (warning,) = job_of(tmp_path, text, "numerics.integrator=backward-euler").warnings
-    assert "time steps up to 0.2 s are longer than the shortest relaxation time 0.001 s" in warning
+    assert "time steps of up to 0.2 s exceed the shortest relaxation time, 0.001 s" in warning
     assert job_of(tmp_path, text).warnings == ()
     assert job_of(tmp_path, text, "numerics.integrator=backward-euler", "history.0.time_step=1e-3").warnings == ()
 
@@ -62,12 +62,12 @@ def test_warning_of_steps_that_skip_waves(tmp_path: Path) -> None:
     assert job_of(tmp_path, text, *fine).warnings == ()
     (warning,) = job_of(tmp_path, text, *fine, "history.0.cells_per_step=4").warnings
     assert "0.5 of its shortest wave" in warning
-    assert "cells_per_step up to 2)" in warning
+    assert "cells_per_step of at most 2)" in warning
 
 
 def test_warning_of_velocity_without_duration(tmp_path: Path) -> None:
     (warning,) = job_of(tmp_path, SMALL, "history.0.velocity=3").warnings
-    assert warning == "history.0: nothing slides in a stage without duration or distance; its velocity has no effect"
+    assert warning == "history.0: a stage without duration or distance does not slide; its velocity has no effect"
 
 
 def test_waves_of_a_free_box_are_refused(tmp_path: Path) -> None:

@@ -174,8 +174,8 @@ def test_heights_with_coordinates() -> None:
     for each in (named, fallen, named.transpose("x", "y")):
         assert np.array_equal(pc.surface(each, grid), pc.surface(heights, grid))
     wrong = {
-        "surface has points 0.001 m apart along x, but the grid has 0.002 m": (named, [8e-3, 6e-3]),
-        "surface has points 2 m apart along y": (named.assign_coords(y=1e3 * y), [4e-3, 6e-3]),
+        "surface has a spacing of 0.001 m along x, but cells of the grid are 0.002 m": (named, [8e-3, 6e-3]),
+        "surface has a spacing of 2 m along y": (named.assign_coords(y=1e3 * y), [4e-3, 6e-3]),
         "got coordinates x that are not equally spaced": (named.assign_coords(x=[0.0, 1e-3, 3e-3, 4e-3]), [4e-3, 6e-3]),
     }
     for words, (given, size) in wrong.items():
@@ -243,7 +243,7 @@ MISTAKES = [
     (np.where(HEIGHTS > 0, HEIGHTS, np.nan), "got 96 of 192 that are not finite"),
     (np.ma.masked_less(HEIGHTS, 0), "got 96 of 192 that are not finite"),
     (1e-300 * HEIGHTS, "e-3"),  # 1e-305 m, say
-    (1e200 * HEIGHTS, "nothing can be computed"),
+    (1e200 * HEIGHTS, "outside of 1e-60 to 1e+60 m"),
     (HEIGHTS.tolist(), "a job file names a file instead"),
 ]
 

@@ -180,7 +180,7 @@ def test_a_resolved_job_reads_back_with_any_title(tmp_path: Path, title: str) ->
 def test_a_resolved_job_that_is_none(tmp_path: Path) -> None:
     path = tmp_path / "job.resolved.yaml"
     path.write_text("[1, 2")
-    with pytest.raises(InputError, match=r"job\.resolved\.yaml is cut off: it lacks its section checkpoint"):
+    with pytest.raises(InputError, match=r"job\.resolved\.yaml is incomplete: it lacks the section checkpoint"):
         shown_job(path)
 
 
@@ -190,7 +190,7 @@ def test_a_resolved_job_that_is_none(tmp_path: Path) -> None:
 @pytest.mark.parametrize("section", added_sections.own_sections())
 def test_an_empty_section_of_an_effect_is_an_absent_one(tmp_path: Path, section: str) -> None:
     assert job_of(tmp_path, SMALL + f"{section}:\n") == job_of(tmp_path, SMALL)
-    with pytest.raises(InputError, match=f"zzzzzz is not a known key; there are .*\\b{section}\\b"):
+    with pytest.raises(InputError, match=f"zzzzzz is not a known key; known keys: .*\\b{section}\\b"):
         job_of(tmp_path, SMALL + "zzzzzz: 1\n")
 
 
@@ -242,7 +242,9 @@ def test_energies_count_from_a_body_at_rest(tmp_path: Path) -> None:
 def test_a_rough_surface_needs_a_wave(tmp_path: Path) -> None:
     """On a box of 1 mm there is none from 0.44 to 0.4 mm: (2, 1) has 0.447 mm, (2, 2) 0.354 mm."""
     (mistake,) = mistakes_of(tmp_path, replaced(SMALL, surface=ROUGH % ("4.4e-4", "4.0e-4")))
-    assert mistake.startswith("job.yaml:1:54: surface.long_wavelength leaves no wave down to short_wavelength")
+    assert mistake.startswith(
+        "job.yaml:1:54: surface.long_wavelength must leave a wave of the grid down to short_wavelength"
+    )
     assert job_of(tmp_path, replaced(SMALL, surface=ROUGH % ("4.5e-4", "4.0e-4"))).surface
 
 
@@ -272,7 +274,7 @@ def test_fractions_that_add_up_to_1_are_a_liquid() -> None:
         ({"branches": FRACTIONS}, "material.modulus_0 is missing"),
         (
             {"modulus_0": 1e6, "modulus_inf": 1e5, "branches": FRACTIONS},
-            "material.modulus_inf does not go with modulus_0",
+            "material.modulus_inf cannot be given with modulus_0",
         ),
         ({"modulus_0": 1e6, "branches": [*FRACTIONS, {"g": 0.26, "tau": 1.0}]}, "fractions g that add up to 1.01"),
         (

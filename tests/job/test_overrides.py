@@ -41,7 +41,7 @@ def _work_in_tmp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("a: 1\nb: [1,\n  2\n", ("job.yaml:4:1: cannot be read as YAML: expected ',' or ']', but got '<stream end>' "
          "(while parsing a flow sequence in line 2)")),
         ("a: b: c\n", "job.yaml:1:5: cannot be read as YAML: mapping values are not allowed here; "
-            "keys of one mapping begin in the same column, and a text that holds a colon needs quotes"),
+            "keys of one mapping must begin in the same column, and a text with a colon needs quotes"),
         ("a: 1\n\tb: 2\n", "job.yaml:2:1: cannot be read as YAML: found character '\\t' that "
          "cannot start any token; indent by blanks, not by tabs"),
         ("a: *b\n", "job.yaml:1:4: cannot be read as YAML: found undefined alias 'b'"),
@@ -58,7 +58,7 @@ def test_text_that_cannot_be_read(text: str | bytes, mistake: str) -> None:
     ("line", "mistake"),
     [
         ("title: x\ntitle: y", "7:1: title is given twice, first in line 6"),
-        ("title: &x [*x]", "1:1: cannot be read as YAML: it is nested too deeply, or an alias holds itself"),
+        ("title: &x [*x]", "1:1: cannot be read as YAML: it is nested too deeply, or an alias contains itself"),
         ("title: !!timestamp 2001-01-01", "6:8: !!timestamp does not belong in a job"),
         ("title: !!python/object:os.system {}", "6:8: !!python/object:os.system does not belong in a job"),
         ("1: x", "6:1: a key must be a word, got '1'"),
@@ -66,7 +66,7 @@ def test_text_that_cannot_be_read(text: str | bytes, mistake: str) -> None:
         ("body: {thickness: 1,02}", "6:21: a key must be a word, got '02'; write decimals with a point"),
         ("body: {thickness: 1 mm}", "6:19: body.thickness must be a positive thickness [m], got '1 mm'; write 1.0e-3"),
         ("? [a]\n: x", "6:3: a key must be a word, got a list or a mapping"),
-        ("<<: 3", "6:5: << takes a mapping, or a list of mappings"),
+        ("<<: 3", "6:5: << must be a mapping, or a list of mappings"),
     ],
 )
 def test_what_yaml_allows_and_a_job_does_not(line: str, mistake: str) -> None:
@@ -113,7 +113,7 @@ def test_overrides_of_what_is_auto() -> None:
     )
     bands = job_of("\n".join(lines) + "\n", "bands.cutoff_slope=1.3", "bands.samples=3").bands
     assert bands == Bands(cutoff_slope=1.3, samples=3)
-    with pytest.raises(InputError, match=r"grid\.points is 'auto' and no mapping of keys, so it has no 0"):
+    with pytest.raises(InputError, match=r"grid\.points is 'auto', not a mapping of keys, and has no 0"):
         job_of(SMALL.replace("points: 64", "points: auto"), "grid.points.0=64")
 
 
@@ -129,11 +129,11 @@ def test_overrides_of_what_is_auto() -> None:
         ("grid..points=512", "must have the form key.path=value, like grid.points=512"),
         ("grid.points=[1", ("cannot be read as YAML: expected ',' or ']', but got '<stream end>' "
          "(while parsing a flow sequence in line 1)")),
-        ("grid.points.0=1", "grid.points is 64 and no mapping of keys, so it has no 0; give grid.points as a whole"),
+        ("grid.points.0=1", "grid.points is 64, not a mapping of keys, and has no 0; give grid.points as a whole"),
         ("history.1.pressure=1", "history is a list with one entry, history.0, and has no 1"),
         ("history.last.pressure=1", ("history is a list with one entry, history.0, and has no last; "
          "did you mean history.0.last?")),
-        ("history.0.pressure.to=-1", ("history.0.pressure is 100000.0 and no mapping of keys, so it has no to; "
+        ("history.0.pressure.to=-1", ("history.0.pressure is 100000.0, not a mapping of keys, and has no to; "
          "give history.0.pressure as a whole")),
         ("history.0.pressure=-1", ("history.0.pressure must be a pressure [Pa] of zero or more, got -1; pulling needs "
          "adhesion")),
@@ -228,7 +228,7 @@ def test_a_mistake_in_an_included_file_that_says_material_is_found_there() -> No
         ("[1, 2]", "m.yaml:1:1: must be one mapping with the keys of a material"),
         ("", "m.yaml:1:1: must be one mapping with the keys of a material"),
         ("{include: n, model: elastic, shear_modulus: 1}", ("m.yaml:1:2: material.include is not a key of model "
-         "elastic; there are model, poisson, shear_modulus, hardness")),
+         "elastic; known keys: model, poisson, shear_modulus, hardness")),
         ("{shear_modulus: 1}", "m.yaml:1:1: material.model is missing; it must be elastic | zener | dma"),
     ],
 )  # fmt: skip
@@ -240,7 +240,7 @@ def test_included_files_that_are_no_material(content: str, mistake: str) -> None
 def test_an_include_that_is_not_there() -> None:
     must = "material.include must name a material file"
     assert mistakes_of(with_material("{include: rubbr}")) == [
-        f"job.yaml:3:21: {must}, got 'rubbr' (looked for rubbr.yaml and materials/rubbr.yaml beside the "
+        f"job.yaml:3:21: {must}, got 'rubbr' (looked for rubbr.yaml and materials/rubbr.yaml in the directory of the "
         "job file, and among the program's own: synthetic_tyre)"
     ]
     assert mistakes_of(with_material("{include: no/m.yaml, poisson: 9}")) == [
@@ -324,14 +324,15 @@ def test_one_case(path: Path) -> None:
         ("  - {}", "job.yaml:7:5: sweep must be a list of mappings from keys to lists of values, got a mapping"),
         (
             "  - {grid.points: [8, 16], grid.size: [1]}",
-            "job.yaml:7:5: keys of one mapping move together and need as many values each, got 2 of grid.points, 1 of "
+            "job.yaml:7:5: keys of one mapping change together and need equal numbers of values, "
+            "got 2 of grid.points, 1 of "
             "grid.size",
         ),
         (
             "  - {grid: [{points: 8, size: 1}], grid.points: [16]}",
             "job.yaml:7:36: grid.points is swept a second time, first as grid at job.yaml:7:6",
         ),
-        ("  - {grid.points: 1:2000:1001}", "job.yaml:7:3: sweep has 1001 cases, and 1000 is the most"),
+        ("  - {grid.points: 1:2000:1001}", "job.yaml:7:3: sweep has 1001 cases; at most 1000 are allowed"),
     ],
 )
 def test_mistakes(path: Path, line: str, mistake: str) -> None:

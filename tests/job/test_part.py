@@ -40,12 +40,12 @@ GRID = {
         "1:39: grid.boundary must be periodic | free | [periodic, free], got 'open'"
     ),
     "grid: {pionts: 1, points: 64, size: 1}": "1:8: grid.pionts is not a known key; did you mean points?",
-    "grid: {points: 64, size: 1, zz: 1}": "1:29: grid.zz is not a known key; there are points, size, boundary",
+    "grid: {points: 64, size: 1, zz: 1}": "1:29: grid.zz is not a known key; known keys: points, size, boundary",
 }
 
 SURFACES = {
     "surface: wave": "2:10: surface must be one shape, or a list of shapes, got 'wave'",
-    "surface: []": "2:10: surface needs at least one shape; shape: flat is one",
+    "surface: []": "2:10: surface needs at least one shape, such as shape: flat",
     "surface: [3]": (
         "2:11: surface.0 must be a mapping with shape: rough | sphere | cylinder | wave | file | array | topography | "
         "flat, got 3"
@@ -59,7 +59,7 @@ SURFACES = {
     ),
     "surface: {shape: sphere}": "2:10: surface.radius is missing; it must be a positive length [m]",
     "surface: {shape: sphere, radius: 1, axis: y}": (
-        "2:37: surface.axis is not a key of shape sphere; there are shape, radius, profile, center"
+        "2:37: surface.axis is not a key of shape sphere; known keys: shape, radius, profile, center"
     ),
     "load: 1.0": "5:1: load is not a known key; give it to the stages of history",
     "material: {model: elastic, E: 3.0e6}": (
@@ -97,7 +97,7 @@ MATERIALS = {
     "material: {model: Prony}": "3:19: material.model must be elastic | zener | dma, got 'Prony'; did you mean zener?",
     "material: {model: elastic}": ("3:11: material.shear_modulus is missing; it must be a positive shear modulus [Pa]"),
     "material: {model: elastic, shear_modulus: 1, branches: []}": (
-        "3:46: material.branches is not a key of model elastic; there are model, poisson, shear_modulus, hardness"
+        "3:46: material.branches is not a key of model elastic; known keys: model, poisson, shear_modulus, hardness"
     ),
     "material: {model: elastic, shear_modulus: 1, poisson: -1}": (
         "3:55: material.poisson must be a Poisson ratio [-] above -1 and up to 0.5, got -1"
@@ -106,10 +106,10 @@ MATERIALS = {
         "3:39: material.modulus_inf must be a shear modulus [Pa] of zero or more, got -1"
     ),
     "material: {model: zener}": (
-        "3:11: material has no stiffness at all: modulus_inf and all branches are zero; give one of them a modulus [Pa]"
+        "3:11: material has no stiffness: modulus_inf and all branches are zero; give one of them a modulus [Pa]"
     ),
     "material: {model: zener, branches: [{G0: 1, G1: 0, eta1: 0}, {modulus: 0, relaxation_time: 1}]}": (
-        "3:11: material has no stiffness at all: modulus_inf and all branches are zero; give one of them a modulus [Pa]"
+        "3:11: material has no stiffness: modulus_inf and all branches are zero; give one of them a modulus [Pa]"
     ),
     "material: {model: zener, branches: 5}": "3:36: material.branches must be a list of branches, got 5",
     "material: {model: zener, branches: [{g0: 5}]}": (
@@ -143,7 +143,7 @@ HISTORIES = {
     ),
     "history: [{approach: deep}]": "4:22: history.0.approach must be a finite approach [m], got 'deep'",
     "history: [{pressure: 0}, {force: 0}]": (
-        "4:22: history.0.pressure must not be zero in every stage: nothing would ever touch"
+        "4:22: history.0.pressure must not be zero in every stage: there would be no contact"
     ),
     "history: [{pressure: {from: 1}, duration: 1, time_step: 1}]": (
         "4:22: history.0.pressure.to is missing; it must be a pressure [Pa] of zero or more"
@@ -152,28 +152,26 @@ HISTORIES = {
         "4:36: history.0.pressure.to must be a pressure [Pa] of zero or more, got -2; pulling needs adhesion"
     ),
     "history: [{pressure: {from: 1, to: 2, at: 3}, duration: 1, time_step: 1}]": (
-        "4:39: history.0.pressure.at is not a known key; there are from, to"
+        "4:39: history.0.pressure.at is not a known key; known keys: from, to"
     ),
     "history: [{pressure: {from: 1, to: 2}}]": (
-        "4:22: history.0.pressure changes from one value to another, which needs a duration [s] or a distance [m]"
+        "4:22: history.0.pressure is a ramp, which needs a duration [s] or a distance [m]"
     ),
     "history: [{approach: {from: 0, to: 1e-6}}]": (
-        "4:22: history.0.approach changes from one value to another, which needs a duration [s] or a distance [m], or "
+        "4:22: history.0.approach is a ramp, which needs a duration [s] or a distance [m], or "
         "a velocity [m/s] in its braces"
     ),
     "history: [{approach: {from: 0, to: 1e-6, velocity: 2e-6}, duration: 1}]": (
-        "4:52: history.0.approach.velocity and a duration are both given: the duration follows from it (0.5 s); leave "
-        "it out, or the duration of the stage"
+        "4:52: history.0.approach.velocity already gives the duration, 0.5 s; leave out the velocity or duration"
     ),
     "history: [{approach: {from: 0, to: 1e-6, velocity: 2e-6}, velocity: 1, distance: 1}]": (
-        "4:52: history.0.approach.velocity and a distance are both given: the duration follows from it (0.5 s); leave "
-        "it out, or the distance of the stage"
+        "4:52: history.0.approach.velocity already gives the duration, 0.5 s; leave out the velocity or distance"
     ),
     "history: [{approach: {from: 1e-6, to: 1e-6, velocity: 1}}]": (
-        "4:55: history.0.approach.velocity needs two ends that differ: an approach that does not change has no velocity"
+        "4:55: history.0.approach.velocity needs different ends: a constant approach has no velocity"
     ),
     "history: [{pressure: {from: 0, to: 1, velocity: 1}, duration: 1}]": (
-        "4:39: history.0.pressure.velocity is not a known key; there are from, to"
+        "4:39: history.0.pressure.velocity is not a known key; known keys: from, to"
     ),
     "history: [{pressure: 1, velocity: 1, duration: 1, time_step: auto, cells_per_step: 1}]": (
         "4:11: history.0 takes at most one of time_step | cells_per_step, got time_step and cells_per_step"
@@ -204,7 +202,7 @@ HISTORIES = {
 OTHERS = {
     "initial: {state: steady}": "5:10: initial needs a pressure [Pa] for the steady state to start from",
     "initial: {velocity: 1}": (
-        "5:10: initial.state must be steady when velocity or pressure is given: a virgin body has felt nothing"
+        "5:10: initial.state must be steady if velocity or pressure is given: a virgin body has no history"
     ),
     "initial: {state: stedy, pressure: 1}": (
         "5:18: initial.state must be virgin | steady, got 'stedy'; did you mean steady?"
@@ -224,15 +222,15 @@ OTHERS = {
         "5:24: output.fields.1 must be pressure | displacement | gap | height | temperature | traction, got 'presure'; "
         "did you mean pressure?"
     ),
-    "output: {fields: [gap, gap]}": "5:24: output.fields.1 names gap a second time",
+    "output: {fields: [gap, gap]}": "5:24: output.fields.1 repeats gap",
     "output: {every: 0}": "5:17: output.every must be a positive whole number of steps, got 0",
     "output: {directory: 3}": "5:21: output.directory must be the path of a directory (text), got 3",
     "numerics: {slope: spectral}": (
-        "5:12: numerics.slope is not a known key; it went; slopes of the surface are those of its waves"
+        "5:12: numerics.slope is not a known key; it was removed; slopes are those of the waves of the surface"
     ),
     "output: {mesh_check: true}": (
-        "5:10: output.mesh_check is not a known key; it went; `parcontact study` measures the error of the mesh, with "
-        "a ladder study.mesh"
+        "5:10: output.mesh_check is not a known key; it was removed; `parcontact study` measures the error of the "
+        "mesh, with a list study.mesh"
     ),
     "output: {branch_dissipation: true}": "5:30: output.branch_dissipation needs energy: true",
     "checkpoint: {every: 1, minutes: 1}": (

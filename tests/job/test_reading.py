@@ -62,7 +62,7 @@ def test_every_mistake_in_order(tmp_path: Path) -> None:
         "did you mean periodic?",
         "job.yaml:7:47: surface.0.waves.1 must be two whole numbers of waves in the box, along x and along y, got 0.5",
         "job.yaml:8:29: surface.1.radius must be a positive length [m], got 0",
-        "job.yaml:8:32: surface.1.hurst is not a key of shape sphere; there are shape, radius, profile, center",
+        "job.yaml:8:32: surface.1.hurst is not a key of shape sphere; known keys: shape, radius, profile, center",
         f"job.yaml:9:25: surface.2.path must be an existing file, got 'road.npy' (looked for {tmp_path / 'road.npy'})",
         "job.yaml:12:12: material.poisson must be a Poisson ratio [-] above -1 and up to 0.5, got 0.6",
         "job.yaml:14:24: material.branches.0.G1 must be a shear modulus [Pa] of zero or more, got -1",

@@ -75,7 +75,7 @@ BOMBS = [by_sequence(), by_map(), by_merge()]
 @pytest.mark.parametrize("bomb", BOMBS, ids=["sequence", "map", "merge"])
 def test_aliases_that_multiply(tmp_path: Path, bomb: str) -> None:
     """In a job, and in a material that it includes."""
-    sentence = "1:1: has more than 100000 values once its aliases are followed, which no job has"
+    sentence = "1:1: has more than 100000 values after expansion of its aliases, the limit for a job"
     assert mistakes_of(tmp_path, f"{SMALL}{bomb}\n") == [f"job.yaml:{sentence}"]
     (tmp_path / "m.yaml").write_text(bomb)
     (mistake,) = mistakes_of(tmp_path, with_material("{include: m.yaml}"))
@@ -96,14 +96,14 @@ def test_only_regular_files_of_bounded_size_are_read(tmp_path: Path) -> None:
     with (tmp_path / "sparse.yaml").open("wb") as file:
         file.truncate(10_000_000_000)
     for path, reason in (
-        (tmp_path / "pipe.yaml", "it is no regular file"),
-        (Path("/dev/zero"), "it is no regular file"),
-        (tmp_path / "sparse.yaml", "it is larger than 2 MB, which no job is"),
+        (tmp_path / "pipe.yaml", "it is not a regular file"),
+        (Path("/dev/zero"), "it is not a regular file"),
+        (tmp_path / "sparse.yaml", "it is larger than 2 MB, the limit for a job"),
     ):
         with pytest.raises(JobError, match=f"cannot be read: {reason}"):
             load(path)
     (mistake,) = mistakes_of(tmp_path, with_material("{include: sparse.yaml}"))
-    assert mistake.endswith("sparse.yaml: cannot be read: it is larger than 2 MB, which no job is")
+    assert mistake.endswith("sparse.yaml: cannot be read: it is larger than 2 MB, the limit for a job")
     (mistake,) = mistakes_of(tmp_path, with_material("{include: pipe.yaml}"))
     assert "material.include must name a material file" in mistake
     os.mkfifo(tmp_path / "road.npy")
@@ -149,7 +149,10 @@ def test_an_include_is_searched_beside_the_job_only(tmp_path: Path) -> None:
     (tmp_path / "materials" / "m.yaml").write_text("{model: elastic, shear_modulus: 2e6}")
     text = with_material("{include: m}")
     (mistake,) = mistakes_of(tmp_path / "deep", text)
-    assert "must name a material file, got 'm' (looked for m.yaml and materials/m.yaml beside the job file" in mistake
+    assert (
+        "must name a material file, got 'm' (looked for m.yaml and materials/m.yaml in the directory of the job file"
+        in mistake
+    )
     alongside = tmp_path / "deep" / "materials" / "m.yaml"
     alongside.write_bytes(b"abc: 1\n")
     included = read_job(tmp_path / "deep" / "job.yaml", ()).included
@@ -162,11 +165,11 @@ def test_an_include_is_searched_beside_the_job_only(tmp_path: Path) -> None:
 def test_a_sweep_of_more_cases_than_a_length_can_be(tmp_path: Path) -> None:
     axes = ", ".join(f"{{history.0.a{i}: {list(range(100))}}}" for i in range(12))
     (mistake,) = mistakes_of(tmp_path, f"{SMALL}sweep: [{axes}]\n")
-    assert mistake == "job.yaml:6:8: sweep has 1000000000000000000000000 cases, and 1000 is the most"
+    assert mistake == "job.yaml:6:8: sweep has 1000000000000000000000000 cases; at most 1000 are allowed"
 
 
 def test_a_key_that_is_indented_more_than_the_one_before() -> None:
     """The column is what is wrong; the brace that is open comes later."""
     said = "".join(map(str, yamltext.parse("title: x\n grid: {points", "job.yaml").mistakes))
     assert "job.yaml:2:6" in said
-    assert "keys of one mapping begin in the same column" in said
+    assert "keys of one mapping must begin in the same column" in said

@@ -81,7 +81,7 @@ def test_nothing_is_asked_of_the_mesh_of_a_map(tmp_path: Path) -> None:
     assert points_of(tmp_path, f"surface=[{there}, {shorter}]")[0] > points_of(tmp_path, f"surface={there}")[0]
     for change, sentence in (
         ("adhesion={work: 0.05, range: 1e-9}", "adhesion.range must be at least"),
-        ("grid.size=100.0", "the box is 100 m along y, the map only 0.001 m"),
+        ("grid.size=100.0", "the box is 100 m along y, but the map only 0.001 m"),
     ):
         assert any(sentence in text for text in mistakes_of(tmp_path, AUTO, f"surface={there}", change))
 

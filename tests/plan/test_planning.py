@@ -40,7 +40,7 @@ def test_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: p
     assert "off  viscoelasticity" in said
     assert "1 steps: stage 1 1" in said
     assert re.search(r"memory per rank \[MB\] +1 rank +2 ranks +1000 ranks", said)
-    assert re.search(r"time on 1 rank: \S+ s\*? a step, .* in all", said)
+    assert re.search(r"time on 1 rank: \S+ s\*? per step, .* in all", said)
     assert "tried: 1 steps on 1 rank in" in said
     assert sorted(path.name for path in tmp_path.iterdir()) == ["job.yaml", "parcontact.py"]
 
@@ -61,8 +61,8 @@ def costs_of_a_trial(share: float = 1.0) -> Costs:
 def test_what_other_programs_have_disturbed_is_stated() -> None:
     """A trial that waited for its cores: a warning before its times."""
     (quiet, _), (warning, *_) = printed_plan.times(costs_of_a_trial(0.95)), printed_plan.times(costs_of_a_trial(0.46))
-    assert "busy" not in quiet
-    assert "busy with other programs" in warning
+    assert "other programs" not in quiet
+    assert "other programs use this machine" in warning
     assert "each rank of the trial had only 46 % of a core" in warning
 
 
@@ -115,7 +115,7 @@ def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert "1 steps: stage 1 1" in said
     assert "parcontact steady: 2 steady states, 2 velocities" in said
     assert re.search(r"tried: [12] states on 1 rank in", said)
-    assert re.search(r"time on 1 rank: \S+ s\*? a state, ", said)
+    assert re.search(r"time on 1 rank: \S+ s\*? per state, ", said)
     steady = said[said.index("parcontact steady:") :]
     stated = re.search(r"from the errors of the trial: friction ([\d.]+) % by mesh, area ", steady)
     assert stated
@@ -129,7 +129,7 @@ def test_plan_of_a_whole_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str
     lines = capsys.readouterr().out.splitlines()
     assert "first of 3 cases: history.0.duration = 0.001" in lines
     assert lines[-3] == "sweep of 3 cases: 0, 1, 2 were tried"
-    assert lines[-2].startswith("the longest takes ")  # of no other cases anything is assumed
+    assert lines[-2].startswith("the longest case takes ")  # of no other cases anything is assumed
     assert re.fullmatch(r"on 1 rank: \S+( s)?\*? in all, one case after the other", lines[-1])
     assert [path.name for path in tmp_path.iterdir()] == ["job.yaml"]
 

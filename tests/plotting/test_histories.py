@@ -63,7 +63,7 @@ def test_theory_beside_a_run(tmp_path: Path, drawn: list[Figure]) -> None:
 
 def test_a_directory_above_that_of_a_run(tmp_path: Path) -> None:
     out = ran(tmp_path, KINDS["creep"][0])
-    with pytest.raises(InputError, match=rf"holds no run and no friction curve: .*; did you mean {out}\?$"):
+    with pytest.raises(InputError, match=rf"has neither a run nor a friction curve: .*; did you mean {out}\?$"):
         plots.plot([out.parent])
 
 
@@ -89,7 +89,7 @@ def test_run_that_goes_on(tmp_path: Path, drawn: list[Figure]) -> None:
     plots.plot([out])
     assert panels(drawn[0]) == KINDS["creep"][1]
     (out / "fields.h5").write_bytes(b"")
-    with pytest.raises(InputError, match=r"fields\.h5 cannot be read: it is no HDF5 file, or cut off"):
+    with pytest.raises(InputError, match=r"fields\.h5 cannot be read: it is not an HDF5 file, or incomplete"):
         plots.plot([out])
     (out / "fields.h5").unlink()
     plots.plot([out])
@@ -97,7 +97,7 @@ def test_run_that_goes_on(tmp_path: Path, drawn: list[Figure]) -> None:
 
 
 def test_directory_without_a_run(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"no measures\.csv"):
+    with pytest.raises(InputError, match=r"neither measures\.csv nor"):
         plots.plot([tmp_path])
     (tmp_path / "measures.csv").write_text("step\n")
     with pytest.raises(InputError, match=r"job\.resolved\.yaml cannot be read"):

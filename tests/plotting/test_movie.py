@@ -67,7 +67,7 @@ def test_a_gif_alone_without_ffmpeg(out: Path, capsys: pytest.CaptureFixture[str
 def test_an_ffmpeg_that_fails(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put_ffmpeg("echo 'frames were read' >&2; echo 'no codec' >&2; exit 3")
     assert asked(out, "--movie", "gap") == 2
-    assert f"ffmpeg has failed to write {out / 'gap.mp4'}: no codec" in capsys.readouterr().err
+    assert f"ffmpeg cannot write {out / 'gap.mp4'}: no codec" in capsys.readouterr().err
     assert [path.name for path in out.glob("gap.*")] == ["gap.gif"]
 
 

@@ -36,7 +36,7 @@ def test_the_maps_of_an_instant(tmp_path: Path, drawn: list[Figure], at: str, ti
     [
         (["--at", "7"], "--at 7: no map is saved after step 7; the nearest steps with maps are 1, 2, 3"),
         (["--at", "1.5"], "--at 1.5: maps are saved from 0 to 0 s"),
-        (["--at", "1", "--movie", "gap"], "goes with neither --movie nor --compare"),
+        (["--at", "1", "--movie", "gap"], "leave it out with --movie or --compare"),
     ],
 )
 def test_no_such_instant(tmp_path: Path, capfd: pytest.CaptureFixture[str], words: list[str], sentence: str) -> None:
@@ -50,7 +50,7 @@ def test_no_such_instant(tmp_path: Path, capfd: pytest.CaptureFixture[str], word
 def test_a_run_without_maps_has_none_of_an_instant(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     out = ran(tmp_path, WAVE + ELASTIC + LOADS)
     assert asked(out, "--at", "1") == 2
-    assert "holds no maps; output: {fields: [...]} saves them" in capfd.readouterr().err
+    assert "has no maps; save them by output: {fields: [...]}" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def simulation(job: Any = BALL, set: Any = None) -> pc.Simulation:
     ("call", "said"),
     [
         (lambda: simulation(None), "the job must be the path of a file or a mapping, got None"),
-        (lambda: simulation(BALL, {5: 1}), "set has a key that is no word, 5"),
+        (lambda: simulation(BALL, {5: 1}), "set has a key that is not a text, 5"),
         (lambda: simulation(BALL, 5), "set must be a mapping of keys and values, got 5"),
         (lambda: pc.steady(BALL, "abc"), "velocities must be a number, a list of numbers or a range .* got 'abc'"),
         (lambda: pc.steady(BALL, [None]), r"velocities must be a number.* got \[None\]"),  # type: ignore[list-item]
@@ -93,11 +93,13 @@ def test_advice_in_the_words_of_python(tmp_path: Path) -> None:
     (tmp_path / "full" / "mine").touch()
     simulation(BALL, ours).run()
     advice: dict[str, Callable[[], Any]] = {
-        'give restart="never" to start afresh, or output.directory for another': lambda: simulation(
+        'give restart="never" to start from the beginning, or output.directory for another': lambda: simulation(
             BALL, {**ours, "surface.amplitude": 3e-6}
         ).run(),
-        "restart=PATH goes on from an earlier": lambda: simulation(BALL, {**ours, "history.0.pressure": 3e4}).run(),
-        "it holds mine; give another output.directory, or restart=": lambda: simulation(
+        "give restart=PATH to continue from an earlier": lambda: simulation(
+            BALL, {**ours, "history.0.pressure": 3e4}
+        ).run(),
+        "it has mine; give another output.directory, or restart=": lambda: simulation(
             BALL, {"output.directory": str(tmp_path / "full")}
         ).run(),
         'leave it out (set={"sweep": None})': lambda: simulation(SWEPT),
@@ -128,7 +130,7 @@ def test_more_points_than_any_machine_holds() -> None:
 def test_a_simulation_is_saved_not_pickled(act: Callable[[Any], Any]) -> None:
     run = simulation()
     next(run.steps())
-    with pytest.raises(TypeError, match=r"cannot be pickled or copied: .* save\(path\) keeps it"):
+    with pytest.raises(TypeError, match=r"cannot be pickled or copied: .* use save\(path\)"):
         act(run)
     assert pickle.loads(pickle.dumps(run.row)).step == 0
 

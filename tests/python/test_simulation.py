@@ -67,7 +67,7 @@ def test_errors_are_those_that_a_run_says(nowhere: Path, capsys: pytest.CaptureF
     [
         ({"grid": {"points": 0, "size": 1.0}}, "grid.points must be a positive whole number of points, got 0"),
         ({"gird": 1}, "gird is not a known key; did you mean grid?"),
-        ({"title": "x", 5: 1}, "the job has a key that is no word, 5"),
+        ({"title": "x", 5: 1}, "the job has a key that is not a text, 5"),
         ({"title": object()}, "title must be numbers, texts, lists or mappings, got <object object"),
         ({"history": [{"pressure": "much"}]}, "history.0.pressure must be"),
         ({"title": 3}, "title must be text"),
@@ -224,7 +224,7 @@ def test_open(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (nowhere / "here" / "fields.h5").rename("elsewhere.h5")
     with pytest.raises(FileNotFoundError):
         pc.open("here") and data.pressure_map.isel(t=0).load()
-    with pytest.raises(pc.InputError, match="no output directory of a run"):
+    with pytest.raises(pc.InputError, match="not the output directory of a run"):
         pc.open(nowhere)
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(ImportError, match="needs xarray, which is not installed: pip install xarray"):

@@ -85,8 +85,8 @@ def check(found: Page) -> None:
     assert all(min(size(picture)) > 100 for picture in found.pictures)
 
 
-ASKED = ["What was asked", "Material", "Surface"]
-COMMON = [*ASKED, "Error budget", "Cost", "Warnings", "Provenance", "What to cite", "Data"]
+ASKED = ["Job", "Material", "Surface"]
+COMMON = [*ASKED, "Error budget", "Cost", "Warnings", "Provenance", "References to cite", "Data"]
 
 
 def test_run(tmp_path: Path) -> None:
@@ -173,7 +173,7 @@ def test_two_curves_together(tmp_path: Path) -> None:
         paths.append(tmp_path / name)
     found = Page(page.write_report(paths).read_text())
     check(found)
-    assert found.headings == ["Together", *2 * ["Friction curve", "Provenance", "What to cite", "Data"]]
+    assert found.headings == ["Together", *2 * ["Friction curve", "Provenance", "References to cite", "Data"]]
     assert len(found.pictures) == 2 + 2 * 2
 
 
@@ -186,7 +186,7 @@ def test_sweep_and_study(tmp_path: Path) -> None:
     (tmp_path / "study.txt").write_text("for 1 %: mesh 64\n")
     found = Page(page.write_report([tmp_path]).read_text())
     check(found)
-    assert found.headings == ["Sweep", "What accuracy costs", "Provenance", "What to cite", "Data"]
+    assert found.headings == ["Sweep", "Cost of accuracy", "Provenance", "References to cite", "Data"]
     for stated in (">failed</td>", ">0.12346</td>", ">exponential</td>", "for 1 %: mesh 64"):
         assert stated in found.text
     # a phone shows rows of wide tables as names, which may break at marks, and values
@@ -206,8 +206,8 @@ def test_a_report_of_a_sweep_says_what_differs_between_cases(tmp_path: Path, mon
     found = Page(page.write_report([tmp_path / "out" / "job", tmp_path / "out" / "job" / "cases" / "000"]).read_text())
     of_first = [f"{name} of the first case" for name in ASKED]
     assert found.headings[:4] == ["Sweep", *of_first]
-    assert found.headings.count("What was asked") == 1  # of the case itself, in the second chapter
-    assert "There are 2 cases. They differ in surface.scale (1.0, 2.0)." in found.text
+    assert found.headings.count("Job") == 1  # of the case itself, in the second chapter
+    assert "The sweep has 2 cases, with surface.scale (1.0, 2.0)." in found.text
     assert "road.npy" in found.text
     assert str(tmp_path) not in found.text
 
@@ -268,7 +268,11 @@ def test_heights_that_are_gone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "out", "stated"),
-    [("nowhere", None, "is no directory"), (".", None, "holds no results"), (".", "report.pdf", r"must end in \.html")],
+    [
+        ("nowhere", None, "is not a directory"),
+        (".", None, "has no results"),
+        (".", "report.pdf", r"must end in \.html"),
+    ],
 )
 def test_nothing_to_report(tmp_path: Path, name: str, out: str | None, stated: str) -> None:
     with pytest.raises(InputError, match=stated):

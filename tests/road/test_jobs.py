@@ -77,7 +77,9 @@ def test_the_slope_comes_back(road: Path, periodic: str, finer: int) -> None:
 
 
 def test_a_larger_box_is_refused(road: Path) -> None:
-    with pytest.raises(InputError, match=r"the box is 0\.002 m along y, the map only 0\.001 m; make the box smaller"):
+    with pytest.raises(
+        InputError, match=r"the box is 0\.002 m along y, but the map only 0\.001 m; use a smaller grid.size"
+    ):
         heights_of(road, MPI.COMM_SELF, POINTS, 2 * LENGTH)
 
 
@@ -94,7 +96,9 @@ def test_another_part_of_the_map(road: Path) -> None:
     found = heights_of(road, MPI.COMM_SELF, half, LENGTH / 2, f"{plain}, centre: [2.5e-4, 7.5e-4]")
     part = heights[half:, :half]
     assert np.abs(found - (part - part.mean())).max() <= 1e-12 * np.ptp(part)
-    with pytest.raises(InputError, match=r"around 0.0002 m along x leaves the map.*; 0.00025 to 0.00075 m would do"):
+    with pytest.raises(
+        InputError, match=r"around 0.0002 m along x leaves the map.*; a centre of 0.00025 to 0.00075 m was expected"
+    ):
         heights_of(road, MPI.COMM_SELF, half, LENGTH / 2, f"{plain}, centre: [2.0e-4, 7.5e-4]")
 
 
@@ -140,8 +144,8 @@ def test_the_verb_surface(road: Path, main: "Main", run_parcontact: "RunParconta
     [
         ("size: [1.5, 1.5]", "the map is 1.5 x 1.5 m; are lengths in m?"),
         ("pixel: 0.01", "the map is 1.92 x 1.92 m; are lengths in m?"),
-        ("pixel: 2.0e-12", "points of the map are 0.002 nm apart, less than atoms; are lengths in this unit?"),
-        ("pixel: [1.3e-5, 3.0e-5]", "points of the map are 13 µm apart along x and 30 µm along y"),
+        ("pixel: 2.0e-12", "the spacing of points is 0.002 nm, less than the size of atoms; is the unit right?"),
+        ("pixel: [1.3e-5, 3.0e-5]", "the spacing of points is 13 µm along x and 30 µm along y"),
         ("unit: nm, size: [1.0e-2, 1.0e-2]", "the map is 10 mm x 10 mm, and its heights differ by 3"),
         ("pixel: [1.3e-5, 1.4e-5]", ""),
     ],
@@ -176,7 +180,7 @@ def test_bands_have_no_direction() -> None:
         "steady": {"velocities": [0.1], "pressures": [1e5]},
     }
     assert jobs.load({**job, "surface": part}).bands is not None
-    with pytest.raises(jobs.JobError, match=r"surface\.anisotropy does not go with bands"):
+    with pytest.raises(jobs.JobError, match=r"surface\.anisotropy cannot be used with bands"):
         jobs.load({**job, "surface": {**part, "anisotropy": {"ratio": 3}}})
 
 
@@ -271,7 +275,7 @@ def test_a_map_without_a_job(road: Path, main: "Main", monkeypatch: pytest.Monke
 @pytest.mark.parametrize(
     ("cells", "more", "written"),
     [
-        (16, "", "accuracy: 0.05}  # what these points keep, by a guess"),
+        (16, "", "accuracy: 0.05}  # estimate for these points"),
         (2, "", "accuracy: 0.01}  # needs more points"),
         (3, "numerics.accuracy=0.03", "accuracy: 0.03}\n"),
     ],
@@ -311,10 +315,10 @@ def test_points_that_stick_out(shared_path: Path, comm: MPI.Intracomm, communica
     for group in communicators:
         doubts = [*map(str, sanity.check_heights(scene.set_up(job, Slab(group, POINTS, POINTS))))]
         assert group.allgather(doubts) == [doubts] * group.size
-        assert doubts[0].startswith("surface: 2 points of the map stick out of their neighbours by more than 16 times")
+        assert doubts[0].startswith("surface: 2 points of the map differ from their neighbours by more than 16 times")
         found = [float(text) for text in re.findall(r"([0-9.]+) with(?:out)?\b", doubts[0])]
         assert found == pytest.approx([expected, SLOPE], rel=0.02)
-        assert "by the spectrum of the heights with the points that stick out" in doubts[1]
+        assert "by the spectrum of the heights, which has outliers" in doubts[1]
 
 
 # -- a box as large as a point of the map, or smaller, is refused instead of being flat -------------------------------
@@ -332,7 +336,9 @@ def fine_map(tmp_path: Path) -> dict[str, object]:
 @pytest.mark.parametrize("periodic", ["smooth", "mirror"])
 @pytest.mark.parametrize("size", [0.01 * APART, 0.9 * APART, [10 * APART, 1.4 * APART]])
 def test_a_box_of_one_point(fine_map: dict[str, object], size: object, periodic: str) -> None:
-    with pytest.raises(pc.InputError, match=r"the box is .* m along \w, and points of the map are 1e-05 m apart"):
+    with pytest.raises(
+        pc.InputError, match=r"the box is .* m along \w, below the spacing of points of the map, 1e-05 m"
+    ):
         pc.surface({**fine_map, "periodic": periodic}, {"points": 8, "size": size})
 
 

@@ -158,21 +158,41 @@ BAD = {
     "no unit": ("road.npy", HEIGHTS, (None, SIZE, None), "does not say the unit of its heights"),
     "no size": ("road.npy", HEIGHTS, ("m", None, None), "does not say how large its map is"),
     "a block": ("road.npy", HEIGHTS[None], ("m", SIZE, None), "has 3 dimensions; a map of two"),
-    "words": ("road.npy", [["a", "b"]], ("m", SIZE, None), "holds values of type <U1, which are no heights"),
-    "complex": ("road.npy", HEIGHTS * 1j, ("m", SIZE, None), "holds values of type complex128, which are no heights"),
-    "too high": ("road.npy", HEIGHTS * 1e306, ("m", SIZE, None), "which cannot be computed with"),
-    "too wide": ("road.npy", HEIGHTS, ("m", (math.inf, 1.0), None), "would be inf x 1 m, which is no size"),
-    "nowhere": ("road.xyz", SQUARE + "1 inf 0\n", ("m", None, None), "its map would be 6 x inf m, which is no size"),
+    "words": ("road.npy", [["a", "b"]], ("m", SIZE, None), "holds values of type <U1; real numbers were expected"),
+    "complex": (
+        "road.npy",
+        HEIGHTS * 1j,
+        ("m", SIZE, None),
+        "holds values of type complex128; real numbers were expected",
+    ),
+    "too high": ("road.npy", HEIGHTS * 1e306, ("m", SIZE, None), "1e-70 to 1e+70 m were expected"),
+    "too wide": (
+        "road.npy",
+        HEIGHTS,
+        ("m", (math.inf, 1.0), None),
+        "would be inf x 1 m; two positive lengths were expected",
+    ),
+    "nowhere": (
+        "road.xyz",
+        SQUARE + "1 inf 0\n",
+        ("m", None, None),
+        "the map would be 6 x inf m; two positive lengths were expected",
+    ),
     "a stray point": ("road.xyz", SQUARE + "1e300 0 0\n", ("m", None, None), "positions along x are not equally"),
     "objects": ("road.npy", [[None, {}]], ("m", SIZE, None), "cannot be read"),
     "few points": ("road.npy", HEIGHTS[:3], ("m", SIZE, None), "at least 4 each way"),
     "mostly missing": ("road.npy", np.where(HEIGHTS > -1e-7, np.nan, HEIGHTS), ("m", SIZE, None), "more than half"),
     "a word": ("road.xyz", "1 2 x\n", ("m", None, None), "cannot be read"),
-    "an unknown format": ("road.abc", "what is this", (None, None, None), "of no format that SurfaceTopography knows"),
+    "an unknown format": (
+        "road.abc",
+        "what is this",
+        (None, None, None),
+        "in a format that SurfaceTopography does not know",
+    ),
     "ragged": ("road.txt", "1 2 3\n4 5\n", ("m", SIZE, None), "cannot be read"),
     "no bytes": ("road.npy", b"", ("m", SIZE, None), "it is empty"),
     "no values": ("road.npy", np.empty((0, 8)), ("m", SIZE, None), "an array of shape (0, 8), without values"),
-    "no heights": ("road.nms", "\0" * 3468, (None, None, None), "of no format that SurfaceTopography knows"),
+    "no heights": ("road.nms", "\0" * 3468, (None, None, None), "in a format that SurfaceTopography does not know"),
     "bytes": ("road.bin", bytes(range(200)) * 25, ("m", SIZE, None), "has no channel of heights"),
     "decimal commas": (
         "road.txt",
@@ -187,10 +207,10 @@ BAD = {
         ("m", None, None),
         "positions along x are not equally spaced",
     ),
-    "a size twice": ("road.xyz", SQUARE, ("m", SIZE, None), "give no size"),
+    "a size twice": ("road.xyz", SQUARE, ("m", SIZE, None), "leave out size"),
     "an array in a file of another name": ("road.npz", HEIGHTS, ("m", SIZE, None), "may have x or y first; save its"),
-    "a unit twice": ("road.nc", None, ("mm", None, None), "give no unit"),
-    "its size twice": ("road.nc", None, (None, SIZE, None), "give no size"),
+    "a unit twice": ("road.nc", None, ("mm", None, None), "leave out unit"),
+    "its size twice": ("road.nc", None, (None, SIZE, None), "leave out size"),
     "an unknown channel": ("road.nc", None, (None, None, "Gloss"), "has no channel 'Gloss'; it has Default"),
 }
 
@@ -218,7 +238,7 @@ def test_a_header_of_gigabytes(tmp_path: Path) -> None:
     with (tmp_path / "road.npy").open("wb") as file:
         file.write(b"\x93NUMPY\x02\x00\xff\xff\xff\xe0")
         file.truncate(3_900_000_000)
-    with pytest.raises(InputError, match="its header claims to be larger than 1 MB"):
+    with pytest.raises(InputError, match="its header has more than 1 MB"):
         read(tmp_path / "road.npy", "m", SIZE, None)
 
 

@@ -96,10 +96,13 @@ def test_limits_too_narrow_to_start(
 @pytest.mark.parametrize(
     ("error", "said"),
     [
-        (MemoryError(), "parcontact: out of memory; free some, allow more by ulimit -v, or take fewer points\n"),
+        (MemoryError(), "parcontact: out of memory; free memory, raise the limit (ulimit -v), or use fewer points\n"),
         (ImportError("libx.so: failed to map segment from shared object"), "parcontact: out of memory; "),
         (SystemError("error return without exception set"), "parcontact: out of memory; "),
-        (OSError(errno.EMFILE, "Too many open files"), "parcontact: out of open files; allow more by ulimit -n: "),
+        (
+            OSError(errno.EMFILE, "Too many open files"),
+            "parcontact: too many open files; raise the limit (ulimit -n): ",
+        ),
     ],
 )
 def test_what_the_machine_lacks(main: Main, monkeypatch: pytest.MonkeyPatch, error: Exception, said: str) -> None:
@@ -121,7 +124,7 @@ def test_working_directory_that_was_removed(here: Path, main: Main, verb: str) -
     (here / "gone").rmdir()
     code, _, said = main(verb, here / "job.yaml")
     assert code == BAD_INPUT
-    assert said.startswith("parcontact: the working directory cannot be found (No such file or directory): change to")
+    assert said.startswith("parcontact: the working directory does not exist (No such file or directory): change to")
 
 
 def test_pictures_are_as_without_the_settings_of_others(
@@ -149,7 +152,7 @@ def test_directory_for_scratch_files_that_cannot_be(
     monkeypatch.setenv("TMPDIR", name)
     code, _, said = main("job.yaml", "--out", "out")
     assert code == BAD_INPUT
-    assert said.startswith(f"parcontact: TMPDIR is {name}, which cannot be made (")
+    assert said.startswith(f"parcontact: TMPDIR is {name}, which cannot be created (")
     assert len(said.splitlines()) == 1
     assert not (here / "out").exists()
 
@@ -161,8 +164,8 @@ def test_table_without_a_column(here: Path, main: Main, verb: str, column: str) 
     table.write_text(table.read_text().replace(column, "other", 1))
     code, shown, said = main(verb, "out")
     assert code == BAD_INPUT
-    assert f"out/measures.csv, line 1, names no column {column}; mend it" in shown + said
-    with pytest.raises(InputError, match="names no column"):
+    assert f"out/measures.csv, line 1, has no column {column}; correct it" in shown + said
+    with pytest.raises(InputError, match="has no column"):
         tables.read_columns(table)[column]
 
 

@@ -132,7 +132,7 @@ def test_checkpoint_of_another_run(main: Main, tmp_path: Path) -> None:
     before = contents(tmp_path / "two")
     code, said = main("job.yaml", "--out", "two", "--restart", "one/checkpoint/step-5.h5")
     assert code == BAD_INPUT
-    assert "one/checkpoint/step-5.h5 is of another run than two, which holds measures.csv, fields.h5" in said
+    assert "one/checkpoint/step-5.h5 belongs to another run than two, which has measures.csv, fields.h5" in said
     assert contents(tmp_path / "two") == before
     assert main("job.yaml", "--out", "three", "--restart", "one/checkpoint/step-5.h5")[0] == DONE
     assert steps(tmp_path / "three") == list(range(6, STEPS + 1))
@@ -149,8 +149,8 @@ def test_finished_run_without_its_checkpoints(main: Main, tmp_path: Path) -> Non
     before = contents(out)
     code, said = main("job.yaml", "--out", "out")
     assert code == BAD_INPUT
-    assert "out holds measures.csv, fields.h5 of a run that has finished at t = " in said
-    assert "but its checkpoints are missing; give --restart never to start afresh" in said
+    assert "out has measures.csv, fields.h5 of a run that has finished at t = " in said
+    assert "but its checkpoints are missing; give --restart never to start from the beginning" in said
     assert contents(out) == before
     assert main("job.yaml", "--out", "out", "--restart", "never")[0] == DONE
 
@@ -164,7 +164,10 @@ def test_results_of_unknown_origin(main: Main, tmp_path: Path) -> None:
     before = contents(out)
     code, said = main("job.yaml", "--out", "out")
     assert code == BAD_INPUT
-    assert "out is not empty and not of this program: it holds fields.h5, job.yaml, measures.csv, notes.txt; " in said
+    assert (
+        "out is not empty and was not made by this program: it has fields.h5, job.yaml, measures.csv, notes.txt; "
+        in said
+    )
     assert contents(out) == before
     assert main("job.yaml", "--out", "out", "--restart", "never")[0] == DONE
     after = contents(out)
@@ -187,7 +190,7 @@ def test_working_directory_as_output(main: Main, tmp_path: Path) -> None:
     before = contents(tmp_path / "shared")
     code, said = main("shared/mine.yaml", "--out", "shared")
     assert code == BAD_INPUT
-    assert "it holds job.yaml" in said
+    assert "it has job.yaml" in said
     assert contents(tmp_path / "shared") == before
 
 
@@ -235,7 +238,7 @@ def test_planted_links_where_a_run_goes_on(main: Main, tmp_path: Path, name: str
     before = (tmp_path / "precious").read_bytes()
     code, said = main(*words, *(curve and [*curve[:1], "0.1,0.2,0.3", *curve[2:]]))
     assert (tmp_path / "precious").read_bytes() == before
-    assert code == DONE or f"out/{name} is a link, which may lead anywhere; move it away" in said
+    assert code == DONE or f"out/{name} is a symbolic link, which is not followed; move it away" in said
 
 
 # -- fields that cannot be read ---------------------------------------------------------------------------------------
@@ -328,7 +331,7 @@ def test_by_commands(
         said.append(capsys.readouterr().err)
     assert (here / f"{name}.aside").read_text() == MINE
     assert asides(here) == [f"{name}.aside"]
-    assert f"{name} was there and not written by this program: it is kept as {Path(name).name}.aside" in said[0]
+    assert f"{name} existed and was not written by this program: it was renamed to {Path(name).name}.aside" in said[0]
     assert said[1] == ""
 
 
@@ -348,9 +351,9 @@ EDITS: list[tuple[Callable[[str], str], str]] = [
     (change(4, lambda line: "abc" + line), "measures.csv, line 4: the step 'abc2' is not a whole number"),
     (change(4, lambda line: line + ",7"), "measures.csv, line 4, has "),
     (change(4, lambda line: line[:20].rsplit(",", 1)[0]), "measures.csv, line 4, has "),
-    (change(1, lambda line: "a,b"), "measures.csv, line 1, does not name the columns"),
+    (change(1, lambda line: "a,b"), "measures.csv, line 1, must name the columns"),
     (lambda text: text + "1,", ""),
-    (lambda text: "", "measures.csv, line 1, does not name the columns"),
+    (lambda text: "", "measures.csv, line 1, must name the columns"),
 ]
 
 

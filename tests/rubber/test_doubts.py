@@ -213,7 +213,7 @@ def test_wave_numbers_of_shapes() -> None:
 def test_a_job_says_its_temperature() -> None:
     """The reference where it gives none; a_T by the formula of Williams, Landel and Ferry."""
     assert rubber(0.1).facts == (
-        "material: at 20 C, the reference of its shift, as the job gives no material.temperature",
+        "material: at 20 C, the reference of its shift; the job gives no material.temperature",
     )
     shift_factor = 10.0 ** (-8.86 * 20.0 / 121.6)
     assert rubber(0.1, temperature=40.0).facts == (f"material: at 40 C (a_T = {shift_factor:.4g}, reference 20 C)",)
@@ -223,14 +223,14 @@ def test_a_job_says_its_temperature() -> None:
 def test_temperatures_beyond_the_measured_ones() -> None:
     job = rubber(0.1, band=None)
     (text,) = map(str, doubt_band(job, [-60.0, -40.0, 20.0, 120.0]))
-    assert text.startswith("material: -60, -40, 120 C is beyond the -20 to 60 C")
+    assert text.startswith("material: -60, -40, 120 C is outside of the measured -20 to 60 C")
     (own,) = map(str, doubt_band(rubber(0.1, band=None, temperature=80.0)))
-    assert own.startswith("material: 80 C is beyond")
+    assert own.startswith("material: 80 C is outside")
 
 
 def test_a_curve_from_python_warns_at_its_own_temperatures() -> None:
     """They are not those of the job, whose material has its reference."""
     with warnings.catch_warnings(record=True, action="always") as stated:
         pc.steady(rubber(0.1, band=None), velocities=[0.1], pressures=[1e4], temperatures=[-40.0])
-    beyond = "material: -40 C is beyond the -20 to 60 C of its measurement"
+    beyond = "material: -40 C is outside of the measured -20 to 60 C"
     assert [str(one.message).startswith(beyond) for one in stated].count(True) == 1

@@ -51,7 +51,7 @@ def test_a_table_becomes_a_material(tmp_path: Path, main: "Main") -> None:
     (tmp_path / "mine.yaml").write_text("title: mine\n")
     code, _, err = main("fit", "rubber.csv", "--out", "mine.yaml")
     assert code == 2
-    assert err.startswith("parcontact: mine.yaml is there and was not written by parcontact fit")
+    assert err.startswith("parcontact: mine.yaml exists and was not written by parcontact fit")
     assert (tmp_path / "mine.yaml").read_text() == "title: mine\n"
 
 

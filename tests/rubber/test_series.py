@@ -170,10 +170,10 @@ def test_a_material_file_and_a_table_in_a_job_are_the_same(tmp_path: Path) -> No
         ("{model: dma, path: ~nosuchuser/rubber.csv}", "material.path must be the name of a file, got"),
         ("{model: dma, path: /dev/null}", "material.path must be an existing file, got '/dev/null'"),
         ("{model: dma, path: bad.csv}", "cannot be fitted"),
-        ("{model: dma, path: rubber.csv, temperature: -100}", "material.temperature is beyond the shift"),
+        ("{model: dma, path: rubber.csv, temperature: -100}", "material.temperature is outside of the shift"),
         ("{model: dma, path: rubber.csv, reference: 200}", "must lie within -20 and 60 C, got 200"),
         ("{model: dma, path: rubber.csv, error: 0}", "material.error must be a positive"),
-        ("{model: zener, modulus_inf: 1.0e6, temperature: 40}", "has no effect without material.shift"),
+        ("{model: zener, modulus_inf: 1.0e6, temperature: 40}", "needs material.shift"),
         (
             "{model: zener, modulus_inf: 1.0e6, shift: {law: wlf, C1: 8, C2: 100, reference: 20}, temperature: -90}",
             "below -80 C",
@@ -325,7 +325,10 @@ def test_laws_in_a_job(tmp_path: Path) -> None:
     density = load(tmp_path, SHIFTED.format(30, "{law: density, expansion: 5e-4}")).material.fitted
     assert density.long_modulus == pytest.approx(1e6 * (1 - 5e-3) * 303.15 / 293.15, rel=1e-12)
     for material, sentence in (
-        (SHIFTED.format(50, FACTORS), "material.temperature is beyond the shift: 50 C is outside the shift factors"),
+        (
+            SHIFTED.format(50, FACTORS),
+            "material.temperature is outside of the shift: 50 C is outside the shift factors",
+        ),
         (SHIFTED.format(30, "{law: factors, temperatures: [0, null], logs: [0, 1]}"), "got nothing"),
         (SHIFTED.format(5, "{law: factors, temperatures: [0, 10], logs: [0, 1]}"), "vertical.temperatures must reach"),
         (

@@ -133,7 +133,7 @@ def of_another_job(path: Path) -> None:
 
 FAULTS = [
     (damage, "is damaged"),
-    (newer, "written by a newer parcontact"),
+    (newer, "of a newer parcontact"),
     (truncate, "is damaged: it has 5000 bytes instead of"),
     (of_another_job, "belongs to another job: surface.0.seed was 4, is 3"),
 ]
@@ -152,7 +152,7 @@ def test_falls_back(
         fault(path)
     capfd.readouterr()
     assert bench.run(data, out) == 0
-    warnings = [line for line in capfd.readouterr().err.splitlines() if "passed over" in line]
+    warnings = [line for line in capfd.readouterr().err.splitlines() if "skipped" in line]
     assert len(warnings) == 2
     assert all(message in line and str(path) in line for line, path in zip(warnings, reversed(bad), strict=True))
     same(whole, out, len(rows(whole)) - 1)
@@ -197,14 +197,14 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"numerics": {"precision": "mixed"}}, "numerics.precision was double, is mixed"),
     (
         {"history": [{**PRESS, "pressure": 2e5}, SLIDE, FASTER]},
-        "step 1 of the 6 already made had pressure 100000.0, has pressure 200000.0",
+        "step 1 of the 6 completed ones had pressure 100000.0, but has pressure 200000.0",
     ),
     (
         {"history": [PRESS, {**SLIDE, "velocity": 0.3}, FASTER]},
-        "step 6 of the 6 already made ended at t = 0.00125 s, ends at 0.00116666",
+        "step 6 of the 6 completed ones ended at t = 0.00125 s, but ends at 0.00116666",
     ),
-    ({"history": [PRESS]}, "step 6 of the 6 already made ended at t = 0.00125 s, ends at 0.0015"),
-    ({"history": [TOUCH]}, "6 steps were made, and the job has 1 up to t = 0.00125 s"),
+    ({"history": [PRESS]}, "step 6 of the 6 completed ones ended at t = 0.00125 s, but ends at 0.0015"),
+    ({"history": [TOUCH]}, "6 steps were completed, but the job has 1 up to t = 0.00125 s"),
 ]
 
 
@@ -223,7 +223,7 @@ def test_refused(stopped: tuple[Bench, Path], changes: dict[str, Any], message: 
     with pytest.raises(InputError) as raised:
         bench.run(bench.job("viscoelastic", **changes), out)
     assert message in str(raised.value)
-    assert "give --restart never to start afresh" in str(raised.value)
+    assert "give --restart never to start from the beginning" in str(raised.value)
     assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
 
@@ -319,6 +319,6 @@ def test_no_error_is_stated_where_the_box_cuts_a_contact_off(
     for force, inside, name in ((1.0, False, "edge"), (0.011, True, "room")):
         assert main(["job.yaml", "--set", f"history.1.force={force}", "--set", f"output.directory={name}"]) == 0
         out = capsys.readouterr().out
-        assert ("no error is stated of steps whose contact reaches the edge of the box" in out) != inside
+        assert ("no error is stated for steps whose contact reaches the edge of the box" in out) != inside
         errors = tables.read_columns(tmp_path / name / "measures.csv")["error_area"]
         assert [math.isnan(error) for error in errors] == [True, False, not inside]

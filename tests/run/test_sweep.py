@@ -104,7 +104,7 @@ def test_a_finished_case_whose_table_lacks_rows_is_damaged(
     whole = csv.read_text()
     csv.unlink() if damage is None else csv.write_text(damage(whole))
     assert main(["job.yaml", "--case", "0", "--quiet"]) == 1
-    assert f"lacks rows; mend it, or move {directory} away to run it afresh" in capsys.readouterr().err
+    assert f"lacks rows; correct it, or move {directory} away to run the job again" in capsys.readouterr().err
     assert [row["state"] for row in table()] == ["damaged", *"-----"]
     directory.rename("aside")
     assert main(["job.yaml", "--case", "0", "--quiet"]) == 0
@@ -120,7 +120,7 @@ def test_a_sweep_ends_with_its_largest_errors(cases: tuple[Case, ...], capsys: p
         assert main(["job.yaml", "--set", two, *words]) == 0
         said = capsys.readouterr()
         lines = [line for line in said.out.splitlines() if line.startswith("largest estimated error of ")]
-        return lines[-2:], [line for line in said.err.splitlines() if "more than numerics.accuracy asks for" in line]
+        return lines[-2:], [line for line in said.err.splitlines() if "exceeds numerics.accuracy" in line]
 
     stated, warned = end("--set", "numerics.accuracy=0.5")
     for column, what, line in zip(slide.ERRORS, ("friction", "the corrected contact area"), stated, strict=True):
@@ -129,7 +129,7 @@ def test_a_sweep_ends_with_its_largest_errors(cases: tuple[Case, ...], capsys: p
         assert line == f"largest estimated error of {what}: {100 * max(errors):.3g} %, in case {worst}"
         assert max(errors) < 0.5
         _, beyond = end("--set", f"numerics.accuracy={math.sqrt(errors[0] * errors[1])}")
-        warning = f"warning: the estimated error of {what} is more than numerics.accuracy asks for in case {worst};"
+        warning = f"warning: the estimated error of {what} exceeds numerics.accuracy in case {worst};"
         assert any(text.startswith(warning) for text in beyond)
     assert not warned
 
@@ -222,7 +222,7 @@ def test_another_jobs_directory_is_refused(cases: tuple[Case, ...], capsys: pyte
     Path("mine").mkdir()
     Path("mine/letter.txt").write_text("Dear")
     before = sorted(Path(".").rglob("*"))
-    for out, stated in (("there", "there holds a run of another job: grid.points"), ("mine", "it holds letter.txt")):
+    for out, stated in (("there", "there has a run of another job: grid.points"), ("mine", "it has letter.txt")):
         assert main(["job.yaml", "--quiet", "--out", out]) == 2
         assert stated in capsys.readouterr().err
     assert sorted(Path(".").rglob("*")) == before
@@ -238,7 +238,7 @@ def test_nothing_is_written_through_a_link_in_place_of_a_case(
     elsewhere.mkdir()
     link.parent.mkdir(parents=True, exist_ok=True)
     link.symlink_to(elsewhere)
-    with pytest.raises(InputError, match=rf"{planted} is a link, through which no case is written"):
+    with pytest.raises(InputError, match=rf"{planted} is a symbolic link, which is not followed"):
         sweep.refuse_foreign_sweep(cases)
 
 

@@ -157,9 +157,9 @@ ZENER = {"model": "zener", "modulus_inf": G, "branches": [{"modulus": G, "relaxa
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"adhesion": {"work": 0.05, "range": 1e-6}}, "must be periodic or free with adhesion; [periodic, free]"),
-        ({"body": {"thickness": 1e-3}}, "must be periodic or free with a layer (body); [periodic, free] goes without"),
-        ({"initial": {"state": "steady", "pressure": 1e4}, "material": ZENER}, "with steady sliding; [periodic"),
+        ({"adhesion": {"work": 0.05, "range": 1e-6}}, "must be periodic or free with adhesion, got [periodic, free]"),
+        ({"body": {"thickness": 1e-3}}, "must be periodic or free with a layer (body), got [periodic, free]"),
+        ({"initial": {"state": "steady", "pressure": 1e4}, "material": ZENER}, "with steady sliding, got [periodic"),
         ({"numerics": {"kernel": "spectral"}}, "must be love when grid.boundary is free"),
     ],
 )  # fmt: skip
@@ -173,7 +173,7 @@ def test_what_a_strip_does_not_have(changes: dict[str, Any], said: str) -> None:
 @pytest.mark.parametrize(
     ("boundary", "said"),
     [
-        (["free", "periodic"], "must be periodic along x where it is free along y, got [free, periodic]: exchange"),
+        (["free", "periodic"], "must be [periodic, free] if it is free along one axis, got [free, periodic]: exchange"),
         (["periodic", "open"], "grid.boundary must be periodic | free | [periodic, free], got"),
         (["periodic"], "grid.boundary must be periodic | free | [periodic, free], got"),
     ],

@@ -153,7 +153,7 @@ def test_sweep_of_another_job_leaves_all_as_it_is(main: Main, tmp_path: Path) ->
     assert main("steady", "one.yaml", "--out", "there") == (DONE, "")
     before = {path: path.read_bytes() for path in (tmp_path / "there").rglob("*.csv")}
     code, said = main("steady", "other.yaml", "--out", "there")
-    assert (code, "cases/001 holds a friction curve of another job: surface.0.amplitude" in said) == (BAD_INPUT, True)
+    assert (code, "cases/001 has a friction curve of another job: surface.0.amplitude" in said) == (BAD_INPUT, True)
     assert {path: path.read_bytes() for path in (tmp_path / "there").rglob("*.csv")} == before
 
 

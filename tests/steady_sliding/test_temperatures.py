@@ -115,9 +115,9 @@ def test_table_theory_and_picture(tmp_path: Path, main: Main, run_parcontact: Ru
 @pytest.mark.parametrize(
     ("changes", "stated"),
     [
-        (["material.shift=null"], "has no effect without material.shift"),
+        (["material.shift=null"], "needs material.shift"),
         (["material={model: elastic, shear_modulus: 1.0e6}"], "relaxation times depend on it"),
-        (["steady.temperatures=[-40.0]"], "beyond the shift"),
+        (["steady.temperatures=[-40.0]"], "outside of the shift"),
     ],
 )
 def test_temperatures_that_the_material_does_not_know(tmp_path: Path, changes: list[str], stated: str) -> None:

@@ -92,7 +92,7 @@ def test_failed_write_leaves_the_old_one(comm: MPI.Intracomm, tmp_path: Path) ->
         checkpoint.write_checkpoint(path, slab, FACTS, bad)
     assert isinstance(look(path, comm), Contents)
     assert [file.name for file in tmp_path.iterdir()] == ["file.h5"]
-    with pytest.raises(RunError, match=r"cannot make .*No such file or directory"):
+    with pytest.raises(RunError, match=r"cannot create .*No such file or directory"):
         write(tmp_path / "absent" / "file.h5", comm)
 
 
@@ -161,8 +161,8 @@ DAMAGE: list[tuple[Callable[[bytes], bytes], str]] = [
     (lambda data: data + b"more", "is damaged: it has .* bytes instead of"),
     (lambda data: b"", "is incomplete or damaged: it has no seal"),
     (_unsealed, "is incomplete or damaged: it has no seal"),
-    (_newer, "is of format 3, written by a newer parcontact, and this one reads format 2 only"),
-    (_older, "is of format 1, written by an older parcontact, and this one reads format 2 only"),
+    (_newer, "has format 3 of a newer parcontact; format 2 was expected"),
+    (_older, "has format 1 of an older parcontact; format 2 was expected"),
     (lambda data: data.replace(b'"bytes"', b'"butes"', 1), "is damaged: its seal cannot be read"),
 ]
 
@@ -196,9 +196,9 @@ def test_info(comm: MPI.Intracomm, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not exist"):
         info.describe_path(tmp_path / "absent.h5")
     (tmp_path / "other.h5").write_bytes(b"something else")
-    with pytest.raises(InputError, match="it is no HDF5 file"):
+    with pytest.raises(InputError, match="it is not an HDF5 file"):
         info.describe_path(tmp_path / "other.h5")
     with h5py.File(tmp_path / "other.h5", "w"):
         pass
-    with pytest.raises(InputError, match="neither a checkpoint nor a file of fields"):
+    with pytest.raises(InputError, match="neither a checkpoint nor a field file"):
         info.describe_path(tmp_path / "other.h5")

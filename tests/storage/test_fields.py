@@ -298,7 +298,7 @@ def test_one_error_for_all(
     make(path, slab)
     with pytest.raises(RunError, match=r"cannot write .*file\.h5"):
         hdf5.write_rows(path, slab, [Slice("a", (), field_hdf5(slab)), Slice("absent", (), field_hdf5(slab))])
-    with pytest.raises(RunError, match=r"cannot make .*: No such file"):
+    with pytest.raises(RunError, match=r"cannot create .*: No such file"):
         make(shared_path / "absent" / "file.h5", slab)
 
 
@@ -317,5 +317,5 @@ def test_maps_of_another_file_are_refused(tmp_path: Path, kind: str) -> None:
         else:
             place = [(str(tmp_path / "raw"), 0, 32)]
             file.create_dataset("gap", (2, 2), float, external=place)
-    with pytest.raises(InputError, match="gap is stored in another file"):
+    with pytest.raises(InputError, match="gap is a link to another file"):
         hdf5.open_results(tmp_path / "fields.h5")

@@ -131,7 +131,7 @@ def test_other_files_and_other_jobs_are_refused(tmp_path: Path, job: Path) -> No
     out.mkdir()
     for name in ("theory.csv", ".hidden", "notes.txt"):
         (out / name).write_text("mine")
-    with pytest.raises(InputError, match=r"not empty and not of this program: it holds notes\.txt; give --out"):
+    with pytest.raises(InputError, match=r"not empty and was not made by this program: it has notes\.txt; give --out"):
         make(directory_at(out), job)
     (out / "notes.txt").unlink()
     make(directory_at(out), job)
@@ -140,7 +140,7 @@ def test_other_files_and_other_jobs_are_refused(tmp_path: Path, job: Path) -> No
     with pytest.raises(InputError, match=keep):
         make(directory_at(out, "study"), job, {**PLAIN, "grid": {"points": [9, 9]}})
     (out / marker.MARKER).write_text("{")
-    with pytest.raises(InputError, match="is damaged, so that the owner of"):
+    with pytest.raises(InputError, match="is damaged, so the owner of"):
         make(directory_at(out), job)
 
 
@@ -148,7 +148,9 @@ def test_the_directory_of_a_sweep_is_stated(tmp_path: Path, job: Path) -> None:
     """A sweep has no marker of its own, its cases have."""
     for case in ("000", "001"):
         make(directory_at(tmp_path / "out" / "cases" / case), job)
-    with pytest.raises(InputError, match=r"out is that of a sweep, with 2 of its cases; give --out for .* with --case"):
+    with pytest.raises(
+        InputError, match=r"out belongs to a sweep and has 2 of its cases; give --out for .* with --case"
+    ):
         make(directory_at(tmp_path / "out"), job)
 
 

@@ -106,7 +106,7 @@ JOB: dict[str, Any] = {
 
 
 def test_what_to_cite(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="holds no run"):
+    with pytest.raises(InputError, match="has no run"):
         citations.describe_citations(tmp_path)
     data = {**JOB, "grid": {**JOB["grid"], "boundary": "free"}, "surface": {"shape": "sphere", "radius": 1e-2}}
     (tmp_path / "job.yaml").write_text(yaml.safe_dump({**data, "material": {"model": "elastic", "shear_modulus": 1e6}}))
@@ -285,7 +285,7 @@ def test_a_run_that_ended_with_its_contact_has_one() -> None:
     rows = table(*NEAR, (-2.0, -1e-6, 0.2), (-2.25, -1e-6, 0.2))
     assert find(rows, detached=True) == [PullOff(5, -2.25, 0.25, 6, MESH)]
     (reported,) = describe_pull_off(rows, 1.0, 1e-9, detached=True)
-    assert reported.endswith("its error is 280 mN, and nothing held the next load")
+    assert reported.endswith("its error is 280 mN, and the next load had no equilibrium")
 
 
 def test_nothing_is_said_without_a_pull() -> None:

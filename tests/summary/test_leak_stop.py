@@ -35,7 +35,7 @@ ALONG_Y = "leakage along y stops between 95 and 105 kPa"  # the pressures next t
 def test_waves_close_at_the_pressure_of_full_contact(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Along the grooves at p*, across them from the first contact on; from the run's own table, and from `leak`."""
     out = press(tmp_path, [0.5, 0.95, 1.05, 1.5], leakage={"every": 1})
-    across = "leakage along x has stopped at the first instant, under 50 kPa"
+    across = "leakage along x has already stopped at the first instant, under 50 kPa"
     assert leak_stop.describe_leak_stop(out) == [across, ALONG_Y]
     assert __main__.main(["leak", str(out)]) == 0
     assert leak_stop.describe_leak_stop(out) == [across, ALONG_Y]
@@ -63,10 +63,10 @@ def test_waves_close_at_the_pressure_of_full_contact(tmp_path: Path, capsys: pyt
         (
             [0.0, 2e-18],
             [1e6, 1e6],
-            "has stopped at the first instant, under 1 MPa, and begins again between 1 and 2 h, under 1 MPa",
+            "has already stopped at the first instant, under 1 MPa, and begins again between 1 and 2 h, under 1 MPa",
         ),
-        ([0.0, 0.0], [1e6, 2e6], "has stopped at the first instant, under 1 MPa"),
-        ([3e-18, 1e-18], [2e6, 1e6], "does not stop, up to 2 MPa"),
+        ([0.0, 0.0], [1e6, 2e6], "has already stopped at the first instant, under 1 MPa"),
+        ([3e-18, 1e-18], [2e6, 1e6], "does not stop up to 2 MPa"),
         ([math.nan, math.nan], [1e6, 2e6], ""),
     ],
 )

@@ -75,7 +75,7 @@ def test_sentences_about_a_slide() -> None:
     assert said([REST, CLIMB, SETTLE], table) == [
         "mu_max, the highest friction of the slide, is 4.00 ± 0.12, 1 m after its start",
         "mu_dyn, the mean friction over the last three quarters of this slide of 4 m, is 2.333 ± 0.027",
-        "the mean contact area over the same distance is 0.2333 as counted in points",
+        "the mean contact area over the same distance is 0.2333 by counting points",
         "largest estimated errors of single steps of the slide: friction 3 %",
     ]
     assert not said([REST], table)
@@ -92,8 +92,8 @@ def test_forces_of_a_slide_under_no_load() -> None:
     found = measure_slide(stages(REST, CLIMB, SETTLE), table)
     assert found is not None
     assert math.isnan(found.mu_max + found.mu_dyn)
-    (force, *_), where = said([REST, CLIMB, SETTLE], table), "in 2 of 3 steps of the slide, in which no load presses"
-    mean = "5 N at most, and 2.17 N in the mean"  # 3.5 over a metre, 1.5 over two
+    (force, *_), where = said([REST, CLIMB, SETTLE], table), "in 2 of 3 steps of the slide, which have no load"
+    mean = "5 N at most, and 2.17 N on average"  # 3.5 over a metre, 1.5 over two
     assert force.startswith(f"friction is not defined {where}, and is 0 in the table: the tangential force is {mean}")
     table |= {"force_x": [9.0, 9.0, 0.0, 0.0, -1.0], "force_y": [0.0] * 5}  # no force, as where nothing touches
     assert said([REST, CLIMB, SETTLE], table)[0].startswith("mu_max, the highest friction of the slide, is 6")
@@ -104,7 +104,7 @@ def test_sentences_about_a_slide_that_others_follow() -> None:
     table = rows((0, 0, 9), (1, 0, 8), (1.5, 1, 4), (2.0, 2, 2))
     history = [REST, CLIMB, REST, {**CLIMB, "velocity": 3.0}]
     stated = said(history, table)
-    assert stated[0] == "the last slide has not begun; these numbers are of the one before, which ends with history.1"
+    assert stated[0] == "the last slide has not begun; these numbers are of the previous one, ending with history.1"
     assert stated[1:] == said(history[:2], table)
     assert measure_slide(stages(*history), table) is None
     assert len(said([REST, CLIMB, SETTLE], rows((0, 0, 9), (1, 0, 8), (1.2, 0.4, 5)))) == 3
@@ -144,7 +144,7 @@ def test_the_area_whose_error_is_stated_and_friction_that_is_all_error() -> None
     table["contact_area_corrected"] = [0.8 * area for area in table["contact_area"]]
     table["error_friction"] = [float("nan"), 0.1, 1.1]
     stated = said([CLIMB], table)
-    area = "the mean contact area over the same distance is 0.3133 as corrected for its edges, "
-    assert f"{area}and 0.3917 as counted in points" in stated
+    area = "the mean contact area over the same distance is 0.3133 corrected for its edges, "
+    assert f"{area}and 0.3917 by counting points" in stated
     assert "largest estimated errors of single steps of the slide: friction unknown" in stated
     assert stated[-1] == "in some steps of the slide friction is smaller than its estimated error"

@@ -1,4 +1,4 @@
-"""Rules that a job as a whole must keep, and warnings about what will probably disappoint."""
+"""Rules for a job as a whole, and warnings about settings that are allowed but probably not meant."""
 
 from typing import Any, Protocol
 
@@ -8,7 +8,7 @@ from ..sections.stages import Initial, Stage, Steady
 
 
 class Sections(Protocol):
-    """Sections of a job that warnings are about."""
+    """The sections of a job that warnings need."""
 
     grid: Grid
     surface: tuple[Any, ...]

@@ -1,7 +1,4 @@
-"""Warnings about resolution and precision: what is allowed in a job but will probably disappoint, and what to do.
-
-`meaning.py` judges the physics of a job, `size.py` its size.
-"""
+"""Warnings about the resolution of a job: mesh, box, and time steps; `meaning.py` has physics, `size.py` memory."""
 
 from __future__ import annotations
 
@@ -17,21 +14,21 @@ from ..sections.stages import AUTO, GeometricStep, Stage
 from . import Sections
 from .cells import ASIDE, Vector, needed, one_cell
 
-LONG_WAVES = 4  # accuracy: in the box; fewer make the statistics of one surface chance (paper, end of section 3)
-MOST_LONG_WAVES = 500  # tuning: along the box; more of them are a mistake in its unit
-STEPS_PER_WAVE = 4  # accuracy: fewer skip over the shortest waves while sliding
-SAME_LENGTH = 1e-9  # accuracy: lengths this close, relatively, are the same
-LITTLE = 0.05  # tuning: points that lack, as a share of all; so few are not worth another mesh
+LONG_WAVES = 4  # accuracy: least number of longest waves along the box for a representative surface (paper, section 3)
+MOST_LONG_WAVES = 500  # tuning: number of longest waves along the box above which its unit is doubted
+STEPS_PER_WAVE = 4  # accuracy: least time steps per shortest wave while sliding
+SAME_LENGTH = 1e-9  # rounding: relative difference below which lengths are the same
+LITTLE = 0.05  # tuning: relative lack of points that gets no warning
 
-# Standard deviations over 8 to 12 seeds, times the longest waves along a side; found with six steady states of 2 to
-# 50 % contact of bodies of one and twelve branches, in boxes of 2, 4 and 8 of these waves: 0.11 to 0.44 for friction,
-# 0.05 to 0.33 for the area.
+# Relative standard deviation over 8 to 12 seeds, times the number of longest waves along a side; found with six steady
+# states of 2 to 50 % contact of bodies with one and twelve branches, in boxes of 2, 4 and 8 longest waves: 0.11 to 0.44
+# for friction, 0.05 to 0.33 for the area.
 SEED_FRICTION, SEED_AREA = 0.24, 0.17  # accuracy
 
 
 def doubts_of_resolution(job: Sections, directions: Sequence[Vector] = (), chosen: bool = False) -> Iterator[Doubt]:
-    """Yield doubts, in the order of the sections; the surface slides along these directions (unit vectors). A mesh
-    that was `chosen` for the job has cells enough, as far as is known before."""
+    """Yield warnings in the order of the sections; the surface slides along `directions` (unit vectors). The cells of a
+    mesh that was `chosen` for the job are not checked."""
     grid, surface, numerics = job.grid, job.surface, job.numerics
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and max(grid.points) > 1:
@@ -47,7 +44,7 @@ def doubts_of_resolution(job: Sections, directions: Sequence[Vector] = (), chose
 
 
 def _directions(grid: Grid) -> list[tuple[str, float, float]]:
-    """Return name, length and cell [m] of the directions that have more than one point."""
+    """Return name, box length and cell [m] of the axes that have more than one point."""
     found = zip("xy", grid.size, (grid.dx, grid.dy), grid.points, strict=True)
     return [(name, length, cell) for name, length, cell, points in found if points > 1]
 
@@ -61,7 +58,7 @@ def _long_waves(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
 
 
 def doubt_size(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
-    """Yield a doubt about a box that is so large over the longest wave as no box is meant to be."""
+    """Yield a warning about a box of more than MOST_LONG_WAVES longest waves."""
     length = max((length for _, length, _ in _directions(grid)), default=0.0)
     if length > MOST_LONG_WAVES * shape.long_wavelength:
         of_wave = {"wave": shape.long_wavelength, "times": length / shape.long_wavelength}
@@ -79,16 +76,16 @@ def _short_waves(
 def doubt_measured_waves(
     grid: Grid, wave: float, asked: Accuracy, directions: Sequence[Vector], spiky: bool = False
 ) -> Iterator[Doubt]:
-    """Yield a doubt about the shortest wave [m] of a measured surface that slides along these directions; of a `spiky`
-    one it may be that of the points that stick out."""
-    spikes = " with the points that stick out" if spiky else ""
+    """Yield a warning about the shortest wave [m] of a measured surface that slides along `directions`; outliers of a
+    `spiky` surface may shorten it."""
+    spikes = ", which has outliers" if spiky else ""
     for numbers in _few_cells(wave, grid, asked, directions):
         yield Doubt("few cells of a map", "surface", {**numbers, "known": wave, "spikes": spikes})
 
 
 def _few_cells(wave: float, grid: Grid, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[dict[str, object]]:
-    """Yield the numbers of a doubt if a shortest wave has too few cells: how many points it needs along the direction
-    that lacks most, at which price, or what else."""
+    """Yield the numbers of a warning if the shortest wave [m] has too few cells: the points needed along the axis that
+    lacks most, and the factors of memory and time."""
     wants = {name: needed("xy".index(name), directions, asked) for name, _, _ in _directions(grid)}
     lacks = {name: max(wants[name]) * cell / wave for name, _, cell in _directions(grid)}
     name, length, cell = max(_directions(grid), key=lambda direction: lacks[direction[0]], default=("", 0.0, 0.0))
@@ -106,13 +103,13 @@ def _few_cells(wave: float, grid: Grid, asked: Accuracy, directions: Sequence[Ve
         "needed": max(wants[name]),
         "points": math.ceil((1 - SAME_LENGTH) * max(wants[name]) * length / wave),
         "memory": more,
-        "time": f", some {more * finer:.2g} times the time in sliding" if directions else "",
+        "time": f", about {more * finer:.2g} times the time in sliding" if directions else "",
         "wave": max(wants[name]) * cell,
     }
 
 
 def longest_step(stage: Stage, grid: Grid) -> float:
-    """Return the longest time step of a stage [s], before steps are fitted to its end; 0 where it chooses its own."""
+    """Return the longest time step of a stage [s], before steps are fitted to its end; 0 for `time_step: auto`."""
     step = stage.time_step
     if step == AUTO:
         return 0.0
@@ -124,7 +121,7 @@ def longest_step(stage: Stage, grid: Grid) -> float:
 
 
 def _steps(index: int, stage: Stage, grid: Grid, resolved: float, short: float | None) -> Iterator[Doubt]:
-    """Yield doubts about the steps of a stage: longer than what is to be resolved [s], than the shortest wave."""
+    """Yield warnings about steps longer than the time `resolved` [s], or too long for the shortest wave `short` [m]."""
     step = longest_step(stage, grid)
     slid = step * stage.speed
     if stage.speed and not stage.seconds:
@@ -138,9 +135,9 @@ def _steps(index: int, stage: Stage, grid: Grid, resolved: float, short: float |
 
 
 def describe_sample(grid: Grid, surface: tuple[Any, ...], slides: bool) -> str:
-    """Return by how much friction, if it `slides`, and the contact area of another seed differ; '' without a seed.
+    """Return a sentence on the scatter of friction (if it `slides`) and contact area between seeds; '' without a seed.
 
-    As many independent parts as long waves fit into the box average out by the root of their number.
+    The scatter falls with the square root of the number of longest waves in the box.
     """
     longest = max((shape.long_wavelength for shape in surface if isinstance(shape, Rough)), default=0.0)
     if not longest:

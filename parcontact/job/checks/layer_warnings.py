@@ -1,6 +1,6 @@
-"""Warnings about a layer: what its thickness means beside the surface, the mesh and the material.
+"""Warnings about the thickness of a layer, compared with the surface, the mesh and the material.
 
-Each says the value, the limit and what to change. All is judged by lower bounds, as in `meaning`.
+As in `meaning`, heights and lengths are bounded from below, so that sound jobs get no warning.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from ..sections.stages import Stage
 from . import Sections
 from .cells import more_points
 
-THICKEST = 1 / 3  # physics: what presses into a layer over its thickness; beyond, strains are not small
-FEWEST_CELLS = 2.0  # accuracy: in a thickness, over which the pressure at the edge of a contact falls
-LONGEST = 100.0  # physics: thicknesses; to longer waves rubber yields by its compressibility, of 1e-3 of the shear's
-NEARLY = 1e-4  # physics: below 1/2, of the Poisson's ratio of a rubber
+THICKEST = 1 / 3  # physics: limit of small strains for the indentation over the thickness of a layer
+FEWEST_CELLS = 2.0  # accuracy: least cells in a thickness, the length over which pressure falls at the edge of contact
+LONGEST = 100.0  # physics: wavelength over thickness above which the compressibility of rubber matters
+NEARLY = 1e-4  # physics: distance of Poisson's ratio from 1/2 below which a body counts as incompressible
 
 
 def doubts_of_layer(job: Sections) -> Iterator[Doubt]:
-    """Yield doubts about the `body` section of a job, which may be None."""
+    """Yield warnings about the `body` section of a job, if it has one."""
     grid, surface, body, poisson = job.grid, job.surface, job.body, job.material.poisson
     if body is None:
         return
@@ -41,13 +41,13 @@ def doubts_of_layer(job: Sections) -> Iterator[Doubt]:
 
 
 def doubt_height(height: float, thickness: float) -> Iterator[Doubt]:
-    """Yield a doubt about a layer into which a surface of such a height [m] presses."""
+    """Yield a warning if a surface of this height [m] is too high for a layer of this thickness [m]."""
     if height > THICKEST * thickness:
         yield Doubt("high for a layer", "body.thickness", {"height": height, "thickness": thickness})
 
 
 def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, ...]) -> Iterator[Doubt]:
-    """Judge an indenter by its approach: the layer is strained by its share of the thickness."""
+    """Yield a warning if the approach of a sphere is too large for the thickness [m]."""
     if len(surface) != 1 or not isinstance(surface[0], Sphere):
         return
     approaches = [
@@ -62,7 +62,7 @@ def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, 
 
 
 def _rms_height(grid: Grid, surface: tuple[Any, ...]) -> float:
-    """Return a lower bound of the rms height of waves and roughness [m]: steep waves are the shortest at most."""
+    """Return a lower bound of the rms height [m] of waves and roughness; slopes count for the shortest waves."""
     square = 0.0
     for shape in surface:
         if isinstance(shape, Wave):

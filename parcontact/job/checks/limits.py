@@ -1,4 +1,4 @@
-"""Rules on what must fit together in a job: loads and material, surface and mesh, histories and what a run can make."""
+"""Rules that relate sections of a job: loads and material, surface and mesh, history and number of steps."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from .cells import has_wave, one_cell
 
 LOADS = {"pressure": PRESSURE, "force": FORCE}
 BY_SPECTRUM = Rough | RoughSpectrum | Flat
-THINNEST = 1e-9  # accuracy: thickness of a layer over the longer side of its box
-MOST_STEPS = 10**8  # tuning: of a history; at a millisecond each they take more than a day
+THINNEST = 1e-9  # rounding: least thickness of a layer over the longer side of its box
+MOST_STEPS = 10**8  # tuning: most steps of a history; at 1 ms each they take more than a day
 
 
 def kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:
@@ -30,13 +30,13 @@ def kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:
 
 
 def no_strip(what: str, grid: Grid) -> Iterator[Fault]:
-    """Refuse `what` needs other kernels than a box has that is free along y alone."""
+    """Refuse `what` in a box that is free along y only, which has no kernel for it."""
     if any(grid.cyclic) and not all(grid.cyclic):
-        yield Fault(f"must be periodic or free with {what}; [periodic, free] goes without", ("grid", "boundary"))
+        yield Fault(f"must be periodic or free with {what}, got [periodic, free]", ("grid", "boundary"))
 
 
 def half_space_at_rest(grid: Grid, body: Body | None, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
-    """Check that a box which is free along y alone has no layer and no steady sliding, whose kernels it lacks."""
+    """Check that a box that is free along y only has no layer and no steady sliding."""
     asked = {"a layer (body)": body is not None, "steady sliding": steady is not None or initial.state == "steady"}
     for what in (what for what, given in asked.items() if given):
         yield from no_strip(what, grid)
@@ -50,7 +50,7 @@ def layer_is_resolved(grid: Grid, body: Body | None) -> Iterator[Fault]:
 
 
 def layer_is_in_proportion(grid: Grid, body: Body | None) -> Iterator[Fault]:
-    """Check that a layer is not so thin in its box that its compliance is beyond what numbers hold."""
+    """Check that a layer is not so thin that its compliance underflows."""
     if body is not None and body.thickness < THINNEST * max(grid.size):
         sentence = (
             f"must be at least {THINNEST:g} of the box, {THINNEST * max(grid.size):.3g} m, got {body.thickness:g}"
@@ -65,7 +65,7 @@ def no_wake_in_a_layer(grid: Grid, body: Body | None, initial: Initial, steady: 
 
 def waves_are_independent(grid: Grid, steady: Steady | None) -> Iterator[Fault]:
     if steady is not None and steady.waves and grid.boundary == "free":
-        yield Fault("needs a periodic box: the waves of a free one are not independent", ("steady", "waves"))
+        yield Fault("needs a periodic box: waves in a free box are not independent", ("steady", "waves"))
 
 
 def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Fault]:
@@ -87,10 +87,8 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Faul
             sentence = f"must fit into the box of {max(grid.size):.6g} m, got {shape.short_wavelength!r}"
             yield Fault(sentence, ("surface", index, "short_wavelength"))
         elif isinstance(shape, Rough) and not has_wave(grid, shape.short_wavelength, shape.long_wavelength):
-            sentence = (
-                f"leaves no wave down to short_wavelength, {shape.short_wavelength:g} m, that fits the box and the "
-            )
-            yield Fault(f"{sentence}grid, got {shape.long_wavelength!r}", ("surface", index, "long_wavelength"))
+            sentence = f"must leave a wave of the grid down to short_wavelength, {shape.short_wavelength:g} m, but has "
+            yield Fault(f"{sentence}none, got {shape.long_wavelength!r}", ("surface", index, "long_wavelength"))
         for number, (waves, n) in enumerate(zip(getattr(shape, "waves", ()), grid.points, strict=False)):
             if abs(waves) > n / 2:
                 sentence = f"must be within {-(n // 2)} and {n // 2} waves for {n} points (Nyquist), got {waves}"
@@ -98,32 +96,34 @@ def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Faul
 
 
 def bands_fit(bands: Any, surface: tuple[Any, ...], steady: Steady | None, output: Output) -> Iterator[Fault]:
-    """Check that a surface in bands is known by its spectrum, a measured map coming first, and that no map is saved."""
+    """Check that the surface of a job with bands has a spectrum, after at most one measured map, and saves no maps."""
     if bands is None:
         return
     for index, shape in enumerate(surface):
         if not isinstance(shape, BY_SPECTRUM) and not (index == 0 and isinstance(shape, Topography)) and shape:
-            sentence = "must be rough in a job with bands (self-affine, or a spectrum); a topography comes first"
+            sentence = (
+                "must be rough in a job with bands (self-affine, or a spectrum); only the first may be a topography"
+            )
             yield Fault(sentence, ("surface", index, "shape"))
         if getattr(shape, "anisotropy", None) is not None:
-            yield Fault("does not go with bands, which are rings of wavenumbers", ("surface", index, "anisotropy"))
+            yield Fault("cannot be used with bands, which are isotropic", ("surface", index, "anisotropy"))
     if not any(shape is None or isinstance(shape, Rough | RoughSpectrum) for shape in surface):
-        yield Fault("needs a rough shape in a job with bands: finer waves follow from a spectrum", ("surface",))
+        yield Fault("needs a rough shape in a job with bands, for the spectrum of the finer waves", ("surface",))
     if steady is not None and steady.waves:
-        yield Fault("does not go with bands: bands.csv has the friction of each band", ("steady", "waves"))
+        yield Fault("cannot be used with bands: bands.csv has the friction of each band", ("steady", "waves"))
     if output.fields:
-        yield Fault("does not go with bands: there is no map of all waves", ("output", "fields"))
+        yield Fault("cannot be used with bands: no grid has all waves; leave it out", ("output", "fields"))
 
 
 def some_shape(surface: tuple[Any, ...]) -> Iterator[Fault]:
     if not surface:
-        yield Fault("needs at least one shape; shape: flat is one", ("surface",))
+        yield Fault("needs at least one shape, such as shape: flat", ("surface",))
 
 
 def no_temperature(output: Output) -> Iterator[Fault]:
-    """Refuse the map of a temperature in a job without `thermal`; with it this rule does not hold."""
+    """Refuse maps of the temperature; the effect `thermal` lifts this rule."""
     if "temperature" in output.fields:
-        yield Fault("has temperature, which needs a thermal section", ("output", "fields"))
+        yield Fault("includes temperature, which needs a thermal section", ("output", "fields"))
 
 
 def no_traction(output: Output) -> Iterator[Fault]:
@@ -145,11 +145,11 @@ def some_load(history: tuple[Any, ...], initial: Initial) -> Iterator[Fault]:
     if not history or None in history or initial.pressure or any(stage.approach for stage in history):
         return
     if not any(stage.load.start or stage.load.end for stage in history):
-        yield Fault("must not be zero in every stage: nothing would ever touch", ("history", 0, history[0].control))
+        yield Fault("must not be zero in every stage: there would be no contact", ("history", 0, history[0].control))
 
 
 def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
-    """Check that nothing is pulled: only surfaces that stick can be."""
+    """Check that no load is tensile; the effect `adhesion` lifts this rule."""
     for index, stage in enumerate(history):
         if stage is None or stage.control == "approach":
             continue
@@ -173,8 +173,11 @@ def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> It
 def steady_bodies_do_not_flow(
     grid: Grid, material: AnyMaterial, body: Body | None, initial: Initial, steady: Steady | None
 ) -> Iterator[Fault]:
-    """Check that a body without long-term modulus has a steady state: nothing holds waves that do not vary along the
-    sliding, so that it has one on a periodic line of points only, along which the surface slides."""
+    """Check that a body without long-term modulus has a steady state.
+
+    It flows at waves that do not vary along the sliding, so it has one only on a periodic line of points in the sliding
+    direction.
+    """
     if material.fitted.long_modulus > 0.0:
         return
     asked = [("initial", initial.velocity)] if initial.state == "steady" else []
@@ -188,11 +191,11 @@ def steady_bodies_do_not_flow(
 
 def energies_count_from_rest(initial: Initial, output: Output) -> Iterator[Fault]:
     if initial.state == "steady" and output.energy:
-        yield Fault("needs initial: {state: virgin}: energies count from a body at rest", ("output", "energy"))
+        yield Fault("needs initial: {state: virgin}: energies start from a body at rest", ("output", "energy"))
 
 
 def arrays_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
-    """Check that arrays have the shape of the grid, and its cell if they have coordinates."""
+    """Check that arrays have the shape of the grid, and coordinates, if any, its cells."""
     for index, shape in enumerate(surface):
         if not isinstance(shape, HeightArray):
             continue
@@ -200,45 +203,45 @@ def arrays_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
         if heights.shape != (grid.ny, grid.nx):
             yield Fault(f"has shape {heights.shape}, but the grid has (ny, nx) = {grid.ny, grid.nx}", place)
             continue
-        for axis, apart, cell in zip("xy", heights.cell, (grid.dx, grid.dy), strict=True):
-            if abs(apart - cell) > SAME_CELL * cell:
-                yield Fault(f"has points {apart:.6g} m apart along {axis}, but the grid has {cell:.6g} m", place)
+        for axis, spacing, cell in zip("xy", heights.cell, (grid.dx, grid.dy), strict=True):
+            if abs(spacing - cell) > SAME_CELL * cell:
+                sentence = f"has a spacing of {spacing:.6g} m along {axis}, but cells of the grid are {cell:.6g} m"
+                yield Fault(sentence, place)
 
 
 def loads_are_borne(
     grid: Grid, material: AnyMaterial, history: tuple[Stage | None, ...], initial: Initial, steady: Steady | None
 ) -> Iterator[Fault]:
-    """Check that the counterbody bears the mean pressures, and that no steady sliding is asked of one that yields."""
+    """Check that mean pressures are below the hardness, and that there is no steady sliding with a hardness."""
     hardness = material.hardness
     if hardness is None:
         return
     for key, given in (("initial", initial.state == "steady"), ("steady", steady is not None)):
         if given:
-            yield Fault("does not go with material.hardness: slide into the steady state with a stage", (key,))
+            yield Fault("cannot be used with material.hardness: slide into the steady state with a stage", (key,))
     for index, stage in enumerate(history):
         if stage is None or stage.control == "approach":
             continue
         mean = max(stage.load.start, stage.load.end) / (grid.lx * grid.ly if stage.control == "force" else 1.0)
         if mean >= hardness:
-            sentence = f"leads to a mean pressure of {mean:.4g} Pa, no less than material.hardness = {hardness:g} Pa"
-            yield Fault(f"{sentence}: there is no equilibrium", ("history", index, stage.control))
+            sentence = f"leads to a mean pressure of {mean:.4g} Pa; it must be below material.hardness, {hardness:g} Pa"
+            yield Fault(sentence, ("history", index, stage.control))
 
 
 def refuse_steady(section: str) -> Rule:
-    """Return the rule that no steady sliding is asked for with a section that brings a contact law: its solver has the
-    usual one."""
+    """Return the rule that excludes steady sliding with a section whose effect has its own contact law."""
 
     def check(given: Any, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
         for key, asked in (("initial", initial.state == "steady"), ("steady", steady is not None)):
             if given is not None and asked:
-                sentence = f"does not go with {section}: slide into the steady state with a stage of the history"
+                sentence = f"cannot be used with {section}: slide into the steady state with a stage of the history"
                 yield Fault(sentence, (key,))
 
     return Rule((section, "initial", "steady"), check)
 
 
 def steps_can_be_made(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
-    """Check how many steps the stages have together."""
+    """Check that the history has at most MOST_STEPS steps."""
     total = 0.0
     for index, stage in enumerate(history):
         if stage is None:
@@ -252,13 +255,13 @@ def steps_can_be_made(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator
 
 
 def count_steps(grid: Grid, history: tuple[Stage, ...]) -> int:
-    """Return about how many steps a history has; jumps are left out."""
+    """Return the estimated number of steps of a history, without instantaneous stages."""
     lasting = [stage for stage in history if stage.seconds]
     return math.ceil(sum(estimate_steps(stage, stage.seconds, first_step(stage, grid)) for stage in lasting))
 
 
 def first_step(stage: Stage, grid: Grid) -> float:
-    """Return the (first) time step [s] of a stage that lasts, before steps are fitted to its end."""
+    """Return the first time step [s] of a stage with a duration, before steps are fitted to its end."""
     if stage.cells_per_step is not None:
         return stage.cells_per_step * one_cell(stage, grid)
     if isinstance(stage.time_step, GeometricStep):
@@ -269,7 +272,7 @@ def first_step(stage: Stage, grid: Grid) -> float:
 
 
 def estimate_steps(stage: Stage, seconds: float, first: float) -> float:
-    """Return about how many steps a stage that lasts so long has."""
+    """Return the estimated number of steps of a stage of `seconds` whose first step is `first` [s]."""
     count = seconds / first if first else math.inf
     growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
     return count if growth == 1.0 else min(count, math.log1p(count * (growth - 1.0)) / math.log(growth))

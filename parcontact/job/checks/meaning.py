@@ -1,7 +1,6 @@
-"""Warnings about what a job means: scenes outside of the theory, which has small slopes, small strains and no end.
+"""Warnings about jobs outside of the theory: a linear half space with small slopes and strains.
 
-Each says the value, the limit and what to change. A half space is linear: surfaces are gentle, pressures well below the
-modulus, and what is isolated has room around it. All is judged by lower bounds, so that no sound scene is warned of.
+Slopes, pressures and contact radii are bounded from below, so that sound jobs get no warning.
 """
 
 from __future__ import annotations
@@ -18,22 +17,22 @@ from ..sections.materials import Elastic, PronyBranch, Zener
 from ..sections.stages import Stage
 from . import Sections
 
-STEEP = 0.5  # physics: rms slope; some tenths are small
-STEEPEST = 1.0  # physics: radius of a contact over that of its sphere; beyond, slopes are not small
-SOFTEST, HARDEST = 1e3, 1e12  # physics: shear moduli [Pa] go from 1e3 (gels) to 5e11 (diamond)
-STRAIN = 1.0  # physics: mean pressure over 2 G/(1 - nu); beyond, strains are not small
-LEAST = 1e-12  # accuracy: of the modulus at once, which a fluid keeps for a quotient
-NEAR = 0.4  # accuracy: of the longest wave; as near to where it was, the surface is over its own imprint
-REMEMBERS = 0.1  # accuracy: of the time since; a branch that relaxes in less has forgotten
-ALONE = 0.01  # accuracy: of the load, by which neighbours in a periodic box may change it
-IMAGES = 20  # accuracy: along each side, on either side: the rest is 3 % of all
-ROUNDS = 1000  # tuning: through the box that are looked at
-SAME = 1e-9  # accuracy: ways this near, relatively, are the same
-BEYOND = 100.0  # physics: times slower or faster than all branches: nothing relaxes
+STEEP = 0.5  # physics: largest rms slope that counts as small
+STEEPEST = 1.0  # physics: radius of contact over radius of the sphere, up to which slopes are small
+SOFTEST, HARDEST = 1e3, 1e12  # physics: range of shear moduli [Pa]; gels have 1e3, diamond 5e11
+STRAIN = 1.0  # physics: mean pressure over 2 G/(1 - nu), up to which strains are small
+LEAST = 1e-12  # rounding: smallest modulus of a fluid over its instantaneous modulus, to avoid division by 0
+NEAR = 0.4  # accuracy: distance to the starting point, over the longest wave, at which imprints overlap
+REMEMBERS = 0.1  # accuracy: relaxation time over the time since the imprint, below which it is forgotten
+ALONE = 0.01  # accuracy: limit on the relative change of the load by periodic images
+IMAGES = 20  # accuracy: number of images summed on each side; the others add 3 %
+ROUNDS = 1000  # tuning: limit on the passages through the box that are checked for imprints
+SAME = 1e-9  # rounding: relative difference below which distances are the same
+BEYOND = 100.0  # physics: ratio of frequencies to those of all branches, above which nothing relaxes
 
 
 def doubts_of_scene(job: Sections) -> Iterator[Doubt]:
-    """Yield doubts, in the order of the sections."""
+    """Yield warnings in the order of the sections."""
     material = job.material.fitted
     yield from _slopes(job.grid, job.surface)
     yield from doubt_moduli(material)
@@ -45,21 +44,21 @@ def doubts_of_scene(job: Sections) -> Iterator[Doubt]:
 
 
 def doubt_slope(slope: float) -> Iterator[Doubt]:
-    """Yield a doubt about an rms slope, if it is too large."""
+    """Yield a warning about an rms slope above STEEP."""
     if slope > STEEP:
         yield Doubt("steep", "surface", {"slope": slope, "most": STEEP})
 
 
-READ = OnOneMesh | RoughSpectrum | Topography  # shapes whose heights only a look at them tells
+READ = OnOneMesh | RoughSpectrum | Topography  # shapes whose heights are read from files or arrays
 
 
 def says_all(surface: tuple[Any, ...]) -> bool:
-    """Return whether the slopes of a surface follow from the job, without its heights."""
+    """Return True if the rms slope of a surface follows from the job without its heights."""
     return not any(isinstance(shape, READ) or getattr(shape, "rms_slope", 0.0) is None for shape in surface)
 
 
 def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Doubt]:
-    """Judge shapes whose rms slope follows from the job; those of files are known once they are read."""
+    """Yield a warning about the rms slope if it follows from the job."""
     if not says_all(surface):
         return
     square = 0.0
@@ -73,7 +72,7 @@ def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Doubt]:
 
 
 def doubt_moduli(material: Elastic | Zener) -> Iterator[Doubt]:
-    """Yield a doubt about moduli that no solid has."""
+    """Yield a warning about an instantaneous modulus that no solid has."""
     modulus = material.instant_modulus
     if modulus < SOFTEST:
         yield Doubt("soft", "material", {"modulus": modulus, "least": SOFTEST, "in_mega": 1e6 * modulus})
@@ -82,12 +81,12 @@ def doubt_moduli(material: Elastic | Zener) -> Iterator[Doubt]:
 
 
 def instant_contact_modulus(material: Elastic | Zener) -> float:
-    """E* = 2 G/(1 - nu) at a sudden strain [Pa], the largest there is."""
+    """Return the instantaneous contact modulus E* = 2 G/(1 - nu) [Pa], the largest at any time."""
     return 2.0 * material.instant_modulus / (1.0 - material.poisson)
 
 
 def _mean(stage: Stage, load: float, grid: Grid) -> float:
-    """Return the mean pressure of a stage that prescribes a load [Pa]; nothing for an approach."""
+    """Return the mean pressure of a stage with a load [Pa]; 0 for a stage with an approach."""
     if stage.control == "approach":
         return 0.0
     return load / (grid.lx * grid.ly) if stage.control == "force" else load
@@ -110,7 +109,7 @@ def _pressures(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
 
 
 def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) -> Iterator[Doubt]:
-    """Judge the largest load on a rough surface by the share that touches by Persson, erf(sqrt(2) p/(E* h'))."""
+    """Yield a warning if the largest load gives less than one point in contact by Persson, erf(sqrt(2) p/(E* h'))."""
     sticks = getattr(job, "adhesion", None) is not None or any(stage.control == "approach" for stage in job.history)
     slopes = [shape.rms_slope or 0.0 if isinstance(shape, Rough) else math.inf for shape in job.surface]
     stiffness = 2.0 * material.long_modulus / (1.0 - material.poisson) * math.hypot(*slopes)
@@ -121,9 +120,10 @@ def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) 
 
 
 def modulus_after(material: Elastic | Zener, seconds: float) -> float:
-    """Return a bound from above of a constant pressure over the strain that it has made after so long, as E* [Pa].
+    """Return an upper bound of pressure over strain after a constant pressure for `seconds`, as E* [Pa].
 
-    It is the mean of E*(t): int_0^t E*(t - s) J(s) ds = t and the creep compliance J rises, so J(t) >= t/int_0^t E*.
+    The bound is the mean of E*(t): int_0^t E*(t - s) J(s) ds = t with rising creep compliance J, so
+    J(t) >= t/int_0^t E*.
     """
     modulus = material.instant_modulus
     for branch in material.branches:
@@ -137,7 +137,7 @@ def modulus_after(material: Elastic | Zener, seconds: float) -> float:
 
 
 def _instants(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
-    """Judge stages of a rubber that follow each other at one instant, and are all."""
+    """Yield a warning if a relaxing body has several stages and none has a duration."""
     timeless = len(job.history) > 1 and not any(stage.seconds for stage in job.history)
     if timeless and material.instant_modulus > material.long_modulus and job.initial.state == "virgin":
         moduli = {"modulus": material.instant_modulus, "relaxed": material.long_modulus}
@@ -145,7 +145,7 @@ def _instants(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
 
 
 def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
-    """Sliding excites the angular frequencies q v of the surface's waves; branches answer around 1/relaxation time."""
+    """Yield a warning if the angular frequencies q v of the sliding waves are far from all 1/relaxation time."""
     branches = [one for one in material.branches if isinstance(one, PronyBranch) or one.G0 > 0.0]
     times = [branch.relaxation_time for branch in branches if 0.0 < branch.relaxation_time < math.inf]
     rough = [shape for shape in job.surface if isinstance(shape, Rough)]
@@ -154,7 +154,7 @@ def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     speeds += [math.hypot(*job.initial.velocity)] if any(job.initial.velocity) else []
     speeds += job.steady.velocities if job.steady else ()
     if not (times and lengths and speeds) or getattr(material, "temperature", None) is not None:
-        return  # at another temperature the branches relax at other rates
+        return  # relaxation times are given at another temperature
     low, high = 2 * math.pi * min(speeds) / max(lengths), 2 * math.pi * max(speeds) / min(lengths)
     slow, fast = 1.0 / max(times), 1.0 / min(times)
     if high * BEYOND < slow or low > fast * BEYOND:
@@ -167,7 +167,7 @@ def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
 
 
 def _room(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
-    """Judge a single sphere: the least radius its contact can have, where it goes, and whether the box holds that."""
+    """Yield warnings if the least contact of a single sphere is too large for its radius, or leaves the box."""
     grid, sphere = job.grid, job.surface[0]
     if len(job.surface) != 1 or not isinstance(sphere, Sphere) or min(grid.points) == 1:
         return
@@ -188,7 +188,7 @@ def _room(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
 
 
 def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
-    """Return the radius of contact at the end of a stage [m] by Hertz (1882), a lower bound for a body that creeps."""
+    """Return the contact radius [m] at the end of a stage by Hertz (1882), a lower bound for a creeping body."""
     if stage.control == "approach":
         return math.sqrt(max(stage.load.end, 0.0) * radius)
     force = _mean(stage, stage.load.end, grid) * grid.lx * grid.ly
@@ -196,7 +196,7 @@ def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
 
 
 def neighbours(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
-    """Judge a single sphere in a periodic box by the least radius that its contact has."""
+    """Yield a warning if images change the load of a single sphere in a periodic box."""
     modulus = instant_contact_modulus(material)
     return acting_neighbours(
         job, lambda radius: max((_hertz(stage, radius, modulus, job.grid) for stage in job.history), default=0.0)
@@ -204,11 +204,11 @@ def neighbours(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
 
 
 def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Iterator[Doubt]:
-    """Yield a doubt about a sphere alone in a periodic box, if the images of its contact change its load.
+    """Yield a warning if periodic images of the contact change the load of a single sphere by more than ALONE.
 
-    `contact` gives for the radius R of the sphere that of the contact under the same force by Hertz, a. An image at the
-    distance r, where the force P is, bends the body by the curvature `P/(2 pi E* r^3)` of its displacement. So the load
-    at a given radius of contact changes by `2 a^3/(3 pi) sum 1/r^3`.
+    `contact` maps the radius R of the sphere [m] to the Hertzian radius of contact a [m]. An image at the distance r
+    with the force P adds the curvature `P/(2 pi E* r^3)`, so the load at a given contact radius changes by
+    `2 a^3/(3 pi) sum 1/r^3`.
     """
     grid, sphere = job.grid, job.surface[0]
     single = len(job.surface) == 1 and isinstance(sphere, Sphere) and min(grid.points) > 1
@@ -224,14 +224,13 @@ def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Itera
         )
 
 
-# -- slides that come round -------------------------------------------------------------------------------------------
+# -- slides over their own imprint ------------------------------------------------------------------------------------
 
 
 def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
-    """Yield a doubt about each slide, of stages of one velocity, that goes over the imprint of its own beginning.
+    """Yield a warning for each slide (consecutive stages of one velocity) that meets the imprint of its own beginning.
 
-    Waves that fill the box repeat themselves on a shorter way, and mean it. A slide that begins in its own steady state
-    finds no other imprint.
+    Surfaces of waves only are periodic by intention. A slide that begins in its steady state meets no other imprint.
     """
     grid, initial = job.grid, job.initial
     times = [branch.relaxation_time for branch in material.branches if branch.relaxation_time < math.inf]
@@ -239,7 +238,7 @@ def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
         return
     memory = max(times) * material.time_factor
     longest = max((shape.long_wavelength for shape in job.surface if isinstance(shape, Rough)), default=0.0)
-    near = NEAR * min(longest, *grid.size)  # longer waves are those of the box
+    near = NEAR * min(longest, *grid.size)
     steady = (initial.velocity, initial.pressure) if initial.state == "steady" else None
     for velocity, stages in groupby(enumerate(job.history), key=lambda stage: stage[1].velocity):
         (index, first), *more = stages
@@ -254,8 +253,8 @@ def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
 
 
 def _round_trip(grid: Grid, velocity: tuple[float, float], most: float, near: float) -> float:
-    """Return the way [m] after which a slide of at `most` so many seconds is within `near` of where it began, but for
-    whole boxes; inf if it never is."""
+    """Return the distance [m] after which a slide of at most `most` seconds is within `near` [m] of a periodic image of
+    its start; inf if it never is."""
     along = [abs(one) for one in velocity]
     main, other = (0, 1) if along[0] / grid.lx >= along[1] / grid.ly else (1, 0)
     for count in range(1, ROUNDS):

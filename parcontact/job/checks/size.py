@@ -1,4 +1,4 @@
-"""Warnings about what a job needs: memory and disk, against those of this machine, and lower bounds all of them."""
+"""Warnings about memory and disk: lower bounds of what a job needs, compared with this machine."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from ..sections.calculation import Grid, Output
 from . import Sections
 from .limits import count_steps
 
-MAPS, MAPS_FREE = 9.0, 18.0  # tuning: of 8 bytes per point, which any run holds; free ones have padded transforms
-MOST_INSTANTS = 10**6  # tuning: of fields in one file; each has its place in it from the start
+MAPS, MAPS_FREE = 9.0, 18.0  # tuning: least memory of a periodic and of a free run [8 bytes per point]
+MOST_INSTANTS = 10**6  # tuning: most saved instants in one file, which reserves space for all of them
 GIGA = 1e9
 CGROUP = Path("/sys/fs/cgroup/memory.max")
 
 
 def doubts_of_size(job: Sections) -> Iterator[Doubt]:
-    """Yield doubts about memory and disk."""
+    """Yield warnings about memory and disk."""
     grid, output = job.grid, job.output
     yield from doubt_memory(grid)
     if output.fields:
@@ -32,7 +32,7 @@ def doubts_of_size(job: Sections) -> Iterator[Doubt]:
 
 
 def doubt_memory(grid: Grid) -> Iterator[Doubt]:
-    """Yield a doubt if no run of a grid can fit into the memory of the machines it runs on."""
+    """Yield a warning if the grid cannot fit into the memory of the machines."""
     needed = (MAPS if all(grid.cyclic) else MAPS_FREE) * 8.0 * grid.nx * grid.ny
     each, count = _memory(), machines()
     if needed > each * count:
@@ -42,19 +42,19 @@ def doubt_memory(grid: Grid) -> Iterator[Doubt]:
 
 
 def beyond_file(count: int, output: Output) -> str:
-    """Return what to say if one file cannot hold so many instants of fields, or ''."""
+    """Return a message if a run of `count` steps saves more than MOST_INSTANTS instants of fields, or ''."""
     saved = -(-count // output.every)
     if not output.fields or saved <= MOST_INSTANTS:
         return ""
     least = -(-count // MOST_INSTANTS)
     return (
-        f"output.every: {saved:.4g} instants of fields would be saved, and a file holds {MOST_INSTANTS} at most; use "
+        f"output.every: {saved:.4g} instants of fields would be saved, but a file holds at most {MOST_INSTANTS}; use "
         f"every: {least} or more"
     )
 
 
 def machines() -> int:
-    """Return on how many machines this program runs, as far as its launcher tells."""
+    """Return the number of machines of this program, from the environment variables of its launcher."""
 
     def number(name: str) -> int:
         text = os.environ.get(name, "")
@@ -65,7 +65,7 @@ def machines() -> int:
 
 
 def _memory() -> float:
-    """Return the bytes of this machine, or those it grants to this program."""
+    """Return the memory of this machine, or the limit of this program's control group [bytes]."""
     whole = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     try:
         return min(whole, float(CGROUP.read_text()))
@@ -74,7 +74,7 @@ def _memory() -> float:
 
 
 def _free(directory: Path) -> float:
-    """Return the bytes left on the disk of the nearest directory that there is."""
+    """Return the free disk space [bytes] of the directory, or of its nearest existing parent."""
     for place in (directory.absolute(), *directory.absolute().parents):
         try:
             return float(shutil.disk_usage(place).free)

@@ -32,22 +32,22 @@ FieldName = Literal["pressure", "displacement", "gap", "height", "temperature", 
 
 
 def _different(name: str) -> Rule:
-    """Return the rule that no value of a list comes twice."""
+    """Return the rule that the values of a list differ."""
 
     def check(values: tuple[Any, ...]) -> Iterator[Fault]:
         for index, value in enumerate(values):
             if value is not None and value in values[:index]:
                 shown = value if name == "fields" else repr(value)
-                yield Fault(f"names {shown} a second time", (name, index))
+                yield Fault(f"repeats {shown}", (name, index))
 
     return Rule((name,), check)
 
 
 def _boundary(value: Any) -> Any:
-    """Return `periodic`, `free`, or the pair of both; a pair of two that are the same is one of them."""
+    """Return `periodic`, `free`, or the pair of both; a pair of two equal words becomes one word."""
     pair = tuple(value) if isinstance(value, list | tuple) else (value, value)
     if pair == STRIP[::-1]:
-        refuse(Fault("must be periodic along x where it is free along y, got [free, periodic]: exchange x and y"))
+        refuse(Fault("must be [periodic, free] if it is free along one axis, got [free, periodic]: exchange x and y"))
     if len(pair) != 2 or any(one not in STRIP for one in pair):
         refuse(Fault(f"must be {BOUNDARY}, got {quote(value)}{did_you_mean(value, STRIP)}"))
     return pair if pair == STRIP else pair[0]
@@ -73,7 +73,7 @@ class Grid(Part):
 
     @property
     def cyclic(self) -> tuple[bool, bool]:
-        """Return whether the box repeats itself along x, and along y."""
+        """Return whether the box is periodic along x and along y."""
         return self.boundary != "free", self.boundary == "periodic"
 
     @property
@@ -106,14 +106,14 @@ class Grid(Part):
 
 
 class Body(Part):
-    """A layer on a rigid base, to which it is bonded, or along which it slides freely: without it a half space."""
+    """A layer, bonded to a rigid base or sliding on it without friction; without this section a half space."""
 
     thickness: Positive = Field(description="a positive thickness [m]")
     base: Literal["bonded", "smooth"] = "bonded"
 
 
-TOLERANCE_SHARE, BRANCH_SHARE = 0.5, 0.1  # accuracy: parts of numerics.accuracy
-AREA_BY_STEPS = 0.25  # accuracy: the error of the area by time steps, over that of friction, at most
+TOLERANCE_SHARE, BRANCH_SHARE = 0.5, 0.1  # accuracy: tolerance and branch_error, over numerics.accuracy
+AREA_BY_STEPS = 0.25  # accuracy: largest error of the area by time steps, over the error of friction
 FRACTION: TypeAdapter[float] = TypeAdapter(Fraction)
 
 
@@ -125,7 +125,7 @@ class Accuracy(Part):
 
     @property
     def both(self) -> tuple[float, float]:
-        """The accuracies of friction and of the area."""
+        """Return the accuracies of friction and of the area."""
         return self.friction, self.area
 
     @property
@@ -134,7 +134,7 @@ class Accuracy(Part):
 
     @property
     def of_steps(self) -> float:
-        """The error of friction that time steps may make: the area has a quarter of it at most."""
+        """Return the error of friction that time steps may cause; the error of the area is at most a quarter of it."""
         return min(self.friction, self.area / AREA_BY_STEPS)
 
 
@@ -145,8 +145,8 @@ def _accuracy(value: Any, info: ValidationInfo) -> float | Accuracy:
 
 
 class Numerics(Part):
-    """Settings of the solution; `accuracy` chooses the tolerance and what branches may be folded, where these are
-    not given, and says how fine the mesh should be."""
+    """Settings of the solution; `accuracy` chooses `tolerance` and `branch_error` unless they are given, and the mesh
+    of `points: auto`."""
 
     accuracy: Annotated[float | Accuracy, PlainValidator(_accuracy, json_schema_input_type=Fraction | Accuracy)] = (
         Field(default=1e-2, description="an error of friction and area [-] above 0 and below 1, or {friction, area}")
@@ -162,11 +162,11 @@ class Numerics(Part):
     accept_unconverged: Flag = False
     strict: Flag = False
 
-    foreign = MappingProxyType({"slope": Instead("it went; slopes of the surface are those of its waves")})
+    foreign = MappingProxyType({"slope": Instead("it was removed; slopes are those of the waves of the surface")})
     _chosen: dict[str, float] = PrivateAttr(default_factory=dict)
 
     def model_post_init(self, context: Any) -> None:
-        """Let the accuracy choose what is not given."""
+        """Choose tolerance and branch error by the accuracy unless they are given."""
         least = self.asked.strictest
         shares = {"tolerance": TOLERANCE_SHARE * least, "branch_error": BRANCH_SHARE * least}
         self._chosen = {name: share for name, share in shares.items() if name not in self.model_fields_set}
@@ -174,12 +174,12 @@ class Numerics(Part):
 
     @property
     def chosen(self) -> dict[str, float]:
-        """The values that the accuracy has chosen: those of keys that are not given."""
+        """Return the values that the accuracy chose, by key."""
         return self._chosen
 
     @property
     def asked(self) -> Accuracy:
-        """The accuracy of friction and of the area; a number is that of both."""
+        """Return the accuracies of friction and of the area, which are equal if one number is given."""
         if isinstance(self.accuracy, Accuracy):
             return self.accuracy
         return Accuracy(friction=self.accuracy, area=self.accuracy)
@@ -190,11 +190,11 @@ def _needs_energy(branch_dissipation: bool, energy: bool) -> Iterator[Fault]:
         yield Fault("needs energy: true", ("branch_dissipation",))
 
 
-MEASURE_MESH = "it went; `parcontact study` measures the error of the mesh, with a ladder study.mesh"
+MEASURE_MESH = "it was removed; `parcontact study` measures the error of the mesh, with a list study.mesh"
 
 
 class Output(Part):
-    """Files of a run: which, where and how often. A relative directory starts at the working directory."""
+    """Output files of a run; a relative directory starts at the working directory."""
 
     directory: Annotated[Path, AfterValidator(from_home)] = Field(
         default=Path("out"), description="the path of a directory (text)"
@@ -217,7 +217,7 @@ class Output(Part):
 
 
 class Checkpoint(Part):
-    """Times at which the state is saved, by steps or by wall time, and how many of the last ones are kept."""
+    """Intervals between checkpoints, in steps or in wall time, and the number of checkpoints that are kept."""
 
     every: Count | None = Field(default=None, description="a positive whole number of steps")
     minutes: Positive | None = Field(default=None, description="a positive wall time in minutes [min]")
@@ -227,12 +227,12 @@ class Checkpoint(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
-        """Save every 10 minutes unless told otherwise."""
+        """Save every 10 minutes by default."""
         return data if data.keys() & {"every", "minutes"} else {"minutes": 10.0, **data}
 
 
 LADDERS = ("mesh", "cells_per_step", "integrator")
-SWEPT = "it went; a `sweep:` compares values of numerics.{}"
+SWEPT = "it was removed; compare values of numerics.{} by a `sweep:`"
 
 
 def _some_ladder(*ladders: tuple[Any, ...]) -> Iterator[Fault]:
@@ -241,7 +241,7 @@ def _some_ladder(*ladders: tuple[Any, ...]) -> Iterator[Fault]:
 
 
 class Study(Part):
-    """Ladders that `parcontact study` refines; a ladder that is left out has the job's own value."""
+    """Lists of values (ladders) for `parcontact study`; a missing ladder is the value of the job."""
 
     mesh: Annotated[tuple[Count, ...], BeforeValidator(listed)] = Field(
         default=(), description="a list of positive whole numbers of points along x"

@@ -28,14 +28,14 @@ def _ordered(name: str, than: str) -> Rule:
 
     def check(shorter: float, longer: float) -> Iterator[Fault]:
         if shorter > longer:
-            limit = " and ".join(dict.fromkeys(("long_wavelength", than)))  # the latter may be the former by default
+            limit = " and ".join(dict.fromkeys(("long_wavelength", than)))  # the default of `than` is long_wavelength
             yield Fault(f"must not be longer than {limit}, {longer:g} m, got {shorter!r}", (name,))
 
     return Rule((name, than), check)
 
 
 class Anisotropy(Part):
-    """Waves along `angle` are `ratio` times longer than those across it, with the same power."""
+    """Waves along `angle` are `ratio` times as long as waves of the same power across it."""
 
     ratio: Number = Field(ge=1, le=1e6, description="a number of 1 or more")
     angle: Real = Field(default=0.0, description="a finite angle [deg]")
@@ -65,10 +65,10 @@ class Rough(Part):
 
 
 class RoughSpectrum(Part):
-    """A random surface with a measured isotropic spectrum, in a table whose columns say which: `q[1/m] C2D[m^4]`, or
-    `q[1/m] C1D[m^3]` of profiles. With `hurst` it goes on beyond its shortest wave as q^(-2 (1 + hurst)).
+    """A random surface with a measured isotropic spectrum, from a table with columns `q[1/m] C2D[m^4]`, or
+    `q[1/m] C1D[m^3]` of profiles. With `hurst` it is extrapolated to shorter waves as q^(-2 (1 + hurst)).
 
-    Wavelengths are those of the data unless they are given.
+    The default range of wavelengths is that of the data.
     """
 
     label: ClassVar[str] = "shape rough with a spectrum"
@@ -83,7 +83,7 @@ class RoughSpectrum(Part):
 
 
 class Sphere(Part):
-    """A sphere; `paraboloid` is its parabola at the tip, the surface of Hertz's theory."""
+    """A sphere; `profile: paraboloid` is its parabola at the tip, as in Hertz's theory."""
 
     shape: Literal["sphere"] = "sphere"
     radius: Radius
@@ -92,7 +92,7 @@ class Sphere(Part):
 
 
 class Cylinder(Part):
-    """A cylinder lying along `axis`."""
+    """A cylinder along `axis`."""
 
     shape: Literal["cylinder"] = "cylinder"
     radius: Radius
@@ -102,7 +102,7 @@ class Cylinder(Part):
 
 
 class Wave(Part):
-    """`A cos(2 pi (wx x/Lx + wy y/Ly) + phase)`; a product of cosines is the sum of two waves of half its amplitude."""
+    """`A cos(2 pi (wx x/Lx + wy y/Ly) + phase)`; a product of cosines is the sum of two waves of half the amplitude."""
 
     shape: Literal["wave"] = "wave"
     amplitude: Real = Field(description="a finite height [m]")
@@ -118,7 +118,7 @@ def _surface_file(path: Path, info: ValidationInfo) -> Path:
 
 
 class HeightFile(Part):
-    """Heights read from a file of the grid's shape, times `scale`; `dataset` names them in an HDF5 file."""
+    """Heights from a file with the shape of the grid, times `scale`; `dataset` is their name in an HDF5 file."""
 
     shape: Literal["file"] = "file"
     path: Annotated[Path, AfterValidator(_surface_file), Field(description="the path of a .npy, .h5 or .txt file")]
@@ -127,7 +127,7 @@ class HeightFile(Part):
 
 
 class MapUnits(Part):
-    """Units of the numbers in a file of a measured map, along the map and of its heights."""
+    """Units of a measured map: of positions (xy) and of heights (z)."""
 
     xy: MapUnit
     z: MapUnit
@@ -142,7 +142,7 @@ class Topography(Part):
 
     shape: Literal["topography"] = "topography"
     path: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a measured map")]
-    unit: MapUnit | None = None  # of heights and positions; only for formats that have none
+    unit: MapUnit | None = None  # unit of heights and positions, only for formats without units
     units: MapUnits | None = Field(default=None, description="a mapping {xy: UNIT, z: UNIT}")
     size: Annotated[
         tuple[Positive, Positive] | None, Field(description="two positive lengths [m], only for formats that have none")
@@ -150,7 +150,7 @@ class Topography(Part):
     pixel: Annotated[
         tuple[Positive, Positive] | None, BeforeValidator(both), Field(description="one or two positive lengths [m]")
     ] = None
-    nodata: Number | None = Field(default=None, description="the number that a file has for missing points")
+    nodata: Number | None = Field(default=None, description="the number that marks missing points in the file")
     outliers: Literal["keep", "clip"] = "keep"
     short_wavelength: Wavelength | None = Field(default=None, description="a positive wavelength [m]")
     channel: str | None = Field(default=None, description="the name of a channel of the file (text)")
@@ -165,7 +165,7 @@ class Topography(Part):
 
     @property
     def copies(self) -> int:
-        """Return how many times the map lies along each direction: a mirrored one twice."""
+        """Return the number of copies of the map along each axis: 2 if it is mirrored."""
         return 2 if self.periodic == "mirror" else 1
 
     @property
@@ -173,7 +173,7 @@ class Topography(Part):
         return self.units.z if self.units else self.unit
 
     def size_of(self, points: tuple[int, ...]) -> tuple[float, float] | None:
-        """Return the size [m] that the job gives to a map of points along x and y, if it does."""
+        """Return the size [m] that the job gives to a map with `points` along x and y, or None."""
         if self.pixel is None:
             return self.size
         return self.pixel[0] * points[0], self.pixel[1] * points[1]
@@ -185,9 +185,9 @@ class Flat(Part):
     shape: Literal["flat"] = "flat"
 
 
-# Given by their waves; the others are closed forms at every point.
+# Shapes given by their waves; the others are closed forms at every point.
 Spectral = Rough | RoughSpectrum | Wave | HeightFile | HeightArray | Topography
-OnOneMesh = HeightFile | HeightArray  # heights at the points of the grid, and nowhere else
+OnOneMesh = HeightFile | HeightArray  # shapes known at the points of one grid only
 KINDS: dict[str, type[Part]] = {
     "rough": Rough,
     "sphere": Sphere,
@@ -202,7 +202,7 @@ CHOSEN = chosen("shape", KINDS)
 
 
 def _shape(data: Any, info: ValidationInfo) -> Any:
-    """Return a shape; a rough one with a `spectrum` is measured, the others follow from a few numbers."""
+    """Return a shape; `shape: rough` with a `spectrum` is a RoughSpectrum."""
     if isinstance(data, dict) and data.get("shape") == "rough" and data.get("spectrum") is not None:
         return RoughSpectrum.model_validate(data, context=info.context)
     return data if isinstance(data, RoughSpectrum) else CHOSEN(data, info)

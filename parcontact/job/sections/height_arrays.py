@@ -1,4 +1,4 @@
-"""Heights that are given in Python instead of a file. In files that are written they are a height file beside these."""
+"""Heights given as an array in Python. A stored job names a height file in its own directory instead."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-SAME_CELL = 1e-3  # accuracy: relative: coordinates this close are rounded
+SAME_CELL = 1e-3  # rounding: relative difference of coordinates from equal spacing
 EXPECTED = "must be a numpy array of heights [m], real and finite, of shape (ny, nx)"
 
 
 class GivenHeights:
-    """A map of heights [m], read only. Where a job is sent to other ranks, `values` stay behind: root deals them.
+    """A read-only map of heights [m], shape (ny, nx). Only root has `values`: they are not sent with the job.
 
-    `cell` is the distance [m] of its points along x and y, nan where they have no coordinates.
+    `cell` is the spacing [m] of points along x and y, NaN without coordinates.
     """
 
     def __init__(self, given: Any) -> None:
-        """Raise TypeError or ValueError for what is no map of finite real numbers."""
-        import numpy as np  # slow to import, and jobs in files do without
+        """Raise TypeError or ValueError unless `given` is a map of finite real numbers."""
+        import numpy as np  # slow import, not needed for jobs in files
 
         self.cell = math.nan, math.nan
         if sorted(map(str, getattr(given, "dims", ()))) == ["x", "y"]:  # xarray's axes have names, and places
@@ -44,9 +44,7 @@ class GivenHeights:
             raise ValueError(f"{wrong} of {values.size} that are not finite")
         highest = float(np.abs(values).max(initial=0.0))
         if highest and not SMALLEST <= highest <= LARGEST:
-            raise ValueError(
-                f"heights of {highest:.3g} m: beyond {SMALLEST:g} to {LARGEST:g} m nothing can be computed"
-            )
+            raise ValueError(f"heights of {highest:.3g} m, outside of {SMALLEST:g} to {LARGEST:g} m")
         values.flags.writeable = False
         self.values: NDArray[np.float64] | None = values
         self.shape: tuple[int, int] = values.shape
@@ -55,7 +53,7 @@ class GivenHeights:
 
     @property
     def name(self) -> str:
-        """The name of the file in which they are stored: other heights have another one."""
+        """Return the name of the file in which the heights are stored, with their checksum."""
         return f"surface-{self.checksum}.npy"
 
     def __eq__(self, other: object) -> bool:
@@ -72,9 +70,9 @@ class GivenHeights:
 
 
 def _distance(given: Any, axis: str) -> float:
-    """Return how far the points of an xarray.DataArray are apart along an axis [m], nan where they have no coordinates.
+    """Return the spacing [m] of an xarray.DataArray along an axis, NaN without coordinates.
 
-    Raises ValueError where they are not equally spaced.
+    Raises ValueError if coordinates are not equally spaced.
     """
     import numpy as np
 
@@ -99,7 +97,7 @@ def _heights(given: Any) -> GivenHeights:
 
 
 class HeightArray(Part):
-    """Heights given in Python, as a numpy array. A job that is stored names a file of them, which lies beside it."""
+    """Heights given in Python as a numpy array; a stored job names a height file instead."""
 
     shape: Literal["array"] = "array"
     heights: Annotated[GivenHeights, PlainValidator(_heights), WithJsonSchema({"allOf": [False]})] = Field(
@@ -107,14 +105,14 @@ class HeightArray(Part):
     )
 
     def stored(self) -> dict[str, Any]:
-        """Return the file of heights that stands for it, as plain data."""
+        """Return the `shape: file` of a stored job, as plain data."""
         return {"shape": "file", "path": self.heights.name, "scale": 1.0, "dataset": "heights"}
 
 
 def with_shapes(surface: Any) -> Any:
-    """Return the `surface` of a job as a list of shapes; an array, alone or in a list, is one.
+    """Return the `surface` of a job as a list of shapes; arrays become shapes.
 
-    Rows of numbers are meant as an array, and are refused as a whole.
+    Nested lists of numbers become one array, which is refused as a whole.
     """
     shapes = surface if isinstance(surface, list) else [surface]
     if len(shapes) > 1 and all(isinstance(shape, list | int | float) for shape in shapes):

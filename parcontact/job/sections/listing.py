@@ -1,4 +1,4 @@
-"""A resolved job as plain data: what YAML loads again, what tells it from other jobs, a table with units to read."""
+"""A resolved job as plain data: for YAML, for comparison with other jobs, and as a table with units."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ from .height_arrays import HeightArray
 from .part import Part
 from .stages import Ramp
 
-MOST_BRANCHES = 6  # of a table to read: of more the first and the last
+MOST_BRANCHES = 6  # largest number of branches that a table shows; of more it shows the first and the last
 
 
 def plain_data(value: Any) -> Any:
-    """Return a value of a job as the plain data it was written as; keys without a value are left out, and those that
-    the accuracy has chosen: it chooses them again."""
+    """Return a value of a job as plain data; keys without a value and keys chosen by the accuracy are left out."""
     if isinstance(value, HeightArray):
         return value.stored()
     if isinstance(value, Part):
@@ -33,13 +32,13 @@ def plain_data(value: Any) -> Any:
 
 
 def items(part: Part) -> Iterator[tuple[str, Any]]:
-    """Return the keys of a part that have a value, as they are written in a job."""
+    """Return the keys of a part that have a value, with their values."""
     names = (name for name in type(part).model_fields if name not in part.left_out())
     return ((name, value) for name in names if (value := getattr(part, name)) is not None)
 
 
 def plain_job(job: Any) -> dict[str, Any]:
-    """Return a job as plain data by which it is known; files that are read are known by what they hold."""
+    """Return a job as plain data for its fingerprint, with checksums of input files in place of their paths."""
     data: dict[str, Any] = plain_data(job)
     data["numerics"] |= job.numerics.chosen
     for part, given in zip([*data["surface"], data["material"]], [*job.surface, job.material], strict=True):
@@ -54,13 +53,13 @@ def plain_job(job: Any) -> dict[str, Any]:
 
 
 def unit(part: Part, key: str) -> str:
-    """Return the unit of a key, from the brackets in its description; '' for numbers without one and for words."""
+    """Return the unit of a key, from the brackets in its description; '' if it has none."""
     found = re.search(r"\[([^\],]+)\]", type(part).model_fields[key].description or "")
     return found.group(1) if found and found.group(1) != "-" else ""
 
 
 def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
-    """Yield key, value and unit of everything in a part; each item of a list of parts is one row."""
+    """Yield key, value and unit of all keys in a part; each item of a list of parts is one row."""
     for key, value in items(part):
         name = f"{path}{key}"
         if isinstance(value, Part):
@@ -78,7 +77,7 @@ def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
 
 
 def _unit_of(value: Any, part: Part, key: str) -> str:
-    """Return the unit of a number, and the velocity of a ramp; '' for words, as time_step: auto, and for mappings."""
+    """Return the unit of a number, with the velocity of a ramp; '' for words such as auto, and for mappings."""
     if isinstance(value, Ramp) and value.velocity:
         return f"{unit(part, key)} at {text(value.velocity)} m/s"
     return "" if isinstance(value, str | Part) else unit(part, key)
@@ -91,7 +90,7 @@ def listed_line(part: Part) -> str:
 
 
 def text(value: Any) -> str:
-    """Return a value in the few digits that a reader wants."""
+    """Return a value as text, numbers in six digits."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

@@ -21,13 +21,13 @@ from .temperature import Celsius, Shift, shifted
 Modulus = Annotated[NonNegative, Field(description="a shear modulus [Pa] of zero or more")]
 Hardness = Annotated[Positive | None, Field(description="a positive pressure [Pa] at which the counterbody yields")]
 Poisson = Annotated[Number, Field(gt=-1, le=0.5, description="a Poisson ratio [-] above -1 and up to 0.5")]
-ROUNDED = 1e-9  # rounding: of fractions that add up to 1
+ROUNDED = 1e-9  # rounding: allowed error of the sum of fractions
 YOUNG = ("young_modulus", "youngs_modulus", "elastic_modulus", "young", "e")
 BY_THREE = "moduli here are shear moduli: {} is E/(2 (1 + poisson)), a third of Young's modulus E for rubber"
 
 
 class ZenerBranch(Part):
-    """A spring G0 in series with a Kelvin element, spring G1 beside dashpot eta1; G1 = 0 makes it a Maxwell branch."""
+    """A spring G0 in series with a Kelvin element (spring G1 parallel to dashpot eta1); a Maxwell branch if G1 = 0."""
 
     label: ClassVar[str] = "a branch of the form G0, G1, eta1"
     G0: Positive = Field(description="a positive shear modulus [Pa]")
@@ -36,17 +36,17 @@ class ZenerBranch(Part):
 
     @property
     def relaxation_time(self) -> float:
-        """Time constant of stress relaxation at constant strain, eta1 / (G0 + G1) [s]."""
+        """Return the time constant of stress relaxation at constant strain, eta1 / (G0 + G1) [s]."""
         return self.eta1 / (self.G0 + self.G1)
 
     @property
     def instant_modulus(self) -> float:
-        """Modulus at a sudden strain [Pa]."""
+        """Return the instantaneous modulus [Pa]."""
         return self.G0 if self.eta1 > 0 else self.G0 * self.G1 / (self.G0 + self.G1)
 
     @property
     def long_modulus(self) -> float:
-        """Modulus after all relaxation [Pa]."""
+        """Return the long-term modulus [Pa]."""
         return self.G0 if math.isinf(self.eta1) else self.G0 * self.G1 / (self.G0 + self.G1)
 
 
@@ -59,24 +59,24 @@ class PronyBranch(Part):
 
     @property
     def instant_modulus(self) -> float:
-        """Modulus at a sudden strain [Pa]."""
+        """Return the instantaneous modulus [Pa]."""
         return self.modulus
 
     @property
     def long_modulus(self) -> float:
-        """Modulus after all relaxation: none [Pa]."""
+        """Return the long-term modulus, 0 [Pa]."""
         return 0.0
 
 
 class FractionBranch(Part):
-    """A term of a Prony series of finite-element programs: `G(t) = modulus_0 (1 - sum g (1 - exp(-t/tau)))`."""
+    """A term of a Prony series as in finite-element programs: `G(t) = modulus_0 (1 - sum g (1 - exp(-t/tau)))`."""
 
     label: ClassVar[str] = "a branch of the form g, tau"
     g: Number = Field(ge=0, le=1, description="a fraction of modulus_0 [-] from 0 to 1")
     tau: Positive = Field(description="a positive relaxation time [s]")
 
     def times(self, modulus: float) -> PronyBranch:
-        """Return the branch of a body with this modulus at a sudden strain [Pa]."""
+        """Return the branch of a body with the instantaneous modulus `modulus` [Pa]."""
         return PronyBranch(modulus=self.g * modulus, relaxation_time=self.tau)
 
 
@@ -86,7 +86,7 @@ FORMS: tuple[type[AnyBranch], ...] = (ZenerBranch, PronyBranch, FractionBranch)
 
 
 def _branch(data: Any, info: ValidationInfo) -> AnyBranch:
-    """Return a branch of the form that its keys have."""
+    """Return a branch in the form that its keys determine."""
     if isinstance(data, AnyBranch):
         return data
     names = [", ".join(form.words()) for form in FORMS]
@@ -120,12 +120,12 @@ class Elastic(Part):
 
     @property
     def fitted(self) -> Elastic:
-        """The body itself."""
+        """Return the body itself."""
         return self
 
     @property
     def instant_modulus(self) -> float:
-        """Modulus at a sudden strain, and after all relaxation (`long_modulus`) [Pa]."""
+        """Return the shear modulus, which is also the long-term modulus [Pa]."""
         return self.shear_modulus
 
     long_modulus = instant_modulus
@@ -151,17 +151,17 @@ Measured = Annotated[
 
 
 def _fractions(modulus_0: float | None, modulus_inf: float, branches: tuple[AnyBranch | None, ...]) -> Iterator[Fault]:
-    """Fractions need the modulus of which they are, and are all that then makes the body relax."""
+    """Check that fractions have a modulus_0, and that a body with modulus_0 has fractions only, of sum 1 at most."""
     fractions = [branch.g for branch in branches if isinstance(branch, FractionBranch)]
     if fractions and modulus_0 is None:
         yield Fault(
-            "is missing: g of branches is a fraction of it; give the modulus at a sudden strain", ("modulus_0",)
+            "is missing: g of branches is a fraction of it; give the instantaneous shear modulus [Pa]", ("modulus_0",)
         )
     if modulus_0 is None:
         return
     if modulus_inf:
-        rest = "modulus_inf is what fractions leave of modulus_0: leave one of the two out"
-        yield Fault(f"does not go with modulus_0: {rest}", ("modulus_inf",), at_key=True)
+        rest = "modulus_inf = modulus_0 (1 - sum of g); leave one of the two out"
+        yield Fault(f"cannot be given with modulus_0: {rest}", ("modulus_inf",), at_key=True)
     if len(fractions) < len(branches) and None not in branches:
         yield Fault("needs branches of the form g, tau", ("modulus_0",), at_key=True)
     if sum(fractions) > 1.0 + ROUNDED:
@@ -172,21 +172,21 @@ def _stiff(modulus_0: float | None, modulus_inf: float, branches: tuple[AnyBranc
     own = [branch for branch in branches if not isinstance(branch, FractionBranch)]
     moduli = [branch.instant_modulus for branch in own if branch is not None]
     if modulus_0 is None and len(own) == len(branches) and None not in branches and modulus_inf + sum(moduli) == 0:
-        yield Fault("has no stiffness at all: modulus_inf and all branches are zero; give one of them a modulus [Pa]")
+        yield Fault("has no stiffness: modulus_inf and all branches are zero; give one of them a modulus [Pa]")
 
 
 class Zener(Part):
     """Springs, Kelvin and Maxwell branches in parallel with the spring `modulus_inf`, G_inf of Eq. (8).
 
-    The long-term modulus may be zero: the body is then a fluid in the long run. With a `shift` all relaxation times and
-    moduli are those of its reference temperature; at another `temperature` times are a_T times as long, and moduli b_T
-    times as large. With `modulus_0`, the modulus at a sudden strain, branches are fractions of it.
+    The body is a fluid if the long-term modulus is zero. With a `shift` relaxation times and moduli are given at its
+    reference temperature; at another `temperature` times are multiplied by a_T and moduli by b_T. With the
+    instantaneous modulus `modulus_0`, branches are fractions of it.
     """
 
     model: Literal["zener"] = "zener"
     poisson: Poisson = 0.5
     modulus_inf: Modulus = 0.0
-    modulus_0: Positive | None = Field(default=None, description="a positive shear modulus at a sudden strain [Pa]")
+    modulus_0: Positive | None = Field(default=None, description="a positive instantaneous shear modulus [Pa]")
     branches: tuple[Branch, ...] = Field(default=(), description="a list of branches")
     shift: Shift | None = Field(default=None, description="a mapping with law: wlf | arrhenius | factors")
     temperature: Celsius | None = Field(default=None, description="a temperature [deg C], up to 5000")  # the reference
@@ -204,7 +204,7 @@ class Zener(Part):
     @model_validator(mode="wrap")
     @classmethod
     def _with_moduli(cls, data: Any, handler: Callable[[Any], Self]) -> Self:
-        """Put moduli in place of fractions of `modulus_0`."""
+        """Replace fractions of `modulus_0` by moduli."""
         found = handler(data)
         if (whole := found.modulus_0) is None:
             return found
@@ -215,36 +215,36 @@ class Zener(Part):
 
     @property
     def fitted(self) -> Zener:
-        """The body itself."""
+        """Return the body itself."""
         return self
 
     @property
     def time_factor(self) -> float:
-        """a_T: the relaxation times at the temperature over those at the reference [-]."""
+        """Return a_T, the ratio of relaxation times at the temperature to those at the reference [-]."""
         if self.shift is None or self.temperature is None:
             return 1.0
         return float(10.0 ** self.shift.made.log_factor(self.temperature))
 
     @property
     def modulus_factor(self) -> float:
-        """b_T: the moduli at the temperature over those at the reference [-]."""
+        """Return b_T, the ratio of moduli at the temperature to those at the reference [-]."""
         if self.shift is None or self.temperature is None:
             return 1.0
         return float(10.0 ** log_vertical(self.shift.made, self.temperature))
 
     @property
     def instant_modulus(self) -> float:
-        """Modulus at a sudden strain, at the temperature of the body [Pa]."""
+        """Return the instantaneous modulus at the temperature of the body [Pa]."""
         return self.modulus_factor * (self.modulus_inf + sum(branch.instant_modulus for branch in self.branches))
 
     @property
     def long_modulus(self) -> float:
-        """Modulus after all relaxation, at the temperature of the body [Pa]."""
+        """Return the long-term modulus at the temperature of the body [Pa]."""
         return self.modulus_factor * (self.modulus_inf + sum(branch.long_modulus for branch in self.branches))
 
 
 class Dma(Part):
-    """A compound fitted to a table of measured moduli when the job is read, as `parcontact fit` does."""
+    """A material fitted to a table of measured moduli when the job is read, as by `parcontact fit`."""
 
     model: Literal["dma"] = "dma"
     path: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a table of measured moduli")]
@@ -274,30 +274,30 @@ class Dma(Part):
 
     @property
     def doubts(self) -> tuple[Doubt, ...]:
-        """Doubts about the fit."""
+        """Return the warnings about the fit."""
         return self._doubts
 
     @property
     def fitted(self) -> Zener:
-        """The compound as springs and Maxwell branches."""
+        """Return the material as springs and Maxwell branches."""
         return self._fitted
 
 
 def describe_temperature(material: Elastic | Zener | Dma) -> str:
-    """Return at which temperature a material is, '' of one that says nothing of temperatures."""
+    """Return a sentence on the temperature of a material, '' for a material without a shift."""
     body = material.fitted
     if not isinstance(body, Zener) or body.shift is None:
         return ""
     reference = body.shift.made.reference
     if body.temperature is None:
-        return f"material: at {reference:g} C, the reference of its shift, as the job gives no material.temperature"
+        return f"material: at {reference:g} C, the reference of its shift; the job gives no material.temperature"
     factors = f"a_T = {body.time_factor:.4g}"
     factors += f", b_T = {body.modulus_factor:.4g}" if body.shift.vertical else ""
     return f"material: at {body.temperature:g} C ({factors}, reference {reference:g} C)"
 
 
 def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
-    """Return a material at another temperature [deg C]. Raises InputError where nothing says how it depends on it."""
+    """Return a material at another temperature [deg C]. Raises InputError for a material without a shift."""
     body = material.fitted
     if not isinstance(body, Zener):
         raise InputError("temperatures need a material whose relaxation times depend on it: model zener or dma")
@@ -307,6 +307,6 @@ def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
 
 
 KINDS = {"elastic": Elastic, "zener": Zener, "dma": Dma}
-CALLED = dict.fromkeys(("prony", "maxwell", "viscoelastic", "sls"), "zener")  # what others name it
+CALLED = dict.fromkeys(("prony", "maxwell", "viscoelastic", "sls"), "zener")  # names in other programs
 AnyMaterial = Elastic | Zener | Dma
 Material = Annotated[AnyMaterial, PlainValidator(chosen("model", KINDS, CALLED), json_schema_input_type=AnyMaterial)]

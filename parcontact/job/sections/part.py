@@ -1,9 +1,9 @@
-"""Base of all sections of a job: frozen pydantic models whose mistakes are sentences, reported all at once.
+"""Base of all sections of a job: frozen pydantic models that report all mistakes at once, as sentences.
 
 A `Part` declares its keys as fields. The description of a field completes the sentence "grid.size must be ..." and
-holds its unit, `[m]`. Pydantic checks each field; the base class adds what needs several keys together: `one_of` and
-`at_most_one` for keys that exclude each other, and `rules`, each of which runs as soon as the fields it needs are
-right, whatever else is wrong.
+contains its unit, `[m]`. Pydantic checks each field; the base class checks several keys together: `one_of` and
+`at_most_one` for keys that exclude each other, and `rules`, each of which runs if the fields that it needs are correct,
+even if others are not.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from .quantities import from_home
 
 
 class Origin(NamedTuple):
-    """Origin of a job: its absolute path, and the file of its material if it includes one; `mesh` says which
-    points were chosen for it. `approaches` says of each stage where its approach was written, `strict` where
-    `numerics.strict` was; '' for jobs from Python.
+    """Origin of a job: its absolute path, and the file of an included material; `mesh` describes chosen points.
+    `approaches` are the places of the approaches of the stages, `strict` is that of `numerics.strict` ('' for jobs from
+    Python).
 
-    `numbers_as_texts`: PyYAML's own `safe_load` leaves texts for some numbers, 1.0e6 and 1e-3. `names_directory`: the
-    job says itself where its results go.
+    `numbers_as_texts`: texts such as 1e-3 may be numbers, as PyYAML's `safe_load` returns them. `names_directory`: the
+    job gives its output directory.
     """
 
     path: Path = Path("job.yaml")
@@ -58,14 +58,14 @@ def existing_file(path: Path, info: ValidationInfo) -> Path:
 
 
 class Rule(NamedTuple):
-    """A check of several fields; runs when all of those in `needs` are right (bad items of lists come as None)."""
+    """A check of the fields in `needs`; it runs if all of them are correct (wrong items of lists are None)."""
 
     needs: tuple[str, ...]
     check: Callable[..., Iterator[Fault]]
 
 
 class Instead(NamedTuple):
-    """A word that is no key: advice on what to give instead, and the keys of which one is meant."""
+    """Advice for an unknown key, and the keys of which one is probably meant."""
 
     advice: str
     keys: tuple[str, ...] = ()
@@ -76,8 +76,8 @@ class Part(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    label: ClassVar[str] = ""  # what the part is called, unless its kind says it: "shape sphere"
-    foreign: ClassVar[Mapping[str, Instead]] = {}  # words of other programs
+    label: ClassVar[str] = ""  # name of the part in messages, by default its kind, such as "shape sphere"
+    foreign: ClassVar[Mapping[str, Instead]] = {}  # advice for removed keys and for keys of other programs
     one_of: ClassVar[tuple[tuple[str, ...], ...]] = ()
     at_most_one: ClassVar[tuple[tuple[str, ...], ...]] = ()
     rules: ClassVar[tuple[Rule, ...]] = ()
@@ -88,7 +88,7 @@ class Part(BaseModel):
         return data
 
     def left_out(self) -> tuple[str, ...]:
-        """Return the keys that have a value but are not written."""
+        """Return the keys that are not written although they have a value."""
         return ()
 
     @classmethod
@@ -104,20 +104,20 @@ class Part(BaseModel):
             return data
         if not isinstance(data, dict):
             refuse(Fault(f"must be a mapping of keys, got {quote(data)}"))
-        known = cls.words()  # an empty value is an absent key, but no excuse for one that there is not
+        known = cls.words()  # a key without a value is absent if it is known, and a mistake otherwise
         given = {key: value for key, value in data.items() if value is not None or key not in known}
         filled = cls.filled(dict(given), info.context)
         part, errors = None, list[ErrorDetails]()
         try:
             part = handler(filled)
         except ValidationError as failure:
-            # a list of which a value is wrong is no list that is too short
+            # a list with a wrong value is not too short
             errors = [error for error in failure.errors() if error["type"] != "too_short" or not error["input"]]
-        # a default that was made of a wrong value is no second mistake
+        # a default that depends on a wrong value is not a second mistake
         of_user = [error for error in errors if _absent(error) or error["loc"][:1] in {(), *((key,) for key in given)}]
         meant = {word for key in given if key not in known for word in cls._instead(str(key)).keys}
-        told = [error for error in of_user or errors if not (_absent(error) and error["loc"][0] in meant)]
-        faults = [cls._fault(error, filled) for error in told]
+        reported = [error for error in of_user or errors if not (_absent(error) and error["loc"][0] in meant)]
+        faults = [cls._fault(error, filled) for error in reported]
         faults += cls._exclusive_faults(given, meant)
         for rule in cls.rules:
             values = [_value(cls, name, part, filled, errors, info.context) for name in rule.needs]
@@ -129,7 +129,7 @@ class Part(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Return pydantic's schema with what keys ask of each other."""
+        """Return pydantic's schema with the exclusions between keys."""
         found = handler.resolve_ref_schema(handler(core))
         rules: list[Any] = [{"oneOf": [{"required": [word]} for word in group]} for group in cls.one_of]
         rules += [{"not": {"required": list(pair)}} for group in cls.at_most_one for pair in combinations(group, 2)]
@@ -142,7 +142,7 @@ class Part(BaseModel):
 
     @classmethod
     def _fault(cls, error: ErrorDetails, filled: dict[str, Any]) -> Fault:
-        """Return pydantic's error as the rest of a sentence."""
+        """Return pydantic's error as a fault."""
         kind, path, value = error["type"], error["loc"], error["input"]
         if kind in (AT_VALUE, AT_KEY):
             return Fault(error["msg"], path, kind == AT_KEY)
@@ -151,7 +151,7 @@ class Part(BaseModel):
             word = kind_key(cls)
             label = cls.label or (word and f"{word} {cls.model_fields[word].default}")
             what = f"is not a key of {label}" if label else "is not a known key"
-            advice = cls._instead(name).advice or f"there are {', '.join(cls.words())}"
+            advice = cls._instead(name).advice or f"known keys: {', '.join(cls.words())}"
             return Fault(f"{what}; {advice}", path, at_key=True)
         field = cls.model_fields[name]
         words = literal_words(field.annotation) if _absent(error) or kind == "literal_error" else ()
@@ -163,14 +163,14 @@ class Part(BaseModel):
 
     @classmethod
     def _instead(cls, word: str) -> Instead:
-        """Return which keys an unknown word may stand for; no advice where nothing is known of it."""
+        """Return advice for an unknown word, empty if no key resembles it."""
         close = closest(word, cls.words())
         misspelt = Instead(f"did you mean {close}?", (close,)) if close else Instead("")
         return cls.foreign.get(word.lower(), misspelt)
 
     @classmethod
     def _exclusive_faults(cls, given: Mapping[str, Any], meant: Collection[str]) -> Iterator[Fault]:
-        """Check which keys were given, whatever their values; what an unknown word was `meant` to be does not lack."""
+        """Check the keys that exclude each other; keys that unknown words are `meant` to be do not count as missing."""
         for group in (*cls.one_of, *cls.at_most_one):
             present = [word for word in group if word in given]
             lacks = group in cls.one_of and not any(word in meant for word in group)
@@ -179,15 +179,15 @@ class Part(BaseModel):
                 yield Fault(f"{number} {list_words(group)}, got {' and '.join(present) or 'none'}")
 
 
-WRONG = object()  # stands for the value of a field that has mistakes
+WRONG = object()  # in place of the value of a field with mistakes
 
 
 def _value(
     kind: type[Part], name: str, part: Part | None, filled: Mapping[str, Any], errors: list[ErrorDetails], context: Any
 ) -> Any:
-    """Return the value of one field, also when other fields have mistakes.
+    """Return the value of one field, also if other fields have mistakes.
 
-    It is WRONG if it has mistakes itself; in a list they are of single items, for which None stands.
+    A value with mistakes is WRONG; in a list, wrong items are None.
     """
     if part is not None:
         return getattr(part, name)
@@ -207,7 +207,7 @@ def _value(
 
 
 def kind_key(part: type[Part]) -> str:
-    """Return the key that says which kind of part it is, '' for parts of which there is one kind."""
+    """Return the key that selects the kind of a part (shape, model, law), or ''."""
     kinds = (word for word in ("shape", "model", "law") if word in part.model_fields)
     return next((word for word in kinds if len(get_args(part.model_fields[word].annotation)) == 1), "")
 

@@ -1,4 +1,4 @@
-"""The kinds of values in a job, and the short forms in which they may be written."""
+"""Types of the values in a job, and their short forms."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from ..text.fault import Fault, quote, refuse, shorten
 
-FROM_SURFACE = "from surface"  # of a grid: what its measured map has
-AUTO_POINTS = "auto"  # of a grid: what the accuracy asks for
-MOST = 2**31 - 1  # of what is counted: the libraries for transforms and messages count in 32 bits
-SMALLEST, LARGEST = 1e-60, 1e60  # accuracy: of numbers, so that double precision holds what follows from them
-LONGEST_NUMBER = 400  # tuning: characters of a number that is given as a text
-LONGEST_NAME = 4096  # characters of a path: PATH_MAX of Linux
+FROM_SURFACE = "from surface"  # grid.points or grid.size: those of the measured map
+AUTO_POINTS = "auto"  # grid.points: chosen by the accuracy
+MOST = 2**31 - 1  # largest whole number: transforms and messages count in 32 bits
+SMALLEST, LARGEST = 1e-60, 1e60  # rounding: range of numbers in a job, whose squares and quotients do not overflow
+LONGEST_NUMBER = 400  # tuning: longest text of a number [characters]
+LONGEST_NAME = 4096  # longest path, PATH_MAX of Linux [characters]
 
-MOST_OF_A_RANGE = 100_000  # tuning
+MOST_OF_A_RANGE = 100_000  # tuning: most numbers in a range first:last:count
 
 
 def _number(value: Any, info: ValidationInfo) -> Any:
-    """Return the number that a text stands for, where texts may be numbers."""
+    """Return a text as a number, if texts may be numbers."""
     if isinstance(value, str) and len(value) <= LONGEST_NUMBER and getattr(info.context, "numbers_as_texts", False):
         with suppress(ValueError):
             return float(value)
@@ -30,13 +30,13 @@ def _number(value: Any, info: ValidationInfo) -> Any:
 
 
 def _whole(value: Any, info: ValidationInfo) -> Any:
-    """Return 1e3 as a whole number."""
+    """Return a float such as 1e3 as a whole number."""
     value = _number(value, info)
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def both(value: Any) -> Any:
-    """Return a pair; one value stands for both directions."""
+    """Return a pair; a single value is used for both axes."""
     return value if isinstance(value, list | tuple) else (value, value)
 
 
@@ -57,7 +57,7 @@ def countable(value: int) -> int:
 
 
 def from_home(path: Path) -> Path:
-    """Replace a leading ~ or ~user of a path; refuse what names nobody, or is too long for any file."""
+    """Replace a leading ~ or ~user of a path; refuse unknown users, and paths that are too long."""
     if len(str(path)) > LONGEST_NAME or any(len(part.encode()) > 255 for part in path.parts):
         refuse(Fault(f"must be the name of a file, got {len(str(path))} characters, {shorten(str(path), 40)!r}"))
     try:
@@ -67,9 +67,9 @@ def from_home(path: Path) -> Path:
 
 
 def log_range(text: str) -> tuple[float, ...]:
-    """`a:b:n` as n positive numbers from a to b, equally spaced in their logarithm.
+    """Return n positive numbers from a to b, equally spaced in the logarithm, from a text `a:b:n`.
 
-    Raises ValueError with the rest of the sentence "... must be" for other text.
+    Raises ValueError with the end of the sentence "... must be ...".
     """
     try:
         first, last, count = text.split(":")
@@ -86,7 +86,7 @@ def log_range(text: str) -> tuple[float, ...]:
 
 
 def bounded(value: float) -> float:
-    """Refuse what would overflow in a run: squares of slopes and strains, quotients of lengths."""
+    """Refuse numbers that would overflow in a run, in squares of slopes and strains or quotients of lengths."""
     if value and not SMALLEST <= abs(value) <= LARGEST:
         refuse(Fault(f"must be zero, or from {SMALLEST:g} to {LARGEST:g} in size, got {value!r}"))
     return value

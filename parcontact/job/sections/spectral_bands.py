@@ -13,7 +13,7 @@ from .quantities import Count, Positive, Whole, both
 
 Auto = Literal["auto"]
 AUTO: Auto = "auto"
-LEAST_CELLS = 2.0  # accuracy: per shortest wave of a band: the grid has no waves shorter than two
+LEAST_CELLS = 2.0  # accuracy: least cells per shortest wave of a band (Nyquist)
 
 
 class Bands(Part):
@@ -44,11 +44,11 @@ SomeBands = Annotated[Bands | Auto, PlainValidator(_choose, json_schema_input_ty
 
 
 def _without(name: str, why: str) -> Rule:
-    """Return the rule that a job in bands does not have a section."""
+    """Return the rule that a job with bands does not have a section."""
 
     def check(bands: Any, section: Any) -> Iterator[Fault]:
         if bands is not None and section:
-            yield Fault(f"does not go with bands: {why}", (name,))
+            yield Fault(f"cannot be used with bands: {why}", (name,))
 
     return Rule(("bands", name), check)
 

@@ -1,4 +1,4 @@
-"""The `initial`, `history` and `steady` sections: what is done to the body."""
+"""The `initial`, `history` and `steady` sections: loads and velocities."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ Velocity = Annotated[Vector, BeforeValidator(_no_ramp), Field(description=VELOCI
 
 @dataclass(frozen=True)
 class Ramp:
-    """A load that goes linearly from `start` to `end` within a stage.
+    """A load that changes linearly from `start` to `end` within a stage.
 
-    An approach may say at which `velocity` [m/s] it changes, along the normal: the duration of the stage follows.
+    The normal `velocity` [m/s] of an approach, if given, determines the duration of the stage.
     """
 
     start: float
@@ -51,7 +51,7 @@ class Ramp:
 
     @property
     def seconds(self) -> float:
-        """The duration that follows from the normal velocity [s]; 0 where none is given."""
+        """Return the duration by the normal velocity [s]; 0 without one."""
         return abs(self.end - self.start) / self.velocity if self.velocity else 0.0
 
     def at(self, fraction: float) -> float:
@@ -60,7 +60,7 @@ class Ramp:
 
 
 def _ramp(number: Any, description: str, **more: Any) -> PlainValidator:
-    """Return a validator that makes a `Ramp` of one number, or of {from, to} and the keys that are in `more`."""
+    """Return a validator that makes a `Ramp` of one number, or of {from, to} and the keys in `more`."""
     end: Any = (number, Field(description=description))
     keys = create_model("Ends", __base__=Part, **{"from": end, "to": end}, **more)
 
@@ -73,7 +73,7 @@ def _ramp(number: Any, description: str, **more: Any) -> PlainValidator:
         given = value if isinstance(value, dict) else {"from": value, "to": value}
         ramp = Ramp(*(number for _, number in keys.model_validate(given, context=info.context)))
         if ramp.velocity and ramp.constant:
-            refuse(Fault("needs two ends that differ: an approach that does not change has no velocity", ("velocity",)))
+            refuse(Fault("needs different ends: a constant approach has no velocity", ("velocity",)))
         return ramp
 
     return PlainValidator(read, json_schema_input_type=number | keys)
@@ -90,7 +90,7 @@ class GeometricStep(Part):
 
 
 Auto = Literal["auto"]
-AUTO: Auto = "auto"  # time steps that follow the error asked for
+AUTO: Auto = "auto"  # time steps chosen by numerics.accuracy
 
 
 def _time_step(value: Any, info: ValidationInfo) -> float | GeometricStep | Auto:
@@ -114,7 +114,7 @@ def _stepping(
     cells_per_step: float | None,
     approach: Ramp | None,
 ) -> Iterator[Fault]:
-    """Check that steps have time to be made in, and ways a velocity."""
+    """Check that a stage with time steps has a duration, and a stage with a distance a velocity."""
     lasts = duration is not None or distance is not None or (approach is not None and approach.velocity is not None)
     if not lasts and (time_step or cells_per_step):
         key = "time_step" if time_step else "cells_per_step"
@@ -132,19 +132,19 @@ def _lasting_ramp(duration: float | None, distance: float | None, *loads: Ramp |
         if ramp is None:
             continue
         if ramp.velocity and given:
-            told = f"the duration follows from it ({ramp.seconds:.4g} s); leave it out, or the {given[0]} of the stage"
-            yield Fault(f"and a {given[0]} are both given: {told}", (name, "velocity"))
+            sentence = f"already gives the duration, {ramp.seconds:.4g} s; leave out the velocity or {given[0]}"
+            yield Fault(sentence, (name, "velocity"))
         if not ramp.constant and not ramp.velocity and not given:
             normal = ", or a velocity [m/s] in its braces" if name == "approach" else ""
             needs = f"needs a duration [s] or a distance [m]{normal}"
-            yield Fault(f"changes from one value to another, which {needs}", (name,))
+            yield Fault(f"is a ramp, which {needs}", (name,))
 
 
 WHICH_LOAD = "give a pressure [Pa], a force [N] or an approach [m]"
 
 
 class Stage(Part):
-    """One stage of the history: a load, a velocity, and how long they last; an instantaneous stage is one solve."""
+    """One stage of the history: a load, a velocity, and a duration; a stage without duration is one solve."""
 
     name: str = Field(default="stage", description="text (put numbers in quotes)")
     pressure: Annotated[Ramp | None, _ramp(Real, PRESSURE)] = Field(default=None, description=PRESSURE + SIGNED)
@@ -155,7 +155,7 @@ class Stage(Part):
     distance: Positive | None = Field(default=None, description="a positive length [m]")
     time_step: TimeStep | None = Field(
         default=None, description="a positive time step [s], {first, growth}, or auto"
-    )  # auto where the stage lasts and does not give cells_per_step either
+    )  # default: auto, if the stage has a duration and no cells_per_step
     cells_per_step: Positive | None = Field(
         default=None, description="a positive number of cells (a fraction is allowed)"
     )
@@ -170,7 +170,7 @@ class Stage(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
-        """Let a stage that lasts and does not say in which steps choose them itself."""
+        """Set `time_step: auto` for a stage with a duration that gives no steps."""
         approach, given = data.get("approach"), data.keys() & {"time_step", "cells_per_step"}
         moves = approach.get("velocity") if isinstance(approach, dict) else getattr(approach, "velocity", None)
         lasts = moves or data.keys() & {"duration", "distance"}
@@ -178,28 +178,28 @@ class Stage(Part):
 
     @property
     def chooses(self) -> bool:
-        """True if it chooses its own time steps."""
+        """Return True for `time_step: auto`."""
         return self.time_step == AUTO
 
     @property
     def control(self) -> Control:
-        """The load that is prescribed."""
+        """Return the kind of the prescribed load."""
         return next(name for name in CONTROLS if getattr(self, name) is not None)
 
     @property
     def load(self) -> Ramp:
-        """The prescribed load, in the unit of its control: Pa, N or m."""
+        """Return the prescribed load, in the unit of its control: Pa, N or m."""
         ramp: Ramp = getattr(self, self.control)
         return ramp
 
     @property
     def speed(self) -> float:
-        """Magnitude of the velocity [m/s]."""
+        """Return the magnitude of the velocity [m/s]."""
         return math.hypot(*self.velocity)
 
     @property
     def seconds(self) -> float:
-        """The duration of the stage [s]; 0 for an instantaneous one."""
+        """Return the duration of the stage [s]; 0 for an instantaneous stage."""
         if self.distance is not None:
             return self.distance / self.speed
         return self.duration or self.load.seconds
@@ -209,11 +209,11 @@ def _steady_start(state: str, velocity: tuple[float, float], pressure: float | N
     if state == "steady" and pressure is None:
         yield Fault("needs a pressure [Pa] for the steady state to start from")
     if state == "virgin" and (any(velocity) or pressure is not None):
-        yield Fault("must be steady when velocity or pressure is given: a virgin body has felt nothing", ("state",))
+        yield Fault("must be steady if velocity or pressure is given: a virgin body has no history", ("state",))
 
 
 class Initial(Part):
-    """The past of the body: nothing, or steady sliding (at rest: full relaxation) under a pressure."""
+    """The state of the body at time 0: undeformed, or in steady sliding (at rest: fully relaxed) under a pressure."""
 
     state: Literal["virgin", "steady"] = "virgin"
     velocity: Velocity = (0.0, 0.0)
@@ -241,7 +241,7 @@ def _directed(direction: tuple[float, float]) -> Iterator[Fault]:
 
 
 class Steady(Part):
-    """Steady sliding solved directly, for each speed under each pressure, at each temperature."""
+    """Steady sliding, solved directly for each speed, pressure and temperature."""
 
     velocities: SomeNumbers = Field(description="positive speeds [m/s]: a list, or first:last:count")
     pressures: SomeNumbers | None = Field(
@@ -249,7 +249,7 @@ class Steady(Part):
     )
     temperatures: Annotated[tuple[Celsius, ...], Field(min_length=1), BeforeValidator(listed)] | None = Field(
         default=None, description="temperatures [deg C], up to 5000: a list"
-    )  # default: that of the material
+    )  # default: the temperature of the material
     direction: tuple[Real, Real] = Field(default=(1.0, 0.0), description="a direction [x, y] [-]")
     waves: Flag = False
 
@@ -257,7 +257,7 @@ class Steady(Part):
 
     @property
     def unit_direction(self) -> tuple[float, float]:
-        """The direction with length 1."""
+        """Return the direction as a unit vector."""
         x, y = self.direction
         length = math.hypot(x, y)
         return x / length, y / length

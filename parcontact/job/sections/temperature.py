@@ -15,15 +15,15 @@ from ..text.fault import Fault
 from .part import Part, Rule, chosen
 from .quantities import NonNegative, Positive, Real
 
-LOWEST, HIGHEST = -273.15, 5000.0  # physics: deg C
-LARGEST_SHIFT = 60.0  # accuracy: log10 of a_T, either way: relaxation times remain numbers that can be computed with
+LOWEST, HIGHEST = -273.15, 5000.0  # physics: range of temperatures [deg C]
+LARGEST_SHIFT = 60.0  # rounding: largest magnitude of log10 a_T for which relaxation times do not overflow
 Celsius = Annotated[Real, Field(gt=LOWEST, le=HIGHEST, description="a temperature [deg C], up to 5000")]
 
 
 def _rising(
     temperatures: tuple[float, ...], logs: tuple[float, ...], reference: float | None = None
 ) -> Iterator[Fault]:
-    if None in temperatures:  # a mistake of its own
+    if None in temperatures:  # reported separately
         return
     if len(temperatures) < 2 or any(b <= a for a, b in pairwise(temperatures)):
         yield Fault("must be at least two rising temperatures [deg C]", ("temperatures",))
@@ -37,7 +37,7 @@ class DensityLaw(Part):
     """`b_T = rho T/(rho_ref T_ref)`, temperatures in K; `rho = rho_ref (1 - expansion (T - reference))`."""
 
     law: Literal["density"] = "density"
-    expansion: NonNegative = Field(description="a loss of density per kelvin [1/K] of zero or more, of rubber 6e-4")
+    expansion: NonNegative = Field(description="a loss of density per kelvin [1/K] of zero or more (rubber: 6e-4)")
 
     def at(self, reference: float) -> Density:
         """Return the law with the reference of its shift [deg C]."""
@@ -69,7 +69,7 @@ def _reaches(vertical: AnyVertical | None, reference: float) -> Iterator[Fault]:
 
 
 class ShiftLaw(Part):
-    """Base of the laws of a shift; `kind` is what computes with the same numbers."""
+    """Base of the laws of a shift; `kind` is the class in `rubber.shift` that evaluates it."""
 
     kind: ClassVar[Callable[..., Law]]
     reference: Celsius
@@ -121,17 +121,17 @@ def shifted(shift: AnyShift | None, temperature: float | None) -> Iterator[Fault
     if temperature is None:
         return
     if shift is None:
-        sentence = "has no effect without material.shift, which says how relaxation times depend on it; give a shift"
+        sentence = "needs material.shift, the dependence of relaxation times on temperature; give a shift"
         yield Fault(sentence, ("temperature",))
         return
     try:
         log = shift.made.log_factor(temperature)
         log_vertical(shift.made, temperature)
     except InputError as error:
-        yield Fault(f"is beyond the shift: {error}", ("temperature",))
+        yield Fault(f"is outside of the shift: {error}", ("temperature",))
         return
     if not abs(log) <= LARGEST_SHIFT:
         sentence = (
-            f"would change the relaxation times by a factor of 10^{log:.3g} from those at the reference; at most "
+            f"would change the relaxation times by a factor of 10^{log:.3g}; the limits are 10^-{LARGEST_SHIFT:g} and "
         )
-        yield Fault(f"{sentence}10^{LARGEST_SHIFT:g} either way can be computed", ("temperature",))
+        yield Fault(f"{sentence}10^{LARGEST_SHIFT:g}", ("temperature",))

@@ -1,1 +1,1 @@
-"""Reading a job: YAML text or Python data as plain data that remembers where each value was written."""
+"""Reading of YAML text or Python data as plain data, with the place of each value."""

@@ -1,4 +1,4 @@
-"""Mistakes as sentences: the part of a sentence that follows the name of a key, and its way through pydantic."""
+"""Mistakes as predicates of sentences about a key, and their transport through pydantic."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from .places import Key
 
-MAX_WORD = 40  # tuning: characters of a word that may be a misspelt one
-BOUNDED = reprlib.Repr()  # a `repr` that never writes out all of something large
+MAX_WORD = 40  # tuning: longest word that is checked for misspelling [characters]
+BOUNDED = reprlib.Repr()  # a `repr` of limited length
 BOUNDED.maxlist = BOUNDED.maxtuple = BOUNDED.maxset = 60
 BOUNDED.maxstring = BOUNDED.maxlong = BOUNDED.maxother = 500
 PREFIXES = {"": 1.0, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
 UNITS = {f"{prefix}{unit}": size for prefix, size in PREFIXES.items() for unit in ("m", "s", "Pa", "N", "m/s")}
-AT_VALUE, AT_KEY = "at value", "at key"  # the types of our errors within pydantic
+AT_VALUE, AT_KEY = "at value", "at key"  # types of this module's errors in pydantic
 
 
 class Fault(NamedTuple):
-    """A mistake within a part: the rest of the sentence that begins with the name of a key, and the way to that key."""
+    """A mistake: the predicate of a sentence whose subject is a key, and the path to the key."""
 
     predicate: str
     path: Key = ()
@@ -31,7 +31,7 @@ class Fault(NamedTuple):
 
 
 def refuse(*faults: Fault) -> NoReturn:
-    """Raise the faults in the form in which pydantic collects them."""
+    """Raise the faults as a ValidationError, which pydantic collects."""
     raise ValidationError.from_exception_data("job", [_line(fault) for fault in faults])
 
 
@@ -47,12 +47,12 @@ def faults_of(error: ValidationError) -> Iterator[Fault]:
 
 
 def shorten(text: str, most: int = 200) -> str:
-    """Return a text without its middle where it is too long to be read."""
+    """Return a text without its middle if it has more than `most` characters."""
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"
 
 
 def quote(value: Any) -> str:
-    """Return a value as it is shown after "got"."""
+    """Return a value as shown after "got"."""
     if value is None or isinstance(value, dict):
         return "nothing" if value is None else "a mapping"
     text = str(value).lower() if isinstance(value, bool) else BOUNDED.repr(value)
@@ -65,7 +65,7 @@ def list_words(words: Iterable[str]) -> str:
 
 
 def closest(word: Any, words: Iterable[str]) -> str:
-    """Return the one of `words` that `word` may be misspelt for, '' if none is close."""
+    """Return the one of `words` that is closest to a misspelt `word`, '' if none is close."""
     if len(str(word)) > MAX_WORD:
         return ""
     known = {candidate.lower(): candidate for candidate in words}
@@ -74,7 +74,7 @@ def closest(word: Any, words: Iterable[str]) -> str:
 
 
 def in_si(value: Any) -> str:
-    """Return the ending '; write 1.0e-3' if a value is a text of a number and a unit like 1 mm, else nothing."""
+    """Return the ending '; write 1.0e-3' if a value is a number with a unit, such as '1 mm', else ''."""
     found = (
         re.fullmatch(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S+)", value.strip()) if isinstance(value, str) else None
     )
@@ -88,6 +88,6 @@ def in_si(value: Any) -> str:
 
 
 def did_you_mean(word: Any, words: Iterable[str]) -> str:
-    """Return the ending '; did you mean X?' if one of `words` is close to `word`, else nothing."""
+    """Return the ending '; did you mean X?' if one of `words` is close to `word`, else ''."""
     found = closest(word, words)
     return f"; did you mean {found}?" if found else ""

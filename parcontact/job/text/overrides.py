@@ -1,4 +1,4 @@
-"""From a YAML file and changes of its keys to the data of one job: changes put in place, included materials read."""
+"""The data of one job from a YAML file: applies overrides and reads included materials."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OURS = Path(__file__).parents[2] / "materials"  # compounds that come with the p
 
 
 class Included(NamedTuple):
-    """A file that a job includes: its absolute path, and the SHA-256 of what was read from it."""
+    """An included file: its absolute path, and the SHA-256 of its content."""
 
     path: Path
     sha256: str
@@ -30,7 +30,7 @@ class Included(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """A job as read: the data of one job, or of one case, the file of its material, and its sweep if that is sound."""
+    """The data of a job or a case, the file of its included material, and its sweep (None if it has mistakes)."""
 
     source: Source
     included: Included | None
@@ -41,9 +41,9 @@ Changes = Iterable[str | tuple[str, Any]]  # `key.path=value`, or a key and Pyth
 
 
 def read_job(path: Path, changes: Changes, case: int = 0, given: Source | None = None) -> Reading:
-    """Return the data of a job with its overrides, the settings of a case if it has a sweep, and included material.
+    """Return the data of a job with its overrides, the settings of a case of its sweep, and the included material.
 
-    Data that are `given` stand for the file.
+    `given` data are used in place of the file.
     """
     source = given or read_source(path, str(path))
     overrides = [override for change in changes if (override := _parse(change, source))]
@@ -70,7 +70,7 @@ def read_job(path: Path, changes: Changes, case: int = 0, given: Source | None =
 
 
 def _parse(change: str | tuple[str, Any], source: Source) -> Setting | None:
-    """Return a change as a setting; None if it has mistakes, which `source` then holds."""
+    """Return a change as a setting; None if it has mistakes, which are added to `source`."""
     if isinstance(change, str):
         place = Place(f"--set {shorten(change)}")
         name, equals, value = change.partition("=")
@@ -87,9 +87,9 @@ def _parse(change: str | tuple[str, Any], source: Source) -> Setting | None:
 
 
 def _apply(source: Source, override: Setting) -> None:
-    """Put the value of an override where its path leads, making the mappings on the way.
+    """Set the value at the path of an override, and create missing mappings on the path.
 
-    `surface.0` is also a surface that is one mapping instead of a list. `auto` becomes a mapping of the keys that
+    `surface.0` also names a surface that is a single mapping. `auto` is replaced by a mapping of the keys that
     overrides set.
     """
     if not isinstance(source.data, dict):
@@ -114,14 +114,14 @@ def _apply(source: Source, override: Setting) -> None:
 
 
 def _leaves_open(value: Any, name: str) -> bool:
-    """Return whether a value gives no keys, so that a mapping with a key of this name can take its place."""
+    """Return True if a mapping with a key of this name can replace the value: no value, or `auto`."""
     return value is None or (value == "auto" and not name.isdecimal())
 
 
 def _dead_end(node: Any, shown: str, name: str) -> str:
-    """Return why a path leads nowhere from a value of the job, and which one would."""
+    """Return why a path does not exist below a value of the job, and the remedy."""
     if not isinstance(node, list):
-        return f"{shown} is {quote(node)} and no mapping of keys, so it has no {name}; give {shown} as a whole"
+        return f"{shown} is {quote(node)}, not a mapping of keys, and has no {name}; give {shown} as a whole"
     if not node:
         return f"{shown} is an empty list; give {shown} as a whole"
     entries = f"entries {shown}.0 to {shown}.{len(node) - 1}" if len(node) > 1 else f"one entry, {shown}.0"
@@ -139,15 +139,15 @@ def _material(source: Source) -> dict[str, Any]:
 
 
 def _include(source: Source, job: Path, own: dict[str, Any]) -> Included | None:
-    """Replace `material: {include: name, ...}` by the keys of the included file and those given beside it.
+    """Replace `material: {include: name, ...}` by the keys of the included file, updated by the other keys given.
 
     `own` are the keys of a material that the job file describes without an include.
     """
-    beside = _material(source)
-    name, place = beside.get("include"), source.locate(INCLUDE).place
+    given = _material(source)
+    name, place = given.get("include"), source.locate(INCLUDE).place
     if name is None:
         return None
-    del beside["include"]
+    del given["include"]
     found = _find(name, job)
     if isinstance(found, str):
         source.note(place, f"material.include must name a material file, got {quote(name)} ({found})")
@@ -162,26 +162,26 @@ def _include(source: Source, job: Path, own: dict[str, Any]) -> Included | None:
             source.note(at, "must be one mapping with the keys of a material")
         source.data["material"] = UNREADABLE
         return None
-    if hidden := [key for key in own if key in material and key in beside]:
+    if hidden := [key for key in own if key in material and key in given]:
         sentence = f"has no effect on {', '.join(hidden)}, which the job gives itself"
         source.note(place, f"{sentence}; use --set material={{include: {name}}} to replace the material")
     items = included.places.items()
     places = {(*MATERIAL, *key[len(start) :]): known for key, known in items if key != start}
-    for key in beside:
+    for key in given:
         own_place = source.locate((*MATERIAL, key))
         places = {path: known for path, known in places.items() if path[1] != key}
         places[*MATERIAL, key] = own_place.key_place, own_place.place
     places |= {path: known for path, known in source.places.items() if path[:1] == MATERIAL and len(path) > 2}
-    source.put(MATERIAL, material | beside, source.locate(MATERIAL).key_place, at)
+    source.put(MATERIAL, material | given, source.locate(MATERIAL).key_place, at)
     source.places |= places
     return Included(found.absolute(), hashlib.sha256(content).hexdigest())
 
 
 def _find(name: Any, job: Path) -> Path | str:
-    """Return the file that an include means, or else where it was looked for.
+    """Return the included file, or a text on where it was searched.
 
-    A path starts at the job file; a name is looked for in the job's own directory, in materials/ there, and among the
-    compounds that come with the program.
+    A path is relative to the job file; a name is searched in the directory of the job, in its materials/, and among the
+    program's own materials.
     """
     directory = job.absolute().parent
     own = f"among the program's own: {', '.join(sorted(path.stem for path in OURS.glob('*.yaml')))}"
@@ -192,13 +192,14 @@ def _find(name: Any, job: Path) -> Path | str:
             candidates, where = [directory / Path(name).expanduser()], "looked from the job file"
         else:
             candidates = [place / f"{name}.yaml" for place in (directory, directory / "materials", OURS)]
-            where = f"looked for {shorten(name)}.yaml and materials/{shorten(name)}.yaml beside the job file, and {own}"
+            places = f"{shorten(name)}.yaml and materials/{shorten(name)}.yaml in the directory of the job file"
+            where = f"looked for {places}, and {own}"
         return next((path for path in candidates if path.is_file() and path != job.absolute()), where)
     except (OSError, RuntimeError) as error:  # a name that is too long, a user that does not exist
         return shorten(getattr(error, "strerror", None) or str(error))
 
 
 def _shown(path: Path) -> str:
-    """Return a path as short as it can be from the working directory."""
+    """Return a path relative to the working directory if it is below that."""
     relative = os.path.relpath(path)
     return str(path) if relative.startswith("..") else relative

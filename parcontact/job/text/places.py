@@ -1,4 +1,4 @@
-"""Plain data beside the places where they were written, so that a mistake found later points at the text."""
+"""Plain data with the place of each value in its file, for messages about mistakes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Key = tuple[str | int, ...]  # the way to a value: ("history", 0, "pressure")
 
 
 class Place(NamedTuple):
-    """A place where something was written. `line` 0 means that `origin` says it all (a command-line override)."""
+    """A place in a file; `line` is 0 if `origin` is the whole place, such as a command-line override."""
 
     origin: str
     line: int = 0
@@ -20,7 +20,7 @@ class Place(NamedTuple):
 
 
 class Mistake(NamedTuple):
-    """One sentence about what is wrong at a place."""
+    """A place and a sentence about the mistake there."""
 
     place: Place
     sentence: str
@@ -34,14 +34,14 @@ class _Unreadable:
         return "something unreadable"
 
 
-UNREADABLE: Final = _Unreadable()  # stands for a value whose mistake is known already
+UNREADABLE: Final = _Unreadable()  # in place of a value whose mistake is already noted
 NOWHERE: Final = Place("")
 
 
 class Located(NamedTuple):
-    """The end of a path: the path as the user wrote it, and the places of its value and of its key.
+    """The result of following a path: the path as the user wrote it, and the places of its value and of its key.
 
-    Where something is missing, both places are those of what should hold it.
+    For a missing value both places are that of the mapping that lacks it.
     """
 
     path: Key
@@ -52,9 +52,9 @@ class Located(NamedTuple):
 
 @dataclass
 class Source:
-    """The data of a file, of a mapping or of an override, where all of it was written, and the mistakes in it.
+    """The data of a file, of a mapping or of an override, with its place and its mistakes.
 
-    `places` has the places of key and value by the way to them; what it lacks was written where its holder was.
+    `places` has the places of key and value by path; other values have the place of the list or mapping around them.
     """
 
     data: Any = None
@@ -66,7 +66,7 @@ class Source:
         self.mistakes.append(Mistake(place, sentence))
 
     def put(self, path: Key, value: Any, key_place: Place, place: Place) -> None:
-        """Set a value of a mapping or a list that is there, and where its key and all of it were written."""
+        """Set a value in an existing mapping or list, with the places of its key and of the value."""
         node = self.data
         for step in path[:-1]:
             node = node[step]
@@ -75,7 +75,7 @@ class Source:
         self.places[path] = key_place, place
 
     def locate(self, path: Key) -> Located:
-        """Follow a path; steps into a list that was given as one value are left out."""
+        """Follow a path; indices into a list that was given as a single value are ignored."""
         node, place, key_place, steps = self.data, self.place, self.place, Key()
         for step in path:
             if isinstance(node, dict | list) and (step in node if isinstance(node, dict) else step in range(len(node))):

@@ -1,4 +1,4 @@
-"""Jobs given as Python data instead of a file: as good as a file, and a mistake names the key."""
+"""Jobs given as Python data instead of a file; messages about mistakes name the key."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .places import NOWHERE, UNREADABLE, Key, Place, Source
 
 
 def source_of(data: Any, place: Place = NOWHERE) -> Source:
-    """Return plain data as a `Source` all of which was written at one place."""
+    """Return Python data as a `Source` with one place."""
     source = Source(place=place)
     try:
         source.data = _plain(data, (), source)
@@ -22,12 +22,12 @@ def source_of(data: Any, place: Place = NOWHERE) -> Source:
 
 
 def is_array(value: Any) -> bool:
-    """Return whether a value is an array, of numpy or as good as one."""
+    """Return True for an array of numpy, or of a library with the same interface."""
     return hasattr(value, "__array__") and getattr(value, "ndim", 0) > 0
 
 
 def _plain(value: Any, path: Key, source: Source) -> Any:
-    """Return a value as what YAML could have been read as; what cannot be is a mistake."""
+    """Return a value as plain data like that of YAML; note a mistake if it has no such form."""
     if is_array(value) and _is_map(value, path):
         return value
     if hasattr(value, "tolist"):  # numpy's numbers and arrays
@@ -41,7 +41,7 @@ def _plain(value: Any, path: Key, source: Source) -> Any:
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
         return {key: _plain(item, (*path, key), source) for key, item in value.items()}
     if isinstance(value, Mapping):
-        wrong = f"has a key that is no word, {quote(next(key for key in value if not isinstance(key, str)))}"
+        wrong = f"has a key that is not a text, {quote(next(key for key in value if not isinstance(key, str)))}"
     else:
         wrong = f"must be numbers, texts, lists or mappings, got {shorten(repr(value), 60)}"
     source.note(source.place, f"{'.'.join(map(str, path)) or 'the job'} {wrong}")
@@ -49,5 +49,5 @@ def _plain(value: Any, path: Key, source: Source) -> Any:
 
 
 def _is_map(value: Any, path: Key) -> bool:
-    """Return whether an array stands where heights are due; one without a key is the value of an override."""
+    """Return True if an array is at the path of heights, or is the value of an override (an empty path)."""
     return path == ("surface",) or path[-1:] == ("heights",) or (value.ndim == 2 and path[:-1] in ((), ("surface",)))

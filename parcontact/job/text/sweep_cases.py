@@ -1,7 +1,7 @@
-"""The `sweep` section: one job, many cases.
+"""The `sweep` section: many cases of one job.
 
-A sweep is a list of mappings from keys of the job to lists of values. Keys within one mapping move together, mappings
-multiply: cases are numbered from 0, those of the last mapping the fastest.
+A sweep is a list of mappings from keys of the job to lists of values. Keys within one mapping change together; cases
+are all combinations of the mappings, numbered from 0, with the last mapping changing fastest.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from .fault import quote, shorten
 from .places import Key, Place, Source
 
 SWEEP: Key = ("sweep",)
-MAX_CASES = 1000  # tuning
-FIXED = ("sweep", "output.directory")  # keys that are the same in all cases
+MAX_CASES = 1000  # tuning: most cases of a sweep
+FIXED = ("sweep", "output.directory")  # keys that cannot be swept
 
 
 class Setting(NamedTuple):
-    """A value for a key, of a case of a sweep, from the command line or from Python, and where both were written."""
+    """A value for a key, from a sweep, the command line or Python, with the places of both."""
 
     name: str
     value: Any
@@ -36,11 +36,11 @@ class Setting(NamedTuple):
         return f"{self.name} = {self.value}"
 
 
-Axis = list[tuple[Setting, ...]]  # the settings that each step of one mapping makes together
+Axis = list[tuple[Setting, ...]]  # of one mapping: for each of its values, the settings of all its keys
 
 
 class Sweep:
-    """The mappings of a sweep; none without one."""
+    """The mappings of a sweep; without a sweep there are none."""
 
     def __init__(self, axes: list[Axis], place: Place) -> None:
         self.axes, self.place = axes, place
@@ -50,20 +50,20 @@ class Sweep:
         return math.prod(map(len, self.axes)) if self.axes else 0
 
     def case(self, index: int) -> tuple[Setting, ...]:
-        """Return what distinguishes a case."""
+        """Return the settings of a case."""
         moves = next(itertools.islice(itertools.product(*self.axes), index, None))
         return tuple(itertools.chain(*moves))
 
 
 def take_sweep(source: Source) -> Sweep | None:
-    """Take the sweep out of a job; None if it has mistakes, which `source` then holds."""
+    """Remove the sweep from the data of a job and return it; None if it has mistakes, which are noted in `source`."""
     data = source.data if isinstance(source.data, dict) else {}
     section, place = data.get("sweep"), source.locate(SWEEP).place
     mistakes = len(source.mistakes)
     sweep = Sweep([] if section is None else list(_axes(section, source)), place)
-    count = math.prod(map(len, sweep.axes)) if sweep.axes else 0  # may be more than a length can be
+    count = math.prod(map(len, sweep.axes)) if sweep.axes else 0  # may be too large for len()
     if count > MAX_CASES:
-        source.note(place, f"sweep has {quote(count)} cases, and {MAX_CASES} is the most")
+        source.note(place, f"sweep has {quote(count)} cases; at most {MAX_CASES} are allowed")
     sound = len(source.mistakes) == mistakes and source.locate(SWEEP).readable
     data.pop("sweep", None)
     return sweep if sound else None
@@ -81,14 +81,14 @@ def _axes(section: Any, source: Source) -> Iterator[Axis]:
         columns = [_column(name, values, path, source, seen) for name, values in mapping.items()]
         if all(columns) and len({len(column) for column in columns}) > 1:
             counts = ", ".join(f"{len(column)} of {shorten(column[0].name)}" for column in columns)
-            what = "keys of one mapping move together and need as many values each"
+            what = "keys of one mapping change together and need equal numbers of values"
             source.note(source.locate(path).place, f"{what}, got {counts}")
             continue
-        yield list(zip(*columns, strict=False))  # they are as long as each other, unless one has mistakes
+        yield list(zip(*columns, strict=False))  # lengths are equal, unless one column has mistakes
 
 
 def _column(name: str, values: Any, path: Key, source: Source, seen: dict[str, Place]) -> list[Setting]:
-    """Return all values of one key; an empty list, and a mistake in `source`, if they are none."""
+    """Return the settings of one key; an empty list, and a mistake in `source`, if its values are wrong."""
     at = source.locate((*path, name))
     place, key_place = at.place, at.key_place
     settings: list[Setting] = []
@@ -113,7 +113,7 @@ def _column(name: str, values: Any, path: Key, source: Source, seen: dict[str, P
 
 
 def _overlap(one: str, other: str) -> bool:
-    """Return whether one key is the other or within it."""
+    """Return True if one key is equal to the other or within it."""
     return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
 
 

@@ -1,8 +1,7 @@
-"""YAML text as a `Source`: plain data that remembers where each value and key was written.
+"""YAML text as a `Source`: plain data with the places of all values and keys.
 
-Two things differ from PyYAML's own reading: `1e-3` is a number, and equal keys in one mapping are a mistake instead of
-the last one winning. Numbers are decimal: `12:30` and `010` are text. What a text may grow to is bounded: its own size,
-and its values once all aliases are followed.
+Unlike in PyYAML, `1e-3` is a number, repeated keys are a mistake, and numbers are decimal: `12:30` and `010` are text.
+The size of a text and the number of its values after expansion of aliases are limited.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from .fault import shorten
 from .places import UNREADABLE, Key, Place, Source
 
 YAML_TAG = "tag:yaml.org,2002:"
-RESOLVERS = (  # tag, what such a scalar looks like, first characters; tried in this order
+RESOLVERS = (  # tag, pattern of its scalars, their first characters; tried in this order
     ("bool", r"^(?:yes|Yes|YES|no|No|NO|true|True|TRUE|false|False|FALSE|on|On|ON|off|Off|OFF)$", "yYnNtTfFoO"),
     ("int", r"^[-+]?(?:0|[1-9][0-9_]*)$", "-+0123456789"),
     ("float", r"^[-+]?(?:[0-9][0-9_]*\.?[0-9_]*|\.[0-9][0-9_]*)[eE][-+]?[0-9]+$", "-+.0123456789"),
@@ -28,9 +27,9 @@ RESOLVERS = (  # tag, what such a scalar looks like, first characters; tried in 
     ("null", r"^(?:~|null|Null|NULL|)$", ["~", "n", "N", ""]),
 )
 SCALAR_TAGS = tuple(YAML_TAG + name for name in ("bool", "int", "float", "null", "str"))
-# Bounds against texts that a broken program has written; no job comes near them.
-MAX_BYTES = 2_000_000  # tuning: of a file
-MAX_VALUES = 100_000  # tuning: of a text, an alias counting as all that it stands for
+# Limits far above the size of any job, against broken files.
+MAX_BYTES = 2_000_000  # tuning: largest size of a file [bytes]
+MAX_VALUES = 100_000  # tuning: most values in a text after its YAML aliases are expanded
 
 
 def _implicit_resolvers() -> dict[str, list[tuple[str, re.Pattern[str]]]]:
@@ -42,13 +41,13 @@ def _implicit_resolvers() -> dict[str, list[tuple[str, re.Pattern[str]]]]:
 
 
 class JobLoader(yaml.SafeLoader):
-    """PyYAML's safe loader with the numbers of this module's docstring."""
+    """PyYAML's safe loader with RESOLVERS."""
 
     yaml_implicit_resolvers = _implicit_resolvers()
 
 
 class JobDumper(yaml.SafeDumper):
-    """PyYAML's safe dumper that quotes exactly the texts which `JobLoader` would take for something else."""
+    """PyYAML's safe dumper with RESOLVERS: it quotes texts that `JobLoader` would not read as text."""
 
     yaml_implicit_resolvers = _implicit_resolvers()
 
@@ -59,20 +58,20 @@ def dump(data: Any) -> str:
 
 
 def read_source(path: Path, shown: str) -> Source:
-    """Return the `Source` of a YAML file, called `shown` in messages; one that cannot be read is a mistake in it."""
+    """Return the `Source` of a YAML file, called `shown` in messages; an unreadable file is noted as a mistake."""
     return read_with_content(path, shown)[1]
 
 
 def read_with_content(path: Path, shown: str) -> tuple[bytes, Source]:
-    """Return the bytes of a YAML file too."""
+    """Return the bytes of a YAML file, and its `Source`."""
     try:
         if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():  # a pipe might never end
-            raise OSError(0, "it is no regular file")
+            raise OSError(0, "it is not a regular file")
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
         if len(content) <= MAX_BYTES:
             return content, parse(content, shown)
-        reason = f"it is larger than {MAX_BYTES / 1e6:g} MB, which no job is"
+        reason = f"it is larger than {MAX_BYTES / 1e6:g} MB, the limit for a job"
     except FileNotFoundError:
         reason = "there is no such file"
     except (OSError, ValueError) as error:  # ValueError: a null character in its name
@@ -85,16 +84,16 @@ def read_with_content(path: Path, shown: str) -> tuple[bytes, Source]:
 
 
 def _remedy(problem: str) -> str:
-    """Return what to do about a frequent problem of PyYAML's, or ''."""
+    """Return the remedy for a frequent message of PyYAML, or ''."""
     if "\\t" in problem:
         return "; indent by blanks, not by tabs"
     if problem.startswith("mapping values"):
-        return "; keys of one mapping begin in the same column, and a text that holds a colon needs quotes"
+        return "; keys of one mapping must begin in the same column, and a text with a colon needs quotes"
     return ""
 
 
 def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
-    """Return YAML text as a `Source`; `origin` names it in places, unless `whole` is the one place of all of it."""
+    """Return YAML text as a `Source`; `origin` is its name in places, unless `whole` is the place of all values."""
     start = whole or Place(origin, 1, 1)
     source = Source(UNREADABLE, start)
     reader = _Reader(source, origin, whole)
@@ -109,16 +108,16 @@ def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
     except yaml.YAMLError as error:
         source.note(start, str(error))
     except RecursionError:
-        source.note(start, "cannot be read as YAML: it is nested too deeply, or an alias holds itself")
+        source.note(start, "cannot be read as YAML: it is nested too deeply, or an alias contains itself")
     return source
 
 
 class _Reader:
-    """Turns YAML nodes into plain data; places and mistakes go into a `Source`."""
+    """Converts YAML nodes to plain data, and notes places and mistakes in a `Source`."""
 
     def __init__(self, source: Source, origin: str, whole: Place | None):
         self.source, self.origin, self.whole = source, origin, whole
-        self.count = 0  # of values so far
+        self.count = 0  # number of values so far
 
     def place(self, mark: yaml.Mark | None) -> Place:
         if self.whole is not None or mark is None:
@@ -137,7 +136,9 @@ class _Reader:
     def value(self, node: yaml.Node, path: Key) -> Any:
         self.count += 1
         if self.count > MAX_VALUES:
-            raise yaml.YAMLError(f"has more than {MAX_VALUES} values once its aliases are followed, which no job has")
+            raise yaml.YAMLError(
+                f"has more than {MAX_VALUES} values after expansion of its aliases, the limit for a job"
+            )
         if isinstance(node, yaml.MappingNode) and node.tag == YAML_TAG + "map":
             return self.mapping(node, path)
         if isinstance(node, yaml.SequenceNode) and node.tag == YAML_TAG + "seq":
@@ -150,12 +151,12 @@ class _Reader:
         return self.refuse(node, f"{shorten(node.tag.replace(YAML_TAG, '!!'))} does not belong in a job")
 
     def item(self, key: yaml.Node, child: yaml.Node, path: Key) -> Any:
-        """Return the value of a mapping or a list, and note its place unless it is known from another mapping."""
+        """Return the value of a mapping or a list, and record its place unless it is already known."""
         self.source.places.setdefault(path, (self.place(key.start_mark), self.place(child.start_mark)))
         return self.value(child, path)
 
     def mapping(self, node: yaml.MappingNode, path: Key) -> dict[str, Any]:
-        """Return a mapping; what `<<` merges counts only where the mapping has no such key."""
+        """Return a mapping; its own keys override keys merged by `<<`."""
         found: dict[str, Any] = {}
         merged: list[yaml.Node] = []
         for key, child in node.value:
@@ -174,10 +175,10 @@ class _Reader:
             if isinstance(inherited := self.value(other, path), dict):
                 found = inherited | found
             else:
-                self.refuse(other, "<< takes a mapping, or a list of mappings")
+                self.refuse(other, "<< must be a mapping, or a list of mappings")
         return found
 
 
 def _follows_a_comma(key: yaml.Node, child: yaml.Node) -> bool:
-    """Return whether a key may be the digits after a decimal comma, as in {thickness: 0,02}: it has no value."""
+    """Return True if a key is probably the digits after a decimal comma, as in {thickness: 0,02}: it has no value."""
     return isinstance(key, yaml.ScalarNode) and key.value[:1].isdigit() and not child.value
