@@ -69,7 +69,7 @@ def test_check_knows_all_temperatures(tmp_path: Path, capsys: pytest.CaptureFixt
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(job_of(surface)))
     assert main(["check", str(tmp_path / "job.yaml")]) == 0
     said = capsys.readouterr().out
-    assert "70 C is beyond the -20 to 60 C" in said
+    assert "70 C is outside of the measured -20 to 60 C" in said
     slope = cut_bands(jobs.load(tmp_path / "job.yaml")).rms_slope(1, 0)
     assert f"rms slope {slope:.4g}" in said
 

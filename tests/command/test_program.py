@@ -69,7 +69,7 @@ BAD: list[tuple[Sequence[str], str]] = [
     (["job.yaml", "--wall", "soon"], "must be a wall time HH:MM:SS, got 'soon'"),
     (["job.yaml", "--sett", "grid.points=8"], "unrecognized arguments"),
     (["info", "absent.h5"], "absent.h5 does not exist"),
-    (["info", "job.yaml"], "job.yaml is neither a checkpoint nor a field file: it is no HDF5 file"),
+    (["info", "job.yaml"], "job.yaml is neither a checkpoint nor a field file: it is not an HDF5 file"),
     (
         ["plot", "job.yaml"],
         "it has neither measures.csv nor steady.csv; give the output directory of a run, such as out/job",
