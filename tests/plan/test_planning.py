@@ -185,7 +185,9 @@ def test_memory_to_ask_a_batch_system_for(tmp_path: Path, outside_mpi: dict[str,
         return done.stdout
 
     said("job.yaml", "--quiet", "--set", "grid.points=256", "--out", "small")  # the compiler would take memory, too
-    text = said("plan", "job.yaml", "--ranks", "1", "--seconds", "0.1")
+    words = ("plan", "job.yaml", "--ranks", "1", "--seconds", "0.1")
+    said(*words, "--set", "grid.points=256")
+    text = said(*words)
     program, asked = (
         1e6 * float(re.findall(rf"{what} +(\S+)$", text, re.M)[0])
         for what in ("program without maps", "to ask a batch system for")
