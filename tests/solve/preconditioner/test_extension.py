@@ -51,7 +51,7 @@ def extended(s: Map, w: Map, points: Map, pairs: int = 0) -> Map:
     """The sums s and w over cells of a given number of points, extended: `(s + f I e)/(w + f)`; first over a given
     number of `pairs`, below 0 along y."""
     ny, nx = s.shape
-    if s.size == 1 and not pairs:
+    if s.size == 1:
         return np.asarray(s / (w + FLOOR * points))
     down, told_down = (np.eye(ny), np.eye(ny)) if pairs > 0 else (adding(ny), interpolating(ny))
     across, told_across = (np.eye(nx), np.eye(nx)) if pairs < 0 else (adding(nx), interpolating(nx))
