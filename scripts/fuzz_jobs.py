@@ -205,8 +205,8 @@ def history_faults(directory: Path, job: jobs.Job) -> Iterator[str]:
     if fields.exists():
         with h5py.File(fields) as file:
             for pressure in file.get("pressure", ()):
-                beside = LATER * job.numerics.tolerance * np.max(np.abs(pressure))  # of the law: its gap is solved for
-                least = -(strength + beside) if stick else 0.0
+                error = LATER * job.numerics.tolerance * np.max(np.abs(pressure))  # by the error of the gap
+                least = -(strength + error) if stick else 0.0
                 if not (np.all(pressure >= least) and np.all(pressure <= most)):
                     yield f"pressures from {np.min(pressure):g} to {np.max(pressure):g} Pa, not {least:g} to {most:g}"
 

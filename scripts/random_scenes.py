@@ -51,7 +51,7 @@ def twins(directory: Path, counts: Counter[str], seed: int, number: int) -> Iter
     yield from (f"({found.about}): {sentence}" for sentence in wrong)
 
 
-def beside_double(directory: Path, counts: Counter[str], seed: int, number: int) -> Iterator[str]:
+def compare_with_double(directory: Path, counts: Counter[str], seed: int, number: int) -> Iterator[str]:
     """Count a scene that mixed precision does not solve though double precision does, or solves otherwise."""
     scene = sketch(Random(f"{seed} {number}"))
     (double, failed), (other, fails) = (areas(scene, directory, name) for name in ("double", "mixed"))
@@ -81,7 +81,7 @@ def main() -> int:
         what="scenes",
         steps=(-1, "go on until there are so many (20000; 100000 with --long)"),
         long=(False, "march one scene back and forth"),
-        mixed=(False, "mixed precision beside double"),
+        mixed=(False, "mixed precision compared with double"),
     )
     asked, counts = options.parse_args(), Counter[str]()
     warnings.simplefilter("ignore" if asked.mixed else "error")
@@ -89,7 +89,7 @@ def main() -> int:
         return 0 if histories.campaign(asked.steps if asked.steps >= 0 else 100_000) else 1
     steps = asked.steps if asked.steps >= 0 else 20_000
     with tempfile.TemporaryDirectory() as directory:
-        made = partial(beside_double if asked.mixed else twins, Path(directory), counts, asked.seed)
+        made = partial(compare_with_double if asked.mixed else twins, Path(directory), counts, asked.seed)
         faulty = campaign.go(asked, made, counts, lambda: not asked.mixed and counts["steps"] < steps)
     return 1 if faulty else 0
 

@@ -24,7 +24,7 @@ from ..physics.roughness import EDGE, Roughness
 from ..steady_sliding.curve import Request, request
 from ..storage import files, hdf5, tables
 from ..storage.curve_points import Wanted
-from ..summary import theory_beside, theory_settings
+from ..summary import theory_comparison, theory_settings
 from ..summary.theory_settings import TheorySettings
 from ..theory import full_contact, persson, persson_rings
 from ..theory.persson_history import Memory, SlidingLeg, follow
@@ -166,7 +166,7 @@ def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
     if not job.history:
         return _foretell_curve(job, settings)
     path = write_theory(job, predict(job, Slab.alone(*job.grid.points), gamma, waves), settings)
-    compared = theory_beside.describe_theory(path.parent, job.history, job.grid.dx)
+    compared = theory_comparison.describe_theory(path.parent, job.history, job.grid.dx)
     return [f"Persson's theory, {settings.sentence}: {path}", *compared]
 
 

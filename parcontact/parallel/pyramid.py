@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .mpi import MPI
 from .regrid import fetch
-from .rows import RowsBeside
+from .rows import RowExchange
 from .slab import Slab
 
 Shape = tuple[int, int]  # points of a cell along x and y: 1 or 2
@@ -67,7 +67,7 @@ class PyramidStep:
     fine: Slab
     coarse: Slab
     shape: Shape
-    _kept: dict[tuple[str, tuple[int, ...]], "RowsBeside"] = field(default_factory=dict)
+    _kept: dict[tuple[str, tuple[int, ...]], "RowExchange"] = field(default_factory=dict)
 
     @property
     def above(self) -> int:
@@ -87,7 +87,7 @@ class PyramidStep:
             made = Slab(self.fine.comm, self.coarse.nx, self.coarse.ny, self.fine.tally, ends)
             cells[...] = fetch(made, cells[self.own], [slice(0, made.ny)] * made.comm.size)
 
-    def points_beside(self, points: NDArray[Any], *offsets: int) -> NDArray[Any]:
+    def adjacent_points(self, points: NDArray[Any], *offsets: int) -> NDArray[Any]:
         """Return rows next to those of this rank: -1 is the last one above, 0 the first below, 1 the next; shape
         (offsets, nx).
 
@@ -97,20 +97,22 @@ class PyramidStep:
         if self.shape[1] == 1:
             return points[:0]
         cycle = self.fine.ny + self.fine.ny % 2
-        return self._beside("points", self.fine, self.fine.dealt, cycle, offsets).fetch(points)
+        return self._row_exchange("points", self.fine, self.fine.dealt, cycle, offsets).fetch(points)
 
-    def cells_beside(self, cells: NDArray[Any], *offsets: int) -> NDArray[Any]:
+    def adjacent_cells(self, cells: NDArray[Any], *offsets: int) -> NDArray[Any]:
         """Return the same for rows next to the cells that end in points of this rank."""
         if self.shape[1] == 1:
             return cells[:0]
-        return self._beside("cells", self.coarse, self._ending, self.coarse.ny, offsets).fetch(cells)
+        return self._row_exchange("cells", self.coarse, self._ending, self.coarse.ny, offsets).fetch(cells)
 
     @cached_property
     def _ending(self) -> list[slice]:
         """The rows of cells that end in points of each rank."""
         return list(map(ending_in(self.fine, self.shape[1]), range(self.fine.comm.size)))
 
-    def _beside(self, what: str, slab: Slab, parts: list[slice], cycle: int, offsets: tuple[int, ...]) -> "RowsBeside":
+    def _row_exchange(
+        self, what: str, slab: Slab, parts: list[slice], cycle: int, offsets: tuple[int, ...]
+    ) -> "RowExchange":
         """Return the exchange of rows next to the part of each rank with points; it is stored for further calls."""
         key = what, offsets
         if key not in self._kept:
@@ -120,5 +122,5 @@ class PyramidStep:
                 else []
                 for part, points in zip(parts, self.fine.dealt, strict=True)
             ]
-            self._kept[key] = RowsBeside(slab, wanted, self.fine.comm.rank)
+            self._kept[key] = RowExchange(slab, wanted, self.fine.comm.rank)
         return self._kept[key]

@@ -24,17 +24,17 @@ def roll_rows(slab: Slab, field: Array, count: int, out: Array) -> Array:
 def before_first(slab: Slab, field: Array, cyclic: bool) -> Array:
     """Return the row of a map before this rank's first one, shape (nx,); collective. The row before the first of the
     map is the last if the map is `cyclic`, otherwise the first itself. Ranks without rows get zeros."""
-    return _beside(slab, field, [-1], [], cyclic)[0]
+    return _adjacent_rows(slab, field, [-1], [], cyclic)[0]
 
 
 def around(slab: Slab, field: Array, count: int, cyclic: bool) -> tuple[Array, Array]:
     """Return the rows of a map before this rank's first one and after its last, shape (count, nx), the nearest first;
     collective. A map that is not `cyclic` continues with its first and last row. Ranks without rows get zeros."""
-    found = _beside(slab, field, range(-1, -1 - count, -1), range(count), cyclic)
+    found = _adjacent_rows(slab, field, range(-1, -1 - count, -1), range(count), cyclic)
     return found[:count], found[count:]
 
 
-def _beside(slab: Slab, field: Array, above: Sequence[int], below: Sequence[int], cyclic: bool) -> Array:
+def _adjacent_rows(slab: Slab, field: Array, above: Sequence[int], below: Sequence[int], cyclic: bool) -> Array:
     """Return rows counted from this rank's first one, and from the one after its last."""
 
     def wanted(part: slice) -> list[int]:
@@ -42,11 +42,11 @@ def _beside(slab: Slab, field: Array, above: Sequence[int], below: Sequence[int]
         return [number % slab.ny if cyclic else min(max(number, 0), slab.ny - 1) for number in numbers]
 
     everyone = [wanted(part) if part.start < part.stop else [] for part in slab.dealt]
-    found = RowsBeside(slab, everyone, slab.comm.rank).fetch(field)
+    found = RowExchange(slab, everyone, slab.comm.rank).fetch(field)
     return found if everyone[slab.comm.rank] else np.zeros((len(above) + len(below), slab.nx), field.dtype)
 
 
-class RowsBeside:
+class RowExchange:
     """Exchange of rows of a map between ranks, in one message; rows outside the map are zeros.
 
     `wanted` has the row numbers for each rank. A map that every rank has is on a slab of one rank.

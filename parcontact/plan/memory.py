@@ -29,7 +29,7 @@ FREE_SHARE = 0.7  # tuning: share of the free memory that jobs may take
 MEMINFO = Path("/proc/meminfo")
 MOST_POINTS = 2**20  # tuning: largest number of points of a case that runs on one rank of a sweep
 SPARE = 2.0  # tuning: memory of the first contact or steady state on nested grids, over the memory of steps
-NESTED = 2.5  # accuracy: maps that a first solve on coarser grids holds besides those of steps, at most
+NESTED = 2.5  # accuracy: largest number of maps of a first solve on coarser grids, in addition to maps of steps
 FAILED_SETS = 1.25  # accuracy: times the maps of a steady state with sets, at most, after these have failed
 SPECTRUM = "surface spectrum"
 

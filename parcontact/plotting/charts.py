@@ -19,7 +19,7 @@ NAMES, LINE = 9, 12  # size of the names of stages, and height of their lines [p
 MAX_NAME = 24  # most letters of the name of a stage
 LEVELS = 3  # most rows of horizontal names of stages
 FEW_NAMES, MANY_NAMES = 2, 4  # most lines for a legend inside a narrow and a wide panel
-SMALL, NAMES_BESIDE = 5.0, 2  # width of a small picture [inch]; names per row in its legend
+SMALL, NAMES_PER_ROW = 5.0, 2  # width of a small picture [inch]; names per row in its legend
 HEADROOM, PEAK_ROOM = 1.08, 1.25  # upper limit over the highest value, without and with its name in the legend
 FRACTION = "contact area /\nnominal area"
 BAR_SHARE = 0.8  # width of a bar over the distance of bars, in the logarithm
@@ -103,8 +103,8 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
 def _place_legend(axes: Axes, names: int) -> dict[str, Any]:
     """Return the place of a legend of `count` lines: inside the panel, or at its side, above or below."""
     small = axes.figure.bbox.width / axes.figure.dpi < SMALL
-    if names > (MANY_NAMES if small else FEW_NAMES) and _panels_beside(axes) == 1:
-        return style.BELOW | {"ncols": NAMES_BESIDE} if small else style.BESIDE
+    if names > (MANY_NAMES if small else FEW_NAMES) and _panels_per_row(axes) == 1:
+        return style.BELOW | {"ncols": NAMES_PER_ROW} if small else style.AT_SIDE
     return style.ABOVE if names > MANY_NAMES else {}
 
 
@@ -203,7 +203,7 @@ def _mark_stages(axes: Axes, stages: Sequence[tuple[str, float, float]], named: 
         axes.axvline(start, color=style.GREY, lw=0.8, ls=":", zorder=0)
     if not named or len(stages) < 2:
         return
-    width = AXES_SHARE * 72.0 * axes.figure.bbox.width / axes.figure.dpi / _panels_beside(axes)
+    width = AXES_SHARE * 72.0 * axes.figure.bbox.width / axes.figure.dpi / _panels_per_row(axes)
     places = (axes.transScale + axes.transLimits).transform([(x, 1.0) for _, *ends in stages for x in ends])[:, 0]
     ends = np.clip(places, 0.0, 1.0).reshape(-1, 2)  # from 0 at the left to 1 at the right
     names = [style.plain(name, MAX_NAME) for name, _, _ in stages]
@@ -222,7 +222,7 @@ def _mark_stages(axes: Axes, stages: Sequence[tuple[str, float, float]], named: 
         axes.annotate(name, (x / width, 1.0), (0, 2 + LINE * level), **look)
 
 
-def _panels_beside(axes: Axes) -> int:
+def _panels_per_row(axes: Axes) -> int:
     place = axes.get_subplotspec()
     return place.get_gridspec().ncols if place else 1
 

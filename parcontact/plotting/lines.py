@@ -63,7 +63,7 @@ def _draw_pressures(
     axes.locator_params(nbins=5)
     prefixes.label(axes.xaxis, along, "m")
     prefixes.label(axes.yaxis, "pressure", "Pa")
-    axes.legend(**style.BESIDE, **MANY_LINES)
+    axes.legend(**style.AT_SIDE, **MANY_LINES)
 
 
 def _make_strip(run: PlottedRun, fields: Fields) -> style.Panel:

@@ -51,7 +51,7 @@ ABOVE: dict[str, Any] = {  # legend of a panel of half the width
     "columnspacing": 1.0,
     "handlelength": 1.4,
 }
-BESIDE: dict[str, Any] = {  # legend at the right of a full panel
+AT_SIDE: dict[str, Any] = {  # legend at the right of a full panel
     "loc": "upper left",
     "bbox_to_anchor": (1.0, 1.0),
     "borderaxespad": 0.0,

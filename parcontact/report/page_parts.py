@@ -82,7 +82,7 @@ def draw_panel(panel: style.Panel, caption: str) -> Picture:
         panel(axes)
         names = len(axes.get_legend_handles_labels()[1])
         if names > charts.MANY_NAMES:  # a legend below the panel enlarges the picture
-            figure.set_figheight(SIZE[1] + NAME_HEIGHT * math.ceil(names / charts.NAMES_BESIDE))
+            figure.set_figheight(SIZE[1] + NAME_HEIGHT * math.ceil(names / charts.NAMES_PER_ROW))
         figure.savefig(file, format="svg", dpi=style.DPI, metadata={"Date": None})
     return to_uri(file.getvalue(), "image/svg+xml"), caption
 

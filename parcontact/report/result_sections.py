@@ -26,7 +26,7 @@ from ..plotting.plotted_run import (
     to_load,
 )
 from ..storage import hdf5, marker, read_back
-from ..summary import leak_stop, pull_off, slide, sweep_table, theory_beside, theory_settings
+from ..summary import leak_stop, pull_off, slide, sweep_table, theory_comparison, theory_settings
 from .page_parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement"}
@@ -63,7 +63,7 @@ def describe_run(directory: Path) -> ReportSection:
         *slide.describe_slide(run.job.history, run.job.initial, run.job.grid.dx, columns),
         *pull_off.describe_pull_off(columns, box, run.job.numerics.tolerance, bool(marker.detached(directory))),
         *leak_stop.describe_leak_stop(directory),
-        *theory_beside.describe_theory(directory, run.job.history, run.job.grid.dx),
+        *theory_comparison.describe_theory(directory, run.job.history, run.job.grid.dx),
         theory_settings.describe_settings(directory),
     ]
     pictures = [draw_chart(chart) for chart in histories.chart_histories(run)] + _leakage(directory)

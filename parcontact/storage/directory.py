@@ -42,7 +42,7 @@ COPIES = {  # copies of the job: as given, and with every default
     "study": ("study.job.yaml", "study.resolved.yaml"),
 }
 LOCK = ".lock"
-BESIDE = (
+PERMITTED = (
     stopfile.NAME,
     "theory.csv",
     "theory.yaml",
@@ -239,9 +239,9 @@ class Directory:
 
 
 def refuse_files(directory: Path, names: Iterable[str], hint: str = "") -> None:
-    """Raise InputError if a foreign directory has files of these names (except hidden ones and `BESIDE`), or belongs to
-    a sweep."""
-    foreign = sorted(name for name in names if not name.startswith(".") and name not in BESIDE)
+    """Raise InputError if a foreign directory has files of these names (except hidden and `PERMITTED` ones), or belongs
+    to a sweep."""
+    foreign = sorted(name for name in names if not name.startswith(".") and name not in PERMITTED)
     if cases := len([*(directory / CASES).glob(f"*/{marker.MARKER}")]):
         raise InputError(
             f"the output directory {directory} belongs to a sweep and has {cases} of its cases; give --out for another "

@@ -21,7 +21,7 @@ from ..storage import checkpoint, curve_points, fields, hdf5, marker, read_back
 from ..storage.console import meshes_of, warnings_of
 from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
-from . import leak_stop, pull_off, slide, sweep_table, theory_beside, theory_settings
+from . import leak_stop, pull_off, slide, sweep_table, theory_comparison, theory_settings
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
 SHOWN = 20  # tuning: most numbers of one name, or failed cases, that are shown
@@ -190,7 +190,7 @@ def _theory(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield count + (settings.sentence if settings else "of unknown settings")
     if (resolved := table.with_name(RESOLVED)).exists():
         job = shown_job(resolved)
-        yield from (f"  {text}" for text in theory_beside.describe_theory(table.parent, job.history, job.grid.dx))
+        yield from (f"  {text}" for text in theory_comparison.describe_theory(table.parent, job.history, job.grid.dx))
 
 
 def _curve(table: Path, claims: dict[str, Claim]) -> Iterator[str]:

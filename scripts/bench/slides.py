@@ -34,7 +34,7 @@ FIRST, LATER = 12, 48  # steps next to peers
 PRESSURE = 0.165  # next to peers, for 7 to 9 % of contact
 RELAXATION_TIMES = [10.0**k for k in range(-4, 4)]
 MODULUS = 2.0
-EXACT_BESIDE_PEERS = 1e-7
+EXACT_FOR_PEERS = 1e-7
 TOLERANCES = [1e-2, 5e-3, 2e-3, 1e-3, 5e-4]
 PEERS = (Task("tamaas", TAMAAS_SLIDING, -3.0),)
 
@@ -62,7 +62,7 @@ def slide(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]
         if tolerance != DEFAULT:
             break
     if asked.peers is not None:
-        yield from _beside_peers(points, asked.peers)
+        yield from _compare_with_peers(points, asked.peers)
 
 
 def _friction(job: Json) -> Map:
@@ -83,11 +83,11 @@ def _backward_euler_job(points: int, tolerance: float, precision: str = "double"
     }
 
 
-def _beside_peers(points: int, directory: Path) -> Iterator[Line]:
+def _compare_with_peers(points: int, directory: Path) -> Iterator[Line]:
     """Ours at the tolerance that makes friction good to ERROR with the fewest calls, and theirs."""
     half, tried = LATER // 2, []
     with warnings.catch_warnings(action="ignore"):  # of a body as soft as 1 Pa
-        rows = marched(begun(_backward_euler_job(points, EXACT_BESIDE_PEERS)))[0][-LATER:]
+        rows = marched(begun(_backward_euler_job(points, EXACT_FOR_PEERS)))[0][-LATER:]
         exact = np.array([row.measures.friction_x for row in rows])
         for tolerance in TOLERANCES:
             rows, clock = marched(begun(_backward_euler_job(points, tolerance, "mixed")))
@@ -103,7 +103,7 @@ def _beside_peers(points: int, directory: Path) -> Iterator[Line]:
     yield Line(f"{what}: operator calls per step", calls)
     yield Line(f"{what}: a step", 1e3 * ours, "ms")
     yield Line(f"{what}: one of the first {FIRST}", 1e3 * float(np.mean(seconds[FIRST // 2 : FIRST])), "ms")
-    job = _backward_euler_job(points, EXACT_BESIDE_PEERS)
+    job = _backward_euler_job(points, EXACT_FOR_PEERS)
     heights = np.asarray(pc.surface(job["surface"], job["grid"]))
     q = 2j * np.pi * np.fft.rfftfreq(points, 1.0 / points)
     slope = np.fft.irfft(q * np.fft.rfft(heights, axis=1), points, axis=1)

@@ -117,7 +117,7 @@ def test_the_verb(run_parcontact: RunParcontact, tmp_path: Path) -> None:
     }
 
 
-def test_settings_are_those_of_the_table_beside_them(tmp_path: Path) -> None:
+def test_settings_are_read_with_their_table(tmp_path: Path) -> None:
     """A table that could not be written leaves those before; legends name what cases share."""
     ran, other = (job(output={"directory": str(tmp_path / name)}) for name in ("ran", "other"))
     first, second = TheorySettings(0.5, "lattice"), TheorySettings(0.6, "lattice")

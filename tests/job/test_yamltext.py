@@ -142,7 +142,7 @@ def test_an_include_that_changes_nothing_is_stated(tmp_path: Path) -> None:
     ]
 
 
-def test_an_include_is_searched_beside_the_job_only(tmp_path: Path) -> None:
+def test_an_include_is_searched_in_the_directory_of_the_job_only(tmp_path: Path) -> None:
     """A file in a shared parent must not change the physics unseen; what was read is known by path and hash."""
     (tmp_path / "materials").mkdir()
     (tmp_path / "deep" / "materials").mkdir(parents=True)

@@ -287,7 +287,7 @@ def test_displacement_is_that_of_the_whole_box(
     assert np.vdot(q, u) == pytest.approx(np.vdot(p, v), rel=1e-12)
 
 
-def test_inverse_on_tiles_beside_each_other() -> None:
+def test_inverse_on_adjacent_tiles() -> None:
     """It is that of a periodic box of eight tiles, for a pressure within one of the tiles: to rounding on the tiles
     around it, and nothing beyond."""
     count = 8 * SIDE

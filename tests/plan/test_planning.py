@@ -97,7 +97,7 @@ def test_times_as_people_tell_them(seconds: float, text: str) -> None:
     assert len(text) < 11
 
 
-def test_steady_states_beside_a_history() -> None:
+def test_steady_states_of_a_job_with_history() -> None:
     """They are planned on their own, under the pressures that the verb would take."""
     steady = only_steady_states(job(material=TWO, history=[CELLS], steady={"velocities": [0.1]}))
     assert steady.history == ()

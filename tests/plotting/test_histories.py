@@ -22,7 +22,7 @@ def test_panels(tmp_path: Path, drawn: list[Figure], kind: str) -> None:
     assert panels(drawn[0]) == expected
 
 
-def test_hertz_beside_the_sphere(tmp_path: Path, drawn: list[Figure]) -> None:
+def test_sphere_is_drawn_with_hertz(tmp_path: Path, drawn: list[Figure]) -> None:
     """The computed pressures lie on Hertz's line, to 2 % of the highest at 7 cells per radius but for the edge."""
     plots.plot([ran(tmp_path, KINDS["Hertz"][0])])
     computed, hertz = drawn[0].axes[0].get_lines()
@@ -40,7 +40,7 @@ def test_no_panel_of_friction_that_is_0(tmp_path: Path, drawn: list[Figure]) -> 
     assert panels(drawn[0]) == [FRACTION, PEAK]
 
 
-def test_theory_beside_a_run(tmp_path: Path, drawn: list[Figure]) -> None:
+def test_theory_is_drawn_with_a_run(tmp_path: Path, drawn: list[Figure]) -> None:
     """Where theory.csv is, friction and contact area have its line, over what the run is drawn over."""
     out = ran(tmp_path, WAVE + ZENER + SLIDE)
     text = "time,distance,pressure,friction,contact_area\n0.0,0.0,1e3,0.0,0.5\n1.0,2e-3,1e3,0.25,0.75\n"
@@ -67,7 +67,7 @@ def test_a_directory_above_that_of_a_run(tmp_path: Path) -> None:
         plots.plot([out.parent])
 
 
-def test_theory_beside_a_run_with_an_interface(tmp_path: Path, drawn: list[Figure]) -> None:
+def test_theory_is_drawn_with_a_run_with_an_interface(tmp_path: Path, drawn: list[Figure]) -> None:
     """The friction that the theory is of, without that of the interface, has a line of its own."""
     out = ran(tmp_path, WAVE + ZENER + SLIDE + "interface: {shear_stress: 1.0e3}\n")
     (out / "theory.csv").write_text("time,distance,pressure,friction,contact_area\n0.0,0.0,1e3,0.0,0.5\n")

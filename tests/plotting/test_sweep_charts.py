@@ -27,7 +27,7 @@ def case(velocity: float, seed: int, friction: float | str, size: float = 1.0, t
     return (0, velocity, velocity, seed, size, "done", friction, 0.1, 0.2, theory)
 
 
-def test_means_over_seeds_beside_cases_and_theory(tmp_path: Path) -> None:
+def test_means_over_seeds_with_cases_and_theory(tmp_path: Path) -> None:
     """Cases that are not done yet are left out; keys that move together are one."""
     rows = [case(1.0, 1, 3.0), case(1.0, 2, 5.0), case(20.0, 1, 7.0, theory=0.7), case(20.0, 2, "", theory=0.7)]
     friction, area = sweep_charts.chart_sweep(saved(tmp_path, *rows))
@@ -116,7 +116,7 @@ def test_the_picture(tmp_path: Path) -> None:
     assert picture.stat().st_size > 10_000
 
 
-def test_many_lines_have_their_key_beside_them(tmp_path: Path, drawn: list[Figure]) -> None:
+def test_legend_of_many_lines_is_at_their_side(tmp_path: Path, drawn: list[Figure]) -> None:
     """Three values of a second key, means, cases and theories of all: none is over a line or over another key, and a
     colour means the same value in both panels."""
     head = (*HEAD, "theory_mu_max", "theory_mu_dyn", "theory_contact_area")

@@ -62,7 +62,7 @@ def results(boundary: str, precision: str, tolerance: float = 9e-6, energy: bool
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
-def test_marches_beside_double_precision(boundary: str) -> None:
+def test_marches_agree_with_double_precision(boundary: str) -> None:
     """Of what is largest in the march: to a thousandth of the tolerance, pressures to a hundredth; the same area."""
     double, p, calls = results(boundary, "double")
     series, found, took = results(boundary, "mixed")

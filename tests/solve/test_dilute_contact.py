@@ -88,7 +88,7 @@ def test_few_calls_of_the_whole_operator(
         assert np.linalg.norm(p - expected) <= 1e-4 * np.linalg.norm(expected)
 
 
-def test_tiles_beside_an_edge() -> None:
+def test_tiles_at_an_edge() -> None:
     """A block at the edge has no neighbour beyond it."""
     near, slab = np.zeros((16, 16), np.bool_), Slab.alone(512, 512)
     near[5, 0] = True

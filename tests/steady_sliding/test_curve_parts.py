@@ -175,7 +175,7 @@ def test_curve_of_another_job(main: Main, tmp_path: Path) -> None:
     assert (tmp_path / "out" / "steady.csv").read_bytes() == before
 
 
-def test_curve_beside_a_run(main: Main, tmp_path: Path) -> None:
+def test_curve_in_the_directory_of_a_run(main: Main, tmp_path: Path) -> None:
     """Each has its own files in one directory; of another scene neither may be there."""
     assert main("run.yaml", "--out", "out")[0] == DONE
     names = ("job.yaml", "job.resolved.yaml", "measures.csv")

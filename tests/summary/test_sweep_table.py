@@ -163,7 +163,7 @@ def test_errors_of_the_highest_and_the_mean_friction(cases: tuple[Case, ...]) ->
     assert found == pytest.approx([0.3, 0.03, 0.25, (0.03 + 0.06) / 2], rel=1e-9)
 
 
-def test_theory_of_all_cases_stands_beside_them(cases: tuple[Case, ...]) -> None:
+def test_sweep_table_has_theory_of_all_cases(cases: tuple[Case, ...]) -> None:
     for case in cases[:2]:
         directory = case.job.output.directory
         directory.mkdir(parents=True)

@@ -32,22 +32,22 @@ class CellLevel:
 
     def add_up(self, points: Map, cells: Map) -> None:
         step = self.step
-        loops.add_up(points, step.points_beside(points, 0, -1), step.above, *step.shape, cells[step.own])
+        loops.add_up(points, step.adjacent_points(points, 0, -1), step.above, *step.shape, cells[step.own])
         step.complete(cells)
 
     def add_up_back(self, cells: Map, points: Map) -> None:
         step = self.step
-        loops.add_up_back(cells[step.own], step.cells_beside(cells, 0, -1), step.above, *step.shape, points)
+        loops.add_up_back(cells[step.own], step.adjacent_cells(cells, 0, -1), step.above, *step.shape, points)
 
     def interpolate(self, cells: Map, known: Map, points: Map) -> None:
         step = self.step
         loops.interpolate_cells(
-            cells[step.own], step.cells_beside(cells, 0, -1), step.above, *step.shape, known, points
+            cells[step.own], step.adjacent_cells(cells, 0, -1), step.above, *step.shape, known, points
         )
 
     def interpolate_back(self, known: Map, points: Map, cells: Map) -> None:
         step = self.step
-        around = [step.points_beside(field, 0, 1, -2, -1) for field in (known, points)]
+        around = [step.adjacent_points(field, 0, 1, -2, -1) for field in (known, points)]
         own = cells[step.own]
         loops.gather_cells(known, around[0], points, around[1], step.above, *step.shape, own)
         step.complete(cells)

@@ -103,7 +103,7 @@ class LongWavePreconditioner:
 
     def _find_rest(self, level: int) -> None:
         z = self._z[level]
-        neighbours = self._levels[level].step.points_beside(z, 0, -1)
+        neighbours = self._levels[level].step.adjacent_points(z, 0, -1)
         _rest(z, neighbours, self._given[level], self._diagonal[level], *self._faces, self._left[level])
 
     def _add_up(self, level: int, points: NDArray[Any]) -> None:

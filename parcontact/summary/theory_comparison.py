@@ -13,7 +13,7 @@ from . import slide, theory_settings
 RUN = "measures.csv"
 
 
-class Beside(NamedTuple):
+class ComparedResult(NamedTuple):
     """A result [-] of the theory, the result of the run (None without a run), and its error (NaN if unknown)."""
 
     name: str
@@ -22,7 +22,7 @@ class Beside(NamedTuple):
     error: float = math.nan
 
 
-def compare_with_theory(directory: Path, history: Sequence[Stage], cell: float) -> list[Beside]:
+def compare_with_theory(directory: Path, history: Sequence[Stage], cell: float) -> list[ComparedResult]:
     """Return results of theory.csv and of measures.csv in a directory, none without the former; `cell` is the spacing
     of the grid along x [m].
 
@@ -31,7 +31,7 @@ def compare_with_theory(directory: Path, history: Sequence[Stage], cell: float) 
     """
     predicted, found = (_results(directory / name, history, cell) for name in (theory_settings.TABLE, RUN))
     nothing = None, math.nan
-    return [Beside(name, value, *found.get(name, nothing)) for name, (value, _) in predicted.items()]
+    return [ComparedResult(name, value, *found.get(name, nothing)) for name, (value, _) in predicted.items()]
 
 
 def _results(path: Path, history: Sequence[Stage], cell: float) -> dict[str, tuple[float, float]]:
@@ -58,5 +58,5 @@ def describe_theory(directory: Path, history: Sequence[Stage], cell: float) -> I
         yield f"Persson's theory predicts {', '.join(pairs)}"
 
 
-def _run(one: Beside) -> str:
+def _run(one: ComparedResult) -> str:
     return "" if one.run is None else f" (run: {with_error(one.run, one.error)})"
