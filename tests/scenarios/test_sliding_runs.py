@@ -362,11 +362,11 @@ def friction(points: int, surface: Any, body: Any, speed: float, boundary: str =
 )
 def test_stated_errors_cover_what_edges_lose(surface: Any, body: Any, speed: float, boundary: str) -> None:
     """The true error is that against meshes of 192 and 384 points in a periodic box, from both of which the first order
-    of the cell is taken off. It is 0.4 to 8 % here. An estimate holds in 19 of 20 scenes: one of these ten misses the
-    error by 8 %. The largest is 5.3 times the error."""
+    of the cell is taken off. It is 0.4 to 8 % here. The ten estimates are 1.3 to 4.8 times as large, near the
+    median of all scenes of the page `coverage` (3.3)."""
     coarse, fine = (friction(points, surface, body, speed)[0] for points in (192, 384))
     exact = 2.0 * fine - coarse
     for points in (64, 96):
         found, error = friction(points, surface, body, speed, boundary)
         true = abs(found / exact - 1.0)
-        assert true < 1.1 * error < 6.0 * true
+        assert true < error < 5.0 * true
