@@ -41,7 +41,7 @@ _ROOMS = {
     "Flow": "leakage.flow",
 }
 
-if not TYPE_CHECKING:  # else any misspelt name would have a type
+if not TYPE_CHECKING:  # type checkers would accept misspelt names
 
     def __getattr__(name: str) -> Any:
         if name not in _ROOMS:

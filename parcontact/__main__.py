@@ -61,14 +61,14 @@ def program() -> int:
 
 def _end_by_signal(number: int, frame: FrameType | None) -> None:
     """Report a signal that arrives outside of a run, and end the process by its default action."""
-    if all(os.environ.get(name, "0") == "0" for name in ranks.RANKS):  # not by MPI, which may just be starting
+    if all(os.environ.get(name, "0") == "0" for name in ranks.RANKS):  # without MPI, which may be starting
         os.write(2, f"parcontact: ended by {signal.Signals(number).name}, with nothing to save\n".encode())
     signal.signal(number, signal.SIG_DFL)
     signal.raise_signal(number)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line `argv`, by default that of this process, and return the exit code."""
+    """Run the command line `argv` (default: the command line of this process), and return the exit code."""
     with tolerant_streams():
         return _run(list(sys.argv[1:] if argv is None else argv))
 
@@ -113,7 +113,7 @@ def _judge_output() -> int:
 def _leave_code(code: int, words: Sequence[str] = ()) -> int:
     """Write the exit code, on root, to the file that PARCONTACT_EXIT_FILE names: launchers may end with their own.
 
-    The `words` of the command that goes on follow, a line each, if there is one.
+    If the run can be continued, the words of the command line that does so follow, one per line.
     """
     if ranks.is_root() and (path := os.environ.get("PARCONTACT_EXIT_FILE")):
         more = without_restart(words) if code == AGAIN else []

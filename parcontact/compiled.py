@@ -58,7 +58,7 @@ def _save_data_first(files: Any, key: Any, data: Any) -> None:
 
 def _cache_of(compiled: Any) -> Any:
     """Return numba's cache of a compiled function; None if compiling is switched off."""
-    dispatcher = getattr(compiled, "_dispatcher", compiled)  # functions of points have a dispatcher, loops are one
+    dispatcher = getattr(compiled, "_dispatcher", compiled)  # compiled loops are dispatchers themselves
     return getattr(dispatcher, "_cache", None) or getattr(dispatcher, "cache", None)
 
 
@@ -105,7 +105,8 @@ def _find_scipy() -> None:
 
 @cache
 def say_that_it_compiles() -> None:
-    """Tell whoever waits, once and on root, why nothing happens yet; not in files and pipes."""
+    """Print once that loops are being compiled, on root and only if a person watches: on a terminal or in a
+    notebook."""
     mpi = sys.modules.get("mpi4py.MPI")
     watched = sys.stderr.isatty() or "ipykernel" in sys.modules
     if watched and (mpi is None or mpi.COMM_WORLD.rank == 0):

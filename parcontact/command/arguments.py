@@ -196,12 +196,12 @@ def parse_arguments(words: Sequence[str]) -> argparse.Namespace:
     elif first not in (*NAMES, "-h", "--help", "--version", COMPLETION):
         _refuse_misspelt(first)
         words = ["run", *words]
-    requeued = os.environ.get("SLURM_RESTART_COUNT", "") not in ("", "0")  # such a job began before, and goes on
+    requeued = os.environ.get("SLURM_RESTART_COUNT", "") not in ("", "0")  # a requeued job continues its run
     return make_parser().parse_args(without_restart(words) if requeued else words)
 
 
 def without_restart(words: Sequence[str]) -> list[str]:
-    """Return the words of the command that goes on where this one has ended."""
+    """Return the words of the command line that continues the run of these `words`."""
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--restart")
     return parser.parse_known_args(words)[1]

@@ -20,7 +20,7 @@ UNSAID = ("give unit", "give size")  # parts of messages about maps without unit
 OF_POSITIONS = "units: {xy: UNIT"  # part of messages about maps that give their size without its unit
 HOW = "on the command line: --set surface.unit=um"
 HOW_SIZE = f"{HOW} --set surface.size=[1e-3,1e-3]"
-ACCURACIES = (0.01, 0.02, 0.05, 0.1, 0.2)  # tuning: a job to start from gets the first that its points can keep
+ACCURACIES = (0.01, 0.02, 0.05, 0.1, 0.2)  # tuning: a job to start from gets the first one possible
 LOAD = {"pressure": 1.0e5}
 
 

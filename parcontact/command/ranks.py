@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 BLANK = " \0"  # characters that may follow the name of an MPI library
 LEAST_FILES, LEAST_MEMORY = 32, 520e6  # tuning: open files, and memory [bytes], that MPI needs to start
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")  # variables that hold the rank
-LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # ... number of ranks
+LAUNCHERS = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")  # number of ranks
 
 
 def is_root() -> bool:

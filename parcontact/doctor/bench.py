@@ -97,7 +97,7 @@ class Bench:
         return float(np.sqrt(2.0) * np.std(self.whole(march, "pressure")))
 
     def _note(self, row: StepRow) -> None:
-        self.residual = float(np.max((self.residual, row.certificate.worst)))  # NaN if one is
+        self.residual = float(np.max((self.residual, row.certificate.worst)))  # NaN if one of them is NaN
         self.iterations = max(self.iterations, row.iterations)
 
     # -- what is expected ---------------------------------------------------------------------------------------------

@@ -63,7 +63,7 @@ def nearly_full(bench: Bench) -> None:
 
 def closed_by_load(bench: Bench) -> None:
     """Check sliding in full contact of many waves: steady and stepped forces are sums over waves in closed form, and
-    the steady friction is that of Persson's theory for any gamma."""
+    the steady friction agrees with Persson's theory for any gamma."""
     velocity, points = 0.3 * WAVELENGTH / RELAXATION, 16
     surface = [
         {"shape": "wave", "amplitude": share * HEIGHT, "waves": [x, y], "phase": 1.0 * x} for x, y, share in WAVES

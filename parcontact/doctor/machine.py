@@ -63,7 +63,7 @@ def prepare_loops(comm: "MPI.Intracomm") -> str:
     began = time.perf_counter()
     touch = {"pressure": 3e4, "duration": 1e-3, "time_step": 5e-4}
     slide = {"pressure": 3e4, "velocity": 0.03, "distance": 3e-5, "cells_per_step": 1}
-    road = {"shape": "rough", "hurst": 0.9, "rms_slope": 0.02, "seed": 1}  # whose steady sliding needs every solver
+    road = {"shape": "rough", "hurst": 0.9, "rms_slope": 0.02, "seed": 1}  # its steady sliding needs every solver
     road |= {"long_wavelength": 2.5e-4, "short_wavelength": 6.25e-5}
     rough: Json = {"grid": {"points": 32, "size": 1e-3}, "surface": road, "numerics": {"tolerance": 5e-3}}
     steady, energy = {"state": "steady", "velocity": 0.03, "pressure": 3e4}, {"energy": True}

@@ -107,7 +107,7 @@ class Job(Part):
 
     @classmethod
     def words(cls) -> tuple[str, ...]:
-        """Return the names of all sections, including those of this package's effects and `sweep`."""
+        """Return the names of all sections, including sections of this package's effects and `sweep`."""
         return (*dict.fromkeys((*super().words(), *added_sections.own_sections())), "sweep")
 
     def __eq__(self, other: object) -> bool:

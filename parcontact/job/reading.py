@@ -161,7 +161,8 @@ def _case(job: Job, index: int, sweep: Sweep | None) -> Case:
 
 
 def _job_error(given: Given, mistakes: list[Mistake]) -> JobError:
-    """Return the error with the mistakes in the order of the file, those in other files last; a long list is cut."""
+    """Return the error with the mistakes in the order of the file, and mistakes in other files last; a long list is
+    cut."""
     own = "" if isinstance(given, Mapping) else str(Path(given))
     ordered = sorted(mistakes, key=lambda mistake: (mistake.place.origin != own, mistake.place))
     sentences = list(dict.fromkeys(map(str, ordered)))

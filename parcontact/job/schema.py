@@ -101,7 +101,7 @@ def _sweep() -> Schema:
 
 
 def _included(definitions: Schema) -> Schema:
-    """Return the schema of an included material: keys other than `include` replace those of the file."""
+    """Return the schema of an included material: keys other than `include` replace keys of the file."""
     properties: Schema = {"include": {"type": "string", "description": "the name of a material file"}}
     for kind in (Elastic, Zener, Dma):
         for word, value in definitions[kind.__name__]["properties"].items():

@@ -49,7 +49,7 @@ class Costs:
 
     @property
     def finer(self) -> float:
-        """Return the work N log N on the grid of the job over that on the grid of the sample."""
+        """Return the ratio of the work N log N on the grid of the job to the work on the grid of the sample."""
         mine, tried = _points(self.job), _points(self.sample.job)
         return mine * math.log(mine + 1) / (tried * math.log(tried + 1))
 

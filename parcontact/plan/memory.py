@@ -78,8 +78,8 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool =
 
 
 def most_bytes(job: Job, ranks: int) -> int:
-    """Return the bytes that rank 0 holds at most in maps at once: those of steps, of a first solve on coarser grids and
-    of saved fields, or those of the steady state from which a run starts."""
+    """Return the largest memory of rank 0 in maps [bytes]: in steps with a first solve on coarser grids and saved
+    fields, or in the steady state from which a run starts."""
     (nx, ny), one_map = job.grid.points, 8 * job.grid.nx * job.grid.ny / ranks
     steps = total_bytes(job, ranks) + len(job.output.fields) * one_map + NESTED * one_map * (nx * ny >= WORTHWHILE)
     return int(max(steps, FAILED_SETS * steady_start(job, ranks, sets=True))) + on_tiles(job)

@@ -1,7 +1,7 @@
 """Price of accuracy: mesh, steps, memory and time of a job at other accuracies, from the errors in a trial.
 
 Errors fall with the orders of their fits (`accuracy.constants`) until each is its share (`accuracy.shares`). Meshes of
-surfaces with a shortest wave are those of `points: auto`.
+surfaces with a shortest wave are chosen as by `points: auto`.
 """
 
 import math
@@ -23,7 +23,7 @@ from .sample import Sample
 ACCURACIES = (0.05, 0.01, 3e-3, 1e-3)
 CHOSEN = 2.1  # accuracy: error of chosen steps over their share: 0.8 of the allowed error (TIME_MEDIAN)
 CALLS = 0.18  # tuning: power of 1/accuracy with which calls grow: 1.4 to 1.7 times for a tenth in eight scenes
-MOST = 16.0  # tuning: largest ratio of a mesh or of steps to those of the trial, either way
+MOST = 16.0  # tuning: largest factor between the mesh or steps and the trial, either way
 
 
 def error_of(sample: Sample, name: str, source: str) -> float:
@@ -54,7 +54,7 @@ def points_at(costs: Costs, whole: Job, accuracy: float) -> tuple[int, int]:
 
 
 def steps_at(costs: Costs, accuracy: float, points: tuple[int, int]) -> int:
-    """Return the steps at an accuracy; steps given by the job do not become longer in cells."""
+    """Return the number of steps at an accuracy. If the job gives its steps, they are at most as many cells long."""
     job, sample = costs.job, costs.sample
     if not any(stage.seconds for stage in job.history):  # single solves, or steady states
         return sample.steps

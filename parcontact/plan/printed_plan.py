@@ -12,14 +12,17 @@ from .costs import Costs
 
 SUMS_PER_STEP = 1  # sums over ranks per step outside of the march, to decide whether to stop
 DAY, YEAR = 86400.0, 365.25 * 86400.0  # [s]
-LARGE = 1e10  # size from which on the unit is GB [bytes]
+LARGE = 1e10  # least size that is printed in GB [bytes]
 OF_STEADY_STATES = (
     *("viscoelasticity", "isolated contact", "layer", "surface spectrum", "preconditioner in single precision"),
     *("interface", "thermal"),
 )
 ON_TILES = "more on rank 0 (tiles), at most"
 TO_ASK_FOR = "to ask a batch system for"
-STEADY_STARTS = (("steady start, before", False), ("steady start, with sets", True))  # and whether by sets of points
+STEADY_STARTS = (
+    ("steady start, before", False),
+    ("steady start, with sets", True),
+)  # and True if solved by sets of points
 
 
 def effects(job: Job) -> Iterator[str]:
@@ -32,7 +35,7 @@ def effects(job: Job) -> Iterator[str]:
 
 
 def maps(job: Job, ranks: Sequence[int], program: int) -> Iterator[str]:
-    """Yield a table of the bytes that a rank holds by their purpose; the `program` without maps has so many."""
+    """Yield a table of the memory of a rank by purpose; `program` is its memory without maps [bytes]."""
     columns = [memory.holdings(job, count) for count in ranks]
     before = STEADY_STARTS if choices(job).steady_start.on else ()
     tiles = memory.on_tiles(job)

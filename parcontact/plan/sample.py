@@ -170,7 +170,7 @@ def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[S
 
 
 def _solve(sliding: SteadySliding, velocity: tuple[float, float], pressure: float) -> Point | None:
-    """Return the steady state, or None if the solver fails: its cost counts all the same."""
+    """Return the steady state, or None if the solver fails; the time of a failure counts, too."""
     with suppress(RunError):
         return sliding.solve(velocity, pressure)
     return None
@@ -209,7 +209,7 @@ def _make(march: March, step: Step) -> dict[str, float]:
     """Make a step; return its costs and its errors."""
     _, cost = _cost(march.scene.slab, partial(march.advance, step))
     far = weight_of(march.scene.job.history[step.stage].speed * step.dt, step.dt)
-    friction = march.row.measures.friction if march.scene.job.directions else 0.0  # without sliding it is noise
+    friction = march.row.measures.friction if march.scene.job.directions else 0.0  # noise without sliding
     return cost | dict(_errors(march.row.errors, far, friction))
 
 

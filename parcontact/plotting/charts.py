@@ -24,7 +24,7 @@ HEADROOM, PEAK_ROOM = 1.08, 1.25  # upper limit over the highest value, without 
 FRACTION = "contact area /\nnominal area"
 BAR_SHARE = 0.8  # width of a bar over the distance of bars, in the logarithm
 LEAST = 0.99  # largest downward error bar over the value
-ZERO_ROW = 0.05  # height of the row of marks at 0, over that of the panel
+ZERO_ROW = 0.05  # height of the row of marks at 0, over the height of the panel
 FEW_DECADES = 1.5  # decades of a logarithmic axis below which minor ticks have labels
 
 
@@ -101,7 +101,7 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
 
 
 def _place_legend(axes: Axes, names: int) -> dict[str, Any]:
-    """Return the place of a legend of `count` lines: inside the panel, or at its side, above or below."""
+    """Return the place of a legend with this number of names: inside the panel, or at its side, above or below."""
     small = axes.figure.bbox.width / axes.figure.dpi < SMALL
     if names > (MANY_NAMES if small else FEW_NAMES) and _panels_per_row(axes) == 1:
         return style.BELOW | {"ncols": NAMES_PER_ROW} if small else style.AT_SIDE

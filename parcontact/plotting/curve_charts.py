@@ -96,7 +96,7 @@ def _make_theory(columns: dict[str, Array], x: str, y: str, by: str) -> Iterator
 def _make_thin(
     columns: dict[str, Array], x: str, y: str, by: str, label: str, dashes: str, color: str = ""
 ) -> Iterator[ChartLine]:
-    """Yield thin lines in addition to those of the simulation; the first has the label."""
+    """Yield thin lines, drawn in addition to the simulation; the first has the label."""
     for number, line in enumerate(_make_lines(columns, x, y, by, "")):
         own = {"color": color or style.line(number)["color"], "linestyle": dashes, "linewidth": THIN}
         yield ChartLine("" if number else label, line.x, line.y, own)

@@ -14,7 +14,7 @@ from . import conductivity, prefixes, style
 from .charts import Axis, Chart, ChartLine
 from .plotted_run import PlottedRun
 
-EARLY = 0.05  # share of the time within which half of the rows make a linear axis useless
+EARLY = 0.05  # half of the rows within this share of the time make a linear axis useless
 FEW_ROWS = 8
 FLASH = "flash_temperature"
 ENERGIES = {
@@ -25,7 +25,7 @@ ENERGIES = {
     "snaps": "snap_loss",
 }
 FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # columns of a run with leakage
-VISCOUS = "friction_viscous"  # friction without that of the interface; in the table of a run with one
+VISCOUS = "friction_viscous"  # friction of the body; in tables of runs with an interface
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def _add_theory(chart: Chart, run: PlottedRun) -> Chart:
 
 
 def _find_charts(run: PlottedRun, along: Abscissa) -> Iterator[Chart]:
-    """Yield the panels of a run: key, measure, lines by name, and whether it shows anything."""
+    """Yield the panels of a run that show anything: key, measure, and lines by name."""
     columns, free = run.columns, run.free
     signed = run.backwards and not along.marked  # the axis of speed has no direction
     friction = "friction coefficient" + "\nalong x" * signed

@@ -51,8 +51,8 @@ BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile, and the ratio to it above which po
 def map_panels(run: PlottedRun, at: str = "") -> tuple[list[style.Panel], list[style.Panel]]:
     """Return panels of pressures on a line, and of the saved maps of one instant.
 
-    The default instant is the last one; for contacts that end in detachment, that of the pull-off or of the largest
-    load. Raises InputError if nothing is saved at the instant `at`.
+    The default instant is the last one; for contacts that end in detachment, the pull-off or the largest load. Raises
+    InputError if nothing is saved at the instant `at`.
     """
     try:
         with hdf5.open_results(run.directory / "fields.h5") as file:
@@ -198,8 +198,7 @@ def draw_frames(
     size: tuple[float, float] = (4.5, 4.0),
     dpi: int = 110,
 ) -> Iterator[Image.Image]:
-    """Draw a map of shape (instant, y, x) that a job has left in a file at each index that has a label, with one range
-    of colours."""
+    """Draw a saved map of shape (instant, y, x) at each index that has a label, with one range of colours."""
 
     def read(index: int) -> Array:
         pressure = file["pressure"][index] if name == "gap" and "pressure" in file else None

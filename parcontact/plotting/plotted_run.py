@@ -68,8 +68,8 @@ class PlottedRun:
 
     @property
     def telling_step(self) -> int:
-        """Return the step whose maps show the contact: the last one, or after a detachment that of the pull-off or of
-        the largest load."""
+        """Return the step whose maps show the contact: the last one, or after a detachment the step of the pull-off or
+        of the largest load."""
         columns = {name: values.tolist() for name, values in self._all.items()}
         row = pull_off.choose_row(columns, bool(marker.detached(self.directory)))
         return int(self._all["step"][row])

@@ -100,8 +100,8 @@ def line(number: int) -> dict[str, Any]:
 def figure_of(
     title: str, groups: Sequence[Sequence[Panel]], legend: bool = False, maps: Sequence[Panel] = ()
 ) -> Figure:
-    """Draw groups of panels below each other in even rows, then `maps` in places of one size; with `legend` one for all
-    panels, under the title."""
+    """Draw groups of panels below each other in even rows, then `maps`, all of one size. With `legend` there is space
+    for one legend of all panels under the title."""
     parts = [(row, 1, len(row)) for group in groups for row in _split_rows(group)]
     parts += [(maps, -(-len(maps) // COLUMNS), COLUMNS)] if maps else []
     heights = [rows for _, rows, _ in parts]

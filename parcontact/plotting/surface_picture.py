@@ -13,13 +13,10 @@ from ..physics.surface_statistics import Statistics
 from . import prefixes, style
 
 BINS = 60
-FEW, OUTLYING = (
-    1e-3,
-    1.5,
-)  # share of outlying points on either side, and the range that is drawn over that of the others
+FEW, OUTLYING = (1e-3, 1.5)  # share of outlying points on either side, and the drawn range over the range of the others
 RESOLVED = 8  # cells of a wave that is resolved in a contact
 COARSEST = 800  # most points of the drawn map along a side
-ROUNDING = 1e-20  # rounding: smallest power over the largest that is drawn
+ROUNDING = 1e-20  # rounding: smallest drawn power over the largest
 LEGEND = 8  # size of letters of the legend [points]
 
 

@@ -40,7 +40,7 @@ class Simulation:
     """A job, run from Python on the ranks of `comm`; all methods are collective.
 
     Parameters: `job`, the path of a job file or a mapping with the same keys; `set`, values by keys like `grid.points`
-    that replace those of the job; `comm`, an MPI communicator (default: all ranks). Raises JobError for a job with
+    that replace values of the job; `comm`, an MPI communicator (default: all ranks). Raises JobError for a job with
     mistakes, InputError for files that do not match it; warns (ParcontactWarning, on root) about implausible values.
 
     Files are written by `run` only, and only if the job, or `set`, gives `output.directory`. Paths in a mapping are
@@ -63,9 +63,9 @@ class Simulation:
     def steps(self) -> Iterator[Row]:
         """Yield the row of the initial state, then one after each step, which is made on demand in memory.
 
-        A second call continues after the last step. Raises RunError for a failed step, after which the state is that
-        before the step. All ranks must make each step: if one leaves the loop by `break` or an exception, the others
-        raise RunError.
+        A second call continues after the last step. Raises RunError for a failed step, and keeps the state before the
+        step. All ranks must make each step: if one leaves the loop by `break` or an exception, the others raise
+        RunError.
         """
         march, self._stepped = self._march, True
         timeline = march.timeline()
@@ -110,7 +110,7 @@ class Simulation:
 
     @property
     def row(self) -> Row:
-        """Return the measures of the last step, also before a restart; initially those of the initial state."""
+        """Return the measures of the last step, also before a restart; before the first step, of the initial state."""
         march, saved = self._march, self._saved
         added = columns_of(march.scene.effects)
         if saved is not None and saved.table.last and march.row.step == saved.step:

@@ -40,7 +40,7 @@ class SweepRun:
 
     Groups of ranks take cases in turn, one at a time. `act` gets a job, the slab of the group, and a function that
     tells if a warning is shown. `limit` is the latest end (time of `time.monotonic`); `shown` are warnings that were
-    already shown. Failures are recorded if it `runs` its cases.
+    already shown. Failures are recorded only if `runs` is True: `act` runs the cases.
     """
 
     cases: Sequence[Case]

@@ -91,7 +91,7 @@ class Watch:
         if not began:
             return False
         if self.rules.every is not None:
-            return step // self.rules.every > self._made // self.rules.every  # a step may stand for several
+            return step // self.rules.every > self._made // self.rules.every  # a multiple may be skipped
         return self.rules.minutes is not None and now - self._saved >= 60.0 * self.rules.minutes
 
     @property

@@ -171,7 +171,7 @@ class Directory:
         """Return the unfinished files of a killed run."""
         return [*self.path.glob("*.part"), *self.checkpoints.glob("*.part")]
 
-    # -- whose it is --------------------------------------------------------------------------------------------------
+    # -- ownership ---------------------------------------------------------------------------------------------------
 
     def _has_checkpoints(self) -> bool:
         """Return True if the directory has sound checkpoints, as a copy without its marker has."""

@@ -149,7 +149,7 @@ def _move(path: Path, slab: Slab, parts: Sequence[Slice], writes: bool) -> None:
 def _place(dataset: h5py.Dataset, part: Slice, slab: Slab) -> int:
     """Return the offset of this rank's rows in the file [bytes]; raises ValueError for another type or shape."""
     if (dataset.dtype, dataset.shape[-2:], slab.shape) != (part.rows.dtype, (slab.ny, slab.nx), part.rows.shape):
-        kinds = f"{dataset.dtype} {dataset.shape}, not of {part.rows.dtype} {part.rows.shape} and its like"
+        kinds = f"{dataset.dtype} {dataset.shape}; {part.rows.dtype} with rows {part.rows.shape} was expected"
         raise ValueError(f"{part.name} is of {kinds}")
     if not part.rows.size:
         return 0

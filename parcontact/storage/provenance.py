@@ -76,7 +76,7 @@ class Provenance:
                 file.attrs.modify(name, text)
 
     def _renewable(self, job: str) -> dict[str, NDArray[np.bytes_]]:
-        """Return the attributes of fixed size that change during a run; `job` is that of the file."""
+        """Return the attributes of fixed size that change during a run; `job` is the job of the file."""
         texts = {
             "chain": (_chain_text(self.chain, job), CHAIN_BYTES),
             "warnings": ("\n".join(self.warnings), WARNING_BYTES),
@@ -103,7 +103,8 @@ def read_chain(file: h5py.File) -> tuple[Link, ...]:
 
 
 def _chain_text(chain: Sequence[Link], job: str) -> str:
-    """Return a chain as JSON; an empty job is that of the file, and the oldest jobs are left out if it is too long."""
+    """Return a chain as JSON. An empty job means the job of the file; the oldest jobs are left out if the text is too
+    long."""
     links = [asdict(replace(link, job="" if link.job == job else link.job)) for link in chain]
     for link in links:
         if len(json.dumps(links)) > CHAIN_BYTES and link["job"]:

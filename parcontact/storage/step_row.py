@@ -91,7 +91,7 @@ class MeasuresFile(GrowingTable):
 def cut_back_table(
     path: Path, step: int, then: TableMark, branches: int = 0, added: Sequence[str] = ()
 ) -> tuple[TableMark, list[str]]:
-    """Remove rows after `step`, and an incomplete row; the columns become those of the present job.
+    """Remove rows after `step`, and an incomplete row; the columns become the columns of the present job.
 
     `then` is the state when the checkpoint was written: its last row is added if the disk was full. Returns the new
     state and messages on lost rows. Raises InputError for a damaged file, which is not changed.

@@ -33,8 +33,8 @@ def gather(slab: Slab) -> NDArray[np.uint8]:
 
 
 def recall(transforms: Sequence[Any], slab: Slab, saved: NDArray[np.uint8] | None) -> None:
-    """Use the wisdom of a checkpoint, if it has as many ranks, else that of the first run on this machine with the same
-    `transforms` (`scene.Choices`); collective."""
+    """Use the wisdom of a checkpoint, if it has as many ranks, else the wisdom of the first run on this machine with
+    the same `transforms` (`scene.Choices`); collective."""
 
     def kept() -> bytes:
         with suppress(OSError):

@@ -129,7 +129,7 @@ def _sliding(job: Job) -> list[Stage]:
 
 
 def describe_choices(job: Job) -> list[str]:
-    """Return sentences on what is the same, or chosen for the accuracy, in every case."""
+    """Return sentences on the settings that are equal, or chosen for the accuracy, in every case."""
     lines, reach = list[str](), chosen_range(job)
     if reach is not None:
         own = f"{job.grid.nx} x {job.grid.ny} points, the job's own mesh"

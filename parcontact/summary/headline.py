@@ -81,7 +81,8 @@ def _flow(columns: Columns, row: int, axis: str) -> str:
 
 
 def _area(job: Job, columns: Columns, detached: bool) -> str:
-    """Return the mean contact area of the slide; without a slide that of the row chosen by `pull_off.choose_row`."""
+    """Return the mean contact area of the slide; without a slide the area in the row chosen by
+    `pull_off.choose_row`."""
     if (found := slide.measure_slide(job.history, columns)) is not None:
         error = slide.absolute_errors(job.history, columns, job.grid.dx).get("contact_area", math.nan)
         return f"the mean contact area is {_size(job, found.contact_area_corrected, error)}"

@@ -1,6 +1,6 @@
 """Pressures, or instants, between which contact closes the gap along x and along y.
 
-Conductivities K are those of `leak.csv`, from saved gaps, else those of measures.csv.
+Conductivities K are read from `leak.csv`, which is made from saved gaps, else from measures.csv.
 """
 
 import math

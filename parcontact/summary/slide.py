@@ -67,7 +67,7 @@ def measure_slide(history: Sequence[Stage], columns: Mapping[str, Sequence[float
 
 
 def _without_load(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return those of `rows`, except the first, with a tangential force but without load, or under tension."""
+    """Return the rows, except the first, that have a tangential force and no load, or a tensile one."""
     friction = np.asarray(columns["friction"], float)[rows]
     return rows[1:][((friction == 0.0) & (_tangential(columns, rows) > 0.0))[1:]]
 

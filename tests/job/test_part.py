@@ -226,7 +226,7 @@ OTHERS = {
     "output: {every: 0}": "5:17: output.every must be a positive whole number of steps, got 0",
     "output: {directory: 3}": "5:21: output.directory must be the path of a directory (text), got 3",
     "numerics: {slope: spectral}": (
-        "5:12: numerics.slope is not a known key; it was removed; slopes are those of the waves of the surface"
+        "5:12: numerics.slope is not a known key; it was removed; slopes follow from the waves of the surface"
     ),
     "output: {mesh_check: true}": (
         "5:10: output.mesh_check is not a known key; it was removed; `parcontact study` measures the error of the "

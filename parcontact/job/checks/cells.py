@@ -56,7 +56,7 @@ class Guess(NamedTuple):
 
     @property
     def few(self) -> float:
-        """Return the ratio of random errors to those in a box of FEW waves."""
+        """Return the ratio of random errors to the random errors in a box of FEW waves."""
         return FEW / max(self.waves, FEW)
 
 
@@ -120,7 +120,7 @@ def cells_for_area(accuracy: float) -> float:
 
 def needed(axis: int, directions: Sequence[Vector], asked: Accuracy) -> tuple[float, float]:
     """Return the cells per shortest wave along an axis, for friction and for the contact area, of a surface that slides
-    along `directions` (unit vectors); without sliding both are those of the area."""
+    along `directions` (unit vectors); without sliding both are for the area."""
     if not directions:
         return cells_for_area(asked.area), cells_for_area(asked.area)
     if any(abs(way[axis]) > ASIDE for way in directions):

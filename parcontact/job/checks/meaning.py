@@ -28,7 +28,7 @@ ALONE = 0.01  # accuracy: limit on the relative change of the load by periodic i
 IMAGES = 20  # accuracy: number of images summed on each side; the others add 3 %
 ROUNDS = 1000  # tuning: limit on the passages through the box that are checked for imprints
 SAME = 1e-9  # rounding: relative difference below which distances are the same
-BEYOND = 100.0  # physics: ratio of frequencies to those of all branches, above which nothing relaxes
+BEYOND = 100.0  # physics: frequency over the frequency of every branch, above which nothing relaxes
 
 
 def doubts_of_scene(job: Sections) -> Iterator[Doubt]:

@@ -162,7 +162,7 @@ class Numerics(Part):
     accept_unconverged: Flag = False
     strict: Flag = False
 
-    foreign = MappingProxyType({"slope": Instead("it was removed; slopes are those of the waves of the surface")})
+    foreign = MappingProxyType({"slope": Instead("it was removed; slopes follow from the waves of the surface")})
     _chosen: dict[str, float] = PrivateAttr(default_factory=dict)
 
     def model_post_init(self, context: Any) -> None:
@@ -211,7 +211,7 @@ class Output(Part):
 
     @property
     def maps(self) -> tuple[str, ...]:
-        """The names of the maps that the fields have: one for each component."""
+        """Return the names of the maps of the fields; a vector has one map for each component."""
         both = {"traction": ("traction_x", "traction_y")}
         return tuple(name for field in self.fields for name in both.get(field, (field,)))
 

@@ -68,7 +68,7 @@ class RoughSpectrum(Part):
     """A random surface with a measured isotropic spectrum, from a table with columns `q[1/m] C2D[m^4]`, or
     `q[1/m] C1D[m^3]` of profiles. With `hurst` it is extrapolated to shorter waves as q^(-2 (1 + hurst)).
 
-    The default range of wavelengths is that of the data.
+    The default range of wavelengths is the range of the data.
     """
 
     label: ClassVar[str] = "shape rough with a spectrum"

@@ -32,8 +32,8 @@ from .quantities import from_home
 
 class Origin(NamedTuple):
     """Origin of a job: its absolute path, and the file of an included material; `mesh` describes chosen points.
-    `approaches` are the places of the approaches of the stages, `strict` is that of `numerics.strict` ('' for jobs from
-    Python).
+    `approaches` are the places of the approaches of the stages, `strict` is the place of `numerics.strict` ('' for jobs
+    from Python).
 
     `numbers_as_texts`: texts such as 1e-3 may be numbers, as PyYAML's `safe_load` returns them. `names_directory`: the
     job gives its output directory.

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from ..text.fault import Fault, quote, refuse, shorten
 
-FROM_SURFACE = "from surface"  # grid.points or grid.size: those of the measured map
+FROM_SURFACE = "from surface"  # grid.points or grid.size: as the measured map
 AUTO_POINTS = "auto"  # grid.points: chosen by the accuracy
 MOST = 2**31 - 1  # largest whole number: transforms and messages count in 32 bits
 SMALLEST, LARGEST = 1e-60, 1e60  # rounding: range of numbers in a job, whose squares and quotients do not overflow

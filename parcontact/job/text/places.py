@@ -41,7 +41,7 @@ NOWHERE: Final = Place("")
 class Located(NamedTuple):
     """The result of following a path: the path as the user wrote it, and the places of its value and of its key.
 
-    For a missing value both places are that of the mapping that lacks it.
+    The places of a missing value are the place of the mapping that lacks it.
     """
 
     path: Key

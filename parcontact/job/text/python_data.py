@@ -27,7 +27,7 @@ def is_array(value: Any) -> bool:
 
 
 def _plain(value: Any, path: Key, source: Source) -> Any:
-    """Return a value as plain data like that of YAML; note a mistake if it has no such form."""
+    """Return a value as plain data, as read from YAML; note a mistake if this is impossible."""
     if is_array(value) and _is_map(value, path):
         return value
     if hasattr(value, "tolist"):  # numpy's numbers and arrays
