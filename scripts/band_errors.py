@@ -1,9 +1,9 @@
-"""Bands against one grid that holds all waves: random cases in two dimensions, or --line for three decades in one.
+"""Compare bands with one grid that holds all waves, for random surfaces, or with --line for profiles of three decades.
 
-Both have four cells per shortest wave, and the coarsest band has the waves of the one grid, so that what differs is the
-method and the chance of finer surfaces. `--cases 20` takes some twenty minutes on one core. Each line is a case; the
-last lines count how often friction is within 5 %, the area within 6 %, and how often the stated error of method and
-surfaces covers the difference.
+Both have four cells per shortest wave, and the coarsest band has the waves of the one grid. They differ by the method
+and by the random surfaces of the finer bands only. `--cases 20` takes some twenty minutes on one core. Each line is a
+case. The last lines count in how many cases friction is within 5 %, the area is within 6 %, and the stated error of
+method and surfaces covers the difference.
 
     python scripts/band_errors.py --cases 20 --seed 1
 """
@@ -73,8 +73,8 @@ def case_of(number: int, seed: int, line: bool) -> tuple[dict[str, Any], int, fl
 
 
 def known_case(number: int, line: bool) -> tuple[dict[str, Any], int, float, float]:
-    """Return the same of a road of Hurst exponent 0.8: of a surface of rms slope 0.25 from 1 mm, or of a profile of it
-    from 4 mm, whose spectrum is that of a surface with an exponent smaller by one half."""
+    """Return the same for a road of Hurst exponent 0.8. It is a surface of rms slope 0.25 with waves up to 1 mm, or a
+    profile with waves up to 4 mm, whose Hurst exponent is smaller by one half."""
     speed, load = KNOWN[line][number % len(KNOWN[line])]
     points, longest, hurst, slope = (LINE, LONG, 0.3, 0.177) if line else (512, 1e-3, 0.8, 0.25)
     waves = {"long_wavelength": longest, "short_wavelength": longest * (64 if line else 16) / points}
@@ -109,8 +109,8 @@ def compare(whole: Point, found: Point, text: str) -> list[float]:
 
 
 def conclude(count: int, table: NDArray[np.float64]) -> None:
-    """Print the differences of all cases, how much of them is the scatter of surfaces, how many are small, and how many
-    are within the stated errors."""
+    """Print for all cases the differences, the part of them by the scatter of surfaces, and the numbers of cases with
+    small differences and within the stated errors."""
     for column, (name, most) in enumerate((("friction", 0.05), ("area", 0.06))):
         error = table[:, column]
         rms, chance = (100 * math.sqrt(np.mean(table[:, place] ** 2)) for place in (column, 4 + column))

@@ -2,27 +2,30 @@
 
     .venv/bin/python scripts/bench.py [PART...] [--points 512] [--rounds 15] [--json FILE] [--peers DIRECTORY]
 
-    solve    a cold elastic solve at 11 % contact to a pressure error of 1e-7, in double and mixed precision, and peers'
-    dilute   cold elastic solves in free boxes at 0.07 to 2 % contact on two and four times as many points; with peers,
-             aspher's
+    solve    a cold elastic solve at 11 % contact to a pressure error of 1e-7, in double and mixed precision;
+             peers: tamaas and aspher
+    dilute   cold elastic solves in free boxes at 0.07 to 2 % contact on two and four times as many points;
+             peers: aspher
     free     operator calls of cold solves in free boxes at 0.2 to 35 % contact to a pressure error of 1e-5: on
-             512 x 512 points, and on ever finer grids
-    adhesion a cold adhesive elastic solve at 24 % contact to a pressure error of 1e-5, and peers'
-    slide    sliding over a rough surface with twelve branches, by one cell a step; with peers, next to them with eight
-    march    the velocity step of the paper's Fig. 8 on two ranks: a step over its transforms, and what it holds
+             512 x 512 points, and on finer and finer grids
+    adhesion a cold adhesive elastic solve at 24 % contact to a pressure error of 1e-5; peers: tamaas and Adhesion
+    slide    sliding over a rough surface with twelve branches, by one cell a step; peers: tamaas, with eight
+    march    the velocity step of the paper's Fig. 8 on two ranks: a step over its transforms, and memory
     steady   steady sliding from a cold start, and along a curve of eight velocities per decade
     flow     leakage through the gap of a contact of 30 %, along x and along y: for --points 2048
-    scale    a transform, a cold solve and a sliding step on two ranks, over one
-    sizes    a cold solve and a sliding step on 256 x 256 points and on ever finer grids, over N^2 log2 N
+    scale    a transform, a cold solve and a sliding step: times on two ranks over times on one
+    sizes    a cold solve and a sliding step on 256 x 256 points and on finer and finer grids, over N^2 log2 N
     large    a cold elastic solve at 8 % contact to a pressure error of 1e-5: for --points 8192
 
-Operator calls are those on the finest grid, coarser ones counted by their share of its points. Times of one process are
-CPU times, those of `march` and `scale` wall times. What is compared takes turns, round by round;
-shown are the median, and of the ratios of each round the median and the quartiles. The pressure error is the relative
-L2 distance from a solution to 1e-11, the same for every program, of friction from steps to a tolerance of 5e-5,
-next to peers 1e-7. `--peers DIRECTORY` installs tamaas, aspher and Adhesion there, each in an environment of its own,
-and gives each 7 minutes of CPU time for `solve`, `adhesion` and `slide` to find the loosest tolerance by which it
-reaches the error; one that does not has a ratio of "more than".
+Operator calls on coarser grids count by their share of the points of the finest one. Times of one process are CPU
+times; `march` and `scale` have wall times. Functions that are compared take turns in each round. Printed are the median
+time, and the median and the quartiles of the ratios of each round. The error of pressures is the relative L2 distance
+to a solution with a tolerance of 1e-11, the same for every program. The error of friction is the difference to steps
+with a tolerance of 5e-5 (1e-7 for the comparison with other programs).
+
+`--peers DIRECTORY` compares with these programs, and installs each there in its own environment. In
+`solve`, `adhesion` and `slide` each has 7 minutes of CPU time to find the loosest tolerance with which it reaches the
+error. The ratio of a program that does not reach it is "more than".
 """
 
 import argparse
@@ -44,14 +47,14 @@ from bench.solves import large, sizes, solve
 from bench.table import Line
 
 FEWEST = 64  # points along a side
-BUSY = 0.5  # cores at work before the benchmark, above which it warns
+BUSY = 0.5  # busy cores before the benchmark above which it warns
 PARTS = {"solve": solve, "slide": slide, "steady": steady, "sizes": sizes, "large": large, "adhesion": adhesion}
 PARTS |= {"dilute": dilute, "free": free, "flow": flow}
 ON_TWO_RANKS = {"march": march, "scale": scale}
 
 
 def measure(parts: list[str], asked: argparse.Namespace) -> Iterator[tuple[str, Line]]:
-    """Measure the parts of this process first, then those of two ranks."""
+    """Measure the parts of this process first, then the parts on two ranks."""
     for part in parts:
         if part in PARTS:
             yield from ((part, line) for line in PARTS[part](asked.points, asked.rounds, asked))
@@ -60,7 +63,8 @@ def measure(parts: list[str], asked: argparse.Namespace) -> Iterator[tuple[str, 
 
 
 def on_two_ranks(parts: list[str], asked: argparse.Namespace) -> Iterator[tuple[str, Line]]:
-    """Lines of parts that this script, started on two ranks, measures there. Raises RuntimeError if it cannot."""
+    """Yield the lines of the parts that this script measures in a process of two ranks. Raises RuntimeError if it
+    cannot."""
     words = [Path(sys.executable).with_name("mpirun"), "-n", 2, sys.executable, __file__, *parts, "--inside"]
     words += ["--points", asked.points, "--rounds", asked.rounds]
     done = subprocess.run(list(map(str, words)), capture_output=True, text=True, env=runs.environment())
@@ -86,7 +90,9 @@ def arguments() -> argparse.Namespace:
     if unknown := set(asked.parts) - set(names):
         parser.error(f"there is no part {', '.join(sorted(unknown))}; there are {', '.join(names)}")
     if asked.points < FEWEST:
-        parser.error(f"--points must be {FEWEST} or more: the shortest wave has 16 of them, the longest a quarter")
+        parser.error(
+            f"--points must be {FEWEST} or more: the shortest wave has 16 points, the longest is a quarter of the box"
+        )
     asked.parts = asked.parts or names
     return asked
 

@@ -1,4 +1,4 @@
-"""The frame of campaigns: trials drawn from a seed and a number; those with faults are stated, to be made again."""
+"""Frame of campaigns: trials drawn from a seed and a number; the numbers of trials with faults are printed."""
 
 import argparse
 import time
@@ -12,13 +12,13 @@ EVERY = 50  # trials between two lines of progress
 
 
 def parser(doc: str | None, trials: int, what: str = "trials", **more: tuple[Any, str]) -> argparse.ArgumentParser:
-    """Options of all campaigns, and `more` by their names: a default and a help text each."""
+    """Return the options of all campaigns, and the options in `more`: a default and a help text by name."""
     made = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     made.add_argument(f"--{what}", type=int, default=trials, dest="trials", metavar="N")
-    made.add_argument("--seed", type=int, default=0, help="of all that is chosen")
-    made.add_argument("--from", type=int, default=0, dest="first", metavar="NUMBER", help="of the first trial")
-    made.add_argument("--only", type=int, metavar="NUMBER", help="make this trial alone")
-    made.add_argument("--minutes", type=float, default=1e9, help="begin no further trial after so many")
+    made.add_argument("--seed", type=int, default=0, help="seed of all random choices")
+    made.add_argument("--from", type=int, default=0, dest="first", metavar="NUMBER", help="number of the first trial")
+    made.add_argument("--only", type=int, metavar="NUMBER", help="make this trial only")
+    made.add_argument("--minutes", type=float, default=1e9, help="begin no further trial after this time")
     for name, (value, text) in more.items():
         kind: Any = {"action": "store_true"} if value is False else {"type": type(value), "default": value}
         made.add_argument(f"--{name.replace('_', '-')}", help=text, **kind)
@@ -26,7 +26,7 @@ def parser(doc: str | None, trials: int, what: str = "trials", **more: tuple[Any
 
 
 def numbers(asked: argparse.Namespace) -> range:
-    """Which trials are asked for."""
+    """Return the numbers of the requested trials."""
     return (
         range(asked.only, asked.only + 1) if asked.only is not None else range(asked.first, asked.first + asked.trials)
     )
@@ -38,9 +38,10 @@ def go(
     counts: Counter[str],
     also: Callable[[], bool] = lambda: False,
 ) -> int:
-    """Make the trials, and further ones while `also` says so; how many had faults, the sentences that each returns.
+    """Make the trials, and further ones while `also` returns True; return the number of trials with faults.
 
-    A trial that ends with an exception has that as its fault. `counts` is what trials count; printed at the end.
+    `trial` returns its faults as sentences; an exception is a fault, too. `counts` has counts of the trials, printed at
+    the end.
     """
     chosen, began, faulty, number = numbers(asked), time.monotonic(), 0, numbers(asked).start
     while (number < chosen.stop or also()) and time.monotonic() - began < 60.0 * asked.minutes:

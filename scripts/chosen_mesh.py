@@ -1,19 +1,20 @@
 #!/usr/bin/env python3
-"""Whether meshes that `points: auto` chooses keep what numerics.accuracy asks for, and whether cheaper ones would.
+"""Check if the meshes chosen by `points: auto` keep numerics.accuracy, and if cheaper meshes would keep it.
 
     .venv/bin/python scripts/chosen_mesh.py [--scenes 10] [--seed 0] [--area 1.0] [--dozens 1] [--finest 1920]
 
 Each scene is a steady state of a random rough surface with `--dozens` of its shortest waves along a side: Hurst
 exponents of 0.5 to 1, slopes of 0.01 to 0.2, 1 to 80 % of contact, bodies of one branch or of twelve. Accuracies are
-5, 1 and 0.3 % of friction, and `--area` times as much of the area. True errors are against `--finest` points along each
-side, of the area extrapolated from half as many and these: 160 cells per shortest wave, or 80 with 24 waves.
+5, 1 and 0.3 % of friction; accuracies of the area are `--area` times as large. The reference has `--finest` points
+along each side, 160 cells per shortest wave, or 80 with 24 waves. Its area is extrapolated from this mesh and half as
+many points.
 
-A chosen mesh is compared with the cheapest of those with cells up to 4 : 1 and LENGTHS along each side. Errors scatter
-and change signs from mesh to mesh, so that one may be right by luck. A person who looks for a mesh by hand finds out by
-refining it. So the cheapest mesh is one that keeps the accuracy, as do all that are as fine or finer along each side.
+A chosen mesh is compared with the cheapest mesh that has LENGTHS along each side and cells up to 4 : 1. Errors scatter
+and change signs from mesh to mesh, so a coarse mesh may keep an accuracy by chance. The cheapest mesh is therefore one
+that keeps the accuracy together with all meshes that are as fine or finer along each side.
 
-Ends with 0 if at most a tenth of the accuracies is missed, and chosen meshes have at most MOST times the points of the
-cheapest ones in the median.
+The exit code is 0 if at most a tenth of the accuracies is missed, and if chosen meshes have in the median at most MOST
+times the points of the cheapest ones.
 """
 
 import argparse
@@ -36,17 +37,17 @@ from parcontact.mesh import load
 
 ACCURACIES = (0.05, 0.01, 0.003)
 SIZE, DOZEN = 1e-3, 12
-MOST = 1.5  # times the points of the cheapest mesh
-LENGTHS = (32, 48, 64, 80, 96, 128, 160, 192, 240, 288, 384, 480)  # for a dozen of shortest waves
-AREA_ORDER = 1.0  # edges of contact are wrong by a share of a cell
-AREA, DOZENS = "the accuracy of the area over that of friction", "of shortest waves along a side of the box"
+MOST = 1.5  # points over the points of the cheapest mesh
+LENGTHS = (32, 48, 64, 80, 96, 128, 160, 192, 240, 288, 384, 480)  # points along a side for a dozen of shortest waves
+AREA_ORDER = 1.0  # order of the error, as edges of contact are wrong by a share of a cell
+AREA, DOZENS = "accuracy of the area over accuracy of friction", "dozens of shortest waves along a side of the box"
 
 Mesh = tuple[int, int]
 Keeps = Callable[[Mesh], bool]
 
 
 def scene(seed: int, number: int, dozens: int) -> dict[str, Any]:
-    """A job without points and accuracy."""
+    """Return a job without points and accuracy."""
     wave = SIZE / (DOZEN * dozens)
     dice = Random(f"mesh {seed} {number}")
     slope, speed = 10.0 ** dice.uniform(-2.0, -0.7), 10.0 ** dice.uniform(-1.5, 1.0)
@@ -67,14 +68,14 @@ def scene(seed: int, number: int, dozens: int) -> dict[str, Any]:
 
 
 def steady(job: dict[str, Any], mesh: Mesh) -> tuple[float, float]:
-    """Friction and corrected area, solved a hundred times as well as the smallest accuracy asks for."""
+    """Return friction and corrected area, with a tolerance of a hundredth of the smallest accuracy."""
     numerics = {"tolerance": 3e-5, "branch_error": 0.0}
     found = pc.steady({**job, "grid": {"points": list(mesh), "size": SIZE}, "numerics": numerics})
     return float(found.friction[0]), float(found.contact_area_corrected[0])
 
 
 def trial(asked: argparse.Namespace, counts: Counter[str], ratios: list[float], number: int) -> Iterator[str]:
-    """Yield what is missed; add the points over those of the cheapest mesh."""
+    """Yield the missed accuracies; append the ratios of the points to the points of the cheapest mesh."""
     job, meshes = scene(asked.seed, number, asked.dozens), meshes_of(asked.dozens, asked.finest)
     solved = cache(partial(steady, job))
     finest, half = solved((asked.finest, asked.finest)), solved((asked.finest // 2, asked.finest // 2))
@@ -97,19 +98,19 @@ def trial(asked: argparse.Namespace, counts: Counter[str], ratios: list[float], 
         print(f"  {text}, errors {found}; cheapest: {f'{best[0]} x {best[1]}' if best else 'this one'}", flush=True)
         if not keeps(chosen):
             counts["missed"] += 1
-            yield f"{text} points miss it by {found}"
+            yield f"{text} points have errors of {found}"
 
 
 def meshes_of(dozens: int, finest: int) -> list[Mesh]:
-    """Return the meshes for a given number of dozens of shortest waves, those of the fewest points first; none is near
-    the reference."""
+    """Return the meshes for a number of dozens of shortest waves, the cheapest first. All are much coarser than the
+    reference."""
     lengths = [dozens * length for length in LENGTHS if 4 * length <= finest]
     return sorted(((nx, ny) for nx, ny in product(lengths, lengths) if ny <= nx <= 4 * ny), key=math.prod)
 
 
 def cheapest(keeps: Keeps, meshes: list[Mesh], most: int) -> Mesh | None:
-    """Return the mesh with the fewest points that keeps the accuracy, as do all that are as fine or finer along each
-    side; None of `most` points and more."""
+    """Return the mesh with the fewest points, below `most`, that keeps the accuracy together with all meshes that are
+    as fine or finer along each side; None without one."""
     for one in (mesh for mesh in meshes if math.prod(mesh) < most):
         if all(keeps(other) for other in meshes if other[0] >= one[0] and other[1] >= one[1]):
             return one
@@ -123,7 +124,7 @@ def main() -> int:
     warnings.simplefilter("ignore")
     campaign.go(asked, partial(trial, asked, counts, ratios), counts)
     median, more = statistics.median(ratios), sum(ratio > MOST for ratio in ratios)
-    print(f"points over those of the cheapest mesh: {median:.2f} in the median, above {MOST} {more} times")
+    print(f"points over points of the cheapest mesh: {median:.2f} in the median, above {MOST} {more} times")
     return 0 if counts["missed"] <= 0.1 * counts["accuracies"] and median <= MOST else 1
 
 

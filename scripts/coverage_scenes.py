@@ -1,8 +1,8 @@
-"""Random scenes whose true errors can be found: each is a job on a grid, and the same job on a finer one.
+"""Random scenes with known errors: each is a job on a grid, and the same job on a finer grid.
 
-All choices follow from the number of a scene. What is random is fixed by wavelengths and by seeds, never by the grid: a
-finer grid sees the same surface in the same box for the same time. Maps are written band-limited to the points of each
-grid, so that interpolation plays no part.
+All choices follow from the number of a scene. Surfaces are given by wavelengths and seeds, which do not depend on the
+grid: a finer grid has the same surface in the same box for the same time. Maps are sums of waves at the points of each
+grid, so they are not interpolated.
 """
 
 import math
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 Json = dict[str, Any]
 Map = NDArray[np.float64]
-SECOND = 1e-3  # relaxation times are some decades around it [s]
+SECOND = 1e-3  # relaxation times are within some decades of it [s]
 HISTORIES = {
     "static": 8,
     "rest": 6,
@@ -32,12 +32,12 @@ HISTORIES = {
 SLIDES = ("slide", "velocity step", "reversal", "oblique", "steady start", "steady")
 EFFECTS = {"none": 60, "layer": 12, "hardness": 9, "heat": 12, "adhesion": 7}
 SURFACES = {"rough": 40, "wave": 12, "sphere": 16, "cylinder": 12, "measured": 20}
-FINER = 4  # times as fine is the grid of a reference
+FINER = 4  # refinement of the grid of a reference
 
 
 @dataclass(frozen=True)
 class Sketch:
-    """A scene: its job without maps, waves of a measured map by their numbers along x and y, and what class it is."""
+    """A scene: its job without maps, the waves of a measured map by their numbers along x and y, and its classes."""
 
     number: int
     plain: Json
@@ -45,7 +45,7 @@ class Sketch:
     kind: Json
 
     def job(self, directory: Path, finer: int = 1, sharper: float = 1.0) -> Json:
-        """The job on a grid a given number of times finer, with so much more accuracy asked for; its map in this
+        """Return the job on a grid `finer` times as fine, with `sharper` times the accuracy; write its map into the
         directory."""
         grid = self.plain["grid"]
         points = [n * finer if n > 1 else 1 for n in grid["points"]]
@@ -148,7 +148,7 @@ class _Draw:
         }
         return Sketch(self.number, plain, self.waves, kind)
 
-    # -- what there is ------------------------------------------------------------------------------------------------
+    # -- body and surface ----------------------------------------------------------------------------------------------
 
     def _points(self) -> list[int]:
         dice = self.dice
@@ -172,7 +172,8 @@ class _Draw:
         return {"model": "zener", "modulus_inf": total * decades(dice, -3, 0.5), "branches": branches}
 
     def _speed(self, length: float) -> float:
-        """At which about a relaxation time passes while it slides so far; in every fourth scene anything."""
+        """Return a speed [m/s] at which sliding by `length` [m] takes about a relaxation time; in every fourth scene
+        any speed."""
         if self.body["model"] == "elastic" or self.dice.random() < 0.25:
             return length / SECOND * decades(self.dice, -5, 5)
         branches = self.body["branches"]
@@ -180,14 +181,15 @@ class _Draw:
         return float(length / branch["relaxation_time"] * decades(self.dice, -1.5, 1.0))
 
     def _stiffness(self, frequency: float) -> float:
-        """|G| of a motion that is so fast [1/s]."""
+        """Return |G| [Pa] at a frequency [1/s]."""
         if self.body["model"] == "elastic":
             return float(self.body["shear_modulus"])
         turns = [(b["modulus"], 2j * math.pi * frequency * b["relaxation_time"]) for b in self.body["branches"]]
         return float(abs(self.body["modulus_inf"] + sum(g * w / (1.0 + w) for g, w in turns)))
 
     def _shapes(self) -> tuple[list[Json], float, float, float]:
-        """Shapes but for maps; the length [m] that passes; the rms slope; the radius of what is round, or 0."""
+        """Return the shapes except maps, a typical wavelength or length [m], the rms slope, and the radius of a round
+        shape, or 0."""
         dice, short = self.dice, self.cells * self.dx
         radius = self.size * decades(dice, 0.5, 1.5)
         long = min(self.size * dice.choice([1.0, 0.5, 0.5]), self.dx * min(n for n in self.points if n > 1))
@@ -220,7 +222,8 @@ class _Draw:
         return [rough, *below], length, slope, radius if self.free else 0.0
 
     def _center(self) -> list[float]:
-        """Near the middle, anywhere between points; farther back where it has to stay inside."""
+        """Return a random position between points near the middle; in a free box at 0.38 of its length, so that the
+        contact stays inside."""
         dice, (nx, ny) = self.dice, self.points
         return [((0.38 if self.free else 0.5) * nx + dice.random()) * self.dx, (0.5 * ny + dice.random()) * self.dx]
 
@@ -235,7 +238,7 @@ class _Draw:
                     waves[x, y], square = a, square + 0.5 * abs(2.0 * math.pi * k * a) ** 2
         return {index: a * slope / math.sqrt(square) for index, a in waves.items()}
 
-    # -- what is done with it -----------------------------------------------------------------------------------------
+    # -- loads and motion ----------------------------------------------------------------------------------------------
 
     def _area(self) -> float:
         dice = self.dice
@@ -244,7 +247,7 @@ class _Draw:
         return dice.uniform(0.5, 1.1) if dice.random() < 0.25 else decades(dice, -3, -0.3)
 
     def _radius(self, area: float) -> float:
-        """The radius of one contact, in cells."""
+        """Return the radius of one contact in cells."""
         count = self.points[0] * self.points[1]
         if self.surface == "cylinder":
             return 0.5 * area * self.points[0]
@@ -296,7 +299,8 @@ class _Draw:
             plain["history"] = [slide(v * decades(dice, -1.5, 1.5), way)]
 
     def _add_effect(self, plain: Json, p: float, mean: float) -> None:
-        """A layer, a hardness, heat, or adhesion, whose history is another; `mean` is the pressure of what touches."""
+        """Add a layer, a hardness, heat, or adhesion with its own history; `mean` is the mean pressure in the contact
+        [Pa]."""
         dice = self.dice
         if self.effect == "layer":
             base = dice.choice(["bonded", "smooth"])
@@ -311,7 +315,8 @@ class _Draw:
             plain["output"] = {"energy": True}
 
     def _stick(self, plain: Json) -> None:
-        """Press and pull by a height of the surface, with a process zone of two to eight cells."""
+        """Add adhesion: press and pull over about the height of the surface, with a process zone of two to eight
+        cells."""
         dice, modulus = self.dice, 4.0 * self.body.get("modulus_inf", self.body.get("shear_modulus"))
         shape, zone = plain["surface"][0], self.dx * decades(dice, 0.3, 0.9)
         top, height = 0.0, self.size**2 / (8.0 * shape.get("radius", 1.0))
@@ -332,7 +337,7 @@ def _branches(count: int) -> str:
 
 
 def _round_pressure(surface: str, radius: float, area: float, size: float, points: list[int]) -> float:
-    """Mean pressure over the shear modulus at which Hertz's contact is this share of the box."""
+    """Return the mean pressure over the shear modulus for which Hertz's contact is this share of the box."""
     share = points[1] / points[0] if points[1] > 1 else 1.0
     if surface == "cylinder":
         return math.pi * (0.5 * area * size) ** 2 / radius / size

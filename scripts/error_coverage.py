@@ -4,14 +4,15 @@
     .venv/bin/python scripts/error_coverage.py --figures [--to out/coverage]
     .venv/bin/python scripts/error_coverage.py --job NUMBER [--to out/coverage]
 
-Elastic and viscoelastic bodies, layers, hardness, heat, adhesion; five kinds of surfaces in periodic and free boxes,
-loads from 0.1 % of contact to all of it, histories of nine kinds, 2 to 16 cells per shortest wave; numerics.accuracy
-from 0.5 to 10 %. A scene that takes longer than `--limit` seconds of CPU, its reference included, is left out.
+Scenes have elastic and viscoelastic bodies, layers, hardness, heat and adhesion. They have five kinds of surfaces in
+periodic and free boxes, contact areas from 0.1 % to all of the box, nine kinds of histories, 2 to 16 cells per shortest
+wave, and a numerics.accuracy from 0.5 to 10 %. A scene that takes longer than `--limit` seconds of CPU, its reference
+included, is left out.
 
-Each scene becomes a file with all that its steps have seen, so that constants can be fitted and judged without another
-run: `--figures` estimates all errors anew from these files. `coverage.md` has the tables and each miss by name,
-`coverage.png` estimates over true errors. Scenes below 760 served to find constants, further ones were drawn later. The
-script ends with 1 if less than 95 % of the later ones are as wrong as asked for at most, or say that they are not.
+Each scene becomes a file with all observations of its steps. Constants can be fitted and assessed from these files
+without another run: `--figures` estimates all errors anew. `coverage.md` has the tables and each miss by name,
+`coverage.png` estimates over true errors. Constants were fitted to scenes below 760; later scenes are for validation.
+The exit code is 1 if less than 95 % of the later scenes are within the requested accuracy, or report that they are not.
 """
 
 import json
@@ -53,26 +54,26 @@ from parcontact.steady_sliding import curve
 from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.summary import pull_off
 
-SHARPER = 10.0  # times the accuracy is asked of a reference
+SHARPER = 10.0  # accuracy of a scene over the accuracy of its reference
 SAME_TIME = 1e-9
-GOAL = 0.95  # of the unseen scenes
-FITTED = 760  # scenes below served to find constants
-ROUNDING = 1e-10  # relative: errors below it are none
+GOAL = 0.95  # least share of the later scenes
+FITTED = 760  # constants were fitted to scenes below this number
+ROUNDING = 1e-10  # relative errors below it count as 0
 QUANTITIES = ("friction", "area", "energy", "flash temperature", "pull-off")
 CLASSES = ("history", "surface", "body", "boundary", "effect")
 HEAD = "kept or warned | warned | within | estimate/error: median | 5 to 95 %"
-SEEN: list[tuple[RunProperties, StepObservation]] = []  # by the last step
+SEEN: list[tuple[RunProperties, StepObservation]] = []  # observations of the present run
 
 
 class TooLongError(Exception):
-    """A scene takes longer than the limit."""
+    """A scene takes more CPU time than the limit."""
 
 
-# -- one scene: all that its run and its reference have seen ----------------------------------------------------------
+# -- observations of one scene and its reference -----------------------------------------------------------------------
 
 
 def note_what_is_seen() -> None:
-    """Let the estimates of steps and of steady states note their observations."""
+    """Make the estimates of steps and of steady states record their observations in SEEN."""
 
     def noting(own: Any) -> Any:
         def judge(run: RunProperties, observed: StepObservation) -> ErrorBudget:
@@ -86,7 +87,7 @@ def note_what_is_seen() -> None:
 
 
 def run(plain: Json) -> Json:
-    """March a job in this process, or solve its steady state: its rows, and what each has seen."""
+    """March a job in this process, or solve its steady states; return the rows with their observations."""
     SEEN.clear()
     with warnings.catch_warnings(action="ignore"):
         job = Job.model_validate(plain)
@@ -148,7 +149,7 @@ def _names(effect: Any) -> list[str]:
 
 
 def _stated(errors: ErrorBudget | None) -> list[float] | None:
-    """The errors of friction and area that a row states, 0 without friction."""
+    """Return the stated errors of friction and area of a row, 0 without friction."""
     return errors and [errors.friction.of_friction if errors.friction else 0.0, errors.area.total]
 
 
@@ -159,7 +160,7 @@ def _plain(properties: RunProperties) -> Json:
 
 
 def place_of(timeline: Timeline, step: int) -> int:
-    """Return how many rows before that of a step have its time; the initial state is one, at 0."""
+    """Return the number of earlier rows at the time of a step; the initial state is a row at time 0."""
     time, place = timeline[step].time if step else 0.0, 0
     while place < step and (timeline[step - place - 1].time if step > place + 1 else 0.0) == time:
         place += 1
@@ -167,7 +168,7 @@ def place_of(timeline: Timeline, step: int) -> int:
 
 
 def made(number: int, to: Path, limit: float) -> Iterator[str]:
-    """Write what a scene and its reference have seen; yield why there is none."""
+    """Write the observations of a scene and its reference; yield the reason of a failure."""
     path, drawn = to / "scenes" / f"{number}.json", sketch(number)
     if path.exists():
         return
@@ -195,14 +196,14 @@ def made(number: int, to: Path, limit: float) -> Iterator[str]:
     path.write_text(json.dumps(line, default=float))
 
 
-# -- what is true, and what is stated ---------------------------------------------------------------------------------
+# -- true and estimated errors -----------------------------------------------------------------------------------------
 #
-# Errors are those of which the sentences of the budget speak: means over the distance slid, over time where nothing
-# slides. A reference is read at the instants of the run. Friction of an elastic body is 0.
+# Errors are errors of means over the distance slid, or over time if nothing slides, as printed at the end of a run.
+# A reference is read at the instants of the run. Friction of an elastic body is 0.
 
 
 def at(rows: list[Json], name: str, row: Json) -> float:
-    """The value of a reference at the instant of a row."""
+    """Return the value of a reference at the instant of a row."""
     times, instant = [each["time"] for each in rows], row["time"]
     first = bisect_left(times, instant * (1.0 - SAME_TIME))
     there = bisect_right(times, instant * (1.0 + SAME_TIME)) - first
@@ -215,10 +216,10 @@ def at(rows: list[Json], name: str, row: Json) -> float:
 
 
 def judged(to: Path) -> pandas.DataFrame:
-    """A row for each scene and quantity: its value, the true error and the estimate, both relative to the value.
+    """Return a row for each scene and quantity: its value, the true error and the estimate, both relative to the value.
 
-    `reported`: it says that the accuracy asked for is not met. `kept`: it is as wrong as asked for at most, or says
-    that it is not. `within`: the error is the estimate at most, or is stated as "1 or more" of friction.
+    `reported`: the run reports that the requested accuracy is not met. `kept`: the error is within the accuracy, or
+    reported. `within`: the error is within the estimate, or the error of friction is stated as "1 or more".
     """
     lines = []
     for path in sorted((to / "scenes").glob("*.json"), key=lambda path: int(path.stem)):
@@ -235,7 +236,7 @@ def judged(to: Path) -> pandas.DataFrame:
 
 
 def _means(line: Json, own: Json, reference: Json) -> Iterator[Json]:
-    """Friction and area, with the errors that the present estimates make of what the steps have seen."""
+    """Yield friction and area, with errors estimated anew from the observations of the steps."""
     data = {**own["run"], "cell": tuple(own["run"]["cell"]), "points": own["run"].get("points", own.get("points"))}
     if data["prony"]:
         modulus, moduli, times = data["prony"]
@@ -260,7 +261,7 @@ def _means(line: Json, own: Json, reference: Json) -> Iterator[Json]:
 
 
 def _others(own: Json, reference: Json) -> Iterator[Json]:
-    """Energy dissipated, flash temperature and pull-off, where they are known and an error is stated."""
+    """Yield dissipated energy, flash temperature and pull-off, if they are known and an error is stated."""
     (*_, last), (*_, true) = own["rows"], reference["rows"]
     pairs = {
         "energy": ("dissipated", last.get("error_energy", math.nan) / (last.get("dissipated") or math.nan)),
@@ -278,7 +279,7 @@ def _others(own: Json, reference: Json) -> Iterator[Json]:
 
 
 def _pull_off(series: Json) -> tuple[float, float] | None:
-    """The highest pull of a run and its error [N], None without one."""
+    """Return the last pull-off of a run and its error [N]; None without one."""
     names = ("time", "pressure", "approach", "max_pressure")
     columns = {name: [row[name] for row in series["rows"]] for name in names}
     columns["contact_area"] = [row["counted"] for row in series["rows"]]
@@ -290,11 +291,11 @@ def _pull_off(series: Json) -> tuple[float, float] | None:
     return -pull.pressure * series["box"], pull.error(series["tolerance"]) * series["box"]
 
 
-# -- tables and a picture ---------------------------------------------------------------------------------------------
+# -- tables and a picture ----------------------------------------------------------------------------------------------
 
 
 def tables(found: pandas.DataFrame) -> Iterator[str]:
-    """All tables, as Markdown."""
+    """Yield all tables in Markdown."""
     yield f"| scenes | of | {HEAD} |\n|{7 * '---|'}"
     for title, some in (("fitted", found[found.scene < FITTED]), ("later", found[found.scene >= FITTED])):
         for name in QUANTITIES:
@@ -330,7 +331,7 @@ def _row(some: pandas.DataFrame) -> str:
 
 
 def picture(found: pandas.DataFrame, path: Path) -> None:
-    """Estimates over true errors, a panel for friction and one for the area, by history."""
+    """Draw estimates over true errors, by history, in a panel for friction and one for the area."""
     figure, ends = Figure(figsize=(11, 5.2), layout="constrained"), np.array([1e-6, 10.0])
     for axes, name in zip(figure.subplots(1, 2), QUANTITIES[:2], strict=True):
         own = found[(found.quantity == name) & (found.error > ROUNDING)]
@@ -345,7 +346,7 @@ def picture(found: pandas.DataFrame, path: Path) -> None:
 
 
 def conclude(to: Path) -> bool:
-    """Write tables and picture; whether as many unseen scenes as promised are covered."""
+    """Write tables and picture; return True if the promised share of later scenes is covered."""
     found = judged(to)
     text = "\n".join(["# Coverage of the error estimates\n", *tables(found), ""])
     (to / "coverage.md").write_text(text)
@@ -369,9 +370,9 @@ def main() -> int:
         __doc__,
         trials=400,
         what="scenes",
-        to=("out/coverage", "the directory of the tables"),
-        limit=(25.0, "CPU seconds of a scene"),
-        figures=(False, "only the figures of the scenes that are there"),
+        to=("out/coverage", "directory of the tables"),
+        limit=(25.0, "limit on the CPU time of a scene [s]"),
+        figures=(False, "only make the figures of existing scenes"),
         job=(-1, "only write the job of this scene"),
     )
     asked = options.parse_args()

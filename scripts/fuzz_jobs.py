@@ -1,18 +1,18 @@
 #!/usr/bin/env python3
-"""Jobs of all sections mixed, sound and broken: what `check` accepts runs, and the rest ends in a sentence.
+"""Random jobs of all sections, sound and broken: jobs that `check` accepts must run, others must end with a sentence.
 
     .venv/bin/python scripts/fuzz_jobs.py [--jobs 2000] [--seed 0] [--only NUMBER]
 
 Jobs are drawn by tests/robustness/any_job.py, on grids of a few hundred points. Half of them stay as they are. In a
-quarter some values are changed to extreme ones or to values of another kind. The others have characters of the text
-changed, cut, doubled or put in, or a file of heights, or a job file, that is damaged, of another type or length, no
-regular file, or leads elsewhere. All go through the command line, in this process: `check`, then the run. Of what ran
-small shares go through `report`, `leak`, `plan` and `study` as well.
+quarter some values are changed to extreme ones or to values of another kind. In the others characters of the text are
+changed, cut, doubled or inserted; or a file of heights, or the job file, is damaged, of another type or length, no
+regular file, or a link. All jobs go through the command line, in this process: `check`, then the run. Small shares of
+the finished jobs go through `report`, `leak`, `plan` and `study`, too.
 
-Counted as faults: an exception that is not a sentence, a warning of NumPy, a run that refuses what `check` accepts or
-fails for a reason that is none of physics, a result that is not finite or out of its bounds (area, pressure, load,
-energies), a mistake without its place, more than 3 s of CPU time to refuse, files left after a refusal, and more than
-1 GB. Ends with 0 if there are none.
+Faults are: a traceback, a warning of NumPy, a run that refuses a job that `check` accepts, a failure without a physical
+reason, a result that is not finite or out of its bounds (area, pressure, load, energies), a mistake without its place,
+a refusal that takes more than 3 s of CPU time or leaves files, and more than 1 GB of memory. The exit code is 0 without
+faults.
 """
 
 import contextlib
@@ -50,17 +50,17 @@ from parcontact.effects.adhesion import chosen_range
 from parcontact.job.checks import limits
 from parcontact.job.text import yamltext
 
-CPU_SECONDS = 3.0  # to refuse a job
-HANG_SECONDS = 120.0  # of CPU time for all that is done with a job
+CPU_SECONDS = 3.0  # limit on the CPU time to refuse a job
+HANG_SECONDS = 120.0  # limit on the CPU time of a job
 BYTES = 1e9
-POINTS = 2**12  # of a grid on which a job is run here
-STEPS = 400  # of a history that is run here
-LATER = 8.0  # times the tolerance that steps may have
-SLACK = 1e-6  # of a load, relative: sums over all points
+POINTS = 2**12  # most points of a job that is run
+STEPS = 400  # most steps of a history that is run
+LATER = 8.0  # largest residual over the tolerance
+SLACK = 1e-6  # relative error of a load, by sums over all points
 DONE, FAILED, REFUSED = 0, 1, 2  # exit codes
-LATER_SHARES = {"report": 0.05, "leak": 0.5, "plan": 0.08, "study": 0.5}  # of what ran
+LATER_SHARES = {"report": 0.05, "leak": 0.5, "plan": 0.08, "study": 0.5}  # shares of the finished jobs
 PLACE = re.compile(r"^(.+:\d+:\d+|--set .+|parcontact|.+job\.yaml: cannot be read): \S|^\.\.\. and \d+ more")
-PHYSICS = ("double precision reaches only", "the flash temperature", "an error with numerics.strict")  # of a failed run
+PHYSICS = ("double precision reaches only", "the flash temperature", "an error with numerics.strict")  # of failures
 NOT_FINITE = re.compile(r"(?<![\w.-])-?(nan|inf)(?![\w])(?<!points are nan)", re.IGNORECASE)
 EXTREME = (
     *(0, -0.0, 1, -1, 0.5, 5e-324, 1e-300, 1e-150, 1e-30, 1e30, 1e150, 1e300, 1.7e308, -1e300, 1e18, 2**31,
@@ -79,14 +79,15 @@ BOMB = "\n".join(["b0: &b0 [x]", *(f"b{i}: &b{i} [{', '.join([f'*b{i - 1}'] * 9)
 
 
 class HangError(BaseException):
-    """More CPU time than anything here may take; no code of the program catches it."""
+    """A job takes more than HANG_SECONDS of CPU time; no code of the program catches this exception."""
 
 
-# -- what the program does with a job ---------------------------------------------------------------------------------
+# -- running a job -----------------------------------------------------------------------------------------------------
 
 
 def command(*words: str | Path) -> tuple[int, str]:
-    """The exit code of a command line, and what it said: mistakes and warnings of `check`, all of a quiet run."""
+    """Return the exit code and the messages of a command line: mistakes and warnings of `check`, all output of a quiet
+    run."""
     said = io.StringIO()
     with contextlib.redirect_stdout(said if "--quiet" in words else io.StringIO()), contextlib.redirect_stderr(said):
         try:
@@ -97,7 +98,7 @@ def command(*words: str | Path) -> tuple[int, str]:
 
 
 def drive(path: Path, here: Path) -> Iterator[str]:
-    """Check a job, and run it if that accepts it: yields how it ended, then faults."""
+    """Check a job, and run it if `check` accepts it; yield how it ended, then its faults."""
     before, began = set(here.rglob("*")), time.process_time()
     code, said = command("check", path)
     spent = time.process_time() - began
@@ -132,7 +133,8 @@ def drive(path: Path, here: Path) -> Iterator[str]:
 
 
 def later_faults(path: Path, here: Path, job: jobs.Job) -> Iterator[str]:
-    """Faults of what is done with a job that has run, one time in LATER_SHARE each: its text decides."""
+    """Yield faults of further verbs on a finished job, each with the probability in LATER_SHARES, drawn from its
+    text."""
     out, dice = here / "results", Random(path.read_bytes())
     directory = out if (out / "measures.csv").exists() else out / "cases" / "000"
     words = {
@@ -149,14 +151,14 @@ def later_faults(path: Path, here: Path, job: jobs.Job) -> Iterator[str]:
 
 
 def is_large(job: jobs.Job) -> bool:
-    """Whether a job is too much for a campaign of thousands."""
+    """Return True if a job is too large for a campaign of thousands."""
     steps = limits.count_steps(job.grid, job.history)
     points = len(job.steady.velocities) * len(job.steady.pressures or (1,)) if job.steady else 0
     return job.grid.nx * job.grid.ny > POINTS or steps > STEPS or points > STEPS
 
 
 def refusal_faults(said: str) -> Iterator[str]:
-    """Faults of what is said of a mistake."""
+    """Yield faults of the messages about mistakes."""
     if not 0 < len(said.strip()) <= 50_000:
         yield f"a message of {len(said)} characters"
     if "Traceback" in said:
@@ -167,7 +169,8 @@ def refusal_faults(said: str) -> Iterator[str]:
 
 
 def run_faults(code: int, said: str) -> Iterator[str]:
-    """Faults of how a run ended; a load that cannot be borne is physics, a solve that does not converge is not."""
+    """Yield faults of the end of a run. A load that the surfaces cannot carry is a physical reason, a solve that does
+    not converge is not."""
     if "Traceback" in said:
         yield f"a traceback: {said[-400:]}"
     elif code == REFUSED:
@@ -175,23 +178,23 @@ def run_faults(code: int, said: str) -> Iterator[str]:
     elif code not in (DONE, FAILED):
         yield f"ended with {code}: {said[-400:]}"
     elif code == FAILED and not any(reason in said for reason in PHYSICS):
-        yield f"no reason of physics: {said[-500:]}"
+        yield f"no physical reason: {said[-500:]}"
     if NOT_FINITE.search(said):
-        yield f"says nan or inf: {said[-400:]}"
+        yield f"prints nan or inf: {said[-400:]}"
 
 
-# -- results ----------------------------------------------------------------------------------------------------------
+# -- results -----------------------------------------------------------------------------------------------------------
 
 
 def rows_of(table: Path) -> Iterator[dict[str, float]]:
-    """Rows of a table of numbers, without what is empty."""
+    """Return the rows of a table of numbers, without empty cells."""
     with table.open() as lines:
         for row in csv.DictReader(lines):
             yield {name: float(text) for name, text in row.items() if text not in ("", None)}
 
 
 def history_faults(directory: Path, job: jobs.Job) -> Iterator[str]:
-    """Faults of a table of measures and of maps of pressure."""
+    """Yield faults of a table of measures and of maps of pressure."""
     stick, hardness = job.section("adhesion"), job.material.hardness
     most = math.inf if hardness is None else hardness * (1.0 + SLACK)
     strength = 0.0
@@ -212,7 +215,7 @@ def history_faults(directory: Path, job: jobs.Job) -> Iterator[str]:
 
 
 def load_faults(row: dict[str, float], job: jobs.Job) -> Iterator[str]:
-    """Faults of the load of a step: at its time each stage that has begun and not ended may be the one."""
+    """Yield faults of the load of a step. If its time is in several stages, the load may be the load of any of them."""
     if not row["step"]:
         return
     began, box, loads = 0.0, job.grid.lx * job.grid.ly, list[tuple[str, float, float]]()
@@ -225,13 +228,13 @@ def load_faults(row: dict[str, float], job: jobs.Job) -> Iterator[str]:
             unit = box if stage.control == "force" else 1.0
             most = max(abs(stage.load.start), abs(stage.load.end)) / unit
             loads.append((name, load / unit, most))
-    tiny = {"approach": sys.float_info.epsilon * max(job.grid.size), "pressure": 0.0}  # below the digits of heights
+    tiny = {"approach": sys.float_info.epsilon * max(job.grid.size), "pressure": 0.0}  # rounding error of heights
     if not any(abs(row[name] - load) <= SLACK * most + tiny[name] for name, load, most in loads):
         yield f"step {row['step']:g} at {row['time']:g} s: {row['pressure']:g} Pa, {row['approach']:g} m, not {loads}"
 
 
 def row_faults(where: str, row: dict[str, float], most: float) -> Iterator[str]:
-    """Faults of the numbers of a step, or of a point of a curve."""
+    """Yield faults of the numbers of a step, or of a point of a curve."""
     wrong = [name for name, value in row.items() if not math.isfinite(value) and name != "seconds"]
     if wrong:
         yield f"{where}: not finite: {', '.join(wrong)}"
@@ -262,7 +265,7 @@ def bounded() -> Iterator[None]:
 
 
 def trial(seed: int, counts: Counter[str], number: int) -> Iterator[str]:
-    """Faults of one job."""
+    """Yield the faults of one job."""
     with tempfile.TemporaryDirectory() as name, contextlib.chdir(name), warnings.catch_warnings():
         warnings.simplefilter("error")
         dice, here = Random(f"{seed} {number}"), Path(name)
@@ -277,7 +280,7 @@ def trial(seed: int, counts: Counter[str], number: int) -> Iterator[str]:
         yield from faults
 
 
-# -- making them ---
+# -- making them -------------------------------------------------------------------------------------------------------
 
 
 def _write(directory: Path, text: str) -> Path:
@@ -307,7 +310,7 @@ def changed_text(dice: Random, directory: Path) -> Path:
 
 
 def leaves(data: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """The ways to everything in a job."""
+    """Yield the paths to all values in a job."""
     if path:
         yield path
     items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
@@ -336,7 +339,7 @@ def changed_values(dice: Random, directory: Path) -> Path:
 
 
 def changed_file(dice: Random, directory: Path) -> Path:
-    """A file of heights that is damaged, of another type or length, or no file; sometimes the job itself."""
+    """Make a file of heights that is damaged, of another type or length, or no file; sometimes the job itself."""
     if dice.random() < 0.1:
         return odd_file(dice, directory / "job.yaml")
     path = directory / f"damaged.{dice.choice(['npy', 'txt', 'xyz'])}"
@@ -361,7 +364,7 @@ def changed_file(dice: Random, directory: Path) -> Path:
 
 
 def odd_file(dice: Random, path: Path) -> Path:
-    """No regular file that can be read, or nothing at all."""
+    """Put a pipe, a device, a directory or another unreadable file at a path, or nothing."""
     kind = dice.choice(["pipe", "device", "directory", "sparse", "missing", "loop", "unreadable"])
     if kind == "pipe":
         os.mkfifo(path)

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Starts an MPI launcher so that a wish to stop reaches its ranks as the signal by which they save: .venv/bin/mpirun.
+"""Start an MPI launcher so that signals make its ranks save and stop; installed as .venv/bin/mpirun.
 
     launch.py LAUNCHER ARGUMENT...
 
-Launchers themselves give their ranks a few seconds after TERM or INT, and end with a code of their own. Here TERM, INT,
-HUP and USR1 all become USR1, which launchers hand on to the ranks; a run of parcontact then saves and ends with 3. A
-second signal, or 10 minutes after the first one, ends the launcher as it is used to. The code is that of the launcher.
+After TERM or INT launchers kill their ranks within a few seconds, and end with their own exit code. This program sends
+USR1 instead of TERM, INT, HUP and USR1, which launchers forward to the ranks; a run of parcontact then saves and ends
+with 3. The launcher is terminated by a second signal, or 10 minutes after the first one. The exit code is the exit code
+of the launcher.
 """
 
 import ctypes
@@ -18,9 +19,9 @@ from pathlib import Path
 from types import FrameType
 
 ASKS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1)
-SECONDS_TO_START = 1.0  # in which the launcher has started its ranks
-SECONDS_TO_SAVE = 600.0  # for the step that is being made, and a checkpoint
-SECONDS_TO_END = 15.0  # for the launcher to end its ranks, each of which it gives 3 s and again 3 s
+SECONDS_TO_START = 1.0  # within which the launcher starts its ranks
+SECONDS_TO_SAVE = 600.0  # for the present step and a checkpoint
+SECONDS_TO_END = 15.0  # for the launcher to end its ranks, after two waits of 3 s each
 PR_SET_PDEATHSIG = 1
 
 
@@ -31,12 +32,12 @@ class Launched:
         self.pid, self.asked, self.began = 0, False, time.monotonic()
 
     def start(self, words: list[str]) -> None:
-        signal.pthread_sigmask(signal.SIG_BLOCK, ASKS)  # what comes before the launcher is there waits for it
+        signal.pthread_sigmask(signal.SIG_BLOCK, ASKS)  # signals wait until the launcher exists
         parent = os.getpid()
         self.pid = os.fork()
         if self.pid == 0:
             os.setpgid(0, 0)
-            ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)  # nothing goes on when this program is killed
+            ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)  # the launcher ends when this program is killed
             signal.pthread_sigmask(signal.SIG_UNBLOCK, ASKS)
             if os.getppid() != parent:
                 os._exit(1)
@@ -51,11 +52,11 @@ class Launched:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, ASKS)
 
     def ask(self, number: int, frame: FrameType | None) -> None:
-        """The ranks save and stop. Before there are ranks, or when asked again, all ends at once."""
+        """Make the ranks save and stop; end the launcher at once without ranks, or at the second signal."""
         young = self.began + SECONDS_TO_START - time.monotonic()
         if self.asked or not self.has_ranks():
             self.end(number, frame)
-        elif young > 0.0:  # Open MPI may hang when a rank is sent a signal that is just being made
+        elif young > 0.0:  # Open MPI may hang if a signal reaches a rank that is just starting
             self.after(young, self.ask)
         else:
             self.asked = True
@@ -63,7 +64,7 @@ class Launched:
             os.kill(self.pid, signal.SIGUSR1)
 
     def end(self, number: int, frame: FrameType | None) -> None:
-        """The launcher ends its ranks, or is killed if it cannot: they then notice that it is gone."""
+        """Make the launcher end its ranks; kill it if it does not: its ranks then end, too."""
         self.after(SECONDS_TO_END, self.kill)
         os.kill(self.pid, signal.SIGTERM)
 
@@ -75,15 +76,15 @@ class Launched:
         signal.setitimer(signal.ITIMER_REAL, seconds)
 
     def has_ranks(self) -> bool:
-        """Whether the launcher has started a process; where the system does not say so, it has."""
+        """Return True if the launcher has started a process, or if the system does not say so."""
         try:
             return bool(Path(f"/proc/{self.pid}/task/{self.pid}/children").read_text())
         except OSError:
             return True
 
     def wait(self) -> int:
-        os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOWAIT)  # signals are handled meanwhile
-        signal.pthread_sigmask(signal.SIG_BLOCK, (*ASKS, signal.SIGALRM))  # its number may soon be that of another
+        os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOWAIT)  # signals are handled during the wait
+        signal.pthread_sigmask(signal.SIG_BLOCK, (*ASKS, signal.SIGALRM))  # its number may be used again soon
         code = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
         return code if code >= 0 else 128 - code
 

@@ -1,7 +1,6 @@
-"""Writes the pages of the manual, as Sphinx reads them, into a directory: with what the program says of itself,
-notebooks run, and pictures.
+"""Write the pages of the manual as sources for Sphinx, with generated tables, executed notebooks, and pictures.
 
-    .venv/bin/python scripts/manual_pages.py --to out/manual/source [--no-notebooks]
+.venv/bin/python scripts/manual_pages.py --to out/manual/source [--no-notebooks]
 """
 
 import argparse
@@ -30,7 +29,7 @@ NOTEBOOKS = texts.PAGES.parent / "notebooks"
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--to", type=Path, required=True, help="the directory to write")
+    parser.add_argument("--to", type=Path, required=True, help="directory of the pages")
     parser.add_argument("--no-notebooks", action="store_true", help="write the notebooks without running them")
     options = parser.parse_args()
     target: Path = options.to
@@ -50,7 +49,7 @@ def main() -> int:
 
 
 def pieces(notebook: Path, target: Path, run: bool) -> Iterator[str]:
-    """A notebook as Markdown: its texts, its cells, and what each prints and draws."""
+    """Yield a notebook as Markdown: its texts, its cells, and their output and pictures."""
     space: dict[str, Any] = {"__name__": "__main__"}
     for number, cell in enumerate(json.loads(notebook.read_text())["cells"]):
         source = "".join(cell["source"])
@@ -64,7 +63,7 @@ def pieces(notebook: Path, target: Path, run: bool) -> Iterator[str]:
 
 
 def outcome(source: str, space: dict[str, Any], target: Path, name: str) -> Iterator[str]:
-    """Run a cell where it can leave files; what it has printed, and its figures."""
+    """Run a cell in a temporary directory; yield its printed output and its figures."""
     from matplotlib import pyplot
 
     printed = io.StringIO()

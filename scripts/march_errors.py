@@ -3,14 +3,14 @@
 
     .venv/bin/python scripts/march_errors.py [--marches 40] [--seed 0] [--from 0] [--only NUMBER]
 
-Slides from rest, oblique ones, steps of velocity and reversals on rough surfaces of 6 to 16 cells per shortest wave.
-The first table has the relative error of mu_dyn with steps of given lengths, its bias, and operator calls. The second
-holds the part `time` of the error budget to it, where the two views of friction agree (AGREE), over even and odd
-numbers. The third has steps that are chosen: operator calls, the errors, and how often mu_dyn and mu_max are right
-within what the run states.
+Marches are slides from rest, oblique slides, steps of velocity and reversals, on rough surfaces of 6 to 16 cells per
+shortest wave. The first table has the relative error of mu_dyn with steps of given lengths, its bias, and operator
+calls. The second compares the part `time` of the error budget with this error, for even and for odd numbers, if the
+error by the mesh is below AGREE. The third is for chosen steps: operator calls, errors, and how often the errors of
+mu_dyn and mu_max are within the estimates of the run.
 
-PASSING of `accuracy.constants` was fitted to 30 of 60 marches of an earlier version of this script, which drew others;
-what this one prints is in the manual's pages `method` and `accuracy`.
+PASSING of `accuracy.constants` was fitted to 30 of 60 other marches, of an earlier version of this script. Results are
+on the manual's pages `method` and `accuracy`.
 """
 
 import math
@@ -35,11 +35,11 @@ CELL = SIZE / POINTS
 EXACT = {"tolerance": 1e-6, "branch_error": 0.0}
 GIVEN = [(name, cells) for name in ("exponential-linear", "exponential") for cells in (2.0, 1.0, 0.5)]
 ACCURACIES = 0.1, 0.03, 0.01
-AGREE = 0.01  # of friction, by which its views differ at most where the error is that of the time steps
+AGREE = 0.01  # largest error of friction by the mesh for which time steps dominate the error
 
 
 def march_of(seed: int, number: int) -> Json:
-    """A random march, without its numerics."""
+    """Return a random job without its numerics."""
     dice = Random(f"march {seed} {number}")
     short, speed, slope = (
         dice.choice([6, 8, 8, 12, 16]) * CELL,
@@ -81,7 +81,7 @@ def march_of(seed: int, number: int) -> Json:
 
 
 def run(job: Json, cells: float | None = None, **numerics: Any) -> tuple[dict[str, NDArray[Any]], list[StepRow], Any]:
-    """The columns of a run, its rows, and its stages."""
+    """Return the columns of a run, its rows, and its stages."""
     history = [stage if cells is None else {**stage, "cells_per_step": cells} for stage in job["history"]]
     march = begun({**job, "history": history, "numerics": numerics})
     rows, _ = marched(march)
@@ -99,12 +99,12 @@ def run(job: Json, cells: float | None = None, **numerics: Any) -> tuple[dict[st
 
 
 def late(columns: dict[str, NDArray[Any]], name: str) -> float:
-    """The mean of a column over the slide."""
+    """Return the mean of a column over its second half."""
     return float(np.nanmean(columns[name][-max(2, len(columns[name]) // 2) :]))
 
 
 def trial(seed: int, found: dict[Any, list[tuple[float, ...]]], number: int) -> Iterator[str]:
-    """March in all ways; keep errors."""
+    """March a job with all settings; append the errors to `found`."""
     job = march_of(seed, number)
     columns, _, stages = run(job, 0.125, **EXACT)
     exact = slide.measure_slide(stages, columns)

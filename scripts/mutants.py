@@ -1,10 +1,11 @@
-"""Breaks the code in random places, one at a time, and says which of its tests see it.
+"""Break the code in random places, one at a time, and print the tests that detect it.
 
     .venv/bin/python scripts/mutants.py [--count 40] [--seed 0] [--list] [part ...]
 
-A part is a file of the program that has tests of its own (see `tests_of`). In each an operator, a comparison, a sign,
-a number or a limit in a function, drawn at random, is changed to a wrong one. Some changes alter nothing that matters:
-of all, at least `SEEN` must be seen. Works on a copy of the last commit. Some ten seconds a change.
+A part is a file of the program with its own tests (see `tests_of`). In a function of each part a random operator,
+comparison, sign, number or limit is changed to a wrong one. Some changes do not alter results, so tests must detect a
+share of at least `SEEN` of all changes. The script works on a copy of the last commit, and takes some ten seconds per
+change.
 """
 
 import argparse
@@ -23,10 +24,10 @@ ROOT = Path(__file__).parents[1]
 HOUSE, TESTS = ROOT / "parcontact", ROOT / "tests"
 ROOMS = ("accuracy", "physics", "parallel", "solve", "march", "scene", "storage", "plan", "effects", "history")
 LONGEST = 600.0  # seconds for the tests of one change
-SEEN = 0.8  # share of the changes that must be seen
-FEWEST = 8  # places to break in a part
+SEEN = 0.8  # share of the changes that tests must detect
+FEWEST = 8  # least places to break in a part
 SLIDING = "scenarios/test_sliding_runs.py"
-OTHERS = {  # further tests that answer for a part
+OTHERS = {  # further tests of a part
     "march/step.py": f"march/test_adhesive_steps.py scenarios/test_viscoelastic.py {SLIDING}",
     "march/step_errors.py": SLIDING,
     "physics/body.py": "scenarios/test_viscoelastic.py",
@@ -40,11 +41,11 @@ PAIRS = ((ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.Lt, ast.GtE), (ast.Gt, as
 SWAPS: dict[type[ast.AST], type[ast.AST]] = {a: b for pair in PAIRS for a, b in (pair, pair[::-1])}
 SWAPS |= {ast.And: ast.Or, ast.Or: ast.And}
 NAMES = {"max": "min", "min": "max", "expm1": "exp", "exp": "expm1", "sin": "cos", "cos": "sin", "abs": "float"}
-Change = tuple[str, Callable[[], None]]  # what is done, and doing it to the tree
+Change = tuple[str, Callable[[], None]]  # description, and a function that changes the tree
 
 
 def tests_of(part: str) -> tuple[str, ...]:
-    """Return the tests of a file of the program: `tests/ROOM/test_NAME*.py`, else those of its room that import it."""
+    """Return the tests of a file of the program: `tests/ROOM/test_NAME*.py`, else tests of its room that import it."""
     path = Path(part)
     own = sorted((TESTS / path).parent.glob(f"test_{path.stem}*.py"))
     if not own:
@@ -56,14 +57,14 @@ def tests_of(part: str) -> tuple[str, ...]:
 
 
 def parts() -> list[str]:
-    """Files of the program that can be broken in many places, and whose tests are known by their names."""
+    """Return the files of the program that can be broken in many places and have tests of their names."""
     files = [path for room in ROOMS for path in sorted((HOUSE / room).rglob("*.py"))]
     found = [path for path in files if len(list(changes(ast.parse(path.read_text())))) >= FEWEST]
     return [name for name in (str(path.relative_to(HOUSE)) for path in found) if tests_of(name)]
 
 
 def changes(tree: ast.Module) -> Iterator[Change]:
-    """Every change that can be made in the functions of a module; annotations, messages and indices stay."""
+    """Yield every possible change in the functions of a module, except in annotations, messages and indices."""
     for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)):
         for statement in function.body:
             for node in ast.walk(statement):
@@ -110,7 +111,7 @@ def _become(node: ast.UnaryOp, other: ast.expr) -> None:
 
 
 def draw(part: str, chance: random.Random, source: Path = ROOT) -> tuple[str, str]:
-    """A change of a part: what it is, and the text of the file with it."""
+    """Return the description of a random change of a part, and the changed text of the file."""
     tree = ast.parse((source / "parcontact" / part).read_text())
     what, act = chance.choice(list(changes(tree)))
     act()
@@ -118,7 +119,7 @@ def draw(part: str, chance: random.Random, source: Path = ROOT) -> tuple[str, st
 
 
 def first_failure(tree: Path, files: tuple[str, ...]) -> str:
-    """The first test that fails, '' if none does."""
+    """Return the first test that fails, '' without one."""
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *files]
     environment = {**os.environ, "PYTHONPATH": str(tree), "OMP_NUM_THREADS": "1"}
     try:
@@ -132,7 +133,7 @@ def first_failure(tree: Path, files: tuple[str, ...]) -> str:
 
 
 def try_out(part: str, text: str, tree: Path) -> str:
-    """The first test that sees a change, '' if none does; the file is then as it was."""
+    """Return the first test that detects a change, '' without one; the file is restored."""
     path = tree / "parcontact" / part
     before = path.read_text()
     path.write_text(text)
@@ -144,9 +145,9 @@ def try_out(part: str, text: str, tree: Path) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=40, help="changes that are tried")
+    parser.add_argument("--count", type=int, default=40, help="number of changes")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--list", action="store_true", help="only say what would be changed")
+    parser.add_argument("--list", action="store_true", help="only list the changes")
     parser.add_argument("parts", nargs="*", metavar="part", help="files of the program, like solve/contact.py")
     chosen = parser.parse_args()
     chance = random.Random(chosen.seed)

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Draw the paper's figures from what its jobs have written, 8 cm wide.
+"""Draw the paper's figures, 8 cm wide, from the results of its jobs.
 
     scripts/paper_figures.py                   all figures whose jobs have run (out/<job>), into jobs/paper/pictures
     scripts/paper_figures.py 8 9 --from out --to pictures
 
-Run it with the Python of .venv. What is not there yet is left out, and said.
+Run it with the Python of .venv. Figures without results are left out, with a message.
 """
 
 import argparse
@@ -32,11 +32,11 @@ JOBS = Path(__file__).resolve().parents[1] / "jobs" / "paper"
 DPI = 300
 RC = {**style.RC, "font.size": 7, "axes.titlesize": 7, "legend.fontsize": 6.5, "lines.linewidth": 1.1}
 RC |= {"lines.markersize": 3, "axes.linewidth": 0.6, "xtick.major.width": 0.6, "ytick.major.width": 0.6}
-CREEP_TIME, RADIUS = 1e-2, 1e-2  # of the sphere's rubber [s], and of the sphere [m]
-INSTANTS = (0.2, 0.4, 1.0, 2.0, 4.0)  # of fig03, in creep times
+CREEP_TIME, RADIUS = 1e-2, 1e-2  # creep time of the sphere's rubber [s], radius of the sphere [m]
+INSTANTS = (0.2, 0.4, 1.0, 2.0, 4.0)  # instants of fig03 [creep times]
 QUANTITIES = (("mu_max", "$\\mu_{max}$"), ("mu_dyn", "$\\mu_{dyn}$"), ("contact_area", "area"))  # columns, names
-WIDTH, HEIGHT = 3.15, 2.1  # of a picture and of a panel [inch]: 8 cm
-TITLE = 5.2  # points, of the title of a legend
+WIDTH, HEIGHT = 3.15, 2.1  # width of a picture (8 cm), height of a panel [inch]
+TITLE = 5.2  # size of the title of a legend [points]
 LOOKS: tuple[tuple[dict[str, Any], str, str, bool], ...] = (  # of sweeps: points, theory, its error; with names
     ({"fmt": "o-"}, "--", "-", True),
     ({"fmt": "D", "mfc": "none"}, ":", ":", False),  # on a finer grid
@@ -44,7 +44,7 @@ LOOKS: tuple[tuple[dict[str, Any], str, str, bool], ...] = (  # of sweeps: point
 
 
 class MissingError(Exception):
-    """The results that a figure is drawn from are not there."""
+    """The results for a figure are missing."""
 
 
 def there(path: Path) -> Path:
@@ -63,7 +63,8 @@ def panels(count: int, height: float = HEIGHT) -> tuple[Figure, Sequence[Axes]]:
 
 
 def explain(axes: Axes, directory: Path, **look: Any) -> None:
-    """The legend of a panel, with the settings of the theory if they are known, and those of all cases of a sweep."""
+    """Draw the legend of a panel, with the settings of the theory if they are known and the same for all cases of a
+    sweep."""
     axes.legend(**look, title=theory_settings.describe_settings(directory) or None, title_fontsize=TITLE)
 
 
@@ -74,7 +75,8 @@ def moduli(job: Job) -> tuple[float, float]:
 
 
 def over_distance(axes: Axes, directory: Path, name: str, label: str, number: int = 0, start: float = 0.0) -> None:
-    """Simulation and theory of one case over the distance slid since an instant [s]; logarithmic, in um."""
+    """Draw simulation and theory of one case over the distance slid since an instant [s], on a logarithmic axis in
+    um."""
     for table, dashes, of in (("measures.csv", "-", "simulation"), ("theory.csv", "--", "theory")):
         found = columns(directory, table)
         distance = found["distance"] - found["distance"][found["time"] <= start * (1 + 1e-9)][-1]
@@ -83,7 +85,7 @@ def over_distance(axes: Axes, directory: Path, name: str, label: str, number: in
 
 
 def means(rows: Sequence[dict[str, Any]], key: str, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Values of a key, means and standard deviations over its cases that are done."""
+    """Return the values of a key, with means and standard deviations over the finished cases of each."""
     at = sorted({row[key] for row in rows})
     groups = [np.array([row[name] for row in rows if row[key] == value and row[name] == row[name]]) for value in at]
     there = [k for k, group in enumerate(groups) if group.size]
@@ -92,7 +94,7 @@ def means(rows: Sequence[dict[str, Any]], key: str, name: str) -> tuple[np.ndarr
 
 
 def rows_of(directory: Path) -> list[dict[str, Any]]:
-    """Rows of the table of a sweep, with the contact area of simulations as corrected for its edges."""
+    """Return the rows of the table of a sweep; contact areas of simulations are corrected at edges."""
     rows = sweep_table.read_cases(there(directory / "sweep.csv"))
     for row in rows:
         case = directory / "cases" / f"{int(row['case']):03d}"
@@ -105,10 +107,8 @@ def rows_of(directory: Path) -> list[dict[str, Any]]:
 
 
 def over_key(out: Path, name: str, key: str, label: str, scale: float = 1.0) -> Figure:
-    """Friction, area and the error of the theory over the key of a sweep; bars are standard deviations over seeds.
-
-    The same with shorter waves, in the directory NAME_finer, has open markers, its theory dotted lines.
-    """
+    """Draw friction, area and the error of the theory over the key of a sweep; bars are standard deviations over seeds.
+    Results with shorter waves, in the directory NAME_finer, have open markers and dotted theory."""
     found = [rows_of(out / name)]
     if (out / f"{name}_finer" / "sweep.csv").is_file():
         found.append(rows_of(out / f"{name}_finer"))
@@ -183,7 +183,8 @@ def fig03(out: Path) -> Figure:
 
 
 def ring_means(heights: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Phi of Eq. 12, averaged over the waves of rings as wide as a wave number of the box; rad/m and m^4."""
+    """Return Phi of Eq. 12 [m^4] and wave numbers [rad/m], averaged over rings of the width of one wave number of the
+    box."""
     n = heights.shape[0]
     power = size**2 * np.abs(np.fft.fft2(heights) / n**2) ** 2
     number = np.fft.fftfreq(n, 1 / n)
@@ -210,7 +211,7 @@ def fig05(out: Path) -> Figure:
     exponent = 2 - 2 * part.hurst
     constant = part.rms_slope**2 * 2 * np.pi * exponent / (k_long**4 * ((k_short / k_long) ** exponent - 1))
     inside = (k >= 0.999 * k_long) & (k < 1.001 * k_short)
-    bottom.loglog(k[inside], found[inside], ".", color=style.BLUE, label="found, means of rings")
+    bottom.loglog(k[inside], found[inside], ".", color=style.BLUE, label="simulated, means over rings")
     asked = constant * (k[inside] / k_long) ** (-2 * (1 + part.hurst))
     bottom.loglog(k[inside], asked, "--", color=style.RED, label=f"asked, C = {constant:.3g} m⁴")
     bottom.set(xlabel="wave number k [rad/m]", ylabel="Φ [m⁴]")
@@ -258,7 +259,7 @@ def fig08(out: Path) -> Figure:
 
 
 def fig09(out: Path) -> Figure:
-    """With the steady states of the periodic box, for one surface, if they are there."""
+    """Draw friction; add the steady states of the periodic box for one surface, if they exist."""
     figure = over_key(out, "fig09_velocities", "history.1.velocity", "velocity $V_1$ [m/s]")
     if (table := out / "fig09_steady" / "cases" / "000" / "steady.csv").is_file():
         found = columns(table.parent, table.name)

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
-"""Random scenes of contacts that stick: laws, surfaces, bodies, loads, rates and grids; every run must come to its end.
+"""Random scenes of adhesive contacts, with random laws, surfaces, bodies, loads, rates and grids; every run must
+finish.
 
     .venv/bin/python scripts/random_adhesion.py [--scenes 200] [--seed 0] [--only NUMBER] [--finer 10]
 
-A scene that was not pulled off under a load ends after its last step. After each step the gap is not negative, the
-pressure is minus the attraction where the gap is open, energies add up, and what snaps lose never falls. A solve that
-does not reach its tolerance is a fault. Each scene is made again in steps `--finer` times as short: where contact ends
-in one of both, it ends in the other, but for a step; 0 leaves that out. Restarts and ranks: tests/march. Ends with 0 if
-all held.
+A run ends after its last step, or when the surfaces detach under a load. After each step the gap must not be negative,
+the pressure must be minus the attraction where the gap is open, energies must add up, and the energy lost in snaps must
+not fall. A solve that does not reach its tolerance is a fault. Each scene is repeated with `--finer` times as many
+steps (0: not repeated); contact must end at the same times within a step. Restarts and ranks are tested in tests/march.
+The exit code is 0 without faults.
 """
 
 import math
@@ -28,17 +29,17 @@ from parcontact.errors import RunError
 from parcontact.job import Job
 from parcontact.march.loop import March
 
-MODULUS = 1e6  # Pa; of the relaxed body
-STEPS = 12  # of a stage
-BALANCE = 1e-9  # of the largest energy: rounding
-WRONG = 0.05  # of all pressure: certificates allow a gap to be wrong by a part of the range
-LEAST = 1e-3  # of the strength, or of the work of adhesion: less is none
-LATE = 1.5  # steps: between the ends of contact with longer and with shorter ones
+MODULUS = 1e6  # modulus of the relaxed body [Pa]
+STEPS = 12  # steps of a stage
+BALANCE = 1e-9  # rounding error of energies over the largest energy
+WRONG = 0.05  # error over the sum of pressures, by the allowed error of the gap
+LEAST = 1e-3  # share of the strength, or of the work of adhesion, that counts as 0
+LATE = 1.5  # most steps between ends of contact with longer and shorter steps
 Map = NDArray[np.float64]
 
 
 def scene(random: Random) -> dict[str, Any]:
-    """A job: one of spheres, waves and rough surfaces, pressed, pulled or slid."""
+    """Return a job with a sphere, waves or a rough surface that is pressed, pulled or slid."""
     points, size = random.choice([16, 24, 32, 48]), 10 ** random.uniform(-5, -3)
     cell, poisson = size / points, random.choice([0.5, 0.5, 0.3])
     modulus = 2 * MODULUS / (1 - poisson)
@@ -64,7 +65,7 @@ def scene(random: Random) -> dict[str, Any]:
 
 
 def shape(random: Random, size: float, cell: float) -> tuple[dict[str, Any], float]:
-    """A surface, and its height [m] over the box."""
+    """Return a surface, and its height [m] over the box."""
     kind = random.choice(["sphere", "wave", "rough", "rough"])
     if kind == "sphere":
         radius = size * 10 ** random.uniform(0.5, 1.5)
@@ -86,8 +87,8 @@ def body(random: Random, poisson: float) -> dict[str, Any]:
 
 
 def history(random: Random, height: float, top: float, size: float, modulus: float) -> Iterator[dict[str, Any]]:
-    """One to three stages: approaches between apart and a tenth of the height below its `top`, loads of either sign,
-    slides."""
+    """Return one to three stages: approaches from separation to a tenth of the height below its `top`, loads of either
+    sign, and slides."""
     control = random.choice(["approach", "approach", "pressure"])
     moves = control == "approach"
     level, scale = (-top, 0.4 * height) if moves else (0.0, 0.2 * modulus * height / size)
@@ -105,7 +106,7 @@ def history(random: Random, height: float, top: float, size: float, modulus: flo
 
 
 def violations(march: March, before: float) -> Iterator[str]:
-    """What is wrong after a step, of which `before` says what snaps had lost."""
+    """Yield violations after a step; `before` is the energy lost in snaps before it [J]."""
     row, gap, p = march.row, march.field("gap"), march.field("pressure")
     law = march.scene.choices.adhesion
     assert law is not None
@@ -115,7 +116,7 @@ def violations(march: March, before: float) -> Iterator[str]:
     if law.kind == "exponential":
         apart = np.abs(p + law.strength * np.exp(-gap / law.range))[gap > 0.0].sum()
         if apart > WRONG * np.abs(p).sum() + LEAST * law.strength * p.size:
-            yield f"open points carry {apart / np.abs(p).sum():.2g} of all pressure too much or too little"
+            yield f"pressures of open points are wrong by {apart / np.abs(p).sum():.2g} of all pressure"
     parts = row.stored, row.dissipated, surfaces, lost
     grid = march.scene.choices.grid
     largest = max(map(abs, (row.work, *parts, LEAST * law.work * grid.lx * grid.ly)))
@@ -126,7 +127,8 @@ def violations(march: March, before: float) -> Iterator[str]:
 
 
 def go(job: dict[str, Any], counts: Counter[str], checks: bool = True) -> tuple[March, Map, list[str]]:
-    """March a job to its end: time, contact area and pressure of each step, and what was wrong, if it is checked."""
+    """March a job to its end; return the march, the time, contact area and pressure of each step, and violations if
+    `checks`."""
     march, made, wrong, lost = runs.begun(Job.model_validate(job)), [], list[str](), 0.0
     for step in march.steps():
         march.advance(step)
@@ -148,14 +150,14 @@ def go(job: dict[str, Any], counts: Counter[str], checks: bool = True) -> tuple[
 
 
 def trial(counts: Counter[str], seed: int, finer: int, number: int) -> Iterator[str]:
-    """March a scene, and once more in finer steps."""
+    """March a scene, and repeat it with finer steps."""
     job = scene(Random(f"{seed} {number}"))
     about = f"({job['grid']['boundary']} {job['surface']['shape']} {job['material']['model']} {job['adhesion']['law']})"
     try:
         march, made, wrong = go(job, counts)
         counts["snaps"] += march.state.memories["adhesion"].snaps
         counts["touched"] += bool(made[:, 1].max(initial=0.0) > 0.0)
-        counts["came off"] += bool(march.detached)
+        counts["detached"] += bool(march.detached)
         wrong += in_finer_steps(job, made, counts, finer) if finer else []
     except RunError as error:
         counts["failed"] += 1
@@ -164,7 +166,7 @@ def trial(counts: Counter[str], seed: int, finer: int, number: int) -> Iterator[
 
 
 def in_finer_steps(job: dict[str, Any], made: Map, counts: Counter[str], finer: int) -> Iterator[str]:
-    """Where contact ends in steps that are shorter or in those that are not, but not in both."""
+    """Yield the times at which contact ends with longer or with shorter steps only."""
     steps = [{**stage, "time_step": stage["duration"] / (finer * STEPS)} for stage in job["history"]]
     try:
         _, again, _ = go({**job, "history": steps}, Counter(), checks=False)
@@ -182,7 +184,7 @@ def in_finer_steps(job: dict[str, Any], made: Map, counts: Counter[str], finer: 
 
 
 def ends(made: Map, lasts: float) -> Iterator[float]:
-    """Times at which contact ends and does not begin again for a while, or before the history ends."""
+    """Yield the times at which contact ends for at least `lasts` [s], or until the end of the history."""
     for before, now in pairwise(made):
         after = (made[:, 0] >= now[0]) & (made[:, 0] <= now[0] + lasts)
         if before[1] > 0.0 and not made[after, 1].any():

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Random scenes by the hundred: bodies, surfaces, histories and grids as hard as they come; nothing may break.
+"""Hundreds of random scenes with difficult bodies, surfaces, histories and grids; no run may fail.
 
     .venv/bin/python scripts/random_scenes.py [--scenes 500] [--steps 20000] [--seed 0] [--only NUMBER --steps 0]
     .venv/bin/python scripts/random_scenes.py --long [--steps 100000]
     .venv/bin/python scripts/random_scenes.py --mixed [--scenes 250] [--seed 77]
 
-Each scene is marched twice, the second time described in another way (raised, in other units, mirrored, transposed),
-until there are at least a given number of scenes and steps. Every step is checked as in tests/robustness/witness.py. A
-solve that asks for more digits than double precision has may fail, and is counted; no other may. `--long` marches one
-small scene back and forth for a given number of steps and looks for drift, as tests/robustness/test_long.py does for
-fewer. Ends with 0 if all held. `--mixed` counts in how many scenes mixed precision fails, or gives a contact area off
-by more than 1 %, where double precision solves them, all at the default tolerance.
+Each scene is marched twice, the second time in another description (raised, in other units, mirrored, transposed),
+until the given numbers of scenes and steps are reached. Every step is checked as in tests/robustness/witness.py. Only a
+solve that needs more digits than double precision has may fail; such failures are counted. `--long` marches one small
+scene back and forth for a given number of steps and looks for drift, as tests/robustness/test_long.py does for fewer.
+The exit code is 0 without faults. `--mixed` counts the scenes, at the default tolerance, that double precision solves
+and mixed precision does not, or with a contact area that differs by more than 1 %.
 """
 
 import sys
@@ -37,22 +37,23 @@ from robustness.witness import trial
 from parcontact.errors import RunError
 from parcontact.job import Numerics
 
-WRONG = 0.01  # of the largest contact area
+WRONG = 0.01  # difference of areas over the largest contact area
 
 
 def twins(directory: Path, counts: Counter[str], seed: int, number: int) -> Iterator[str]:
     """March a scene and its twin."""
     found = trial(Random(f"{seed} {number}"), directory)
     counts.update(found.counts)
-    counts["iterations at most"] = max(counts["iterations at most"], found.iterations)
-    apart = "% of what certificates allow apart, at most"
+    counts["most iterations"] = max(counts["most iterations"], found.iterations)
+    apart = "% of the difference that certificates allow, at most"
     counts[apart] = max(counts[apart], round(100 * found.distance))
-    wrong = found.violations[:3] + (found.failures if found.counts["failed"] else [])  # not those beyond double
+    failures = found.failures if found.counts["failed"] else []  # without failures beyond double precision
+    wrong = found.violations[:3] + failures
     yield from (f"({found.about}): {sentence}" for sentence in wrong)
 
 
 def compare_with_double(directory: Path, counts: Counter[str], seed: int, number: int) -> Iterator[str]:
-    """Count a scene that mixed precision does not solve though double precision does, or solves otherwise."""
+    """Count a scene that double precision solves, if mixed precision fails or gives another contact area."""
     scene = sketch(Random(f"{seed} {number}"))
     (double, failed), (other, fails) = (areas(scene, directory, name) for name in ("double", "mixed"))
     both = min(len(double), len(other))
@@ -63,7 +64,7 @@ def compare_with_double(directory: Path, counts: Counter[str], seed: int, number
 
 
 def areas(made: Sketch, directory: Path, precision: str) -> tuple[NDArray[np.float64], bool]:
-    """The contact area after each step, and whether a step failed."""
+    """Return the contact area after each step, and True if a step failed."""
     numerics = {**made.numerics, "precision": precision, "tolerance": Numerics().tolerance}
     found = list[float]()
     try:
@@ -79,7 +80,7 @@ def main() -> int:
         __doc__,
         trials=500,
         what="scenes",
-        steps=(-1, "go on until there are so many (20000; 100000 with --long)"),
+        steps=(-1, "least number of steps (20000; 100000 with --long)"),
         long=(False, "march one scene back and forth"),
         mixed=(False, "mixed precision compared with double"),
     )

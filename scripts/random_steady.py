@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Steady sliding of random bodies at high pressures and velocities: what it costs, and what is not solved.
+"""Steady sliding of random bodies at high pressures and velocities: costs, and failed solves.
 
     .venv/bin/python scripts/random_steady.py [--bodies 200] [--seed 1] [--only NUMBER] [--most 600]
 
-Rubbers of 2 to 12 branches, 3 to 1000 times as stiff at once as in the end, on self-affine surfaces, under 1 to 100 MPa
-at 0.3 to 100 m/s. Each result is checked by an operator of numpy's own. Ends with 1 if a body was not solved, a result
-was wrong, or took more than a given number of operator calls.
+Rubbers have 2 to 12 branches and instantaneous moduli of 3 to 1000 times the long-term modulus. They slide on
+self-affine surfaces under 1 to 100 MPa at 0.3 to 100 m/s. Each result is checked by an independent operator made with
+numpy. The exit code is 1 if a solve fails, a result is wrong, or a solve takes more than `--most` operator calls.
 """
 
 import sys
@@ -29,7 +29,7 @@ from parcontact.steady_sliding.sliding import SteadySliding
 
 
 def drawn(random: np.random.Generator) -> tuple[dict[str, Any], float, float]:
-    """A job, a speed [m/s] and a pressure [Pa]."""
+    """Return a job, a speed [m/s] and a pressure [Pa]."""
 
     def between(least: float, most: float) -> float:
         return float(np.exp(random.uniform(np.log(least), np.log(most))))

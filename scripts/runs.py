@@ -18,7 +18,7 @@ Json = dict[str, Any]
 def begun(
     job: "Job | Mapping[str, Any] | Path", sets: Mapping[str, Any] | Sequence[str] = (), comm: Any = None
 ) -> "March":
-    """A march before its first step, by this process unless a communicator is given; `sets` replaces keys."""
+    """Return a march before its first step, on this process unless a communicator is given; `sets` replaces keys."""
     from mpi4py import MPI
 
     from parcontact.job import Job
@@ -31,7 +31,8 @@ def begun(
 
 
 def marched(march: "March", note: Callable[["March"], None] | None = None) -> tuple[list["StepRow"], list[float]]:
-    """All rows of a march, the initial one first, and the CPU time [s] when each was done; `note` sees each state."""
+    """Return all rows of a march, the initial one first, and the CPU time [s] after each; `note` is called with the
+    march after each."""
     from parcontact.march.loop import run_steps
 
     rows, clock = list["StepRow"](), list[float]()
@@ -47,10 +48,10 @@ def marched(march: "March", note: Callable[["March"], None] | None = None) -> tu
 
 
 def environment() -> dict[str, str]:
-    """The environment without the marks that MPI leaves in it, which would confuse another mpirun.
+    """Return the environment without variables of MPI, which would confuse another mpirun.
 
-    An mpirun whose ranks have ended with an error ends at once, too: it would give each 3 s and again 3 s to do so.
-    A rank that waits for another one gives its core away, as other programs may need it.
+    An mpirun whose ranks failed ends at once, instead of after two waits of 3 s. Waiting ranks yield their cores to
+    other programs.
     """
     clean = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
     times = {f"{name}_MCA_odls_base_sigkill_timeout": "0" for name in ("OMPI", "PRTE")}
@@ -58,7 +59,8 @@ def environment() -> dict[str, str]:
 
 
 def ranks_of(pid: int) -> list[int]:
-    """The ranks of an mpirun of scripts/setup, in their order: they are the children of its only child."""
+    """Return the process numbers of the ranks of an mpirun of scripts/setup, in order: they are the children of its
+    only child."""
     return [rank for launcher in _children(pid) for rank in _children(launcher)]
 
 

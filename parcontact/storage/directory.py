@@ -171,7 +171,7 @@ class Directory:
         """Return the unfinished files of a killed run."""
         return [*self.path.glob("*.part"), *self.checkpoints.glob("*.part")]
 
-    # -- ownership ---------------------------------------------------------------------------------------------------
+    # -- ownership -----------------------------------------------------------------------------------------------------
 
     def _has_checkpoints(self) -> bool:
         """Return True if the directory has sound checkpoints, as a copy without its marker has."""
@@ -189,7 +189,7 @@ class Directory:
         """Call `act` on root; collective. Raises InputError on all ranks if it fails."""
         hdf5.write_on_root(self.slab, act, f"the output directory {self.path} cannot be written", InputError)
 
-    # -- the lock -----------------------------------------------------------------------------------------------------
+    # -- the lock ------------------------------------------------------------------------------------------------------
 
     def _lock_and_read(self) -> None:
         self._made = [path for path in (self.path, *self.path.parents) if not path.exists()]

@@ -1,4 +1,4 @@
-"""Part `adhesion`: a cold adhesive solve of a rough surface, and peers' on the same surface and branch."""
+"""Part `adhesion`: a cold adhesive solve of a rough surface, by this program and by others on the same branch."""
 
 import argparse
 import statistics
@@ -21,13 +21,14 @@ from .work import MODULUS, Cold, distance
 
 ERROR = 1e-5  # of pressures
 STRENGTH = 0.012  # work of adhesion over E*, slope^2 and the shortest wave: with more of it there are several branches
-EXACT = 1e-8  # a tolerance whose pressures others are compared with
+EXACT = 1e-8  # tolerance of the reference
 TOLERANCES = [10.0**-exponent for exponent in np.arange(1.5, 9.0, 0.25)]
 PEERS = (Task("tamaas", TAMAAS_ADHESIVE, -4.0), Task("Adhesion", ADHESION_COLD, -4.0))
 
 
 class Sticky:
-    """Cold solves of the surface of `Cold` from an even gap, whose mean is given: the standard deviation of heights."""
+    """Cold solves of the surface of `Cold`. They start from an even gap, equal to the standard deviation of the
+    heights, which is also the given mean gap."""
 
     def __init__(self, points: int) -> None:
         self.slab = Slab.alone(points, points)
@@ -46,7 +47,8 @@ class Sticky:
 
 
 def adhesion(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
-    """A solve to the loosest tolerance by which the pressure is wrong by at most ERROR; its peers to the same error."""
+    """Measure a solve with the loosest tolerance for which the error of the pressure is at most ERROR, and other
+    programs with the same error."""
     surface = Sticky(points)
     solved = surface.solve(EXACT)
     exact, touching = solved.p.copy(), solved.gap == 0.0

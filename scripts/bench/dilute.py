@@ -1,4 +1,5 @@
-"""Parts `dilute` and `free`: cold solves in free boxes, of few points in contact next to aspher, and of any contact."""
+"""Parts `dilute` and `free`: cold solves in free boxes, with few points in contact (compared with aspher) and with any
+area."""
 
 import argparse
 import statistics
@@ -25,12 +26,12 @@ from .work import EXACT, MODULUS, Cold, Solver
 ERROR = 5e-5  # of pressures
 CASES = ((2, 0.00105), (2, 0.0094), (4, 0.00038), (4, 0.003))  # times `--points`; mean pressure over E*
 SMALLEST, LOADS = 512, (0.001, 0.01, 0.05, 0.2)  # of `free`: points along a side, mean pressures over E*
-FREE_ERROR, TIGHT = 1e-5, 1e-8  # of its pressures, and the tolerance of what they are compared with
+FREE_ERROR, TIGHT = 1e-5, 1e-8  # errors of its pressures, and tolerance of the reference
 PEERS = (Task("aspher", ASPHER_DILUTE, -4.0),)
 
 
 class Dilute(Cold):
-    """The same surface in a box with nothing around, solved on tiles first where that costs less."""
+    """The same surface in a free box, solved on tiles first where that costs less."""
 
     def __init__(self, points: int, load: float) -> None:
         super().__init__(points, load=load)
@@ -38,8 +39,7 @@ class Dilute(Cold):
         self.operators = Operators(self.body.operator(self.fft), self.body.inverse(self.fft))
 
     def solve_anew(self, tolerance: float) -> None:
-        """Make transforms, operators and solver as for the first time, without measuring which are the fastest, and
-        solve."""
+        """Make transforms, operators and solver anew, without measuring which transforms are the fastest, and solve."""
         kept = self.fft, self.operators
         self.fft = FFT(self.slab, measured=False)
         self.operators = Operators(self.body.operator(self.fft), self.body.inverse(self.fft))
@@ -66,7 +66,7 @@ class Dilute(Cold):
         return np.asarray((self.go_on(solver, start) if contact is None else contact).p)
 
     def counted(self, solver: Solver, error: float) -> Iterator[Line]:
-        """Operator calls of a solve, and its error."""
+        """Yield the operator calls of a solve, and its error."""
         name, before = f"{len(self.heights)}^2, {np.mean(self.reference > 0.0):.2%}", self.slab.tally["operator"]
         self.solve(solver)
         yield Line(f"{name}: operator calls", self.slab.tally["operator"] - before)
@@ -74,7 +74,7 @@ class Dilute(Cold):
 
 
 def dilute(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
-    """Two grids of two and four times as many points along a side, at two loads each."""
+    """Measure grids of two and four times as many points along a side, at two loads each."""
     for times, load in CASES:
         surface = Dilute(times * points, load)
         surface.reference = surface.solve(surface.solver(EXACT))
@@ -91,7 +91,7 @@ def dilute(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line
 
 
 def free(points: int, *_: object) -> Iterator[Line]:
-    """Operator calls on 512 x 512 points and on ever finer grids, at loads from dilute contacts on."""
+    """Yield operator calls on 512 x 512 points and on finer and finer grids, from dilute contacts to high loads."""
     side = min(SMALLEST, points)
     while side <= points:
         for load in LOADS:

@@ -25,7 +25,7 @@ def flow(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
         start = time.process_time()
         found: Flow = solve_flow(gap, (1.0, 1.0), axis)
         yield Line(f"flow along {axis}", time.process_time() - start, "s")
-        yield Line("  of what flows in, missing where it flows out", found.imbalance)
+        yield Line("  missing outflow over inflow", found.imbalance)
     yield Line("flow along x and along y", time.process_time() - began, "s")
 
 

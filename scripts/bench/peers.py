@@ -1,4 +1,4 @@
-"""Other programs on the same work, each in an environment of its own, to the same measured error."""
+"""Other programs on the same problems, each in its own environment, with the same measured error."""
 
 import json
 import os
@@ -135,9 +135,9 @@ def attempt(tolerance):
 
 
 class Task(NamedTuple):
-    """Work for a program: its `code` defines `attempt(tolerance) -> (seconds, error)`, with what is `given` to it, and
-    with adhesion the number of points that touch where the reference is open, or the other way round; the search begins
-    at the tolerance `10**exponent`."""
+    """Problem for a program. Its `code` defines `attempt(tolerance) -> (seconds, error)` with the data in `given`. With
+    adhesion `attempt` also returns the number of points that touch in the result or in the reference only. The search
+    begins at the tolerance `10**exponent`."""
 
     program: str
     code: str
@@ -145,8 +145,8 @@ class Task(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The time of a program [s] by the loosest tolerance with which its error was small enough; or, if it did not get
-    there, the longest try. `flips` are those of a contact with adhesion."""
+    """Result of a program: its time [s] with the loosest tolerance that reached the error, else with the longest try.
+    `flips`: with adhesion, the number of points that touch in the result or in the reference only."""
 
     reached: bool
     seconds: float
@@ -155,7 +155,8 @@ class Found(NamedTuple):
 
 
 def compare_peers(directory: Path, tasks: tuple[Task, ...], given: Mapping[str, Any], ours: float) -> Iterator[Line]:
-    """CPU seconds of each to the error `given["wanted"]`, over `ours`; one that fails is left out."""
+    """Yield the CPU time of each program for the error `given["wanted"]`, and its ratio to `ours`; failed programs are
+    left out."""
     for task in tasks:
         try:
             found = search(installed(directory, task.program), task, given)
@@ -172,7 +173,8 @@ def compare_peers(directory: Path, tasks: tuple[Task, ...], given: Mapping[str, 
 
 
 def search(python: Path, task: Task, given: Mapping[str, Any]) -> Found:
-    """Try smaller and smaller tolerances until the error is reached, or larger and larger ones until it is not."""
+    """Try smaller and smaller tolerances until the error is reached, or larger and larger ones as long as it is
+    reached."""
     with tempfile.TemporaryDirectory() as where:
         file = Path(where, "given.npz")
         np.savez(file, exponent=task.exponent, **given)
@@ -184,7 +186,7 @@ def search(python: Path, task: Task, given: Mapping[str, Any]) -> Found:
 
 
 def judge(said: list[dict[str, Any]], wanted: float) -> Found:
-    """The cheapest try that was good enough; else the longest one, of which the last may not have ended in time."""
+    """Return the cheapest try that reached the error; else the longest one, which may be unfinished."""
     if good := [one for one in said if one.get("error", np.inf) <= wanted]:
         cheapest = min(good, key=lambda one: one["seconds"])
         return Found(True, cheapest["seconds"], cheapest["error"], cheapest.get("flips", ()))
@@ -195,7 +197,7 @@ def judge(said: list[dict[str, Any]], wanted: float) -> Found:
 
 
 def installed(directory: Path, program: str) -> Path:
-    """The Python of a program's own environment, which is made if it is not there."""
+    """Return the Python of a program's own environment, which is made if missing."""
     python, done = directory / program / "bin" / "python", directory / program / "installed"
     if not done.exists():
         _call(sys.executable, "-m", "venv", "--clear", directory / program)
@@ -207,7 +209,7 @@ def installed(directory: Path, program: str) -> Path:
 
 
 def _eigen(python: Path, where: Path) -> dict[str, str]:
-    """Return the environment in which aspher is built from source: headers that another package has."""
+    """Return the environment variables for building aspher from source, with headers from another package."""
     _call(python, "-m", "pip", "download", "-q", "--no-deps", "-d", where, HEADERS)
     zipfile.ZipFile(next(where.glob("*.whl"))).extractall(where)
     include = where / "cmeel.prefix" / "include" / "eigen3"

@@ -1,4 +1,4 @@
-"""Parts `scale` and `march`: one rank next to two, and a run on two ranks."""
+"""Parts `scale` and `march`: one rank compared with two, and a run on two ranks."""
 
 import argparse
 import time
@@ -18,18 +18,18 @@ from .work import Cold, Slide, pair
 
 TOLERANCE = 1e-6  # of cold solves
 JOB = ROOT / "jobs" / "paper" / "fig08_velocity_step.yaml"  # of `march`
-CELLS = 16  # of its shortest wave
+CELLS = 16  # cells per shortest wave
 LONGEST = 1.25e-4  # [m], half of its longest wave: for small grids
 WORLD = MPI.COMM_WORLD
 Work = Callable[[], object]
 
 
 def scale(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
-    """On two ranks of the same node: rank 0 alone, then both; the other waits and keeps no core busy; collective."""
+    """Measure rank 0 alone, then both ranks of a node; a waiting rank keeps no core busy; collective."""
     for what, make, boxes in (
         ("transform", _transforms, 1),
         ("cold solve", _cold_solve, 1),
-        ("cold solve, each rank as many points", _cold_solve, 2),
+        ("cold solve, as many points per rank", _cold_solve, 2),
         ("sliding step", _sliding_step, 1),
     ):
         one, two = _in_turns(make, points, boxes, rounds)
@@ -60,7 +60,7 @@ def _sliding_step(points: int, comm: MPI.Intracomm, boxes: int) -> Work:
 def _in_turns(
     make: Callable[[int, MPI.Intracomm, int], Work], points: int, boxes: int, rounds: int
 ) -> tuple[list[float], list[float]]:
-    """Seconds of one box on rank 0 alone, and of a given number of boxes on both ranks; collective."""
+    """Return the times [s] of one box on rank 0 alone, and of the given number of boxes on both ranks; collective."""
     single = make(points, MPI.COMM_SELF, 1) if WORLD.rank == 0 else None
     double = make(points, WORLD, boxes)
     one, two = list[float](), list[float]()
@@ -82,10 +82,11 @@ def _in_turns(
 
 
 def march(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
-    """From the steady start through the climb, then rounds of a step of one cell and bare transforms; collective.
+    """March from the steady start to the end of the first stage; then compare steps of one cell with bare transforms;
+    collective.
 
-    Bare transforms have the exchange between ranks; in double precision for all transforms of a step, whatever theirs
-    is, and each in its own precision.
+    Bare transforms include the exchange between ranks. They are timed once in double precision for all transforms of a
+    step, and once in the precision of each.
     """
     sets = {"grid.points": points, "surface.0.short_wavelength": min(CELLS * 1e-3 / points, LONGEST)}
     run = begun(JOB, sets, WORLD)
@@ -110,12 +111,12 @@ def march(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
     yield Line("operator calls per step", (slab.tally["operator"] - calls) / rounds)
     for name, values in ratios.items():
         yield quartiles(f"a step over its transforms, {name}", values)
-    yield Line("held at most, the steady start included", held, "maps")
-    yield Line("the same without one for each branch", held - len(run.state.body.branches), "maps")
+    yield Line("largest memory, with the steady start", held, "maps")
+    yield Line("the same without one map per branch", held - len(run.state.body.branches), "maps")
 
 
 def _seconds(call: Callable[[], object]) -> float:
-    """Wall time of the slowest rank; collective."""
+    """Return the wall time [s] of the slowest rank; collective."""
     WORLD.Barrier()
     began = time.perf_counter()
     call()

@@ -1,10 +1,11 @@
 """Parts `slide` and `steady`: sliding step by step and directly.
 
-The slide next to peers has eight branches and backward Euler, as tamaas can do it too: relaxation times from 1e-4 to
-1e3, moduli of 2 each over a long-term modulus of 1, in a box of length 1 at a velocity of 1, by one cell a step.
-Friction is judged, and a step is timed, over the second half of FIRST steps of others and of LATER ones of ours: tamaas
-starts each solve from nothing, so that its later steps take as long as its first ones. Ours are solved in mixed
-precision, and timed in the mean: for some the start does, which take half as long as others.
+The slide that is compared with tamaas has eight branches and backward Euler, which tamaas has, too. Relaxation times
+are from 1e-4 to 1e3, each modulus is 2, and the long-term modulus is 1, in a box of length 1 at a velocity of 1 with
+steps of one cell. Errors of friction and times of a step are taken from the second half of the steps: FIRST steps of
+tamaas, LATER steps of this program. Later steps of tamaas take as long as its first ones, because it starts each solve
+from zero. This program uses mixed precision. Its times are means, because some of its steps need no iteration and take
+half as long as others.
 """
 
 import argparse
@@ -26,12 +27,12 @@ from .peers import TAMAAS_SLIDING, Task, compare_peers
 from .table import Line, Map, interleave
 from .work import pair, sliding_job
 
-DEFAULT, EXACT = 5e-3, 5e-5  # tolerances of a job that gives none, and of one to compare with
+DEFAULT, EXACT = 5e-3, 5e-5  # default tolerance of jobs, and tolerance of the reference
 LARGER = (0.1, 0.05, 0.02, 0.01)
 ERROR = 1e-3  # of friction
-FEWEST = 8  # steps: the first ones are not like the others
-FIRST, LATER = 12, 48  # steps next to peers
-PRESSURE = 0.165  # next to peers, for 7 to 9 % of contact
+FEWEST = 8  # steps: the first ones differ from the others
+FIRST, LATER = 12, 48  # steps compared with other programs
+PRESSURE = 0.165  # compared with other programs, for 7 to 9 % of contact
 RELAXATION_TIMES = [10.0**k for k in range(-4, 4)]
 MODULUS = 2.0
 EXACT_FOR_PEERS = 1e-7
@@ -40,8 +41,8 @@ PEERS = (Task("tamaas", TAMAAS_SLIDING, -3.0),)
 
 
 def slide(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
-    """Means over the second half of the steps: at the default tolerance, and at the largest one with which friction is
-    nowhere wrong by more than ERROR; with eight branches next to peers."""
+    """Yield means over the second half of the steps, at the default tolerance and at the largest one whose errors of
+    friction are all at most ERROR; compare a slide with eight branches with other programs."""
     steps = max(4 * rounds, FEWEST)
     half = steps // 2
     exact = _friction(sliding_job(points, steps, EXACT))[half:]
@@ -70,7 +71,7 @@ def _friction(job: Json) -> Map:
 
 
 def _backward_euler_job(points: int, tolerance: float, precision: str = "double") -> Json:
-    """All branches have a map."""
+    """Return a job in which all branches have a map."""
     numerics = {"integrator": "backward-euler", "tolerance": tolerance, "branch_error": 0.0, "precision": precision}
     rough = {"hurst": 0.8, "long_wavelength": 0.25, "short_wavelength": 8 / points, "rms_slope": 0.1, "seed": 1}
     branches = [{"modulus": MODULUS, "relaxation_time": tau} for tau in RELAXATION_TIMES]
@@ -84,9 +85,10 @@ def _backward_euler_job(points: int, tolerance: float, precision: str = "double"
 
 
 def _compare_with_peers(points: int, directory: Path) -> Iterator[Line]:
-    """Ours at the tolerance that makes friction good to ERROR with the fewest calls, and theirs."""
+    """Measure this program at the tolerance that needs the fewest calls for an error of friction of at most ERROR, and
+    other programs."""
     half, tried = LATER // 2, []
-    with warnings.catch_warnings(action="ignore"):  # of a body as soft as 1 Pa
+    with warnings.catch_warnings(action="ignore"):  # the body is as soft as 1 Pa
         rows = marched(begun(_backward_euler_job(points, EXACT_FOR_PEERS)))[0][-LATER:]
         exact = np.array([row.measures.friction_x for row in rows])
         for tolerance in TOLERANCES:
@@ -102,7 +104,7 @@ def _compare_with_peers(points: int, directory: Path) -> Iterator[Line]:
     yield Line(f"{what}: largest error of friction", error)
     yield Line(f"{what}: operator calls per step", calls)
     yield Line(f"{what}: a step", 1e3 * ours, "ms")
-    yield Line(f"{what}: one of the first {FIRST}", 1e3 * float(np.mean(seconds[FIRST // 2 : FIRST])), "ms")
+    yield Line(f"{what}: a step of the first {FIRST}", 1e3 * float(np.mean(seconds[FIRST // 2 : FIRST])), "ms")
     job = _backward_euler_job(points, EXACT_FOR_PEERS)
     heights = np.asarray(pc.surface(job["surface"], job["grid"]))
     q = 2j * np.pi * np.fft.rfftfreq(points, 1.0 / points)
@@ -121,4 +123,4 @@ def steady(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
     sliding = SteadySliding(base)
     curve = [sliding.solve((0.03 * 10 ** (k / 8), 0.0), 1e5).operator_calls for k in range(min(17, rounds + 2))]
     yield Line("curve: operator calls per further point", statistics.fmean(curve[1:]))
-    yield Line("curve: the most of them", max(curve[1:]))
+    yield Line("curve: most operator calls per point", max(curve[1:]))

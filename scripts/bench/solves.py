@@ -18,12 +18,12 @@ from .work import LOAD, MODULUS, Cold, Slide, distance
 
 ERROR = 1e-7  # of pressures
 PEERS = (Task("tamaas", TAMAAS_COLD, -6.5), Task("aspher", ASPHER_COLD, -6.5))
-SMALLEST = 256  # points along a side, where `sizes` begins
+SMALLEST = 256  # points along a side of the first grid of `sizes`
 TOLERANCE = 1e-6  # of its cold solves
 LIGHT = 0.036  # mean pressure over E* of `large`, for 8 % of contact at a slope of 1
 LARGE_ERROR = 1e-5  # of its pressures
-COARSER = 4  # times fewer points, where the tolerance for that is looked for
-FURTHER = 1e3  # times smaller a tolerance, to see the error
+COARSER = 4  # ratio to the grid on which the tolerance is found
+FURTHER = 1e3  # ratio of the tolerance to that of the reference
 
 
 def solve(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
@@ -44,8 +44,8 @@ def solve(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]
 
 
 def sizes(points: int, rounds: int, _: argparse.Namespace) -> Iterator[Line]:
-    """Up to a given number of points, twice as many along each side every time; times are also stated over N^2 log2
-    N."""
+    """Measure grids with twice as many points along each side every time, up to `points`; times are also stated over
+    N^2 log2 N."""
     side = min(SMALLEST, points)
     while side <= points:
         surface, slide = Cold(side), Slide(side)
@@ -67,9 +67,9 @@ def _cost(side: int, what: str, call: Callable[[], object], slab: Slab, rounds: 
 
 
 def large(points: int, *_: object) -> Iterator[Line]:
-    """A cold solve at 8 % of contact: to a tolerance that is good enough on a coarser grid, then on from there until
-    the pressure is good enough, seen from where it gets with a thousandth of that tolerance. What is compared is kept
-    in single precision, for memory."""
+    """Measure a cold solve at 8 % of contact. Its tolerance is one that suffices on a coarser grid, and is halved until
+    the error of the pressure is at most LARGE_ERROR. The reference is solved to a tolerance FURTHER times smaller, and
+    kept in single precision to save memory."""
     tolerance = Cold(max(points // COARSER, 64), load=LIGHT).loosest(LARGE_ERROR)[0][0].tolerance
     began = time.process_time()
     surface = Cold(points, load=LIGHT)
@@ -78,8 +78,8 @@ def large(points: int, *_: object) -> Iterator[Line]:
     calls, began = tally["operator"], time.process_time()
     found = surface.go_on(solver, surface.start(solver))
     seconds, calls = time.process_time() - began, tally["operator"] - calls
-    yield Line("held at most", tally["map bytes at most"] / 1e9, "GB")
-    yield Line("resident at most", _resident(), "GB")
+    yield Line("largest memory in maps", tally["map bytes at most"] / 1e9, "GB")
+    yield Line("largest resident memory", _resident(), "GB")
     own, reached, certificate = solver[0], found.p.astype(np.float32), found.certificate.worst
     own.tolerance = tolerance / FURTHER
     exact = surface.go_on(solver, found.p).p
@@ -99,9 +99,9 @@ def large(points: int, *_: object) -> Iterator[Line]:
     yield Line("certificate", certificate)
     yield Line("contact area", float(np.count_nonzero(reached)) / reached.size)
     yield Line("pressure error", error)
-    yield Line("resident at most, what it is compared with included", _resident(), "GB")
+    yield Line("largest resident memory, with the reference", _resident(), "GB")
 
 
 def _resident() -> float:
-    """Return how much of this process was in memory at most [GB]."""
+    """Return the largest resident memory of this process [GB]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6

@@ -27,7 +27,7 @@ class Line:
 
 
 def quartiles(what: str, values: Sequence[float]) -> Line:
-    """The median of some ratios, with their quartiles."""
+    """Return the median of ratios with their quartiles."""
     low, middle, high = np.quantile(values, (0.25, 0.5, 0.75)).tolist()
     return Line(what, middle, "", low, high)
 
@@ -38,8 +38,8 @@ def interleave(
     clock: Callable[[], float] = time.process_time,
     before: int = 1,
 ) -> dict[str, list[float]]:
-    """Seconds of each function in every round, in turns; `before` these all are called once, or a given number of
-    times."""
+    """Return the times [s] of each function in every round, by turns, after `before` calls of each that are not
+    timed."""
     times: dict[str, list[float]] = {name: [] for name in functions}
     for count in range(before + rounds):
         for name, function in functions.items():
@@ -51,7 +51,7 @@ def interleave(
 
 
 def compare(times: dict[str, list[float]], base: str) -> Iterator[Line]:
-    """The median of each function, and the ratio of the others to the base."""
+    """Yield the median time of each function, and the ratios of the others to `base`."""
     for name, seconds in times.items():
         yield Line(name, 1e3 * statistics.median(seconds), "ms")
         if name != base:

@@ -34,10 +34,10 @@ SMALL = {
     "bench": Small(
         ["--points", "64", "--rounds", "1", "--json", "bench.json"],
         r"(?s)double: operator calls +\d\d .*tolerance 0.005: operator calls per step +[4-9](\.| ).*"
-        r"curve: the most of them +\d{2,3}[. ].*"
+        r"curve: most operator calls per point +\d{2,3}[. ].*"
         r"adhesion +operator calls +\d+ .*dilute +128\^2.*free +64\^2.*"
         r"flow along x and along y.*"
-        r"each branch.*solve: speed of 2 ranks",
+        r"per branch.*solve: speed of 2 ranks",
     ),
     "chosen_mesh": Small(
         ["--only", "5", "--seed", "100", "--finest", "240"], r"(?m)^1 made: \d with faults; 3 accuracies", (0, 1)
