@@ -9,7 +9,9 @@ import pytest
 from marched_jobs import marched
 from mpi4py import MPI
 
+from parcontact.effects import stick_slip
 from parcontact.job import Job
+from parcontact.physics.shear_operator import ShearOperator
 from parcontact.python.simulation import Simulation
 
 G, RADIUS, FORCE, MU = 1e6, 1e-2, 1e-3, 0.5
@@ -23,13 +25,13 @@ def mindlin(share: float) -> float:
     return 3.0 * MU * FORCE * 1.5 / (16.0 * G * A) * (1.0 - (1.0 - share) ** (2.0 / 3.0))
 
 
-def sphere(stops: Any, points: int = 64, tolerance: float = 1e-4, **more: Any) -> Job:
-    """A sphere pressed on, then moved to stops along x [m], one step each."""
+def sphere(stops: Any, points: int = 64, tolerance: float = 1e-4, across: float = 4.0, **more: Any) -> Job:
+    """A sphere pressed on a box of `across` radii of its contact, then moved to stops along x [m], one step each."""
     ways = np.diff([0.0, *stops])
     slides = [{"force": FORCE, "velocity": float(way), "duration": 1.0, "time_step": 1.0} for way in ways]
     return Job.model_validate(
         {
-            "grid": {"points": points, "size": 4.0 * A, "boundary": "free"},
+            "grid": {"points": points, "size": across * A, "boundary": "free"},
             "surface": {"shape": "sphere", "radius": RADIUS},
             "material": {"model": "elastic", "shear_modulus": G, "poisson": 0.5},
             "interface": {"coefficient": MU, "stick": True},
@@ -67,7 +69,7 @@ def test_cattaneo_and_mindlin() -> None:
         assert sticking == pytest.approx(A * (1.0 - share) ** (1.0 / 3.0), abs=cell)
 
 
-@pytest.mark.mpi(2, 4)
+@pytest.mark.mpi(2, 3, 4)
 def test_ranks_agree(comm: MPI.Intracomm) -> None:
     """Forces, sticking areas and energies are those of one rank, to the digits that sums in other orders leave."""
     job = rough({"shear_stress": 2e5, "stick": True}, output={"energy": True})
@@ -77,20 +79,39 @@ def test_ranks_agree(comm: MPI.Intracomm) -> None:
     assert 0.0 < alone.added[2] < alone.measures.contact_area
 
 
-def test_loops_of_mindlin_and_deresiewicz() -> None:
-    """What slip loses in a cycle between the shares 0.9 and -0.9, to 1 % with 16 cells in the radius; the work of the
-    force is the same to what the trapezoidal rule makes of ten steps, and the balance closes but for rounding."""
-    share, far = 0.9, mindlin(0.9)
+@pytest.mark.parametrize(("poisson", "share"), [(0.0, 0.5), (0.5, 0.9)])
+def test_loops_of_mindlin_and_deresiewicz(monkeypatch: pytest.MonkeyPatch, poisson: float, share: float) -> None:
+    """What slip loses in a cycle between a share and its opposite, with 27 cells in the radius and 20 steps a way.
+
+    The theory is exact if tractions move the surface as with Poisson's ratio 0: 0.5 % at one half. With 1/2 slip is not
+    quite along the force, which the theory assumes, and less is lost: 1 % at nine tenths. The work of the force is the
+    same to what the trapezoidal rule makes of the steps, and the balance closes but for rounding."""
+    monkeypatch.setattr(stick_slip, "ShearOperator", lambda fft, size, _, free: ShearOperator(fft, size, poisson, free))
+    softer = (2.0 - poisson) / 1.5  # compliance of a sphere over that with 1/2
+    far = softer * mindlin(share)
     down = np.linspace(far, -far, 21)[1:]
-    rows = marched(sphere([far, *down, *-down], output={"energy": True}))[1][2:]
+    rows = marched(sphere([far, *down, *-down], across=2.4, output={"energy": True}))[1][2:]
     lost = rows[-1].added[3] - rows[0].added[3]
     part = 1.0 - (1.0 - share) ** (5.0 / 3.0) - 5.0 * share / 6.0 * (1.0 + (1.0 - share) ** (2.0 / 3.0))
-    assert lost == pytest.approx(4.8 * part * MU * FORCE * mindlin(1.0), rel=1e-2)
+    exact = 4.8 * part * MU * FORCE * softer * mindlin(1.0)
+    assert lost == pytest.approx(exact, rel=1e-2 if poisson else 5e-3)
     forces, stops = [-row.measures.force_x for row in rows], [far, *down, *-down]
     pairs = zip(forces[1:], forces[:-1], np.diff(stops), strict=True)
     assert sum(0.5 * (new + old) * way for new, old, way in pairs) == pytest.approx(lost, rel=5e-3)
     last = rows[-1]
     assert last.work == pytest.approx(last.stored + last.dissipated + last.added[3], rel=1e-12)
+
+
+@pytest.mark.parametrize(("time", "stiffer"), [(1e3, 1.0), (1e-9, 5.0)])
+def test_slow_and_fast_limits_of_rubber(time: float, stiffer: float) -> None:
+    """A sphere on rubber that has relaxed under its load, moved in one step: the displacement over force is that of an
+    elastic body with the modulus after long, or with the modulus at once, to the 0.5 % of Cattaneo and Mindlin."""
+    way = mindlin(0.5) / stiffer
+    press = {"force": FORCE, "duration": 1.0, "time_step": {"first": 1e-4, "growth": 1.5}}
+    slide = {"force": FORCE, "velocity": way / time, "duration": time, "time_step": time}
+    row = marched(sphere([], 48, across=2.4, material=RUBBER, history=[press, slide]))[1][-1]
+    found = -row.measures.force_x / (MU * FORCE)
+    assert mindlin(found) / stiffer == pytest.approx(way, rel=5e-3)
 
 
 def test_full_slip_is_friction_of_the_interface() -> None:
