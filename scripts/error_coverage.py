@@ -72,7 +72,7 @@ class TooLongError(Exception):
 # -- observations of one scene and its reference -----------------------------------------------------------------------
 
 
-def note_what_is_seen() -> None:
+def record_observations() -> None:
     """Make the estimates of steps and of steady states record their observations in SEEN."""
 
     def noting(own: Any) -> Any:
@@ -198,7 +198,7 @@ def made(number: int, to: Path, limit: float) -> Iterator[str]:
 
 # -- true and estimated errors -----------------------------------------------------------------------------------------
 #
-# Errors are errors of means over the distance slid, or over time if nothing slides, as printed at the end of a run.
+# Errors refer to means over the distance slid, or over time if nothing slides, as printed at the end of a run.
 # A reference is read at the instants of the run. Friction of an elastic body is 0.
 
 
@@ -381,7 +381,7 @@ def main() -> int:
         print(write_job(sketch(asked.job), to))
         return 0
     if not asked.figures:
-        note_what_is_seen()
+        record_observations()
         campaign.go(asked, lambda number: made(number, to, asked.limit), Counter())
     return 0 if conclude(to) else 1
 

@@ -47,14 +47,14 @@ class MissingError(Exception):
     """The results for a figure are missing."""
 
 
-def there(path: Path) -> Path:
+def require_file(path: Path) -> Path:
     if not path.is_file():
         raise MissingError(f"{path} is missing")
     return path
 
 
 def columns(directory: Path, name: str = "measures.csv") -> dict[str, np.ndarray]:
-    return {key: np.array(values) for key, values in tables.read_columns(there(directory / name)).items()}
+    return {key: np.array(values) for key, values in tables.read_columns(require_file(directory / name)).items()}
 
 
 def panels(count: int, height: float = HEIGHT) -> tuple[Figure, Sequence[Axes]]:
@@ -95,7 +95,7 @@ def means(rows: Sequence[dict[str, Any]], key: str, name: str) -> tuple[np.ndarr
 
 def rows_of(directory: Path) -> list[dict[str, Any]]:
     """Return the rows of the table of a sweep; contact areas of simulations are corrected at edges."""
-    rows = sweep_table.read_cases(there(directory / "sweep.csv"))
+    rows = sweep_table.read_cases(require_file(directory / "sweep.csv"))
     for row in rows:
         case = directory / "cases" / f"{int(row['case']):03d}"
         if row["state"] == "done":
@@ -157,7 +157,7 @@ def fig02(out: Path) -> Figure:
 
 
 def fig03(out: Path) -> Figure:
-    directory = there(out / "fig03_sphere_pressure" / "fields.h5").parent
+    directory = require_file(out / "fig03_sphere_pressure" / "fields.h5").parent
     job = load(JOBS / "fig03_sphere_pressure.yaml")
     glassy, rubbery = moduli(job)
     force = job.history[0].load.end
@@ -195,7 +195,7 @@ def ring_means(heights: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray
 
 
 def fig05(out: Path) -> Figure:
-    directory = there(out / "fig05_surface" / "fields.h5").parent
+    directory = require_file(out / "fig05_surface" / "fields.h5").parent
     job = load(directory / "job.resolved.yaml")
     part, size = job.surface[0], job.grid.lx
     with h5py.File(directory / "fields.h5") as fields:

@@ -24,7 +24,7 @@ OF_A_CURVE = ("velocities", "pressures", "temperatures")
 
 
 def each_case(options: argparse.Namespace, world: MPI.Intracomm, act: Act, runs: bool = True) -> int:
-    """Apply `act` to a job, to all cases of its sweep, or to the case that is asked for; collective.
+    """Apply `act` to a job, to all cases of its sweep, or to the selected case; collective.
 
     Cases that run at the same time print only their beginning and end.
     """

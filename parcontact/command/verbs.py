@@ -313,7 +313,9 @@ def schema(options: argparse.Namespace) -> int:
     from ..job import added_sections
     from ..job import schema as job_schema
 
-    unknown = (f"{added_sections.whose(name)} {reason}" for name, reason in job_schema.without_schema().items())
+    unknown = (
+        f"{added_sections.describe_effect(name)} {reason}" for name, reason in job_schema.without_schema().items()
+    )
     for text in (*added_sections.unusable(), *unknown):
         print(f"warning: {text}; the schema does not include it", file=sys.stderr)
     print(json.dumps(job_schema.json_schema(), indent=1))

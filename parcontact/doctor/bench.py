@@ -67,7 +67,7 @@ class Bench:
         """Return the finding with the largest `share`."""
         return self.failure or str(max(self.findings.values(), key=lambda found: found.share))
 
-    # -- running ------------------------------------------------------------------------------------------------------
+    # -- running -------------------------------------------------------------------------------------------------------
 
     def begin(self, data: Json) -> March:
         """Return a march at the start of a job, by default with a tolerance of 1e-10 and all branches; collective."""
@@ -100,7 +100,7 @@ class Bench:
         self.residual = float(np.max((self.residual, row.certificate.worst)))  # NaN if one of them is NaN
         self.iterations = max(self.iterations, row.iterations)
 
-    # -- what is expected ---------------------------------------------------------------------------------------------
+    # -- expected values -----------------------------------------------------------------------------------------------
 
     def expect(self, what: str, found: float, expected: float, within: float, scale: float | None = None) -> None:
         """Record a result with an allowed error of `within` times `scale` (default: the exact value)."""

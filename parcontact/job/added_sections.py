@@ -46,10 +46,10 @@ def naming_effect(section: str) -> Iterator[None]:
     except (InputError, RunError):
         raise
     except (Exception, SystemExit) as error:
-        raise RunError(f"{whose(section)} has failed: {type(error).__name__}: {error}") from error
+        raise RunError(f"{describe_effect(section)} has failed: {type(error).__name__}: {error}") from error
 
 
-def whose(section: str) -> str:
+def describe_effect(section: str) -> str:
     """Return the name of the effect of a section, and the entry point of its class."""
     return f"the effect {section} ({_registered()[section].value})"
 

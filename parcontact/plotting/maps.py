@@ -109,8 +109,8 @@ def mask(name: str, values: Array, pressure: Array | None, job: Job) -> Array:
 
 
 def stick_maps(traction: Array, pressure: Array, job: Job) -> tuple[Array, Array]:
-    """Return the sizes of tractions where there is pressure, and over their bounds: 1 where points slip. A shear
-    strength is the largest traction."""
+    """Return the sizes of tractions where there is pressure, and their ratios to the bound of traction, which are 1
+    where points slip. The bound is the coefficient times the pressure, or for a shear strength the largest traction."""
     touching, coefficient = pressure > 0.0, job.section("interface").coefficient
     bound = np.full(pressure.shape, traction.max()) if coefficient is None else coefficient * pressure
     share = np.divide(traction, bound, out=np.zeros_like(traction), where=bound > 0.0)

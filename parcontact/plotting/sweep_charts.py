@@ -90,7 +90,7 @@ def sweep_title(directory: Path) -> str:
 def _find_keys(rows: Rows) -> list[str]:
     """Return the keys with several numbers, except those that choose a sample; of keys that change together the
     first."""
-    keys = _tell_apart(rows, _swept(rows))
+    keys = _drop_joint_keys(rows, _swept(rows))
     return [name for name in keys if all(isinstance(row[name], float) for row in rows)]
 
 
@@ -101,7 +101,7 @@ def _swept(rows: Rows) -> list[str]:
     return [name for name in keys if name.split(".")[-1] not in SAMPLES]
 
 
-def _tell_apart(rows: Rows, names: Sequence[str]) -> list[str]:
+def _drop_joint_keys(rows: Rows, names: Sequence[str]) -> list[str]:
     """Return the names with several values; of names that change together the first."""
     found: dict[tuple[int, ...], str] = {}
     for name in names:
@@ -116,7 +116,7 @@ def _split(rows: Rows, key: str) -> dict[tuple[str, ...], Rows]:
     """Return the rows of each line by the values of the other keys, except `key`, the keys that change with it, and
     those that choose a sample."""
     places = [name for name in sweep_table.PLACES if name in rows[0]]
-    others = [name for name in _tell_apart(rows, [key, *places, *_swept(rows)]) if name != key]
+    others = [name for name in _drop_joint_keys(rows, [key, *places, *_swept(rows)]) if name != key]
     lines: dict[tuple[str, ...], list[dict[str, Any]]] = {}
     for row in rows:
         lines.setdefault(tuple(_named(name, row[name]) for name in others) or ("",), []).append(row)

@@ -154,12 +154,12 @@ def find_changed_step(contents: Contents, job: Job) -> str:
     )
     count = min(number, len(old), len(new))
     for step in range(old.shared(new) + 1, count + 1):
-        if difference := next(_apart(old[step], new[step]), ""):
+        if difference := next(_step_differences(old[step], new[step]), ""):
             return f"step {step} of the {number} completed ones {difference}"
     return f"{number} steps were completed, but the job has {count} up to t = {until:g} s" if count < number else ""
 
 
-def _apart(old: Step, new: Step) -> Iterator[str]:
+def _step_differences(old: Step, new: Step) -> Iterator[str]:
     """Yield the differences of two steps."""
     size = math.hypot(*old.position)
     if old.jump != new.jump:

@@ -48,7 +48,7 @@ class Request:
     @property
     def points(self) -> list[Wanted]:
         """All points, in the order in which they are solved."""
-        return curve_points.asked(self.velocities, self.pressures, self.temperatures)
+        return curve_points.requested_points(self.velocities, self.pressures, self.temperatures)
 
     def velocity(self, speed: float) -> tuple[float, float]:
         return speed * self.direction[0], speed * self.direction[1]

@@ -25,7 +25,9 @@ class Wanted(NamedTuple):
         return f"{self.speed:.4g} m/s under {quantity(self.pressure, 'Pa', 4)}{heated}"
 
 
-def asked(speeds: Sequence[float], pressures: Sequence[float], temperatures: Sequence[float] = ()) -> list[Wanted]:
+def requested_points(
+    speeds: Sequence[float], pressures: Sequence[float], temperatures: Sequence[float] = ()
+) -> list[Wanted]:
     """Return all combinations of speeds, pressures and temperatures without repetition, in the order of solution."""
     order = product(temperatures or (math.nan,), pressures, speeds)
     return list(dict.fromkeys(Wanted(speed, pressure, temperature) for temperature, pressure, speed in order))

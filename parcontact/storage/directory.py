@@ -55,7 +55,7 @@ ADVICE = "give --restart never to start from the beginning, or --out for another
 
 
 class Directory:
-    """A directory of results. Only root accesses it; collective methods, marked as such, broadcast the result."""
+    """A directory of results. Only root accesses it; methods that are collective broadcast the result."""
 
     def __init__(self, path: Path, slab: Slab, verb: str = "run") -> None:
         self.path, self.slab, self.verb = path, slab, verb
@@ -105,7 +105,7 @@ class Directory:
         """Write the marker and the job; collective. Raises InputError if the directory cannot be written."""
 
         def act() -> None:
-            self._put_aside_what_is_not_ours(job)
+            self._rename_foreign_files(job)
             self.claims = {**self.claims, self.verb: claim}
             marker.write_claims(self.path, self.claims)
             if self.verb == "run":
@@ -177,7 +177,7 @@ class Directory:
         """Return True if the directory has sound checkpoints, as a copy without its marker has."""
         return any(checkpoint.is_one(path) for _, path in self.saved())
 
-    def _put_aside_what_is_not_ours(self, job: Path) -> None:
+    def _rename_foreign_files(self, job: Path) -> None:
         """Rename files with the names of this verb's results if neither the marker nor a checkpoint proves their
         origin."""
         if self.claim is None and not (self.verb == "run" and self._has_checkpoints()):

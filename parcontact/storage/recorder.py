@@ -17,8 +17,8 @@ from .step_row import MeasuresFile, StepRow, cut_back_table
 
 @dataclass(frozen=True)
 class Recording:
-    """Outputs of a run of `total` steps (an estimate if `open_ended`): dissipation of `branches`, columns `added` by
-    effects, and `maps` of a box of this `size` [m] after `every` steps."""
+    """Outputs of a run of `total` steps (an estimate if `open_ended`). The table has the dissipation of `branches` and
+    the columns `added` by effects; `maps` of a box of this `size` [m] are saved after `every` steps."""
 
     total: int
     branches: int = 0

@@ -204,12 +204,12 @@ def _curve(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
         if errors:
             parts = ", ".join(f"{name.removeprefix('error_')} {100 * value:.3g} %" for name, value in errors.items())
             numerics = claims["steady"].job.get("numerics", {}) if "steady" in claims else {}
-            asked = f"; requested: {_asked(numerics['accuracy'])}" if "accuracy" in numerics else ""
+            asked = f"; requested: {_accuracy_text(numerics['accuracy'])}" if "accuracy" in numerics else ""
             yield f"  largest estimated errors of the curve: {parts}{asked}"
         yield from (f"  warning: {text}" for text in warnings_of(table.with_name(curve_points.LOG)))
 
 
-def _asked(accuracy: Any) -> str:
+def _accuracy_text(accuracy: Any) -> str:
     """Return the accuracy of a job (plain data) as text."""
     parts = accuracy if isinstance(accuracy, dict) else {"": accuracy}
     return ", ".join(f"{name} {100 * value:.3g} %".lstrip() for name, value in parts.items())

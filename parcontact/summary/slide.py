@@ -188,7 +188,7 @@ def describe_slide(
         yield f"largest estimated errors of single steps of the slide: {parts}"
     if known.get(ERRORS[0], 0.0) >= 1.0:
         yield "in some steps of the slide friction is smaller than its estimated error"
-    if _goes_on(initial, [history[index] for index in _slide(so_far)], rows):
+    if _continues_steady_start(initial, [history[index] for index in _slide(so_far)], rows):
         yield from _against_start(columns, found.mu_dyn, known.get(ERRORS[0], math.nan))
 
 
@@ -232,7 +232,7 @@ def _unsettled(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -
         )
 
 
-def _goes_on(initial: Initial, stages: Sequence[Stage], rows: NDArray[np.intp]) -> bool:
+def _continues_steady_start(initial: Initial, stages: Sequence[Stage], rows: NDArray[np.intp]) -> bool:
     """Return True if a slide continues the steady sliding with which its run began, under the same load."""
     if initial.state != "steady" or initial.pressure is None or rows[0] != 0:
         return False

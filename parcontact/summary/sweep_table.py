@@ -210,7 +210,9 @@ def state(case: Case) -> str:
 def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]]) -> bool:
     """Return True if a friction curve lacks requested points."""
     asked = (
-        curve_points.asked(section.velocities, section.pressures or (), section.temperatures or ()) if section else ()
+        curve_points.requested_points(section.velocities, section.pressures or (), section.temperatures or ())
+        if section
+        else ()
     )
     return bool(curve_points.lacking(asked, curve_points.of_table(columns)))
 

@@ -38,7 +38,7 @@ class Dilute(Cold):
         self.body = HalfSpace(self.size, free=True)
         self.operators = Operators(self.body.operator(self.fft), self.body.inverse(self.fft))
 
-    def solve_anew(self, tolerance: float) -> None:
+    def solve_from_scratch(self, tolerance: float) -> None:
         """Make transforms, operators and solver anew, without measuring which transforms are the fastest, and solve."""
         kept = self.fft, self.operators
         self.fft = FFT(self.slab, measured=False)
@@ -63,7 +63,7 @@ class Dilute(Cold):
         start, (own, operators) = np.zeros_like(self.heights), solver
         coarse = lambda slab, tolerance: self.solver(tolerance, slab=slab)  # noqa: E731
         contact = cold_start.prepare_start(own, self.problem(operators), start, coarse, self.on_tiles)
-        return np.asarray((self.go_on(solver, start) if contact is None else contact).p)
+        return np.asarray((self.solve_from(solver, start) if contact is None else contact).p)
 
     def counted(self, solver: Solver, error: float) -> Iterator[Line]:
         """Yield the operator calls of a solve, and its error."""
@@ -81,7 +81,7 @@ def dilute(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line
         solver, error = surface.loosest(ERROR)
         yield from surface.counted(solver, error)
         ours = {"a cold solve": partial(surface.solve, solver)}
-        ours["all made for it"] = partial(surface.solve_anew, solver[0].tolerance)
+        ours["all made for it"] = partial(surface.solve_from_scratch, solver[0].tolerance)
         seconds = {what: statistics.median(each) for what, each in interleave(ours, min(rounds, 5), before=0).items()}
         yield from (Line(what, 1e3 * each, "ms") for what, each in seconds.items())
         if asked.peers is not None:

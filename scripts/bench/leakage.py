@@ -33,5 +33,5 @@ def gap_of(points: int) -> np.ndarray:
     """The gap of a cold elastic solve, in units of the box."""
     surface = Cold(points, load=LOAD)
     solver = surface.solver(TOLERANCE)
-    found = surface.go_on(solver, surface.start(solver))
+    found = surface.solve_from(solver, surface.start(solver))
     return np.where(found.p > 0.0, 0.0, np.maximum(found.u - surface.heights - found.d, 0.0))

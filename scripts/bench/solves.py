@@ -76,13 +76,13 @@ def large(points: int, *_: object) -> Iterator[Line]:
     solver, tally = surface.solver(tolerance), surface.slab.tally
     yield Line("surface, transforms and operators", time.process_time() - began, "s")
     calls, began = tally["operator"], time.process_time()
-    found = surface.go_on(solver, surface.start(solver))
+    found = surface.solve_from(solver, surface.start(solver))
     seconds, calls = time.process_time() - began, tally["operator"] - calls
     yield Line("largest memory in maps", tally["map bytes at most"] / 1e9, "GB")
     yield Line("largest resident memory", _resident(), "GB")
     own, reached, certificate = solver[0], found.p.astype(np.float32), found.certificate.worst
     own.tolerance = tolerance / FURTHER
-    exact = surface.go_on(solver, found.p).p
+    exact = surface.solve_from(solver, found.p).p
     own.tolerance = tolerance
     if (error := distance(reached, exact)) > LARGE_ERROR:
         exact = exact.astype(np.float32)
@@ -90,7 +90,7 @@ def large(points: int, *_: object) -> Iterator[Line]:
         own.tolerance /= 2.0
         found.p[...] = reached
         before, began = tally["operator"], time.process_time()
-        certificate = surface.go_on(solver, found.p).certificate.worst
+        certificate = surface.solve_from(solver, found.p).certificate.worst
         seconds, calls = seconds + time.process_time() - began, calls + tally["operator"] - before
         reached[...] = found.p
         error = distance(reached, exact)

@@ -76,13 +76,13 @@ class Cold:
         cold_start.prepare_start(own, self.problem(operators), start, lambda slab, tol: self.solver(tol, slab=slab))
         return start
 
-    def go_on(self, solver: Solver, start: Map) -> Contact:
+    def solve_from(self, solver: Solver, start: Map) -> Contact:
         """Solve from `start`, which is overwritten by the solution."""
         own, operators = solver
         return own.solve(self.problem(operators), start)
 
     def solve(self, solver: Solver) -> Map:
-        return np.asarray(self.go_on(solver, self.start(solver)).p)
+        return np.asarray(self.solve_from(solver, self.start(solver)).p)
 
     def loosest(self, error: float, single: bool = False) -> tuple[Solver, float]:
         """Return the solver with the loosest tolerance for an error of the pressure of at most `error`, and its

@@ -16,7 +16,7 @@ from parcontact.physics.measures import Measures
 from parcontact.scene import choices
 from parcontact.storage import directory, files, marker, tables, wisdom
 from parcontact.storage.checkpoint import TableMark
-from parcontact.storage.curve_points import asked
+from parcontact.storage.curve_points import requested_points
 from parcontact.storage.directory import Directory
 from parcontact.storage.marker import Claim
 from parcontact.storage.step_row import MeasuresFile, StepRow, cut_back_table
@@ -222,8 +222,8 @@ def test_wisdom_of_a_checkpoint(cache: Path) -> None:
 
 
 def test_a_point_that_is_asked_for_again_is_one() -> None:
-    assert asked((0.1, 1.0, 0.1), (1e5, 1e5)) == asked((0.1, 1.0), (1e5,))
-    assert asked((0.1, 0.1), (1e5,), (20.0, 20.0)) == [(0.1, 1e5, 20.0)]
+    assert requested_points((0.1, 1.0, 0.1), (1e5, 1e5)) == requested_points((0.1, 1.0), (1e5,))
+    assert requested_points((0.1, 0.1), (1e5,), (20.0, 20.0)) == [(0.1, 1e5, 20.0)]
 
 
 # -- measures.csv: exact numbers, cut back without repeating or losing a row ------------------------------------------

@@ -161,8 +161,8 @@ def choose_points(
     wave: float, size: Vector, directions: Sequence[Vector], asked: Accuracy, guesses: Sequence[Guess]
 ) -> tuple[int, int]:
     """Return the least points along x and y for the errors `asked`, for a surface with this shortest wave [m] that
-    slides along `directions` (unit vectors), or does not slide. Of meshes with equal numbers of points the squarest is
-    taken."""
+    slides along `directions` (unit vectors), or does not slide. Among meshes with equal numbers of points the mesh with
+    the smallest larger side is returned."""
     along_x, along_y = (_fast_lengths(MOST_CELLS * length / wave) for length in size)
     meshes = sorted(product(along_x, along_y), key=lambda points: (math.prod(points), max(points)))
     x, y = (wave / length for length in size)

@@ -65,7 +65,7 @@ class Rule(NamedTuple):
 
 
 class Instead(NamedTuple):
-    """Advice for an unknown key, and the keys of which one is probably meant."""
+    """Advice for an unknown key, and the keys that are possibly meant."""
 
     advice: str
     keys: tuple[str, ...] = ()
