@@ -97,6 +97,7 @@ class InterfaceEffect(Effect[Memory]):
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("interface", "material"), _incompressible),
         Rule(("interface", "grid", "body", "initial", "steady"), _sticks),
+        Rule(("interface", "adhesion"), _no_adhesion),
         Rule(("interface", "output"), _has_tractions),
     )
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_traction,)

@@ -220,16 +220,17 @@ SEPARATOR = ":"  # separates the sections in the class name of an extended job, 
 
 @cache
 def extended_model(sections: tuple[str, ...]) -> type[Job]:
-    """Return the model of a job extended by sections of effects."""
+    """Return the model of a job extended by sections of effects; rules on the section of another effect apply if the
+    job has it."""
     effects = added_sections.effects_of(sections)
     fields: dict[str, Any] = {
         name: (effect.section | None, Field(default=None, description="a mapping of keys"))
         for name, effect in effects.items()
     }
     made = create_model(SEPARATOR.join(("Job", *sections)), __base__=Job, __module__=__name__, **fields)
-    own: Iterator[Any] = (
-        _named_rule(name, rule) for name, effect in effects.items() for rule in getattr(effect, "rules", ())
-    )
+    absent = set(Job.words()) - set(made.model_fields)
+    every = ((name, rule) for name, effect in effects.items() for rule in getattr(effect, "rules", ()))
+    own: Iterator[Any] = (_named_rule(name, rule) for name, rule in every if absent.isdisjoint(rule.needs))
     laws = (limits.refuse_steady(name) for name, effect in effects.items() if getattr(effect, "brings_law", False))
     lifted = [check for effect in effects.values() for check in getattr(effect, "lifts", ())]
     kept = (rule for rule in Job.rules if rule.check not in lifted)
