@@ -23,6 +23,7 @@ ENERGIES = {
     "stored": "stored",
     "surfaces": "surface_energy",
     "snaps": "snap_loss",
+    "slip": "slip_loss",
 }
 FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # columns of a run with leakage
 VISCOUS = "friction_viscous"  # friction of the body; in tables of runs with an interface
@@ -57,7 +58,21 @@ def chart_histories(run: PlottedRun, over: str = "") -> list[Chart]:
     log = along.axis.unit == "s" and _steps_grow(along.values)
     found = [replace(chart, stages=along.stages, log_x=log) for chart in _find_charts(run, along)]
     found[0] = replace(found[0], named=True)
-    return found if along.marked or along.loop else [_add_theory(chart, run) for chart in found]
+    if along.marked or along.loop:
+        return found
+    first, *others = (_add_theory(chart, run) for chart in found)
+    return [first, *_chart_cycles(run), *others]
+
+
+def _chart_cycles(run: PlottedRun) -> list[Chart]:
+    """Return the panel of friction over displacement of a surface that sticks and is moved to and fro along x."""
+    if not (run.backwards and "stick_area" in run.columns):
+        return []
+    ways = np.diff(run.columns["distance"], prepend=0.0)
+    for number, rows in run.rows_of_stages.items():
+        ways[rows] *= np.sign(run.job.history[number].velocity[0])
+    line = ChartLine("", np.cumsum(ways), run.columns["friction_x"], style.line(0))
+    return [Chart("friction", Axis("displacement along x", "m"), Axis("friction coefficient\nalong x"), [line])]
 
 
 def _steps_grow(times: Array) -> bool:

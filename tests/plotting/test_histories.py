@@ -136,6 +136,24 @@ def test_a_contact_that_sticks_is_drawn_with_its_tension(tmp_path: Path, drawn: 
     assert legend.get_window_extent().y0 >= found["energy"].get_window_extent().y1
 
 
+def test_a_cycle_of_stick_is_drawn_as_a_loop(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Friction over the displacement, which returns; and the energy lost in slip is named."""
+    stick = "interface: {coefficient: 0.5, stick: true}\noutput: {energy: true}\n"
+    way = "{force: 0.1, velocity: %s1.0e-6, duration: 1.0, time_step: 0.5}"
+    stages = f"history: [{{force: 0.1}}, {way % ''}, {way % '-'}]\n"
+    plots.plot([ran(tmp_path, SPHERE + ELASTIC + stick + stages)])
+    (loop,) = (axes for axes in drawn[0].axes if axes.get_xlabel() == "displacement along x [µm]")
+    (line,) = loop.get_lines()
+    assert np.array(line.get_xdata()) == pytest.approx([0.0, 5e-7, 1e-6, 5e-7, 0.0], abs=1e-18)
+    friction = np.array(line.get_ydata())
+    assert friction[0] == pytest.approx(0.0, abs=1e-5)
+    assert friction[1] > friction[3]  # there and back
+    (energy,) = (axes for axes in drawn[0].axes if axes.get_ylabel().startswith("energy"))
+    legend = energy.get_legend()
+    assert legend is not None
+    assert "slip" in [text.get_text() for text in legend.get_texts()]
+
+
 def test_a_load_is_not_drawn_over_itself(tmp_path: Path, drawn: list[Figure]) -> None:
     out = ran(tmp_path, SPHERE + ELASTIC + "history: [{force: {from: 0, to: 0.1}, duration: 1.0, time_step: 0.25}]\n")
     for over, there in (("time", 1), ("load", 0)):
