@@ -61,7 +61,7 @@ DONE, FAILED, REFUSED = 0, 1, 2  # exit codes
 LATER_SHARES = {"report": 0.05, "leak": 0.5, "plan": 0.08, "study": 0.5}  # shares of the finished jobs
 PLACE = re.compile(r"^(.+:\d+:\d+|--set .+|parcontact|.+job\.yaml: cannot be read): \S|^\.\.\. and \d+ more")
 PHYSICS = ("double precision reaches only", "the flash temperature", "an error with numerics.strict")  # of failures
-NOT_FINITE = re.compile(r"(?<![\w.-])-?(nan|inf)(?![\w])(?<!points are nan)", re.IGNORECASE)
+NOT_FINITE = re.compile(r"(?<![\w.-])-?(nan|inf)(?![\w])(?<!points must be nan)", re.IGNORECASE)
 EXTREME = (
     *(0, -0.0, 1, -1, 0.5, 5e-324, 1e-300, 1e-150, 1e-30, 1e30, 1e150, 1e300, 1.7e308, -1e300, 1e18, 2**31,
     2**63, 2**64), *(2**128, 10**40, -(10**40), math.inf, -math.inf, math.nan, True, False, None, "", "x",

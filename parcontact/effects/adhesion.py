@@ -78,7 +78,7 @@ def _bodies(adhesion: Adhesion | None, material: Any) -> Iterator[Fault]:
     if adhesion is None:
         return
     if material.hardness is not None:
-        yield Fault("does not go with adhesion: leave one of them out", ("material", "hardness"))
+        yield Fault("cannot be used with adhesion: leave one of them out", ("material", "hardness"))
     if adhesion.range == AUTO and material.fitted.long_modulus == 0.0:
         yield Fault("must be a length [m] for a body without long-term modulus, got auto", ("adhesion", "range"))
 
@@ -151,7 +151,7 @@ def _no_strip(adhesion: Any, grid: Any) -> Iterator[Fault]:
 
 def _no_bands(adhesion: Any, bands: Any) -> Iterator[Fault]:
     if adhesion is not None and bands is not None:
-        yield Fault("does not go with bands: they are coupled by pressures alone", ("adhesion",))
+        yield Fault("cannot be used with bands: they are coupled by pressures alone", ("adhesion",))
 
 
 class AdhesionColumns(Effect[AdhesionMemory]):

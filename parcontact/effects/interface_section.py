@@ -28,7 +28,7 @@ def _coefficient(coefficient: float | None, velocity: float | None, stick: bool)
     if coefficient is not None and not stick:
         yield Fault("needs stick: true", ("coefficient",))
     if stick and velocity is not None:
-        sentence = "does not go with stick: a strength that falls with velocity has more than one solution of a step"
+        sentence = "cannot be used with stick: a strength that falls with velocity has more than one solution of a step"
         yield Fault(sentence, ("velocity",))
 
 
@@ -60,12 +60,12 @@ def _sticks(interface: Any, grid: Any, body: Any, initial: Any, steady: Any) -> 
         yield Fault("needs grid.boundary: periodic or free, got [periodic, free]", place)
     for key, asked in (("initial", initial.state == "steady"), ("steady", steady is not None)):
         if asked:
-            yield Fault("does not go with interface.stick: slide into the steady state with a stage", (key,))
+            yield Fault("cannot be used with interface.stick: slide into the steady state with a stage", (key,))
 
 
 def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
     if interface is not None and interface.stick and adhesion is not None:
-        yield Fault("does not go with adhesion: leave one of them out", ("interface", "stick"))
+        yield Fault("cannot be used with adhesion: leave one of them out", ("interface", "stick"))
 
 
 def _has_tractions(interface: Any, output: Any) -> Iterator[Fault]:

@@ -47,14 +47,14 @@ def _shifts(thermal: Thermal | None, material: Any) -> Iterator[Fault]:
 
 def _no_warm_start(thermal: Thermal | None, initial: Any) -> Iterator[Fault]:
     if thermal is not None and thermal.feedback != "none" and initial.state == "steady":
-        yield Fault("does not go with thermal.feedback: slide into the steady state with a stage", ("initial",))
+        yield Fault("cannot be used with thermal.feedback: slide into the steady state with a stage", ("initial",))
 
 
 def _in_curves(thermal: Thermal | None, history: Any, grid: Grid, bands: Any) -> Iterator[Fault]:
     if thermal is None or thermal.counterbody is None:
         return
     if bands is not None:
-        yield Fault("does not go with bands: all heat goes into the rubber", ("thermal", "counterbody"))
+        yield Fault("cannot be used with bands: all heat goes into the rubber", ("thermal", "counterbody"))
     if history:
         yield Fault(
             "is for friction curves: leave out the history, or the counterbody, and all heat goes into the rubber",

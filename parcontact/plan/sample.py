@@ -4,6 +4,7 @@ Each stage has an equal share of the time. When it is used up, one long step lea
 steps of a stage, where the load may jump, are not used for the others.
 """
 
+import re
 import resource
 import time
 from collections.abc import Callable, Iterator
@@ -11,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
+from pathlib import Path
 from typing import TypeVar
 
 from .. import scene
@@ -110,7 +112,7 @@ def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sampl
     took = time.perf_counter() - began
     idle = slab.reduce((), [1.0 - (time.process_time() - worked) / took])[0]
     held = slab.tally["map bytes at most"]
-    resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * KILO - held
+    resident = peak_memory() - held
     return Sample(
         job, slab.comm.size, starting, building, took, slab.agree(resident), tuple(stages), slab.agree(held), 1.0 - idle
     )
@@ -122,7 +124,20 @@ def measure_program(job: Job, slab: Slab) -> int:
     Collective.
     """
     _warm_up(job, slab)
-    return int(slab.reduce((), [float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * KILO)])[0])
+    return int(slab.reduce((), [float(peak_memory())])[0])
+
+
+def peak_memory() -> int:
+    """Return the largest resident memory of this process so far [bytes].
+
+    The kernel's `VmHWM` begins with the program; `ru_maxrss`, for systems without it, also counts the process that
+    started the program.
+    """
+    with suppress(OSError):
+        found = re.search(r"VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text())
+        if found:
+            return int(found[1]) * KILO
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * KILO
 
 
 def _warm_up(job: Job, slab: Slab) -> None:

@@ -166,7 +166,7 @@ def test_a_cut_off_leaves_steep_waves_out() -> None:
     [
         ({"history": [{"pressure": 1e5}]}, "history cannot be used with bands"),
         ({"grid": {"points": 64, "size": 1e-2}}, "takes at most one of grid | bands, got grid and bands"),
-        ({"adhesion": {"work": 0.05, "range": 1e-7}}, "adhesion does not go with bands"),
+        ({"adhesion": {"work": 0.05, "range": 1e-7}}, "adhesion cannot be used with bands"),
         ({"surface": {"shape": "sphere", "radius": 1e-2}}, "must be rough in a job with bands"),
         ({"output": {"fields": ["pressure"]}}, "no grid has all waves"),
         ({"bands": "all"}, "bands must be auto, or a mapping with count, points and waves, got 'all'"),

@@ -39,7 +39,7 @@ def job(**changes: Any) -> Job:
         ({"adhesion": {"work": 0.05, "range": "short"}}, "adhesion.range must be a positive range"),
         ({"adhesion": {"work": 0.05, "range": 1e-7}, "material": RUBBER}, "adhesion.range must be at least 1.98e-07 m"),
         ({"adhesion": {"work": 0.05}, "material": {**RUBBER, "modulus_inf": 0.0}}, "without long-term modulus"),
-        ({"material": {"model": "elastic", "shear_modulus": 1e6, "hardness": 1e9}}, "does not go with adhesion"),
+        ({"material": {"model": "elastic", "shear_modulus": 1e6, "hardness": 1e9}}, "cannot be used with adhesion"),
         ({"steady": {"velocities": [1.0], "pressures": [1e3]}}, "steady cannot be used with adhesion"),
         ({"adhesion": None, "history": [{"pressure": -1e3}]}, "must be a pressure [Pa] of zero or more"),
     ],

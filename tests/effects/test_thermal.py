@@ -281,7 +281,7 @@ KEYS = "thermal: {conductivity: 0.2, diffusivity: 1.0e-7"
         ("thermal: {conductivity: 1, diffusivity: 1.0e-7, feedback: mean}", "5:59: thermal.feedback needs a material"),
         (
             f"{KEYS}, feedback: mean}}\ninitial: {{state: steady, velocity: 1, pressure: 1.0e5}}",
-            "initial does not go with",
+            "initial cannot be used with",
         ),
         (f"{KEYS}, counterbody: {{conductivity: 2}}}}", "thermal.counterbody.diffusivity is missing"),
         (

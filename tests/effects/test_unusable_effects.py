@@ -26,7 +26,7 @@ CHANGES = {
     "a value too many": ("return memory[1:]", "return 1.0, 2.0", r"number for each of its columns \(wear_depth\)"),
     "no value": ("return memory[1:]", "return None", r"number for each of its columns \(wear_depth\), got None"),
     "words": ("return memory[1:]", "return ['deep']", "number for each of its columns"),
-    "a column of ours": (MEMBER, MEMBER.replace("wear_depth", "friction"), "has a column friction: an effect must"),
+    "a column of ours": (MEMBER, MEMBER.replace("wear_depth", "friction"), "has a column friction: its effect must"),
     "a comma": (MEMBER, MEMBER.replace("wear_depth", "a,b"), "its columns must be a tuple of different names"),
     "no columns": (MEMBER, "section = WearSection", "has no attribute 'columns'"),
     "no section": (MEMBER, "columns = ()", "has no attribute 'section'"),

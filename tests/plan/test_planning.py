@@ -168,8 +168,8 @@ def test_a_large_job_is_tried_on_a_coarser_grid() -> None:
     assert choose_grid(job(), 1, 10.0) == job()
 
 
-PEAK = "import resource, sys; from parcontact.__main__ import main; code = main(sys.argv[1:]); "
-PEAK += "print('peak', resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024); sys.exit(code)"
+PEAK = "import sys; from parcontact.__main__ import main; from parcontact.plan.sample import peak_memory; "
+PEAK += "code = main(sys.argv[1:]); print('peak', peak_memory()); sys.exit(code)"
 
 
 def test_memory_to_ask_a_batch_system_for(tmp_path: Path, outside_mpi: dict[str, str]) -> None:
