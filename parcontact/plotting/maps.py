@@ -39,7 +39,7 @@ LOOKS = {
     "height": Look("m", "cividis", note=" (up is into the body)"),
     "temperature": Look("K", "hot", note=" rise"),
     "traction": Look("Pa", "inferno"),
-    "slip": Look("", "viridis", note=" (1) and stick: traction over its bound"),
+    "slip": Look("", "viridis", note=": traction over its bound"),
 }
 TRACTIONS = ("traction_x", "traction_y")
 TENSION = "RdBu_r"  # colours of pressures of both signs
