@@ -35,9 +35,9 @@ COMPOUNDS: dict[str, dict[str, Any]] = {
     },
 }
 LONG = 4e-3  # m
-POINTS = (320, 512, 512, 1024)  # of the one grid, four boxes of whose longest waves have 16 cells times the decades
+POINTS = (320, 512, 512, 1024)  # points along a side of the one grid
 LINE = 65536
-KNOWN = (  # velocities [m/s] and pressures [Pa] of synthetic_tyre on surfaces of 1.5 decades, and on profiles of three
+KNOWN = (  # velocities [m/s] and pressures [Pa] of synthetic_tyre on surfaces of 1.5 and on profiles of 3 decades
     ((0.1, 1e6), (0.1, 2e5), (10.0, 2e6), (1e-3, 3e5)),
     ((0.1, 1e6), (1e-3, 1e6), (10.0, 1e6), (0.1, 2e5), (10.0, 1e7)),
 )
@@ -59,7 +59,7 @@ def case_of(number: int, seed: int, line: bool) -> tuple[dict[str, Any], int, fl
         },
         **{"rms_slope": round(slope, 3), "seed": int(chance.integers(1000)), "amplitudes": "fixed"},
     }
-    load = float(10 ** chance.uniform(-2.0, 0.5))  # over the rms pressure of full contact
+    load = float(10 ** chance.uniform(-2.0, 0.5))  # pressure over the rms pressure of full contact
     job = {
         **{"surface": surface, "material": COMPOUNDS[name], "numerics": {"tolerance": 2e-3}},
         **{"steady": {"velocities": [speed], "pressures": [1e5]}},
@@ -88,7 +88,7 @@ def known_case(number: int, line: bool) -> tuple[dict[str, Any], int, float, flo
 
 
 def solve(job: dict[str, Any], count: int, points: int, samples: int, line: bool, speed: float, load: float) -> Point:
-    waves = 64 if line else 16  # times the cells of a wave
+    waves = 64 if line else 16  # points of a band over the cells per shortest wave, for one band
     along = points if count == 1 else 2 * round(waves / 2 * (points / waves) ** (1 / count))
     shape = [along, 1] if line else along
     bands = {"count": count, "points": shape, "samples": samples}
@@ -128,7 +128,7 @@ def main() -> int:
         bands=("2,3", "numbers of bands"),
         samples=(2, "surfaces"),
         line=(False, "profiles of three decades along the sliding"),
-        known=(False, "the cases of the manual for one road, each with other seeds, in place of random ones"),
+        known=(False, "the cases of the manual for one road, with other seeds, instead of random cases"),
     ).parse_args()
     counts, began = [int(count) for count in asked.bands.split(",")], time.monotonic()
     rows: dict[int, list[list[float]]] = {count: [] for count in counts}

@@ -80,8 +80,10 @@ def as_json(lines: list[tuple[str, Line]]) -> str:
 def arguments() -> argparse.Namespace:
     names = [*PARTS, *ON_TWO_RANKS]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(names)}; all of them by default")
-    parser.add_argument("--points", type=int, default=512, help="along x and y")
+    parser.add_argument(
+        "parts", nargs="*", metavar="PART", help=f"parts to measure, of {', '.join(names)} (default: all)"
+    )
+    parser.add_argument("--points", type=int, default=512, help="points along x and y")
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("--json", type=Path, help="write the lines into this file, too")
     parser.add_argument("--peers", type=Path, help="compare with other programs, installed into this directory")

@@ -1,7 +1,7 @@
 """Plans of jobs: effects, memory per rank, and the costs by a trial.
 
-Of a sweep the first case is planned in full; the last one and one between are tried, and the times of the others are
-proportional to their work, steps (or steady states) times N log N, from the nearest tried case.
+The first case of a sweep is planned in full. The last case and some between are tried. The times of the others follow
+from the nearest tried case in proportion to their work, which is steps (or steady states) times N log N.
 """
 
 import math

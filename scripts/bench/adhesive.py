@@ -19,8 +19,8 @@ from .peers import ADHESION_COLD, TAMAAS_ADHESIVE, Task, compare_peers
 from .table import Line
 from .work import MODULUS, Cold, distance
 
-ERROR = 1e-5  # of pressures
-STRENGTH = 0.012  # work of adhesion over E*, slope^2 and the shortest wave: with more of it there are several branches
+ERROR = 1e-5  # allowed error of pressures
+STRENGTH = 0.012  # work of adhesion over E*, slope^2 and the shortest wave: larger values have several branches
 EXACT = 1e-8  # tolerance of the reference
 TOLERANCES = [10.0**-exponent for exponent in np.arange(1.5, 9.0, 0.25)]
 PEERS = (Task("tamaas", TAMAAS_ADHESIVE, -4.0), Task("Adhesion", ADHESION_COLD, -4.0))
@@ -59,7 +59,7 @@ def adhesion(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Li
         found = surface.solve(tolerance)
         seconds.append(time.process_time() - began)
     yield Line("contact area", float(touching.mean()))
-    yield Line("mean pressure over the largest", float(exact.mean() / exact.max()))
+    yield Line("mean pressure over largest pressure", float(exact.mean() / exact.max()))
     yield Line("operator calls", (surface.slab.tally["operator"] - before) / rounds)
     yield Line("pressure error", distance(found.p, exact))
     yield Line("points on another branch", int(np.count_nonzero((found.gap == 0.0) != touching)))

@@ -23,9 +23,9 @@ from .peers import ASPHER_DILUTE, Task, compare_peers
 from .table import Line, Map, interleave
 from .work import EXACT, MODULUS, Cold, Solver
 
-ERROR = 5e-5  # of pressures
-CASES = ((2, 0.00105), (2, 0.0094), (4, 0.00038), (4, 0.003))  # times `--points`; mean pressure over E*
-SMALLEST, LOADS = 512, (0.001, 0.01, 0.05, 0.2)  # of `free`: points along a side, mean pressures over E*
+ERROR = 5e-5  # allowed error of pressures
+CASES = ((2, 0.00105), (2, 0.0094), (4, 0.00038), (4, 0.003))  # points over `--points`, mean pressure over E*
+SMALLEST, LOADS = 512, (0.001, 0.01, 0.05, 0.2)  # for `free`: points of the first grid, mean pressures over E*
 FREE_ERROR, TIGHT = 1e-5, 1e-8  # errors of its pressures, and tolerance of the reference
 PEERS = (Task("aspher", ASPHER_DILUTE, -4.0),)
 

@@ -12,7 +12,7 @@ from .table import Line
 from .work import Cold
 
 LOAD = 0.15  # mean pressure over E*, for 30 % of contact at a slope of 1
-TOLERANCE = 1e-5  # of the contact
+TOLERANCE = 1e-5  # tolerance of the contact solve
 WARM = 32  # points of a small map, for which loops are compiled
 
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from .table import Line
 
-LIMIT = 420  # CPU seconds of one program, all tolerances together
-HEADERS = "cmeel-eigen"  # has the headers that aspher is compiled with
+LIMIT = 420  # CPU time of one program for all tolerances [s]
+HEADERS = "cmeel-eigen"  # package with the headers for aspher
 SEARCH = """\
 import json, resource, sys, time
 import numpy as np

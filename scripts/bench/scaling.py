@@ -16,10 +16,10 @@ from parcontact.parallel.slab import Slab
 from .table import Line, quartiles
 from .work import Cold, Slide, pair
 
-TOLERANCE = 1e-6  # of cold solves
-JOB = ROOT / "jobs" / "paper" / "fig08_velocity_step.yaml"  # of `march`
+TOLERANCE = 1e-6  # tolerance of cold solves
+JOB = ROOT / "jobs" / "paper" / "fig08_velocity_step.yaml"  # job of `march`
 CELLS = 16  # cells per shortest wave
-LONGEST = 1.25e-4  # [m], half of its longest wave: for small grids
+LONGEST = 1.25e-4  # limit on the shortest wave on small grids, half of the longest wave [m]
 WORLD = MPI.COMM_WORLD
 Work = Callable[[], object]
 

@@ -29,7 +29,7 @@ from .work import pair, sliding_job
 
 DEFAULT, EXACT = 5e-3, 5e-5  # default tolerance of jobs, and tolerance of the reference
 LARGER = (0.1, 0.05, 0.02, 0.01)
-ERROR = 1e-3  # of friction
+ERROR = 1e-3  # allowed error of friction
 FEWEST = 8  # steps: the first ones differ from the others
 FIRST, LATER = 12, 48  # steps compared with other programs
 PRESSURE = 0.165  # compared with other programs, for 7 to 9 % of contact

@@ -16,14 +16,14 @@ from .peers import ASPHER_COLD, TAMAAS_COLD, Task, compare_peers
 from .table import Line, compare, interleave
 from .work import LOAD, MODULUS, Cold, Slide, distance
 
-ERROR = 1e-7  # of pressures
+ERROR = 1e-7  # allowed error of pressures
 PEERS = (Task("tamaas", TAMAAS_COLD, -6.5), Task("aspher", ASPHER_COLD, -6.5))
 SMALLEST = 256  # points along a side of the first grid of `sizes`
-TOLERANCE = 1e-6  # of its cold solves
+TOLERANCE = 1e-6  # tolerance of its cold solves
 LIGHT = 0.036  # mean pressure over E* of `large`, for 8 % of contact at a slope of 1
-LARGE_ERROR = 1e-5  # of its pressures
-COARSER = 4  # ratio to the grid on which the tolerance is found
-FURTHER = 1e3  # ratio of the tolerance to that of the reference
+LARGE_ERROR = 1e-5  # allowed error of its pressures
+COARSER = 4  # points over the points of the grid on which the tolerance is found
+FURTHER = 1e3  # tolerance over the tolerance of the reference
 
 
 def solve(points: int, rounds: int, asked: argparse.Namespace) -> Iterator[Line]:
