@@ -68,7 +68,7 @@ def _compiled(compiler: Callable[[bool], Any]) -> Any:
     if place is None:
         return compiler(False)
     config: Any = numba.config
-    others, config.CACHE_DIR = config.CACHE_DIR, str(place)  # numba reads it while it decorates
+    others, config.CACHE_DIR = config.CACHE_DIR, str(place)  # numba reads it in `compiler`
     try:
         compiled = compiler(True)
     except RuntimeError:

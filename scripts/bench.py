@@ -63,8 +63,8 @@ def measure(parts: list[str], asked: argparse.Namespace) -> Iterator[tuple[str, 
 
 
 def on_two_ranks(parts: list[str], asked: argparse.Namespace) -> Iterator[tuple[str, Line]]:
-    """Yield the lines of the parts that this script measures in a process of two ranks. Raises RuntimeError if it
-    cannot."""
+    """Yield the lines of the parts that this script measures in a process of two ranks. Raises RuntimeError if that
+    process fails."""
     words = [Path(sys.executable).with_name("mpirun"), "-n", 2, sys.executable, __file__, *parts, "--inside"]
     words += ["--points", asked.points, "--rounds", asked.rounds]
     done = subprocess.run(list(map(str, words)), capture_output=True, text=True, env=runs.environment())

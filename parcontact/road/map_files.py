@@ -177,7 +177,7 @@ def _instrument(part: Topography) -> MapContents:
     if reader.format() in OF_NUMPY:
         raise InputError(f"{path} may have x or y first; save its array by numpy.save as .npy, whose rows are along x")
     names = [found.name for found in reader.channels]
-    if not names or (reader.format() == "hgt" and path.suffix.lower() != ".hgt"):  # which reads any file as heights
+    if not names or (reader.format() == "hgt" and path.suffix.lower() != ".hgt"):  # this reader accepts any file
         raise InputError(f"{path} has no channel of heights")
     if part.channel is not None and part.channel not in names:
         raise InputError(f"{path} has no channel {part.channel!r}; it has {', '.join(map(str, names))}")
