@@ -73,6 +73,7 @@ def test_cattaneo_and_mindlin() -> None:
 def test_ranks_agree(comm: MPI.Intracomm) -> None:
     """Forces, sticking areas and energies are those of one rank, to the digits that sums in other orders leave."""
     job = rough({"shear_stress": 2e5, "stick": True}, output={"energy": True})
+    job["history"][1]["duration"] = 3e-5  # most slips, some sticks
     alone, together = (marched(job, comm=each)[1][-1] for each in (MPI.COMM_SELF, comm))
     assert together.added == pytest.approx(alone.added, rel=1e-6)
     assert together.measures.force_x == pytest.approx(alone.measures.force_x, rel=1e-6)
