@@ -13,7 +13,7 @@ from sliding import rough, slide
 
 import parcontact as pc
 from parcontact.accuracy.budget import ErrorBudget, ErrorParts
-from parcontact.accuracy.controller import CLOSE, FIRST, StepTolerance, tolerance_before
+from parcontact.accuracy.controller import CLOSE, FIRST, MOST, StepTolerance, tolerance_before
 from parcontact.accuracy.shares import AREA, FRICTION, SOLVER_MEDIAN
 from parcontact.history.timeline import Step
 from parcontact.march.loop import March
@@ -59,6 +59,18 @@ def test_what_friction_allows(rest: float, allowed: float) -> None:
         found = tolerance(march, after(march, ErrorParts(error, rest, 0.0, 0.0), ErrorParts(0.0, 0.0, 0.0, 0.0)))
         assert found is not None
         assert abs(np.log2(found / (CERTIFICATE * allowed / error))) <= 0.2501  # the nearest power of the root of two
+
+
+def test_bounds() -> None:
+    """The tolerance is between that of the job, 0.5 of the accuracy, and 8 times this; above it is at most 0.05."""
+    nothing, much = ErrorParts(0.0, 0.0, 0.0, 0.0), ErrorParts(1.0, 0.0, 0.0, 0.0)
+    for accuracy, highest in ((1e-3, MOST * 5e-4), (1e-2, MOST * 5e-3), (2e-2, 0.05), (0.5, 0.25)):
+        march = begun(job(accuracy=accuracy))
+        assert tolerance(march, after(march, nothing, nothing)) == pytest.approx(highest)
+        assert tolerance(march, after(march, much, nothing)) == pytest.approx(0.5 * accuracy)
+        area = ErrorParts(AREA.solver * SOLVER_MEDIAN * accuracy, 0.0, 0.0, 0.0)  # as much as allowed
+        found = tolerance(march, after(march, nothing, area))
+        assert found == pytest.approx(max(0.5 * accuracy, CERTIFICATE))
 
 
 def test_what_it_saves() -> None:

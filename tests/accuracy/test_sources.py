@@ -46,6 +46,18 @@ def test_spots_are_counted() -> None:
     assert count_spots(bare, full) == count_spots(replace(bare, identical_contacts=True), four) == 1.0
 
 
+def test_radius_of_a_spot() -> None:
+    """A circle of ten cells has pi r^2 cells and 8 r sides. A hole in full contact has as many."""
+    points, cells, sides = 10_000, 100 * math.pi, 80
+    spot = replace(SEEN, area=cells / points, corrected=(cells - SIDE * sides) / points)
+    hole = replace(SEEN, area=1 - cells / points, corrected=1 - (cells + SIDE * sides) / points)
+    assert radius_of(RUN, spot) == pytest.approx(10.0)
+    assert radius_of(RUN, hole) == pytest.approx(10.0)
+    assert radius_of(RUN, replace(SEEN, area=1.0, corrected=1.0)) == math.inf
+    yielded = replace(spot, corrected=spot.area, spared=spot.area - spot.corrected)  # its edge is as long
+    assert radius_of(RUN, yielded) == pytest.approx(10.0)
+
+
 def test_spots_of_long_cells() -> None:
     """A circle of 10 units on cells of 1 x 4: its radius is 4 mean sides of 2.5."""
     run, cells = replace(RUN, cell=(1.0, 4.0), cells_per_wave=None), 100 * math.pi / 4.0
@@ -151,6 +163,22 @@ def test_far_above_the_frequencies_of_the_body() -> None:
     """The loss angle falls with the frequency: s^3 in all."""
     share, slow = lost_in_short_waves(ONE, 5.0, FAST, False)
     assert slow == pytest.approx(share**2, rel=1e-4)
+
+
+def test_between_both() -> None:
+    """m of the module by adaptive quadrature, to 2 %: the error of its nodes for one branch."""
+
+    def mean(frequency: float) -> float:
+        def loss(t: float) -> float:
+            turn = 1j * frequency / t * 1e-3
+            modulus = 1.0 + turn / (1.0 + turn)
+            return 2.0 * t * modulus.imag / abs(modulus)
+
+        return float(quad(loss, 0.0, 1.0)[0])
+
+    for speed in (1e2, 1e3):
+        share, slow = lost_in_short_waves(ONE, 5.0, speed, False)
+        assert slow == pytest.approx(share * mean(math.pi * speed) / mean(share * math.pi * speed), rel=0.02)
 
 
 def test_without_edges_or_losses() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from parcontact.accuracy.budget import estimate
-from parcontact.accuracy.observation import RunProperties, StepObservation
+from parcontact.accuracy.observation import RunProperties, StepObservation, radius_of
 from parcontact.accuracy.time_error import error_of_rise, time_error
 from parcontact.physics.prony import Prony
 
@@ -92,6 +92,30 @@ def test_friction_that_rises_within_a_step_is_late() -> None:
     """By L of the step: friction of which nine tenths came in it is wrong by 0.9 L, and as much where it falls."""
     for change in (0.09, -0.09):
         assert error_of_rise(RISING, replace(RISEN, change=change)) == pytest.approx(0.9 * LATE, rel=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1.0])
+def test_after_a_jump_friction_may_rise_by_what_the_body_loses(angle: float) -> None:
+    """The change is slope times sine of the loss angle, of one branch with r = G/G_inf: r z/sqrt((1 + z^2) (1 + (1 +
+    r)^2 z^2)), at the frequency z/tau with which spots pass by their radius, or waves by an angle."""
+    z = max(1.0 / radius_of(RISING, RISEN), angle) / STEPS
+    loss = 10.0 * z / math.sqrt((1.0 + z**2) * (1.0 + (11.0 * z) ** 2))
+    found = error_of_rise(RISING, replace(RISEN, angle=angle, change=math.inf, uneven=0.2))
+    assert found == pytest.approx(LATE * 0.2 * 0.3 * loss / 0.1, rel=1e-9)
+
+
+@pytest.mark.parametrize("change", [0.09, math.inf])
+@pytest.mark.parametrize(
+    ("known", "seen"),
+    [
+        (RISING, replace(RISEN, slid=0.0)),  # at rest
+        (RISING, replace(RISEN, friction=0.0)),
+        (replace(RISING, prony=None), RISEN),  # elastic
+        (replace(RISING, exponential=False), RISEN),
+    ],
+)
+def test_where_no_friction_rises(known: RunProperties, seen: StepObservation, change: float) -> None:
+    assert error_of_rise(known, replace(seen, change=change)) == 0.0
 
 
 def test_the_error_of_a_rise_can_be_taken_from_a_budget() -> None:

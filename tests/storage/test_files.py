@@ -16,7 +16,7 @@ from parcontact.physics.measures import Measures
 from parcontact.scene import choices
 from parcontact.storage import directory, files, marker, tables, wisdom
 from parcontact.storage.checkpoint import TableMark
-from parcontact.storage.curve_points import requested_points
+from parcontact.storage.curve_points import lacking, of_table, requested_points
 from parcontact.storage.directory import Directory
 from parcontact.storage.marker import Claim
 from parcontact.storage.step_row import MeasuresFile, StepRow, cut_back_table
@@ -224,6 +224,15 @@ def test_wisdom_of_a_checkpoint(cache: Path) -> None:
 def test_a_point_that_is_asked_for_again_is_one() -> None:
     assert requested_points((0.1, 1.0, 0.1), (1e5, 1e5)) == requested_points((0.1, 1.0), (1e5,))
     assert requested_points((0.1, 0.1), (1e5,), (20.0, 20.0)) == [(0.1, 1e5, 20.0)]
+
+
+def test_what_a_table_lacks() -> None:
+    """Speeds and pressures to 1e-6; a temperature that was not asked for is no other one. Speeds are solved first."""
+    none, there = math.nan, of_table({"velocity": [0.1, 1.0], "pressure": [1e5, 1e5]})
+    assert lacking(requested_points((1.0, 0.5, 0.1), (1e5,)), there) == [1]
+    assert lacking([(0.1 * (1 + 5e-7), 1e5, none), (0.1 * (1 + 2e-6), 1e5, none), (0.1, 1.1e5, none)], there) == [1, 2]
+    heated = of_table({"velocity": [0.1, 1.0], "pressure": [1e5, 1e5], "temperature": [20.0, -5.0]})
+    assert lacking(requested_points((0.1, 1.0), (1e5,), (20.0, -5.0)), heated) == [1, 2]
 
 
 # -- measures.csv: exact numbers, cut back without repeating or losing a row ------------------------------------------
