@@ -58,3 +58,18 @@ def test_a_rest_does_not_dilute_what_a_slide_says() -> None:
     assert summary.friction == pytest.approx(slide.friction, rel=1e-12)
     assert summary.area == pytest.approx(slide.area, rel=1e-12)
     assert all(", mean over the distance slid" in line for line in summary.lines((0.012, 0.010)))
+
+
+def test_steps_that_last_no_time_count_where_none_does() -> None:
+    """Three loads without duration: their mean; next to a step that lasts they do not count."""
+    stills = [StepObservation(error, 0.0, 0.1, 0.1) for error in (1e-3, 2e-3, 6e-3, 8e-3)]
+    *loads, lasting = (estimate(KNOWN, still) for still in stills)
+    summary = ErrorSums()
+    for budget in loads:
+        summary = summary.plus(budget, 0.0, 0.0)
+    assert summary.friction is None
+    assert summary.area is not None
+    assert summary.area.solver == pytest.approx(sum(budget.area.solver for budget in loads) / 3.0)
+    area = summary.plus(lasting, 0.0, 1e-9).area
+    assert area is not None
+    assert area.solver == pytest.approx(lasting.area.solver)

@@ -6,7 +6,7 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 from stepping_body import HeldBody
 
-from parcontact.accuracy.embedded import EmbeddedPair
+from parcontact.accuracy.embedded import SAMPLED_ROWS, EmbeddedPair
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import MovedHeights, ZenerBody
 from parcontact.physics.prony import Prony
@@ -164,3 +164,18 @@ def test_order_in_the_length_of_a_step(times: list[float], dt: float, order: flo
     body.commit(trial, np.ones((1, 4)))
     look = EmbeddedPair(slab, body.body, DX).compare(dt, trial, body.memory, np.ones((1, 4)), np.ones((1, 4)), 4.0, 1.0)
     assert look.order == pytest.approx(order, rel=1e-5)
+
+
+@pytest.mark.mpi
+def test_a_sample_of_the_rows(communicators: list[MPI.Intracomm]) -> None:
+    """Rows at equal distances in the whole map, the same on any number of ranks: between 8 and 16 of them in full
+    contact, ten times as many where 1 % of the points is pressed."""
+    whole = march(MPI.COMM_SELF, "exponential", 8, 200, 1e-2)[1][4]
+    assert whole[0] > 0.0
+    for comm in communicators:
+        assert_allclose(march(comm, "exponential", 8, 200, 1e-2)[1][4], whole, rtol=1e-12)
+    for ny in (1, 31, 64, 200, 1024, 4096):
+        pair = EmbeddedPair(Slab.alone(4, ny), ZenerBody(Slab.alone(1, 1), PRONY, "exponential"), DX)
+        assert len(range(0, ny, pair.stride(1.0))) <= 2 * SAMPLED_ROWS
+        assert len(range(0, ny, pair.stride(1.0))) >= min(ny, SAMPLED_ROWS)
+        assert len(range(0, ny, pair.stride(0.01))) >= min(ny, 10 * SAMPLED_ROWS)

@@ -94,6 +94,31 @@ def test_a_step_after_one_that_was_made_anew_does_not_grow() -> None:
     assert third.dt == pytest.approx(2.0 * second.dt, rel=1e-12)
 
 
+def test_growth_is_from_the_step_before() -> None:
+    """In the same stage; in the first one there is none."""
+    steps = made(march_of(PRESS, SLIDE), lambda number, step: ALLOWED * (0.1, 2.0, 0.4)[number % 3] * step.dt / 1e-4)
+    assert len({step.dt for step in steps}) > 5
+    before: Step | None = None
+    for step in steps:
+        expected = step.dt / before.dt if before is not None and before.stage == step.stage else 0.0
+        assert step.growth == pytest.approx(expected, rel=1e-9)
+        before = step
+
+
+@pytest.mark.parametrize(
+    ("changes", "goes_on"),
+    [({}, True), ({"velocity": 0.2}, False), ({"velocity": -0.1}, False), ({"pressure": 2e4}, False)],
+)
+def test_a_stage_goes_on_with_the_steps_before_it_if_nothing_has_changed(changes: Json, goes_on: bool) -> None:
+    """With small parts of a cell; else a whole one is tried first."""
+    march = march_of({**SLIDE, "distance": 6 * CELL}, {**SLIDE, **changes})
+    tries = attempts(march, lambda number, step: ALLOWED * (2.0 if step.dt > 0.13 * CELL / 0.1 else 1.0))
+    last = [steps[-1] for steps in tries if steps[-1].stage == 0][-1]
+    first = next(step for steps in tries for step in steps if step.stage == 1)
+    assert last.dt < 0.13 * CELL / 0.1
+    assert first.dt == pytest.approx(last.dt if goes_on else CELL / abs(first.velocity[0]), rel=1e-9)
+
+
 @pytest.mark.parametrize(("velocity", "cells"), [(0.2, [7, 8, 9, 10, 11, 12, 12.6]), (-0.1, [5, 4, 3, 2, 1, 0])])
 def test_whole_cells_are_those_of_where_the_surface_was_at_first(velocity: float, cells: list[float]) -> None:
     """In either direction, from a part of a cell: to the next one that is LEAST_WAY of a cell away, or more. The error
