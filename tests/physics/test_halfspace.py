@@ -14,7 +14,7 @@ from numpy.typing import DTypeLike
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.convolution import Convolution, MirroredConvolution
-from parcontact.physics.halfspace import HalfSpace
+from parcontact.physics.halfspace import UNIFORM, HalfSpace
 from parcontact.physics.love import love
 
 from .maps import coordinates, gathered, product, random_map
@@ -99,6 +99,17 @@ def test_inverse(communicators: list[MPI.Intracomm]) -> None:
 
 
 # -- free -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("wx", "wy"), [(0, 0), (1, 0), (0, 5), (3, 2), (17, 13)])
+def test_inverse_of_half_waves(communicators: list[MPI.Intracomm], wx: int, wy: int) -> None:
+    """The preconditioner continues displacements mirrored at the edges."""
+    size, poisson = (2.0, 1.0), 0.3
+    wave = np.cos(np.pi * wy * (np.arange(14) + 0.5) / 14)[:, None] * np.cos(np.pi * wx * (np.arange(18) + 0.5) / 18)
+    q = np.pi * np.hypot(wx / size[0], wy / size[1]) + UNIFORM / 2.0
+    for comm in communicators:
+        inverse = HalfSpace(size, poisson, "love", free=True).inverse(FFT(Slab(comm, 18, 14)))
+        assert_allclose(applied(inverse, wave), q / (1.0 - poisson) * wave, rtol=0, atol=1e-12 * q)
 
 
 @pytest.mark.parametrize("poisson", [0.5, 0.3])

@@ -237,6 +237,21 @@ def test_the_preconditioner_is_the_inverse_of_short_waves(base: Base, poisson: f
     assert product[q > 0.0].max() < 1.0 + 1e-5  # the softest wave is looked for among 2000
 
 
+@pytest.mark.parametrize("poisson", [0.4, 0.49, 0.5])
+def test_long_waves_are_stiffer_than_the_softest_one(poisson: float) -> None:
+    """`softest + 1/(c0 + c2 q^2)` is the stiffness of waves longer than the thickness; of an incompressible layer c2 is
+    d^3/3. What is left is (q d)^4 of the compliance."""
+    layer = Layer(2.0, "bonded", poisson)
+    waves, (_, softest) = layer.long_waves((100.0, 50.0)), layer.softest_wave
+    assert waves is not None
+    q = np.array([0.01, 0.02]) / layer.thickness
+    compliance = (1 - poisson) / q * layer.compliance_ratio(q)
+    added = 1.0 / compliance - softest
+    np.testing.assert_allclose(added, 1.0 / (waves.c0 + waves.c2 * q**2), rtol=1e-3)
+    assert waves.c0 == pytest.approx(0.0) or poisson < 0.5
+    assert waves.c2 == pytest.approx(8 / 3) or poisson < 0.5
+
+
 def test_where_no_wave_is_stiffer_than_the_softest() -> None:
     """Smooth bases, compressible layers, and layers that are thick for their box."""
     for layer, size in ((Layer(1.0, "smooth"), 100.0), (Layer(1.0, "bonded", 0.2), 100.0), (Layer(1.0), 2.0)):
