@@ -248,6 +248,7 @@ def test_long_waves_are_stiffer_than_the_softest_one(poisson: float) -> None:
     compliance = (1 - poisson) / q * layer.compliance_ratio(q)
     added = 1.0 / compliance - softest
     np.testing.assert_allclose(added, 1.0 / (waves.c0 + waves.c2 * q**2), rtol=1e-3)
+    assert np.diff(1.0 / added) == pytest.approx(waves.c2 * np.diff(q**2), rel=0.01)
     assert waves.c0 == pytest.approx(0.0) or poisson < 0.5
     assert waves.c2 == pytest.approx(8 / 3) or poisson < 0.5
 
