@@ -127,7 +127,7 @@ def test_it_costs_nothing() -> None:
         ("interface: {shear_stress: 1.0e5}", "interface needs material.poisson of at least 0.49, got 0.3"),
         (
             "interface: {shear_stress: 1.0e5, stick: true}\nadhesion: {work: 0.05, range: 1.0e-6}",
-            "interface.stick does not go with adhesion",
+            "interface.stick cannot be used with adhesion",
         ),
     ],
 )
