@@ -131,7 +131,7 @@ def test_whole_cells_are_those_of_where_the_surface_was_at_first(velocity: float
 
 @pytest.mark.parametrize("duration", np.linspace(3.05e-4, 5.05e-4, 21).tolist())
 def test_no_short_step_is_left_over_at_rest(duration: float) -> None:
-    """Of steps that are identical the last one is a tenth longer at most, or the last two are halves of what is left.
+    """The last of several equal steps is a tenth longer at most, or the last two are halves of what is left.
     The error is what is allowed where a step is as long as the first, and goes with the power 1.7."""
     first = list[float]()
 

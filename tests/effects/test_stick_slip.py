@@ -83,7 +83,8 @@ def test_ranks_agree(comm: MPI.Intracomm) -> None:
 
 @pytest.mark.parametrize(("poisson", "share"), [(0.0, 0.5), (0.5, 0.9)])
 def test_loops_of_mindlin_and_deresiewicz(monkeypatch: pytest.MonkeyPatch, poisson: float, share: float) -> None:
-    """What slip loses in a cycle between a share and its opposite, with 27 cells in the radius and 20 steps a way.
+    """The energy lost in slip in a cycle between a share and its opposite, with 27 cells in the radius and 20
+    steps a way.
 
     The theory is exact if tractions move the surface as with Poisson's ratio 0: 0.5 % at one half. With 1/2 slip is not
     quite along the force, which the theory assumes, and less is lost: 1 % at nine tenths. The work of the force is the

@@ -12,7 +12,7 @@ WAVE = {"shape": "wave", "amplitude": 1e-6, "waves": [2, 0]}
 
 
 def warnings(thickness: float, surface: Any = WAVE, **changes: Any) -> list[str]:
-    """What a job with a layer is warned of, in addition to what it is warned of without."""
+    """Return the warnings of a job with a layer that it does not have without."""
     given = {
         "grid": {"points": 64, "size": 1e-3},
         "surface": surface,

@@ -1,4 +1,4 @@
-"""What a page says that a run prints, in addition to what it printed."""
+"""Comparison of the output shown on a page with the output of a run."""
 
 import re
 

@@ -211,7 +211,7 @@ def test_the_scripts_of_the_page_on_many_runs(elsewhere: Path, outside_mpi: dict
 
 
 def areas_of(script: str) -> str:
-    """What a script prints, by its job and loads alone."""
+    """Return the output of a script, for its job and loads alone."""
     space: dict[str, Any] = {"__name__": "read"}
     exec(compile(script, "block", "exec"), space)
     runs = {load: pc.Simulation(space["JOB"], {"history.0.pressure": load}, MPI.COMM_SELF) for load in space["LOADS"]}

@@ -85,7 +85,7 @@ def test_further_pressures_are_named_by_their_age() -> None:
 
 
 def test_a_checkpoint_may_lack_all_pressures_but_the_last() -> None:
-    """Those that it lacks are not known: they have a modulus of 0, and no position."""
+    """Pressures that a checkpoint lacks are unknown: they have a modulus of 0, and no position."""
     march = begun(job(RUBBER, CHOSEN))
     part, contact = parts_of(march.scene)["contact"], march.state.contact
     entries = part.entries(contact, march.scene.units)

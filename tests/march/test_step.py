@@ -376,7 +376,7 @@ def test_the_longest_steps_do_where_nothing_touches() -> None:
 
 
 def test_effects_are_given_the_energy_that_the_body_gains(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is stored and dissipated in all steps adds up to the columns of the row, to rounding of their sums."""
+    """The stored and dissipated energies of all steps add up to the columns of the row, to rounding of their sums."""
     follow, gained = AdhesionColumns.follow, list[float]()
 
     def note(effect: AdhesionColumns, instant: Instant, memory: AdhesionMemory) -> Changes[AdhesionMemory]:

@@ -1,4 +1,4 @@
-"""What each precision promises: loads, certificates, and results next to those of double precision."""
+"""Each precision keeps its promises: loads, certificates, and results next to those of double precision."""
 
 import math
 import random
