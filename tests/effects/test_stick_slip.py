@@ -81,28 +81,38 @@ def test_ranks_agree(comm: MPI.Intracomm) -> None:
     assert 0.0 < alone.added[2] < alone.measures.contact_area
 
 
-@pytest.mark.parametrize(("poisson", "share"), [(0.0, 0.5), (0.5, 0.9)])
-def test_loops_of_mindlin_and_deresiewicz(monkeypatch: pytest.MonkeyPatch, poisson: float, share: float) -> None:
-    """The energy lost in slip in a cycle between a share and its opposite, with 27 cells in the radius and 20
-    steps a way.
+class AlongForce(ShearOperator):
+    """Tractions along x move the surface along x only, as the theory of loops assumes."""
 
-    The theory is exact if tractions move the surface as with Poisson's ratio 0: 0.5 % at one half. With 1/2 slip is not
-    quite along the force, which the theory assumes, and less is lost: 1 % at nine tenths. The work of the force is the
-    same to what the trapezoidal rule makes of the steps, and the balance closes but for rounding."""
-    monkeypatch.setattr(stick_slip, "ShearOperator", lambda fft, size, _, free: ShearOperator(fft, size, poisson, free))
-    softer = (2.0 - poisson) / 1.5  # compliance of a sphere over that with 1/2
-    far = softer * mindlin(share)
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self._symbols[2][...] = 0.0  # u_y over t_x
+
+
+def lost_in_a_cycle(share: float) -> float:
+    """Energy lost in slip in a cycle between a share of the force of sliding and its opposite, in 20 steps a way with
+    27 cells in the radius. Checks that the force makes it, and that the energies are balanced but for rounding."""
+    far = mindlin(share)
     down = np.linspace(far, -far, 21)[1:]
     rows = marched(sphere([far, *down, *-down], across=2.4, output={"energy": True}))[1][2:]
-    lost = rows[-1].added[3] - rows[0].added[3]
-    part = 1.0 - (1.0 - share) ** (5.0 / 3.0) - 5.0 * share / 6.0 * (1.0 + (1.0 - share) ** (2.0 / 3.0))
-    exact = 4.8 * part * MU * FORCE * softer * mindlin(1.0)
-    assert lost == pytest.approx(exact, rel=1e-2 if poisson else 5e-3, abs=0.0)
-    forces, stops = [-row.measures.force_x for row in rows], [far, *down, *-down]
-    pairs = zip(forces[1:], forces[:-1], np.diff(stops), strict=True)
+    last, lost = rows[-1], rows[-1].added[3] - rows[0].added[3]
+    forces = [-row.measures.force_x for row in rows]
+    pairs = zip(forces[1:], forces[:-1], np.diff([far, *down, *-down]), strict=True)
     assert sum(0.5 * (new + old) * way for new, old, way in pairs) == pytest.approx(lost, rel=5e-3, abs=0.0)
-    last = rows[-1]
     assert last.work == pytest.approx(last.stored + last.dissipated + last.added[3], rel=1e-12, abs=0.0)
+    return lost
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75, 0.9])
+def test_loops_of_mindlin_and_deresiewicz(monkeypatch: pytest.MonkeyPatch, share: float) -> None:
+    """The theory assumes slip along the force. With an operator that has no other slip it is met to 0.5 %; with twice
+    the cells and steps to 0.25 %. Slip across the force makes the loss smaller, by 0.2 to 1.5 % on both meshes."""
+    whole = lost_in_a_cycle(share)
+    monkeypatch.setattr(stick_slip, "ShearOperator", AlongForce)
+    along = lost_in_a_cycle(share)
+    part = 1.0 - (1.0 - share) ** (5.0 / 3.0) - 5.0 * share / 6.0 * (1.0 + (1.0 - share) ** (2.0 / 3.0))
+    assert along == pytest.approx(4.8 * part * MU * FORCE * mindlin(1.0), rel=5e-3, abs=0.0)
+    assert 0.985 * along < whole < 0.998 * along
 
 
 @pytest.mark.parametrize(("time", "stiffer"), [(1e3, 1.0), (1e-9, 5.0)])
