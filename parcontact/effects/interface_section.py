@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from ..job.checks import limits
+from ..job.sections.geometry import Rough, RoughSpectrum, Topography
 from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Flag, Positive
 from ..job.text.fault import Fault
@@ -63,6 +64,23 @@ def _sticks(interface: Any, grid: Any, body: Any, initial: Any, steady: Any) -> 
             yield Fault("cannot be used with interface.stick: slide into the steady state with a stage", (key,))
 
 
+def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
+    """Refuse rolling without stick, of a rough surface, and in chosen steps."""
+    rough = any(isinstance(shape, Rough | RoughSpectrum | Topography) for shape in surface)
+    for index, stage in enumerate(history):
+        if stage is None or not stage.rolls:
+            continue
+        sentence = ""
+        if interface is None or not interface.stick:
+            sentence = "needs interface: {stick: true}: without it all that touches slides"
+        elif rough:
+            sentence = "needs a smooth surface: heights travel with the contact, and those of a rough wheel do not"
+        elif stage.chooses:
+            sentence = "needs cells_per_step or a time_step: chosen steps do not follow the tractions"
+        if sentence:
+            yield Fault(sentence, ("history", index, "creep"))
+
+
 def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
     if interface is not None and interface.stick and adhesion is not None:
         yield Fault("cannot be used with adhesion: leave one of them out", ("interface", "stick"))
@@ -97,6 +115,7 @@ class InterfaceEffect(Effect[Memory]):
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("interface", "material"), _incompressible),
         Rule(("interface", "grid", "body", "initial", "steady"), _sticks),
+        Rule(("interface", "history", "surface"), _rolls),
         Rule(("interface", "adhesion"), _no_adhesion),
         Rule(("interface", "output"), _has_tractions),
     )

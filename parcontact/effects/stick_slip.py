@@ -21,6 +21,10 @@ and nothing is shifted. The surface moves over them and carries the bounds f, wh
 step. A point without contact has g = u, so that its slip counts from its first contact. Targets of points that stick
 are not reset to u, so that residuals of solves do not add up over many steps.
 
+A surface that rolls moves as a shape, while its points move along the body by a share of that way, the creep (F. W.
+Carter, Proc. R. Soc. Lond. A 112 (1926) 151): D grows by the creep times the motion of the shape. Sliding has the creep
+1, free rolling the creep 0.
+
 With output.energy the work of the tractions on the body is added to the work of the pressures, and the loss in slip is
 
     sum (t_old + t)/2 (s - s_old),
@@ -107,7 +111,8 @@ class StickSlip(InterfaceEffect[StickMemory]):
     def follow(self, instant: Instant, memory: StickMemory) -> Changes[StickMemory]:
         """Return the tractions after a step, in the maps of a memory; collective."""
         step, alpha, target = instant.step, instant.modulus, memory.target
-        for part, moved in zip(components(target), instant.moved, strict=True):
+        (x, y), (along, across) = instant.moved, self._scene.job.history[step.stage].creep
+        for part, moved in zip(components(target), (along * x - across * y, along * y + across * x), strict=True):
             part += moved / self._scene.units.height
         trial = self._body.begin(memory.body, step.dt, MovedHeights(target), step.growth)
         new = self._start(instant, memory)

@@ -19,6 +19,7 @@ CONTROLS: tuple[Control, ...] = ("pressure", "force", "approach")
 PRESSURE = "a pressure [Pa] of zero or more"
 FORCE = "a force [N] of zero or more"
 VELOCITY = "a velocity [m/s]: a number along x, or [vx, vy]"
+SLIDES = (1.0, 0.0)  # physics: creep of a surface that slides without rolling
 SIGNED = ", with adhesion also below zero"
 APPROACH = "a finite approach [m]"
 SECONDS: TypeAdapter[float] = TypeAdapter(Positive)
@@ -32,6 +33,7 @@ def _no_ramp(value: Any) -> Any:
 
 
 Velocity = Annotated[Vector, BeforeValidator(_no_ramp), Field(description=VELOCITY)]
+Creep = Annotated[Vector, Field(description="a creep [-]: a number along the velocity, or [along, across]")]
 
 
 @dataclass(frozen=True)
@@ -113,13 +115,15 @@ def _stepping(
     time_step: float | GeometricStep | Auto | None,
     cells_per_step: float | None,
     approach: Ramp | None,
+    creep: tuple[float, float],
 ) -> Iterator[Fault]:
-    """Check that a stage with time steps has a duration, and a stage with a distance a velocity."""
+    """Check that a stage with time steps has a duration, and a stage with a distance or a creep a velocity."""
     lasts = duration is not None or distance is not None or (approach is not None and approach.velocity is not None)
     if not lasts and (time_step or cells_per_step):
         key = "time_step" if time_step else "cells_per_step"
         yield Fault("needs a duration [s] or a distance [m]: without them a stage is one solve", (key,))
-    for name, value in (("distance", distance), ("cells_per_step", cells_per_step)):
+    rolls = None if creep == SLIDES else creep
+    for name, value in (("distance", distance), ("cells_per_step", cells_per_step), ("creep", rolls)):
         if value is not None and not any(velocity):
             yield Fault("needs a velocity [m/s] that is not zero", (name,))
 
@@ -151,6 +155,7 @@ class Stage(Part):
     force: Annotated[Ramp | None, _ramp(Real, FORCE)] = Field(default=None, description=FORCE + SIGNED)
     approach: Annotated[Ramp | None, _ramp(Real, APPROACH, velocity=NORMAL)] = Field(default=None, description=APPROACH)
     velocity: Velocity = (0.0, 0.0)
+    creep: Creep = SLIDES
     duration: Positive | None = Field(default=None, description="a positive time [s]")
     distance: Positive | None = Field(default=None, description="a positive length [m]")
     time_step: TimeStep | None = Field(
@@ -164,7 +169,7 @@ class Stage(Part):
     one_of = (CONTROLS,)
     at_most_one = (("duration", "distance"), ("time_step", "cells_per_step"))
     rules = (
-        Rule(("duration", "distance", "velocity", "time_step", "cells_per_step", "approach"), _stepping),
+        Rule(("duration", "distance", "velocity", "time_step", "cells_per_step", "approach", "creep"), _stepping),
         Rule(("duration", "distance", *CONTROLS), _lasting_ramp),
     )
 
@@ -180,6 +185,11 @@ class Stage(Part):
     def chooses(self) -> bool:
         """Return True for `time_step: auto`."""
         return self.time_step == AUTO
+
+    @property
+    def rolls(self) -> bool:
+        """Return True if points of the surface move otherwise than its shape."""
+        return self.creep != SLIDES
 
     @property
     def control(self) -> Control:
