@@ -27,9 +27,10 @@ Carter, Proc. R. Soc. Lond. A 112 (1926) 151): D grows by the creep times the mo
 
 With output.energy the work of the tractions on the body is added to the work of the pressures, and the loss in slip is
 
-    sum (t_old + t)/2 (s - s_old),
+    sum max(0, (t_old + t)/2 (s - s_old)),
 
-so that work = stored + dissipated + slip_loss.
+so that work = stored + dissipated + slip_loss. At each point slip loses energy. If the motion turns back within a
+step, the trapezoidal rule may give less than 0, and then 0 is closer to the loss.
 """
 
 from __future__ import annotations
@@ -56,6 +57,7 @@ from ..solve.tangential import discs
 from ..solve.tangential.solver import TangentialSolver
 from .effect import Changes, Instant, Sheared
 from .interface_section import InterfaceEffect
+from .slipping import settle_slips
 
 
 class BoundedTraction(NamedTuple):
@@ -63,6 +65,16 @@ class BoundedTraction(NamedTuple):
 
     traction: Array
     bound: Array
+
+
+class _Settled(NamedTuple):
+    """Sums over the points of a step: the energy lost in slip [J], the force on the rigid surface [N], the mean
+    traction over the mean bound, and the number of points that stick."""
+
+    lost: float
+    force: Vector
+    share: Vector
+    stuck: int
 
 
 @dataclass(frozen=True)
@@ -116,17 +128,18 @@ class StickSlip(InterfaceEffect[StickMemory]):
             part += moved / self._scene.units.height
         trial = self._body.begin(memory.body, step.dt, MovedHeights(target), step.growth)
         new = self._start(instant, memory)
-        solved = self._solver.solve(new.bound, trial.effective, self._stiffness(instant), new.traction)
+        stiffness = self._stiffness(instant)
+        solved = self._solver.solve(new.bound, trial.effective, stiffness, new.traction)
         body = self._body.commit(memory.body, trial, solved.displacement, surface_of(memory.body))
         now, before = Pressed(new.traction, alpha), Pressed(memory.last.traction, memory.alpha)
         energy = memory.energy
         if self._energy is not None and energy is not None:
             energy = self._energy.advance(energy, step.dt, now, before, solved.displacement, body, step.growth)
-        sheared, share = self._settle(instant, now, before, new.bound, surface_of(body), target)
-        sheared = replace(sheared, error=solved.certificate, share=self._share_of_area(instant, solved.stuck))
-        columns = *parts_of_friction(sheared), solved.stuck / self._slab.points
+        settled = self._settle(now, before, new.bound, stiffness, surface_of(body), target)
+        sheared = self._sheared(instant, settled, solved.certificate)
+        columns = *parts_of_friction(sheared), settled.stuck / self._slab.points
         lost = memory.lost + sheared.lost
-        after = StickMemory(body, new, memory.last, target, alpha, share, energy, lost, columns)
+        after = StickMemory(body, new, memory.last, target, alpha, settled.share, energy, lost, columns)
         return Changes(after, solved.failure, sheared=sheared)
 
     def _start(self, instant: Instant, memory: StickMemory) -> BoundedTraction:
@@ -157,26 +170,26 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return square / work if work > 0.0 else 1.0
 
     def _settle(
-        self, instant: Instant, now: Pressed, before: Pressed, bound: Array, u: Array, target: Array
-    ) -> tuple[Sheared, Vector]:
-        """Return what the tractions add to the measures of a step, and their mean share of the bounds, and renew the
-        targets of points that slip or are not touched; collective."""
-        sums = list[float]()
-        for each in range(2):
-            t, old, aim, place = (components(one)[each] for one in (now.p, before.p, target, u))
-            sums += discs.settle(self._solver.free, t, now.modulus, old, before.modulus, place, aim)
-        lost_x, total_x, lost_y, total_y, most = self._slab.sum(*sums, float(bound.sum(dtype=np.float64)))
+        self, now: Pressed, before: Pressed, bound: Array, stiffness: float, u: Array, target: Array
+    ) -> _Settled:
+        """Renew the targets of points that slip or are not touched, and return sums over all points; collective."""
+        t, old = ((each.modulus, *components(each.p)) for each in (now, before))
+        sums = settle_slips(bound, stiffness, *t, *old, *components(u), *components(target))
+        lost, total_x, total_y, most, stuck = self._slab.sum(*sums)
         unit = self._cell_force * now.modulus
         force = 0.0 - unit * total_x, 0.0 - unit * total_y
-        lost = (lost_x + lost_y) * self._cell_force * self._scene.units.height
         share = (total_x / most, total_y / most) if most > 0.0 else (0.0, 0.0)
-        return Sheared(_with_force(instant, force), force, lost), share
+        return _Settled(lost * self._cell_force * self._scene.units.height, force, share, round(stuck))
 
-    def _share_of_area(self, instant: Instant, stuck: int) -> float:
-        """Return the share of the tractions that is wrong as the area is: all of those by a shear strength; by a
-        coefficient where points stick, as those that slip add up to a share of the load."""
+    def _sheared(self, instant: Instant, settled: _Settled, error: float) -> Sheared:
+        """Return what the tractions add to the measures of a step.
+
+        The share of the tractions that is wrong as the area is: all of those by a shear strength; by a coefficient
+        where points stick, as those that slip add up to a share of the load."""
         touching = instant.measures.contact_area * self._slab.points
-        return stuck / touching if self._law.coefficient is not None and touching > 0.0 else 1.0
+        by_load = self._law.coefficient is not None and touching > 0.0
+        share = settled.stuck / touching if by_load else 1.0
+        return Sheared(_with_force(instant, settled.force), settled.force, settled.lost, error, share)
 
     def values(self, memory: StickMemory) -> Sequence[float]:
         """Return the parts of friction, the share of the box that sticks, and the energy lost in slip [J], NaN without

@@ -178,7 +178,9 @@ def _follow(
     changes = dict[str, Changes[Any]]()
     for name, effect in scene.effects.items():
         changes[name] = effect.follow(instant, state.memories[name])
-        instant = replace(instant, sheared=changes[name].sheared or instant.sheared)
+        if (sheared := changes[name].sheared) is not None:
+            errors = replace(made.errors, budget=_budget_of(made, sheared))
+            instant = replace(instant, sheared=sheared, error_friction=errors.of_friction)
     scene.relax({name: each.memory for name, each in changes.items()})
     return changes, instant.sheared
 

@@ -151,19 +151,3 @@ def move_tractions(bound, free, step, d_x, d_y, turn, u_x, u_y, e_x, e_y, x, y):
             row_size += here
         size, cut = size + row_size, cut + row_cut
     return size, cut
-
-
-@loop
-def settle(free, t, alpha, t_old, alpha_old, u, target):
-    """Replace `target` by u where points are not free, for one component. Return the sums of `(alpha t + alpha_old
-    t_old)/2 (target - u)` over these points, and of t."""
-    lost, total = 0.0, 0.0
-    for j in range(t.shape[0]):
-        row_lost, row_total = 0.0, 0.0
-        for i in range(t.shape[1]):
-            row_total += t[j, i]
-            if not free[j, i]:
-                row_lost += 0.5 * (alpha * t[j, i] + alpha_old * t_old[j, i]) * (target[j, i] - u[j, i])
-                target[j, i] = u[j, i]
-        lost, total = lost + row_lost, total + row_total
-    return lost, total
