@@ -1,7 +1,7 @@
 """Errors of a solved contact. This module imports no other, so that tables are read quickly."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,8 @@ class Certificate:
         L^2 = <p, u^2>/<p> - (<p, u>/<p>)^2,
 
     at least LEAST_SHARE of the mean `<p, u>/<p>`, for contacts of one or two points, and at most the height of the
-    surface. It does not depend on the size of the box.
+    surface. It does not depend on the size of the box. In steady sliding along lines of points, waves that do not vary
+    along the lines may have a far lower modulus, and most of the displacement (`iterate.Lines`).
     """
 
     complementarity: float
@@ -30,3 +31,8 @@ class Certificate:
     def worst(self) -> float:
         total = self.complementarity + self.penetration + self.load
         return total if math.isnan(total) else max(self.complementarity, self.penetration, self.load)
+
+    def shortened(self, share: float) -> "Certificate":
+        """Return the certificate with gaps over `share` times the length."""
+        gaps = self.complementarity / share, self.penetration / share
+        return replace(self, complementarity=gaps[0], penetration=gaps[1], length=share * self.length)

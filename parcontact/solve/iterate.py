@@ -15,6 +15,35 @@ LEAST_HEIGHT = 1e-9  # accuracy: the same, over the height of the surface, where
 
 
 @dataclass(frozen=True)
+class Lines:
+    """Lines of points along the sliding, of a body that is stiffer for waves along them.
+
+    `axis` of an array of rows along the lines; `contrast` c: modulus of waves along them over that of waves that do
+    not vary along them. An error of the gap that varies along the lines causes c times the pressure. So the lengths of
+    displacements that vary along the lines, and 1/c of the others, add up to the length of the certificate: a share s
+    of the length for one modulus,
+
+        s^2 = v + (1 - v)/c^2,
+
+    with v the share of the variance of u that remains with the mean of each line subtracted, weighted by the pressure.
+    """
+
+    axis: int
+    contrast: float
+
+    def share_of_length(self, slab: Slab, p: Array, u: Array, iterate: "Iterate") -> float:
+        """Return s for the image u of p and their sums; collective."""
+        loads, moments = p.sum(axis=self.axis), np.einsum("ij,ij->i" if self.axis else "ij,ij->j", p, u)
+        if not self.axis:  # lines cross the rows of all ranks
+            loads, moments = np.split(np.array(slab.sum(*loads, *moments)), 2)
+        between = np.divide(moments**2, loads, out=np.zeros_like(loads), where=loads > 0.0).sum()
+        between = slab.sum(between)[0] if self.axis else between
+        variance = iterate.squares - (2.0 * iterate.energy) ** 2 / iterate.load
+        along = min(max((iterate.squares - between) / variance, 0.0), 1.0) if variance > 0.0 else 1.0
+        return math.sqrt(along + (1.0 - along) / self.contrast**2)
+
+
+@dataclass(frozen=True)
 class Iterate:
     """Sums over an iterate at the approach d: of p, of p g, `energy = <p, A p>/2`, of `p (A p)^2`, and of p and p g
     over free points.

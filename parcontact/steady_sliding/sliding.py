@@ -30,7 +30,7 @@ from ..solve.preconditioner.extension import pairs_for
 from .heating import Feedback, find_temperatures
 from .losses import branch_powers
 from .point import Point
-from .stiffness import loses_most, soft_stripes
+from .stiffness import loses_most, soft_stripes, stiffer_lines
 
 COARSE_TOLERANCE = 0.02  # tuning: tolerance on the certificate on all grids but the finest
 LOOSE, AS_RIGHT = 1e-3, 0.6  # accuracy: factor AS_RIGHT on tolerances above LOOSE, for areas as accurate as in marches
@@ -282,12 +282,14 @@ class SteadySliding:
         limit: float = math.inf,
     ) -> SteadySolver:
         numerics, height = self.setup.choices.numerics, self.setup.height / self.setup.units.height
-        tolerance = max(self._tolerance, 0.0 if level is self.levels[0] else COARSE_TOLERANCE)
+        finest = level is self.levels[0]
+        tolerance = max(self._tolerance, 0.0 if finest else COARSE_TOLERANCE)
         most, along = int(min(limit, 20 * numerics.max_iterations)), soft_stripes(self.setup, velocity)
         slab, grid = level.slab, self.setup.grid
         pairs = pairs_for(grid.lx / slab.nx, grid.ly / slab.ny)
         what = slab, operator, preconditioner, height, tolerance, most
-        return SteadySolver(*what, along=along, pairs=pairs, least_cut=least_cut)
+        lines = stiffer_lines(self.setup, velocity) if finest else None  # coarse grids only give starts
+        return SteadySolver(*what, along=along, pairs=pairs, least_cut=least_cut, lines=lines)
 
     def _operators(self, level: SteadyLevel, velocity: Vector) -> tuple[Convolution, Convolution]:
         """Return the operator at a velocity [m/s], and its inverse, approximate for a free body."""

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from ..physics.prony import complex_modulus
 from ..scene import Setup
+from ..solve.iterate import Lines
 
 CONTRAST = 30.0  # tuning: least |G| of the shortest wave over G_inf for `soft_stripes`
 LOSSY = 3.0  # tuning: least loss tangent of a wave for `loses_most`
+HIGHEST = 1e3  # rounding: largest contrast, as larger displacements between lines have rounding errors
 SOFT = 4.0  # tuning: largest |G| of the longest wave over G_inf for `loses_most`
 
 Vector = tuple[float, float]
@@ -32,6 +34,15 @@ def loses_most(setup: Setup, velocity: Vector) -> bool:
     if moduli is None or abs(moduli[0]) >= SOFT * setup.prony.modulus_inf:
         return False
     return bool(np.any(moduli.imag > LOSSY * moduli.real))
+
+
+def stiffer_lines(setup: Setup, velocity: Vector) -> Lines | None:
+    """Return the lines along a velocity [m/s], with |G| of the longest wave along them over G_inf; None for an elastic
+    body, on a line of points, in a free box, and for oblique velocities."""
+    moduli = _moduli(setup, velocity)
+    if moduli is None or not setup.prony.moduli.size:
+        return None
+    return Lines(1 if velocity[0] else 0, min(float(abs(moduli[0])) / setup.prony.modulus_inf, HIGHEST))
 
 
 def _moduli(setup: Setup, velocity: Vector) -> NDArray[np.complex128] | None:

@@ -28,7 +28,7 @@ from ...parallel.slab import Array, Slab
 from .. import kernels
 from ..certificate import Certificate
 from ..constraint import NonNegative
-from ..iterate import certify, form_iterate
+from ..iterate import Lines, certify, form_iterate
 from ..local_load import LEAST_CUT
 from ..precision import precision_of_directions
 from ..problem import Operator
@@ -78,7 +78,8 @@ class SteadySolver:
     Parameters: `operator` A; `preconditioner` K near its inverse; `height` of the surface; `tolerance` on the
     certificate; `max_steps`, a limit on linear steps; `directions` of each linear solve; `along`, the axis of
     sliding where the body is far softer along stripes (`stripes`), else None; `pairs` of doublings that make cells
-    square (`extension.pairs_for`); `least_cut` (`local_load`).
+    square (`extension.pairs_for`); `least_cut` (`local_load`); `lines` along which the body is stiffer, if gaps are to
+    be certified for them.
     """
 
     constraint = NonNegative()  # steady sliding has no other constraint
@@ -95,8 +96,9 @@ class SteadySolver:
         along: int | None = None,
         pairs: int = 0,
         least_cut: float = LEAST_CUT,
+        lines: Lines | None = None,
     ) -> None:
-        self.slab, self.operator = slab, operator
+        self.slab, self.operator, self.lines = slab, operator, lines
         self.height, self.tolerance, self.max_steps = height, tolerance, max_steps
         self._projected = Projected(slab, operator, preconditioner, self.constraint, pairs, least_cut)
         kept = precision_of_directions(tolerance, LOOSE)
@@ -261,5 +263,7 @@ class SteadySolver:
         iterate = form_iterate(self.slab, self.constraint, p, self._u, h, 0.0).settled()
         found = certify(self.slab, self.constraint, p, self._u, h, iterate, mean, self.height, self._working)
         certificate = found[-1]
+        if self.lines is not None and iterate.load > 0.0:
+            certificate = certificate.shortened(self.lines.share_of_length(self.slab, p, self._u, iterate))
         self._length = certificate.length
         return iterate.d, certificate
