@@ -11,7 +11,6 @@ from ..physics.interface_friction import InterfaceFriction
 from ..physics.measures import Measures
 from .effect import Changes, Instant
 from .interface_section import Interface, InterfaceEffect
-from .relaxation import time_factor_of
 
 
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
@@ -40,9 +39,7 @@ class InterfaceColumns(InterfaceEffect[tuple[float, float]]):
     def shear(job: Any) -> InterfaceFriction | None:
         """Return the stress of the section, shifted to the temperature of the material; None with `stick`."""
         law: Interface = job.section("interface")
-        if law.stick or law.shear_stress is None:
-            return None
-        return InterfaceFriction(law.shear_stress, law.velocity, law.width or 1.0, time_factor_of(job.material))
+        return None if law.stick else law.friction(job.material)
 
     def __init__(self, scene: Any) -> None: ...
 

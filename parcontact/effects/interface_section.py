@@ -13,7 +13,9 @@ from ..job.sections.part import Part, Rule
 from ..job.sections.quantities import Flag, Positive
 from ..job.text.fault import Fault
 from ..physics.entries import Memory
+from ..physics.interface_friction import InterfaceFriction
 from .effect import Decision, Effect
+from .relaxation import time_factor_of
 
 SAME = 1e-9  # rounding: tolerance on Poisson's ratio
 LEAST_POISSON = 0.49  # physics: least Poisson's ratio for which shear hardly moves the surface along its normal
@@ -28,9 +30,8 @@ def _whole_bell(velocity: float | None, width: float | None) -> Iterator[Fault]:
 def _coefficient(coefficient: float | None, velocity: float | None, stick: bool) -> Iterator[Fault]:
     if coefficient is not None and not stick:
         yield Fault("needs stick: true", ("coefficient",))
-    if stick and velocity is not None:
-        sentence = "cannot be used with stick: a strength that falls with velocity has more than one solution of a step"
-        yield Fault(sentence, ("velocity",))
+    if coefficient is not None and velocity is not None:
+        yield Fault("cannot be used with coefficient: a bell over the velocity needs shear_stress", ("velocity",))
 
 
 def _incompressible(interface: Any, material: Any) -> Iterator[Fault]:
@@ -106,6 +107,12 @@ class Interface(Part):
 
     one_of = (("shear_stress", "coefficient"),)
     rules = (Rule(("velocity", "width"), _whole_bell), Rule(("coefficient", "velocity", "stick"), _coefficient))
+
+    def friction(self, material: Any) -> InterfaceFriction | None:
+        """Return the shear stress, shifted to the temperature of a material; None with a coefficient."""
+        if self.shear_stress is None:
+            return None
+        return InterfaceFriction(self.shear_stress, self.velocity, self.width or 1.0, time_factor_of(material))
 
 
 class InterfaceEffect(Effect[Memory]):

@@ -4,6 +4,10 @@ The rigid surface moves by D along itself, the points of the body by u under tra
 
     |t| <= f,    f = mu p (Coulomb) or a shear strength at all points in contact.
 
+A shear strength that depends on velocity is that of the velocity of the surface along itself in each step, at all
+points, so that a step has one solution. While the surface rests the last strength stays. Before the surface has moved
+there are no tractions, and the highest strength bounds them.
+
 A point in contact slips by `s = D - u`: its slip grows along t where `|t| = f`, and is constant where `|t| < f`. In an
 incompressible half space tractions and pressures move the surface independently of each other
 (`physics.shear_operator`), so that the tractions of a step follow from its pressures. The body obeys the law of
@@ -82,15 +86,17 @@ class StickMemory:
     """Memory of stick and slip. Maps are in the run's units; all but bounds have two stacked components.
 
     `body` is the memory of the displacements along the surface, `last` the tractions of the last step, with the
-    modulus `alpha`; `spare` receives the next ones. `target` is where points that stick end. `share` is the mean
-    traction over the mean bound. `energy` is the memory of the energies, None without them; `lost` is the energy
-    lost in slip [J]. `columns` are the columns of the last row without `slip_loss`.
+    modulus `alpha`; `spare` receives the next ones. `target` is where points that stick end. `strength` is the shear
+    strength of the last step in which the surface moved [Pa]. `share` is the mean traction over the mean bound.
+    `energy` is the memory of the energies, None without them; `lost` is the energy lost in slip [J]. `columns` are the
+    columns of the last row without `slip_loss`.
     """
 
     body: BodyMemory
     last: BoundedTraction
     spare: BoundedTraction
     target: Array
+    strength: float
     alpha: float = 0.0
     share: Vector = (0.0, 0.0)
     energy: EnergyMemory | None = None
@@ -107,6 +113,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
     def __init__(self, scene: Any) -> None:
         setup, slab, grid, numerics = scene.setup, scene.slab, scene.choices.grid, scene.choices.numerics
         self._scene, self._slab, self._law = scene, slab, scene.job.section("interface")
+        self._friction = self._law.friction(scene.job.material)
         self._both = stacked(slab)
         self._body, self._energy = scene.body_for_shear(self._both)
         self._cell_force = grid.dx * grid.dy * scene.units.pressure
@@ -118,16 +125,19 @@ class StickSlip(InterfaceEffect[StickMemory]):
     def at_rest(self) -> StickMemory:
         last, spare = (BoundedTraction(self._both.zeros(), self._slab.zeros()) for _ in range(2))
         energy = None if self._energy is None else self._energy.at_rest()
-        return StickMemory(self._body.at_rest(), last, spare, self._both.zeros(), energy=energy)
+        strength = self._law.shear_stress or 0.0
+        return StickMemory(self._body.at_rest(), last, spare, self._both.zeros(), strength, energy=energy)
 
     def follow(self, instant: Instant, memory: StickMemory) -> Changes[StickMemory]:
         """Return the tractions after a step, in the maps of a memory; collective."""
         step, alpha, target = instant.step, instant.modulus, memory.target
         (x, y), (along, across) = instant.moved, self._scene.job.history[step.stage].creep
-        for part, moved in zip(components(target), (along * x - across * y, along * y + across * x), strict=True):
+        way = along * x - across * y, along * y + across * x
+        for part, moved in zip(components(target), way, strict=True):
             part += moved / self._scene.units.height
+        strength = self._strength(step.dt, math.hypot(*way), memory.strength)
         trial = self._body.begin(memory.body, step.dt, MovedHeights(target), step.growth)
-        new = self._start(instant, memory)
+        new = self._start(instant, memory, strength)
         stiffness = self._stiffness(instant)
         solved = self._solver.solve(new.bound, trial.effective, stiffness, new.traction)
         body = self._body.commit(memory.body, trial, solved.displacement, surface_of(memory.body))
@@ -139,20 +149,27 @@ class StickSlip(InterfaceEffect[StickMemory]):
         sheared = self._sheared(instant, settled, solved.certificate)
         columns = *parts_of_friction(sheared), settled.stuck / self._slab.points
         lost = memory.lost + sheared.lost
-        after = StickMemory(body, new, memory.last, target, alpha, settled.share, energy, lost, columns)
+        after = StickMemory(body, new, memory.last, target, strength, alpha, settled.share, energy, lost, columns)
         return Changes(after, solved.failure, sheared=sheared)
 
-    def _start(self, instant: Instant, memory: StickMemory) -> BoundedTraction:
+    def _strength(self, dt: float, way: float, last: float) -> float:
+        """Return the shear strength [Pa] of a step in which the surface moves by a way [m] along itself; `last` is the
+        strength before."""
+        if self._friction is None or dt == 0.0 or way == 0.0:
+            return last
+        return self._friction.shifted(self._scene.time_factor).stress(way / dt)
+
+    def _start(self, instant: Instant, memory: StickMemory, strength: float) -> BoundedTraction:
         """Return the bounds of a step and tractions to start from, in the spare maps; local."""
         (t, bound), last = memory.spare, memory.last
-        self._fill_bound(instant, bound)
+        self._fill_bound(instant, strength, bound)
         scale = memory.alpha / instant.modulus, instant.step.growth
         discs.extrapolate_tractions(
             *components(last.traction), last.bound, *scale, bound, *memory.share, *components(t)
         )
         return memory.spare
 
-    def _fill_bound(self, instant: Instant, bound: Array) -> None:
+    def _fill_bound(self, instant: Instant, strength: float, bound: Array) -> None:
         """Put `f/alpha` into a map. A shear strength acts on the corrected contact area, as without stick."""
         if self._law.coefficient is not None:
             np.multiply(instant.pressure, self._law.coefficient, out=bound)
@@ -160,8 +177,8 @@ class StickSlip(InterfaceEffect[StickMemory]):
             return
         measures = instant.measures
         share = measures.contact_area_corrected / measures.contact_area if measures.contact_area > 0.0 else 0.0
-        strength = self._law.shear_stress * share / (instant.modulus * self._scene.units.pressure)
-        np.multiply(instant.touching != 0, strength, out=bound)
+        each = strength * share / (instant.modulus * self._scene.units.pressure)
+        np.multiply(instant.touching != 0, each, out=bound)
 
     def _stiffness(self, instant: Instant) -> float:
         """Return pressure over displacement of the contact as a whole, `<p, p>/<p, A p>`; collective."""
@@ -221,6 +238,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
             both["lost"] = Entry(memory.lost, 1.0, "J")
         found = {"bound": Entry(memory.last.bound, pressure), "modulus": Entry(memory.alpha, units.modulus, "Pa")}
         found |= {"share": Entry(np.array(memory.share)), "columns": Entry(np.array(memory.columns))}
+        found["strength"] = Entry(memory.strength, 1.0, "Pa")
         for name, entry in both.items():
             found |= _split(name, entry) if entry.is_map else {name: entry}
         return found
@@ -236,6 +254,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return replace(
             memory,
             body=self._body.restored(memory.body, joined),
+            strength=float(saved["strength"]),
             alpha=float(saved["modulus"]),
             share=(x, y),
             energy=energy,

@@ -121,7 +121,7 @@ def test_it_costs_nothing() -> None:
         ("interface: {coefficient: 0.5}", "interface.coefficient needs stick: true"),
         (
             "interface: {coefficient: 0.5, stick: true, velocity: 1.0, width: 1.0}",
-            "interface.velocity cannot be used with stick",
+            "interface.velocity cannot be used with coefficient: a bell over the velocity needs shear_stress",
         ),
         ("interface: {coefficient: 0.5, stick: true}", "interface.stick needs material.poisson of 0.5, got 0.3"),
         ("interface: {shear_stress: 1.0e5}", "interface needs material.poisson of at least 0.49, got 0.3"),
