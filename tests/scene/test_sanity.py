@@ -82,6 +82,17 @@ def test_absurd_jobs_are_stated(job: Job, words: list[str], monkeypatch: pytest.
     assert len(found) == 1, job.warnings
 
 
+def test_slow_shear_of_a_contact_that_sticks_is_not_slow_sliding() -> None:
+    """It is sheared within far less than a wave. Fast sliding gives the warning with stick, too."""
+    for velocity, stated in ((1e-9, [False, True]), (1e9, [True, True])):
+        slide = {**PRESS, "velocity": velocity, "duration": 1.0 / velocity, "time_step": 0.1 / velocity}
+        jobs = (
+            job_of(ROUGH, [slide], material=ZENER, interface={"shear_stress": 1e5, "stick": stick})
+            for stick in (True, False)
+        )
+        assert [any("sliding excites" in text for text in job.warnings) for job in jobs] == stated
+
+
 def test_loads_that_press_less_than_one_point_are_stated() -> None:
     """One of 64 x 64 points is a share of 2.4e-4, which sqrt(8/pi) p/(E* h') is at 61 Pa, with E* of 4 MPa and a slope
     of 0.1; a load that is approached, or sticks, says nothing."""

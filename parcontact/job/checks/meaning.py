@@ -145,7 +145,11 @@ def _instants(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
 
 
 def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
-    """Yield a warning if the angular frequencies q v of the sliding waves are far from all 1/relaxation time."""
+    """Yield a warning if the angular frequencies q v of the sliding waves are far from all 1/relaxation time.
+
+    A contact that sticks is sheared before it slides, within far less than a wave. So its highest frequency is not
+    known, and slow sliding gives no warning.
+    """
     branches = [one for one in material.branches if isinstance(one, PronyBranch) or one.G0 > 0.0]
     times = [branch.relaxation_time for branch in branches if 0.0 < branch.relaxation_time < math.inf]
     rough = [shape for shape in job.surface if isinstance(shape, Rough)]
@@ -157,7 +161,9 @@ def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
         return  # relaxation times are given at another temperature
     low, high = 2 * math.pi * min(speeds) / max(lengths), 2 * math.pi * max(speeds) / min(lengths)
     slow, fast = 1.0 / max(times), 1.0 / min(times)
-    if high * BEYOND < slow or low > fast * BEYOND:
+    interface = getattr(job, "interface", None)
+    sticks = interface is not None and interface.stick
+    if (high * BEYOND < slow and not sticks) or low > fast * BEYOND:
         how, modulus = ("slower", "long-term") if high < slow else ("faster", "instantaneous")
         rates = {"low": low, "high": high, "slow": slow, "fast": fast}
         yield Doubt("elastic", "material", {**rates, "times": BEYOND, "how": how, "modulus": modulus})
