@@ -27,6 +27,7 @@ SEAM = 2.0  # accuracy: least jump across the edge, over the largest increment i
 FEW_CELLS = 0.15  # accuracy: least excess of the counted area, as a share of it, for a warning
 FEW_POINTS = 2**22  # tuning: largest number of points whose heights are computed for a check; this takes seconds
 STRICT = "an error with numerics.strict"
+RESOLVED = 1e-6  # accuracy: largest rounding of heights over an approach
 FULL_CONTACT_ROUNDING = 1e-14  # rounding: relative rounding of a sum of lengths
 
 
@@ -101,12 +102,29 @@ def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
     )
 
 
+def below_rounding(setup: Setup, approach: float) -> str:
+    """Return a sentence on an approach [m] that is lost in the rounding of the heights, or ''; 0 is never lost."""
+    heights = setup.heights.span + abs(setup.surface.datum)
+    least = float(np.finfo(np.float64).eps) / RESOLVED * heights
+    if not 0.0 < abs(approach) < least:
+        return ""
+    return (
+        f"an approach of {approach:.3g} m is lost in the rounding of heights that span {heights:.3g} m; give 0 or at "
+        f"least {least:.3g} m, check the unit of the heights, or prescribe a pressure"
+    )
+
+
 def refuse_approaches(setup: Setup) -> None:
-    """Raise JobError for stages whose approach exceeds the approach at full contact."""
-    mistakes = []
-    for index, stage in enumerate(setup.job.history if has_full_contact(setup) else ()):
-        most = max(stage.load.start, stage.load.end)
-        if stage.control == "approach" and (text := beyond_full_contact(setup, most, setup.heights.mean)):
+    """Raise JobError for stages whose approach exceeds the approach at full contact, or is lost in the rounding of the
+    heights."""
+    mistakes, bounded = [], has_full_contact(setup)
+    for index, stage in enumerate(setup.job.history):
+        if stage.control != "approach":
+            continue
+        ends = stage.load.start, stage.load.end
+        text = below_rounding(setup, max(ends, key=abs))
+        text = text or (beyond_full_contact(setup, max(ends), setup.heights.mean) if bounded else "")
+        if text:
             place = next(iter(setup.job.origin.approaches[index:]), "")
             mistakes.append(f"{place}: history.{index}: {text}" if place else f"history.{index}: {text}")
     if mistakes:

@@ -284,3 +284,22 @@ def test_approaches_beyond_full_contact_are_stated_with_their_places(tmp_path: P
         sanity.refuse_approaches(scene.set_up(load(path), Slab.alone(64, 64)))
     found = [text.partition(" an approach")[0] for text in caught.value.mistakes]
     assert found == [f"{path}:5:16: history.0:", f"{path}:6:26: history.1:"]
+
+
+@pytest.mark.parametrize(("approach", "lost"), [(0.0, False), (-2.3e-6, False), (-2.2e-6, True), (1e-9, True)])
+def test_approaches_below_the_rounding_of_heights_are_refused(tmp_path: Path, approach: float, lost: bool) -> None:
+    """A wave of 5 km spans 10 km. Heights are rounded to 2.2e-12 m then, a millionth of 2.2e-6 m."""
+    path, wave = tmp_path / "job.yaml", "surface: {shape: wave, amplitude: 5.0e+3, waves: [1, 0]}\n"
+    path.write_text(
+        "grid: {points: 8, size: 1.0e-3}\n" + wave + "material: {model: elastic, shear_modulus: 1.0e6}\n"
+        f"history: [{{approach: {approach!r}}}]\n"
+    )
+    job = load(path) if approach else load(path, ["history.0.approach={from: 0, to: 0}", "history.0.duration=1"])
+    setup = scene.set_up(job, Slab.alone(8, 8))
+    if not lost:
+        return sanity.refuse_approaches(setup)
+    with pytest.raises(JobError) as caught:
+        sanity.refuse_approaches(setup)
+    (text,) = caught.value.mistakes
+    assert text.startswith(f"{path}:4:22: history.0: an approach of {approach:.3g} m is lost in the rounding of")
+    assert "at least 2.22e-06 m" in text
