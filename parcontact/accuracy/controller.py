@@ -48,6 +48,7 @@ NAME = "mean logarithm"  # its name in a checkpoint
 SAFETY = 0.98  # tuning: length of a step over that with the allowed error
 REJECTED = 1.19  # accuracy: error of a rejected step over the allowed one
 MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0  # tuning: limits on a step over the one before, or over a rejected one
+LEAST_SHEAR = 1.0 / 1024.0  # accuracy: cells in the first step of a slide if points stick; spots slide in a hundredth
 LEVELS = 2  # tuning: log2 of the number of lengths per factor of two, for steps below a quarter of a cell
 REST_LEVELS = 4  # tuning: number of lengths per factor of two at rest
 LEAST_WAY = 0.35  # tuning: least length of a step that ends at a multiple, over its nominal length
@@ -169,6 +170,14 @@ class Controller:
         most = 1.0 if rejected else MOST_GROWTH
         return MadeStep(span.index, end, self._level(span, step.dt * min(max(wanted, 1.0), most)))
 
+    def limit(self, made: MadeStep, dt: float, turned: float) -> MadeStep:
+        """Return the record of a step of length dt in which the mean traction has changed by the share `turned` of its
+        bound, with a next step in which it changes by the root of the accuracy at most, if it changes as fast."""
+        most = math.sqrt(self.job.numerics.asked.of_steps)
+        if turned * made.next <= most * dt:
+            return made
+        return made._replace(next=self._level(self.timeline.spans[made.stage], most / turned * dt))
+
     def _shorter(self, chosen: ChosenSteps, span: Span, step: Step, share: float) -> Step | None:
         """Return a step of at most this share of a step, None if that one is the shortest."""
         least, dt = _bounds(span).least, share * step.dt
@@ -198,7 +207,8 @@ class Controller:
         if self._goes_on(span) and chosen.next:
             return self._level(span, chosen.next)
         if span.stage.speed:
-            return min(limits.most, one_cell(span.stage, self.job.grid))
+            cells = LEAST_SHEAR if self.job.sticks else 1.0
+            return min(limits.most, cells * one_cell(span.stage, self.job.grid))
         return self._level(span, RELAXING * self.body.shortest_time)
 
     def _goes_on(self, span: Span) -> bool:

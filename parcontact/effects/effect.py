@@ -97,12 +97,13 @@ class Instant:
 @dataclass(frozen=True)
 class Changes(Generic[Remembered]):
     """Changes by an effect in a step: its memory, a sentence for run.log or '', and whether errors can be stated across
-    the step."""
+    the step. `turned` is the change of the mean traction over the mean bound of traction."""
 
     memory: Remembered
     remark: str = ""
     states_errors: bool = True
     sheared: Sheared | None = None
+    turned: float = 0.0
 
 
 class Effect(Protocol[Memory]):

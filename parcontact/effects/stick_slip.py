@@ -150,7 +150,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         columns = *parts_of_friction(sheared), settled.stuck / self._slab.points
         lost = memory.lost + sheared.lost
         after = StickMemory(body, new, memory.last, target, strength, alpha, settled.share, energy, lost, columns)
-        return Changes(after, solved.failure, sheared=sheared)
+        return Changes(after, solved.failure, sheared=sheared, turned=math.dist(settled.share, memory.share))
 
     def _strength(self, dt: float, way: float, last: float) -> float:
         """Return the shear strength [Pa] of a step in which the surface moves by a way [m] along itself; `last` is the

@@ -203,8 +203,14 @@ class Job(Part):
 
     @property
     def remembers(self) -> bool:
-        """Return True if the result depends on the history: relaxing branches, or adhesion."""
-        return bool(self.material.fitted.branches) or self.section("adhesion") is not None
+        """Return True if the result depends on the history: relaxing branches, adhesion, or contacts that stick."""
+        return bool(self.material.fitted.branches) or self.section("adhesion") is not None or self.sticks
+
+    @property
+    def sticks(self) -> bool:
+        """Return True if points stick to the surface before they slide."""
+        interface = self.section("interface")
+        return interface is not None and interface.stick
 
     def resolved(self) -> str:
         """Return YAML text with every default, which loads back to an equal job.

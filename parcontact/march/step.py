@@ -48,7 +48,8 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
     energy = _advance_energy(scene, state, solved)
     changes, sheared = _follow(scene, state, made, energy)
     if state.chosen is not None and made.verdict is not None:
-        state.chosen.add(made.verdict)
+        turned = max((each.turned for each in changes.values()), default=0.0)
+        state.chosen.add(scene.controller.limit(made.verdict, made.solved.step.dt, turned))
     if solved.body.displacement is scene.solver.workspace.pressure:
         scene.solver.workspace.pressure = surface_of(state.body)
     step, last = solved.step, state.contact.last
