@@ -98,17 +98,21 @@ def _estimate(sources: Sequence[ErrorSource], run: RunProperties, observed: Step
     return ErrorBudget(ErrorParts(**missing | friction), area)
 
 
-def add_shear(budget: ErrorBudget, body: float, shear: float, whole: float, solver: float, share: float) -> ErrorBudget:
+def add_shear(
+    budget: ErrorBudget, body: float, shear: float, whole: float, solver: float, share: float, time: float
+) -> ErrorBudget:
     """Return the budget of friction `whole`, the sum of the part of the `body`, with its `budget`, and of `shear` by
     tractions.
 
-    The tractions have the relative error `solver` of their solve, and a `share` of them has the error of the area.
+    The tractions have the relative errors `solver` of their solve and `time` of the step, and a `share` of them has the
+    error of the area.
     """
     if whole <= 0.0:
         return replace(budget, friction=None)
     of_body = budget.friction or ErrorParts(*(0.0 for _ in NAMES))
     parts = {name: body * one + shear * share * two for name, one, two in zip(NAMES, of_body, budget.area, strict=True)}
     parts["solver"] += shear * solver
+    parts["time"] += shear * time
     return replace(budget, friction=ErrorParts(**{name: part / whole for name, part in parts.items()}))
 
 

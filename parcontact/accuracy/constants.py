@@ -51,6 +51,13 @@ SOLVER = Fit(
 SOLVER_AREA = Fit("area: times a power of the complementarity", 0.1, 0.7, EARLIER, "at least the error in 80 to 90 %")
 PENETRATING = Fit("area: times the points that penetrate without pressure", 0.8, 1.0, EARLIER, "as SOLVER_AREA")
 NOISE = Fit("tangential force without friction: times slope and complementarity", 0.4, 1.0, EARLIER, "1.2 to 14")
+ROLLING = Fit(
+    "tractions in rolling: times the shares of the contact that enter in a step and that stick",
+    2.0,
+    1.0,
+    "tests/effects/test_rolling.py",
+    "1.3 to 2.3 for cylinders, 10 for a sphere",
+)
 PASSING = Fit(
     "quadratic step: times the cube of the way over the radius of spots",
     0.4,

@@ -67,19 +67,16 @@ def _sticks(interface: Any, grid: Any, body: Any, initial: Any, steady: Any) -> 
 
 def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
     """Refuse rolling without stick, of a rough surface, and in chosen steps."""
+    if interface is None or not interface.stick:
+        yield from limits.no_rolling(history)
+        return
     rough = any(isinstance(shape, Rough | RoughSpectrum | Topography) for shape in surface)
     for index, stage in enumerate(history):
-        if stage is None or not stage.rolls:
-            continue
-        sentence = ""
-        if interface is None or not interface.stick:
-            sentence = "needs interface: {stick: true}: without it all that touches slides"
-        elif rough:
-            sentence = "needs a smooth surface: heights travel with the contact, and those of a rough wheel do not"
-        elif stage.chooses:
-            sentence = "needs cells_per_step or a time_step: chosen steps do not follow the tractions"
-        if sentence:
-            yield Fault(sentence, ("history", index, "creep"))
+        place = ("history", index, "creep")
+        if stage is not None and stage.rolls and rough:
+            yield Fault("needs a smooth surface: heights travel with the contact, those of a rough wheel do not", place)
+        if stage is not None and stage.rolls and stage.chooses:
+            yield Fault("needs cells_per_step or a time_step: chosen steps do not follow the tractions", place)
 
 
 def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
@@ -126,7 +123,7 @@ class InterfaceEffect(Effect[Memory]):
         Rule(("interface", "adhesion"), _no_adhesion),
         Rule(("interface", "output"), _has_tractions),
     )
-    lifts: ClassVar[tuple[Any, ...]] = (limits.no_traction,)
+    lifts: ClassVar[tuple[Any, ...]] = (limits.no_traction, limits.no_rolling)
 
     @staticmethod
     def decide(job: Any) -> Decision:

@@ -46,6 +46,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from ..accuracy.constants import ROLLING
 from ..columns import added_by
 from ..parallel.slab import Array
 from ..physics import loops
@@ -146,7 +147,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         if self._energy is not None and energy is not None:
             energy = self._energy.advance(energy, step.dt, now, before, solved.displacement, body, step.growth)
         settled = self._settle(now, before, new.bound, stiffness, surface_of(body), target)
-        sheared = self._sheared(instant, settled, solved.certificate)
+        sheared = self._sheared(instant, settled, solved.certificate, memory.last.bound, new.bound)
         columns = *parts_of_friction(sheared), settled.stuck / self._slab.points
         lost = memory.lost + sheared.lost
         after = StickMemory(body, new, memory.last, target, strength, alpha, settled.share, energy, lost, columns)
@@ -198,15 +199,20 @@ class StickSlip(InterfaceEffect[StickMemory]):
         share = (total_x / most, total_y / most) if most > 0.0 else (0.0, 0.0)
         return _Settled(lost * self._cell_force * self._scene.units.height, force, share, round(stuck))
 
-    def _sheared(self, instant: Instant, settled: _Settled, error: float) -> Sheared:
-        """Return what the tractions add to the measures of a step.
+    def _sheared(self, instant: Instant, settled: _Settled, error: float, before: Array, bound: Array) -> Sheared:
+        """Return what the tractions add to the measures of a step, from the bounds before and after it; collective.
 
         The share of the tractions that is wrong as the area is: all of those by a shear strength; by a coefficient
-        where points stick, as those that slip add up to a share of the load."""
+        where points stick, as those that slip add up to a share of the load. In rolling, points that enter the contact
+        in a step move with the surface for all of it."""
         touching = instant.measures.contact_area * self._slab.points
         by_load = self._law.coefficient is not None and touching > 0.0
         share = settled.stuck / touching if by_load else 1.0
-        return Sheared(_with_force(instant, settled.force), settled.force, settled.lost, error, share)
+        time = 0.0
+        if touching and self._scene.job.history[instant.step.stage].rolls:
+            entered = self._slab.sum(float(np.count_nonzero((bound > 0.0) & (before <= 0.0))))[0]
+            time = ROLLING.value * (entered / touching) * (settled.stuck / touching)
+        return Sheared(_with_force(instant, settled.force), settled.force, settled.lost, error, share, time)
 
     def values(self, memory: StickMemory) -> Sequence[float]:
         """Return the parts of friction, the share of the box that sticks, and the energy lost in slip [J], NaN without

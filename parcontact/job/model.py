@@ -74,6 +74,7 @@ class Job(Part):
         Rule(("grid", "history"), limits.steps_can_be_made),
         Rule(("output",), limits.no_temperature),
         Rule(("output",), limits.no_traction),
+        Rule(("history",), limits.no_rolling),
         Rule(("bands", "surface", "steady", "output"), limits.bands_fit),
         *BAND_RULES,
     )

@@ -192,7 +192,7 @@ def _budget_of(made: _Made, sheared: Sheared | None) -> ErrorBudget | None:
     if budget is None or sheared is None:
         return budget
     body, now = made.solved.measures.friction, sheared.measures
-    return add_shear(budget, body, now.friction_interface, now.friction, sheared.error, sheared.share)
+    return add_shear(budget, body, now.friction_interface, now.friction, sheared.error, sheared.share, sheared.time)
 
 
 def _describe_passed(step: Step) -> str:

@@ -74,10 +74,19 @@ def test_cattaneo_and_mindlin() -> None:
         assert sticking == pytest.approx(A * (1.0 - share) ** (1.0 / 3.0), abs=cell)
 
 
+def ball_that_rolls(stick: Any) -> dict[str, Any]:
+    """A ball that rolls obliquely over half a cell in each step, with a creep along and across."""
+    job = rough(stick, surface={"shape": "sphere", "radius": 5e-4}, output={"energy": True})
+    job["history"][1] |= {"velocity": [1.0, 0.25], "creep": [0.02, 0.01]}
+    return job
+
+
 @pytest.mark.mpi(2, 3, 4)
-def test_ranks_agree(comm: MPI.Intracomm) -> None:
+@pytest.mark.parametrize("rolls", [False, True])
+def test_ranks_agree(comm: MPI.Intracomm, rolls: bool) -> None:
     """Forces, sticking areas and energies are those of one rank, to the digits that sums in other orders leave."""
-    job = rough({"shear_stress": 2e5, "stick": True}, output={"energy": True})
+    stick = {"shear_stress": 6e4 if rolls else 2e5, "stick": True}
+    job = ball_that_rolls(stick) if rolls else rough(stick, output={"energy": True})
     job["history"][1]["duration"] = 3e-5  # most slips, some sticks
     alone, together = (marched(job, comm=each)[1][-1] for each in (MPI.COMM_SELF, comm))
     assert together.added == pytest.approx(alone.added, rel=1e-6, abs=0.0)
@@ -264,16 +273,17 @@ def test_energies_of_a_body_that_begins_to_slide(material: Any, most: float, sec
     assert last.work == pytest.approx(last.stored + last.dissipated + lost, rel=1e-10, abs=0.0)
 
 
-@pytest.mark.parametrize("section", [{"coefficient": 0.3}, STRONG_BELL], ids=["coefficient", "bell"])
-def test_restart_is_exact(tmp_path: Path, section: Any) -> None:
+@pytest.mark.parametrize("name", ["coefficient", "bell", "rolling"])
+def test_restart_is_exact(tmp_path: Path, name: str) -> None:
     """A run that goes on from a checkpoint has the bits of one that was not stopped, also if it is made at rest, where
     the strength of the last motion stays."""
-    data = rough({**section, "stick": True}, output={"energy": True})
+    stick = {**(STRONG_BELL if name == "bell" else {"coefficient": 0.3}), "stick": True}
+    data = ball_that_rolls(stick) if name == "rolling" else rough(stick, output={"energy": True})
     slide = data["history"][1]
     data["history"] += [{"pressure": 2e5, "duration": 2e-5, "time_step": 1e-5}, slide | {"duration": 2e-5}]
     whole = Simulation(data)
     for row in whole.steps():
-        if row.step == (9 if "coefficient" in section else 15):
+        if row.step == (15 if name == "bell" else 9):
             whole.save(tmp_path / "state.h5")
     again = Simulation.restore(tmp_path / "state.h5")
     last = again.run()

@@ -132,6 +132,14 @@ def no_traction(output: Output) -> Iterator[Fault]:
         yield Fault("has traction, which needs interface: {stick: true}", ("output", "fields"))
 
 
+def no_rolling(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
+    """Refuse rolling in a job without `interface`; with it this rule does not hold."""
+    for index, stage in enumerate(history):
+        if stage is not None and stage.rolls:
+            sentence = "needs interface: {stick: true}: without it all that touches slides"
+            yield Fault(sentence, ("history", index, "creep"))
+
+
 def some_history(history: tuple[Any, ...], steady: Steady | None) -> Iterator[Fault]:
     if not history and steady is None:
         yield Fault("needs at least one stage, unless there is a steady section", ("history",))
