@@ -76,7 +76,7 @@ def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
         if stage is not None and stage.rolls and rough:
             yield Fault("needs a smooth surface: heights travel with the contact, those of a rough wheel do not", place)
         if stage is not None and stage.rolls and stage.chooses:
-            yield Fault("needs cells_per_step or a time_step: chosen steps do not follow the tractions", place)
+            yield Fault("needs cells_per_step or a time_step: chosen steps do not follow the error of rolling", place)
 
 
 def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
