@@ -64,6 +64,8 @@ from .effect import Changes, Instant, Sheared
 from .interface_section import InterfaceEffect
 from .slipping import settle_slips
 
+UNIFORM = 1e-12  # rounding: share of the square of a pressure below which its waves are rounding
+
 
 class BoundedTraction(NamedTuple):
     """Tractions `alpha traction`, stacked, and their bounds, `alpha bound`."""
@@ -118,10 +120,12 @@ class StickSlip(InterfaceEffect[StickMemory]):
         self._both = stacked(slab)
         self._body, self._energy = scene.body_for_shear(self._both)
         self._cell_force = grid.dx * grid.dy * scene.units.pressure
+        self._free = setup.half_space.free
         operator = ShearOperator(setup.fft, setup.size, scene.job.material.poisson, setup.half_space.free)
-        grids = grids_for(setup.size[0] / slab.nx, setup.size[1] / slab.ny)
+        spacing = setup.size[0] / slab.nx, setup.size[1] / slab.ny
         limits = numerics.tolerance, numerics.max_iterations
-        self._solver = TangentialSolver(slab, operator, scene.operators.preconditioner, grids, *limits)
+        inverse, grids = scene.operators.preconditioner, grids_for(*spacing)
+        self._solver = TangentialSolver(slab, operator, min(spacing) / math.pi, inverse, grids, *limits)
 
     def at_rest(self) -> StickMemory:
         last, spare = (BoundedTraction(self._both.zeros(), self._slab.zeros()) for _ in range(2))
@@ -182,10 +186,15 @@ class StickSlip(InterfaceEffect[StickMemory]):
         np.multiply(instant.touching != 0, each, out=bound)
 
     def _stiffness(self, instant: Instant) -> float:
-        """Return pressure over displacement of the contact as a whole, `<p, p>/<p, A p>`; collective."""
+        """Return pressure over displacement of the contact as a whole, `<p, p>/<p, A p>`; collective.
+
+        In a periodic box p is without its mean, which does not move the surface. Where nothing is left, any number will
+        do.
+        """
         p, u = instant.pressure, instant.solved.contact.u
-        square, work = self._slab.sum(loops.dot(p, p), loops.dot(p, u))
-        return square / work if work > 0.0 else 1.0
+        square, work, total = self._slab.sum(loops.dot(p, p), loops.dot(p, u), float(p.sum(dtype=np.float64)))
+        waves = square if self._free else square - total**2 / self._slab.points
+        return waves / work if work > 0.0 and waves > UNIFORM * square else 1.0
 
     def _settle(
         self, now: Pressed, before: Pressed, bound: Array, stiffness: float, u: Array, target: Array

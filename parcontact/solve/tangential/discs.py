@@ -8,11 +8,12 @@ AT_BOUND = 1.0 - 1e-12  # rounding: share of its bound from which a traction is 
 
 
 @loop
-def shorten_to_bounds(bound, x, y):
-    """Shorten the tractions (x, y) to their bounds; a bound of 0 gives no traction."""
+def shorten_to_bounds(bound, x, y, hit):
+    """Shorten the tractions (x, y) to their bounds, and mark those that `hit` them; a bound of 0 gives no traction."""
     for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
             size, most = math.hypot(x[j, i], y[j, i]), bound[j, i]
+            hit[j, i] = most > 0.0 and size >= AT_BOUND * most
             if most <= 0.0:
                 x[j, i], y[j, i] = 0.0, 0.0
             elif size > most:
@@ -41,14 +42,14 @@ def extrapolate_tractions(last_x, last_y, last_bound, factor, growth, bound, mea
 
 
 @loop
-def examine(bound, x, y, u_x, u_y, e_x, e_y, kappa, free):
-    """Mark the `free` points, which touch and do not slip: the traction is below its bound, or the slip `w = e - u` is
-    against it.
+def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
+    """Divide points in contact into those that stick (`free`) and those that slip: their traction was shortened to its
+    bound (`hit`), and the slip `w = e - u` is not against it. `turn` receives |w|/f of points that slip, along t.
 
-    Return sums of |t|, of |P(t + kappa w)|, of `|P(t + kappa w) - t|`, with P(t) the traction shortened to its
-    bound, of `<t, u>/2 - <t, e>` and of `<t, u>/2`; and the number of free points.
+    Return sums of |t|, of |P(t + kappa w)| and of `|P(t + kappa w) - t|`, with P(t) the traction shortened to its
+    bound; the number of points that stick; and the numbers of points that move along x and along y (`residual`).
     """
-    size, moved, residual, energy, work, count = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    size, moved, residual, sticks, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(bound.shape[0]):
         sums = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
         for i in range(bound.shape[1]):
@@ -58,96 +59,140 @@ def examine(bound, x, y, u_x, u_y, e_x, e_y, kappa, free):
                 continue
             a, b = x[j, i], y[j, i]
             w_x, w_y = e_x[j, i] - u_x[j, i], e_y[j, i] - u_y[j, i]
-            here = math.hypot(a, b)
-            free[j, i] = here < AT_BOUND * most or w_x * a + w_y * b <= 0.0
+            here, work = math.hypot(a, b), w_x * a + w_y * b
             other_x, other_y = a + kappa * w_x, b + kappa * w_y
             other = math.hypot(other_x, other_y)
+            sticks_here = work <= 0.0 or not (hit[j, i] or other > most)
+            free[j, i] = sticks_here
+            turn[j, i] = 0.0 if sticks_here else work / (here * most)
             if other > most:
                 other_x, other_y, other = other_x * (most / other), other_y * (most / other), most
-            half = 0.5 * (a * u_x[j, i] + b * u_y[j, i])
             sums[0] += here
             sums[1] += other
             sums[2] += math.hypot(other_x - a, other_y - b)
-            sums[3] += half - a * e_x[j, i] - b * e_y[j, i]
-            sums[4] += half
-            sums[5] += 1.0 if free[j, i] else 0.0
+            sums[3] += 1.0 if sticks_here else 0.0
+            sums[4] += 1.0 if sticks_here or abs(b) > abs(a) else 0.0
+            sums[5] += 1.0 if sticks_here or abs(a) > abs(b) else 0.0
         size, moved, residual = size + sums[0], moved + sums[1], residual + sums[2]
-        energy, work, count = energy + sums[3], work + sums[4], count + sums[5]
-    return size, moved, residual, energy, work, count
+        sticks, along_x, along_y = sticks + sums[3], along_x + sums[4], along_y + sums[5]
+    return size, moved, residual, sticks, along_x, along_y
 
 
 @loop
-def slip_of(free, u, e, r):
-    """Put `e - u` at free points, 0 elsewhere, into r, for one component."""
-    for j in range(r.shape[0]):
-        for i in range(r.shape[1]):
-            r[j, i] = e[j, i] - u[j, i] if free[j, i] else 0.0
+def residual(bound, free, turn, x, y, u_x, u_y, e_x, e_y, short, along_x, moves, r):
+    """Put one component of the residual into r: the slip w of points that stick; of others, the part of w across the
+    traction, times the root of `short/(short + turn)`.
 
-
-@loop
-def turn_products(bound, free, d, u, u_old):
-    """Sums of d d and of `d (u - u_old)` where points slip, of one component."""
-    square, work = 0.0, 0.0
-    for j in range(d.shape[0]):
-        row_square, row_work = 0.0, 0.0
-        for i in range(d.shape[1]):
-            if bound[j, i] > 0.0 and not free[j, i]:
-                row_square += d[j, i] * d[j, i]
-                row_work += d[j, i] * (u[j, i] - u_old[j, i])
-        square, work = square + row_square, work + row_work
-    return square, work
-
-
-@loop
-def direction_products(free, u, u_old, e, z, d):
-    """Over free points, with the slip `w = e - u`, which fell by `c = u - u_old` in the last step along d: sums of w z,
-    c z, w d and c d, of one component."""
-    w_z, c_z, w_d, c_d = 0.0, 0.0, 0.0, 0.0
-    for j in range(z.shape[0]):
-        row_w_z, row_c_z, row_w_d, row_c_d = 0.0, 0.0, 0.0, 0.0
-        for i in range(z.shape[1]):
-            if free[j, i]:
-                w, change = e[j, i] - u[j, i], u[j, i] - u_old[j, i]
-                row_w_z += w * z[j, i]
-                row_c_z += change * z[j, i]
-                row_w_d += w * d[j, i]
-                row_c_d += change * d[j, i]
-        w_z, c_z, w_d, c_d = w_z + row_w_z, c_z + row_c_z, w_d + row_w_d, c_d + row_c_d
-    return w_z, c_z, w_d, c_d
-
-
-@loop
-def redirect(free, z, beta, d):
-    """Put `z + beta d` at free points, 0 elsewhere, into d, for one component."""
-    for j in range(d.shape[0]):
-        for i in range(d.shape[1]):
-            d[j, i] = z[j, i] + beta * d[j, i] if free[j, i] else 0.0
-
-
-@loop
-def move_tractions(bound, free, step, d_x, d_y, turn, u_x, u_y, e_x, e_y, x, y):
-    """Move tractions within their bounds: free ones by `step d`, those that slip by `turn w`, where d becomes by what
-    they moved, over the step. Returns sums of their sizes, and of what was cut off those that were free."""
-    size, cut = 0.0, 0.0
+    A point `moves` along this component if it sticks, or if its traction is mainly across it; r is 0 elsewhere.
+    """
     for j in range(bound.shape[0]):
-        row_size, row_cut = 0.0, 0.0
+        for i in range(bound.shape[1]):
+            a, b = x[j, i], y[j, i]
+            mainly_across = abs(b) > abs(a) if along_x else abs(a) > abs(b)
+            moves[j, i] = free[j, i] or (bound[j, i] > 0.0 and mainly_across)
+            r[j, i] = 0.0
+            if moves[j, i]:
+                w_x, w_y = e_x[j, i] - u_x[j, i], e_y[j, i] - u_y[j, i]
+                if not free[j, i]:
+                    across = (a * w_y - b * w_x) / (a * a + b * b) * math.sqrt(short / (short + turn[j, i]))
+                    w_x, w_y = -b * across, a * across
+                r[j, i] = w_x if along_x else w_y
+
+
+@loop
+def complete(bound, free, turn, x, y, u_x, u_y, e_x, e_y, old_x, old_y, old_u_x, old_u_y, short, long, z_x, z_y):
+    """Complete the direction z, of which the preconditioned residual is given, at points that slip: its part across the
+    traction, times the root of `short/(short + turn)`, and the rest of the residual over `long + turn`.
+
+    With the residual r, the last change d of the tractions, and c = A d + turn d, all of them across the traction where
+    points slip, return the sums of r z, r d, z c and d c.
+    """
+    r_z, r_d, z_c, d_c = 0.0, 0.0, 0.0, 0.0
+    for j in range(bound.shape[0]):
+        sums = [0.0, 0.0, 0.0, 0.0]
+        for i in range(bound.shape[1]):
+            if bound[j, i] <= 0.0:
+                z_x[j, i], z_y[j, i] = 0.0, 0.0
+                continue
+            a, b = x[j, i], y[j, i]
+            w_x, w_y = e_x[j, i] - u_x[j, i], e_y[j, i] - u_y[j, i]
+            d_x, d_y = a - old_x[j, i], b - old_y[j, i]
+            c_x, c_y = u_x[j, i] - old_u_x[j, i], u_y[j, i] - old_u_y[j, i]
+            if not free[j, i]:
+                here = math.hypot(a, b)
+                a, b = -b / here, a / here
+                w, d, c = a * w_x + b * w_y, a * d_x + b * d_y, a * c_x + b * c_y + turn[j, i] * (a * d_x + b * d_y)
+                z = a * z_x[j, i] if abs(a) > abs(b) else 0.0
+                z += b * z_y[j, i] if abs(b) > abs(a) else 0.0
+                share = short / (short + turn[j, i])
+                z = z * math.sqrt(share) + w * (1.0 - share) / (long + turn[j, i])
+                z_x[j, i], z_y[j, i] = a * z, b * z
+                w_x, w_y, d_x, d_y, c_x, c_y = a * w, b * w, a * d, b * d, a * c, b * c
+            sums[0] += w_x * z_x[j, i] + w_y * z_y[j, i]
+            sums[1] += w_x * d_x + w_y * d_y
+            sums[2] += z_x[j, i] * c_x + z_y[j, i] * c_y
+            sums[3] += d_x * c_x + d_y * c_y
+        r_z, r_d, z_c, d_c = r_z + sums[0], r_d + sums[1], z_c + sums[2], d_c + sums[3]
+    return r_z, r_d, z_c, d_c
+
+
+@loop
+def move_tractions(bound, free, x, y, z_x, z_y, step, again, new_x, new_y, hit):
+    """Replace the tractions before (x, y), in (new_x, new_y), by the next ones: `step z` and `again` times the last
+    change further. Those that slip keep their bounds; others are shortened to them."""
+    for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
             most = bound[j, i]
             if most <= 0.0:
+                new_x[j, i], new_y[j, i], hit[j, i] = 0.0, 0.0, False
                 continue
-            if free[j, i]:
-                a, b = x[j, i] + step * d_x[j, i], y[j, i] + step * d_y[j, i]
-            else:
-                a = x[j, i] + turn * (e_x[j, i] - u_x[j, i])
-                b = y[j, i] + turn * (e_y[j, i] - u_y[j, i])
-            here = math.hypot(a, b)
-            if here > most:
-                a, b = a * (most / here), b * (most / here)
-                row_cut += here - most if free[j, i] else 0.0
-                here = most
+            a, b = x[j, i], y[j, i]
+            d_x, d_y = a - new_x[j, i], b - new_y[j, i]
             if not free[j, i]:
-                d_x[j, i], d_y[j, i] = (a - x[j, i]) / step, (b - y[j, i]) / step
-            x[j, i], y[j, i] = a, b
-            row_size += here
-        size, cut = size + row_size, cut + row_cut
-    return size, cut
+                d = (a * d_y - b * d_x) / (a * a + b * b)
+                d_x, d_y = -b * d, a * d
+            a, b = a + step * z_x[j, i] + again * d_x, b + step * z_y[j, i] + again * d_y
+            size = math.hypot(a, b)
+            if size > most or not free[j, i]:
+                a, b, size = a * (most / size), b * (most / size), most
+            new_x[j, i], new_y[j, i], hit[j, i] = a, b, size >= AT_BOUND * most
+
+
+@loop
+def follow_slip(bound, x, y, u_x, u_y, e_x, e_y, kappa, new_x, new_y, hit):
+    """Put `P(t + kappa w)` into the next tractions, with P(t) the traction shortened to its bound."""
+    for j in range(bound.shape[0]):
+        for i in range(bound.shape[1]):
+            most = bound[j, i]
+            if most <= 0.0:
+                new_x[j, i], new_y[j, i], hit[j, i] = 0.0, 0.0, False
+                continue
+            a, b = x[j, i] + kappa * (e_x[j, i] - u_x[j, i]), y[j, i] + kappa * (e_y[j, i] - u_y[j, i])
+            size = math.hypot(a, b)
+            if size > most:
+                a, b, size = a * (most / size), b * (most / size), most
+            new_x[j, i], new_y[j, i], hit[j, i] = a, b, size >= AT_BOUND * most
+
+
+@loop
+def slope_and_curvature(t, new_t, u, new_u, e):
+    """Sums of d w, of d A d, and of |t w|, for the change d of the tractions in both components, with the slip
+    `w = e - u`."""
+    slope, curvature, size = 0.0, 0.0, 0.0
+    for j in range(t.shape[0]):
+        row_slope, row_curvature, row_size = 0.0, 0.0, 0.0
+        for i in range(t.shape[1]):
+            d, w = new_t[j, i] - t[j, i], e[j, i] - u[j, i]
+            row_slope += d * w
+            row_curvature += d * (new_u[j, i] - u[j, i])
+            row_size += abs(t[j, i] * w)
+        slope, curvature, size = slope + row_slope, curvature + row_curvature, size + row_size
+    return slope, curvature, size
+
+
+@loop
+def shorten_change(t, share, new_t):
+    """Replace the change of a map by a share of it."""
+    for j in range(t.shape[0]):
+        for i in range(t.shape[1]):
+            new_t[j, i] = t[j, i] + share * (new_t[j, i] - t[j, i])

@@ -7,15 +7,21 @@ With A the operator of the body, from tractions to displacements, and bounds f o
 w is the slip in a step in which a point that sticks ends at the displacement e. The solution minimizes the convex
 function `J(t) = <t, A t>/2 - <t, e>` over the product of discs |t| <= f. One iteration:
 
-1. Points are free where |t| < f or w points inwards; the others slip.
-2. At free points the direction is `d = E' K E w + beta d`. K is close to the inverse of A, and E extends w beyond
-   these points (`preconditioner.extension`); beta makes d conjugate to the last direction, from the change of w in
-   the last step.
-3. Free tractions move by STEP d, and slipping ones by `TURN kappa w`, both shortened to their discs. kappa is a
-   stiffness of the contact as a whole. If slip is large against f/kappa, this turns a traction into the direction of
-   slip.
+1. Points slip where t was shortened to its disc and w is not against it; the others stick. A traction that slips can
+   only turn. Turning it by an angle is resisted by the body, and by its slip: to A, `|w|/f` is added.
+2. The residual r is w where points stick, and the part of w across t where they slip. The direction z is
+   `S E' K E S r + (1 - S^2)/(1/kappa + |w|/f) r`. K is close to the inverse of A, E extends each component beyond the
+   points that move along it (`preconditioner.extension`), and S, 1 where points stick, is small where slip resists more
+   than the shortest waves.
+3. With d the last change of t, t moves by `STEP (z + beta d) + gamma d`. beta makes z conjugate to d, and gamma
+   minimizes J along d: both follow from A d, which is known. Then tractions that slip get the length f, and others are
+   shortened to it.
+4. Discs are convex, so that all tractions between the old and the new ones are admissible. t becomes the one with the
+   least J of them, and A t follows without another application of A. So J never rises.
+5. If this is a small part of the way, the next iteration takes `t + kappa w`, shortened to its disc, for the new
+   tractions. It always descends.
 
-If J rises, both steps are halved. The certificate compares a traction with the traction that the slip w gives:
+kappa is a stiffness of the contact as a whole. The certificate compares a traction with the one that the slip w gives:
 
     sum |P(t + kappa w) - t| / sum |t|,     P(t) = t shortened to its disc.
 
@@ -34,13 +40,14 @@ from ..preconditioner.extension import ExtendedPreconditioner, Grids
 from ..problem import Operator
 from . import discs
 
-STEP = 0.55  # tuning: step of free tractions; waves along q have half the stiffness that K assumes
-TURN = 2.0  # tuning: step of slipping tractions; with 4 or more, many iterations raise J
-MOST = 4.0  # tuning: largest step of slipping tractions over the last one
-LARGE_CUT = 0.003  # tuning: share of the sum of tractions; if more is cut off, the direction is forgotten
-LEAST_DESCENT = 0.5  # tuning: least slope along d over that along z; below it the last direction is forgotten
-ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # accuracy: share of <t, A t>/2 that is rounding
+STEP = 0.6  # tuning: step along z; waves along q have half the stiffness that K assumes
+LEAST_DESCENT = 0.5  # tuning: least slope along a direction over that along z; below it the last change is forgotten
+MOST_GROWTH = 20.0  # tuning: limit on gamma; reached where nothing resists, as all points of a periodic box stick
+SMALL_SHARE = 0.2  # tuning: share of the way to the new tractions; below it, tractions follow the slip next
+ROUNDING = 4 * float(np.finfo(np.float64).eps)  # rounding: share of sums of t w below which a change of J is rounding
 MAX_STALLED = 60  # tuning: limit on iterations without a smaller certificate
+
+Components = tuple[Array, Array, Array, Array, Array, Array]  # those of t, A t and e
 
 
 @dataclass(frozen=True)
@@ -59,76 +66,80 @@ class Tractions:
 
 
 class TangentialSolver:
-    """Solver on one grid, with the `operator` of the body for stacked tractions and a `preconditioner` for one
-    component."""
+    """Solver on one grid, with the `operator` of the body for stacked tractions, its compliance for the shortest waves,
+    `short`, and a `preconditioner` for one component. `free` are the points that stick at the end of a solve."""
 
     def __init__(
-        self, slab: Slab, operator: Operator, preconditioner: Operator, grids: Grids, tolerance: float, limit: int
+        self,
+        slab: Slab,
+        operator: Operator,
+        short: float,
+        preconditioner: Operator,
+        grids: Grids,
+        tolerance: float,
+        limit: int,
     ) -> None:
-        self.slab, self.tolerance, self._limit = slab, tolerance, limit
+        self.slab, self.tolerance, self._limit, self._short = slab, tolerance, limit, short
         self._operator, self._preconditioner = operator, preconditioner
         self._extended = ExtendedPreconditioner(slab, larger=grids)
         both = stacked(slab)
-        self._u, self._other, self._z, self._d = (both.zeros() for _ in range(4))
-        self.free = slab.zeros(np.bool_)
+        self._other, self._u, self._other_u, self._z = (both.zeros() for _ in range(4))
+        self._turn = slab.zeros()
+        self.free, self._hit, self._moves = (slab.zeros(np.bool_) for _ in range(3))
 
     def solve(self, bound: Array, aim: Array, kappa: float, t: Array) -> Tractions:
         """Solve for bounds f and stacked displacements e of points that stick, from the tractions t, which are
         overwritten by the solution; collective. `kappa` is a stiffness of the contact, in the unit of t over the
         unit of e."""
-        (t_x, t_y), e = components(t), components(aim)
-        discs.shorten_to_bounds(bound, t_x, t_y)
+        discs.shorten_to_bounds(bound, *components(t), self._hit)
         if self._is_at_rest(bound, aim, t):
             return self._rest(bound)
+        start, best, iteration, follows = t, (math.inf, 0), 0, False
         self._operator.apply(t, self._u)
-        best, energy, iteration, begins = (math.inf, 0), math.inf, 0, True
-        touching = self.slab.sum(float(np.count_nonzero(bound > 0.0)))[0]
-        step, turn = STEP, TURN * kappa
         while True:
-            found = discs.examine(bound, t_x, t_y, *components(self._u), *e, kappa, self.free)
-            size, moved, residual, now, work, stuck = self.slab.sum(*found)
+            now = *components(t), *components(self._u), *components(aim)
+            found = discs.examine(bound, self._hit, *now, kappa, self.free, self._turn)
+            size, moved, residual, stuck, *moving = self.slab.sum(*found)
             certificate = residual / (max(size, moved) or 1.0)
             best = min(best, (certificate, iteration))
             failure = self._verdict(certificate, iteration, best)
             if failure is not None:
+                if t is not start:
+                    start[...], self._other = t, t
                 return Tractions(self._u, certificate, iteration, round(stuck), failure)
-            if now > energy + ENERGY_ROUNDING * work:
-                step, turn, begins = 0.5 * step, 0.5 * turn, True
-            if iteration and stuck < touching:
-                turn = self._turn_again(bound, step, turn)
-            energy, iteration = now, iteration + 1
-            if stuck:
-                self._redirect(e, begins)
-            moves = step, *components(self._d), turn, *components(self._u), *e
-            size, cut = self.slab.sum(*discs.move_tractions(bound, self.free, *moves, t_x, t_y))
-            begins = cut > LARGE_CUT * size or not stuck
-            self._u, self._other = self._other, self._u
-            self._operator.apply(t, self._u)
+            if follows:
+                discs.follow_slip(bound, *now, kappa, *components(self._other), self._hit)
+            else:
+                self._move(bound, now, kappa, moving, begins=iteration == 0)
+            t, share = self._descend(aim, t)
+            follows, iteration = share < SMALL_SHARE, iteration + 1
 
-    def _turn_again(self, bound: Array, step: float, turn: float) -> float:
-        """Return the step of tractions that slip, by the compliance that they had in the last one; collective."""
-        sums = np.zeros(2)
-        for d, u, old in zip(*(components(one) for one in (self._d, self._u, self._other)), strict=True):
-            sums += discs.turn_products(bound, self.free, d, u, old)
-        square, work = self.slab.sum(*sums)
-        return min(step * square / work, MOST * turn) if work > 0.0 else turn
+    def _move(self, bound: Array, now: Components, kappa: float, moving: list[float], begins: bool) -> None:
+        """Put the next tractions in the place of the last ones; collective. `now` are the components of t, A t and e,
+        `moving` are numbers of points that move along each component."""
+        z, points = components(self._z), (bound, self.free, self._turn)
+        for along_x, part, number in zip((True, False), z, moving, strict=True):
+            discs.residual(*points, *now, self._short, along_x, self._moves, part)
+            if number:
+                self._extended.apply(self._preconditioner, self._moves, part)
+        last, last_u = components(self._other), components(self._other_u)
+        products = discs.complete(*points, *now, *last, *last_u, self._short, 1.0 / kappa, *z)
+        again = 0.0 if begins else _step_along_last(*self.slab.sum(*products))
+        discs.move_tractions(bound, self.free, *now[:2], *z, STEP, again, *last, self._hit)
 
-    def _redirect(self, e: tuple[Array, Array], begins: bool) -> None:
-        """Make the next direction of free tractions; if it `begins`, the last one is forgotten; collective."""
-        sums = np.zeros(4)
-        u, old, z, d = (components(one) for one in (self._u, self._other, self._z, self._d))
-        for each in range(2):
-            discs.slip_of(self.free, u[each], e[each], z[each])
-            self._extended.apply(self._preconditioner, self.free, z[each])
-            if not begins:
-                sums += discs.direction_products(self.free, u[each], old[each], e[each], z[each], d[each])
-        beta = 0.0
-        if not begins:
-            w_z, c_z, w_d, c_d = self.slab.sum(*sums)
-            beta = max(0.0, -c_z / c_d) if c_d > 0.0 else 0.0
-            beta = beta if w_z + beta * w_d > LEAST_DESCENT * w_z else 0.0
-        for each in range(2):
-            discs.redirect(self.free, z[each], beta, d[each])
+    def _descend(self, aim: Array, t: Array) -> tuple[Array, float]:
+        """Go from the tractions t towards the next ones, to the least J on the way. Return the new tractions, and the
+        share of the way; collective."""
+        new, u, new_u = self._other, self._u, self._other_u
+        self._operator.apply(new, new_u)
+        slope, curvature, size = self.slab.sum(*discs.slope_and_curvature(t, new, u, new_u, aim))
+        rounded = max(abs(slope), curvature) <= ROUNDING * size
+        share = 1.0 if rounded or slope >= curvature else max(slope / curvature, 0.0)
+        if share < 1.0:
+            discs.shorten_change(t, share, new)
+            discs.shorten_change(u, share, new_u)
+        self._other, self._u, self._other_u = t, new_u, u
+        return new, share
 
     def _verdict(self, certificate: float, iteration: int, best: tuple[float, int]) -> str | None:
         """Return None to continue, an empty string if solved, else why the solve has failed."""
@@ -153,3 +164,11 @@ class TangentialSolver:
         np.greater(bound, 0.0, out=self.free)
         self._u.fill(0.0)
         return Tractions(self._u, 0.0, 0, round(self.slab.sum(float(np.count_nonzero(self.free)))[0]))
+
+
+def _step_along_last(r_z: float, r_d: float, z_c: float, d_c: float) -> float:
+    """Return the step along the last change d, from the products of `discs.complete`."""
+    step = MOST_GROWTH
+    if r_d <= MOST_GROWTH * d_c:
+        step = (r_d - STEP * z_c) / d_c if d_c > 0.0 else 0.0
+    return step if STEP * r_z + step * r_d > LEAST_DESCENT * STEP * r_z else 0.0

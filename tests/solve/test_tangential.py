@@ -1,0 +1,162 @@
+"""Tractions within bounds: against projected gradients on the matrix, in descent, in iterations, and on ranks."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from parcontact.parallel.fft import FFT
+from parcontact.parallel.slab import Slab
+from parcontact.physics.halfspace import HalfSpace
+from parcontact.physics.shear_operator import ShearOperator, components, stacked
+from parcontact.solve.preconditioner.extension import ALL
+from parcontact.solve.tangential.solver import TangentialSolver
+
+Map = NDArray[np.float64]
+SIZE, POISSON = (1.0, 1.0), 0.5
+KINDS = ["few", "half", "all but holes", "all"]
+
+
+@dataclass
+class Scene:
+    """Bounds on a box, displacements e of points that stick, and a stiffness of the contact."""
+
+    bound: Map
+    aim: Map
+    kappa: float
+
+    def rows(self, slab: Slab) -> tuple[Map, Map]:
+        """Return this rank's rows of the bounds, and of e, stacked."""
+        return self.bound[slab.rows].copy(), np.concatenate([part[slab.rows] for part in self.aim])
+
+
+def solver_of(slab: Slab, free: bool, tolerance: float, limit: int = 500) -> TangentialSolver:
+    fft = FFT(slab)
+    operator = ShearOperator(fft, SIZE, POISSON, free)
+    inverse = HalfSpace(SIZE, POISSON, "love" if free else "spectral", free).inverse(fft)
+    return TangentialSolver(slab, operator, SIZE[0] / slab.nx / math.pi, inverse, ALL, tolerance, limit)
+
+
+def scene(kind: str, points: int, free: bool = False) -> Scene:
+    """A pattern of bumps, the same on any grid, which sticks in part: points move by different ways, mainly along x."""
+    x, y = np.meshgrid(*[2 * np.pi * np.arange(points) / points] * 2)
+    waves = np.cos(2 * x) + np.cos(3 * y) + np.cos(x + 2 * y + 1.0)
+    level = {"few": 1.2, "half": 0.0, "all but holes": -1.5, "all": -4.0}[kind]
+    bound = np.maximum(waves - level, 0.0)
+    slab = Slab.alone(points, points)
+    tractions, u = np.concatenate([bound, 0.0 * bound]), stacked(slab).zeros()
+    ShearOperator(FFT(slab), SIZE, POISSON, free).apply(tractions, u)
+    above = bound - (0.0 if free else bound.mean())
+    way = 0.7 * float(np.abs(u).max())
+    aim = way * np.array([1.0 + 0.3 * np.cos(y), 0.2 + 0.3 * np.sin(x + 1.0)])
+    return Scene(bound, aim, float((above**2).sum() / (tractions * u).sum()))
+
+
+def matrix_of(solver: TangentialSolver) -> Map:
+    """The operator as a matrix, one column for each traction."""
+    both = stacked(solver.slab)
+    units = np.eye(both.shape[0] * both.shape[1]).reshape(-1, *both.shape)
+    return np.stack([solver._operator.apply(unit, both.zeros()).ravel().copy() for unit in units], axis=1)
+
+
+def shortened(t: Map, bound: Map) -> Map:
+    size = np.hypot(*components(t))
+    return t * np.tile(np.where(size > bound, bound / np.where(size > 0.0, size, 1.0), 1.0), (2, 1))
+
+
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_solution_is_that_of_projected_gradients(kind: str, free: bool) -> None:
+    """The least J agrees with the one of accelerated projected gradients (A. Beck and M. Teboulle, SIAM J. Imaging Sci.
+    2 (2009) 183) on the matrix of 12 x 12 points to 1e-9 of <t, e>; tractions meet their bounds to rounding, and
+    displacements are A t."""
+    given, solver = scene(kind, 12, free), solver_of(Slab.alone(12, 12), free, 1e-8)
+    bound, e = given.rows(solver.slab)
+    t = np.zeros_like(e)
+    solved = solver.solve(bound, e, given.kappa, t)
+    assert not solved.failure
+    assert (np.hypot(*components(t)) <= bound * (1.0 + 1e-14)).all()
+    matrix = matrix_of(solver)
+    np.testing.assert_allclose(solved.displacement.ravel(), matrix @ t.ravel(), rtol=0, atol=1e-13 * given.kappa)
+    rate = 1.0 / np.linalg.eigvalsh(matrix)[-1]
+    other = ahead = np.zeros_like(t)
+    momentum = 1.0
+    for _ in range(4000):
+        new = shortened(ahead + rate * (e - (matrix @ ahead.ravel()).reshape(e.shape)), bound)
+        following = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * momentum**2))
+        ahead, other, momentum = new + (momentum - 1.0) / following * (new - other), new, following
+    found, best = (0.5 * one.ravel() @ matrix @ one.ravel() - (one * e).sum() for one in (t, other))
+    assert found == pytest.approx(best, rel=0.0, abs=1e-9 * float((t * e).sum()))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_iteration_raises_the_energy(kind: str) -> None:
+    """J falls with each iteration, to rounding: solves with a limit of 0, 1, 2, ... iterations stop at its iterates."""
+    given, energies = scene(kind, 24), []
+    for limit in range(12):
+        solver = solver_of(Slab.alone(24, 24), False, 1e-14, limit)
+        bound, e = given.rows(solver.slab)
+        t = shortened(np.concatenate([-0.3 * bound, 0.8 * bound]), bound)
+        u = solver.solve(bound, e, given.kappa, t).displacement
+        energies.append(float((0.5 * t * u - t * e).sum()))
+    assert (np.diff(energies) <= 1e-14 * abs(energies[-1])).all()
+    assert energies[-1] < energies[0]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_iterations_hardly_depend_on_the_grid(kind: str) -> None:
+    """From 32 to 256 points along a side the iterations to 1e-3 grow at most to the double, and stay below 12."""
+    found = []
+    for points in (32, 256):
+        given, solver = scene(kind, points), solver_of(Slab.alone(points, points), False, 1e-3)
+        bound, e = given.rows(solver.slab)
+        solved = solver.solve(bound, e, given.kappa, np.zeros_like(e))
+        assert not solved.failure
+        found.append(solved.iterations)
+    assert found[1] <= min(2 * found[0], 11)
+
+
+def test_nothing_resists_a_box_that_sticks() -> None:
+    """A uniform displacement of a box in full contact has one solution: it slips as a whole, with all tractions at
+    their bounds along it. The mean traction, which no displacement resists, gets there in a few iterations."""
+    solver = solver_of(Slab.alone(16, 16), False, 1e-6)
+    bound = np.ones((16, 16))
+    e = np.concatenate([3e-4 * bound, 4e-4 * bound])
+    t = np.zeros_like(e)
+    solved = solver.solve(bound, e, 10.0, t)
+    assert solved.iterations <= 6
+    np.testing.assert_allclose(t, np.concatenate([0.6 * bound, 0.8 * bound]), rtol=1e-6)
+
+
+def test_points_that_slip_along_x_are_not_moved_along_it() -> None:
+    """Where all points slip along x, tractions can only turn: an iteration applies the preconditioner to the component
+    along y alone, so that 3 operators are counted, after 2 at the start."""
+    solver = solver_of(Slab.alone(16, 16), False, 1e-3, limit=1)
+    given = scene("few", 16)
+    bound, _ = given.rows(solver.slab)
+    e = np.concatenate([np.full_like(bound, 100.0), 10.0 * np.sin(np.arange(16)) + np.zeros_like(bound)])
+    solver.solve(bound, e, given.kappa, np.concatenate([bound, 0.0 * bound]))
+    assert solver.slab.tally["operator"] == 2 + 3
+
+
+@pytest.mark.mpi(2, 3, 4)
+@pytest.mark.parametrize("free", [False, True])
+def test_ranks_have_the_tractions_of_one(comm: MPI.Intracomm, free: bool) -> None:
+    """Tractions on ranks, some of them without rows in the smaller box, are those on one rank to the tolerance of
+    1e-10, with the same iterations."""
+    for points in (3, 20):
+        given, results = scene("half", points, free), []
+        for slab in (Slab.alone(points, points), Slab(comm, points, points)):
+            solver = solver_of(slab, free, 1e-10)
+            bound, e = given.rows(slab)
+            t = np.zeros_like(e)
+            results.append((solver.solve(bound, e, given.kappa, t), t))
+        (alone, whole), (together, own) = results
+        assert together.iterations == alone.iterations
+        assert together.stuck == alone.stuck
+        rows = Slab(comm, points, points).rows
+        for part, other in zip(components(own), components(whole), strict=True):
+            np.testing.assert_allclose(part, other[rows], rtol=0, atol=1e-8 * float(given.bound.max()))
