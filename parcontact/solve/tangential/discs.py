@@ -5,6 +5,7 @@ import math
 from ...compiled import loop
 
 AT_BOUND = 1.0 - 1e-12  # rounding: share of its bound from which a traction is at it
+ACROSS = 0.5  # tuning: least component of a traction across an axis, over the one along it, for moves along the axis
 
 
 @loop
@@ -44,14 +45,15 @@ def extrapolate_tractions(last_x, last_y, last_bound, factor, growth, bound, mea
 @loop
 def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
     """Divide points in contact into those that stick (`free`) and those that slip: their traction was shortened to its
-    bound (`hit`), and the slip `w = e - u` is not against it. `turn` receives |w|/f of points that slip, along t.
+    bound (`hit`), or `t + kappa w` exceeds it, and the slip `w = e - u` is not against t. `turn` receives |w|/f of
+    points that slip, along t.
 
     Return sums of |t|, of |P(t + kappa w)| and of `|P(t + kappa w) - t|`, with P(t) the traction shortened to its
-    bound; the number of points that stick; and the numbers of points that move along x and along y (`residual`).
+    bound; and the numbers of points that move along x and along y (`residual`).
     """
-    size, moved, residual, sticks, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    size, moved, residual, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(bound.shape[0]):
-        sums = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        sums = [0.0, 0.0, 0.0, 0.0, 0.0]
         for i in range(bound.shape[1]):
             most = bound[j, i]
             if most <= 0.0:
@@ -62,20 +64,19 @@ def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
             here, work = math.hypot(a, b), w_x * a + w_y * b
             other_x, other_y = a + kappa * w_x, b + kappa * w_y
             other = math.hypot(other_x, other_y)
-            sticks_here = work <= 0.0 or not (hit[j, i] or other > most)
-            free[j, i] = sticks_here
-            turn[j, i] = 0.0 if sticks_here else work / (here * most)
+            sticks = work <= 0.0 or not (hit[j, i] or other > most)
+            free[j, i] = sticks
+            turn[j, i] = 0.0 if sticks else work / (here * most)
             if other > most:
                 other_x, other_y, other = other_x * (most / other), other_y * (most / other), most
             sums[0] += here
             sums[1] += other
             sums[2] += math.hypot(other_x - a, other_y - b)
-            sums[3] += 1.0 if sticks_here else 0.0
-            sums[4] += 1.0 if sticks_here or abs(b) > abs(a) else 0.0
-            sums[5] += 1.0 if sticks_here or abs(a) > abs(b) else 0.0
+            sums[3] += 1.0 if sticks or abs(b) > ACROSS * abs(a) else 0.0
+            sums[4] += 1.0 if sticks or abs(a) > ACROSS * abs(b) else 0.0
         size, moved, residual = size + sums[0], moved + sums[1], residual + sums[2]
-        sticks, along_x, along_y = sticks + sums[3], along_x + sums[4], along_y + sums[5]
-    return size, moved, residual, sticks, along_x, along_y
+        along_x, along_y = along_x + sums[3], along_y + sums[4]
+    return size, moved, residual, along_x, along_y
 
 
 @loop
@@ -83,13 +84,13 @@ def residual(bound, free, turn, x, y, u_x, u_y, e_x, e_y, short, along_x, moves,
     """Put one component of the residual into r: the slip w of points that stick; of others, the part of w across the
     traction, times the root of `short/(short + turn)`.
 
-    A point `moves` along this component if it sticks, or if its traction is mainly across it; r is 0 elsewhere.
+    A point `moves` along this component if it sticks, or if its traction is sufficiently across it; r is 0 elsewhere.
     """
     for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
             a, b = x[j, i], y[j, i]
-            mainly_across = abs(b) > abs(a) if along_x else abs(a) > abs(b)
-            moves[j, i] = free[j, i] or (bound[j, i] > 0.0 and mainly_across)
+            turns = abs(b) > ACROSS * abs(a) if along_x else abs(a) > ACROSS * abs(b)
+            moves[j, i] = free[j, i] or (bound[j, i] > 0.0 and turns)
             r[j, i] = 0.0
             if moves[j, i]:
                 w_x, w_y = e_x[j, i] - u_x[j, i], e_y[j, i] - u_y[j, i]
@@ -122,8 +123,8 @@ def complete(bound, free, turn, x, y, u_x, u_y, e_x, e_y, old_x, old_y, old_u_x,
                 here = math.hypot(a, b)
                 a, b = -b / here, a / here
                 w, d, c = a * w_x + b * w_y, a * d_x + b * d_y, a * c_x + b * c_y + turn[j, i] * (a * d_x + b * d_y)
-                z = a * z_x[j, i] if abs(a) > abs(b) else 0.0
-                z += b * z_y[j, i] if abs(b) > abs(a) else 0.0
+                z = a * z_x[j, i] if abs(a) > ACROSS * abs(b) else 0.0
+                z += b * z_y[j, i] if abs(b) > ACROSS * abs(a) else 0.0
                 share = short / (short + turn[j, i])
                 z = z * math.sqrt(share) + w * (1.0 - share) / (long + turn[j, i])
                 z_x[j, i], z_y[j, i] = a * z, b * z

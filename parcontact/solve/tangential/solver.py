@@ -61,13 +61,12 @@ class Tractions:
     displacement: Array
     certificate: float
     iterations: int
-    stuck: int
     failure: str = ""
 
 
 class TangentialSolver:
     """Solver on one grid, with the `operator` of the body for stacked tractions, its compliance for the shortest waves,
-    `short`, and a `preconditioner` for one component. `free` are the points that stick at the end of a solve."""
+    `short`, and a `preconditioner` for one component."""
 
     def __init__(
         self,
@@ -85,7 +84,7 @@ class TangentialSolver:
         both = stacked(slab)
         self._other, self._u, self._other_u, self._z = (both.zeros() for _ in range(4))
         self._turn = slab.zeros()
-        self.free, self._hit, self._moves = (slab.zeros(np.bool_) for _ in range(3))
+        self._free, self._hit, self._moves = (slab.zeros(np.bool_) for _ in range(3))
 
     def solve(self, bound: Array, aim: Array, kappa: float, t: Array) -> Tractions:
         """Solve for bounds f and stacked displacements e of points that stick, from the tractions t, which are
@@ -93,20 +92,21 @@ class TangentialSolver:
         unit of e."""
         discs.shorten_to_bounds(bound, *components(t), self._hit)
         if self._is_at_rest(bound, aim, t):
-            return self._rest(bound)
+            self._u.fill(0.0)
+            return Tractions(self._u, 0.0, 0)
         start, best, iteration, follows = t, (math.inf, 0), 0, False
         self._operator.apply(t, self._u)
         while True:
             now = *components(t), *components(self._u), *components(aim)
-            found = discs.examine(bound, self._hit, *now, kappa, self.free, self._turn)
-            size, moved, residual, stuck, *moving = self.slab.sum(*found)
+            found = discs.examine(bound, self._hit, *now, kappa, self._free, self._turn)
+            size, moved, residual, *moving = self.slab.sum(*found)
             certificate = residual / (max(size, moved) or 1.0)
             best = min(best, (certificate, iteration))
             failure = self._verdict(certificate, iteration, best)
             if failure is not None:
                 if t is not start:
                     start[...], self._other = t, t
-                return Tractions(self._u, certificate, iteration, round(stuck), failure)
+                return Tractions(self._u, certificate, iteration, failure)
             if follows:
                 discs.follow_slip(bound, *now, kappa, *components(self._other), self._hit)
             else:
@@ -117,7 +117,7 @@ class TangentialSolver:
     def _move(self, bound: Array, now: Components, kappa: float, moving: list[float], begins: bool) -> None:
         """Put the next tractions in the place of the last ones; collective. `now` are the components of t, A t and e,
         `moving` are numbers of points that move along each component."""
-        z, points = components(self._z), (bound, self.free, self._turn)
+        z, points = components(self._z), (bound, self._free, self._turn)
         for along_x, part, number in zip((True, False), z, moving, strict=True):
             discs.residual(*points, *now, self._short, along_x, self._moves, part)
             if number:
@@ -125,7 +125,7 @@ class TangentialSolver:
         last, last_u = components(self._other), components(self._other_u)
         products = discs.complete(*points, *now, *last, *last_u, self._short, 1.0 / kappa, *z)
         again = 0.0 if begins else _step_along_last(*self.slab.sum(*products))
-        discs.move_tractions(bound, self.free, *now[:2], *z, STEP, again, *last, self._hit)
+        discs.move_tractions(bound, self._free, *now[:2], *z, STEP, again, *last, self._hit)
 
     def _descend(self, aim: Array, t: Array) -> tuple[Array, float]:
         """Go from the tractions t towards the next ones, to the least J on the way. Return the new tractions, and the
@@ -158,12 +158,6 @@ class TangentialSolver:
         parts = *components(aim), *components(t)
         largest = max(float(np.abs(part).max(where=touching, initial=0.0)) for part in parts)
         return self.slab.reduce((), [largest])[0] == 0.0
-
-    def _rest(self, bound: Array) -> Tractions:
-        """Return the result without tractions, in which all points stick; collective."""
-        np.greater(bound, 0.0, out=self.free)
-        self._u.fill(0.0)
-        return Tractions(self._u, 0.0, 0, round(self.slab.sum(float(np.count_nonzero(self.free)))[0]))
 
 
 def _step_along_last(r_z: float, r_d: float, z_c: float, d_c: float) -> float:
