@@ -309,8 +309,9 @@ def cycle_loss(share: float) -> float:
 
 @pytest.mark.parametrize("accuracy", [0.04, 0.01])
 def test_chosen_steps_of_an_elastic_ball(accuracy: float) -> None:
-    """In a cycle friction and loss are within the accuracy of the theory, 0.3 % of which slip across the force takes.
-    The mean traction changes by the root of the accuracy in a step, at most twice that after a small step."""
+    """In a cycle friction is within the accuracy of the theory, 0.3 % of which slip across the force takes, and the
+    loss within twice the accuracy: it is a small difference of works, in which errors of forces of one sign count nine
+    times. The mean traction changes by the root of the accuracy in a step, at most twice that after a small step."""
     far = mindlin(0.9)
     base = {"force": FORCE, "time_step": "auto"}
     ways = [
@@ -326,7 +327,7 @@ def test_chosen_steps_of_an_elastic_ball(accuracy: float) -> None:
     turns = [next(i for i, row in enumerate(rows) if row.time == pytest.approx(time)) for time in (1.0, 3.0, 5.0)]
     assert [shares[i] for i in turns] == pytest.approx([0.9, -0.9, 0.9], abs=0.9 * accuracy)
     lost = rows[turns[2]].added[3] - rows[turns[0]].added[3]
-    assert lost == pytest.approx(cycle_loss(0.9), rel=accuracy)
+    assert lost == pytest.approx(cycle_loss(0.9), rel=2.0 * accuracy)
     changes = [abs(new - old) for old, new in pairwise(shares)]
     assert 0.7 * math.sqrt(accuracy) < max(changes) < 2.0 * math.sqrt(accuracy)
 
