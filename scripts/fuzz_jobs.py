@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """Random jobs of all sections, sound and broken: jobs that `check` accepts must run, others must end with a sentence.
 
-    .venv/bin/python scripts/fuzz_jobs.py [--jobs 2000] [--seed 0] [--only NUMBER]
+    .venv/bin/python scripts/fuzz_jobs.py [--jobs 2000] [--seed 0] [--only NUMBER] [--stick]
 
 Jobs are drawn by tests/robustness/any_job.py, on grids of a few hundred points. Half of them stay as they are. In a
 quarter some values are changed to extreme ones or to values of another kind. In the others characters of the text are
 changed, cut, doubled or inserted; or a file of heights, or the job file, is damaged, of another type or length, no
 regular file, or a link. All jobs go through the command line, in this process: `check`, then the run. Small shares of
-the finished jobs go through `report`, `leak`, `plan` and `study`, too.
+the finished jobs go through `report`, `leak`, `plan` and `study`, too. With `--stick` contacts stick in all jobs.
 
 Faults are: a traceback, a warning of NumPy, a run that refuses a job that `check` accepts, a failure without a physical
 reason, a result that is not finite or out of its bounds (area, pressure, load, energies), a mistake without its place,
@@ -15,6 +15,7 @@ a refusal that takes more than 3 s of CPU time or leaves files, and more than 1 
 faults.
 """
 
+import argparse
 import contextlib
 import csv
 import io
@@ -28,7 +29,7 @@ import tempfile
 import time
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -76,6 +77,9 @@ SPLICES = (
     "1" + "0" * 400, "0x1F", "1_000", "12:30", ".inf", ".nan", "~", "null", "yes"),
 )  # fmt: skip
 BOMB = "\n".join(["b0: &b0 [x]", *(f"b{i}: &b{i} [{', '.join([f'*b{i - 1}'] * 9)}]" for i in range(1, 12))])
+
+
+Draw = Callable[[Random, Path], dict[str, Any]]
 
 
 class HangError(BaseException):
@@ -200,10 +204,14 @@ def history_faults(directory: Path, job: jobs.Job) -> Iterator[str]:
     strength = 0.0
     if stick:
         strength = stick.work / float((chosen_range(job) or math.nan) if stick.range == "auto" else stick.range)
+    law, lost = job.section("interface"), 0.0
     for row in rows_of(directory / "measures.csv"):
         yield from row_faults(f"step {row['step']:g}", row, most)
         if not stick:
             yield from load_faults(row, job)
+        if law and law.stick:
+            yield from traction_faults(row, job, lost)
+            lost = row.get("slip_loss", 0.0)
     fields = directory / "fields.h5"
     if fields.exists():
         with h5py.File(fields) as file:
@@ -248,6 +256,23 @@ def row_faults(where: str, row: dict[str, float], most: float) -> Iterator[str]:
         yield f"{where}: friction {row['friction']:g}"
 
 
+def traction_faults(row: dict[str, float], job: jobs.Job, lost: float) -> Iterator[str]:
+    """Yield faults of the tractions of a step, before which slip had `lost` an energy [J]. Energies of backward Euler
+    only balance for short steps."""
+    where, coefficient = f"step {row['step']:g}", job.section("interface").coefficient or math.inf
+    if row["friction_interface"] > coefficient * (1.0 + SLACK):
+        yield f"{where}: friction of the interface {row['friction_interface']:g}, at most {coefficient:g}"
+    if not 0.0 <= row["stick_area"] <= row["contact_area"] * (1.0 + SLACK):
+        yield f"{where}: {row['stick_area']:g} sticks of {row['contact_area']:g}"
+    if "slip_loss" in row:
+        parts = [row[name] for name in ("work", "stored", "dissipated", "slip_loss")]
+        exact = job.numerics.integrator != "backward-euler"
+        if exact and abs(parts[0] - sum(parts[1:])) > SLACK * max(map(abs, parts)):
+            yield f"{where}: work {parts[0]:g} J, not {sum(parts[1:]):g} J"
+        if row["slip_loss"] < lost:
+            yield f"{where}: slip_loss falls from {lost:g} to {row['slip_loss']:g} J"
+
+
 @contextlib.contextmanager
 def bounded() -> Iterator[None]:
     """Raise HangError after too much CPU time."""
@@ -263,13 +288,13 @@ def bounded() -> Iterator[None]:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
-def trial(seed: int, counts: Counter[str], number: int) -> Iterator[str]:
+def trial(asked: argparse.Namespace, counts: Counter[str], number: int) -> Iterator[str]:
     """Yield the faults of one job."""
     with tempfile.TemporaryDirectory() as name, contextlib.chdir(name), warnings.catch_warnings():
         warnings.simplefilter("error")
-        dice, here = Random(f"{seed} {number}"), Path(name)
+        dice, here = Random(f"{asked.seed} {number}"), Path(name)
         made = dice.choices([as_drawn, changed_values, changed_text, changed_file], [4, 2, 1, 1])[0]
-        path = made(dice, here)
+        path = made(partial(any_job.draw, stick=asked.stick), dice, here)
         try:
             with bounded():
                 ended, *faults = drive(path, here)
@@ -288,12 +313,12 @@ def _write(directory: Path, text: str) -> Path:
     return path
 
 
-def as_drawn(dice: Random, directory: Path) -> Path:
-    return _write(directory, yamltext.dump(any_job.draw(dice, directory)))
+def as_drawn(draw: Draw, dice: Random, directory: Path) -> Path:
+    return _write(directory, yamltext.dump(draw(dice, directory)))
 
 
-def changed_text(dice: Random, directory: Path) -> Path:
-    text = yamltext.dump(any_job.draw(dice, directory))
+def changed_text(draw: Draw, dice: Random, directory: Path) -> Path:
+    text = yamltext.dump(draw(dice, directory))
     for _ in range(dice.choice([1, 1, 2, 4])):
         place, size = dice.randrange(len(text) + 1), dice.randint(0, 20)
         character = chr(dice.choice([dice.randrange(32, 127), dice.randrange(0xD7FF)]))
@@ -317,8 +342,8 @@ def leaves(data: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         yield from leaves(value, (*path, key))
 
 
-def changed_values(dice: Random, directory: Path) -> Path:
-    data = any_job.draw(dice, directory)
+def changed_values(draw: Draw, dice: Random, directory: Path) -> Path:
+    data = draw(dice, directory)
     for _ in range(dice.choice([1, 1, 1, 1, 2])):
         *way, last = dice.choice(list(leaves(data)))
         node: Any = data
@@ -337,14 +362,14 @@ def changed_values(dice: Random, directory: Path) -> Path:
     return _write(directory, dice.choice([yamltext.dump, yaml.safe_dump])(data))
 
 
-def changed_file(dice: Random, directory: Path) -> Path:
+def changed_file(draw: Draw, dice: Random, directory: Path) -> Path:
     """Make a file of heights that is damaged, of another type or length, or no file; sometimes the job itself."""
     if dice.random() < 0.1:
         return odd_file(dice, directory / "job.yaml")
     path = directory / f"damaged.{dice.choice(['npy', 'txt', 'xyz'])}"
     part = {"shape": "topography", "unit": "m", "size": [1e-3, 1e-3]} if path.suffix == ".xyz" else {"shape": "file"}
     grid, surface = {"points": 16, "size": 1e-3}, {**part, "path": path.name}
-    job = _write(directory, yamltext.dump({**any_job.draw(dice, directory), "grid": grid, "surface": surface}))
+    job = _write(directory, yamltext.dump({**draw(dice, directory), "grid": grid, "surface": surface}))
     heights = 1e-6 * np.random.default_rng(dice.getrandbits(32)).standard_normal((16, 16))
     odd = (heights * 1e300, heights * 1e-310, heights[:12], heights[0], heights.astype("S8"), heights * 1j)
     heights = dice.choice([*6 * [heights], *odd])
@@ -382,8 +407,9 @@ def odd_file(dice: Random, path: Path) -> Path:
 
 
 def main() -> int:
-    asked, counts = campaign.parser(__doc__, 2000, "jobs").parse_args(), Counter[str]()
-    faulty = campaign.go(asked, partial(trial, asked.seed, counts), counts)
+    options = campaign.parser(__doc__, 2000, "jobs", stick=(False, "let contacts stick in all jobs"))
+    asked, counts = options.parse_args(), Counter[str]()
+    faulty = campaign.go(asked, partial(trial, asked, counts), counts)
     peak = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     print(f"at most {peak / 1e6:.0f} MB")
     return 1 if faulty or peak > BYTES else 0

@@ -48,8 +48,8 @@ class Scale:
         return self.length / self.time
 
 
-def draw(dice: Random, directory: Path) -> Json:
-    """Return a job as data; the files that it names are in the directory."""
+def draw(dice: Random, directory: Path, stick: bool = False) -> Json:
+    """Return a job as data; the files that it names are in the directory. With `stick` its contact sticks."""
     points = (dice.choice(SIDES), dice.choice(SIDES))
     side = decades(dice, -7, 0)
     size = (side, side * points[1] / points[0] * dice.choice([1.0, 1.0, 1.0, 0.5, 2.0]))
@@ -87,6 +87,7 @@ def draw(dice: Random, directory: Path) -> Json:
         job["checkpoint"] = {"every": dice.choice([1, 3]), "keep": dice.choice([0, 1, 2])}
     if dice.random() < 0.06:
         job["sweep"] = _sweep(dice, job)
+    job = _with_stick(dice, scale, job) if stick else job
     job = job if dice.random() < 0.05 else _reconciled(dice, job)
     return _with_rare_keys(Random(repr(job)), job)
 
@@ -302,6 +303,32 @@ def _thermal(dice: Random, scale: Scale) -> Json:
 def _interface(dice: Random, scale: Scale) -> Json:
     made: Json = {"shear_stress": scale.pressure * decades(dice, -2, 0)}
     return made if dice.random() < 0.5 else {**made, "velocity": scale.speed, "width": dice.uniform(1.0, 5.0)}
+
+
+def _with_stick(dice: Random, scale: Scale, job: Json) -> Json:
+    """Return a job whose contact sticks, with up to five stages that press, rest, shear, reverse, turn and roll."""
+    bound = {"coefficient": decades(dice, -1.5, 0.3)} if dice.random() < 0.5 else _interface(dice, scale)
+    job = {key: value for key, value in job.items() if key not in ("steady", "initial", "body", "adhesion", "leakage")}
+    if "model" in job["material"]:
+        job["material"]["poisson"] = 0.5
+    job["output"] |= {"energy": dice.random() < 0.6} | (
+        {"fields": ["pressure", "traction"]} if dice.random() < 0.5 else {}
+    )
+    way, duration = scale.slope * scale.length * decades(dice, -2, 1), scale.time * decades(dice, -2, 2)
+    speed, load = way / duration, scale.pressure * decades(dice, -2, 0.5)
+    shapes = job["surface"] if isinstance(job["surface"], list) else [job["surface"]]
+    rolls = not any(part["shape"] in ("rough", "topography") for part in shapes)
+    stages: list[Json] = [{"pressure": load, **dice.choice([{}, {"duration": duration}])}]
+    for _ in range(dice.choice([1, 2, 3, 4])):
+        loaded = dice.choice([load, load, {"from": load, "to": load * dice.choice([0.0, 0.5, 2.0])}])
+        moved: Json = {"velocity": dice.choice([speed, speed, -speed, 0.1 * speed, [0.6 * speed, -0.8 * speed]])}
+        steps = _steps(dice, duration, dice.choice([1, 2, 5, 12]), moving=True)
+        if dice.random() < 0.2:
+            moved, steps = {}, {"time_step": duration / dice.choice([1, 3])}
+        elif rolls and dice.random() < 0.3:
+            moved["creep"] = dice.choice([0.0, 0.01, -0.1, [0.5, 0.2]])
+        stages.append({"pressure": loaded, "duration": duration, **moved, **steps})
+    return {**job, "interface": {**bound, "stick": True}, "history": stages}
 
 
 # -- loads and motion -------------------------------------------------------------------------------------------------
