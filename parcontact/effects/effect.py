@@ -43,12 +43,14 @@ class Decision:
 @dataclass(frozen=True)
 class Sheared:
     """Effect of tractions along the surface in a step: the measures including them, their force [N] on the rigid
-    surface, and the energy lost in slip [J]. `error` is the relative error of their solve, a `share` of them has the
-    error of the area, and `time` is their relative error by the length of the step."""
+    surface, and the energy lost in slip [J]. The map `slipping` is in proportion to the power of slip with `thermal`,
+    and to the bounds of tractions if nothing slips. `error` is the relative error of their solve, a `share` of them has
+    the error of the area, and `time` is their relative error by the length of the step."""
 
     measures: Measures
     force: Vector
     lost: float
+    slipping: Array
     error: float = 0.0
     share: float = 0.0
     time: float = 0.0

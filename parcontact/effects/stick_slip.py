@@ -76,12 +76,13 @@ class BoundedTraction(NamedTuple):
 
 class _Settled(NamedTuple):
     """Sums over the points of a step: the energy lost in slip [J], the force on the rigid surface [N], the mean
-    traction over the mean bound, and the number of points that stick."""
+    traction over the mean bound, and the number of points that stick; `slipping` as in `Sheared`."""
 
     lost: float
     force: Vector
     share: Vector
     stuck: int
+    slipping: Array
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         self._friction = self._law.friction(scene.job.material)
         self._both = stacked(slab)
         self._body, self._energy = scene.body_for_shear(self._both)
+        self._slipping = slab.zeros() if scene.job.section("thermal") is not None else np.zeros((0, 0))
         self._cell_force = grid.dx * grid.dy * scene.units.pressure
         self._free = setup.half_space.free
         operator = ShearOperator(setup.fft, setup.size, scene.job.material.poisson, setup.half_space.free)
@@ -201,12 +203,13 @@ class StickSlip(InterfaceEffect[StickMemory]):
     ) -> _Settled:
         """Renew the targets of points that slip or are not touched, and return sums over all points; collective."""
         t, old = ((each.modulus, *components(each.p)) for each in (now, before))
-        sums = settle_slips(bound, stiffness, *t, *old, *components(u), *components(target))
-        lost, total_x, total_y, most, stuck = self._slab.sum(*sums)
+        sums = settle_slips(bound, stiffness, *t, *old, *components(u), *components(target), self._slipping)
+        lost, total_x, total_y, most, stuck, power = self._slab.sum(*sums)
         unit = self._cell_force * now.modulus
         force = 0.0 - unit * total_x, 0.0 - unit * total_y
         share = (total_x / most, total_y / most) if most > 0.0 else (0.0, 0.0)
-        return _Settled(lost * self._cell_force * self._scene.units.height, force, share, round(stuck))
+        slipping = self._slipping if power > 0.0 else bound
+        return _Settled(lost * self._cell_force * self._scene.units.height, force, share, round(stuck), slipping)
 
     def _sheared(self, instant: Instant, settled: _Settled, error: float, before: Array, bound: Array) -> Sheared:
         """Return what the tractions add to the measures of a step, from the bounds before and after it; collective.
@@ -221,7 +224,8 @@ class StickSlip(InterfaceEffect[StickMemory]):
         if touching and self._scene.job.history[instant.step.stage].rolls:
             entered = self._slab.sum(float(np.count_nonzero((bound > 0.0) & (before <= 0.0))))[0]
             time = ROLLING.value * (entered / touching) * (settled.stuck / touching)
-        return Sheared(_with_force(instant, settled.force), settled.force, settled.lost, error, share, time)
+        measures = _with_force(instant, settled.force)
+        return Sheared(measures, settled.force, settled.lost, settled.slipping, error, share, time)
 
     def values(self, memory: StickMemory) -> Sequence[float]:
         """Return the parts of friction, the share of the box that sticks, and the energy lost in slip [J], NaN without

@@ -201,9 +201,11 @@ class ThermalColumns(Effect[ThermalMemory]):
         if self._pulled:
             pressure = np.maximum(pressure, 0.0)
         rubbed = np.where(instant.touching, 1.0, 0.0) if self._rubs else None
-        sums = float(np.count_nonzero(instant.touching)), float(pressure.sum(dtype=np.float64))
-        area, mean = (value / self._slab.points for value in self._slab.sum(*sums))
-        scales = 1.0 / area if area > 0.0 else 0.0, 1.0 / mean if mean > 0.0 else 0.0
+        if instant.sheared is not None:
+            rubbed = instant.sheared.slipping
+        sums = [0.0 if one is None else float(one.sum(dtype=np.float64)) for one in (rubbed, pressure)]
+        of_rubbed, of_pressure = (self._slab.points / one if one > 0.0 else 0.0 for one in self._slab.sum(*sums))
+        scales = of_rubbed, of_pressure
         begins = any(step.velocity) and not memory.warmed
         now = replace(memory, warmed=memory.warmed or begins)
         heating, now = self._heat(instant, now)

@@ -195,6 +195,29 @@ def test_heat_of_slip_is_its_loss() -> None:
     assert rows[-1].added[3] > rows[-3].added[3] > 0.0
 
 
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_heat_is_where_points_slip(share: float) -> None:
+    """After a step so short that heat flows straight down, `T = 2 q sqrt(t/pi)/e` with the effusivity e. In full slip,
+    far beyond the shear of the body, q is half of mu p v, as the traction grows in the step; to 1 %, by the steps of
+    the sum of exponentials. In partial slip the zone that sticks is cold, but for one cell at its edge."""
+    coefficient, way, seconds = (MU, mindlin(share), 1e-7) if share < 1.0 else (1e-6, 1e-9, 1e-7)
+    slide = {"force": FORCE, "velocity": way / seconds, "duration": seconds, "time_step": seconds}
+    more: dict[str, Any] = {"thermal": HEAT, "interface": {"coefficient": coefficient, "stick": True}}
+    march, _ = marched(sphere([], 48, history=[{"force": FORCE}, slide], **more))
+    warm, pressure = march.field("temperature"), march.field("pressure")
+    if share == 1.0:
+        heat = 0.5 * coefficient * pressure * way / seconds
+        exact = 2.0 * heat * math.sqrt(seconds / math.pi) / (0.2 / math.sqrt(1e-7))
+        assert np.abs(warm - exact).max() < 1e-2 * exact.max()
+    else:
+        cell = 4.0 * A / 48
+        at = (np.arange(48) - 23.5) * cell
+        radius = np.hypot(at, at[:, np.newaxis])
+        cold = A * (1.0 - share) ** (1.0 / 3.0) - cell
+        assert warm[radius < cold].max() < 1e-2 * warm.max()
+        assert warm[(radius > cold + 2.0 * cell) & (radius < A - cell)].min() > 5e-2 * warm.max()
+
+
 def test_slip_loses_energy_where_the_motion_turns_back() -> None:
     """In one step from sliding to sliding back the trapezoidal rule would give a loss below 0, by a hundredth of what
     the step before has lost. The energies are balanced but for rounding."""
