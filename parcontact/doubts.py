@@ -307,6 +307,10 @@ SENTENCES = {
         "{where}: the contact reaches the edge of the box and is cut off there, so its results are wrong; use a "
         "larger grid.size, a smaller load or a shorter distance"
     ),
+    "whole box sticks": (
+        "{where}: all of the periodic box is in contact, where no traction moves the mean of its surface: friction of "
+        "the first steps that stick may be too small; use grid.boundary: free, a smaller load or rougher heights"
+    ),
     "cells": (
         "{where}: spots of contact are only a few cells wide: contact_area is about {excess!p} too large (limit: "
         "{most!p}); use {more}, a smaller grid.size or a larger load"

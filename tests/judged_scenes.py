@@ -48,7 +48,7 @@ def rough_heights(points: int, shortest: float, seed: int = 1) -> NDArray[np.flo
 def run(job: Job, steps: int | None = None) -> list[str]:
     """What is said of the contacts of a job's steps."""
     march = March(scene.build(job, Slab.alone(*job.grid.points)))
-    watch, said = sanity.ContactWatch(job.numerics.strict, Timeline.from_job(job)), list[str]()
+    watch, said = sanity.ContactWatch.of(job, Timeline.from_job(job)), list[str]()
     for step in list(Timeline.from_job(job))[:steps]:
         said += map(str, watch.check_step(step.number, march.advance(step).measures))
     return said

@@ -15,7 +15,6 @@ from ..doubts import Doubt
 from ..effects.effect import columns_of
 from ..errors import InputError
 from ..job import Job
-from ..job.checks.cells import more_points
 from ..job.sections.listing import plain_job
 from ..job.text.yamltext import parse
 from ..march.loop import March
@@ -214,7 +213,7 @@ class Simulation:
     @cached_property
     def _contacts(self) -> ContactWatch:
         """Return the watch that warns about implausible contacts."""
-        return ContactWatch(self.job.numerics.strict, self._march.timeline(), more=more_points(self.job.grid))
+        return ContactWatch.of(self.job, self._march.timeline())
 
     def _warns(self, doubt: Doubt) -> bool:
         """Issue a warning on root."""

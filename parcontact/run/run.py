@@ -12,7 +12,6 @@ from ..errors import InputError, RunError
 from ..history.chosen import reached
 from ..job import Job
 from ..job.checks.advice import describe_sample
-from ..job.checks.cells import more_points
 from ..job.sections.listing import plain_data
 from ..march import loop
 from ..march.failure import StepError
@@ -59,8 +58,7 @@ class Run:
         self.facts, self.options, self.console = facts, options, recorder.console
         self.slab, self.job = march.scene.slab, march.scene.job
         self.timeline = march.timeline(options.until or 0.0)
-        more = more_points(self.job.grid)
-        self.contacts = sanity.ContactWatch(self.job.numerics.strict, self.timeline, more=more)
+        self.contacts = sanity.ContactWatch.of(self.job, self.timeline)
         self.watch.state_bytes = sum(entry.nbytes for entry in march.entries().values()) * self.slab.comm.size
         self.first, self.saved, self.failed, self.stop = march.row.step, -1, False, ""
         self.began, self.saving = time.monotonic(), 0.0

@@ -16,6 +16,7 @@ from ..errors import InputError, JobError, RunError
 from ..history.timeline import Timeline
 from ..job import Job, OnOneMesh
 from ..job.checks import advice, layer_warnings, meaning, size
+from ..job.checks.cells import more_points
 from ..job.checks.limits import MOST_STEPS
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
@@ -178,12 +179,21 @@ def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
 
 @dataclass
 class ContactWatch:
-    """Checks of the contact of each step; each kind of warning is given once."""
+    """Checks of the contact of each step; each kind of warning is given once. `sticks` is True for a periodic box whose
+    contact may stick."""
 
     strict: bool
     timeline: Timeline
     seen: set[str] = field(default_factory=set)
     more: str = "more grid.points"
+    sticks: bool = False
+
+    @classmethod
+    def of(cls, job: Job, timeline: Timeline) -> "ContactWatch":
+        """Return the checks of a job."""
+        interface = job.section("interface")
+        sticks = interface is not None and interface.stick and all(job.grid.cyclic)
+        return cls(job.numerics.strict, timeline, more=more_points(job.grid), sticks=sticks)
 
     def check_step(self, step: int, measures: Measures) -> list[Doubt]:
         """Return warnings about a step; raises RunError if these are errors."""
@@ -193,6 +203,8 @@ class ContactWatch:
     def check_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
         """Return warnings about a contact, about its cells if it is `final`; raises RunError if these are errors."""
         found = [*doubt_edge(measures, where), *(doubt_cells(measures, where, self.more) if final else ())]
+        if self.sticks and measures.contact_area == 1.0:
+            found.append(Doubt("whole box sticks", "", {"where": where}))
         new = [doubt for doubt in found if doubt.kind not in self.seen]
         self.seen |= {doubt.kind for doubt in new}
         if new and self.strict:

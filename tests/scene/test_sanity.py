@@ -303,3 +303,13 @@ def test_approaches_below_the_rounding_of_heights_are_refused(tmp_path: Path, ap
     (text,) = caught.value.mistakes
     assert text.startswith(f"{path}:4:22: history.0: an approach of {approach:.3g} m is lost in the rounding of")
     assert "at least 2.22e-06 m" in text
+
+
+@pytest.mark.parametrize(("pressure", "interface"), [(1e5, True), (1e3, True), (1e5, False)])
+def test_a_periodic_box_that_sticks_as_a_whole(pressure: float, interface: bool) -> None:
+    """A box in full contact that may stick is warned of once; one with gaps, or without stick, is not. The wave closes
+    at a pressure of 2 pi G/(1 - nu) times its amplitude over its length, 2.5e4 Pa."""
+    section = {"interface": {"shear_stress": 1e4, "stick": interface}}
+    said = run(job_of(WAVE, [{"pressure": pressure}, {"pressure": pressure}], **section))
+    assert [text for text in said if "all of the periodic box is in contact" in text] == said
+    assert len(said) == (1 if interface and pressure > 2.5e4 else 0)
