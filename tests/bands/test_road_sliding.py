@@ -52,7 +52,7 @@ def test_one_band_is_steady_on_one_grid(pressure: float) -> None:
     assert bands.measures.contact_area == pytest.approx(grid.measures.contact_area, rel=3e-3)  # of some 500 points
     assert bands.measures.friction == pytest.approx(grid.measures.friction, rel=1e-2)  # by slopes: of first order
     assert bands.measures.mean_gap == pytest.approx(grid.measures.mean_gap, rel=1e-3)
-    assert bands.dissipated == pytest.approx(grid.dissipated, rel=2e-3)
+    assert bands.dissipated == pytest.approx(grid.dissipated, rel=2e-3, abs=0.0)
     assert (bands.errors.friction or bands.errors.area).method == 0.0
 
 
