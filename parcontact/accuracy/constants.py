@@ -56,7 +56,7 @@ ROLLING = Fit(
     2.0,
     1.0,
     "tests/effects/test_rolling.py",
-    "1.3 to 2.3 for cylinders, 10 for a sphere",
+    "0.7 to 30 for cylinders, by where edges lie in a cell; 10 for a sphere",
 )
 PASSING = Fit(
     "quadratic step: times the cube of the way over the radius of spots",

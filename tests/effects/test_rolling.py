@@ -162,7 +162,7 @@ def test_energies_of_rubber() -> None:
             "duration: 1.0, time_step: 1.0",
             "creep needs a velocity",
         ),
-        ("0.01", "[0.01, a]", "history.0.creep.1 must be a creep [-]: a number along the velocity, or [along, across]"),
+        ("0.01", "[0.01, a]", "history.0.creep.1 must be a creep [-] from -1000 to 1000: a number"),
     ],
 )
 def test_mistakes(tmp_path: Path, old: str, new: str, sentence: str) -> None:

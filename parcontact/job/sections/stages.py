@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, Valida
 
 from ..text.fault import Fault, quote, refuse
 from .part import Instead, Origin, Part, Rule
-from .quantities import Flag, Positive, Real, Vector, listed, log_range
+from .quantities import Flag, Positive, Real, Vector, along_x, listed, log_range
 from .temperature import Celsius
 
 Control = Literal["pressure", "force", "approach"]
@@ -33,7 +33,9 @@ def _no_ramp(value: Any) -> Any:
 
 
 Velocity = Annotated[Vector, BeforeValidator(_no_ramp), Field(description=VELOCITY)]
-Creep = Annotated[Vector, Field(description="a creep [-]: a number along the velocity, or [along, across]")]
+CREEP = "a creep [-] from -1000 to 1000: a number along the velocity, or [along, across]"
+AnyCreep = Annotated[Real, Field(ge=-1e3, le=1e3)]
+Creep = Annotated[tuple[AnyCreep, AnyCreep], BeforeValidator(along_x), Field(description=CREEP)]
 
 
 @dataclass(frozen=True)
