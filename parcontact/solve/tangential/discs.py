@@ -49,7 +49,7 @@ def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
     points that slip, along t.
 
     Return sums of |t|, of |P(t + kappa w)| and of `|P(t + kappa w) - t|`, with P(t) the traction shortened to its
-    bound; and the numbers of points that move along x and along y (`residual`).
+    bound, and of its components.
     """
     size, moved, residual, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(bound.shape[0]):
@@ -72,8 +72,8 @@ def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
             sums[0] += here
             sums[1] += other
             sums[2] += math.hypot(other_x - a, other_y - b)
-            sums[3] += 1.0 if sticks or abs(b) > ACROSS * abs(a) else 0.0
-            sums[4] += 1.0 if sticks or abs(a) > ACROSS * abs(b) else 0.0
+            sums[3] += abs(other_x - a)
+            sums[4] += abs(other_y - b)
         size, moved, residual = size + sums[0], moved + sums[1], residual + sums[2]
         along_x, along_y = along_x + sums[3], along_y + sums[4]
     return size, moved, residual, along_x, along_y

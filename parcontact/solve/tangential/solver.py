@@ -12,7 +12,7 @@ function `J(t) = <t, A t>/2 - <t, e>` over the product of discs |t| <= f. One it
 2. The residual r is w where points stick, and the part of w across t where they slip. The direction z is
    `S E' K E S r + (1 - S^2)/(1/kappa + |w|/f) r`. K is close to the inverse of A, E extends each component beyond the
    points that move along it (`preconditioner.extension`), and S, 1 where points stick, is small where slip resists more
-   than the shortest waves.
+   than the shortest waves. K is left out for a component along which there is little to correct.
 3. With d the last change of t, t moves by `STEP (z + beta d) + gamma d`. beta makes z conjugate to d, and gamma
    minimizes J along d: both follow from A d, which is known. Then tractions that slip get the length f, and others are
    shortened to it.
@@ -41,6 +41,7 @@ from ..problem import Operator
 from . import discs
 
 STEP = 0.6  # tuning: step along z; waves along q have half the stiffness that K assumes
+LEAST_PART = 0.2  # tuning: least share of a component in the residual for which K is applied to it
 LEAST_DESCENT = 0.5  # tuning: least slope along a direction over that along z; below it the last change is forgotten
 MOST_GROWTH = 20.0  # tuning: limit on gamma; reached where nothing resists, as all points of a periodic box stick
 SMALL_SHARE = 0.2  # tuning: share of the way to the new tractions; below it, tractions follow the slip next
@@ -99,7 +100,7 @@ class TangentialSolver:
         while True:
             now = *components(t), *components(self._u), *components(aim)
             found = discs.examine(bound, self._hit, *now, kappa, self._free, self._turn)
-            size, moved, residual, *moving = self.slab.sum(*found)
+            size, moved, residual, *parts = self.slab.sum(*found)
             certificate = residual / (max(size, moved) or 1.0)
             best = min(best, (certificate, iteration))
             failure = self._verdict(certificate, iteration, best)
@@ -110,18 +111,20 @@ class TangentialSolver:
             if follows:
                 discs.follow_slip(bound, *now, kappa, *components(self._other), self._hit)
             else:
-                self._move(bound, now, kappa, moving, begins=iteration == 0)
+                self._move(bound, now, kappa, parts, begins=iteration == 0)
             t, share = self._descend(aim, t)
             follows, iteration = share < SMALL_SHARE, iteration + 1
 
-    def _move(self, bound: Array, now: Components, kappa: float, moving: list[float], begins: bool) -> None:
+    def _move(self, bound: Array, now: Components, kappa: float, parts: list[float], begins: bool) -> None:
         """Put the next tractions in the place of the last ones; collective. `now` are the components of t, A t and e,
-        `moving` are numbers of points that move along each component."""
+        `parts` the sums of the residual along each axis."""
         z, points = components(self._z), (bound, self._free, self._turn)
-        for along_x, part, number in zip((True, False), z, moving, strict=True):
-            discs.residual(*points, *now, self._short, along_x, self._moves, part)
-            if number:
-                self._extended.apply(self._preconditioner, self._moves, part)
+        for along_x, r, part in zip((True, False), z, parts, strict=True):
+            if part <= LEAST_PART * sum(parts):
+                r.fill(0.0)
+                continue
+            discs.residual(*points, *now, self._short, along_x, self._moves, r)
+            self._extended.apply(self._preconditioner, self._moves, r)
         last, last_u = components(self._other), components(self._other_u)
         products = discs.complete(*points, *now, *last, *last_u, self._short, 1.0 / kappa, *z)
         again = 0.0 if begins else _step_along_last(*self.slab.sum(*products))
