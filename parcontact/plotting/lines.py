@@ -1,4 +1,4 @@
-"""Charts of pressure along a line: of a narrow map, or through the axis of a sphere or cylinder."""
+"""Charts of pressure, and of traction, along a line: of a narrow map, or through the axis of a sphere or cylinder."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -75,6 +75,35 @@ def _make_strip(run: PlottedRun, fields: Fields) -> style.Panel:
     some = "some of the " if len(curves) < len(fields.shown) else "the "
     title = f"pressure at {some}saved instants{load}" if run.lasts else f"pressure under {some}loads"
     return partial(_draw_pressures, curves=curves, along="x" if lies else "y", title=title)
+
+
+def traction_panels(run: PlottedRun, fields: Fields) -> Iterator[style.Panel]:
+    """Yield the panel of tractions along the long side of a narrow map at the chosen instant, if they are saved. With a
+    coefficient of friction it has the bounds."""
+    lies = fields.x.size > fields.y.size
+    along, place = ("x", fields.x) if lies else ("y", fields.y)
+    traction, pressure = fields.read(f"traction_{along}"), fields.read("pressure")
+    if traction is None or pressure is None:
+        return
+    t, p = (field[0] if lies else field[:, 0] for field in (traction, pressure))
+    instant = run.instant(int(fields.steps[fields.chosen]), float(fields.times[fields.chosen]))
+    bound = run.job.section("interface").coefficient
+    touched = place[p > 0.0]
+
+    def draw(axes: Axes) -> None:
+        axes.plot(place, t, color=style.BLUE, label="traction")
+        for sign, name in ((1, "bound"), (-1, "")) if bound is not None else ():
+            axes.plot(place, sign * bound * p, "k:", lw=1.0, label=name)
+        if touched.size:
+            margin = 0.15 * np.ptp(touched)
+            axes.set_xlim(touched.min() - margin, touched.max() + margin)
+        axes.set_title(f"traction along {along}, {instant}")
+        axes.locator_params(nbins=5)
+        prefixes.label(axes.xaxis, along, "m")
+        prefixes.label(axes.yaxis, "traction", "Pa")
+        axes.legend(**style.AT_SIDE, **MANY_LINES)
+
+    yield draw
 
 
 def _make_profile(run: PlottedRun, fields: Fields, shape: Sphere | Cylinder) -> style.Panel:

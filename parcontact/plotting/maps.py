@@ -49,7 +49,7 @@ BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile, and the ratio to it above which po
 
 
 def map_panels(run: PlottedRun, at: str = "") -> tuple[list[style.Panel], list[style.Panel]]:
-    """Return panels of pressures on a line, and of the saved maps of one instant.
+    """Return panels of pressures on a line, and of the saved maps of one instant, or of tractions on a line.
 
     The default instant is the last one; for contacts that end in detachment, the pull-off or the largest load. Raises
     InputError if nothing is saved at the instant `at`.
@@ -59,7 +59,9 @@ def map_panels(run: PlottedRun, at: str = "") -> tuple[list[style.Panel], list[s
             fields = Fields(file, at, until=run.telling_step)
             narrow = min(fields.x.size, fields.y.size) <= STRIP
             pressures = list(lines.line_panels(run, fields, narrow)) if fields.read("pressure") is not None else []
-            return pressures, [] if narrow or not fields.saved else list(_panels(run, fields))
+            if narrow:
+                return pressures, list(lines.traction_panels(run, fields))
+            return pressures, list(_panels(run, fields)) if fields.saved else []
     except (OSError, KeyError):
         if at:
             message = f"--at {at}: {run.directory} has no maps; save them by output: {{fields: [...]}}"

@@ -131,6 +131,23 @@ def test_contacts_that_stick_are_closed_where_their_gap_is_zero() -> None:
     assert np.isnan(maps.mask("gap", gap, np.abs(pressure), job)).all()
 
 
+def test_tractions_of_a_strip_are_a_line_within_their_bounds(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Of a wave that has begun to slide: some points are at the bound, some below."""
+    slide = "{pressure: 1.0e3, velocity: 0.1, distance: 1.2e-7, cells_per_step: 0.001}"
+    stick = "interface: {coefficient: 0.5, stick: true}\noutput: {fields: [pressure, traction]}\n"
+    out = ran(tmp_path, STRIP + ELASTIC + f"history: [{{pressure: 1.0e3}}, {slide}]\n" + stick)
+    plots.plot([out])
+    (axes,) = (one for one in drawn[0].axes if one.get_title().startswith("traction along x"))
+    t, above, below = (np.asarray(line.get_ydata()) for line in axes.lines)
+    with h5py.File(out / "fields.h5") as file:
+        assert np.array_equal(t, file["traction_x"][-1, 0])
+        assert np.array_equal(above, 0.5 * file["pressure"][-1, 0])
+    assert np.array_equal(below, -above)
+    at_bound = t[above > 0.0] > 0.999 * above[above > 0.0]
+    assert at_bound.any()
+    assert not at_bound.all()
+
+
 def test_the_colours_of_pressures_that_pull_and_push_show_both() -> None:
     """Where most of the box is open, too: the range has the lowest, and the highest but for few, and 0 is white."""
     pressure = np.zeros((64, 64))
