@@ -84,9 +84,10 @@ def ball_that_rolls(stick: Any) -> dict[str, Any]:
 @pytest.mark.mpi(2, 3, 4)
 @pytest.mark.parametrize("rolls", [False, True])
 def test_ranks_agree(comm: MPI.Intracomm, rolls: bool) -> None:
-    """Forces, sticking areas and energies are those of one rank, to the digits that sums in other orders leave."""
+    """Forces, sticking areas, energies and temperatures are those of one rank, to the digits that sums in other orders
+    leave."""
     stick = {"shear_stress": 6e4 if rolls else 2e5, "stick": True}
-    job = ball_that_rolls(stick) if rolls else rough(stick, output={"energy": True})
+    job = ball_that_rolls(stick) if rolls else rough(stick, output={"energy": True}, thermal=HEAT)
     job["history"][1]["duration"] = 3e-5  # most slips, some sticks
     alone, together = (marched(job, comm=each)[1][-1] for each in (MPI.COMM_SELF, comm))
     assert together.added == pytest.approx(alone.added, rel=1e-6, abs=0.0)
@@ -166,6 +167,24 @@ def test_full_slip_at_strengths_that_depend_on_velocity() -> None:
     *_, last, rest, end = marched(rough({**BELL, "stick": True}, ELASTIC, **more))[1]
     for row in (rest, end):
         assert row.measures.force_x == pytest.approx(last.measures.force_x, rel=1e-4)
+
+
+def test_strengths_follow_the_temperature() -> None:
+    """Rubber that is warmer than its reference, and warmed by its own heat, has the strength without stick in full
+    slip: 4 % more than without the heat of sliding. To 1e-3, as the first step makes half of the heat."""
+    warm = RUBBER | {"shift": {"law": "wlf", "C1": 8.86, "C2": 101.6, "reference": 20.0}, "temperature": 30.0}
+    slide = {"pressure": 1e5, "velocity": 5.0, "distance": 2e-4, "cells_per_step": 1}
+    found = []
+    for way, feedback in (({}, "none"), ({}, "mean"), ({"stick": True}, "mean")):
+        more: dict[str, Any] = {"history": [{"pressure": 1e5}, slide], "thermal": HEAT | {"feedback": feedback}}
+        job = rough(
+            {"shear_stress": 1e5, "velocity": 0.5, "width": 1.0, **way}, warm, numerics={"tolerance": 1e-4}, **more
+        )
+        measures = marched(job)[1][-1].measures
+        found.append(measures.friction_interface / measures.contact_area_corrected)
+    cold, plain, stuck = found
+    assert stuck == pytest.approx(plain, rel=1e-3)
+    assert plain > 1.03 * cold
 
 
 @pytest.mark.parametrize("material", [RUBBER, ELASTIC], ids=["rubber", "elastic"])
@@ -303,6 +322,8 @@ def test_restart_is_exact(tmp_path: Path, name: str) -> None:
     stick = {**(STRONG_BELL if name == "bell" else {"coefficient": 0.3}), "stick": True}
     data = ball_that_rolls(stick) if name == "rolling" else rough(stick, output={"energy": True})
     slide = data["history"][1]
+    if name == "coefficient":
+        data["history"][1] = slide | {"time_step": "auto"}
     data["history"] += [{"pressure": 2e5, "duration": 2e-5, "time_step": 1e-5}, slide | {"duration": 2e-5}]
     whole = Simulation(data)
     for row in whole.steps():
@@ -364,7 +385,7 @@ def test_chosen_steps_of_a_block_that_begins_to_slide() -> None:
         rows = marched(job)[1][5:]
         found.append(([row.distance for row in rows], [row.measures.friction for row in rows]))
     (at, friction), (all_at, right) = found
-    assert 10 < len(at) <= 20
+    assert 10 < len(at) <= 25
     assert all_at[-1] == pytest.approx(at[-1])
     assert friction == pytest.approx(np.interp(at, all_at, right), abs=0.05 * max(right))
 
