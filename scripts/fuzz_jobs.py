@@ -258,7 +258,7 @@ def row_faults(where: str, row: dict[str, float], most: float) -> Iterator[str]:
 
 def traction_faults(row: dict[str, float], job: jobs.Job, lost: float) -> Iterator[str]:
     """Yield faults of the tractions of a step, before which slip had `lost` an energy [J]. Energies of backward Euler
-    only balance for short steps."""
+    balance for short steps only, and those of contacts that are not solved need not."""
     where, coefficient = f"step {row['step']:g}", job.section("interface").coefficient or math.inf
     if row["friction_interface"] > coefficient * (1.0 + SLACK):
         yield f"{where}: friction of the interface {row['friction_interface']:g}, at most {coefficient:g}"
@@ -266,7 +266,7 @@ def traction_faults(row: dict[str, float], job: jobs.Job, lost: float) -> Iterat
         yield f"{where}: {row['stick_area']:g} sticks of {row['contact_area']:g}"
     if "slip_loss" in row:
         parts = [row[name] for name in ("work", "stored", "dissipated", "slip_loss")]
-        exact = job.numerics.integrator != "backward-euler"
+        exact = job.numerics.integrator != "backward-euler" and not job.numerics.accept_unconverged
         if exact and abs(parts[0] - sum(parts[1:])) > SLACK * max(map(abs, parts)):
             yield f"{where}: work {parts[0]:g} J, not {sum(parts[1:]):g} J"
         if row["slip_loss"] < lost:
