@@ -11,8 +11,10 @@ from marched_jobs import column, marched
 
 from parcontact.errors import InputError
 from parcontact.job import load
+from parcontact.storage.step_row import StepRow
 
 G, RADIUS, HALF_WIDTH, MU = 1e6, 1e-2, 1e-4, 0.5
+LOAD = 1e-3  # of a ball [N]
 LINE_LOAD = math.pi * G * HALF_WIDTH**2 / RADIUS  # Hertz, load [N/m] of a cylinder on an incompressible half space
 FULL = MU * HALF_WIDTH / RADIUS  # creep at which all slips (F. W. Carter, 1926)
 ELASTIC = {"model": "elastic", "shear_modulus": G, "poisson": 0.5}
@@ -64,6 +66,27 @@ def test_carter(share: float, across: int) -> None:
     assert abs(2.0 * errors[1] - errors[0]) < 5e-3
 
 
+def ball(velocity: list[float], creep: list[float], mu: float, radii: int) -> tuple[StepRow, float]:
+    """The last row of a ball that rolls over some radii of its contact, with 8 cells in the radius, along x or against
+    y, and the area of its contact [m^2]."""
+    radius = (3.0 * LOAD * RADIUS / (16.0 * G)) ** (1.0 / 3.0)
+    points, center = [8 * (radii + 3), 24], [1.5 * radius, 1.5 * radius]
+    if velocity[1]:
+        points, center = points[::-1], [center[0], (radii + 1.5) * radius]
+    size = [count * radius / 8.0 for count in points]
+    roll = {"velocity": velocity, "distance": radii * radius, "cells_per_step": 1, "creep": creep}
+    job = {
+        "grid": {"points": points, "size": size, "boundary": "free"},
+        "surface": {"shape": "sphere", "radius": RADIUS, "center": center},
+        "material": ELASTIC,
+        "interface": {"coefficient": mu, "stick": True},
+        "history": [{"force": LOAD}, {"force": LOAD, **roll}],
+        "numerics": {"tolerance": 1e-3},
+    }
+    last = marched(job)[1][-1]
+    return last, last.measures.contact_area * size[0] * size[1]
+
+
 @pytest.mark.parametrize(
     ("velocity", "creep", "coefficient"), [([1.0, 0.0], [1e-4, 0.0], 5.20), ([0.0, -1.0], [0.0, 1e-4], 3.98)]
 )
@@ -71,26 +94,19 @@ def test_coefficients_of_kalker(velocity: Any, creep: Any, coefficient: float) -
     """Without slip a ball has the force `2 G a^2 C creep` on one elastic body (J. J. Kalker, Three-Dimensional Elastic
     Bodies in Rolling Contact, 1990, table E.3, three digits), C along the velocity and across it. With 8 cells in the
     radius it is right to 3 % with the area of the contact that is found, and with 24 cells to 0.7 %."""
-    load, radius = 1e-3, (3.0 * 1e-3 * RADIUS / (16.0 * G)) ** (1.0 / 3.0)
-    turned = velocity[1] != 0.0
-    points = [24, 120] if turned else [120, 24]
-    size = [count * radius / 8.0 for count in points]
-    center = [1.5 * radius, 13.5 * radius] if turned else [1.5 * radius, 1.5 * radius]
-    roll = {"velocity": velocity, "distance": 12 * radius, "cells_per_step": 1, "creep": creep}
-    job = {
-        "grid": {"points": points, "size": size, "boundary": "free"},
-        "surface": {"shape": "sphere", "radius": RADIUS, "center": center},
-        "material": ELASTIC,
-        "interface": {"coefficient": 1e9, "stick": True},
-        "history": [{"force": load}, {"force": load, **roll}],
-        "numerics": {"tolerance": 1e-3},
-    }
-    last = marched(job)[1][-1]
+    last, area = ball(velocity, creep, 1e9, 12)
     assert last.added[2] == last.measures.contact_area
-    area = last.measures.contact_area * size[0] * size[1]
     expected = 2.0 * G * area / math.pi * coefficient * 1e-4  # along +x in both cases: to the left of -y is +x
     assert -last.measures.force_x == pytest.approx(expected, rel=0.03)
     assert abs(last.measures.force_y) < 1e-3 * expected
+
+
+def test_ball_that_slips_everywhere() -> None:
+    """With fifty times the creep at which all slips, slip is along the creep to the squares of angles of a hundredth,
+    and the force is the coefficient times the load."""
+    last, _ = ball([1.0, 0.0], [0.3, 0.0], MU, 2)
+    assert last.added[2] == 0.0
+    assert -last.measures.force_x == pytest.approx(MU * LOAD, rel=1e-3)
 
 
 @pytest.mark.parametrize(("time", "stiffer"), [(1e3, 5.0), (1e-10, 1.0)])
@@ -144,6 +160,22 @@ def test_energies_of_rubber() -> None:
     assert last.added[1] == pytest.approx(drives[-1].added[1], rel=1e-6)
     assert last.added[0] == pytest.approx(-drives[-1].added[0], rel=1e-6)
     assert drives[-1].measures.force_x > 0.0 > last.measures.force_x
+
+
+def test_heat_of_rolling() -> None:
+    """A roller on rubber heats it as a rigid surface that slides without friction of the interface does, and by the
+    energy lost in slip, to rounding: the force of the tractions has no power over the way of the contact."""
+    rubber = {"model": "zener", "modulus_inf": G, "branches": [{"modulus": 4 * G, "relaxation_time": 1e-4}]}
+    rolls = cylinder(
+        0.001, material=rubber, thermal={"conductivity": 0.2, "diffusivity": 1e-7}, output={"energy": True}
+    )
+    slides = {key: value for key, value in rolls.items() if key != "interface"}
+    slides["history"] = [{key: value for key, value in stage.items() if key != "creep"} for stage in rolls["history"]]
+    marches = [marched(each) for each in (rolls, slides)]
+    heat, other = (march.state.memories["thermal"].heat.mean.stored for march, _ in marches)
+    lost = marches[0][1][-1].added[3] / (2.0 * HALF_WIDTH**2)
+    assert heat - other == pytest.approx(lost, rel=1e-6, abs=0.0)
+    assert heat > 1.05 * other > 0.0
 
 
 @pytest.mark.parametrize(
