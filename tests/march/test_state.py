@@ -110,22 +110,39 @@ def test_ways_in_a_checkpoint_are_in_metres(tmp_path: Path) -> None:
     assert contents.numbers["row/distance"] * contents.units["row/distance"] == expected[0]
 
 
-@pytest.mark.parametrize("material", [ELASTIC, RUBBER])
-def test_a_run_in_other_units_goes_on_alike(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, material: dict[str, Any]
+def in_si(march: March) -> dict[str, Any]:
+    """All entries of a checkpoint, in SI units."""
+    return {name: np.asarray(entry.value) * entry.unit for name, entry in march.entries().items()}
+
+
+FREE = {"grid": {"points": 32, "size": 1e-3, "boundary": "free"}, "surface": SPHERE}
+STICKS = {"coefficient": 0.3, "stick": True}
+ADDED = [
+    *({}, FREE, {"thermal": {"conductivity": 0.3, "diffusivity": 1e-7}}, {"interface": STICKS}),
+    {**FREE, "adhesion": {"work": 1e-3, "range": 1e-7}},
+]
+
+
+@pytest.mark.parametrize(("material", "added"), [(ELASTIC, {}), *((RUBBER, added) for added in ADDED)])
+def test_units_change_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, material: dict[str, Any], added: dict[str, Any]
 ) -> None:
-    """In units that are powers of two times those of the run that wrote the checkpoint: to the last bit."""
-    old, _ = marched(job(material, SLIDES))
+    """A run in units that are powers of two times the usual ones, and a checkpoint restored in them: to the last bit,
+    in SI units."""
+    data = job(material, SLIDES, **added)
+    old, _ = marched(data)
     own = old.scene.units
     other = replace(own, height=2.0 * own.height, length=8.0 * own.length, modulus=4.0 * own.modulus)
     monkeypatch.setattr(Units, "near", lambda *_: other)
-    new = begun(job(material, SLIDES))
-    new.restore(checkpoint.inspect(written(old, tmp_path / "step.h5")))
-    assert new.scene.units == other
-    for name in FIELDS:
-        assert np.array_equal(new.field(name), old.field(name)), name
-    for name in ("distance", "work", "stored", "dissipated", "branch_dissipation"):
-        np.testing.assert_equal(getattr(new.row, name), getattr(old.row, name), name)
+    (march, _), restored = marched(data), begun(data)
+    restored.restore(checkpoint.inspect(written(old, tmp_path / "step.h5")))
+    for new in (march, restored):
+        assert new.scene.units == other
+        np.testing.assert_equal(in_si(new), in_si(old))
+        for name in FIELDS:
+            assert np.array_equal(new.field(name), old.field(name)), name
+        for name in ("distance", "work", "stored", "dissipated", "branch_dissipation"):
+            np.testing.assert_equal(getattr(new.row, name), getattr(old.row, name), name)
 
 
 @pytest.mark.parametrize("integrator", ["exponential", "backward-euler"])
