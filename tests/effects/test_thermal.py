@@ -253,7 +253,8 @@ def test_a_march_of_rubber_that_warms_itself() -> None:
 
 def test_without_it_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """A job without the section makes no memory of heat and calls nothing of it, in a march and in a friction curve;
-    with it there are a spectrum for each exponential and one of what is pressed, and the map of the rise."""
+    with it there are a spectrum for each exponential and one of what is pressed, and the map of the rise. Steps before
+    the first slide need no exponentials."""
 
     def refuse(*given: Any, **named: Any) -> None:
         raise AssertionError("called without a thermal section")
@@ -267,7 +268,11 @@ def test_without_it_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "thermal" not in plain.scene.effects
     held = warm.scene.slab.tally["map bytes"] - plain.scene.slab.tally["map bytes"]
     spectrum = 16 * 4 * 17  # bytes, of 32 x 4 points
-    assert held == (exponentials_of(warm.scene.job).kept + 1) * spectrum + 8 * 32 * 4
+    exponentials = exponentials_of(warm.scene.job)
+    assert held == (exponentials.kept + 1) * spectrum + 8 * 32 * 4
+    quick = {"pressure": PRESSURE, "duration": 1e-6, "time_step": 1e-7}
+    kept = [exponentials_of(job(**march_data(history=each))).kept for each in ([quick, SLIDE], [SLIDE, quick])]
+    assert kept[0] == exponentials.kept < kept[1]
 
 
 KEYS = "thermal: {conductivity: 0.2, diffusivity: 1.0e-7"
