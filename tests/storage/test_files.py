@@ -19,6 +19,7 @@ from parcontact.storage.checkpoint import TableMark
 from parcontact.storage.curve_points import lacking, of_table, requested_points
 from parcontact.storage.directory import Directory
 from parcontact.storage.marker import Claim
+from parcontact.storage.read_back import read_results
 from parcontact.storage.step_row import MeasuresFile, StepRow, cut_back_table
 from parcontact.storage.tables import GrowingTable
 
@@ -286,6 +287,19 @@ def test_what_is_lost_is_said(tmp_path: Path) -> None:
     assert "is missing" in cut_back_table(path, 3, TableMark(), 0)[1][0]
     written(path, 3)
     assert "ends with step 2: the rows up to step 5 are lost" in cut_back_table(path, 5, TableMark(), 0)[1][0]
+
+
+def test_rows_up_to_the_last_checkpoint_are_needed(tmp_path: Path) -> None:
+    """Of a run that has not finished, or may still run."""
+    checkpoints, path = tmp_path / "checkpoint", tmp_path / "measures.csv"
+    checkpoints.mkdir()
+    for name in ("step-2.h5", "step-10.h5", "step-11.h5.part", "step-x.h5"):
+        (checkpoints / name).touch()
+    written(path, 11)
+    assert read_results(path)["step"][-1] == 10.0
+    written(path, 10)
+    with pytest.raises(InputError, match="checkpoint after step 10, and the table lacks rows"):
+        read_results(path)
 
 
 def test_other_columns(tmp_path: Path) -> None:
