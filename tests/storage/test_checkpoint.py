@@ -60,6 +60,7 @@ def test_any_number_of_ranks_reads_it(communicators: list[MPI.Intracomm], shared
             assert (contents.step, contents.time, contents.shape) == (7, 0.25, (NY, NX))
             assert contents.job == FACTS.job
             assert contents.chain == FACTS.provenance.chain
+            assert contents.numbers.keys() == {"contact/modulus", "energy/branches"}  # no rank holds a whole map
             slab = Slab(reader, NX, NY)
             wanted = entries(slab)
             empty = {name: Entry(np.zeros_like(entry.value), entry.unit) for name, entry in wanted.items()}

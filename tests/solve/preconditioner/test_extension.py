@@ -11,7 +11,7 @@ from scipy.sparse.linalg import spsolve
 
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.layer import LongWaves
-from parcontact.solve.preconditioner.extension import FLOOR, ExtendedPreconditioner, Grids
+from parcontact.solve.preconditioner.extension import FLOOR, ExtendedPreconditioner, Grids, grids_for
 from parcontact.solve.preconditioner.long_waves import DECAY, LongWavePreconditioner
 
 Map = NDArray[np.float64]
@@ -109,6 +109,30 @@ def test_brings_back_by_the_transpose(ny: int, nx: int, pairs: int, seed: int) -
     assert abs(left - right) <= SINGLE * size
 
 
+@pytest.mark.parametrize(("last", "equal"), [(1.0, False), (1e9, True)])
+def test_largest_cells_of_a_high_floor_count_for_nothing(last: float, equal: bool) -> None:
+    """To single precision: K is given what it is given without them."""
+    random, slab = np.random.default_rng(2), Slab.alone(16, 16)
+    c = random.random((16, 16)) < 0.2
+    r = np.where(c, random.normal(size=(16, 16)), 0.0)
+    given_to_k = []
+    for larger in (Grids(2, 0, last), Grids(1)):
+        inverse, z = Doubling(), r.copy()
+        ExtendedPreconditioner(slab, larger=larger).apply(inverse, c, z)
+        given_to_k.append(inverse.given)
+    difference = np.abs(given_to_k[0] - given_to_k[1]).max()
+    assert (difference <= SINGLE * np.abs(r).max()) == equal
+
+
+def test_cells_are_no_longer_than_the_reach() -> None:
+    """Three doublings to eight points; two of them along x where points are four times closer, to sixteen."""
+    assert grids_for(1.0, 1.0, 8.0) == Grids(3, 0, 1.0)
+    assert grids_for(1.0, 4.0, 16.0) == Grids(4, 2, 1.0)
+    assert grids_for(1.0, 1.0, 2.0)[:2] == (2, 0)
+    assert grids_for(1.0, 1.0, 2.0).last > 1.0
+    assert grids_for(1.0, 17.0, 8.0) == Grids(0)
+
+
 # -- long waves on a thin layer: one V-cycle against a direct solve, its symmetry, any ranks, its memory --------------
 
 SIZE = (1.0, 1.5)
@@ -122,25 +146,27 @@ class Nothing:
         return out
 
 
-def waves(thickness: float) -> LongWaves:
-    return LongWaves(0.0, thickness**3 / 3, thickness, SIZE)
+def waves(thickness: float, squeezed: float) -> LongWaves:
+    """A bonded layer; `squeezed` is c0 over `c2/thickness^2`, 0 if incompressible."""
+    return LongWaves(squeezed * thickness / 3, thickness**3 / 3, thickness, SIZE)
 
 
-def added(comm: MPI.Intracomm, r: Map, contact: NDArray[np.bool_], thickness: float) -> Map:
+def added(comm: MPI.Intracomm, r: Map, contact: NDArray[np.bool_], thickness: float, squeezed: float = 0.0) -> Map:
     """What is added on this rank's rows, 0 outside contact."""
     slab = Slab(comm, r.shape[1], r.shape[0])
-    made = LongWavePreconditioner(slab, waves(thickness), ExtendedPreconditioner(slab))
+    made = LongWavePreconditioner(slab, waves(thickness, squeezed), ExtendedPreconditioner(slab))
     z = slab.empty()
     z[...] = r[slab.rows]
     made.apply(Nothing(), contact[slab.rows].copy(), z)
     return np.where(contact[slab.rows], z, 0.0)
 
 
-def solved(r: Map, contact: NDArray[np.bool_], thickness: float) -> Map:
+def solved(r: Map, contact: NDArray[np.bool_], thickness: float, squeezed: float) -> Map:
     """The solution of its equation by finite differences, with `1/L^2` for the longest wave."""
     (ny, nx), (lx, ly) = r.shape, SIZE
     number = np.arange(nx * ny).reshape(ny, nx)
-    matrix = sparse.diags(np.where(contact, 0.0, 1.0 / (DECAY * thickness) ** 2).ravel() + 1.0 / max(SIZE) ** 2)
+    stiffness = squeezed / thickness**2 + 1.0 / max(SIZE) ** 2
+    matrix = sparse.diags(np.where(contact, 0.0, 1.0 / (DECAY * thickness) ** 2).ravel() + stiffness)
     for axis, step in ((0, ly / ny), (1, lx / nx)):
         for shift in (1, -1):
             there = (np.ones(r.size), (number.ravel(), np.roll(number, shift, axis).ravel()))
@@ -159,12 +185,15 @@ def patches(ny: int, nx: int, seed: int = 1) -> tuple[NDArray[np.bool_], Map]:
     return contact, np.where(contact, random.normal() + smooth / smooth.std(), 0.0)
 
 
-@pytest.mark.parametrize("thickness", [0.03, 0.15])  # cells are smoothed from the finest grid on, and from twice that
+@pytest.mark.parametrize(  # cells are smoothed from the finest grid on, and from twice that
+    ("thickness", "squeezed"), [(0.03, 0.0), (0.15, 0.0), (0.15, 1.0)]
+)
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_is_near_the_solution(thickness: float, seed: int) -> None:
+def test_is_near_the_solution(thickness: float, squeezed: float, seed: int) -> None:
     """Its energy `<r, z>` is that of the solution within a factor 2, as preconditioners of this kind are."""
     contact, r = patches(48, 64, seed)
-    ratio = np.sum(r * added(MPI.COMM_SELF, r, contact, thickness)) / np.sum(r * solved(r, contact, thickness))
+    z = added(MPI.COMM_SELF, r, contact, thickness, squeezed)
+    ratio = np.sum(r * z) / np.sum(r * solved(r, contact, thickness, squeezed))
     assert 0.5 < ratio < 2.0
 
 
