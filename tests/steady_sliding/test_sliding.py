@@ -21,7 +21,7 @@ from parcontact.steady_sliding import sliding as solver
 from parcontact.steady_sliding import start, stiffness
 from parcontact.steady_sliding.point import Point
 from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.steady_sliding.stiffness import loses_most, soft_stripes
+from parcontact.steady_sliding.stiffness import loses_most, soft_stripes, stiffer_lines
 from parcontact.theory import full_contact
 
 FORCE = 0.15  # N
@@ -275,7 +275,6 @@ def test_a_load_beyond_all_digits_is_named(shared_path: Path, comm: MPI.Intracom
 # -- which way is taken to a steady state, by the moduli of a body of one branch --------------------------------------
 
 TIME, SIZE = 1e-3, 1e-3
-FAST = 1e3 * SIZE / TIME  # all waves see the modulus at once
 
 
 def body(ratio: float, points: tuple[int, int] = (32, 48), boundary: str = "periodic") -> Setup:
@@ -299,6 +298,19 @@ def body(ratio: float, points: tuple[int, int] = (32, 48), boundary: str = "peri
 def test_a_body_at_rest_is_relaxed(velocity: tuple[float, float]) -> None:
     assert not loses_most(body(1000.0), velocity)
     assert soft_stripes(body(1000.0), velocity) is None
+
+
+def test_lines_have_the_contrast_of_the_longest_wave() -> None:
+    """For that wave `omega tau = 1` at this velocity: `|G| = G_inf |1 + (r - 1) i/(1 + i)|`."""
+    speed = SIZE / (2 * np.pi * TIME)
+    for axis, velocity in ((1, (-speed, 0.0)), (0, (0.0, speed))):
+        lines = stiffer_lines(body(300.0), velocity)
+        assert lines is not None
+        assert lines.axis == axis
+        assert lines.contrast == pytest.approx(abs(1.0 + 299.0j / (1.0 + 1.0j)), rel=1e-12)
+    for setup in (body(300.0, (32, 1)), body(300.0, boundary="free")):
+        assert stiffer_lines(setup, (speed, 0.0)) is None
+    assert stiffer_lines(body(300.0), (speed, speed)) is None
 
 
 # -- steady sliding of a cylinder, on one row of points, against its theory; and sets of points that stall ------------
