@@ -125,9 +125,9 @@ def test_slow_and_fast_limits_of_rubber(time: float, stiffer: float) -> None:
 @pytest.mark.parametrize("creep", [(0.3, 0.0), (-0.3, 0.2)])
 def test_power_lost_in_slip(creep: Any) -> None:
     """An elastic body that has reached steady rolling stores nothing more: slip loses the force of the tractions times
-    the creep times the way, to what the tolerance of 1e-4 of each step leaves."""
+    the creep times the way, to 2e-5, as after 12 half-widths forces still change by 1e-6 in a step."""
     moved = np.array(creep) * FULL
-    rows = marched(cylinder(moved.tolist(), output={"energy": True}))[1]
+    rows = marched(cylinder(moved.tolist(), output={"energy": True}, numerics={"tolerance": 1e-6}))[1]
     before, last = rows[-2:]
     lost = (
         -0.5
@@ -138,7 +138,7 @@ def test_power_lost_in_slip(creep: Any) -> None:
             for part, name in zip(moved, ("force_x", "force_y"), strict=True)
         )
     )
-    assert last.added[3] - before.added[3] == pytest.approx(lost, rel=1e-3, abs=0.0)
+    assert last.added[3] - before.added[3] == pytest.approx(lost, rel=2e-5, abs=0.0)
 
 
 def test_energies_of_rubber() -> None:
