@@ -162,7 +162,7 @@ def _draw_map(
     mesh = axes.pcolormesh(x, y, empty, cmap=look.colors, norm=norm, rasterized=True)
     axes.set_aspect("equal")
     for axis, along in ((axes.xaxis, "x"), (axes.yaxis, "y")):
-        axis.set_major_locator(MaxNLocator(TICKS, steps=[1, 2, 5, 10]))
+        axis.set_major_locator(MaxNLocator(TICKS - (along == "x"), steps=[1, 2, 5, 10]))
         prefixes.label(axis, along, "m")
     if low <= high:
         ticks = [low] if low == high else MaxNLocator(TICKS, steps=[1, 2, 5, 10])
