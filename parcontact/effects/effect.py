@@ -43,9 +43,9 @@ class Decision:
 @dataclass(frozen=True)
 class Sheared:
     """Effect of tractions along the surface in a step: the measures including them, their force [N] on the rigid
-    surface, and the energy lost in slip [J]. The map `slipping` is in proportion to the power of slip with `thermal`,
-    and to the bounds of tractions if nothing slips. `error` is the relative error of their solve, a `share` of them has
-    the error of the area, and `time` is their relative error by the length of the step."""
+    surface, and the energy lost in slip [J]. With `thermal` the map `slipping` is in proportion to the power of slip;
+    at rest, or if nothing slips, to the bounds of tractions. `error` is the relative error of their solve, a `share` of
+    them has the error of the area, and `time` is their relative error by the length of the step."""
 
     measures: Measures
     force: Vector

@@ -27,7 +27,7 @@ def settle_slips(bound, stiffness, alpha, t_x, t_y, alpha_old, old_x, old_y, u_x
             sums[3] += limit
             if writes:
                 slipping[j, i] = 0.0
-            if limit > 0.0 and math.hypot(a + stiffness * s_x, b + stiffness * s_y) < limit:
+            if math.hypot(a + stiffness * s_x, b + stiffness * s_y) < limit:
                 sums[4] += 1.0
                 continue
             mean_x, mean_y = alpha * a + alpha_old * old_x[j, i], alpha * b + alpha_old * old_y[j, i]

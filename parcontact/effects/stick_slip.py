@@ -76,13 +76,13 @@ class BoundedTraction(NamedTuple):
 
 class _Settled(NamedTuple):
     """Sums over the points of a step: the energy lost in slip [J], the force on the rigid surface [N], the mean
-    traction over the mean bound, and the number of points that stick; `slipping` as in `Sheared`."""
+    traction over the mean bound, the number of points that stick, and the sum of the map `slipping`."""
 
     lost: float
     force: Vector
     share: Vector
     stuck: int
-    slipping: Array
+    power: float
 
 
 @dataclass(frozen=True)
@@ -208,8 +208,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         unit = self._cell_force * now.modulus
         force = 0.0 - unit * total_x, 0.0 - unit * total_y
         share = (total_x / most, total_y / most) if most > 0.0 else (0.0, 0.0)
-        slipping = self._slipping if power > 0.0 else bound
-        return _Settled(lost * self._cell_force * self._scene.units.height, force, share, round(stuck), slipping)
+        return _Settled(lost * self._cell_force * self._scene.units.height, force, share, round(stuck), power)
 
     def _sheared(self, instant: Instant, settled: _Settled, error: float, before: Array, bound: Array) -> Sheared:
         """Return what the tractions add to the measures of a step, from the bounds before and after it; collective.
@@ -225,7 +224,8 @@ class StickSlip(InterfaceEffect[StickMemory]):
             entered = self._slab.sum(float(np.count_nonzero((bound > 0.0) & (before <= 0.0))))[0]
             time = ROLLING.value * (entered / touching) * (settled.stuck / touching)
         measures = _with_force(instant, settled.force)
-        return Sheared(measures, settled.force, settled.lost, settled.slipping, error, share, time)
+        slipping = self._slipping if instant.slid and settled.power > 0.0 else bound
+        return Sheared(measures, settled.force, settled.lost, slipping, error, share, time)
 
     def values(self, memory: StickMemory) -> Sequence[float]:
         """Return the parts of friction, the share of the box that sticks, and the energy lost in slip [J], NaN without

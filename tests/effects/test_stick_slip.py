@@ -204,13 +204,17 @@ def test_full_slip_heats_as_friction_of_the_interface(material: Any) -> None:
 
 def test_heat_of_slip_is_its_loss() -> None:
     """The heat in the body is the energy lost in slip, to rounding: 1e-9. The force of the body is 0 but for rounding,
-    as the ball is symmetric."""
+    as the ball is symmetric. At rest the flash temperature is a mean over the bounds of tractions."""
     base = {"force": FORCE, "duration": 1.0, "time_step": 1.0}
     stages = [{**base, "velocity": way * mindlin(1.0)} for way in (0.5, 1.0, -0.5)]
-    job = sphere([], 48, history=[{"force": FORCE}, *stages, base], thermal=HEAT, output={"energy": True})
+    rest = {"force": FORCE, "duration": 1e-4, "time_step": 1e-4}
+    job = sphere([], 48, history=[{"force": FORCE}, *stages, rest], thermal=HEAT, output={"energy": True})
     march, rows = marched(job)
     heat = march.state.memories["thermal"].heat.mean.stored * (4.0 * A) ** 2
     assert heat == pytest.approx(rows[-1].added[3], rel=1e-9, abs=0.0)
+    warm, pressure = march.field("temperature"), march.field("pressure")
+    at_rest = float((warm * pressure).sum() / pressure.sum())
+    assert rows[-2].added[4] > rows[-1].added[4] == pytest.approx(at_rest, rel=1e-9)
     assert rows[-1].added[3] > rows[-3].added[3] > 0.0
 
 
@@ -271,6 +275,17 @@ def test_loss_in_full_slip_is_stress_times_area_times_way(tolerance: float) -> N
         made = 1e4 * area * (new.distance - old.distance)
         assert new.added[3] - old.added[3] == pytest.approx(made, rel=1e-3, abs=0.0)
         assert new.added[2] == 0.0
+
+
+def test_error_of_the_area_is_one_of_a_strength() -> None:
+    """In full slip a strength on the area has the error of the area. Tractions of a coefficient add up to a share of
+    the load: their error is that of the solve alone, where an elastic body has no friction."""
+    for law, share in (({"coefficient": MU}, 0.0), ({"shear_stress": 1e3}, 1.0)):
+        errors = marched(sphere([1e-5], interface={**law, "stick": True}))[1][-1].errors
+        assert errors is not None
+        assert errors.friction is not None
+        assert errors.area.mesh > 1e-3
+        assert errors.friction.mesh == pytest.approx(share * errors.area.mesh, rel=1e-2, abs=1e-6)
 
 
 @pytest.mark.parametrize("coefficient", [1e-9, 1e9])
@@ -381,7 +396,7 @@ def test_chosen_steps_of_a_block_that_begins_to_slide() -> None:
     found = []
     for way in ({"time_step": "auto"}, {"time_step": 1e-4 / 160}):
         job = rough({"shear_stress": 2e5, "stick": True}, numerics={"accuracy": 0.05})
-        job["history"][1] |= way
+        job["history"][1] |= {"velocity": [0.005, 0.02], **way}
         rows = marched(job)[1][5:]
         found.append(([row.distance for row in rows], [row.measures.friction for row in rows]))
     (at, friction), (all_at, right) = found
