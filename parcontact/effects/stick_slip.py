@@ -67,6 +67,9 @@ from .slipping import settle_slips
 UNIFORM = 1e-12  # rounding: share of the square of a pressure below which its waves are rounding
 
 
+LEAST_BOUND = 1e-12  # rounding: bound of tractions, in the run's units, that displacements hardly resolve: taken as 0
+
+
 class BoundedTraction(NamedTuple):
     """Tractions `alpha traction`, stacked, and their bounds, `alpha bound`."""
 
@@ -180,12 +183,11 @@ class StickSlip(InterfaceEffect[StickMemory]):
         """Put `f/alpha` into a map. A shear strength acts on the corrected contact area, as without stick."""
         if self._law.coefficient is not None:
             np.multiply(instant.pressure, self._law.coefficient, out=bound)
-            bound[instant.touching == 0] = 0.0
-            return
-        measures = instant.measures
-        share = measures.contact_area_corrected / measures.contact_area if measures.contact_area > 0.0 else 0.0
-        each = strength * share / (instant.modulus * self._scene.units.pressure)
-        np.multiply(instant.touching != 0, each, out=bound)
+        else:
+            measures = instant.measures
+            share = measures.contact_area_corrected / measures.contact_area if measures.contact_area > 0.0 else 0.0
+            bound[:] = strength * share / (instant.modulus * self._scene.units.pressure)
+        bound[(instant.touching == 0) | (bound < LEAST_BOUND)] = 0.0
 
     def _stiffness(self, instant: Instant) -> float:
         """Return pressure over displacement of the contact as a whole, `<p, p>/<p, A p>`; collective.

@@ -169,6 +169,19 @@ def test_full_slip_at_strengths_that_depend_on_velocity() -> None:
         assert row.measures.force_x == pytest.approx(last.measures.force_x, rel=1e-4)
 
 
+def test_strengths_that_vanish() -> None:
+    """Far from the maximum of a narrow bell, at 1e-174 of it, nothing sticks and there is no traction; then at the
+    maximum all slips at last, with the force without stick."""
+    ways = [{"pressure": 1e5, "velocity": v, "distance": way} for v, way in ((1.0, 1e-6), (1e-6, 1e-5))]
+    law = {"shear_stress": 1e4, "velocity": 1e-6, "width": 0.3}
+    more: dict[str, Any] = {"history": [{"pressure": 1e5}, *ways], "numerics": {"tolerance": 1e-4}}
+    plain, stuck = (marched(rough({**law, **way}, ELASTIC, **more))[1] for way in ({}, {"stick": True}))
+    assert not any(row.remark for row in stuck)
+    before = [row for row in stuck if 0.0 < row.distance <= 1e-6]
+    assert all(row.measures.force_interface == row.added[2] == 0.0 for row in before)
+    assert stuck[-1].measures.force_x == pytest.approx(plain[-1].measures.force_x, rel=1e-3)
+
+
 def test_strengths_follow_the_temperature() -> None:
     """Rubber that is warmer than its reference, and warmed by its own heat, has the strength without stick in full
     slip: 4 % more than without the heat of sliding. To 1e-3, as the first step makes half of the heat."""
