@@ -254,7 +254,7 @@ def test_a_march_of_rubber_that_warms_itself() -> None:
 def test_without_it_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """A job without the section makes no memory of heat and calls nothing of it, in a march and in a friction curve;
     with it there are a spectrum for each exponential and one of what is pressed, and the map of the rise. Steps before
-    the first slide need no exponentials."""
+    the first slide need no exponentials, and the longest side counts."""
 
     def refuse(*given: Any, **named: Any) -> None:
         raise AssertionError("called without a thermal section")
@@ -273,6 +273,8 @@ def test_without_it_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     quick = {"pressure": PRESSURE, "duration": 1e-6, "time_step": 1e-7}
     kept = [exponentials_of(job(**march_data(history=each))).kept for each in ([quick, SLIDE], [SLIDE, quick])]
     assert kept[0] == exponentials.kept < kept[1]
+    square = {"points": [32, 32], "size": [LENGTH, LENGTH]}
+    assert np.array_equal(exponentials_of(job(**march_data(grid=square))).rates, exponentials.rates)
 
 
 KEYS = "thermal: {conductivity: 0.2, diffusivity: 1.0e-7"

@@ -52,6 +52,15 @@ def test_half_cells_start_from_a_whole_cell_earlier() -> None:
         march.advance(step)
 
 
+def test_an_elastic_body_that_stands_starts_from_its_last_pressure() -> None:
+    history = [{"pressure": 1e4}, {"pressure": 2e4}]
+    march = begun({**SCENE, "material": {"model": "elastic", "shear_modulus": 1e6}, "history": history})
+    march.advance(next(march.steps()))
+    (last,) = march.state.contact.pressures
+    march.state.contact.spare.fill(np.nan)
+    assert np.array_equal(start_of(march, next(march.steps())), last.pressure)
+
+
 # -- steps tell the estimate of the error of rising friction by how much it changed, and how uneven pressures ---------
 
 INF, ONE, AMPLITUDE, SIDE = 1e6, 2e6, 1e-6, 1e-3

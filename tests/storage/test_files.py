@@ -4,6 +4,7 @@ import math
 import os
 import resource
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,7 +20,9 @@ from parcontact.storage.checkpoint import TableMark
 from parcontact.storage.curve_points import lacking, of_table, requested_points
 from parcontact.storage.directory import Directory
 from parcontact.storage.marker import Claim
+from parcontact.storage.provenance import Link, Provenance
 from parcontact.storage.read_back import read_results
+from parcontact.storage.recorder import Recorder, Recording
 from parcontact.storage.step_row import MeasuresFile, StepRow, cut_back_table
 from parcontact.storage.tables import GrowingTable
 
@@ -289,6 +292,31 @@ def test_what_is_lost_is_said(tmp_path: Path) -> None:
     assert "ends with step 2: the rows up to step 5 are lost" in cut_back_table(path, 5, TableMark(), 0)[1][0]
 
 
+def test_the_row_without_room_is_added(tmp_path: Path) -> None:
+    """The last one of a checkpoint, also if it is the first of all."""
+    path = tmp_path / "measures.csv"
+    for count in (3, 1):
+        written(path, count)
+        whole = path.read_text()
+        mark = TableMark(count, whole.splitlines()[-1])
+        path.unlink()
+        written(path, count - 1)
+        assert cut_back_table(path, count - 1, mark, 0) == (mark, [])
+        assert path.read_text() == whole
+        path.unlink()
+
+
+def test_all_records_are_on_the_disk_before_a_checkpoint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    provenance, place = Provenance((Link("", 1),)), SimpleNamespace(slab=Slab.alone(4, 3), path=tmp_path)
+    recording = Recording(1, maps=("pressure",), size=(1.0, 1.0))
+    recorder = Recorder(place, recording, provenance, None, quiet=True)  # type: ignore[arg-type]
+    flushed = set[str]()
+    monkeypatch.setattr(os, "fsync", lambda handle: flushed.add(Path(f"/proc/self/fd/{handle}").resolve().name))
+    recorder.sync(provenance)
+    recorder.close()
+    assert flushed >= {"measures.csv", "fields.h5"}
+
+
 def test_rows_up_to_the_last_checkpoint_are_needed(tmp_path: Path) -> None:
     """Of a run that has not finished, or may still run."""
     checkpoints, path = tmp_path / "checkpoint", tmp_path / "measures.csv"
@@ -297,6 +325,7 @@ def test_rows_up_to_the_last_checkpoint_are_needed(tmp_path: Path) -> None:
         (checkpoints / name).touch()
     written(path, 11)
     assert read_results(path)["step"][-1] == 10.0
+    path.unlink()
     written(path, 10)
     with pytest.raises(InputError, match="checkpoint after step 10, and the table lacks rows"):
         read_results(path)
