@@ -41,6 +41,7 @@ def attempts(march: March, error: Errors, most: int = 1000) -> list[list[Step]]:
             continue
         tries = [march.scene.controller.propose(chosen, span, number)]
         while isinstance(verdict := judged(tries[-1], error(number, tries[-1])), Step):
+            assert verdict.dt < (1.0 - 1e-6) * tries[-1].dt
             tries.append(verdict)
         chosen.add(verdict)
         found.append(tries)
@@ -146,7 +147,21 @@ def test_no_short_step_is_left_over_at_rest(duration: float) -> None:
     assert np.all(steps >= 0.55 * steps[0] * (1.0 - 1e-9))
 
 
-SPHERE, FLAT, FILE = Sphere.model_construct(), Flat.model_construct(), HeightFile.model_construct()
+def test_a_stretched_step_that_is_rejected_is_made_shorter() -> None:
+    """The last of 19 steps, 2^(17/4) - 18 times as long as the others. Its error asks for a length that would be
+    stretched to the same one."""
+    first = list[float]()
+
+    def error(number: int, step: Step) -> float:
+        first.append(step.dt)
+        return ALLOWED * (1.25 if step.dt > 1.001 * first[0] else 1.0)
+
+    tries = attempts(march_of({**PRESS, "duration": 1.8e-3}), error)  # which holds each of them to be shorter
+    assert [step.dt for step in tries[18]][:1] == pytest.approx([first[0] * (2.0**4.25 - 18.0)], rel=1e-9)
+    assert len(tries[18]) > 1
+
+
+SPHERE, FLAT, FILE = SPHERE, FLAT, FILE = Sphere.model_construct(), Flat.model_construct(), HeightFile.model_construct()
 
 
 def wave(*waves: int) -> Wave:

@@ -7,10 +7,12 @@ import pytest
 from marched_jobs import marched
 
 from parcontact import scene
+from parcontact.effects.interface import shares
 from parcontact.errors import InputError
 from parcontact.job import Job, load
 from parcontact.parallel.slab import Slab
 from parcontact.physics.interface_friction import InterfaceFriction
+from parcontact.physics.measures import Measures
 from parcontact.steady_sliding.sliding import SteadySliding
 
 PRESSURE, STRESS, SPEED, LENGTH = 1e5, 2e5, 0.2, 1e-3
@@ -45,6 +47,14 @@ def test_partial_contact_adds_the_stress_on_the_area(speed: float) -> None:
     assert added.force_x - plain.force_x == pytest.approx(-math.copysign(STRESS * area, speed), rel=1e-12)
     assert math.copysign(1.0, added.friction_x) == math.copysign(1.0, speed)
     assert added.friction == pytest.approx(plain.friction + STRESS * added.contact_area_corrected / PRESSURE, rel=1e-12)
+
+
+def test_parts_are_along_the_force() -> None:
+    """The force of the interface opposes the velocity; its part is its component along the total force."""
+    found = Measures(force_x=-3.0, force_y=-4.0, friction=0.5, friction_interface=0.2)
+    for velocity, part in (((0.0, 2.0), 0.16), ((0.0, -2.0), -0.16), ((3.0, 0.0), 0.12), ((3.0, 4.0), 0.2)):
+        assert shares(found, velocity) == pytest.approx((0.5 - part, part), rel=1e-14)
+    assert shares(Measures(), (1.0, 0.0)) == (0.0, 0.0)
 
 
 def test_rest_has_none() -> None:

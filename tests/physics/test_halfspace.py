@@ -59,9 +59,11 @@ def test_cosine(comm: MPI.Intracomm, wx: int, wy: int, poisson: float) -> None:
     x, y = coordinates(slab, size)
     qx, qy = 2 * np.pi * wx / size[0], 2 * np.pi * wy / size[1]
     pressure = 1e5 * np.cos(qx * x + qy * y + 0.3)
-    u = HalfSpace(size, poisson).operator(FFT(slab)).apply(pressure, slab.empty())
+    half_space = HalfSpace(size, poisson)
+    u = half_space.operator(FFT(slab)).apply(pressure, slab.empty())
     expected = (1 - poisson) / np.hypot(qx, qy) * pressure
     assert_allclose(u, expected, rtol=0, atol=1e-13 * 1e5 * (1 - poisson) / np.hypot(qx, qy))
+    assert_allclose(half_space.largest_compliance, (1 - poisson) / (2 * np.pi / max(size)), rtol=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from parcontact import job
 from parcontact.errors import InputError
 from parcontact.job import Stage
 from parcontact.report import page
+from parcontact.storage.provenance import cite_lines
 from parcontact.summary import citations, headline, info, theory_comparison
 from parcontact.summary.pull_off import Columns, PullOff, describe_pull_off, find
 
@@ -123,6 +124,10 @@ def test_what_to_cite(tmp_path: Path) -> None:
     assert "Bugnicourt" in rubber
     assert "Persson" in rubber
     assert "Taylor" in rubber
+    for name, cited in (("map.x3p", True), ("map.npy", False)):  # SurfaceTopography reads the first
+        measured = yaml.safe_load(job.load(tmp_path / "job.yaml").resolved())
+        lines = cite_lines({**measured, "surface": [{"shape": "topography", "path": name}]})
+        assert any("Röttger" in line for line in lines) == cited
 
 
 # -- results of Persson's theory and of a run, from tables whose means are known --------------------------------------
