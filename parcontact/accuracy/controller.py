@@ -104,17 +104,22 @@ class Controller:
     def tolerance(self, memory: StepTolerance, step: Step) -> float | None:
         """Return the tolerance of the solve of a step, None for the tolerance of the job, as in a jump. It is smaller
         before a change and in the first and last step of a stage."""
-        own = self.job.numerics.tolerance
         if step.dt == 0.0:
             return None
-        span = self.timeline.spans[step.stage]
-        ends = reached(step.time, span.time(span.count))
-        most = tolerance_before(self.job, step.stage + 1, self.relaxes) if ends else math.inf
-        if (step.growth == 0.0 or ends) and self.relaxes:
-            most = min(most, FIRST)
+        own, most = self.job.numerics.tolerance, self.largest_tolerance(step)
         if not self.follows:
             return most if most < own else None
         return float(min(own * 2.0 ** (0.5 * round(2.0 * memory.mean)), max(LOOSEST, own), most))
+
+    def largest_tolerance(self, step: Step) -> float:
+        """Return a limit on the tolerance of a step before a change, and of the first and last step of a stage; else
+        infinite, as in a jump."""
+        if step.dt == 0.0:
+            return math.inf
+        span = self.timeline.spans[step.stage]
+        ends = reached(step.time, span.time(span.count))
+        most = tolerance_before(self.job, step.stage + 1, self.relaxes) if ends else math.inf
+        return min(most, FIRST) if (step.growth == 0.0 or ends) and self.relaxes else most
 
     def learn(self, memory: StepTolerance, certificate: float, budget: ErrorBudget | None) -> StepTolerance:
         """Return the memory after a step with this budget, whose solve has reached `certificate`."""

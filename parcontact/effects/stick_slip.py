@@ -128,6 +128,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         self._free = setup.half_space.free
         operator = ShearOperator(setup.fft, setup.size, scene.job.material.poisson, setup.half_space.free)
         spacing = setup.size[0] / slab.nx, setup.size[1] / slab.ny
+        self._tolerance = numerics.tolerance
         limits = numerics.tolerance, numerics.max_iterations
         inverse, grids = scene.operators.preconditioner, grids_for(*spacing)
         self._solver = TangentialSolver(slab, operator, min(spacing) / math.pi, inverse, grids, *limits)
@@ -149,6 +150,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         trial = self._body.begin(memory.body, step.dt, MovedHeights(target), step.growth)
         new = self._start(instant, memory, strength)
         stiffness = self._stiffness(instant)
+        self._solver.tolerance = min(self._tolerance, self._scene.controller.largest_tolerance(step))
         solved = self._solver.solve(new.bound, trial.effective, stiffness, new.traction)
         body = self._body.commit(memory.body, trial, solved.displacement, surface_of(memory.body))
         now, before = Pressed(new.traction, alpha), Pressed(memory.last.traction, memory.alpha)

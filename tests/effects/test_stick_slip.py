@@ -343,6 +343,30 @@ def test_energies_of_a_body_that_begins_to_slide(material: Any, most: float, sec
     assert last.work == pytest.approx(last.stored + last.dissipated + lost, rel=1e-10, abs=0.0)
 
 
+def test_tractions_that_stick_survive_a_jump_of_the_load() -> None:
+    """A flat punch slides, rests under a load that doubles, and loses half of it at once. The bound is a strength, so
+    that no point slips then. The body is 76 times stiffer in the jump: errors of the last tractions grow as much. These
+    have a tolerance of 2.5e-4, and the force changes by less than 76 times as much."""
+    stiff = {"model": "zener", "modulus_inf": 8e7, "branches": [{"modulus": 6e9, "relaxation_time": 4.5e-4}]}
+    rest = {"pressure": {"from": 2.5e6, "to": 5e6}, "duration": 1.4e-2, "time_step": 1.4e-2}
+    slide = {"pressure": 2.5e6, "duration": 1.4e-2, "velocity": 0.24, "time_step": 7e-3}
+    job = Job.model_validate(
+        {
+            "grid": {"points": [12, 3], "size": [0.12, 0.03], "boundary": "free"},
+            "surface": {"shape": "flat"},
+            "material": stiff,
+            "interface": {"shear_stress": 1.2e6, "stick": True},
+            "history": [{"pressure": 2.5e6}, slide, rest, {"pressure": 2.5e6}],
+            "numerics": {"accuracy": 0.1},
+        }
+    )
+    rows = marched(job)[1]
+    before, after = rows[-2:]
+    assert after.measures.pressure == pytest.approx(0.5 * before.measures.pressure)
+    assert before.added[2] == after.added[2] == 1.0
+    assert after.measures.force_x == pytest.approx(before.measures.force_x, rel=76.0 * 2.5e-4, abs=0.0)
+
+
 @pytest.mark.parametrize("name", ["coefficient", "bell", "rolling"])
 def test_restart_is_exact(tmp_path: Path, name: str) -> None:
     """A run that goes on from a checkpoint has the bits of one that was not stopped, also if it is made at rest, where
