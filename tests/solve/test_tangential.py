@@ -12,7 +12,7 @@ from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.shear_operator import ShearOperator, components, stacked
-from parcontact.solve.preconditioner.extension import ALL
+from parcontact.solve.preconditioner.extension import ALL, grids_for
 from parcontact.solve.tangential.solver import TangentialSolver
 
 Map = NDArray[np.float64]
@@ -140,6 +140,27 @@ def test_points_that_slip_along_x_are_not_moved_along_it() -> None:
     e = np.concatenate([np.full_like(bound, 100.0), 10.0 * np.sin(np.arange(16)) + np.zeros_like(bound)])
     solver.solve(bound, e, given.kappa, np.concatenate([bound, 0.0 * bound]))
     assert solver.slab.tally["operator"] == 2 + 3
+
+
+@pytest.mark.parametrize("ratio", [32, 1000])
+def test_steps_adapt_to_a_row_of_long_cells(ratio: int) -> None:
+    """In a free row of cells that are long along it, the preconditioner is up to several hundred times too small. Five
+    points that stick still have their tractions, those of the matrix, to 1e-6 in at most 50 iterations."""
+    points, size = 32, (1.0, 1.0 / 32 / ratio)
+    fft = FFT(Slab.alone(points, 1))
+    operator = ShearOperator(fft, size, POISSON, True)
+    inverse = HalfSpace(size, POISSON, "love", True).inverse(fft)
+    spacing = size[0] / points, size[1]
+    solver = TangentialSolver(fft.slab, operator, spacing[1] / math.pi, inverse, grids_for(*spacing), 1e-8, 50)
+    touches = np.zeros((1, points), np.bool_)
+    touches[0, 14:19] = True
+    bound, both = 1e9 * touches, np.concatenate([touches, touches])
+    e = np.concatenate([1.0 + 0.1 * np.arange(points)[np.newaxis], np.full((1, points), 0.3)])
+    t = np.zeros_like(e)
+    matrix = matrix_of(solver)[both.ravel()][:, both.ravel()]
+    exact = np.linalg.solve(matrix, e[both])
+    solver.solve(bound, e, float(np.abs(exact).max()), t)
+    np.testing.assert_allclose(t[both], exact, rtol=0, atol=1e-6 * np.abs(exact).max())
 
 
 @pytest.mark.mpi(2, 3, 4)

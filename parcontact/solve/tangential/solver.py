@@ -17,7 +17,8 @@ function `J(t) = <t, A t>/2 - <t, e>` over the product of discs |t| <= f. One it
    minimizes J along d: both follow from A d, which is known. Then tractions that slip get the length f, and others are
    shortened to it.
 4. Discs are convex, so that all tractions between the old and the new ones are admissible. t becomes the one with the
-   least J of them, and A t follows without another application of A. So J never rises.
+   least J of them, and A t follows without another application of A. So J never rises. If all points stick and J is
+   least far beyond the new ones, K is much smaller than the inverse of A, as in a free row of long cells: STEP grows.
 5. If this is a small part of the way, the next iteration takes `t + kappa w`, shortened to its disc, for the new
    tractions. It always descends.
 
@@ -40,7 +41,8 @@ from ..preconditioner.extension import ExtendedPreconditioner, Grids
 from ..problem import Operator
 from . import discs
 
-STEP = 0.6  # tuning: step along z; waves along q have half the stiffness that K assumes
+STEP = 0.6  # tuning: least step along z; waves along q have half the stiffness that K assumes
+FAR = 2.0  # tuning: ratio of the way to the least J and the way gone, or its inverse, from which the step changes
 LEAST_PART = 0.2  # tuning: least share of a component in the residual for which K is applied to it
 LEAST_DESCENT = 0.5  # tuning: least slope along a direction over that along z; below it the last change is forgotten
 MOST_GROWTH = 20.0  # tuning: limit on gamma; reached where nothing resists, as all points of a periodic box stick
@@ -95,7 +97,7 @@ class TangentialSolver:
         if self._is_at_rest(bound, aim, t):
             self._u.fill(0.0)
             return Tractions(self._u, 0.0, 0)
-        start, best, iteration, follows = t, (math.inf, 0), 0, False
+        start, best, iteration, follows, step = t, (math.inf, 0), 0, False, STEP
         self._operator.apply(t, self._u)
         while True:
             now = *components(t), *components(self._u), *components(aim)
@@ -111,11 +113,13 @@ class TangentialSolver:
             if follows:
                 discs.follow_slip(bound, *now, kappa, *components(self._other), self._hit)
             else:
-                self._move(bound, now, kappa, parts, begins=iteration == 0)
+                self._move(bound, now, kappa, parts, step, begins=iteration == 0)
             t, share = self._descend(aim, t)
+            if iteration > 0 and not follows and not 1.0 / FAR < share < FAR:
+                step = min(max(share * step, STEP), MOST_GROWTH)
             follows, iteration = share < SMALL_SHARE, iteration + 1
 
-    def _move(self, bound: Array, now: Components, kappa: float, parts: list[float], begins: bool) -> None:
+    def _move(self, bound: Array, now: Components, kappa: float, parts: list[float], step: float, begins: bool) -> None:
         """Put the next tractions in the place of the last ones; collective. `now` are the components of t, A t and e,
         `parts` the sums of the residual along each axis."""
         z, points = components(self._z), (bound, self._free, self._turn)
@@ -127,17 +131,18 @@ class TangentialSolver:
             self._extended.apply(self._preconditioner, self._moves, r)
         last, last_u = components(self._other), components(self._other_u)
         products = discs.complete(*points, *now, *last, *last_u, self._short, 1.0 / kappa, *z)
-        again = 0.0 if begins else _step_along_last(*self.slab.sum(*products))
-        discs.move_tractions(bound, self._free, *now[:2], *z, STEP, again, *last, self._hit)
+        again = 0.0 if begins else _step_along_last(step, *self.slab.sum(*products))
+        discs.move_tractions(bound, self._free, *now[:2], *z, step, again, *last, self._hit)
 
     def _descend(self, aim: Array, t: Array) -> tuple[Array, float]:
         """Go from the tractions t towards the next ones, to the least J on the way. Return the new tractions, and the
-        share of the way; collective."""
+        way to the least J over the way to the next ones: at most 1 where tractions reach their bounds; collective."""
         new, u, new_u = self._other, self._u, self._other_u
         self._operator.apply(new, new_u)
-        slope, curvature, size = self.slab.sum(*discs.slope_and_curvature(t, new, u, new_u, aim))
+        sums = discs.slope_and_curvature(t, new, u, new_u, aim)
+        slope, curvature, size, hits = self.slab.sum(*sums, float(self._hit.any()))
         rounded = max(abs(slope), curvature) <= ROUNDING * size
-        share = 1.0 if rounded or slope >= curvature else max(slope / curvature, 0.0)
+        share = 1.0 if rounded or curvature <= 0.0 or (hits and slope >= curvature) else max(slope / curvature, 0.0)
         if share < 1.0:
             discs.shorten_change(t, share, new)
             discs.shorten_change(u, share, new_u)
@@ -163,9 +168,9 @@ class TangentialSolver:
         return self.slab.reduce((), [largest])[0] == 0.0
 
 
-def _step_along_last(r_z: float, r_d: float, z_c: float, d_c: float) -> float:
-    """Return the step along the last change d, from the products of `discs.complete`."""
-    step = MOST_GROWTH
+def _step_along_last(step: float, r_z: float, r_d: float, z_c: float, d_c: float) -> float:
+    """Return the step along the last change d for a step along z, from the products of `discs.complete`."""
+    again = MOST_GROWTH
     if r_d <= MOST_GROWTH * d_c:
-        step = (r_d - STEP * z_c) / d_c if d_c > 0.0 else 0.0
-    return step if STEP * r_z + step * r_d > LEAST_DESCENT * STEP * r_z else 0.0
+        again = (r_d - step * z_c) / d_c if d_c > 0.0 else 0.0
+    return again if step * r_z + again * r_d > LEAST_DESCENT * step * r_z else 0.0
