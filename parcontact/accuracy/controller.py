@@ -255,6 +255,8 @@ class Controller:
         cell = one_cell(span.stage, self.job.grid)
         at = math.copysign(1.0, along) * x / self.job.grid.dx + now / cell
         size = dt / cell
+        if at + SAME_LEVEL * size == at:  # positions do not resolve the step
+            return dt
         way = (math.ceil(at / size + LEAST_WAY) * size - at) * cell
         return dt if math.isclose(way, dt, rel_tol=SAME_LEVEL) else way
 

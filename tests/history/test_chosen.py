@@ -3,6 +3,7 @@ was cut into pieces or on how many ranks made it."""
 
 import time
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from csv_rows import Rows, measures
 from job.texts import job_of, with_stage
-from marched_jobs import SLS, column, marched
+from marched_jobs import SLS, begun, column, marched
 from mpi4py import MPI
 from restarting import Bench
 
@@ -137,6 +138,16 @@ def test_creep_after_a_jump_while_hardly_sliding() -> None:
     assert slow[-1].measures.contact_area_corrected == pytest.approx(
         still[-1].measures.contact_area_corrected, rel=1e-2
     )
+
+
+def test_a_way_that_positions_do_not_resolve() -> None:
+    """A slide so slow that its way is rounding of the way before ends within 60 steps."""
+    fast = {"pressure": 1e4, "velocity": 1.0, "duration": 1e-3, "time_step": 1e-3}
+    slow = {"pressure": 1e4, "velocity": 1e-20, "duration": 5e-3, "time_step": "auto"}
+    march = begun(data(fast, slow))
+    for step in islice(march.steps(), 60):
+        march.advance(step)
+    assert march.row.time == pytest.approx(6e-3)
 
 
 # -- runs -------------------------------------------------------------------------------------------------------------
