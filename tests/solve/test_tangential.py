@@ -131,6 +131,20 @@ def test_nothing_resists_a_box_that_sticks() -> None:
     np.testing.assert_allclose(t, np.concatenate([0.6 * bound, 0.8 * bound]), rtol=1e-6)
 
 
+def test_failures_name_remedies() -> None:
+    """A solve that ends at its limit, or at rounding, says so, says what to change, and has admissible tractions."""
+    given = scene("half", 24)
+    for tolerance, limit, sentence in ((1e-6, 2, "try numerics.max_iterations above 2"), (1e-30, 900, "stalled")):
+        solver = solver_of(Slab.alone(24, 24), False, tolerance, limit)
+        bound, e = given.rows(solver.slab)
+        t = np.zeros_like(e)
+        solved = solver.solve(bound, e, given.kappa, t)
+        assert sentence in solved.failure
+        assert "smaller steps" in solved.failure
+        assert solved.certificate > tolerance
+        assert (np.hypot(*components(t)) <= bound * (1.0 + 1e-14)).all()
+
+
 def test_points_that_slip_along_x_are_not_moved_along_it() -> None:
     """Where all points slip along x, tractions can only turn: an iteration applies the preconditioner to the component
     along y alone, so that 3 operators are counted, after 2 at the start."""

@@ -155,9 +155,11 @@ class TangentialSolver:
             return ""
         asked = f"{certificate:.3g} where {self.tolerance:.3g} was asked for"
         if iteration >= self._limit or not math.isfinite(certificate):
-            return f"the tractions did not converge in {iteration} iterations: the residual is {asked}"
+            failed = f"the tractions did not converge in {iteration} iterations: the residual is {asked}"
+            return f"{failed}; try numerics.max_iterations above {self._limit}, or smaller steps"
         if iteration - best[1] >= MAX_STALLED:
-            return f"the tractions stalled: no residual below {best[0]:.3g} in {MAX_STALLED} iterations, now {asked}"
+            failed = f"the tractions stalled: no residual below {best[0]:.3g} in {MAX_STALLED} iterations, now {asked}"
+            return f"{failed}; try a larger numerics.tolerance, or smaller steps"
         return None
 
     def _is_at_rest(self, bound: Array, aim: Array, t: Array) -> bool:
