@@ -2,16 +2,29 @@
 
 import math
 from contextlib import nullcontext as does_not_raise
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from parcontact.accuracy.constants import ENERGY
 from parcontact.effects.adhesion import adhesion_law
+from parcontact.effects.adhesive_energies import (
+    FORCE_DOUBT,
+    JUMPS,
+    PUSHED,
+    SURFACES,
+    AdhesiveEnergies,
+    advance_energies,
+)
+from parcontact.effects.contact_protocol import SolvedContact
 from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.mesh import load, load_cases
 from parcontact.parallel.slab import Slab
+from parcontact.physics.measures import Measures
 from parcontact.run.sweep_warnings import sentences_of
 from parcontact.scene import sanity, set_up
 
@@ -224,3 +237,58 @@ def test_approaches_beyond_full_contact_are_refused_before_the_first_step() -> N
             else does_not_raise()
         ):
             sanity.refuse_approaches(setup)
+
+
+# -- energies of a step, of given works -------------------------------------------------------------------------------
+
+AREA = 2.0  # of the box [m^2]
+STEP = 0.25 * ENERGY.value * 4.0  # error of the dissipation, 4 J
+
+
+@pytest.mark.parametrize(
+    ("pushed", "jumps", "force", "approach", "expected"),
+    [
+        (2.0, False, (0.0, 0.0), 0.0, (3.0, 1.0, 0.5, 0.1 + STEP)),  # the work is what is gained, 2 J
+        (4.0, False, (0.0, 0.0), 0.0, (5.0, 1.0, 2.5, 0.1 + STEP)),  # more than any path needs: a snap
+        (4.0, False, (0.0, 0.0), 0.4, (3.0, 1.0, 0.5, 2.1 + STEP)),  # a doubt of 2.4 J, of the path
+        (0.0, False, (0.0, 0.0), 0.0, (3.0, 1.0, 0.5, 2.1 + STEP)),  # less: an error of the rule
+        (1.0, True, (0.0, 0.0), 0.0, (3.0, 1.0, 0.5, 0.1 + STEP)),  # between states without equilibrium
+        (
+            0.0,
+            False,
+            (-1.0, -3.0),
+            0.0,
+            (3.0, 1.0, 0.5, 0.1 + 2.0 + STEP),
+        ),  # drag of 4 J, in doubt by 2 + 6 FORCE_DOUBT
+        (
+            2.0 * FORCE_DOUBT * 3.0 + 0.1,
+            False,
+            (-1.0, -3.0),
+            0.0,
+            (3.1 + 2.0 + 6.0 * FORCE_DOUBT, 1.0, 2.6 + 6.0 * FORCE_DOUBT, 0.1 + STEP),
+        ),
+    ],
+)
+def test_energies_of_a_step(
+    pushed: float, jumps: bool, force: tuple[float, float], approach: float, expected: tuple[float, ...]
+) -> None:
+    """Work, energy of surfaces, loss in snaps and error after a step of known works, to rounding. Surfaces take 1 J
+    from 2 J, and the body 3 J. The trapezoidal rule for the path and for the drag has an error of half the change."""
+    instant: Any = SimpleNamespace(
+        solved=SimpleNamespace(numbers={SURFACES: 1.0, PUSHED: pushed, JUMPS: float(jumps)}),
+        before=Measures(pressure=1.0, force_x=force[0]),
+        measures=Measures(pressure=7.0, force_x=force[1], approach=approach),
+        gained=3.0,
+        error_area=0.25,
+        dissipated=-4.0,
+        moved=(2.0, 0.0),
+    )
+    found = advance_energies(AdhesiveEnergies(1.0, 2.0, 0.5, 0.1), instant, AREA)
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_contact_of_which_all_may_be_an_error_is_not_loaded() -> None:
+    contact: Any = None
+    solved = SolvedContact(contact, None, np.zeros(1), least_load=1.0)
+    assert solved.loaded
+    assert not replace(solved, least_load=math.inf).loaded

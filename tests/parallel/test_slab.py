@@ -107,9 +107,25 @@ def test_rolls_like_numpy(ny: int, count: int, single: bool) -> None:
     np.testing.assert_array_equal(field, whole[slab.rows])
 
 
+@settings(max_examples=40)
+@given(ny=st.integers(1, 9), count=st.integers(1, 3), cyclic=st.booleans())
+def test_rows_around_those_of_a_rank(ny: int, count: int, cyclic: bool) -> None:
+    """Copies, so equal, the nearest first; zeros on ranks without rows."""
+    slab = Slab(MPI.COMM_WORLD, 3, ny)
+    whole = np.arange(1.0, 3.0 * ny + 1.0).reshape(ny, 3)
+    field = whole[slab.rows].copy()
+    above, below = rows.around(slab, field, count, cyclic)
+    for found, numbers in ((above, slab.rows.start - 1 - np.arange(count)), (below, slab.rows.stop + np.arange(count))):
+        expected = whole[numbers % ny if cyclic else np.clip(numbers, 0, ny - 1)]
+        np.testing.assert_array_equal(found, expected if slab.shape[0] else np.zeros((count, 3)))
+    np.testing.assert_array_equal(rows.before_first(slab, field, cyclic), above[0])
+
+
 def test_counts_what_is_sent() -> None:
     slab = Slab(MPI.COMM_WORLD, 4, 8)
     rows.roll_rows(slab, slab.zeros(), 8, slab.empty())
     assert slab.tally["bytes sent"] == 0
     rows.roll_rows(slab, slab.zeros(), 1, slab.empty())
     assert slab.tally["bytes sent"] == (32 if slab.comm.size > 1 else 0)
+    rows.before_first(slab, slab.zeros(), True)
+    assert slab.tally["bytes sent"] == (64 if slab.comm.size > 1 else 0)
