@@ -137,6 +137,16 @@ def test_maps_that_fftw_cannot_take(comm: MPI.Intracomm, dtype: DTypeLike) -> No
 
 
 @pytest.mark.parametrize(("nx", "ny"), SIZES)
+def test_parseval(comm: MPI.Intracomm, nx: int, ny: int) -> None:
+    """Each wave of the half spectrum counts as often as in the full one; rounding."""
+    slab = Slab(comm, nx, ny)
+    fft, whole = FFT(slab), random_map(nx, ny)
+    spectrum = fft.forward(whole[slab.rows])
+    power = slab.sum(float(np.sum(fft.multiplicity * np.abs(spectrum) ** 2)))[0] / slab.points
+    assert power == pytest.approx(float(np.sum(whole**2)), rel=1e-13)
+
+
+@pytest.mark.parametrize(("nx", "ny"), SIZES)
 def test_modes(comm: MPI.Intracomm, nx: int, ny: int) -> None:
     """Those of numpy, except that the shortest wave of an even count is positive."""
     fft = FFT(Slab(comm, nx, ny))

@@ -139,3 +139,15 @@ def test_retardation_times_lie_between_relaxation_times(material: Prony) -> None
     times, later = normal_form(*material).relaxation_times, creep_spectrum(*material).retardation_times
     assert np.all(later >= times[: later.size])  # equal where they differ by less than rounding
     assert np.all(later[: times.size - 1] <= times[1:])
+
+
+@pytest.mark.parametrize("flows", [False, True])
+def test_time_of_a_compliance(flows: bool) -> None:
+    """The inverse of J(t), to rounding; 0 below J(0), and infinite above the last one of a body that does not flow."""
+    spectrum = creep_spectrum(0.0 if flows else BODY.modulus_inf, BODY.moduli, BODY.relaxation_times)
+    most = spectrum.glass + spectrum.compliances.sum()
+    assert (spectrum.fluidity > 0.0) == flows
+    assert spectrum.time(spectrum.glass / 2) == 0.0
+    assert (spectrum.time(2 * most) == np.inf) == (not flows)
+    for target in np.geomspace(spectrum.glass * 1.001, most * 0.999, 5):
+        assert_allclose(spectrum.compliance(spectrum.time(target)), target, rtol=1e-12)

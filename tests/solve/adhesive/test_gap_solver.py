@@ -101,6 +101,18 @@ def test_nothing_holds_a_load_that_pulls_too_much() -> None:
     assert gap.min() > 0.0
 
 
+def test_open_surfaces_that_attract_more_than_the_load_close() -> None:
+    """They have not detached."""
+    slab, _, solve = solver()
+    h, gap = heights(slab), slab.zeros()
+    gap[...] = h.max() - h + WEAK.range
+    assert np.mean(WEAK.strength * np.exp(-gap / WEAK.range)) > 0.02
+    found = solve.solve(WEAK, h, MeanPressure(-0.02), gap, 1e-6)
+    assert not found.failure
+    assert not found.detached
+    assert gap.min() == 0.0
+
+
 class Failing:
     """A solver of gaps of which the first solve fails; what it was given."""
 
