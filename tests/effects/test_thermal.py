@@ -237,6 +237,20 @@ def test_a_restart_goes_on_bit_for_bit(shared_path: Path, comm: MPI.Intracomm) -
     assert np.abs(rows - whole.field("temperature")).max(initial=0.0) < 1e-9 * whole.row.max_temperature
 
 
+def test_slip_heats_as_sliding_without_stick() -> None:
+    """After a slide of two waves, in full slip: the flash temperature and the highest rise, to 2 %, as there is less
+    heat while points stick at first. The force is the same to rounding."""
+    slide = {**SLIDE, "distance": 2 * LENGTH}
+    made = {"grid": {"points": [16, 4], "size": [LENGTH, LENGTH / 4]}, "surface": PARTIAL, "material": ELASTIC}
+    whole, stick = (
+        marched(march_data(**made, history=[slide], numerics={"tolerance": 1e-4}, interface={**RUBS, **more}))[1][-1]
+        for more in ({}, {"stick": True})
+    )
+    assert stick.measures.friction == pytest.approx(whole.measures.friction, rel=1e-9)
+    assert whole.added[2] > 0.5
+    assert stick.added[-3:-1] == pytest.approx(whole.added[-3:-1], rel=0.02)
+
+
 def test_a_march_of_rubber_that_warms_itself() -> None:
     """After many steps its friction is that of rubber that had this temperature from the start, to the 1e-3 by which
     the temperature still changes in the meantime; energies balance as without heat."""
