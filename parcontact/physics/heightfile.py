@@ -12,6 +12,7 @@ from .. import datafiles
 from ..errors import InputError
 from ..parallel.slab import Array, Slab
 
+LONGEST_NUMBER = 1000  # tuning: characters in a line of text for each number
 Values = NDArray[Any]  # of any type, as in the file
 
 
@@ -67,9 +68,11 @@ def _rows(path: Path, dataset: str, slab: Slab) -> Values:
 
 def _text(path: Path, slab: Slab) -> Values:
     """Read a text file: one row per line, numbers separated by blanks; text after # is ignored."""
-    mine, count = np.empty(slab.shape), 0
+    mine, count, longest = np.empty(slab.shape), 0, LONGEST_NUMBER * (1 + slab.nx)
     with path.open() as lines:
-        for number, line in enumerate(lines, 1):
+        for number, line in enumerate(iter(lambda: lines.readline(longest), ""), 1):
+            if len(line) == longest:
+                raise InputError(f"{path}:{number} has {longest} characters or more; {slab.nx} numbers were expected")
             words = line.partition("#")[0].split()
             if words and len(words) != slab.nx and (foreign := datafiles.foreign_numbers(path)):
                 raise InputError(f"{path} cannot be read: {foreign}")

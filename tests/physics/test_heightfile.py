@@ -111,6 +111,7 @@ def test_cut_short(comm: MPI.Intracomm, shared_path: Path) -> None:
         (b"1,2,3,4,5,6,7\n" * NY, "its numbers are separated by commas"),
         (b"1 2 3 4 5 6 7\n" * (NY - 1) + b"1 2 3 4 5 6 high\n", "cannot be read: could not convert string to float"),
         (b"1 2 3 4 5 6 7\n" * (NY - 1) + b"1 2 3 4 5 6\n", f":{NY} has 6 numbers"),
+        (b"\0" * 10_000, ":1 has 8000 characters or more; 7 numbers were expected"),
         (b"\xff\xfe\x00 2 3 4 5 6 7\n" * NY, "cannot be read: "),
     ],
 )
