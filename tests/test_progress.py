@@ -3,6 +3,7 @@
 import io
 import re
 import sys
+import time
 from pathlib import Path
 from time import sleep
 
@@ -13,6 +14,8 @@ from parcontact import progress
 from parcontact.__main__ import main
 from parcontact.plotting.plotted_run import PlottedRun
 from parcontact.report import result_sections
+from parcontact.storage.console import Console
+from parcontact.storage.step_row import StepRow
 
 
 class Terminal(io.StringIO):
@@ -43,6 +46,19 @@ def test_a_bar_stands_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> 
     sleep(0.11)  # tqdm draws no more often than every tenth of a second
     assert list(items) == [2, 3]
     assert re.search(r"1/3 \[\d\d:\d\d<\d\d:\d\d", terminal.getvalue())  # time passed and time left
+
+
+def test_the_time_left_of_a_run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Without a terminal: two steps after the first one have taken 100 s, and seven are left."""
+    now = 5.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    console = Console(quiet=False, total=10)
+    for step in (0, 1):
+        console.step(StepRow(step))
+    now += 100.0
+    console.step(StepRow(3))
+    console.close()
+    assert capsys.readouterr().out.splitlines()[-1] == "# step 3 of 10, about 0:05:50 left"
 
 
 def test_steady_states(job: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

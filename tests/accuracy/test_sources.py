@@ -79,6 +79,17 @@ def test_parts_add_up() -> None:
     assert (budget.friction.folded, budget.area.folded) == (1e-4, pytest.approx(0.9e-4))
 
 
+def test_little_friction_counts_more() -> None:
+    """A quarter of the slope's friction: twice the relative error; none at all: no budget. Steady friction is a sum of
+    squares, whose error does not grow."""
+    less = replace(SEEN, slope=0.08)
+    one, other = friction_of(RUN, SEEN), friction_of(RUN, less)
+    assert other.solver == pytest.approx(2 * one.solver)
+    assert (other.time, other.folded, other.mesh) == (one.time, one.folded, one.mesh)
+    assert estimate(RUN, replace(less, friction=0.0)).friction is None
+    assert friction_of(RUN, less, steady=True).solver == pytest.approx(one.solver)
+
+
 @pytest.mark.parametrize("friction", [1e-18, 1e-7, 1e-6])
 def test_friction_that_is_noise_is_0_within_its_error(friction: float) -> None:
     """Pressures wrong by 1e-3 on slopes of 0.02 may have tangential forces of 0.4 of 2e-5 of the load where there is
