@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.adhesive import law
+from parcontact.solve.adhesive import gap_kernels, law
 from parcontact.solve.adhesive.adhesive_solver import AdhesiveSolver
 from parcontact.solve.adhesive.gap_iterate import GapOperators, GapSolution
 from parcontact.solve.adhesive.gap_solver import GapSolver
@@ -187,6 +187,24 @@ def test_energy_and_slope_of_the_attraction(one: law.Law) -> None:
         assert_allclose((energy(low) - energy(high)) / (2 * step), here, rtol=1e-7)
         slope = (law.attraction(one, low) - law.attraction(one, high)) / (2 * step)
         assert_allclose(slope, law.softening(one, here), rtol=1e-7)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-4])
+@pytest.mark.parametrize("one", LAWS)
+def test_change_of_energy(one: law.Law, size: float) -> None:
+    """Along a way that closes gaps, and along a short one, by the integral of the attraction; the mean attraction of a
+    short way of the exponential law is exact to 1e-7."""
+    gap, q, image, way = np.random.default_rng(4).random((4, 5, 7))
+    way, new, sigma, sigma_new = -size * way, *(np.empty_like(gap) for _ in range(3))
+    sigma[...] = attraction(one, gap)
+    rise, magnitude = gap_kernels.move(one, gap, q, 0.2, sigma, 0.5, way, image, new, sigma_new)
+    assert_allclose(new, np.maximum(gap + 0.5 * way, 0.0), atol=1e-15)
+    assert_allclose(sigma_new, attraction(one, new), rtol=1e-13, atol=1e-15)
+    surface = [law.energy(one, *at) for at in zip(gap.ravel(), sigma.ravel(), strict=True)]
+    surface -= np.array([law.energy(one, *at) for at in zip(new.ravel(), sigma_new.ravel(), strict=True)])
+    exact = (0.5 * way * (q + 0.2 + 0.25 * image)).sum() + surface.sum()
+    assert_allclose(rise, exact, rtol=1e-12, atol=1e-12 + 1e-7 * np.abs(surface).sum() * (size < 1.0))
+    assert magnitude >= abs(rise) * (1.0 - 1e-12)
 
 
 # -- contacts that stick on a free body: the state that the energy falls to, next to that of a matrix ------------------
