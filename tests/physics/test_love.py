@@ -81,6 +81,15 @@ def test_coefficients_are_integrals_along_the_wake(velocity: tuple[float, float]
     assert_allclose(found, expected, rtol=1e-5)
 
 
+@pytest.mark.parametrize("velocity", [(0.02, 0.0), (-1.0, 0.0)])
+def test_rows_along_the_velocity(velocity: tuple[float, float]) -> None:
+    """Whole rows, calculated from cell to cell, agree with each cell: to 1e-5 as above."""
+    x, y = CELL[0] * np.array([0.0, 1.0, 2.0, -2.0, -1.0]), CELL[1] * np.array([0.0, 1.0])
+    found = wake.wake(x[None, :], y[:, None], *CELL, velocity, CREEP)
+    expected = [[along_the_wake(float(a), float(b), velocity) for a in x] for b in y]
+    assert_allclose(found, expected, rtol=1e-5)
+
+
 def test_far_coefficients_are_those_of_point_loads() -> None:
     """Love's displacement far away is that of a point load, `dx dy/(4 pi r)`, to the fourth power of cell over distance
     when two terms of its expansion are taken: here along the whole wake, to 1e-6."""
