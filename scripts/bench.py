@@ -14,6 +14,7 @@
     steady   steady sliding from a cold start, and along a curve of eight velocities per decade
     flow     leakage through the gap of a contact of 30 %, along x and along y: for --points 2048
     scale    a transform, a cold solve and a sliding step: times on two ranks over times on one
+    stick    runs of jobs/stick with stick over the same runs without
     sizes    a cold solve and a sliding step on 256 x 256 points and on finer and finer grids, over N^2 log2 N
     large    a cold elastic solve at 8 % contact to a pressure error of 1e-5: for --points 8192
 
@@ -44,12 +45,13 @@ from bench.leakage import flow
 from bench.scaling import WORLD, march, scale
 from bench.slides import slide, steady
 from bench.solves import large, sizes, solve
+from bench.sticking import stick
 from bench.table import Line
 
 FEWEST = 64  # points along a side
 BUSY = 0.5  # busy cores before the benchmark above which it warns
 PARTS = {"solve": solve, "slide": slide, "steady": steady, "sizes": sizes, "large": large, "adhesion": adhesion}
-PARTS |= {"dilute": dilute, "free": free, "flow": flow}
+PARTS |= {"dilute": dilute, "free": free, "flow": flow, "stick": stick}
 ON_TWO_RANKS = {"march": march, "scale": scale}
 
 

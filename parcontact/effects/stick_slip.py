@@ -59,7 +59,7 @@ from ..physics.shear_operator import ShearOperator, components, stacked
 from ..physics.units import Units
 from ..solve.preconditioner.extension import grids_for
 from ..solve.tangential import discs
-from ..solve.tangential.solver import TangentialSolver
+from ..solve.tangential.solver import TangentialSolver, TractionProblem
 from .effect import Changes, Instant, Sheared
 from .interface_section import InterfaceEffect
 from .slipping import settle_slips
@@ -127,11 +127,9 @@ class StickSlip(InterfaceEffect[StickMemory]):
         self._cell_force = grid.dx * grid.dy * scene.units.pressure
         self._free = setup.half_space.free
         operator = ShearOperator(setup.fft, setup.size, scene.job.material.poisson, setup.half_space.free)
-        spacing = setup.size[0] / slab.nx, setup.size[1] / slab.ny
-        self._tolerance = numerics.tolerance
-        limits = numerics.tolerance, numerics.max_iterations
-        inverse, grids = scene.operators.preconditioner, grids_for(*spacing)
-        self._solver = TangentialSolver(slab, operator, min(spacing) / math.pi, inverse, grids, *limits)
+        grids = grids_for(setup.size[0] / slab.nx, setup.size[1] / slab.ny)
+        self._tolerance, inverse = numerics.tolerance, scene.operators.preconditioner
+        self._solver = TangentialSolver(slab, operator, inverse, grids, numerics.max_iterations)
 
     def at_rest(self) -> StickMemory:
         last, spare = (BoundedTraction(self._both.zeros(), self._slab.zeros()) for _ in range(2))
@@ -150,8 +148,9 @@ class StickSlip(InterfaceEffect[StickMemory]):
         trial = self._body.begin(memory.body, step.dt, MovedHeights(target), step.growth)
         new = self._start(instant, memory, strength)
         stiffness = self._stiffness(instant)
-        self._solver.tolerance = min(self._tolerance, self._scene.controller.largest_tolerance(step))
-        solved = self._solver.solve(new.bound, trial.effective, stiffness, new.traction)
+        tolerance = min(self._tolerance, self._scene.controller.largest_tolerance(step))
+        pulled, last = TractionProblem(new.bound, trial.effective, stiffness, tolerance), memory.last.traction
+        solved = self._solver.solve(pulled, new.traction, last, memory.alpha / alpha)
         body = self._body.commit(memory.body, trial, solved.displacement, surface_of(memory.body))
         now, before = Pressed(new.traction, alpha), Pressed(memory.last.traction, memory.alpha)
         energy = memory.energy
@@ -162,7 +161,9 @@ class StickSlip(InterfaceEffect[StickMemory]):
         columns = *parts_of_friction(sheared), settled.stuck / self._slab.points
         lost = memory.lost + sheared.lost
         after = StickMemory(body, new, memory.last, target, strength, alpha, settled.share, energy, lost, columns)
-        return Changes(after, solved.failure, sheared=sheared, turned=math.dist(settled.share, memory.share))
+        whole = not self._free and instant.measures.contact_area == 1.0  # no step resolves how it begins to slide
+        turned = 0.0 if whole else math.dist(settled.share, memory.share)
+        return Changes(after, solved.failure, sheared=sheared, turned=turned)
 
     def _strength(self, dt: float, way: float, last: float) -> float:
         """Return the shear strength [Pa] of a step in which the surface moves by a way [m] along itself; `last` is the

@@ -48,10 +48,12 @@ def components(field: Array) -> tuple[Array, Array]:
 
 class ShearOperator:
     """Operator from tractions to displacements on a half space of shear modulus 1, loaded inside a box of `size` [any
-    unit of length]; with `free`, nothing surrounds the box. The constructor and `apply` are collective."""
+    unit of length]; with `free`, nothing surrounds the box. `short` is the compliance of the shortest waves across
+    their direction. The constructor and `apply` are collective."""
 
     def __init__(self, fft: FFT, size: Vector, poisson: float, free: bool) -> None:
         slab = fft.slab
+        self.free, self.short = free, min(size[0] / slab.nx, size[1] / slab.ny) / np.pi
         self.fft = FFT(slab, padded_lengths(slab.nx, slab.ny), measured=fft.measured) if free else fft
         self._other = allocate(self.fft.shape, self.fft.complex, slab.tally)
         self._symbols = [allocate(self.fft.shape, np.float64, slab.tally) for _ in range(3)]

@@ -9,11 +9,11 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact.parallel.fft import FFT
-from parcontact.parallel.slab import Slab
+from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.shear_operator import ShearOperator, components, stacked
 from parcontact.solve.preconditioner.extension import ALL, grids_for
-from parcontact.solve.tangential.solver import TangentialSolver
+from parcontact.solve.tangential.solver import TangentialSolver, TractionProblem
 
 Map = NDArray[np.float64]
 SIZE, POISSON = (1.0, 1.0), 0.5
@@ -28,16 +28,17 @@ class Scene:
     aim: Map
     kappa: float
 
-    def rows(self, slab: Slab) -> tuple[Map, Map]:
-        """Return this rank's rows of the bounds, and of e, stacked."""
-        return self.bound[slab.rows].copy(), np.concatenate([part[slab.rows] for part in self.aim])
+    def rows(self, slab: Slab, tolerance: float) -> TractionProblem:
+        """This rank's rows of the problem."""
+        aim = np.concatenate([part[slab.rows] for part in self.aim])
+        return TractionProblem(self.bound[slab.rows].copy(), aim, self.kappa, tolerance)
 
 
-def solver_of(slab: Slab, free: bool, tolerance: float, limit: int = 500) -> TangentialSolver:
+def solver_of(slab: Slab, free: bool, limit: int = 500) -> TangentialSolver:
     fft = FFT(slab)
     operator = ShearOperator(fft, SIZE, POISSON, free)
     inverse = HalfSpace(SIZE, POISSON, "love" if free else "spectral", free).inverse(fft)
-    return TangentialSolver(slab, operator, SIZE[0] / slab.nx / math.pi, inverse, ALL, tolerance, limit)
+    return TangentialSolver(slab, operator, inverse, ALL, limit)
 
 
 def scene(kind: str, points: int, free: bool = False) -> Scene:
@@ -62,7 +63,7 @@ def matrix_of(solver: TangentialSolver) -> Map:
     return np.stack([solver._operator.apply(unit, both.zeros()).ravel().copy() for unit in units], axis=1)
 
 
-def shortened(t: Map, bound: Map) -> Map:
+def shortened(t: Array, bound: Array) -> Array:
     size = np.hypot(*components(t))
     return t * np.tile(np.where(size > bound, bound / np.where(size > 0.0, size, 1.0), 1.0), (2, 1))
 
@@ -73,10 +74,11 @@ def test_solution_is_that_of_projected_gradients(kind: str, free: bool) -> None:
     """The least J agrees with the one of accelerated projected gradients (A. Beck and M. Teboulle, SIAM J. Imaging Sci.
     2 (2009) 183) on the matrix of 12 x 12 points to 1e-9 of <t, e>; tractions meet their bounds to rounding, and
     displacements are A t."""
-    given, solver = scene(kind, 12, free), solver_of(Slab.alone(12, 12), free, 1e-8)
-    bound, e = given.rows(solver.slab)
+    solver = solver_of(Slab.alone(12, 12), free)
+    given = scene(kind, 12, free).rows(solver.slab, 1e-8)
+    bound, e, _, _ = given
     t = np.zeros_like(e)
-    solved = solver.solve(bound, e, given.kappa, t)
+    solved = solver.solve(given, t)
     assert not solved.failure
     assert (np.hypot(*components(t)) <= bound * (1.0 + 1e-14)).all()
     matrix = matrix_of(solver)
@@ -95,13 +97,13 @@ def test_solution_is_that_of_projected_gradients(kind: str, free: bool) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_iteration_raises_the_energy(kind: str) -> None:
     """J falls with each iteration, to rounding: solves with a limit of 0, 1, 2, ... iterations stop at its iterates."""
-    given, energies = scene(kind, 24), []
+    energies = list[float]()
     for limit in range(12):
-        solver = solver_of(Slab.alone(24, 24), False, 1e-14, limit)
-        bound, e = given.rows(solver.slab)
-        t = shortened(np.concatenate([-0.3 * bound, 0.8 * bound]), bound)
-        u = solver.solve(bound, e, given.kappa, t).displacement
-        energies.append(float((0.5 * t * u - t * e).sum()))
+        solver = solver_of(Slab.alone(24, 24), False, limit)
+        given = scene(kind, 24).rows(solver.slab, 1e-14)
+        t = shortened(np.concatenate([-0.3 * given.bound, 0.8 * given.bound]), given.bound)
+        u = solver.solve(given, t).displacement
+        energies.append(float((0.5 * t * u - t * given.aim).sum()))
     assert (np.diff(energies) <= 1e-14 * abs(energies[-1])).all()
     assert energies[-1] < energies[0]
 
@@ -111,9 +113,9 @@ def test_iterations_hardly_depend_on_the_grid(kind: str) -> None:
     """From 32 to 256 points along a side the iterations to 1e-3 grow at most to the double, and stay below 12."""
     found = []
     for points in (32, 256):
-        given, solver = scene(kind, points), solver_of(Slab.alone(points, points), False, 1e-3)
-        bound, e = given.rows(solver.slab)
-        solved = solver.solve(bound, e, given.kappa, np.zeros_like(e))
+        solver = solver_of(Slab.alone(points, points), False)
+        given = scene(kind, points).rows(solver.slab, 1e-3)
+        solved = solver.solve(given, np.zeros_like(given.aim))
         assert not solved.failure
         found.append(solved.iterations)
     assert found[1] <= min(2 * found[0], 11)
@@ -122,38 +124,53 @@ def test_iterations_hardly_depend_on_the_grid(kind: str) -> None:
 def test_nothing_resists_a_box_that_sticks() -> None:
     """A uniform displacement of a box in full contact has one solution: it slips as a whole, with all tractions at
     their bounds along it. The mean traction, which no displacement resists, gets there in a few iterations."""
-    solver = solver_of(Slab.alone(16, 16), False, 1e-6)
+    solver = solver_of(Slab.alone(16, 16), False)
     bound = np.ones((16, 16))
     e = np.concatenate([3e-4 * bound, 4e-4 * bound])
     t = np.zeros_like(e)
-    solved = solver.solve(bound, e, 10.0, t)
+    solved = solver.solve(TractionProblem(bound, e, 10.0, 1e-6), t)
     assert solved.iterations <= 6
     np.testing.assert_allclose(t, np.concatenate([0.6 * bound, 0.8 * bound]), rtol=1e-6)
 
 
 def test_failures_name_remedies() -> None:
     """A solve that ends at its limit, or at rounding, says so, says what to change, and has admissible tractions."""
-    given = scene("half", 24)
     for tolerance, limit, sentence in ((1e-6, 2, "try numerics.max_iterations above 2"), (1e-30, 900, "stalled")):
-        solver = solver_of(Slab.alone(24, 24), False, tolerance, limit)
-        bound, e = given.rows(solver.slab)
-        t = np.zeros_like(e)
-        solved = solver.solve(bound, e, given.kappa, t)
+        solver = solver_of(Slab.alone(24, 24), False, limit)
+        given = scene("half", 24).rows(solver.slab, tolerance)
+        t = np.zeros_like(given.aim)
+        solved = solver.solve(given, t)
         assert sentence in solved.failure
         assert "smaller steps" in solved.failure
         assert solved.certificate > tolerance
-        assert (np.hypot(*components(t)) <= bound * (1.0 + 1e-14)).all()
+        assert (np.hypot(*components(t)) <= given.bound * (1.0 + 1e-14)).all()
 
 
 def test_points_that_slip_along_x_are_not_moved_along_it() -> None:
-    """Where all points slip along x, tractions can only turn: an iteration applies the preconditioner to the component
-    along y alone, so that 3 operators are counted, after 2 at the start."""
-    solver = solver_of(Slab.alone(16, 16), False, 1e-3, limit=1)
-    given = scene("few", 16)
-    bound, _ = given.rows(solver.slab)
+    """Where all points slip along x, tractions can only turn: the preconditioner is applied to the component along y
+    alone, so that each iteration counts 3 operators, after 3 for the start and its certificate."""
+    solver = solver_of(Slab.alone(16, 16), False, limit=1)
+    bound = scene("few", 16).bound
     e = np.concatenate([np.full_like(bound, 100.0), 10.0 * np.sin(np.arange(16)) + np.zeros_like(bound)])
-    solver.solve(bound, e, given.kappa, np.concatenate([bound, 0.0 * bound]))
-    assert solver.slab.tally["operator"] == 2 + 3
+    solver.solve(TractionProblem(bound, e, scene("few", 16).kappa, 1e-3), np.concatenate([bound, 0.0 * bound]))
+    assert solver.slab.tally["operator"] == 3 + 3
+
+
+@pytest.mark.parametrize("steps", [5, 80])
+def test_errors_of_many_steps_do_not_add_up(steps: int) -> None:
+    """A certificate is below 0.3 times the change since the last step, so that tractions that grow evenly over any
+    number of steps from 0, each from the last ones, are right to a share of the last change and of the tolerance."""
+    solver = solver_of(Slab.alone(24, 24), False)
+    given = scene("half", 24).rows(solver.slab, 0.05)
+    t, exact = np.zeros_like(given.aim), np.zeros_like(given.aim)
+    for step in range(1, steps + 1):
+        last, problem = t.copy(), given._replace(aim=given.aim * step / steps)
+        solved = solver.solve(problem, t, last)
+        change, size = (float(np.hypot(*components(each)).sum()) for each in (t - last, t))
+        assert solved.certificate <= max(0.3 * change / size, 0.1 * 0.05)
+    solver.solve(given._replace(tolerance=1e-9), exact)
+    error, size = (float(np.hypot(*components(each)).sum()) for each in (t - exact, exact))
+    assert error <= 0.02 * size
 
 
 @pytest.mark.parametrize("ratio", [32, 1000])
@@ -165,7 +182,7 @@ def test_steps_adapt_to_a_row_of_long_cells(ratio: int) -> None:
     operator = ShearOperator(fft, size, POISSON, True)
     inverse = HalfSpace(size, POISSON, "love", True).inverse(fft)
     spacing = size[0] / points, size[1]
-    solver = TangentialSolver(fft.slab, operator, spacing[1] / math.pi, inverse, grids_for(*spacing), 1e-8, 50)
+    solver = TangentialSolver(fft.slab, operator, inverse, grids_for(*spacing), 50)
     touches = np.zeros((1, points), np.bool_)
     touches[0, 14:19] = True
     bound, both = 1e9 * touches, np.concatenate([touches, touches])
@@ -173,7 +190,7 @@ def test_steps_adapt_to_a_row_of_long_cells(ratio: int) -> None:
     t = np.zeros_like(e)
     matrix = matrix_of(solver)[both.ravel()][:, both.ravel()]
     exact = np.linalg.solve(matrix, e[both])
-    solver.solve(bound, e, float(np.abs(exact).max()), t)
+    solver.solve(TractionProblem(bound, e, float(np.abs(exact).max()), 1e-8), t)
     np.testing.assert_allclose(t[both], exact, rtol=0, atol=1e-6 * np.abs(exact).max())
 
 
@@ -185,10 +202,9 @@ def test_ranks_have_the_tractions_of_one(comm: MPI.Intracomm, free: bool) -> Non
     for points in (3, 20):
         given, results = scene("half", points, free), []
         for slab in (Slab.alone(points, points), Slab(comm, points, points)):
-            solver = solver_of(slab, free, 1e-10)
-            bound, e = given.rows(slab)
-            t = np.zeros_like(e)
-            results.append((solver.solve(bound, e, given.kappa, t), t))
+            mine = given.rows(slab, 1e-10)
+            t = np.zeros_like(mine.aim)
+            results.append((solver_of(slab, free).solve(mine, t), t))
         (alone, whole), (together, own) = results
         assert together.iterations == alone.iterations
         rows = Slab(comm, points, points).rows

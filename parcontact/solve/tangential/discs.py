@@ -49,11 +49,12 @@ def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
     points that slip, along t.
 
     Return sums of |t|, of |P(t + kappa w)| and of `|P(t + kappa w) - t|`, with P(t) the traction shortened to its
-    bound, and of its components.
+    bound; of the components of the latter; of both components of w over points that stick, and their number.
     """
     size, moved, residual, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
+    w_sticks_x, w_sticks_y, count = 0.0, 0.0, 0.0
     for j in range(bound.shape[0]):
-        sums = [0.0, 0.0, 0.0, 0.0, 0.0]
+        sums = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
         for i in range(bound.shape[1]):
             most = bound[j, i]
             if most <= 0.0:
@@ -74,9 +75,14 @@ def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
             sums[2] += math.hypot(other_x - a, other_y - b)
             sums[3] += abs(other_x - a)
             sums[4] += abs(other_y - b)
+            if sticks:
+                sums[5] += w_x
+                sums[6] += w_y
+                sums[7] += 1.0
         size, moved, residual = size + sums[0], moved + sums[1], residual + sums[2]
         along_x, along_y = along_x + sums[3], along_y + sums[4]
-    return size, moved, residual, along_x, along_y
+        w_sticks_x, w_sticks_y, count = w_sticks_x + sums[5], w_sticks_y + sums[6], count + sums[7]
+    return size, moved, residual, along_x, along_y, w_sticks_x, w_sticks_y, count
 
 
 @loop
@@ -101,9 +107,12 @@ def residual(bound, free, turn, x, y, u_x, u_y, e_x, e_y, short, along_x, moves,
 
 
 @loop
-def complete(bound, free, turn, x, y, u_x, u_y, e_x, e_y, old_x, old_y, old_u_x, old_u_y, short, long, z_x, z_y):
-    """Complete the direction z, of which the preconditioned residual is given, at points that slip: its part across the
-    traction, times the root of `short/(short + turn)`, and the rest of the residual over `long + turn`.
+def complete(
+    bound, free, turn, x, y, u_x, u_y, e_x, e_y, old_x, old_y, old_u_x, old_u_y, short, long, mean_x, mean_y, z_x, z_y
+):
+    """Complete the direction z, of which the preconditioned residual is given. Points that stick add a mean. Points
+    that slip keep the part across the traction, times the root of `short/(short + turn)`, and add the rest of the
+    residual over `long + turn`.
 
     With the residual r, the last change d of the tractions, and c = A d + turn d, all of them across the traction where
     points slip, return the sums of r z, r d, z c and d c.
@@ -129,6 +138,9 @@ def complete(bound, free, turn, x, y, u_x, u_y, e_x, e_y, old_x, old_y, old_u_x,
                 z = z * math.sqrt(share) + w * (1.0 - share) / (long + turn[j, i])
                 z_x[j, i], z_y[j, i] = a * z, b * z
                 w_x, w_y, d_x, d_y, c_x, c_y = a * w, b * w, a * d, b * d, a * c, b * c
+            else:
+                z_x[j, i] += mean_x
+                z_y[j, i] += mean_y
             sums[0] += w_x * z_x[j, i] + w_y * z_y[j, i]
             sums[1] += w_x * d_x + w_y * d_y
             sums[2] += z_x[j, i] * c_x + z_y[j, i] * c_y
@@ -140,8 +152,10 @@ def complete(bound, free, turn, x, y, u_x, u_y, e_x, e_y, old_x, old_y, old_u_x,
 @loop
 def move_tractions(bound, free, x, y, z_x, z_y, step, again, new_x, new_y, hit):
     """Replace the tractions before (x, y), in (new_x, new_y), by the next ones: `step z` and `again` times the last
-    change further. Those that slip keep their bounds; others are shortened to them."""
+    change further. Those that slip keep their bounds; others are shortened to them. Return the sum of the changes."""
+    change = 0.0
     for j in range(bound.shape[0]):
+        row_change = 0.0
         for i in range(bound.shape[1]):
             most = bound[j, i]
             if most <= 0.0:
@@ -157,6 +171,25 @@ def move_tractions(bound, free, x, y, z_x, z_y, step, again, new_x, new_y, hit):
             if size > most or not free[j, i]:
                 a, b, size = a * (most / size), b * (most / size), most
             new_x[j, i], new_y[j, i], hit[j, i] = a, b, size >= AT_BOUND * most
+            row_change += math.hypot(a - x[j, i], b - y[j, i])
+        change += row_change
+    return change
+
+
+@loop
+def change_since(bound, x, y, last_x, last_y, factor):
+    """Sums of the changes of tractions in contact since the last step, whose tractions are multiplied by a factor, and
+    of these."""
+    change, size = 0.0, 0.0
+    for j in range(bound.shape[0]):
+        row_change, row_size = 0.0, 0.0
+        for i in range(bound.shape[1]):
+            a, b = factor * last_x[j, i], factor * last_y[j, i]
+            row_size += math.hypot(a, b)
+            if bound[j, i] > 0.0:
+                row_change += math.hypot(x[j, i] - a, y[j, i] - b)
+        change, size = change + row_change, size + row_size
+    return change, size
 
 
 @loop
