@@ -124,13 +124,14 @@ def largest(values: Iterable[float]) -> float:
 
 
 def ripple(distance: ArrayLike, friction: ArrayLike, at: int, cell: float) -> float:
-    """Return the friction in row `at` minus its mean over one cell [m] around it, 0 for steps of a cell or more.
+    """Return the friction in row `at` minus its mean over one cell [m] around it, 0 for steps of a cell or more and in
+    the first cell of the slide, where friction rises.
 
     Steps shorter than a cell meet the points of the grid in turn, which makes friction oscillate.
     """
     x, y = np.asarray(distance, float), np.asarray(friction, float)
     near = np.abs(x - x[at]) <= cell / 2 * (1 + SAME_INSTANT)
-    if np.count_nonzero(near) < 3 or not x[near][0] < x[at] < x[near][-1]:
+    if x[at] - x[0] < cell or np.count_nonzero(near) < 3 or not x[near][0] < x[at] < x[near][-1]:
         return 0.0
     return max(float(y[at] - mean_over_end(x[near], y[near], 1.0)), 0.0)
 

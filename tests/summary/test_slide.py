@@ -115,11 +115,12 @@ def test_sentences_about_a_slide_that_others_follow() -> None:
 
 def test_mu_max_on_a_ripple() -> None:
     """Of a height of 1 and the period of the cell, in steps of an eighth of it: its mean over a cell is 1 less, by
-    trapezoids to round-off. Steps of a cell do not show it."""
+    trapezoids to round-off. Steps of a cell do not show it, and the rise in the first cell of a slide is none."""
     x = np.arange(0.0, 4.0 + 1e-9, 0.125)
     friction = 5.0 + np.cos(2 * np.pi * x)
     assert ripple(x, friction, 16, 1.0) == pytest.approx(1.0, rel=1e-12)
     assert ripple(x[::8], friction[::8], 2, 1.0) == 0.0
+    assert ripple(x, np.minimum(x, 1.25 - x / 2.0), 6, 1.0) == 0.0
     table = rows(*zip(x / 2.0, x, friction, strict=True))
     stated = said([{**CLIMB, "duration": 2.0}], table, 1.0)[0]
     assert "is 6.0 ± 1.0 (1 of it a ripple with the period of a cell), " in stated
