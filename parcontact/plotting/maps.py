@@ -42,6 +42,7 @@ LOOKS = {
     "slip": Look("", "viridis", note=": traction over its bound"),
 }
 TRACTIONS = ("traction_x", "traction_y")
+STICK_MAPS = ("traction", "slip")  # drawn from both components and the pressure
 TENSION = "RdBu_r"  # colours of pressures of both signs
 STRIP = 8  # most points across of a map that is drawn as a line
 TICKS = 5  # most intervals of ticks, fixed so that the layout does not change
@@ -192,6 +193,12 @@ def dataset_of(file: h5py.File, name: str) -> str:
     return next((key for key in (f"{name}_map", name) if key in file and file[key].ndim > 1), "")
 
 
+def drawn_maps(file: h5py.File) -> list[str]:
+    """Return the names of the maps that can be drawn from a file of fields."""
+    sticks = all(key in file for key in (*TRACTIONS, "pressure"))
+    return [name for name in LOOKS if name in file or (sticks and name in STICK_MAPS)]
+
+
 def draw_frames(
     file: h5py.File,
     name: str,
@@ -203,6 +210,9 @@ def draw_frames(
     """Draw a saved map of shape (instant, y, x) at each index that has a label, with one range of colours."""
 
     def read(index: int) -> Array:
+        if name in STICK_MAPS:
+            size = np.hypot(*(file[part][index] for part in TRACTIONS))
+            return stick_maps(size, file["pressure"][index], job)[STICK_MAPS.index(name)]
         pressure = file["pressure"][index] if name == "gap" and "pressure" in file else None
         return mask(name, file[dataset_of(file, name)][index], pressure, job)
 

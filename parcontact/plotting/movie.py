@@ -49,7 +49,7 @@ def _draw(directory: Path, name: str) -> tuple[list[Image.Image], int]:
     with hdf5.open_results(path) as file:
         run = PlottedRun(directory)
         labels = label_frames(run, file)
-        there = [key for key in maps.LOOKS if key in file]
+        there = maps.drawn_maps(file)
         if name not in there or not labels:
             raise InputError(f"{path} has no map of {name}; it has {', '.join(there) or 'none'}")
         chosen = choose_evenly(labels, FRAMES)

@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from drawing import KINDS, asked, ran
+from drawing import ELASTIC, KINDS, SPHERE, asked, ran
 from PIL import Image
 
 from parcontact.storage import files
@@ -53,6 +53,18 @@ def test_an_mp4_where_ffmpeg_is(out: Path) -> None:
     assert words[words.index("-r") + 1] == "2"  # slow enough to see two frames
     assert Path("frames").stat().st_size == 2 * 3 * width * height
     assert files.is_marked(out / "pressure.mp4")
+
+
+@pytest.mark.rendered
+def test_movies_of_slip(tmp_path: Path) -> None:
+    """Tractions and slip are drawn from both saved components, a frame for each instant."""
+    stick = "interface: {coefficient: 0.5, stick: true}\noutput: {fields: [pressure, traction]}\n"
+    shear = "history:\n  - {force: 1.0e-3}\n  - {force: 1.0e-3, velocity: 1.0e-7, duration: 2, time_step: 1}\n"
+    found = ran(tmp_path, SPHERE + ELASTIC + stick + shear)
+    for name in ("traction", "slip"):
+        assert asked(found, "--movie", name, "--out", f"{tmp_path}/{name}.gif") == 0
+        with Image.open(tmp_path / f"{name}.gif") as movie:
+            assert movie.n_frames == 3  # type: ignore[attr-defined]
 
 
 @pytest.mark.rendered
