@@ -171,7 +171,8 @@ def _random_surface(
 ) -> Spectrum:
     """Return the transform of a random surface with a measured spectrum between its longest and shortest wavelengths
     [m], and add to the notes on root; collective."""
-    (long, short), cell = ends, max(length / n for length, n in zip(grid.size, grid.points, strict=True) if n > 1)
+    cells = (length / n for length, n in zip(grid.size, grid.points, strict=True) if n > 1)
+    (long, short), cell = ends, max(cells, default=max(grid.size))
     if fft.slab.root:
         if short < 2 * cell:
             notes.append(f"spectrum: the grid has no waves shorter than two cells, {2 * cell:.4g} m")

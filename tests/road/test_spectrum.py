@@ -339,3 +339,11 @@ def test_white_noise_has_no_hurst_exponent() -> None:
     found = statistics.surface_statistics(np.random.default_rng(3).standard_normal((64, 64)), (1.0, 1.0))
     assert np.isnan(found.hurst)
     assert found.nayak > 1.5  # of an isotropic random surface at least 1.5
+
+
+def test_a_single_point_has_no_waves(tmp_path: Path) -> None:
+    """A grid of one point is refused with a sentence."""
+    q = np.geomspace(1e4, 1e6, 20)
+    job = load(tmp_path, table("q[1/m] C2D[m^4]", q, c2(q)))
+    with pytest.raises(InputError, match="has no wave between"):
+        heights_of(job.model_copy(update={"grid": job.grid.model_copy(update={"points": (1, 1)})}))
