@@ -54,7 +54,7 @@ MOST_GROWTH = 20.0  # limit on gamma; reached where nothing resists, as all poin
 SMALL_SHARE = 0.2  # share of the way to the new tractions; below it, tractions follow the slip next
 MAX_STALLED = 60  # limit on iterations without a smaller certificate
 # accuracy
-SHARE_OF_CHANGE = 0.3  # largest certificate over the change of tractions since the last step
+SHARE_OF_CHANGE = 0.2  # largest certificate over the change of tractions since the last step
 LEAST_TOLERANCE = 0.1  # share of the tolerance that is small enough however little tractions change
 LEAST_LEFT = 0.01  # share of the last tractions; errors of tractions that fall below it count relative to it
 ROUNDING = 4 * float(np.finfo(np.float64).eps)  # share of sums of t w below which a change of J is rounding
