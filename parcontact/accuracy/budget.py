@@ -99,13 +99,13 @@ def _estimate(sources: Sequence[ErrorSource], run: RunProperties, observed: Step
 
 
 def add_shear(
-    budget: ErrorBudget, body: float, shear: float, whole: float, solver: float, share: float, time: float
+    budget: ErrorBudget, body: float, shear: float, whole: float, solver: float, share: float, time: float, mesh: float
 ) -> ErrorBudget:
     """Return the budget of friction `whole`, the sum of the part of the `body`, with its `budget`, and of `shear` by
     tractions.
 
-    The tractions have the relative errors `solver` of their solve and `time` of the step, and a `share` of them has the
-    error of the area.
+    The tractions have the relative errors `solver` of their solve, `time` of the step and `mesh` of the stiffness of
+    spots, and a `share` of them has the error of the area.
     """
     if whole <= 0.0:
         return replace(budget, friction=None)
@@ -113,6 +113,7 @@ def add_shear(
     parts = {name: body * one + shear * share * two for name, one, two in zip(NAMES, of_body, budget.area, strict=True)}
     parts["solver"] += shear * solver
     parts["time"] += shear * time
+    parts["mesh"] += shear * mesh
     return replace(budget, friction=ErrorParts(**{name: part / whole for name, part in parts.items()}))
 
 

@@ -45,7 +45,8 @@ class Sheared:
     """Effect of tractions along the surface in a step: the measures including them, their force [N] on the rigid
     surface, and the energy lost in slip [J]. With `thermal` the map `slipping` is in proportion to the power of slip;
     at rest, or if nothing slips, to the bounds of tractions. `error` is the relative error of their solve, a `share` of
-    them has the error of the area, and `time` is their relative error by the length of the step."""
+    them has the error of the area, and `time` and `mesh` are their relative errors by the length of the step and by the
+    stiffness of spots on the mesh."""
 
     measures: Measures
     force: Vector
@@ -54,6 +55,7 @@ class Sheared:
     error: float = 0.0
     share: float = 0.0
     time: float = 0.0
+    mesh: float = 0.0
 
 
 @dataclass(frozen=True)

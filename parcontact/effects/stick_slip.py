@@ -46,7 +46,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..accuracy.constants import ROLLING
+from ..accuracy.constants import ROLLING, STICKING
 from ..columns import added_by
 from ..parallel.slab import Array
 from ..physics import loops
@@ -219,18 +219,22 @@ class StickSlip(InterfaceEffect[StickMemory]):
         """Return what the tractions add to the measures of a step, from the bounds before and after it; collective.
 
         The share of the tractions that is wrong as the area is: all of those by a shear strength; by a coefficient
-        where points stick, as those that slip add up to a share of the load. In rolling, points that enter the contact
-        in a step move with the surface for all of it."""
-        touching = instant.measures.contact_area * self._slab.points
+        where points stick, as those that slip add up to a share of the load. Spots that stick slip first at their
+        edges, and edge cells make them too stiff; by a coefficient tractions are small there. In rolling, points that
+        enter the contact in a step move with the surface for all of it."""
+        area, corrected = instant.measures.contact_area, instant.measures.contact_area_corrected
+        touching = area * self._slab.points
+        sticking, time = settled.stuck / touching if touching else 0.0, 0.0
         by_load = self._law.coefficient is not None and touching > 0.0
-        share = settled.stuck / touching if by_load else 1.0
-        time = 0.0
+        share = sticking if by_load else 1.0
+        mesh = STICKING.value * sticking * math.hypot(*settled.share)
+        mesh *= 0.0 if by_load or not touching else 1.0 - corrected / area
         if touching and self._scene.job.history[instant.step.stage].rolls:
             entered = self._slab.sum(float(np.count_nonzero((bound > 0.0) & (before <= 0.0))))[0]
-            time = ROLLING.value * (entered / touching) * (settled.stuck / touching)
+            time = ROLLING.value * (entered / touching) * sticking
         measures = _with_force(instant, settled.force)
         slipping = self._slipping if instant.slid and settled.power > 0.0 else bound
-        return Sheared(measures, settled.force, settled.lost, slipping, error, share, time)
+        return Sheared(measures, settled.force, settled.lost, slipping, error, share, time, mesh)
 
     def values(self, memory: StickMemory) -> Sequence[float]:
         """Return the parts of friction, the share of the box that sticks, and the energy lost in slip [J], NaN without

@@ -192,7 +192,8 @@ def _budget_of(made: _Made, sheared: Sheared | None) -> ErrorBudget | None:
     if budget is None or sheared is None:
         return budget
     body, now = made.solved.measures.friction, sheared.measures
-    return add_shear(budget, body, now.friction_interface, now.friction, sheared.error, sheared.share, sheared.time)
+    errors = sheared.error, sheared.share, sheared.time, sheared.mesh
+    return add_shear(budget, body, now.friction_interface, now.friction, *errors)
 
 
 def _describe_passed(step: Step) -> str:

@@ -467,3 +467,21 @@ def test_creep_is_of_second_order() -> None:
     found = [creeping(steps) for steps in (5, 10, 20)]
     assert found[-1] == pytest.approx(0.5, rel=1e-2)
     assert (found[0] - found[1]) / (found[1] - found[2]) == pytest.approx(4.0, rel=0.3)
+
+
+def test_errors_of_a_coarse_mesh_while_spots_stick() -> None:
+    """Friction of a rough contact with a shear strength is too large while spots stick, as edge cells are part of them:
+    with 32 points along a side by more than the error of the area, and by less than the stated errors. The reference
+    has 128 points, which leave a quarter of the error."""
+    slide = {"pressure": 1e5, "velocity": 1.0, "distance": 6e-7, "cells_per_step": 1.0}
+    rows = []
+    for points in (32, 128):
+        slide["cells_per_step"] = 1e-7 * points / 1e-3
+        job = rough({"shear_stress": 2e5, "stick": True}, ELASTIC, points, history=[{"pressure": 1e5}, slide])
+        rows.append(marched({**job, "numerics": {"accuracy": 0.02}})[1][2:])
+    for coarse, fine in zip(*rows, strict=True):
+        ratio = coarse.measures.friction_interface / fine.measures.friction_interface
+        assert abs(ratio - 1.0) <= coarse.error_friction
+    first, exact = rows[0][0], rows[1][0]
+    assert first.added[2] > 0.8 * first.measures.contact_area
+    assert first.measures.friction_interface > (1.0 + first.error_area) * exact.measures.friction_interface
