@@ -23,7 +23,8 @@ g, its last displacement plus the increment of D, and
 Points of the body keep their positions on the grid, as in a march without stick: u, t and the branches belong to them,
 and nothing is shifted. The surface moves over them and carries the bounds f, which follow from the pressure of each
 step. A point without contact has g = u, so that its slip counts from its first contact. Targets of points that stick
-are not reset to u, so that residuals of solves do not add up over many steps.
+are not reset to u, and those of points that slip keep what the tractions lack of their bounds, so that residuals of
+solves do not add up over many steps.
 
 A surface that rolls moves as a shape, while its points move along the body by a share of that way, the creep (F. W.
 Carter, Proc. R. Soc. Lond. A 112 (1926) 151): D grows by the creep times the motion of the shape. Sliding has the creep
@@ -65,8 +66,6 @@ from .interface_section import InterfaceEffect
 from .slipping import settle_slips
 
 UNIFORM = 1e-12  # rounding: share of the square of a pressure below which its waves are rounding
-
-
 LEAST_BOUND = 1e-12  # rounding: bound of tractions, in the run's units, that displacements hardly resolve: taken as 0
 
 
@@ -126,7 +125,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         self._slipping = slab.zeros() if scene.job.section("thermal") is not None else np.zeros((0, 0))
         self._cell_force = grid.dx * grid.dy * scene.units.pressure
         self._free = setup.half_space.free
-        operator = ShearOperator(setup.fft, setup.size, scene.job.material.poisson, setup.half_space.free)
+        operator = ShearOperator(setup.fft, setup.size, scene.job.material.poisson, self._free)
         grids = grids_for(setup.size[0] / slab.nx, setup.size[1] / slab.ny)
         self._tolerance, inverse = numerics.tolerance, scene.operators.preconditioner
         self._solver = TangentialSolver(slab, operator, inverse, grids, numerics.max_iterations)
@@ -225,10 +224,9 @@ class StickSlip(InterfaceEffect[StickMemory]):
         area, corrected = instant.measures.contact_area, instant.measures.contact_area_corrected
         touching = area * self._slab.points
         sticking, time = settled.stuck / touching if touching else 0.0, 0.0
-        by_load = self._law.coefficient is not None and touching > 0.0
-        share = sticking if by_load else 1.0
-        mesh = STICKING.value * sticking * math.hypot(*settled.share)
-        mesh *= 0.0 if by_load or not touching else 1.0 - corrected / area
+        share, mesh = sticking, 0.0
+        if touching and self._law.coefficient is None:
+            share, mesh = 1.0, STICKING.value * (1.0 - corrected / area) * sticking * math.hypot(*settled.share)
         if touching and self._scene.job.history[instant.step.stage].rolls:
             entered = self._slab.sum(float(np.count_nonzero((bound > 0.0) & (before <= 0.0))))[0]
             time = ROLLING.value * (entered / touching) * sticking

@@ -139,9 +139,9 @@ class ThermalMemory:
 
 def _rubs(job: Any) -> bool:
     """Return whether the contact area itself makes heat, by the shear of any effect or by sticking."""
-    effects, interface = effects_of(type(job).model_fields).values(), job.section("interface")
+    effects = effects_of(type(job).model_fields).values()
     shears = (effect.shear(job) is not None for effect in effects if effect.decide(job).on)
-    return any(shears) or (interface is not None and interface.stick)
+    return any(shears) or job.sticks
 
 
 class ThermalColumns(Effect[ThermalMemory]):

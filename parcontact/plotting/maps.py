@@ -196,7 +196,7 @@ def dataset_of(file: h5py.File, name: str) -> str:
 def drawn_maps(file: h5py.File) -> list[str]:
     """Return the names of the maps that can be drawn from a file of fields."""
     sticks = all(key in file for key in (*TRACTIONS, "pressure"))
-    return [name for name in LOOKS if name in file or (sticks and name in STICK_MAPS)]
+    return [name for name in LOOKS if dataset_of(file, name) or (sticks and name in STICK_MAPS)]
 
 
 def draw_frames(

@@ -192,7 +192,7 @@ def _browse_file(
         with hdf5.open_results(path) as file, style.drawing(RC):
             labels = choose_evenly(label(file), MOST_MAPS)
             chosen = Fields(file, until=step).chosen if step is not None else max(labels, default=0)
-            names = [name for name in maps.LOOKS if maps.dataset_of(file, name) and labels]
+            names = maps.drawn_maps(file) if labels else []
             return [_browse_map(file, name, labels, job, chosen) for name in names]
     except hdf5.FAILURES:
         return []

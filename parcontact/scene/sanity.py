@@ -191,8 +191,7 @@ class ContactWatch:
     @classmethod
     def of(cls, job: Job, timeline: Timeline) -> "ContactWatch":
         """Return the checks of a job."""
-        interface = job.section("interface")
-        sticks = interface is not None and interface.stick and all(job.grid.cyclic)
+        sticks = job.sticks and all(job.grid.cyclic)
         return cls(job.numerics.strict, timeline, more=more_points(job.grid), sticks=sticks)
 
     def check_step(self, step: int, measures: Measures) -> list[Doubt]:

@@ -132,7 +132,7 @@ def test_contacts_that_stick_are_closed_where_their_gap_is_zero() -> None:
 
 
 def test_tractions_of_a_strip_are_a_line_within_their_bounds(tmp_path: Path, drawn: list[Figure]) -> None:
-    """Of a wave that has begun to slide: some points are at the bound, some below."""
+    """A wave begins to slide: some points are at the bound, some below."""
     slide = "{pressure: 1.0e3, velocity: 0.1, distance: 1.2e-7, cells_per_step: 0.001}"
     stick = "interface: {coefficient: 0.5, stick: true}\noutput: {fields: [pressure, traction]}\n"
     out = ran(tmp_path, STRIP + ELASTIC + f"history: [{{pressure: 1.0e3}}, {slide}]\n" + stick)

@@ -318,7 +318,7 @@ def test_all_records_are_on_the_disk_before_a_checkpoint(tmp_path: Path, monkeyp
 
 
 def test_rows_up_to_the_last_checkpoint_are_needed(tmp_path: Path) -> None:
-    """Of a run that has not finished, or may still run."""
+    """The directory belongs to a run that has not finished, or may still run."""
     checkpoints, path = tmp_path / "checkpoint", tmp_path / "measures.csv"
     checkpoints.mkdir()
     for name in ("step-2.h5", "step-10.h5", "step-11.h5.part", "step-x.h5"):

@@ -19,3 +19,7 @@ class Sections(Protocol):
     output: Output
     steady: Steady | None
     body: Body | None
+
+    @property
+    def sticks(self) -> bool:
+        """Return True if points stick to the surface before they slide."""

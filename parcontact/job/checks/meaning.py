@@ -161,9 +161,7 @@ def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
         return  # relaxation times are given at another temperature
     low, high = 2 * math.pi * min(speeds) / max(lengths), 2 * math.pi * max(speeds) / min(lengths)
     slow, fast = 1.0 / max(times), 1.0 / min(times)
-    interface = getattr(job, "interface", None)
-    sticks = interface is not None and interface.stick
-    if (high * BEYOND < slow and not sticks) or low > fast * BEYOND:
+    if (high * BEYOND < slow and not job.sticks) or low > fast * BEYOND:
         how, modulus = ("slower", "long-term") if high < slow else ("faster", "instantaneous")
         rates = {"low": low, "high": high, "slow": slow, "fast": fast}
         yield Doubt("elastic", "material", {**rates, "times": BEYOND, "how": how, "modulus": modulus})

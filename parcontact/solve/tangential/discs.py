@@ -193,22 +193,6 @@ def change_since(bound, x, y, last_x, last_y, factor):
 
 
 @loop
-def follow_slip(bound, x, y, u_x, u_y, e_x, e_y, kappa, new_x, new_y, hit):
-    """Put `P(t + kappa w)` into the next tractions, with P(t) the traction shortened to its bound."""
-    for j in range(bound.shape[0]):
-        for i in range(bound.shape[1]):
-            most = bound[j, i]
-            if most <= 0.0:
-                new_x[j, i], new_y[j, i], hit[j, i] = 0.0, 0.0, False
-                continue
-            a, b = x[j, i] + kappa * (e_x[j, i] - u_x[j, i]), y[j, i] + kappa * (e_y[j, i] - u_y[j, i])
-            size = math.hypot(a, b)
-            if size > most:
-                a, b, size = a * (most / size), b * (most / size), most
-            new_x[j, i], new_y[j, i], hit[j, i] = a, b, size >= AT_BOUND * most
-
-
-@loop
 def slope_and_curvature(t, new_t, u, new_u, e):
     """Sums of d w, of d A d, and of |t w|, for the change d of the tractions in both components, with the slip
     `w = e - u`."""

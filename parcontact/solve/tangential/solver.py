@@ -98,10 +98,10 @@ class TangentialSolver:
         self._turn = slab.zeros()
         self._free, self._hit, self._moves = (slab.zeros(np.bool_) for _ in range(3))
 
-    def solve(self, problem: TractionProblem, t: Array, last: Array | None = None, factor: float = 1.0) -> Tractions:
+    def solve(self, problem: TractionProblem, t: Array, last: Array, factor: float = 1.0) -> Tractions:
         """Solve from the tractions t, which are overwritten by the solution; collective. `factor` times `last` are the
         tractions of the step before."""
-        bound, aim, kappa, _ = problem
+        bound, aim, kappa, asked = problem
         discs.shorten_to_bounds(bound, *components(t), self._hit)
         if self._is_at_rest(bound, aim, t):
             self._u.fill(0.0)
@@ -112,12 +112,11 @@ class TangentialSolver:
             now = *components(t), *components(self._u), *components(aim)
             found = self.slab.sum(*discs.examine(bound, self._hit, *now, kappa, self._free, self._turn))
             change = self._move(bound, now, kappa, found, step, begins=iteration == 0)
-            since = (0.0, 0.0) if last is None else discs.change_since(bound, *now[:2], *components(last), factor)
-            change, since, before = self.slab.sum(change, *since)
+            since = discs.change_since(bound, *now[:2], *components(last), factor)
+            change, changed, before = self.slab.sum(change, *since)
             size = max(*found[:2], LEAST_LEFT * before)
-            certificate, tolerance = max(found[2], change) / size, problem.tolerance
-            if last is not None:
-                tolerance *= min(1.0, max(SHARE_OF_CHANGE * since / (tolerance * size), LEAST_TOLERANCE))
+            certificate = max(found[2], change) / size
+            tolerance = min(asked, max(SHARE_OF_CHANGE * changed / size, LEAST_TOLERANCE * asked))
             best = min(best, (certificate, iteration))
             failure = self._verdict(certificate, tolerance, iteration, best)
             if failure is not None:
@@ -125,7 +124,8 @@ class TangentialSolver:
                     start[...], self._other = t, t
                 return Tractions(self._u, certificate, iteration, failure)
             if follows:
-                discs.follow_slip(bound, *now, kappa, *components(self._other), self._hit)
+                self._other[...] = t + kappa * (aim - self._u)
+                discs.shorten_to_bounds(bound, *components(self._other), self._hit)
             t, share = self._descend(aim, t)
             if iteration > 0 and not follows and not 1.0 / FAR < share < FAR:
                 step = min(max(share * step, STEP), MOST_GROWTH)
