@@ -264,3 +264,24 @@ def test_weights_of_a_ladder() -> None:
     level = 0.1 * cubic(rungs[:1]).sum() + 2.0 * cubic(rungs[-1:]).sum() + cubic(rungs[3:4]).sum()
     assert weights @ cubic(rungs) == pytest.approx(level / 4, rel=1e-12)
     assert above == pytest.approx(2.0 * rungs[-1] / beyond.sum(), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("bands", "said"),
+    [
+        ({"waves": 1, "points": 64}, "bands.waves must be a whole number of at least 2"),
+        ({"points": 1}, "needs 128 points or more along a side, got 1$"),
+        ({"points": [64, 1]}, "needs 128 points or more along a side, got 64$"),
+    ],
+)
+@pytest.mark.parametrize("verb", ["check", "steady"])
+def test_bands_without_room_for_their_waves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], bands: dict[str, Any], said: str, verb: str
+) -> None:
+    """One wave along the box, of which the cell of wavenumbers reaches 0; one point; a profile of 16 waves, 2 octaves
+    and 2 cells per shortest wave: 128 points."""
+    surface = {**ROUGH, "short_wavelength": LONG / 4}
+    path = tmp_path / "job.yaml"
+    path.write_text(yaml.safe_dump({**JOB, "surface": surface, "bands": {"count": 1, **bands}}))
+    assert main([verb, str(path)]) == 2
+    assert re.search(said, capsys.readouterr().err, re.MULTILINE)
