@@ -76,6 +76,7 @@ class Job(Part):
         Rule(("output",), limits.no_traction),
         Rule(("history",), limits.no_rolling),
         Rule(("bands", "surface", "steady", "output"), limits.bands_fit),
+        Rule(("study", "grid", "surface", "history"), limits.study_fits),
         *BAND_RULES,
     )
     at_most_one = (("grid", "bands"),)

@@ -12,7 +12,7 @@ from dataclasses import astuple, dataclass
 
 from ..effects.adhesion import chosen_range
 from ..errors import InputError
-from ..job import AUTO, GeometricStep, Job, OnOneMesh, Stage
+from ..job import AUTO, GeometricStep, Job, Stage
 from ..job.checks.cells import one_cell
 
 
@@ -75,17 +75,10 @@ def _cells_of_time_steps(job: Job) -> float:
 
 
 def ladders(job: Job) -> Ladders:
-    """Return the ladders of a job's study. Raises InputError without ladders, or if its surface has one mesh only."""
+    """Return the ladders of a job's study. Raises InputError without ladders."""
     study, numerics = job.study, job.numerics
     if study is None:
         raise InputError("no ladders: add a study section to the job, like study: {mesh: [256, 512, 1024]}")
-    if not job.history:
-        raise InputError("a study compares histories: the job needs a history")
-    if len(study.mesh) > 0 and any(isinstance(shape, OnOneMesh) for shape in job.surface):
-        raise InputError("study.mesh: the heights of a file are given on one mesh; leave this ladder out")
-    for mesh in study.mesh:
-        if job.grid.ny > 1 and mesh * job.grid.ny % job.grid.nx:
-            raise InputError(f"study.mesh: {mesh} points along x give no whole number along y in this box")
     own = next((stage.cells_per_step for stage in job.history if stage.cells_per_step is not None), None)
     if own is None and not _sliding(job):
         own = _cells_of_time_steps(job)

@@ -1,6 +1,7 @@
 """Whole studies: of a wave in full contact, whose friction has a closed form, and as a user runs them."""
 
 import math
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -293,14 +294,19 @@ def test_steps_of_all_kinds_change_alike(path: Path, mesh: int, cells: float, fa
     ("changes", "sentence"),
     [
         ([], "no ladders"),
-        (["study={mesh: [48, 33]}"], "33 points along x give no whole number along y"),
+        (["study={mesh: [48, 33]}"], r"study\.mesh\.1 must give a whole number of points along y in a box of 64 x 32"),
         (["study={mesh: [32, 64]}", "surface={shape: file, path: h.npy}"], "given on one mesh"),
+        (["study={mesh: [32]}", "history=[]", "steady={velocities: 1.0, pressures: 1.0e4}"], "the job needs a history"),
     ],
 )
-def test_refused(path: Path, changes: list[str], sentence: str) -> None:
+def test_refused(path: Path, changes: list[str], sentence: str, main: Main) -> None:
+    """Also by `check`, except that a job without ladders is a sound job."""
     np.save(path.with_name("h.npy"), np.zeros((32, 64)))
     with pytest.raises(InputError, match=sentence):
         ladders(load_job(path, changes))
+    code, _, said = main("check", path, *(word for change in changes for word in ("--set", change)))
+    assert code == (2 if changes else 0)
+    assert not changes or re.search(sentence, said)
 
 
 @pytest.mark.parametrize(
