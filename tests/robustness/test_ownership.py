@@ -1,6 +1,8 @@
 """Whose an output directory is: nothing of another run or of a user is replaced, followed or lost."""
 
 import json
+import os
+import re
 import shutil
 import subprocess
 import sys
@@ -333,6 +335,22 @@ def test_by_commands(
     assert asides(here) == [f"{name}.aside"]
     assert f"{name} existed and was not written by this program: it was renamed to {Path(name).name}.aside" in said[0]
     assert said[1] == ""
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if not name.startswith("out/theory")])
+def test_a_pipe_is_not_renamed(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    """Nor a device, such as /dev/null, which every program uses and root may rename."""
+    monkeypatch.chdir(here)
+    (here / name).unlink(missing_ok=True)
+    os.mkfifo(here / name)
+    assert __main__.main(COMMANDS[name]) == BAD_INPUT
+    assert name in (said := capsys.readouterr().err)
+    assert re.search("it is a device or a pipe, which is not replaced|is not a regular file", said)
+    assert (here / name).is_fifo()
+    assert asides(here) == []
+    assert [*here.rglob("*.part")] == []
 
 
 # -- rows of measures.csv that were edited, before a run or a plot ----------------------------------------------------
