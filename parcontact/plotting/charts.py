@@ -72,13 +72,17 @@ class Chart:
 
 
 def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
-    """Draw a chart; `log` names its logarithmic axes. A legend of many lines is drawn outside of a panel of full
-    width."""
+    """Draw a chart; `log` names its logarithmic axes, which stay linear if the chart has no point for them. A legend of
+    many lines is drawn outside of a panel of full width."""
     log_x, log_y = (
         "none" not in log and (chart.log_x or "x" in log),
         "none" not in log and bool(chart.zeros or "y" in log),
     )
+    marks_zeros = chart.zeros and log_y
     series = [_drop_hidden_points(one, log_x, log_y) for one in chart.series]
+    if not any(np.isfinite(one.x * one.y).any() for one in series):
+        log_x = log_y = False
+        series = [_drop_hidden_points(one, log_x, log_y) for one in chart.series]
     lonely = all(np.isfinite(one.x * one.y).sum() < 2 for one in series)
     if chart.stacked:
         _draw_bars(axes, series[: chart.stacked])
@@ -86,7 +90,7 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
         axes.plot(one.x, one.y, label=one.name or None, **one.look | ({"marker": "o"} if lonely else {}))
         if one.error is not None:
             _draw_errors(axes, one, one.error)
-    if chart.zeros and log_y:
+    if marks_zeros:
         _mark_zeros(axes, chart)
     set_scale(axes, "x", chart.x.name, chart.x.unit, log_x)
     set_scale(axes, "y", chart.y.name, chart.y.unit, log_y)
