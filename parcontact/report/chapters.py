@@ -52,6 +52,7 @@ def describe_directory(directory: Path) -> Chapter:
         if there == ["sweep.csv"]:
             of_job[0] = replace(asked, sentences=[_describe_swept(directory)])
             of_job = [replace(one, title=f"{one.title} of the first case") for one in of_job]
+            warnings = log.warnings_of_cases(directory) or warnings
         sections += of_job
         if there[0] in ("measures.csv", "steady.csv"):
             sections += origin.costs(directory / there[0], found, job)
