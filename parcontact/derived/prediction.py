@@ -162,6 +162,7 @@ def write_steady(job: Job, wanted: Request) -> SteadyInstant:
 def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
     """Write theory.csv for a job on one rank, or steady_theory.csv for a friction curve. Return sentences about it,
     compared with the job's run if there is one."""
+    files.refuse_pipes(job.output.directory)
     settings = TheorySettings(gamma, waves)
     if not job.history:
         return _foretell_curve(job, settings)

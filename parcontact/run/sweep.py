@@ -18,7 +18,7 @@ from ..parallel.groups import Groups
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..printed import per_cent
-from ..storage import marker, stopfile
+from ..storage import files, marker, stopfile
 from ..storage.directory import refuse_files, refuse_other_jobs
 from ..storage.stopfile import StopFile
 from ..summary import sweep_table
@@ -195,6 +195,7 @@ def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
     for path in (directory / CASES, *(case.job.output.directory for case in cases)):
         if path.is_symlink():
             raise InputError(f"{path} is a symbolic link, which is not followed: remove it, or give --out")
+    files.refuse_pipes(directory)
     try:
         claims = marker.read_claims(directory)
         entries = [path.name for path in directory.iterdir()] if directory.is_dir() else []
@@ -203,7 +204,7 @@ def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
     refuse_other_jobs(directory, claims, plain_job(first.job))
     for case in cases:
         there = case.job.output.directory
-        refuse_other_jobs(there, marker.read_claims(there), plain_job(case.job))
+        refuse_other_jobs(there, marker.sound_claims(there), plain_job(case.job))
     if not claims and not {CASES, sweep_table.TABLE} & set(entries):
         refuse_files(directory, entries)
 

@@ -4,6 +4,7 @@ import errno
 import os
 import re
 import secrets
+import stat
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -11,6 +12,9 @@ from io import FileIO
 from pathlib import Path
 from typing import BinaryIO
 
+from ..errors import InputError
+
+PLACES = ("*", "checkpoint/*", "cases/*/*", "cases/*/checkpoint/*")  # of files in an output directory
 MARK = "made by the program parcontact"  # mark in the metadata of pages and pictures
 
 
@@ -52,6 +56,15 @@ def open_to_append(path: Path) -> FileIO:
             raise OSError(f"{path} is a symbolic link, which is not followed; move it away") from None
         raise
     return FileIO(handle, "ab")
+
+
+def refuse_pipes(path: Path) -> None:
+    """Raise InputError if a path, or a file in an output directory or in one of its cases, is a pipe or a device:
+    reading it might never end."""
+    for one in (path, *(found for pattern in PLACES for found in path.glob(pattern))):
+        with suppress(OSError):
+            if (mode := one.stat().st_mode) and (stat.S_ISFIFO(mode) or stat.S_ISCHR(mode) or stat.S_ISBLK(mode)):
+                raise InputError(f"{one} is a device or a pipe, which is not read: move it away")
 
 
 def replace_file(path: Path, text: str) -> None:

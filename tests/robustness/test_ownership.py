@@ -4,10 +4,12 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -347,10 +349,63 @@ def test_a_pipe_is_not_renamed(
     os.mkfifo(here / name)
     assert __main__.main(COMMANDS[name]) == BAD_INPUT
     assert name in (said := capsys.readouterr().err)
-    assert re.search("it is a device or a pipe, which is not replaced|is not a regular file", said)
+    assert re.search("is a device or a pipe, which is not|is not a regular file", said)
     assert (here / name).is_fifo()
     assert asides(here) == []
     assert [*here.rglob("*.part")] == []
+
+
+PIPES = (
+    "measures.csv",
+    "fields.h5",
+    "theory.csv",
+    "theory.yaml",
+    "job.resolved.yaml",
+    "run.log",
+    ".parcontact",
+    ".lock",
+)
+READERS: dict[str, Sequence[str]] = {
+    "run": ("run", "job.yaml", "--out", "out"),
+    "theory": ("theory", "job.yaml", "--out", "out"),
+    **{verb: (verb, "out") for verb in ("plot", "report", "info", "leak", "cite")},
+}
+
+
+@pytest.mark.parametrize("verb", READERS)
+@pytest.mark.parametrize("name", PIPES)
+def test_a_pipe_in_an_output_directory_is_not_read(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], verb: str, name: str
+) -> None:
+    """Reading it might never end; before anything is read or written. Of a case, too; a link to it is as bad."""
+    monkeypatch.chdir(here)
+    for place in ("out", "out/cases/000"):
+        Path(place).mkdir(parents=True, exist_ok=True)
+        path = Path(place, name)
+        path.unlink(missing_ok=True)
+        os.mkfifo(pipe := here / "pipe")
+        path.symlink_to(pipe)
+        with _bounded():
+            assert __main__.main(READERS[verb]) == BAD_INPUT
+        assert f"{path} is a device or a pipe, which is not read: move it away" in capsys.readouterr().err
+        path.unlink()
+        pipe.unlink()
+
+
+@contextmanager
+def _bounded() -> Iterator[None]:
+    """Fail after ten seconds instead of waiting for a writer."""
+
+    def stop(*_: Any) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.alarm(10)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
 
 
 # -- rows of measures.csv that were edited, before a run or a plot ----------------------------------------------------
