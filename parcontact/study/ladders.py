@@ -8,12 +8,16 @@ sliding stages.
 """
 
 import itertools
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
 
 from ..effects.adhesion import chosen_range
 from ..errors import InputError
 from ..job import AUTO, GeometricStep, Job, Stage
 from ..job.checks.cells import one_cell
+
+MakeJob = Callable[[Sequence[str]], Job]  # returns the job changed by overrides
 
 
 @dataclass(frozen=True)
@@ -114,6 +118,18 @@ def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
         elif stage.time_step is not None and stage.time_step != AUTO:
             words.append(f"{place}.time_step={stage.time_step * factor!r}")
     return words
+
+
+def make_jobs(job: Job, refined: Ladders, make: MakeJob) -> dict[Settings, Job]:
+    """Return the jobs of all cases of a study. Raises InputError with the mistakes of the first case that has any."""
+    jobs = dict[Settings, Job]()
+    for case in refined.combine():
+        try:
+            jobs[case] = make(overrides(job, refined.own, case))
+        except InputError as error:
+            said = re.sub(r"(?m)^--set [^:]*: ", "", str(error))
+            raise InputError(f"study, case {case}: {said}") from error
+    return jobs
 
 
 def _sliding(job: Job) -> list[Stage]:

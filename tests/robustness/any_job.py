@@ -114,7 +114,8 @@ def _with_rare_keys(dice: Random, job: Json) -> Json:
         job["grid"]["points"] = "auto"
     elif dice.random() < 0.03 and "history" in job:
         nx = job["grid"]["points"][0]
-        job["study"] = dice.choice([{"mesh": [nx, 2 * nx]}, {"integrator": ["exponential", "backward-euler"]}])
+        meshes = [{"mesh": [nx, 2 * nx]}, {"mesh": sorted({nx // 2 or 1, nx})}]
+        job["study"] = dice.choice([*meshes, {"integrator": ["exponential", "backward-euler"]}])
     if dice.random() < 0.05:
         job["title"] = dice.choice(TITLES)
     return job

@@ -309,6 +309,17 @@ def test_refused(path: Path, changes: list[str], sentence: str, main: Main) -> N
     assert not changes or re.search(sentence, said)
 
 
+def test_check_reads_the_jobs_of_a_study(path: Path, main: Main) -> None:
+    """A mesh too coarse for the shortest wave: check and study refuse it with the same sentence, with the case."""
+    surface = "{shape: rough, hurst: 0.8, rms_slope: 0.1, long_wavelength: 2.5e-4, short_wavelength: 4.0e-5}"
+    words = (path, "--set", f"surface={surface}", "--set", "study={mesh: [16, 32]}")
+    (code, _, said), (ends, _, same) = main("check", *words), main("study", *words)
+    assert (code, ends) == (2, 2)
+    assert said == same
+    assert "study, case mesh 16, " in said
+    assert "short_wavelength must be at least two cells" in said
+
+
 @pytest.mark.parametrize(
     ("study", "sentence"),
     [
