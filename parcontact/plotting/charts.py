@@ -25,6 +25,7 @@ FRACTION = "contact area /\nnominal area"
 BAR_SHARE = 0.8  # width of a bar over the distance of bars, in the logarithm
 LEAST = 0.99  # largest downward error bar over the value
 ZERO_ROW = 0.05  # height of the row of marks at 0, over the height of the panel
+SAME = 1e-9  # rounding: relative difference of equal values on a logarithmic axis
 FEW_DECADES = 1.5  # decades of a logarithmic axis below which minor ticks have labels
 
 
@@ -152,6 +153,9 @@ def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
     """Set name, unit and scale of an axis, with few ticks so that labels do not overlap."""
     axis, few = axes.xaxis if which == "x" else axes.yaxis, True
     if log:
+        low, high = axis.get_data_interval()
+        if 0.0 < low < high < low * (1.0 + SAME):  # Matplotlib finds no limits for values that differ by rounding
+            axes.set(**{f"{which}lim": (low / 10.0, 10.0 * low)})
         axes.set(**{f"{which}scale": "log"})
         low, high = axis.get_view_interval()
         if unit == "s" and prefixes.label_log_times(axis, name):

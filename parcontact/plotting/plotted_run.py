@@ -14,6 +14,8 @@ from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from ..storage import marker, read_back
+from ..storage.fields import UNITS
+from ..storage.hdf5 import MEND
 from ..summary import pull_off
 from . import prefixes
 from .charts import FRACTION, Axis
@@ -126,6 +128,10 @@ class Fields:
         self.steps: NDArray[np.int64] = file["step"][...]
         self.x, self.y = file["x"][...], file["y"][...]
         self.times: Array = file["t"][...]
+        lengths = self.times.shape, self.y.shape, self.x.shape
+        maps = [file[name] for name in UNITS if name in file]
+        if self.steps.shape != lengths[0] or any(one.shape != sum(lengths, ()) for one in maps):
+            raise InputError(f"{file.filename} is damaged: the numbers of its maps and coordinates differ; {MEND}")
         self.saved = np.flatnonzero(~np.isnan(self.times)).tolist()
         self.shown = [self._index(at)] if at else self.saved
         before = [k for k in self.shown if until is None or self.steps[k] <= until]

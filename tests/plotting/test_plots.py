@@ -72,6 +72,7 @@ def test_pictures_are_xml(tmp_path: Path, text: str) -> None:
         ((1.0, 2.0), (0.0, 0.0), "x"),
         ((-1.0, 2.0), (1.0, -2.0), "x y"),  # positive on both axes, but at no common point
         ((1.0, 2.0), (1.0, 2.0), "x y x,y"),
+        ((1e5, 1e5 * (1.0 + 4e-16)), (0.3, 0.3), "x y x,y"),  # one load, of which one result is rounded
     ],
 )
 def test_logarithmic_axes_without_a_point(
