@@ -92,11 +92,11 @@ def _check_study(options: argparse.Namespace, cases: Sequence[Case]) -> None:
 
     for case in cases:
         number = case.number if case.settings else None
-        make_jobs(
-            case.job,
-            ladders(case.job),
-            lambda changes, number=number: mesh.load(options.job, [*job_overrides(options), *changes], number),
-        )
+
+        def make(changes: Sequence[str], number: int | None = number) -> Job:
+            return mesh.load(options.job, [*job_overrides(options), *changes], number)
+
+        make_jobs(case.job, ladders(case.job), make)
 
 
 def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
