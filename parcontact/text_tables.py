@@ -109,6 +109,10 @@ def find_dialect(path: Path, rows: Sequence[str]) -> Dialect:
     if mark == "," and all(_has_decimal_commas(row) for row in rows):
         mark = None
     whole = [Dialect(mark).cells(row) for row in rows]
+    if mark == "," and (_have_mixed_commas(rows) or _are_halves(whole)):
+        raise InputError(
+            f"{path}: commas may be between numbers or within them: {rows[0].strip()[:40]}; use semicolons"
+        )
     with_comma = [cell for cells in whole for cell in cells if mark != "," and WITH_COMMA.fullmatch(cell)]
     if with_comma and any(WITH_POINT.fullmatch(cell) for cells in whole for cell in cells):
         raise InputError(f"{path}: some numbers have decimal commas, such as {with_comma[0]}, others points; use one")
@@ -123,6 +127,20 @@ def find_dialect(path: Path, rows: Sequence[str]) -> Dialect:
         begins=_are_empty(whole, 0) and not _are_empty(whole, 1),
         ends=_are_empty(whole, -1) and not _are_empty(whole, -2),
     )
+
+
+def _have_mixed_commas(rows: Sequence[str]) -> bool:
+    """Return True if blanks follow some commas, and numbers the others: 1,5, 2,5."""
+    return any(re.search(r",[ \t]", row) and re.search(r"\d,\d", row) for row in rows)
+
+
+def _are_halves(rows: Sequence[Sequence[str]]) -> bool:
+    """Return True if cells seem to be numbers before and behind decimal commas in turn: 1,05,-2,5."""
+    rows = [row if row[-1:] != [""] else row[:-1] for row in rows]  # a mark may end each row
+    pairs = [pair for row in rows for pair in zip(row[::2], row[1::2], strict=False)]
+    if any(len(row) % 2 for row in rows) or not all(WITH_COMMA.fullmatch(",".join(pair)) for pair in pairs):
+        return False
+    return any(not whole.isdigit() or not part.isdigit() or re.match(r"0\d", part) for whole, part in pairs)
 
 
 def _are_empty(rows: Sequence[Sequence[str]], at: int) -> bool:
@@ -208,7 +226,9 @@ def unit_size(path: Path, name: str, unit: str, known: dict[str, float]) -> floa
     return known[unit]
 
 
-def read_table(path: Path, expected: str, example: str, names: Set[str], enough: Callable[[set[str]], bool]) -> Table:
+def read_named_columns(
+    path: Path, expected: str, example: str, names: Set[str], enough: Callable[[set[str]], bool]
+) -> Table:
     """Return the columns of a table with names.
 
     Columns with a name of `names` must hold numbers, and others are ignored. `enough` decides whether the names in a

@@ -21,7 +21,7 @@ import numpy as np
 from ..errors import InputError
 from ..job import RoughSpectrum, Topography
 from ..parallel.slab import Array
-from ..text_tables import read_table
+from ..text_tables import read_named_columns
 from . import treatment
 from .map_files import UNITS, Map
 
@@ -106,7 +106,7 @@ def of_line(part: Topography, line: Map) -> tuple[MeasuredSpectrum, tuple[float,
 
 def _read(path: Path) -> tuple[Array, Array, int]:
     """Return wavenumbers [rad/m], the spectrum [m^3 or m^4], and the power of m in its unit."""
-    table = read_table(path, f"a table of {FORMS}", FORMS, {"q", *POWERS}, _are_enough)
+    table = read_named_columns(path, f"a table of {FORMS}", FORMS, {"q", *POWERS}, _are_enough)
     if not _are_enough(set(table.columns)):
         raise InputError(f"{path}: {FORMS} were expected, got {', '.join(table.columns)}")
     if len(table.lines) < FEWEST:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..text_tables import MODULI, TEMPERATURES, read_table, unit_size
+from ..text_tables import MODULI, TEMPERATURES, read_named_columns, unit_size
 from .sane import refuse_odd, refuse_rising
 
 Array = NDArray[np.float64]
@@ -101,7 +101,7 @@ class Measurement:
 
 def read_moduli(path: Path, poisson: float = 0.5) -> Measurement:
     """Read a table; Young's moduli are converted to shear, `G = E/(2 (1 + nu))`. Raises InputError."""
-    table = read_table(path, "a table of moduli", EXAMPLE, MODULI | OTHERS, _are_enough)
+    table = read_named_columns(path, "a table of moduli", EXAMPLE, MODULI | OTHERS, _are_enough)
     if len(table.lines) < LEAST_ROWS:
         raise InputError(f"{path} has {len(table.lines)} rows of numbers; at least {LEAST_ROWS} were expected")
     if set(table.columns) >= RATES_OF:

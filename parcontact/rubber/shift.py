@@ -14,15 +14,18 @@ table       log10 b_T given at some temperatures, likewise
 
 import math
 from bisect import bisect_left
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..doubts import Doubt
 from ..errors import InputError
-from ..text_tables import TEMPERATURES, read_table
+from ..text_tables import TEMPERATURES, read_named_columns
 
 GAS = 8.314462618  # physics: J/(mol K)
 ENERGY = 1e3, 1e7  # physics: limits on the activation energy [J/mol]
 CONSTANT = 1e-3, 1e4  # physics: limits on C1 [-] and C2 [K] of WLF
+HOTTEST = 200.0  # physics: limit on temperatures of rubber [deg C], which decomposes beyond; 200 K is -73 C
 SHOWN = 12  # largest number of factors that are printed
 ZERO = 273.15  # physics: K at 0 deg C
 
@@ -121,6 +124,13 @@ def log_vertical(shift: Shift, temperature: float) -> float:
     return 0.0 if shift.vertical is None else shift.vertical.log_factor(temperature)
 
 
+def doubt_kelvin(place: str, temperatures: Iterable[float | None]) -> Iterator[Doubt]:
+    """Yield a warning if the highest of some temperatures [deg C] is hotter than rubber endures."""
+    highest = max((value for value in temperatures if value is not None), default=0.0)
+    if highest > HOTTEST:
+        yield Doubt("kelvin", place, {"degrees": highest, "most": HOTTEST, "celsius": round(highest - ZERO, 6)})
+
+
 def read_shift(text: str, reference: float | None) -> str | Shift:
     """Return the shift of a command line: the name of a law whose constants are to be fitted, or a law.
 
@@ -158,7 +168,7 @@ def _table(path: Path, reference: float | None) -> Factors:
     if not path.is_file():
         laws = "wlf, arrhenius, free, wlf:C1,C2, arrhenius:J/mol or a readable file"
         raise InputError(f"--shift must be {laws}: there is no file {path}")
-    table = read_table(path, "a table of T[C],log_aT", EXAMPLE, NAMES, {"T", "log_aT"}.issubset)
+    table = read_named_columns(path, "a table of T[C],log_aT", EXAMPLE, NAMES, {"T", "log_aT"}.issubset)
     if not {"T", "log_aT"} <= table.columns.keys() or len(table.lines) < 2:
         raise InputError(f"{path}: a table of {EXAMPLE}, with at least two rows was expected")
     zero = table.unit("T", TEMPERATURES)
