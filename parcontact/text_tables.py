@@ -24,6 +24,7 @@ from .errors import InputError
 LARGEST_TEXT = 50_000_000  # largest file of a table with names [bytes]
 TO_DECODE = 1_000_000  # tuning: bytes from which the encoding of a file is found
 LONGEST_HEAD = 200  # tuning: most lines before the first row of numbers
+SAMPLED = 50  # tuning: lines of a map from which its dialect is found
 MARKS = ";\t,"
 MISSING = {"", "-", "--", "---", "nan", "n/a", "#n/a", "na", "null", "none", "nodata", "no_data", "no data"}
 MISSING |= {"bad", "missing", "masked", "invalid", "#value!", "#num!", "#div/0!"}
@@ -94,6 +95,15 @@ class Dialect:
         found = [cell.strip() for cell in found]
         return found[self.begins and not found[0] : len(found) - (self.ends and not found[-1])]
 
+    def numbers(self, line: str) -> list[float]:
+        """Return the numbers of a row, none for a comment. Raises ValueError for any other text."""
+        if not self.begins and not self.ends and "_" not in line and not (self.commas and "." in line):
+            try:  # most rows hold numbers only, and maps have many rows
+                return list(map(float, (line.replace(",", ".") if self.commas else line).split(self.mark)))
+            except ValueError:
+                pass
+        return [self.number(cell) for cell in self.cells(line)] if COMMENT.sub("", line) else []
+
     def number(self, cell: str) -> float:
         """Return the number in a cell, NaN if it is missing. Raises ValueError for any other text."""
         if cell.lower() in MISSING:
@@ -131,7 +141,7 @@ def find_dialect(path: Path, rows: Sequence[str]) -> Dialect:
 
 def _have_mixed_commas(rows: Sequence[str]) -> bool:
     """Return True if blanks follow some commas, and numbers the others: 1,5, 2,5."""
-    return any(re.search(r",[ \t]", row) and re.search(r"\d,\d", row) for row in rows)
+    return any(re.search(r",[ \t]+[-+.\d]", row) and re.search(r"\d,\d", row) for row in rows)
 
 
 def _are_halves(rows: Sequence[Sequence[str]]) -> bool:
@@ -181,17 +191,16 @@ def number_rows(path: Path, lines: Iterable[str]) -> tuple[list[str], Iterator[t
     head, start = [line for _, line in start[:first]], start[first:]
     if not start:
         return head, iter(())
-    dialect = find_dialect(path, [line for _, line in start if is_row(line)])
+    dialect = find_dialect(path, [line for _, line in start[:SAMPLED] if is_row(line)])
     return head, _rows(path, dialect, chain(start, numbered))
 
 
 def _rows(path: Path, dialect: Dialect, lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, list[float]]]:
     for number, line in lines:
         line = line.strip(" \r\n" if dialect.mark == "\t" else " \t\r\n")
-        if not line or not COMMENT.sub("", line):
-            continue
         try:
-            yield number, [dialect.number(cell) for cell in dialect.cells(line)]
+            if row := dialect.numbers(line):
+                yield number, row
         except ValueError as error:
             raise InputError(
                 f"{path}:{number}: a number was expected, got {str(error).partition(': ')[2][:60]}"

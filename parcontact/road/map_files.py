@@ -118,7 +118,8 @@ def _text(part: Topography) -> MapContents:
         first = next(rows, None)
         columns = len(first[1]) if first else 0
         esri = {line.split()[0].lower(): line.split()[1:] for line in head}
-        known = all(line.startswith("#") for line in head) and part.unit_of_heights and (part.size or part.pixel)
+        comments = not any(text_tables.COMMENT.sub("", line) for line in head)
+        known = comments and part.unit_of_heights and (part.size or part.pixel)
         if first is None or (head and columns > 3 and "cellsize" not in esri and not known):
             return _instrument(part)
         table = _table(path, chain([first], rows), columns in (2, 3))

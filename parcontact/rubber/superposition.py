@@ -155,7 +155,7 @@ class _Search:
         law = replace(self, law="wlf")
         shifts = [self.refine(start, "none", per_decade).shift, law.refine(law.start(), "free", per_decade).shift]
         logs = [[np.array(log[1:]) - log[0] for log in log_factors(shift, self._known)] for shift in shifts]
-        found = [self._refine(*each, "free", per_decade) for each in logs]
+        found = [self._refine(a, b, "free", per_decade) for a, b in logs]
         return min(found, key=lambda each: (self._separate(each.shift), each.misfit))
 
     def _separate(self, shift: Shift) -> int:
