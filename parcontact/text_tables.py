@@ -17,8 +17,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import TextIO
 
+from .column_names import NAMES, NUMBERS, Column, plain_unit, read_cell
 from .errors import InputError
 
 LARGEST_TEXT = 50_000_000  # largest file of a table with names [bytes]
@@ -32,30 +33,8 @@ TWO_WORDS = re.compile(r"\bno data\b", re.IGNORECASE)
 COMMENT = re.compile(r"(?:^|(?<=\s))(?:#(?!N/A|VALUE!|NUM!|DIV/0!)|%|//).*", re.IGNORECASE | re.DOTALL)
 WITH_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
 WITH_POINT = re.compile(r"[-+]?(\d+\.\d*|\.\d+)([eE][-+]?\d+)?")
+AMBIGUOUS = "{path}: commas may be between numbers or within them: {row}; use semicolons"
 THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
-WITH_UNIT = re.compile(r"(.+?)[\s/]*(?:\[([^\]]*)\]|\(([^()]*(?:\([^()]*\)[^()]*)*)\))")  # E'[MPa], q (1/(m))
-PRIMES = {"'": "stor", "''": "loss", '"': "loss"}  # E', E'', E"
-WORDS = {  # lower case; * is an unknown letter
-    **dict.fromkeys(("frequency", "f_set", "freq", "freq."), "f"),
-    **dict.fromkeys(("angular frequency", "ang. frequency", "w", "ω"), "omega"),
-    **{"time": "t", "step time": "t", "temperature": "T", "temp": "T", "temp.": "T"},
-    **{"storage modulus": "*_stor", "loss modulus": "*_loss", "relaxation modulus": "*_relax"},
-    **{"complex modulus": "*_abs", "creep compliance": "*_creep", "compliance": "*_creep"},
-    **{f"shear {word} modulus": f"G_{short}" for word, short in (("storage", "stor"), ("loss", "loss"))},
-    **{f"shear {word} modulus": f"G_{short}" for word, short in (("relaxation", "relax"), ("complex", "abs"))},
-    **{"complex shear modulus": "G_abs", "shear creep compliance": "G_creep", "tensile creep compliance": "E_creep"},
-    **{"e(t)": "E_relax", "g(t)": "G_relax", "d(t)": "E_creep", "j(t)": "G_creep"},
-    **dict.fromkeys(("tan delta", "tan(delta)", "tan_delta", "tan d", "tan δ", "tanδ", "loss factor"), "tan_del"),
-    **dict.fromkeys(("tan(δ)", "damping factor"), "tan_del"),
-    **dict.fromkeys(("delta", "δ", "phase angle", "phase", "loss angle", "phase shift angle"), "delta"),
-    **dict.fromkeys(("q", "wavenumber", "wave number", "wavevector", "wave vector"), "q"),
-    **{"c1d": "C1D", "c2d": "C2D", "x": "x", "y": "y", "z": "z", "height": "z", "heights": "z"},
-}
-MODULI = {f"{letter}_{part}" for letter in "EG*" for part in ("stor", "loss", "relax", "abs", "creep")}
-TEMPERATURES = {"C": 0.0, "°C": 0.0, "degC": 0.0, "deg C": 0.0, "K": -273.15}  # added to them for deg C
-NUMBERS = {"tan_del", "log_aT", "log_bT"}  # columns without a unit
-NAMES = MODULI | NUMBERS | {"T", "t"} | set(WORDS.values())
-SHIFT = re.compile(r"(?:log(?:_?10)?|lg)[\s_(]*([ab])_?t\)?")  # log_aT, log10(a_T)
 
 
 def open_text(path: Path) -> TextIO:
@@ -119,10 +98,8 @@ def find_dialect(path: Path, rows: Sequence[str]) -> Dialect:
     if mark == "," and all(_has_decimal_commas(row) for row in rows):
         mark = None
     whole = [Dialect(mark).cells(row) for row in rows]
-    if mark == "," and (_have_mixed_commas(rows) or _are_halves(whole)):
-        raise InputError(
-            f"{path}: commas may be between numbers or within them: {rows[0].strip()[:40]}; use semicolons"
-        )
+    if mark == "," and _have_mixed_commas(rows):
+        raise InputError(AMBIGUOUS.format(path=path, row=rows[0].strip()[:40]))
     with_comma = [cell for cells in whole for cell in cells if mark != "," and WITH_COMMA.fullmatch(cell)]
     if with_comma and any(WITH_POINT.fullmatch(cell) for cells in whole for cell in cells):
         raise InputError(f"{path}: some numbers have decimal commas, such as {with_comma[0]}, others points; use one")
@@ -146,9 +123,8 @@ def _have_mixed_commas(rows: Sequence[str]) -> bool:
 
 def _are_halves(rows: Sequence[Sequence[str]]) -> bool:
     """Return True if cells seem to be numbers before and behind decimal commas in turn: 1,05,-2,5."""
-    rows = [row if row[-1:] != [""] else row[:-1] for row in rows]  # a mark may end each row
     pairs = [pair for row in rows for pair in zip(row[::2], row[1::2], strict=False)]
-    if any(len(row) % 2 for row in rows) or not all(WITH_COMMA.fullmatch(",".join(pair)) for pair in pairs):
+    if any(len(row) % 2 for row in rows) or not all(pair[0] and WITH_COMMA.fullmatch(",".join(pair)) for pair in pairs):
         return False
     return any(not whole.isdigit() or not part.isdigit() or re.match(r"0\d", part) for whole, part in pairs)
 
@@ -191,7 +167,10 @@ def number_rows(path: Path, lines: Iterable[str]) -> tuple[list[str], Iterator[t
     head, start = [line for _, line in start[:first]], start[first:]
     if not start:
         return head, iter(())
-    dialect = find_dialect(path, [line for _, line in start[:SAMPLED] if is_row(line)])
+    sample = [line for _, line in start[:SAMPLED] if is_row(line)]
+    dialect = find_dialect(path, sample)
+    if dialect.mark == "," and _are_halves([dialect.cells(line) for line in sample]):
+        raise InputError(AMBIGUOUS.format(path=path, row=sample[0].strip()[:40]))
     return head, _rows(path, dialect, chain(start, numbered))
 
 
@@ -205,13 +184,6 @@ def _rows(path: Path, dialect: Dialect, lines: Iterable[tuple[int, str]]) -> Ite
             raise InputError(
                 f"{path}:{number}: a number was expected, got {str(error).partition(': ')[2][:60]}"
             ) from None
-
-
-class Column(NamedTuple):
-    """A name of NAMES, or another text, and a unit; None if the cell has none."""
-
-    name: str
-    unit: str | None
 
 
 @dataclass(frozen=True)
@@ -287,11 +259,7 @@ def _header(
 ) -> tuple[list[Column], int]:
     """Return the columns and the number of the last line of the header."""
     texts = {at: re.sub(r"^\s*(#|%|//)+", "", text) for at, (_, text) in enumerate(lines) if not is_row(text)}
-    heads = {at: columns for at, text in texts.items() if (columns := _named(text, dialect, enough))}
-    if not heads:  # the line that names most is in the message
-        heads = {at: _most_named(text, dialect) for at, text in texts.items()}
-        most = max(heads, key=lambda at: _known(heads[at]), default=-1)
-        heads = {most: heads[most]} if most >= 0 and _known(heads[most]) else {}
+    heads = _candidates(texts, dialect, enough)
     if not heads:
         raise InputError(f"{path}:{lines[0][0]}: names and units of the columns were expected, such as {example}")
     first_row = next((at for at in range(min(heads), len(lines)) if is_row(lines[at][1])), len(lines))
@@ -311,7 +279,16 @@ def _header(
             "and units"
         )
     units = _split_like(texts.get(at + 1, ""), dialect, len(head))
-    return [Column(each.name, _plain_unit(unit)) for each, unit in zip(head, units, strict=True)], lines[at + 1][0]
+    return [Column(each.name, plain_unit(unit)) for each, unit in zip(head, units, strict=True)], lines[at + 1][0]
+
+
+def _candidates(texts: dict[int, str], dialect: Dialect, enough: Callable[[set[str]], bool]) -> dict[int, list[Column]]:
+    """Return the lines that name enough columns, or else the one that names most, for the message."""
+    heads = {at: _most_named(text, dialect) for at, text in texts.items()}
+    if found := {at: head for at, head in heads.items() if enough({column.name for column in head})}:
+        return found
+    most = max(heads, key=lambda at: _known(heads[at]), default=-1)
+    return {most: heads[most]} if most >= 0 and _known(heads[most]) else {}
 
 
 def _known(columns: Sequence[Column]) -> int:
@@ -319,13 +296,7 @@ def _known(columns: Sequence[Column]) -> int:
 
 
 def _most_named(text: str, dialect: Dialect) -> list[Column]:
-    return max(([_column(cell) for cell in cells] for cells in _splits(text, dialect)), key=_known)
-
-
-def _named(text: str, dialect: Dialect, enough: Callable[[set[str]], bool]) -> list[Column]:
-    """Return the columns that a line names, separated as it names most of them; [] unless they are enough."""
-    columns = _most_named(text, dialect)
-    return columns if enough({column.name for column in columns}) else []
+    return max(([read_cell(cell) for cell in cells] for cells in _splits(text, dialect)), key=_known)
 
 
 def _splits(text: str, dialect: Dialect) -> Iterator[list[str]]:
@@ -347,61 +318,10 @@ def _split_like(text: str, dialect: Dialect, count: int) -> list[str]:
     return (cells + [""] * count)[:count]
 
 
-def _column(cell: str) -> Column:
-    """Return the name and the unit in a cell of a header."""
-    text = re.sub(r'^"(.*)"$', r"\1", cell.strip())
-    if name := find_name(text):  # E(t), tan(delta)
-        return Column(name, None)
-    if match := WITH_UNIT.fullmatch(text):
-        return _of_temperature(find_name(match[1]) or match[1], _plain_unit(match[2] or match[3] or ""))
-    for at in (at for at, letter in enumerate(text) if letter == "/"):
-        name, unit = find_name(text[:at]), text[at + 1 :].strip()
-        if name and not find_name(unit):
-            return _of_temperature(name, _plain_unit(unit))
-    return Column(text, None)
-
-
-def _of_temperature(name: str, unit: str) -> Column:
-    """Return a column; t in deg C is a temperature."""
-    return Column("T" if name == "t" and unit.endswith(("C", "K")) else name, unit)
-
-
-def _plain_unit(unit: str) -> str:
-    """Return a unit without brackets, with powers as ^n; a dash is no unit."""
-    unit = re.sub(r"^[\[(](.*)[\])]$", r"\1", unit.strip()).strip().replace("⁻¹", "^-1").replace("℃", "°C")
-    unit = unit.replace("³", "^3").replace("⁴", "^4").replace("**", "^").replace("²", "^2")
-    return "" if unit in ("-", "1", "[-]") else unit
-
-
-def find_name(text: str) -> str:
-    """Return the name of NAMES that a text means, by a word, a symbol, or both; '' if there is none."""
-    text = re.sub(r"\s+", " ", text.strip(" ,:")).replace("″", "''").replace("′", "'").replace("’", "'")
-    if text in NAMES or (name := _symbol(text)):
-        return text if text in NAMES else name
-    if name := WORDS.get(text.lower(), ""):
-        return name
-    words = re.sub(r"[(\[]([^()\[\]]*)[)\]]$", r" \1", text).split()
-    for at in range(1, len(words)):
-        pair = {find_name(" ".join(words[:at])), find_name(" ".join(words[at:]))}
-        exact = {name for name in pair if not name.startswith("*")}
-        if "" not in pair and len(exact) < 2 and len({name[1:] for name in pair}) == 1:
-            return (exact or pair).pop()
-    return ""
-
-
-def _symbol(text: str) -> str:
-    if match := re.fullmatch(r"([EG])('{1,2}|\")", text):
-        return f"{match[1]}_{PRIMES[match[2]]}"
-    if match := re.fullmatch(r"\|?([EG])\*\|?", text):
-        return f"{match[1]}_abs"
-    match = SHIFT.fullmatch(text.lower())
-    return f"log_{match[1]}T" if match else ""
-
-
 def header_of(line: str, count: int) -> list[Column]:
     """Return the `count` columns that a line above rows of numbers names; [] if it does not."""
     text = re.sub(r"^\s*(#|%|//)+", "", line)
-    named = ([_column(cell) for cell in cells] for cells in _splits(text, Dialect(None)) if len(cells) == count)
+    named = ([read_cell(cell) for cell in cells] for cells in _splits(text, Dialect(None)) if len(cells) == count)
     return max(named, key=_known, default=[])
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from .. import datafiles, text_tables
+from ..column_names import Column
 from ..errors import InputError
 from ..job import Topography
 from ..parallel.slab import Array
@@ -140,7 +141,7 @@ def _text(part: Topography) -> MapContents:
     return _positions(path, table, units[0], units[-1])
 
 
-def _name(columns: Sequence[text_tables.Column], axes: str) -> bool:
+def _name(columns: Sequence[Column], axes: str) -> bool:
     """Return True if columns have the names of all axes."""
     return sorted(column.name.lower() for column in columns) == list(axes)
 

@@ -23,8 +23,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..column_names import MODULI, TEMPERATURES
 from ..errors import InputError
-from ..text_tables import MODULI, TEMPERATURES, read_named_columns, unit_size
+from ..text_tables import read_named_columns, unit_size
 from .sane import refuse_odd, refuse_rising
 
 Array = NDArray[np.float64]

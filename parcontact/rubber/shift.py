@@ -18,9 +18,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..column_names import TEMPERATURES
 from ..doubts import Doubt
 from ..errors import InputError
-from ..text_tables import TEMPERATURES, read_named_columns
+from ..text_tables import read_named_columns
 
 GAS = 8.314462618  # physics: J/(mol K)
 ENERGY = 1e3, 1e7  # physics: limits on the activation energy [J/mol]
