@@ -244,6 +244,11 @@ SENTENCES = {
         "auto depends on cells, work and modulus, and gives {least:.4g} to {most:.4g} m in these cases, which are "
         "different physics; to compare them give all one range: {most:.4g} m is resolved by the cells of each"
     ),
+    # temperatures
+    "kelvin": (
+        "{degrees:g} C is hotter than rubber endures (limit: {most:g} C). Temperatures are in deg C: if this is in "
+        "kelvin, give {celsius:g}"
+    ),
     # measured moduli
     "temperatures": (
         "{degrees} C is outside of the measured {low:g} to {high:g} C: the shift is an extrapolation there"

@@ -14,8 +14,8 @@ HOUSE = Path(parcontact.__file__).parent
 ROOT = Path(__file__).parents[1]
 MODULES = {".".join(path.relative_to(HOUSE).with_suffix("").parts): path for path in sorted(HOUSE.rglob("*.py"))}
 FLOORS = [  # from the ground up; a room imports only from the floors below its own
-    {"errors", "printed", "private", "progress", "streams"},
-    {"columns", "compiled", "datafiles", "doubts"},
+    {"column_names", "errors", "printed", "private", "progress", "streams"},
+    {"columns", "compiled", "datafiles", "doubts", "text_tables"},
     {"rubber"},
     {"parallel", "job"},
     {"history", "road", "leakage"},

@@ -147,13 +147,14 @@ class Job(Part):
     def doubts(self) -> tuple[Doubt, ...]:
         """Return all warnings about the job; they are errors with `numerics.strict`."""
         of_fit = self.material.doubts if isinstance(self.material, Dma) else ()
+        of_material = (*of_fit, *meaning.doubt_temperatures(self))
         of_effects = [
             each if isinstance(each, Doubt) else Doubt("said", "", {"text": str(each)}) for each in self._said("doubts")
         ]
         if self.bands is not None:
-            return (*of_fit, *meaning.doubt_moduli(self.material.fitted), *of_effects)
+            return (*of_material, *meaning.doubt_moduli(self.material.fitted), *of_effects)
         return (
-            *of_fit,
+            *of_material,
             *advice.doubts_of_resolution(self, self.directions, chosen=bool(self._origin.mesh)),
             *meaning.doubts_of_scene(self),
             *layer_warnings.doubts_of_layer(self),

@@ -11,6 +11,7 @@ from itertools import groupby
 from typing import Any
 
 from ...doubts import Doubt
+from ...rubber.shift import doubt_kelvin
 from ..sections.calculation import Grid
 from ..sections.geometry import OnOneMesh, Rough, RoughSpectrum, Sphere, Topography, Wave
 from ..sections.materials import Elastic, PronyBranch, Zener
@@ -78,6 +79,17 @@ def doubt_moduli(material: Elastic | Zener) -> Iterator[Doubt]:
         yield Doubt("soft", "material", {"modulus": modulus, "least": SOFTEST, "in_mega": 1e6 * modulus})
     elif modulus > HARDEST:
         yield Doubt("hard", "material", {"modulus": modulus, "most": HARDEST})
+
+
+def doubt_temperatures(job: Sections) -> Iterator[Doubt]:
+    """Yield a warning for each key with a temperature that may be in kelvin."""
+    material, steady = job.material, job.steady
+    shift = getattr(material, "shift", None)
+    yield from doubt_kelvin("material.temperature", [getattr(material, "temperature", None)])
+    yield from doubt_kelvin("material.reference", [getattr(material, "reference", None)])
+    yield from doubt_kelvin("material.shift.reference", [getattr(shift, "reference", None)])
+    yield from doubt_kelvin("material.shift.temperatures", getattr(shift, "temperatures", ()))
+    yield from doubt_kelvin("steady.temperatures", (steady.temperatures if steady else None) or ())
 
 
 def instant_contact_modulus(material: Elastic | Zener) -> float:
