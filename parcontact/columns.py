@@ -195,6 +195,11 @@ MEASURES: Table = (
     ERROR_FRICTION,
     ERROR_AREA,
     Column(
+        *("cut_off", ""),
+        "1 where the contact reaches the edge of a free box and is cut off there, so that the row is wrong, else 0",
+        lambda row: int(row.measures.at_edge),
+    ),
+    Column(
         *("friction_viscous", ""),
         "`friction` minus `friction_interface` (with `interface`): component of the viscoelastic force along the total "
         "force, over the load",
