@@ -64,7 +64,8 @@ class StepObservation:
 
     For steps also: `difference` of the embedded pair, and its `order`; cells (of mean sides) `slid` in `seconds`;
     the `angle` of the pair; `curved`: the displacement is quadratic in time; the `change` of friction since the step
-    before, infinite after a jump; `uneven`: largest minus mean pressure over the mean, at most 1.
+    before, infinite after a jump; `own_error`: error by the length of the step that a body without branches
+    states; `uneven`: largest minus mean pressure over the mean, at most 1.
     """
 
     complementarity: float
@@ -84,6 +85,7 @@ class StepObservation:
     angle: float = 0.0
     curved: bool = False
     change: float = 0.0
+    own_error: float | None = None
     uneven: float = 1.0
 
     @property
