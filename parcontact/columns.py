@@ -165,9 +165,12 @@ FLASH = (
 ERROR_FRICTION = Column(
     *("error_friction", ""),
     "estimated relative error of friction ({doc}`accuracy`); 1 or more where friction cannot be distinguished from 0, "
-    "empty where it is 0",
+    "empty where it is 0, and where spots of contact may be smaller than a cell",
 )
-ERROR_AREA = Column("error_area", "", "estimated relative error of the corrected contact area")
+ERROR_AREA = Column(
+    *("error_area", ""),
+    "estimated relative error of the corrected contact area; empty where spots of contact may be smaller than a cell",
+)
 
 MEASURES: Table = (
     Column("step", "", "number of the step, 0 for the initial state"),
@@ -328,7 +331,7 @@ STEADY: Table = (  # rows are `steady_sliding.point.Point`
     ),
     Column("rounds", "", "steady states solved until the temperature settled (with `feedback`)", when="feedback"),
     ERROR_FRICTION,
-    replace(ERROR_AREA, of=attrgetter("errors.area.total")),
+    ERROR_AREA,
     Column(
         *("friction_slopes", ""),
         "tangential force over normal force, from the slopes of the rigid surface. As in `measures.csv` it includes "

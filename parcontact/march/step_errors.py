@@ -44,6 +44,11 @@ class StepErrors:
         return math.inf if self.budget is None or self.budget.friction is None else self.budget.friction.of_friction
 
     @property
+    def resolved(self) -> bool:
+        """True unless spots of contact may be smaller than a cell."""
+        return self.budget is None or self.budget.resolved
+
+    @property
     def of_area(self) -> float:
         """The relative error of the contact area, 0 where there is none."""
         return 0.0 if self.budget is None else self.budget.area.total

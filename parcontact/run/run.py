@@ -219,6 +219,8 @@ class Run:
             console.say(
                 "no error is stated for steps whose contact reaches the edge of the box: their results are wrong"
             )
+        if "below a cell" in self.contacts.seen:
+            console.say("no error is stated for steps whose spots of contact may be smaller than a cell")
         if adhesion is not None and adhesion.snaps:
             console.say(f"the contact snapped in {adhesion.snaps} of the steps; no error is stated for them")
         if self.stop:
