@@ -30,7 +30,7 @@ class Small(NamedTuple):
 
 
 SMALL = {
-    "band_errors": Small(["--cases", "1"], r"(?m)^2 bands, friction: .*within 5 % in \d of 1"),
+    "band_errors": Small(["--cases", "1", "--points", "64"], r"(?m)^2 bands, friction: .*within 5 % in \d of 1"),
     "bench": Small(
         ["--points", "64", "--rounds", "1", "--json", "bench.json"],
         r"(?s)double: operator calls +\d\d .*tolerance 0.005: operator calls per step +[4-9](\.| ).*"
