@@ -16,7 +16,7 @@ def relaxation_of(material: Material) -> Prony:
     """Return the relaxation function of a material [Pa, s]; its long-term modulus and no terms if it has no
     branches."""
     body = material.fitted
-    if not body.branches:
+    if isinstance(body, jobs.Elastic) or not body.branches:
         return Prony(body.long_modulus, np.zeros(0), np.zeros(0))
     zener = [b for b in body.branches if isinstance(b, jobs.ZenerBranch)]
     plain = [b for b in body.branches if isinstance(b, jobs.PronyBranch)]
