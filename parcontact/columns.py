@@ -165,9 +165,12 @@ FLASH = (
 ERROR_FRICTION = Column(
     *("error_friction", ""),
     "estimated relative error of friction ({doc}`accuracy`); 1 or more where friction cannot be distinguished from 0, "
-    "empty where it is 0",
+    "empty where it is 0, and where spots of contact may be smaller than a cell",
 )
-ERROR_AREA = Column("error_area", "", "estimated relative error of the corrected contact area")
+ERROR_AREA = Column(
+    *("error_area", ""),
+    "estimated relative error of the corrected contact area; empty where spots of contact may be smaller than a cell",
+)
 
 MEASURES: Table = (
     Column("step", "", "number of the step, 0 for the initial state"),
@@ -194,6 +197,11 @@ MEASURES: Table = (
     CORRECTED,
     ERROR_FRICTION,
     ERROR_AREA,
+    Column(
+        *("cut_off", ""),
+        "1 where the contact reaches the edge of a free box and is cut off there, so that the row is wrong, else 0",
+        lambda row: int(row.measures.at_edge),
+    ),
     Column(
         *("friction_viscous", ""),
         "`friction` minus `friction_interface` (with `interface`): component of the viscoelastic force along the total "
@@ -323,7 +331,7 @@ STEADY: Table = (  # rows are `steady_sliding.point.Point`
     ),
     Column("rounds", "", "steady states solved until the temperature settled (with `feedback`)", when="feedback"),
     ERROR_FRICTION,
-    replace(ERROR_AREA, of=attrgetter("errors.area.total")),
+    ERROR_AREA,
     Column(
         *("friction_slopes", ""),
         "tangential force over normal force, from the slopes of the rigid surface. As in `measures.csv` it includes "

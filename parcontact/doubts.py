@@ -316,6 +316,10 @@ SENTENCES = {
         "{where}: all of the periodic box is in contact, where no traction moves the mean of its surface: friction of "
         "the first steps that stick may be too small; use grid.boundary: free, a smaller load or rougher heights"
     ),
+    "below a cell": (
+        "{where}: spots of contact may be smaller than a cell, so that their area and friction are not known and no "
+        "error is stated; use {more}, a smaller grid.size or a larger load"
+    ),
     "cells": (
         "{where}: spots of contact are only a few cells wide: contact_area is about {excess!p} too large (limit: "
         "{most!p}); use {more}, a smaller grid.size or a larger load"

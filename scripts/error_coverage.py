@@ -247,6 +247,8 @@ def _means(line: Json, own: Json, reference: Json) -> Iterator[Json]:
         if not row["weight"] or not row.get("seen"):
             continue
         budget = judge(properties, StepObservation(**{**row["seen"], "way": tuple(row["seen"]["way"])}))
+        if not budget.resolved:
+            continue
         for name, parts in (("friction", budget.friction), ("area", budget.area)):
             if parts is not None and row[name]:
                 no_friction = name == "friction" and line["body"] == "elastic" and not row["seen"]["interface"]

@@ -32,7 +32,7 @@ from ..history.chosen import Bounds, ChosenEnds, ChosenSteps, MadeStep, reached
 from ..history.timeline import Span, Step, Timeline
 from ..job import Job
 from ..job.checks.cells import one_cell
-from ..physics.body import Body
+from ..physics.body import Body, remembers
 from ..physics.entries import Entry, Saved
 from ..physics.units import Units
 from .budget import ErrorBudget, ErrorParts
@@ -91,7 +91,7 @@ class Controller:
 
     @property
     def relaxes(self) -> bool:
-        return self.body.branched is not None
+        return remembers(self.body)
 
     # -- tolerance ----------------------------------------------------------------------------------------------------
 

@@ -30,6 +30,7 @@ MOST_ROUNDS = 20  # tuning: limit on rounds of the temperatures
 LEAST_ERROR, RELATIVE = 0.1, 0.02  # accuracy: error of the rise of a band [K], and relative
 HARD_SHARE = 0.25  # fitted: error of the method over the difference to hard walls; 1 for profiles
 LEAST_METHOD = 0.03  # fitted: least relative error of the method (`scripts/band_errors.py`)
+LEAST_OF_AREA = 0.09  # fitted: the same of a small area; it falls with the open share (`scripts/band_errors.py`)
 NEARLY_ALL = 0.1  # accuracy: open area below which errors fall to 0 with it
 SURE = 2.0  # accuracy: error by the scatter of surfaces over its standard error
 TABLE = "bands.csv"
@@ -58,13 +59,14 @@ class BandOutcome:
     @property
     def method(self) -> list[float]:
         """Error of the method in friction and in the corrected area: a share of the difference between hard walls and
-        laws, at least LEAST_METHOD, less near full contact; 0 for one band."""
+        laws, at least LEAST_METHOD, or LEAST_OF_AREA, less near full contact; 0 for one band."""
         if len(self.results) == 1:
             return [0.0, 0.0]
-        least = LEAST_METHOD * min(1.0, (1.0 - self.results[-1].contact_area_corrected) / NEARLY_ALL)
-        ends = zip(self.hard, self.with_laws, strict=True)
+        open_share = 1.0 - self.results[-1].contact_area_corrected
+        least = LEAST_METHOD * min(1.0, open_share / NEARLY_ALL)
+        ends = zip(self.hard, self.with_laws, (least, max(least, LEAST_OF_AREA * open_share)), strict=True)
         share = 1.0 if self.line else HARD_SHARE
-        return [max(share * abs(hard - law), least * law) for hard, law in ends]
+        return [max(share * abs(hard - law), lowest * law) for hard, law, lowest in ends]
 
 
 @dataclass(frozen=True)
@@ -270,11 +272,13 @@ class RoadSliding:
         )
 
     def _errors(self, outcome: BandOutcome, friction: float) -> ErrorBudget:
-        """Return relative errors; those of grids and of loads beyond ladders are added over bands."""
+        """Return relative errors; those of grids and of loads beyond ladders are added over bands. Each band divides
+        the area that coarser bands leave, so that relative errors of areas by their grids add up."""
         area = outcome.results[-1].contact_area_corrected
         lost = sum(result.load_lost for result in outcome.results)
         of_bands = np.sum([result.errors for result in outcome.results], axis=0)[:2]
-        of_area = outcome.results[-1].errors[2:]
+        grids = [result.errors[3] / (result.contact_area_corrected or 1.0) for result in outcome.results]
+        of_area = outcome.results[-1].errors[2], sum(grids) * area
         method, scatter = outcome.method, [SURE * error for error in outcome.scatter]
         parts = [
             ErrorParts(

@@ -20,6 +20,7 @@ from ..job.sections.quantities import Positive
 from ..job.text.fault import Fault
 from ..parallel.slab import Array
 from ..physics.attraction import AdhesionLaw, cell_of, modulus_of, ramp_of, smallest_range
+from ..physics.body import remembers
 from ..physics.entries import Entry, Saved
 from ..physics.units import Units
 from ..solve.adhesive.law import Law
@@ -224,7 +225,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         snapped = solved.snapped or (chosen and far)
         snapped |= energies.lost > memory.energies.lost and not instant.untouched
         warns = far and not (chosen or memory.front_warning_given or instant.step.jump)
-        warns = warns and self._scene.material.branched is not None
+        warns = warns and remembers(self._scene.material)
         memory = AdhesionMemory(energies, memory.snaps + snapped, memory.front_warning_given or warns, columns)
         remark = (
             f"the edge of contact moves by {0.5 * instant.front:.2g} times a process zone, and rates are resolved up "

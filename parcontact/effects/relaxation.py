@@ -13,10 +13,11 @@ Material = jobs.Elastic | jobs.Zener | jobs.Dma
 
 
 def relaxation_of(material: Material) -> Prony:
-    """Return the relaxation function of a material [Pa, s]; one modulus and no terms if it is elastic."""
+    """Return the relaxation function of a material [Pa, s]; its long-term modulus and no terms if it has no
+    branches."""
     body = material.fitted
-    if isinstance(body, jobs.Elastic):
-        return Prony(body.shear_modulus, np.zeros(0), np.zeros(0))
+    if isinstance(body, jobs.Elastic) or not body.branches:
+        return Prony(body.long_modulus, np.zeros(0), np.zeros(0))
     zener = [b for b in body.branches if isinstance(b, jobs.ZenerBranch)]
     plain = [b for b in body.branches if isinstance(b, jobs.PronyBranch)]
     series, kelvin, viscosity = ([getattr(b, name) for b in zener] for name in ("G0", "G1", "eta1"))

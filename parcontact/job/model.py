@@ -206,8 +206,8 @@ class Job(Part):
 
     @property
     def remembers(self) -> bool:
-        """Return True if the result depends on the history: relaxing branches, adhesion, or contacts that stick."""
-        return bool(self.material.fitted.branches) or self.section("adhesion") is not None or self.sticks
+        """Return True if the result depends on the history: a body that relaxes, adhesion, or contacts that stick."""
+        return self.material.fitted.remembers or self.section("adhesion") is not None or self.sticks
 
     @property
     def sticks(self) -> bool:

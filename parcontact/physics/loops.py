@@ -114,9 +114,10 @@ def measure_yielded(p, u, h, above, below, cyclic, highest):
     """Return sums over the points of this rank for a contact whose pressures end at `highest`, where points have
     yielded.
 
-    They are the excess cells on sharp edges, `sum 1 - p/highest` over points between one that has yielded and one
-    without pressure; the sides between other points below `highest` and points without pressure; the number of points
-    that have yielded, and their sum of `u - h`. `above` and `below` are the rows of p around those of this rank.
+    They are the excess cells if edges at yielded points are sharp, `sum 1 - p/highest` over points between one that has
+    yielded and one without pressure; the sides between other points below `highest` and points without pressure; the
+    number of points that have yielded, and their sum of `u - h`. `above` and `below` are the rows of p around those of
+    this rank.
     """
     ny, nx = p.shape
     sharp, sides, count, gaps = 0.0, 0.0, 0.0, 0.0

@@ -39,6 +39,7 @@ class Row(Mapping[str, float]):
     contact_area_corrected: float
     error_friction: float
     error_area: float
+    cut_off: int
     friction_viscous: float
     friction_interface: float
     stick_area: float

@@ -16,6 +16,7 @@ from ..job.sections.listing import plain_data
 from ..march import loop
 from ..march.failure import StepError
 from ..march.loop import March
+from ..physics.body import states_errors
 from ..scene import sanity
 from ..storage import tables
 from ..storage.checkpoint import Contents, Facts
@@ -212,10 +213,14 @@ class Run:
         sample = describe_sample(self.job.grid, self.job.surface, slides)
         if errors.area is not None and (text := sample):
             console.say(text)
+        if not states_errors(self.march.scene.material):
+            console.say("the body has no estimate of the error by the time steps: no errors are stated")
         if "edge" in self.contacts.seen:
             console.say(
                 "no error is stated for steps whose contact reaches the edge of the box: their results are wrong"
             )
+        if "below a cell" in self.contacts.seen:
+            console.say("no error is stated for steps whose spots of contact may be smaller than a cell")
         if adhesion is not None and adhesion.snaps:
             console.say(f"the contact snapped in {adhesion.snaps} of the steps; no error is stated for them")
         if self.stop:

@@ -84,6 +84,8 @@ def _area(job: Job, columns: Columns, detached: bool) -> str:
     """Return the mean contact area of the slide; without a slide the area in the row chosen by
     `pull_off.choose_row`."""
     if (found := slide.measure_slide(job.history, columns)) is not None:
+        if math.isnan(found.contact_area):
+            return "the box cuts the contact off in the whole slide"
         error = slide.absolute_errors(job.history, columns, job.grid.dx).get("contact_area", math.nan)
         return f"the mean contact area is {_size(job, found.contact_area_corrected, error)}"
     row = pull_off.choose_row(columns, detached)

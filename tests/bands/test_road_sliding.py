@@ -285,3 +285,38 @@ def test_bands_without_room_for_their_waves(
     path.write_text(yaml.safe_dump({**JOB, "surface": surface, "bands": {"count": 1, **bands}}))
     assert main([verb, str(path)]) == 2
     assert re.search(said, capsys.readouterr().err, re.MULTILINE)
+
+
+TWO_BRANCHES = {
+    **{"model": "zener", "modulus_inf": 5e5},
+    "branches": [{"modulus": 4e6, "relaxation_time": 1e-2}, {"modulus": 2e8, "relaxation_time": 1e-6}],
+}
+
+
+@pytest.mark.parametrize("pressure", [1.5e5, 6e5])
+def test_the_stated_error_of_the_area_covers_the_mesh(pressure: float) -> None:
+    """Bands with 4 cells per shortest wave, against two surfaces on one grid with 4 and 8, extrapolated to first order.
+    One grid with 4 cells has most of the error of the mesh itself, and hides it. The two surfaces differ by 2 %."""
+    rough = {**ROUGH, "hurst": 0.95, "long_wavelength": 1e-3, "short_wavelength": 1.25e-4}
+
+    def area(bands: dict[str, int], seed: int) -> tuple[float, float]:
+        numerics, surface = {"tolerance": 1e-3, "accuracy": 0.1}, {**rough, "seed": seed}
+        found = sliding({"surface": surface, "material": TWO_BRANCHES, "bands": bands, "numerics": numerics})
+        point = found.solve((0.48, 0.0), pressure)
+        return point.measures.contact_area_corrected, point.errors.area.total
+
+    def extrapolated(seed: int) -> float:
+        coarse, fine = (area({"count": 1, "samples": 1, "points": points}, seed)[0] for points in (128, 256))
+        return 2.0 * fine - coarse
+
+    (found, stated), exact = area({"count": 2, "samples": 4}, 20), np.mean([extrapolated(seed) for seed in (20, 1)])
+    assert 0.05 < found / exact - 1.0 < stated * found / exact
+
+
+def test_errors_of_the_area_by_the_grids_of_all_bands_add_up() -> None:
+    """Each band divides the area that the coarser ones leave: not the one of the finest band alone."""
+    found = sliding({"surface": {**ROUGH, "short_wavelength": 1e-4}, "bands": {"count": 2, "samples": 1}})
+    point = found.solve((0.1, 0.0), 1e6)
+    grids = [result.errors[3] / result.contact_area_corrected for result in found._results]
+    assert min(grids) > 0.001
+    assert point.errors.area.mesh == pytest.approx(sum(grids), rel=1e-12)

@@ -27,10 +27,18 @@ from parcontact.parallel.signals import Signals
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
 from parcontact.run import sweep, watch
-from parcontact.storage import directory, files
+from parcontact.storage import directory, files, tables
 from parcontact.storage.stopfile import StopFile
 from parcontact.summary import info, slide, sweep_table
 
+LEAVING = """
+grid: {points: 32, size: 1.0e-3, boundary: free}
+surface: {shape: sphere, radius: 1.0e-3}
+material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e6, relaxation_time: 1.0}]}
+history: [{force: 2.0e-2}, {force: 2.0e-2, velocity: 1.0e-3, distance: 5.0e-4}]
+sweep: [{history.1.velocity: [1.0e-3]}]
+numerics: {accuracy: 0.1}
+"""
 CELLS = {"excess": 0.2, "most": 0.15, "more": "more points"}  # of a doubt about contacts of few cells
 
 
@@ -309,6 +317,21 @@ material: {model: elastic, shear_modulus: 1.0e6}
 history: [{pressure: 1.0e4}]
 sweep: [{surface.seed: [1, 2, 3, 4], surface.short_wavelength: [2.5e-4, 2.5e-4, 5.0e-4, 2.5e-4]}]
 """
+
+
+def test_a_ball_that_leaves_its_box_has_no_stated_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its highest friction is the one of the rows in which the box does not cut the contact off."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job.yaml").write_text(LEAVING)
+    assert main(["job.yaml", "--quiet"]) == 0
+    rows = tables.read_columns(Path("out/job/cases/000/measures.csv"))
+    inside = [friction for friction, cut in zip(rows["friction"], rows["cut_off"], strict=True) if not cut]
+    (row,) = table()
+    assert float(row["mu_max"]) == max(inside) < max(rows["friction"])
+    assert [row[name] for name in ("mu_max_error", "mu_dyn_error", "error_friction", "error_area")] == [""] * 4
+    log = Path("out/job/cases/000/run.log").read_text()
+    assert f"in {len(rows['friction']) - len(inside)} of " in log
+    assert "the contact is cut off by the edge of the box: they do not count" in log
 
 
 # -- several programs on the cases of one sweep: a job array, or the same command given twice -------------------------
