@@ -324,7 +324,7 @@ def test_a_contact_that_creeps_out_of_its_box() -> None:
     for speed, warned in ((1e-3, True), (1e2, False)):
         slide = {"force": 0.2, "velocity": speed, "distance": 3e-3}
         job = job_of(sphere, [{"force": 0.2}, slide], material=rubber, grid=grid)
-        texts = [str(doubt) for doubt in load(job).doubts if "leaves the box" in str(doubt)]
+        texts = [str(doubt) for doubt in job.doubts if "leaves the box" in str(doubt)]
         assert [text.partition(":")[0] for text in texts] == ["history.1"] * warned
         radius = (0.75 * 0.2 * 8e-3 / 4e4) ** (1 / 3)  # E* = 4 G of an incompressible body
         assert all(f"a radius of some {radius:.3g} m" in text and "edge is 0.003 m" in text for text in texts)
