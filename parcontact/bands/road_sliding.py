@@ -19,7 +19,7 @@ from ..physics.measures import Measures
 from ..scene import Setup, choices
 from ..solve.certificate import Certificate
 from ..steady_sliding.curve import States, on_one_grid
-from ..steady_sliding.heating import describe_beyond, describe_place
+from ..steady_sliding.heating import describe_beyond, describe_cold_state
 from ..steady_sliding.point import Point
 from .band import Rung, Vector
 from .band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
@@ -192,7 +192,7 @@ class RoadSliding:
                 relax = float(np.clip(-relax * (last @ change) / (change @ change), 0.1, 1.0))
             rises, last = np.clip(rises + relax * over, 0.0, most), over
         raise RunError(
-            f"{describe_place(*place)}: temperatures of bands did not settle in {MOST_ROUNDS} rounds. "
+            f"{describe_cold_state(*place)}: temperatures of bands did not settle in {MOST_ROUNDS} rounds. "
             "Try feedback: none"
         )
 
@@ -208,7 +208,7 @@ class RoadSliding:
             self.setup = replace(self.setup, choices=choices(finest))
             self._cascade.press(self._cascade.velocity, self._cascade.pressure)
         except InputError as error:
-            place = describe_place(*self._place(), self.temperature)
+            place = describe_cold_state(*self._place(), self.temperature)
             raise RunError(f"{place}: no material at the flash temperature: {error}") from None
 
     def _rub(self, results: Results) -> float:

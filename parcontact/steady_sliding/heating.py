@@ -111,13 +111,13 @@ class Feedback:
             middle = 0.5 * (low + high) if high < math.inf else 2.0 * max(found, rise)
             rise = min(found if low < found < high else middle, most)
         raise RunError(
-            f"{describe_place(speed, *place)}: the flash temperature did not settle in {MOST_ROUNDS} rounds: "
+            f"{describe_cold_state(speed, *place)}: the flash temperature did not settle in {MOST_ROUNDS} rounds: "
             f"a rise of {last[0]:.4g} K gives a rise of {last[0] + last[1]:.4g} K. "
             "Try feedback: none"
         )
 
 
-def describe_place(speed: float, pressure: float, temperature: float) -> str:
+def describe_cold_state(speed: float, pressure: float, temperature: float) -> str:
     """Return a text on a state: its velocity [m/s], pressure [Pa] and the temperature of the cold body [deg C]."""
     return f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa and {temperature:.4g} C"
 
@@ -126,7 +126,7 @@ def describe_beyond(speed: float, pressure: float, temperature: float, most: flo
     """Return a sentence on a fixed point above the `most` [K] that the shift of the material allows, where sliding
     warms the rubber by `rise` [K]."""
     return (
-        f"{describe_place(speed, pressure, temperature)}: the flash temperature is above {temperature + most:.4g} C, "
+        f"{describe_cold_state(speed, pressure, temperature)}: the flash temperature is above {temperature + most:.4g} C, "
         f"where the shift factors end; rubber of that temperature is warmed to {temperature + rise:.4g} C. Extend the "
         "table of shift factors, or try feedback: none"
     )

@@ -27,7 +27,7 @@ from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
 from ..solve.precision import reachable_certificate
 from ..solve.preconditioner.extension import pairs_for
-from .heating import Feedback, describe_place, find_temperatures
+from .heating import Feedback, describe_cold_state, find_temperatures
 from .losses import branch_powers
 from .point import Point
 from .stiffness import loses_most, soft_stripes, stiffer_lines
@@ -108,7 +108,7 @@ class SteadySliding:
             try:
                 self._set_material(min(cold + rise, highest))
             except InputError as error:
-                place = describe_place(speed, pressure, cold)
+                place = describe_cold_state(speed, pressure, cold)
                 raise RunError(f"{place}: no material at the flash temperature: {error}") from None
             return self._solve(velocity, pressure)
 
