@@ -125,8 +125,9 @@ def describe_cold_state(speed: float, pressure: float, temperature: float) -> st
 def describe_beyond(speed: float, pressure: float, temperature: float, most: float, rise: float) -> str:
     """Return a sentence on a fixed point above the `most` [K] that the shift of the material allows, where sliding
     warms the rubber by `rise` [K]."""
+    state = describe_cold_state(speed, pressure, temperature)
     return (
-        f"{describe_cold_state(speed, pressure, temperature)}: the flash temperature is above {temperature + most:.4g} C, "
+        f"{state}: the flash temperature is above {temperature + most:.4g} C, "
         f"where the shift factors end; rubber of that temperature is warmed to {temperature + rise:.4g} C. Extend the "
         "table of shift factors, or try feedback: none"
     )
