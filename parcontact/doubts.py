@@ -135,12 +135,13 @@ SENTENCES = {
         "theory assumes small slopes: use a smaller load"
     ),
     "out of the box": (
-        "the contact has a radius of {contact:.3g} m or more and leaves the box of {lx:g} x {ly:g} m; use a "
-        "larger grid.size, a smaller load or a shorter distance"
+        "the contact has a radius of some {contact:.3g} m and leaves the box of {lx:g} x {ly:g} m, whose edge is "
+        "{room:.3g} m from its centre; use a larger grid.size, a smaller load or a shorter distance"
     ),
     "slides out of the box": (
-        "the contact ends at ({x:.4g}, {y:.4g}) m with a radius of {contact:.3g} m or more, and leaves the box of "
-        "{lx:g} x {ly:g} m; use a larger grid.size, a smaller load or a shorter distance"
+        "the contact ends at ({x:.4g}, {y:.4g}) m with a radius of some {contact:.3g} m, and leaves the box of "
+        "{lx:g} x {ly:g} m, whose edge is {room:.3g} m from its centre; use a larger grid.size, a smaller load "
+        "or a shorter distance"
     ),
     "images": (
         "its images in the periodic box of {lx:g} x {ly:g} m change the load at a given radius of contact by "

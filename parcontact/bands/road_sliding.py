@@ -11,7 +11,7 @@ import numpy as np
 from ..accuracy.budget import ErrorBudget, ErrorParts
 from ..columns import BANDS, names_of
 from ..doubts import Doubt
-from ..effects.relaxation import feeds_back, temperature_of
+from ..effects.relaxation import feeds_back, highest_temperature_of, temperature_of
 from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.slab import Array, Slab
@@ -19,6 +19,7 @@ from ..physics.measures import Measures
 from ..scene import Setup, choices
 from ..solve.certificate import Certificate
 from ..steady_sliding.curve import States, on_one_grid
+from ..steady_sliding.heating import describe_beyond, describe_cold_state
 from ..steady_sliding.point import Point
 from .band import Rung, Vector
 from .band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
@@ -167,13 +168,15 @@ class RoadSliding:
         """Find the fixed point of the temperatures of all bands, with one surface per band, and set them in the
         cascade. Raises RunError if it is not found.
 
-        Rounds use Aitken's relaxation. The first is for cold bands, the second starts from the temperatures of
-        the last state.
+        Rounds use Aitken's relaxation; the first is for cold bands. No temperature above the range of the material's
+        shift is tried.
         """
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
+        highest, place = highest_temperature_of(self.job.material), (*self._place(), cold)
+        most = highest - cold
         rises, last, relax, friction_cold = np.zeros(self.cut.count), np.zeros(0), 1.0, math.nan
         for rounds in range(1, MOST_ROUNDS + 1):
-            self._set_temperatures(cold + rises)
+            self._set_temperatures(np.minimum(cold + rises, highest))
             rungs = self._cascade.climb([0])
             results = self._cascade.fall(lambda band, _: rungs[band, 0])  # noqa: B023
             over = (
@@ -181,13 +184,23 @@ class RoadSliding:
             )
             if rounds == 1:
                 friction_cold = sum(result.friction for result in results)
-            if np.all(np.abs(over) <= np.maximum(LEAST_ERROR, RELATIVE * rises)):
+            settled = np.abs(over) <= np.maximum(LEAST_ERROR, RELATIVE * rises)
+            if np.all(settled):
                 return BandTemperatures(rounds, friction_cold)
+            if np.all(settled | ((rises == most) & (over > 0.0))):
+                raise RunError(describe_beyond(*place, most, most + float(over[rises == most].max())))
             if last.size:
                 change = over - last
                 relax = float(np.clip(-relax * (last @ change) / (change @ change), 0.1, 1.0))
-            rises, last = np.maximum(rises + relax * over, 0.0), over
-        raise RunError(f"temperatures of bands did not settle in {MOST_ROUNDS} rounds. Try feedback: none")
+            rises, last = np.clip(rises + relax * over, 0.0, most), over
+        raise RunError(
+            f"{describe_cold_state(*place)}: temperatures of bands did not settle in {MOST_ROUNDS} rounds. "
+            "Try feedback: none"
+        )
+
+    def _place(self) -> tuple[float, float]:
+        """Return the velocity [m/s] and the pressure [Pa] of the state."""
+        return math.hypot(*self._cascade.velocity), self._cascade.pressure
 
     def _set_temperatures(self, temperatures: Array) -> None:
         """Set the temperatures [deg C] of the bands; raises RunError outside the range of the material's shift."""
@@ -197,7 +210,8 @@ class RoadSliding:
             self.setup = replace(self.setup, choices=choices(finest))
             self._cascade.press(self._cascade.velocity, self._cascade.pressure)
         except InputError as error:
-            raise RunError(f"the flash temperature is outside the range of the material's shift: {error}") from None
+            place = describe_cold_state(*self._place(), self.temperature)
+            raise RunError(f"{place}: no material at the flash temperature: {error}") from None
 
     def _rub(self, results: Results) -> float:
         """Return the shear stress [Pa] of the interface, averaged over the nominal area."""

@@ -15,7 +15,7 @@ from ..effects.contact_law import touching_of
 from ..errors import InputError
 from ..job import reading
 from ..job.resolved import RESOLVED, shown_job
-from ..leakage.flow import Flow, Leak, Map, flow_mesh_error, leak, solve_flow
+from ..leakage.flow import Flow, Leak, Map, flow_mesh_error, leak, least_section, solve_flow
 from ..leakage.fluids import PressureDrop
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
@@ -26,6 +26,7 @@ from ..storage import files, hdf5, read_back
 from ..summary import leak_stop
 
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
+INERTIA = 0.2  # accuracy: viscous flow of a gas over its bound by inertia, above which viscous flow is 10 % too large
 MOST_CELLS = 4e6  # tuning: largest map of which every rank solves one; 2048 x 2048 takes 1.4 GB
 
 
@@ -57,12 +58,13 @@ class LeakInstant(NamedTuple):
 
 
 class SolvedLeak(NamedTuple):
-    """The flow at an instant, without maps, its mesh errors along x and y, and the conductivities [m^3] for a fluid
-    with slip."""
+    """The flow at an instant, without maps, and along x and y its mesh errors, the conductivities [m^3] for a fluid
+    with slip, and the smallest open sections [m^2]."""
 
     leak: Leak
     errors: tuple[float, float]
     of_fluid: tuple[float, float]
+    sections: tuple[float, float]
 
 
 class Gaps:
@@ -114,14 +116,16 @@ class Gaps:
     def solve(self, index: int) -> tuple[SolvedLeak, list[Map]]:
         """Return the flow at a saved instant, and its maps for both directions."""
         gap, flows, errors, shown = self.read(index), list[Flow](), list[float](), list[Map]()
-        of_fluid = list[float]()
+        of_fluid, sections = list[float](), list[float]()
         for axis in ("x", "y"):
             flow = solve_flow(gap, self.size, axis, self._sides(axis))
             shown.append(leakage_charts.flux(gap, flow.pressure, self.size))
+            sections.append(least_section(gap, flow, self.size, axis))
             flows.append(replace(flow, pressure=np.empty((0, 0))))
             of_fluid.append(self._conductivity(gap, flow, axis))
             errors.append(flow_mesh_error(gap, flow, self.size, axis, self._sides(axis)))
-        return SolvedLeak(Leak(*flows), (errors[0], errors[1]), (of_fluid[0], of_fluid[1])), shown
+        pairs = ((found[0], found[1]) for found in (errors, of_fluid, sections))
+        return SolvedLeak(Leak(*flows), *pairs), shown
 
     def _sides(self, axis: str) -> bool:
         """Return whether the sides along a flow are periodic."""
@@ -241,16 +245,29 @@ def _describe_fluid(gaps: Gaps, last: LeakInstant, solved: SolvedLeak) -> Iterat
     drop = gaps.drop
     assert drop is not None
     pressures = f"from {quantity(drop.high, 'Pa')} to {quantity(drop.low, 'Pa')}"
-    for axis, through, size in zip("xy", solved.of_fluid, (gaps.size, gaps.size[::-1]), strict=True):
+    sizes = gaps.size, gaps.size[::-1]
+    for axis, through, size, section in zip("xy", solved.of_fluid, sizes, solved.sections, strict=True):
         box = f"a length of {quantity(size[0], 'm')} and a width of {quantity(size[1], 'm')}"
         flows = f"along {axis} {drop.describe_rate(through, *size)}, over {box}"
         yield f"{drop.fluid.name} {pressures} at t = {quantity(last.time, 's')}: {flows}"
+        yield from _describe_inertia(drop, axis, drop.mass_flow(through, *size), drop.inertial_bound(section))
         narrow, path = getattr(last, f"constriction_{axis}"), drop.mean_free_path
         if 0.0 < narrow < path:
             yield (
                 f"along {axis} the constriction, {quantity(narrow, 'm')}, is below the mean free path of "
                 f"{drop.fluid.name}, {quantity(path, 'm')}: the flow is stated for a gas that slips, and is larger"
             )
+
+
+def _describe_inertia(drop: PressureDrop, axis: str, viscous: float, bound: float) -> Iterator[str]:
+    """Yield a warning if the viscous flow of a gas [kg/s] is close to its bound by inertia [kg/s], or above."""
+    if viscous > INERTIA * bound:
+        both = 1.0 / (1.0 / viscous + 1.0 / bound)
+        yield (
+            f"warning: along {axis} inertia limits the flow of {drop.fluid.name}: at most {1e6 * bound:.3g} mg/s pass "
+            f"the smallest open section, and viscous flow alone would be {1e6 * viscous:.3g} mg/s; expect some "
+            f"{1e6 * both:.3g} mg/s, 1/(1/viscous + 1/bound), within 14 %; leak.csv holds the viscous flow"
+        )
 
 
 def _describe_missing(gaps: Gaps, at: str) -> Iterator[str]:

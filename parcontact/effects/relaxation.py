@@ -8,6 +8,7 @@ import numpy as np
 from .. import job as jobs
 from ..job.sections.materials import heated
 from ..physics.prony import Prony, normal_form, zener_to_prony
+from ..rubber.shift import highest_temperature
 
 Material = jobs.Elastic | jobs.Zener | jobs.Dma
 
@@ -40,6 +41,12 @@ def temperature_of(material: Material) -> float:
     if not isinstance(body, jobs.Zener) or body.shift is None:
         return math.nan
     return body.shift.reference if body.temperature is None else body.temperature
+
+
+def highest_temperature_of(material: Material) -> float:
+    """Return the temperature [deg C] at which the tables of a material's shift end; inf without tables."""
+    body = material.fitted
+    return highest_temperature(body.shift.made) if isinstance(body, jobs.Zener) and body.shift else math.inf
 
 
 def factor_at(material: Material, rise: float) -> float:

@@ -77,6 +77,14 @@ def _resistances(gap: Map, constriction: float, periodic_sides: bool) -> Map:
     return found
 
 
+def least_section(gap: Map, flow: Flow, size: tuple[float, float], axis: str = "x") -> float:
+    """Return the smallest open section [m^2] across a flow along `axis`, over cells in which fluid flows; 0 if contact
+    closes the gap. `gap` [m] has the shape (ny, nx), and `size` is (lx, ly) [m]."""
+    across, width = (0, size[1]) if axis == "x" else (1, size[0])
+    wet = np.where(np.isfinite(flow.pressure), gap, 0.0)
+    return float(wet.mean(axis=across).min()) * width
+
+
 def flow_mesh_error(
     gap: Map, flow: Flow, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True
 ) -> float:

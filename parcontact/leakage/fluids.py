@@ -13,6 +13,13 @@ Maxwell, Phil. Trans. R. Soc. 170 (1879) 231)
 At walls that reflect all molecules diffusely it slips, and a gap g conducts like one of `g^3 (1 + 6 lambda/g)`, here
 with lambda at the mean pressure (p1 + p2)/2, which is exact for an even gap. The error is about 10 % for gaps above
 ten mean free paths; in smaller gaps the true flow is larger.
+
+Both flows are viscous. A gas has inertia too: through an open section A no more flows than by the isentropic law of
+A. Barre de Saint-Venant and L. Wantzel, J. Ecole Polytechnique 16 (1839) 85, with the ratio kappa of its heats,
+
+    A p1 sqrt(M/(R T)) sqrt(2 kappa/(kappa - 1) (r^(2/kappa) - r^((kappa + 1)/kappa))),
+
+r being the larger of p2/p1 and (2/(kappa + 1))^(kappa/(kappa - 1)), at which the flow is choked.
 """
 
 import math
@@ -28,13 +35,14 @@ ROOM = 293.15  # physics: temperature of the table [K]
 
 @dataclass(frozen=True)
 class Fluid:
-    """A fluid at 20 C: its viscosity [Pa s], and the molar mass of a gas [kg/mol] or the density of a liquid [kg/m^3],
-    NaN if unknown."""
+    """A fluid at 20 C: its viscosity [Pa s], and the density of a liquid [kg/m^3], NaN if unknown, or the molar mass
+    [kg/mol] and the ratio of heats of a gas."""
 
     name: str
     viscosity: float
     molar_mass: float | None = None
     density: float = math.nan
+    heat_ratio: float = math.nan
 
     def mean_free_path(self, pressure: float) -> float:
         """Return the mean free path [m] of a gas at a pressure [Pa]; 0 for a liquid."""
@@ -49,9 +57,9 @@ class Fluid:
 
 FLUIDS = {  # at 20 C and 1 bar: CRC Handbook of Chemistry and Physics, 97th edition (2016), 6-1 and 6-231
     "water": Fluid("water", 1.0016e-3, density=998.2),
-    "air": Fluid("air", 1.82e-5, 0.028964),
-    "nitrogen": Fluid("nitrogen", 1.76e-5, 0.028014),
-    "helium": Fluid("helium", 1.96e-5, 0.0040026),
+    "air": Fluid("air", 1.82e-5, 0.028964, heat_ratio=1.40),
+    "nitrogen": Fluid("nitrogen", 1.76e-5, 0.028014, heat_ratio=1.40),
+    "helium": Fluid("helium", 1.96e-5, 0.0040026, heat_ratio=1.67),
 }
 
 
@@ -87,6 +95,15 @@ class PressureDrop:
         density."""
         mean = self.fluid.density_at(0.5 * (self.high + self.low))
         return conductivity / (12.0 * self.fluid.viscosity) * (self.high - self.low) * mean * width / length
+
+    def inertial_bound(self, section: float) -> float:
+        """Return the largest flow [kg/s] of a gas through an open section [m^2]; inf for a liquid."""
+        if self.fluid.molar_mass is None:
+            return math.inf
+        kappa = self.fluid.heat_ratio
+        ratio = max(self.low / self.high, (2.0 / (kappa + 1.0)) ** (kappa / (kappa - 1.0)))
+        square = 2.0 * kappa / (kappa - 1.0) * (ratio ** (2.0 / kappa) - ratio ** ((kappa + 1.0) / kappa))
+        return section * self.high * math.sqrt(square * self.fluid.molar_mass / (GAS_CONSTANT * ROOM))
 
     def describe_rate(self, conductivity: float, length: float, width: float) -> str:
         """Return a text on the flow through a conductivity [m^3] over a length and a width [m]: in ml/h at the low

@@ -120,6 +120,12 @@ class Factors:
 Shift = WLF | Arrhenius | Factors  # shift of relaxation times, which are given at `reference` [deg C]
 
 
+def highest_temperature(shift: Shift) -> float:
+    """Return the temperature [deg C] at which the tables of a shift end; inf for laws."""
+    tables = [law for law in (shift, shift.vertical) if isinstance(law, Factors)]
+    return min((law.temperatures[-1] for law in tables), default=math.inf)
+
+
 def log_vertical(shift: Shift, temperature: float) -> float:
     """Return log10 of b_T at a temperature [deg C], 0 without a vertical law; raises InputError outside its range."""
     return 0.0 if shift.vertical is None else shift.vertical.log_factor(temperature)

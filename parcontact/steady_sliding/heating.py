@@ -81,12 +81,13 @@ class Feedback:
         self._speed, self._rise, self._place = 1.0, 0.0, (math.nan, math.nan)
 
     def solve_fixed_point(
-        self, warmed: Callable[[float], Point], speed: float, place: Vector, tolerance: float
+        self, warmed: Callable[[float], Point], speed: float, place: Vector, tolerance: float, most: float = math.inf
     ) -> Point:
         """Return the point `warmed(rise)` whose flash temperature is `rise` [K], to the relative `tolerance`, limited
         to FINEST and COARSEST. `place` is pressure and temperature of the body.
 
-        Raises RunError if it is not found in MOST_ROUNDS rounds, or outside the range of the material's shift.
+        No rise above `most` [K], where the material's shift ends, is tried. Raises RunError if the fixed point is above
+        it, or is not found in MOST_ROUNDS rounds.
         """
         relative = min(max(tolerance, FINEST), COARSEST)
         guess = self._rise * math.sqrt(speed / self._speed) if place == self._place else 0.0
@@ -99,19 +100,37 @@ class Feedback:
             if abs(over) <= max(LEAST_ERROR, relative * rise):
                 self._speed, self._rise, self._place = speed, rise, place
                 return replace(point, operator_calls=calls, seconds=seconds, rounds=rounds, friction_cold=cold)
+            if rise == most and over > 0.0:
+                raise RunError(describe_beyond(speed, *place, most, most + over))
             if rounds == 1 and guess:  # the cold body may be far from the last fixed point
-                rise = guess
+                rise = min(guess, most)
                 continue
             low, high = (rise, high) if over > 0.0 else (low, rise)
             slope = (over - last[1]) / (rise - last[0])
             last, found = (rise, over), rise - over / slope if slope < 0.0 else rise + over
             middle = 0.5 * (low + high) if high < math.inf else 2.0 * max(found, rise)
-            rise = found if low < found < high else middle
+            rise = min(found if low < found < high else middle, most)
         raise RunError(
-            f"steady sliding at {speed:.4g} m/s under {place[0]:.4g} Pa: the flash temperature did not settle in "
-            f"{MOST_ROUNDS} rounds: a rise of {last[0]:.4g} K gives a rise of {last[0] + last[1]:.4g} K. "
+            f"{describe_cold_state(speed, *place)}: the flash temperature did not settle in {MOST_ROUNDS} rounds: "
+            f"a rise of {last[0]:.4g} K gives a rise of {last[0] + last[1]:.4g} K. "
             "Try feedback: none"
         )
+
+
+def describe_cold_state(speed: float, pressure: float, temperature: float) -> str:
+    """Return a text on a state: its velocity [m/s], pressure [Pa] and the temperature of the cold body [deg C]."""
+    return f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa and {temperature:.4g} C"
+
+
+def describe_beyond(speed: float, pressure: float, temperature: float, most: float, rise: float) -> str:
+    """Return a sentence on a fixed point above the `most` [K] that the shift of the material allows, where sliding
+    warms the rubber by `rise` [K]."""
+    state = describe_cold_state(speed, pressure, temperature)
+    return (
+        f"{state}: the flash temperature is above {temperature + most:.4g} C, "
+        f"where the shift factors end; rubber of that temperature is warmed to {temperature + rise:.4g} C. Extend the "
+        "table of shift factors, or try feedback: none"
+    )
 
 
 def describe_hot(points: Sequence[Point]) -> Iterator[Doubt]:

@@ -1,5 +1,6 @@
 """Leakage of runs: the table, the picture, the columns of a run, mistakes, and when random contacts close."""
 
+import re
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -217,3 +218,19 @@ def test_a_fluid(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         __main__.main(["leak", str(out), "--fluid", "beer", "--pressures", "2e5:1e5"])
     assert "a fluid (water, air, nitrogen, helium) or a positive viscosity [Pa s]" in capsys.readouterr().err
+
+
+def test_a_fast_gas_is_limited_by_inertia(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """At 20 bar viscous flow exceeds its bound: a warning states both flows and their combination. Of a liquid
+    there is none."""
+    out = run(
+        MPI.COMM_SELF, tmp_path, surface={**job(tmp_path)["surface"], "rms_slope": 1.0}, history=[{"pressure": 1e4}]
+    )
+    for fluid in ("air", "water"):
+        assert __main__.main(["leak", str(out), "--fluid", fluid, "--pressures", "2e6:1e5"]) == 0
+        text = capsys.readouterr().out
+        assert ("inertia limits the flow" in text) is (fluid == "air")
+        pattern = r"at most (\S+) mg/s.* would be (\S+) mg/s; expect some (\S+) mg/s"
+        for bound, viscous, both in (map(float, flows) for flows in re.findall(pattern, text)):
+            assert viscous > 0.2 * bound
+            assert both == pytest.approx(viscous * bound / (viscous + bound), rel=0.01)  # three digits

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from parcontact.errors import InputError
 from parcontact.leakage.elimination import Balance
-from parcontact.leakage.flow import Map, flow_mesh_error, leak, solve_flow
+from parcontact.leakage.flow import Map, flow_mesh_error, leak, least_section, solve_flow
 from parcontact.leakage.fluids import FLUIDS, Fluid, PressureDrop
 from parcontact.leakage.paths import critical_constriction
 
@@ -246,3 +246,35 @@ def test_sides_that_are_periodic_along_x_alone() -> None:
     one, all_, none = (leak(gap, (1.0, 1.0), periodic) for periodic in ((True, False), True, False))
     assert one.flow_x == none.flow_x != all_.flow_x
     assert one.flow_y == all_.flow_y != none.flow_y
+
+
+@pytest.mark.parametrize(("high", "length", "gap"), [(6e5, 2e-3, 17e-6), (20e5, 1e-3, 6.5e-6)])
+def test_inertia_bounds_the_flow_of_a_gas(high: float, length: float, gap: float) -> None:
+    """Viscous flow between even walls, h^3 (p1^2 - p2^2) M/(24 eta R T L), reaches the choked flow of a nozzle,
+    h p1 sqrt(kappa M/(R T)) (2/(kappa + 1))^((kappa + 1)/(2 (kappa - 1))), at the gaps of its closed form, stated to
+    two digits."""
+    drop = PressureDrop(FLUIDS["nitrogen"], high, 1e5)
+    speed = np.sqrt(8.314462618 * 293.15 / 0.028014)
+    choked = np.sqrt(1.4) * (2 / 2.4) ** 3 * high / speed
+    assert drop.inertial_bound(gap) == pytest.approx(gap * choked, rel=1e-6)
+    exact = np.sqrt(choked * 24 * 1.76e-5 * length * speed**2 / (high**2 - 1e10))
+    assert exact == pytest.approx(gap, rel=0.015)
+    assert drop.mass_flow(exact**3, length, 1.0) == pytest.approx(drop.inertial_bound(exact), rel=1e-6)
+
+
+def test_slow_gas_flows_by_bernoulli() -> None:
+    """A small drop dp gives sqrt(2 rho dp) per section, to the order of dp/p; a liquid has no bound."""
+    drop = PressureDrop(FLUIDS["air"], 1.0001e5, 1e5)
+    density = 1e5 * 0.028964 / (8.314462618 * 293.15)
+    assert drop.inertial_bound(1.0) == pytest.approx(np.sqrt(2 * density * 10.0), rel=1e-3)
+    assert PressureDrop(FLUIDS["water"], 2e5, 1e5).inertial_bound(1.0) == np.inf
+
+
+def test_smallest_open_section() -> None:
+    """A channel with one narrow column: the closed pool next to it does not count."""
+    gap = np.zeros((6, 4))
+    gap[:3], gap[:3, 2], gap[4, 0] = 2e-6, 1e-6, 5e-6
+    flow, turned = solve_flow(gap, (4e-3, 6e-3), "x"), solve_flow(gap.T, (6e-3, 4e-3), "y")
+    assert least_section(gap, flow, (4e-3, 6e-3), "x") == pytest.approx(3e-9)
+    assert least_section(gap.T, turned, (6e-3, 4e-3), "y") == pytest.approx(3e-9)
+    assert least_section(gap, solve_flow(gap, (4e-3, 6e-3), "y"), (4e-3, 6e-3), "y") == 0.0

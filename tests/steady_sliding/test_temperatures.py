@@ -1,18 +1,23 @@
 """Friction curves at several temperatures: one curve over a_T v, with Persson's theory next to it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import Main, RunParcontact
+from scipy.special import lambertw
 
 from parcontact import job as jobs
 from parcontact import scene
-from parcontact.errors import InputError, JobError
+from parcontact.errors import InputError, JobError, RunError
 from parcontact.parallel.slab import Slab
+from parcontact.physics.flash import Flash
 from parcontact.plotting import curve_charts
+from parcontact.rubber.shift import WLF, Factors, highest_temperature
 from parcontact.steady_sliding.curve import request
+from parcontact.steady_sliding.heating import Feedback
+from parcontact.steady_sliding.point import Point
 from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.storage.tables import read_columns
 from parcontact.theory import full_contact
@@ -154,3 +159,35 @@ def test_a_curve_says_its_temperature(tmp_path: Path, main: Main) -> None:
     code, out, err = main(*words, "--temperatures", "20", "--set", "output.directory=own")
     assert code == 0, err
     assert "material: at" not in out
+
+
+def rise_in_round(friction_of: Callable[[float], float], guesses: list[float]) -> Callable[[float], Point]:
+    """A body whose flash temperature is a function of its own; the rises that are tried are listed."""
+
+    def warmed(rise: float) -> Point:
+        guesses.append(rise)
+        return Point((1.0, 0.0), 1e5, 0.0, 1.0, None, 0.1, None, None, 1.0, 1, 0.0, (), Flash(friction_of(rise)))  # type: ignore[arg-type]
+
+    return warmed
+
+
+def test_trial_temperatures_stay_within_the_shift() -> None:
+    """T = 80 exp(-T/20): the first trial, 80 K, is beyond the table, the solution, 24.06 K, is not. Of T = 80 there is
+    none up to 40 K, which a sentence names with velocity and temperature."""
+    tried: list[float] = []
+    body = rise_in_round(lambda rise: 80.0 * np.exp(-rise / 20.0), tried)
+    point = Feedback().solve_fixed_point(body, 1.0, (1e5, 5.0), 1e-3, most=40.0)
+    exact = 20.0 * float(lambertw(4.0).real)
+    assert max(tried) == 40.0
+    assert point.flash is not None
+    assert point.flash.mean == pytest.approx(exact, abs=0.05)  # stops at a difference of .02 K and 1e-3
+    with pytest.raises(RunError, match=r"at 1 m/s under 1e\+05 Pa and 5 C.*is above 45 C.*warmed to 85 C"):
+        Feedback().solve_fixed_point(rise_in_round(lambda _: 80.0, tried), 1.0, (1e5, 5.0), 1e-3, most=40.0)
+    assert max(tried) == 40.0
+
+
+def test_tables_of_a_shift_end() -> None:
+    """The lower end of two tables; laws have none."""
+    vertical = Factors((0.0, 50.0), (0.0, 0.1), 20.0)
+    assert highest_temperature(Factors((0.0, 60.0), (1.0, -1.0), 20.0, vertical)) == 50.0
+    assert highest_temperature(WLF(8.86, 101.6, 20.0)) == np.inf

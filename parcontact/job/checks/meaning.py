@@ -183,28 +183,41 @@ def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
 
 
 def _room(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
-    """Yield warnings if the least contact of a single sphere is too large for its radius, or leaves the box."""
+    """Yield warnings if the least contact of a single sphere is too large for its radius, or the relaxed one leaves the
+    box."""
     grid, sphere = job.grid, job.surface[0]
     if len(job.surface) != 1 or not isinstance(sphere, Sphere) or min(grid.points) == 1:
         return
     x, y = sphere.center or (grid.lx / 2, grid.ly / 2)
-    modulus, found = instant_contact_modulus(material), set()
+    modulus, found, elapsed = instant_contact_modulus(material), set(), 0.0
     for index, stage in enumerate(job.history):
+        elapsed += stage.seconds
         x, y = x + stage.velocity[0] * stage.seconds, y + stage.velocity[1] * stage.seconds
         radius = _hertz(stage, sphere.radius, modulus, grid)
         if radius / sphere.radius > STEEPEST and "steep" not in found:
             found.add("steep")
             yield Doubt("large contact", f"history.{index}", {"contact": radius, "radius": sphere.radius})
         room = min(x, grid.lx - x, y, grid.ly - y)
+        radius = _hertz(stage, sphere.radius, _relaxed_contact_modulus(material, elapsed), grid)
         if radius > room and radius > 0.0 and "room" not in found:
             found.add("room")
             kind = "slides out of the box" if stage.speed and stage.seconds else "out of the box"
-            numbers = {"contact": radius, "lx": grid.lx, "ly": grid.ly, "x": x, "y": y}
+            numbers = {"contact": radius, "lx": grid.lx, "ly": grid.ly, "x": x, "y": y, "room": max(room, 0.0)}
             yield Doubt(kind, f"history.{index}", numbers)
 
 
+def _relaxed_contact_modulus(material: Elastic | Zener, seconds: float) -> float:
+    """Return E*(t) [Pa] after `seconds` of relaxation. Under a constant load 1/E*(t) bounds the creep compliance from
+    above, and with it the contact."""
+    modulus = material.long_modulus
+    for branch in material.branches:
+        ratio = seconds / (material.time_factor * branch.relaxation_time) if branch.relaxation_time else math.inf
+        modulus += material.modulus_factor * (branch.instant_modulus - branch.long_modulus) * math.exp(-ratio)
+    return 2.0 * max(modulus, LEAST * material.instant_modulus) / (1.0 - material.poisson)
+
+
 def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
-    """Return the contact radius [m] at the end of a stage by Hertz (1882), a lower bound for a creeping body."""
+    """Return the contact radius [m] at the end of a stage by Hertz (1882) for a contact modulus [Pa]."""
     if stage.control == "approach":
         return math.sqrt(max(stage.load.end, 0.0) * radius)
     force = _mean(stage, stage.load.end, grid) * grid.lx * grid.ly
