@@ -8,7 +8,7 @@ import re
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -101,6 +101,35 @@ def test_a_case_that_fails_does_not_stop_the_others(
     assert [row["state"] for row in table()] == ["-"] * 6
 
 
+@pytest.mark.parametrize(("refused", "code"), [(range(6), 2), (range(5), 1), ((), 0)])
+def test_a_sweep_is_bad_input_if_all_of_its_cases_are(
+    cases: tuple[Case, ...], refused: Sequence[int], code: int
+) -> None:
+    """2 if no case can be run, as for a job without a sweep; 1 if some of them can."""
+    begun = list[Job]()
+
+    def act(job: Job, slab: Slab) -> int:
+        begun.append(job)
+        if len(begun) - 1 in refused:
+            raise InputError("the third law does not hold")
+        return 0
+
+    assert go(cases, act) == code
+    assert len(begun) == 6
+
+
+def test_a_refused_theory_of_a_sweep_writes_nothing(
+    cases: tuple[Case, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A wave has no isotropic spectrum, in no case of the sweep."""
+    words = ["theory", "job.yaml", "--set", "surface={shape: wave, amplitude: 1.0e-6, waves: [2, 1]}"]
+    assert main([*words, "--set", "sweep=[{history.0.pressure: [1.0e5, 2.0e5]}]"]) == 2
+    said = capsys.readouterr()
+    assert said.err.count("the theory takes the power spectrum of one isotropic rough surface") == 2
+    assert "results of all cases" not in said.out
+    assert [path.name for path in tmp_path.iterdir()] == ["job.yaml"]
+
+
 @pytest.mark.parametrize("damage", [lambda text: text[: len(text) // 2], lambda text: text + "x\n", None])
 def test_a_finished_case_whose_table_lacks_rows_is_damaged(
     cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str], damage: Callable[[str], str] | None
@@ -111,7 +140,7 @@ def test_a_finished_case_whose_table_lacks_rows_is_damaged(
     csv = directory / "measures.csv"
     whole = csv.read_text()
     csv.unlink() if damage is None else csv.write_text(damage(whole))
-    assert main(["job.yaml", "--case", "0", "--quiet"]) == 1
+    assert main(["job.yaml", "--case", "0", "--quiet"]) == 2  # as for a job without a sweep
     assert f"lacks rows; correct it, or move {directory} away to run the job again" in capsys.readouterr().err
     assert [row["state"] for row in table()] == ["damaged", *"-----"]
     directory.rename("aside")
