@@ -1,7 +1,7 @@
 """Sections that effects add to a job.
 
-An effect, also of this package, is registered under the name of its section by an entry point that names its class
-(`effects.effect`):
+An effect of this package is found by its folder (`capabilities`). One of another package is registered under the name
+of its section by an entry point that names its class (`effects.effect`):
 
     [project.entry-points."parcontact.effects"]
     wear = "tread_wear:Wear"
@@ -15,8 +15,10 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from types import ModuleType
 from typing import Any
 
+from .. import capabilities
 from ..errors import InputError, RunError
 from .sections.part import Part
 from .text.fault import Fault, refuse
@@ -66,11 +68,16 @@ def unusable() -> list[str]:
 
 @cache
 def _registered() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=_is_ours)}
+    others = {entry.name: entry for entry in entry_points(group=GROUP)}
+    return others | {each.SECTION: _entry_of(each) for each in capabilities.folders()}
+
+
+def _entry_of(folder: ModuleType) -> EntryPoint:
+    return EntryPoint(folder.SECTION, f"{folder.__name__}.effect:{folder.EFFECT}", GROUP)
 
 
 def _is_ours(entry: EntryPoint) -> bool:
-    """Return True for an effect of this package; such effects are sorted last, so that no other one replaces them."""
+    """Return True for an effect of this package."""
     return entry.value.startswith(f"{__package__.partition('.')[0]}.")
 
 
