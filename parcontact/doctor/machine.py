@@ -12,8 +12,8 @@ import h5py
 import numpy as np
 
 from .. import private
+from ..effects.leakage.flow import leak
 from ..job import Job, load
-from ..leakage.flow import leak
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..plan.costs import measure_write_rate

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..columns import UNITS
+from ..effects.leakage import conductivity
 from ..errors import InputError
 from ..parallel.slab import Array
 from ..storage import read_back
-from . import conductivity, prefixes, style
+from . import prefixes, style
 from .charts import Axis, Chart, ChartLine
 from .plotted_run import PlottedRun
 

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from restarting import ELASTIC, ROUGH, ZENER, Bench, cut, rows, same
 
 from parcontact import Simulation
-from parcontact.leakage.flow import leak
+from parcontact.effects.leakage.flow import leak
 from parcontact.summary import info
 
 STICK = {"work": 0.05, "range": 1e-6}

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
-from ..compiled import loop
+from ...compiled import loop
 
 Mask = NDArray[np.bool_]
 

@@ -7,8 +7,8 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ..printed import quantity, span
-from ..storage import read_back
+from ...printed import quantity, span
+from ...storage import read_back
 
 Columns = Mapping[str, Sequence[float]]
 

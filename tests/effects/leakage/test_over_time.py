@@ -13,8 +13,8 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact import __main__
-from parcontact.derived import leakage_over_time as leak
-from parcontact.leakage.flow import flow_mesh_error, solve_flow
+from parcontact.effects.leakage import over_time as leak
+from parcontact.effects.leakage.flow import flow_mesh_error, solve_flow
 from parcontact.report import result_sections
 
 POINTS = 64

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from parcontact.effects.leakage.elimination import Balance
+from parcontact.effects.leakage.flow import Map, flow_mesh_error, leak, solve_flow
+from parcontact.effects.leakage.fluids import FLUIDS, Fluid, PressureDrop
+from parcontact.effects.leakage.paths import critical_constriction
 from parcontact.errors import InputError
-from parcontact.leakage.elimination import Balance
-from parcontact.leakage.flow import Map, flow_mesh_error, leak, solve_flow
-from parcontact.leakage.fluids import FLUIDS, Fluid, PressureDrop
-from parcontact.leakage.paths import critical_constriction
 
 
 def wave(points: int, depth: float) -> Map:

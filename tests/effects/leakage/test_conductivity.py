@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from parcontact.derived.leakage_over_time import LeakInstant
-from parcontact.plotting import charts, conductivity, leakage_charts
+from parcontact.effects.leakage import conductivity
+from parcontact.effects.leakage import pictures as leakage_charts
+from parcontact.effects.leakage.over_time import LeakInstant
+from parcontact.plotting import charts
 
 
 def drawn(chart: charts.Chart) -> dict[str, np.ndarray]:

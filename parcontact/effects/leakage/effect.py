@@ -1,4 +1,4 @@
-"""Leakage: the flow of a fluid through the gap of the contact during a run (`leakage.flow`)."""
+"""Leakage: the flow of a fluid through the gap of the contact during a run (`effects.leakage.flow`)."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from ..columns import added_by
-from ..job.sections.part import Part
-from ..job.sections.quantities import Count
-from ..leakage.flow import leak
-from ..parallel.root import on_root
-from .effect import Changes, Decision, Effect, Instant
+from ...columns import added_by
+from ...job.sections.part import Part
+from ...job.sections.quantities import Count
+from ...parallel.root import on_root
+from ..effect import Changes, Decision, Effect, Instant
+from .flow import leak
 
 NOTHING = (math.nan, math.nan, math.nan)
 

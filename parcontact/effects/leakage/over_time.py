@@ -9,21 +9,22 @@ from typing import NamedTuple
 import h5py
 import numpy as np
 
-from .. import scene
-from ..columns import LEAK, choose_columns, names_of, to_csv, values_of
-from ..effects.contact_law import touching_of
-from ..errors import InputError
-from ..job import reading
-from ..job.resolved import RESOLVED, shown_job
-from ..leakage.flow import Flow, Leak, Map, flow_mesh_error, leak, solve_flow
-from ..leakage.fluids import PressureDrop
-from ..parallel.mpi import MPI
-from ..parallel.slab import Slab
-from ..plotting import conductivity, leakage_charts
-from ..plotting.plotted_run import Fields, PlottedRun
-from ..printed import per_cent, quantity, stated_error
-from ..storage import files, hdf5, read_back
-from ..summary import leak_stop
+from ... import scene
+from ...columns import LEAK, choose_columns, names_of, to_csv, values_of
+from ...errors import InputError
+from ...job import reading
+from ...job.resolved import RESOLVED, shown_job
+from ...parallel.mpi import MPI
+from ...parallel.slab import Slab
+from ...plotting.plotted_run import Fields, PlottedRun
+from ...printed import per_cent, quantity, stated_error
+from ...storage import files, hdf5, read_back
+from ..contact_law import touching_of
+from . import conductivity
+from . import pictures as leakage_charts
+from . import results as leak_stop
+from .flow import Flow, Leak, Map, flow_mesh_error, leak, solve_flow
+from .fluids import PressureDrop
 
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
 MOST_CELLS = 4e6  # tuning: largest map of which every rank solves one; 2048 x 2048 takes 1.4 GB
@@ -35,7 +36,7 @@ class LeakInstant(NamedTuple):
     `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` their ratios to K of the surface that
     just touches, NaN if unknown; `constriction` [m] is the smallest gap on the widest path of the direction that leaks
     more; `error_x` and `error_y` are the relative changes of K on half the mesh (`flow.flow_mesh_error`); `flow_rate`
-    [m^3/s] and `mass_flow` [kg/s] are those of a fluid in this direction (`leakage.fluids`), NaN without a fluid.
+    [m^3/s] and `mass_flow` [kg/s] are those of a fluid in this direction (`fluids`), NaN without a fluid.
     """
 
     time: float

@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 
-from ..columns import UNITS
-from ..leakage.flow import Flow, Map
-from . import charts, conductivity, prefixes, style
-from .style import Panel
+from ...columns import UNITS
+from ...plotting import charts, prefixes, style
+from ...plotting.style import Panel
+from . import conductivity
+from .flow import Flow, Map
 
 DECADES = 3  # decades of the flow on the colour scale
 SAME = 1e-6  # rounding: relative difference below which pressures are the same

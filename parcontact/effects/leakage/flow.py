@@ -18,8 +18,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import datafiles
-from ..errors import InputError
+from ... import datafiles
+from ...errors import InputError
 from .elimination import Balance
 from .paths import connected_from_end_to_end, critical_constriction
 

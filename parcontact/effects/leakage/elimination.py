@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from ..compiled import loop
+from ...compiled import loop
 
 Map = NDArray[np.floating]
 DRY, WHITE = -1, -2  # numbers of cells that are not black

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..parallel.slab import Array
-from . import style
-from .charts import Axis, Chart, ChartLine
+from ...parallel.slab import Array
+from ...plotting import style
+from ...plotting.charts import Axis, Chart, ChartLine
 
 CONTINUUM = 1e-8  # physics: gap of about thirty molecules of water, the least for continuum flow [m]
 THIN = "constriction\nunder 10 nm"
