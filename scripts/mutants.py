@@ -35,7 +35,7 @@ OTHERS = {  # further tests of a part
     "solve/adhesive/gap_kernels.py": "solve/adhesive/test_gap_solver.py",
     **dict.fromkeys(("solve/constraint.py", "solve/kernels.py"), "solve/test_contact.py"),
     "physics/loops.py": "physics/test_material.py physics/test_probe.py physics/test_surface.py physics/test_energy.py "
-    "physics/test_heat.py accuracy/test_embedded.py",
+    "effects/heat/test_heat.py accuracy/test_embedded.py",
 }
 PAIRS = ((ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.Lt, ast.GtE), (ast.Gt, ast.LtE), (ast.Eq, ast.NotEq))
 SWAPS: dict[type[ast.AST], type[ast.AST]] = {a: b for pair in PAIRS for a, b in (pair, pair[::-1])}

@@ -46,6 +46,9 @@ KNOW_MPI = {"python", "parallel", "storage", "summary", "derived", "command"}
 OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of another room
     **dict.fromkeys((f"effects.leakage.{name}" for name in ("elimination", "flow", "fluids", "paths")), "physics"),
     **dict.fromkeys((f"effects.leakage.{name}" for name in ("conductivity", "pictures")), "plotting"),
+    **dict.fromkeys((f"effects.heat.{name}" for name in ("flash", "heat", "heat_memory", "heat_unbounded")), "physics"),
+    "effects.heat.heating": "steady_sliding",
+    "effects.heat.band_heat": "bands",
     "effects.leakage.results": "summary",
     "effects.leakage.over_time": "derived",
 }

@@ -11,6 +11,7 @@ import numpy as np
 from ..accuracy.budget import ErrorBudget, ErrorParts
 from ..columns import BANDS, names_of
 from ..doubts import Doubt
+from ..effects.heat.band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
 from ..effects.relaxation import feeds_back, temperature_of
 from ..errors import InputError, RunError
 from ..job import Job
@@ -21,7 +22,6 @@ from ..solve.certificate import Certificate
 from ..steady_sliding.curve import States, on_one_grid
 from ..steady_sliding.point import Point
 from .band import Rung, Vector
-from .band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
 from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, cut_bands, describe_cut, doubts_of_bands
 from .steep_waves import STRAIN

@@ -1,4 +1,4 @@
-"""Heat of sliding: temperatures of the rubber below the contact (`physics.heat`, `physics.heat_memory`)."""
+"""Heat of sliding: temperatures of the rubber below the contact (`effects.heat.heat`, `effects.heat.heat_memory`)."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ import numpy as np
 from numpy.typing import DTypeLike
 from pydantic import Field
 
-from ..accuracy.constants import FLASH
-from ..columns import added_by
-from ..errors import InputError, RunError
-from ..history.timeline import Timeline
-from ..job import Grid
-from ..job.added_sections import effects_of
-from ..job.checks import limits
-from ..job.sections.part import Part, Rule
-from ..job.sections.quantities import Positive
-from ..job.text.fault import Fault
-from ..parallel import spectra
-from ..parallel.fft import Spectrum
-from ..parallel.slab import Array
-from ..physics.entries import Entry, Saved
-from ..physics.exponentials import Exponentials, fit_exponentials
-from ..physics.heat import Conductor, Depths, depths_of
-from ..physics.heat_memory import Heating, HeatMemory
-from ..physics.prony import Prony
-from ..physics.units import Units
-from .effect import Changes, Decision, Effect, Instant
-from .relaxation import factor_at, feeds_back, temperature_of
+from ...accuracy.constants import FLASH
+from ...columns import added_by
+from ...errors import InputError, RunError
+from ...history.timeline import Timeline
+from ...job import Grid
+from ...job.added_sections import effects_of
+from ...job.checks import limits
+from ...job.sections.part import Part, Rule
+from ...job.sections.quantities import Positive
+from ...job.text.fault import Fault
+from ...parallel import spectra
+from ...parallel.fft import Spectrum
+from ...parallel.slab import Array
+from ...physics.entries import Entry, Saved
+from ...physics.exponentials import Exponentials, fit_exponentials
+from ...physics.prony import Prony
+from ...physics.units import Units
+from ..effect import Changes, Decision, Effect, Instant
+from ..relaxation import factor_at, feeds_back, temperature_of
+from .heat import Conductor, Depths, depths_of
+from .heat_memory import Heating, HeatMemory
 
 LOOSEST, SHARE = 1e-3, 0.1  # accuracy: error of the memory of heat: at most, and as a share of the job's accuracy
 DECAYED = 10.0  # accuracy: duration of the memory of heat over the diffusion time of the longest wave

@@ -11,12 +11,12 @@ from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.columns import STEADY
-from parcontact.effects.thermal import exponentials_of
+from parcontact.effects.heat.effect import exponentials_of
+from parcontact.effects.heat.heat import Conductor, Depths
+from parcontact.effects.heat.heat_memory import Heating, MeanMemory
 from parcontact.errors import InputError
 from parcontact.job import Job, load
 from parcontact.parallel.slab import Slab
-from parcontact.physics.heat import Conductor, Depths
-from parcontact.physics.heat_memory import Heating, MeanMemory
 from parcontact.python.simulation import Simulation
 from parcontact.steady_sliding.point import Point
 from parcontact.steady_sliding.sliding import SteadySliding
@@ -274,7 +274,11 @@ def test_without_it_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError("called without a thermal section")
 
     warm = marched(march_data())[0]
-    places = "effects.thermal.HeatMemory", "effects.thermal.depths_of", "steady_sliding.sliding.find_temperatures"
+    places = (
+        "effects.heat.effect.HeatMemory",
+        "effects.heat.effect.depths_of",
+        "steady_sliding.sliding.find_temperatures",
+    )
     for place in places:
         monkeypatch.setattr(f"parcontact.{place}", refuse)
     plain = marched(march_data(thermal=None))[0]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..parallel.slab import Array, Slab
+from ...parallel.slab import Array, Slab
 
 BINS = 512  # accuracy: bins of the histogram for quartiles, whose error is 1/512 of the range
 

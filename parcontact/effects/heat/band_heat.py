@@ -2,7 +2,7 @@
 
 Heat of a band lies where its waves strain the rubber, and is distributed over the contact in proportion to the
 pressure. With waves cos(m z) along the depth, in which the heat of band i and the temperature of band k have the
-shares g_i(m) and g_k(m) of `physics.heat`, 1 on the surface, the rise of band k is
+shares g_i(m) and g_k(m) of `effects.heat.heat`, 1 on the surface, the rise of band k is
 
     T_k = sum_i h_i 2/pi int g_i g_k (S(m) + sum_(j <= i, k) S_j(m)) dm,
 
@@ -19,12 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effects.thermal import Thermal
-from ..parallel.slab import Array
-from ..physics.convolution import travelling_wavenumbers, wavenumbers
-from ..physics.flash import Flash
-from ..physics.heat import Conductor, depths_of
-from ..scene import Setup
+from ...parallel.slab import Array
+from ...physics.convolution import travelling_wavenumbers, wavenumbers
+from ...scene import Setup
+from .effect import Thermal
+from .flash import Flash
+from .heat import Conductor, depths_of
 
 Vector = tuple[float, float]
 SPACING, LOWEST, HIGHEST = 0.3, 1e-4, 30.0  # accuracy: spacing of ln m; limits of m over wavenumbers of bands

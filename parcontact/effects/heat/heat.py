@@ -28,11 +28,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..parallel.fft import FFT, Spectrum
-from ..parallel.slab import Array, deal
-from .convolution import ALL, PARTS, Convolution, travelling_wavenumbers, wavenumbers
-from .halfspace import HalfSpace
-from .prony import Prony, complex_modulus
+from ...parallel.fft import FFT, Spectrum
+from ...parallel.slab import Array, deal
+from ...physics.convolution import ALL, PARTS, Convolution, travelling_wavenumbers, wavenumbers
+from ...physics.halfspace import HalfSpace
+from ...physics.prony import Prony, complex_modulus
 
 Vector = tuple[float, float]
 SPACING, LOWEST, HIGHEST = 0.3, 1e-5, 30.0  # accuracy: waves m along the depth: spacing of ln m; limits over q

@@ -1,4 +1,4 @@
-"""Heat that slides over a free half space: influence coefficients for `physics.heat`.
+"""Heat that slides over a free half space: influence coefficients for `effects.heat.heat`.
 
 A uniform heat on one cell of `dx x dy`, while the body passes below it with the velocity -v, warms the distance (x,
 y) from the cell by the heat of all earlier times t,
@@ -17,9 +17,9 @@ which tends to 1 - 3/s^2. For the temperature at the depths where heat is releas
 
 import numpy as np
 
-from ..parallel.fft import FFT
-from ..parallel.slab import Array
-from .convolution import Convolution, padded_lengths, tabulate
+from ...parallel.fft import FFT
+from ...parallel.slab import Array
+from ...physics.convolution import Convolution, padded_lengths, tabulate
 from .heat import Conductor, Depths, Vector
 
 GAUSS = np.polynomial.legendre.leggauss(4)

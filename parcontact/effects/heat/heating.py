@@ -1,6 +1,6 @@
 """Temperatures of steady sliding: the map below the contact, and the one temperature of the rubber that follows.
 
-The map is exact for its heat (`physics.heat`, `physics.flash`). With feedback all rubber relaxes as at the flash
+The map is exact for its heat (`heat`, `flash`). With feedback all rubber relaxes as at the flash
 temperature, `T = T_0 + F(T)`: a fixed point, found by secants within a bracket. Each round is a steady state.
 """
 
@@ -11,19 +11,19 @@ from functools import partial
 
 import numpy as np
 
-from ..doubts import Doubt
-from ..effects.relaxation import feeds_back, temperature_of
-from ..effects.thermal import Thermal
-from ..errors import RunError
-from ..job import Job, Zener
-from ..parallel.slab import Array
-from ..physics.flash import Flash, flash_of, share_of, spread_over
-from ..physics.heat import depths_of, sliding_heat
-from ..physics.heat_unbounded import sliding_heat_unbounded
-from ..physics.measures import Measures
-from ..scene import Setup
-from ..solve.constraint import Mask
-from .point import Point
+from ...doubts import Doubt
+from ...errors import RunError
+from ...job import Job, Zener
+from ...parallel.slab import Array
+from ...physics.measures import Measures
+from ...scene import Setup
+from ...solve.constraint import Mask
+from ...steady_sliding.point import Point
+from ..relaxation import feeds_back, temperature_of
+from .effect import Thermal
+from .flash import Flash, flash_of, share_of, spread_over
+from .heat import depths_of, sliding_heat
+from .heat_unbounded import sliding_heat_unbounded
 
 MOST_ROUNDS = 10  # tuning: limit on the rounds of the fixed point
 LEAST_ERROR = 0.02  # accuracy: least error of the flash temperature [K]

@@ -1,4 +1,4 @@
-"""Temperature of the surface of a conducting half space under heat that changes with time: `physics.heat` in time
+"""Temperature of the surface of a conducting half space under heat that changes with time: `effects.heat.heat` in time
 steps.
 
 Each wave (j, k) of the sum of exponentials (`physics.exponentials`), along the depth and along the surface, satisfies
@@ -6,7 +6,7 @@ Each wave (j, k) of the sum of exponentials (`physics.exponentials`), along the 
     dc/dt = -(m_j^2 + D k^2) c + q^(k, t) g_j,     T^(k) = sum_j w_j c_j/e,                                       (1)
 
 with the effusivity e. q is linear in time within a step, over which (1) is solved exactly. For heat on the surface g =
-1; for heat of the body it is the share (3) of `physics.heat` of the wave m_j/sqrt(D) along the depth. The temperature
+1; for heat of the body it is the share (3) of `heat` of the wave m_j/sqrt(D) along the depth. The temperature
 at the depths where this heat is released is `sum_j w_j g_j c_j/e`.
 
 The mean of the box (k = 0) has its own sum, of numbers, exact to 1e-9 at any time, so that no heat is lost.
@@ -16,11 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..parallel.fft import FFT, Spectrum
-from ..parallel.slab import Array, allocate
-from . import loops
-from .convolution import wavenumbers
-from .exponentials import Exponentials, fit_exponentials, shares_of_step
+from ...parallel.fft import FFT, Spectrum
+from ...parallel.slab import Array, allocate
+from ...physics import loops
+from ...physics.convolution import wavenumbers
+from ...physics.exponentials import Exponentials, fit_exponentials, shares_of_step
 from .heat import Conductor, Depths, Vector
 
 MEAN_TIMES, MEAN_ERROR = (

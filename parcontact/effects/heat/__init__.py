@@ -1,0 +1,3 @@
+"""Heat of sliding: temperatures of the rubber below the contact."""
+
+SECTION, EFFECT = "thermal", "ThermalColumns"
