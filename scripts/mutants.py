@@ -31,8 +31,8 @@ OTHERS = {  # further tests of a part
     "march/step.py": f"march/test_adhesive_steps.py scenarios/test_viscoelastic.py {SLIDING}",
     "march/step_errors.py": SLIDING,
     "physics/body.py": "scenarios/test_viscoelastic.py",
-    "effects/adhesion_doubts.py": "effects/test_adhesion.py",
-    "solve/adhesive/gap_kernels.py": "solve/adhesive/test_gap_solver.py",
+    "effects/adhesion/adhesion_doubts.py": "effects/adhesion/test_effect.py",
+    "effects/adhesion/gap_kernels.py": "effects/adhesion/test_gap_solver.py",
     **dict.fromkeys(("solve/constraint.py", "solve/kernels.py"), "solve/test_contact.py"),
     "physics/loops.py": "physics/test_material.py physics/test_probe.py physics/test_surface.py physics/test_energy.py "
     "effects/heat/test_heat.py accuracy/test_embedded.py",

@@ -49,6 +49,12 @@ OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of anothe
     **dict.fromkeys((f"effects.heat.{name}" for name in ("flash", "heat", "heat_memory", "heat_unbounded")), "physics"),
     "effects.heat.heating": "steady_sliding",
     "effects.heat.band_heat": "bands",
+    "effects.adhesion.attraction": "physics",
+    **dict.fromkeys(
+        (f"effects.adhesion.{name}" for name in ("adhesive_solver", "free_inverse", "gap_iterate")), "solve"
+    ),
+    **dict.fromkeys((f"effects.adhesion.{name}" for name in ("gap_kernels", "gap_solver", "law")), "solve"),
+    "effects.adhesion.pull_off": "summary",
     "effects.leakage.results": "summary",
     "effects.leakage.over_time": "derived",
 }

@@ -8,13 +8,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects.adhesion import pull_off
 from ..errors import InputError
 from ..history.timeline import Timeline
 from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from ..storage import marker, read_back
-from ..summary import pull_off
 from . import prefixes
 from .charts import FRACTION, Axis
 

@@ -14,6 +14,7 @@ from PIL import Image
 
 from .. import progress
 from ..columns import STEADY, SWEEP, UNITS
+from ..effects.adhesion import pull_off
 from ..effects.leakage import results as leak_stop
 from ..job import Job
 from ..plotting import curve_charts, histories, maps, prefixes, style, sweep_charts
@@ -27,7 +28,7 @@ from ..plotting.plotted_run import (
     to_load,
 )
 from ..storage import hdf5, marker, read_back
-from ..summary import pull_off, slide, sweep_table, theory_comparison, theory_settings
+from ..summary import slide, sweep_table, theory_comparison, theory_settings
 from .page_parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement"}

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from .. import scene
 from ..doubts import Doubt
-from ..effects.adhesion import AdhesionMemory
+from ..effects.adhesion import pull_off
+from ..effects.adhesion.effect import AdhesionMemory
 from ..errors import InputError, RunError
 from ..history.chosen import reached
 from ..job import Job
@@ -23,7 +24,7 @@ from ..storage.console import always
 from ..storage.directory import Directory
 from ..storage.recorder import Recorder
 from ..storage.stopfile import StopFile
-from ..summary import pull_off, slide
+from ..summary import slide
 from .watch import Watch
 
 DONE, STOPPED_EARLY = 0, 3  # exit codes: success; stopped early with a good checkpoint, run again

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..effects.adhesive_law import end_of
+from ..effects.adhesion.adhesive_law import end_of
 from ..effects.effect import columns_of
 from ..errors import InputError
 from ..history.chosen import ChosenSteps, reached

@@ -59,7 +59,7 @@ def _doubt_ranges(cases: Sequence[Case]) -> Iterator[Doubt]:
     """Yield a warning about cases that have different ranges of adhesion although none is given."""
     if not any(case.job.section("adhesion") for case in cases):
         return
-    from ..effects.adhesion import chosen_range  # not needed for jobs without adhesion
+    from ..effects.adhesion.effect import chosen_range  # not needed for jobs without adhesion
 
     reaches = {reach for case in cases if (reach := chosen_range(case.job)) is not None}
     if len(reaches) > 1:

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..effects.adhesion import adhesion_law
+from ..effects.adhesion.attraction import AdhesionLaw
+from ..effects.adhesion.effect import adhesion_law
 from ..effects.effect import Decision, Effect, guarded
 from ..effects.folded_branches import FoldedBranches, bounded_error, fold_branches, time_scales
 from ..effects.relaxation import feeds_back, relaxation_of, time_factor_of
@@ -18,7 +19,6 @@ from ..history.chosen import describe_steps
 from ..history.timeline import Timeline
 from ..job import Grid, Job, Numerics, Output, Spectral, added_sections
 from ..job.sections import listing
-from ..physics.attraction import AdhesionLaw
 from ..physics.interface_friction import Shear
 from ..physics.prony import Prony
 from ..solve.precision import LOOSE, VERY_LOOSE

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..doubts import Doubt
-from ..effects.adhesion_doubts import doubt_range
+from ..effects.adhesion.adhesion_doubts import doubt_range
 from ..errors import InputError, JobError, RunError
 from ..history.timeline import Timeline
 from ..job import Job, OnOneMesh

@@ -10,7 +10,7 @@ sliding stages.
 import itertools
 from dataclasses import astuple, dataclass
 
-from ..effects.adhesion import chosen_range
+from ..effects.adhesion.effect import chosen_range
 from ..errors import InputError
 from ..job import AUTO, GeometricStep, Job, OnOneMesh, Stage
 from ..job.checks.cells import one_cell

@@ -6,12 +6,13 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+from ..effects.adhesion import pull_off
 from ..effects.leakage import results as leak_stop
 from ..job import Job
 from ..job.resolved import RESOLVED, shown_job
 from ..printed import quantity, with_error
 from ..storage import marker, read_back
-from . import pull_off, slide, sweep_table
+from . import slide, sweep_table
 
 SWEPT = (  # results of a sweep in order of preference: column, words, unit, column of the error
     ("pull_off", "the pull-off force", "N", "pull_off_error"),

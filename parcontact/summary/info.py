@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..effects.adhesion import pull_off
 from ..effects.leakage import results as leak_stop
 from ..errors import InputError
 from ..job import Job
@@ -22,7 +23,7 @@ from ..storage import checkpoint, curve_points, fields, hdf5, marker, read_back
 from ..storage.console import meshes_of, warnings_of
 from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
-from . import pull_off, slide, sweep_table, theory_comparison, theory_settings
+from . import slide, sweep_table, theory_comparison, theory_settings
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
 SHOWN = 20  # tuning: most numbers of one name, or failed cases, that are shown

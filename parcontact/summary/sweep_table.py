@@ -14,12 +14,13 @@ from statistics import fmean, stdev
 from typing import Any
 
 from ..columns import SWEEP, SWEEP_RESULTS, added_names, choose_columns, names_of, to_csv
+from ..effects.adhesion import pull_off
 from ..errors import InputError
 from ..history.timeline import Timeline
 from ..job import Case, Steady
 from ..job.reading import CASES
 from ..storage import curve_points, files, marker, read_back, tables
-from . import pull_off, slide
+from . import slide
 
 TABLE = "sweep.csv"
 CURVES = "sweep_curves.csv"

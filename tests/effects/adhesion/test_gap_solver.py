@@ -8,14 +8,14 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
+from parcontact.effects.adhesion.adhesive_solver import AdhesiveSolver
+from parcontact.effects.adhesion import gap_kernels, law
+from parcontact.effects.adhesion.gap_iterate import GapOperators, GapSolution
+from parcontact.effects.adhesion.gap_solver import GapSolver
+from parcontact.effects.adhesion.law import Law
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.adhesive import gap_kernels, law
-from parcontact.solve.adhesive.adhesive_solver import AdhesiveSolver
-from parcontact.solve.adhesive.gap_iterate import GapOperators, GapSolution
-from parcontact.solve.adhesive.gap_solver import GapSolver
-from parcontact.solve.adhesive.law import Law
 from parcontact.solve.certificate import Certificate
 from parcontact.solve.problem import Approach, Control, MeanPressure, Operator
 from parcontact.solve.workspace import Workspace

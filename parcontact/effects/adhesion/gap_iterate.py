@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ...parallel.slab import Array, Slab
-from ..certificate import Certificate
-from ..iterate import LEAST_SHARE
-from ..problem import Control, Operator
+from ...solve.certificate import Certificate
+from ...solve.iterate import LEAST_SHARE
+from ...solve.problem import Control, Operator
 from . import gap_kernels
 from .law import Law
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...parallel.slab import Array, Slab
-from ..problem import Operator
+from ...solve.problem import Operator
 from .gap_iterate import GapOperators
 
 MAX_STEPS = 100  # accuracy: limit on the steps; a dozen are usual

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...compiled import loop
 from ...parallel.slab import Array
-from ..constraint import Mask
+from ...solve.constraint import Mask
 
 EXPONENTIAL, DUGDALE = 0, 1
 LOG_TWO = math.log(2.0)

@@ -11,11 +11,11 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from ..doubts import Doubt
-from ..job.checks import meaning
-from ..job.sections.calculation import Grid
-from ..job.sections.geometry import Sphere
-from ..physics.attraction import AdhesionLaw
+from ...doubts import Doubt
+from ...job.checks import meaning
+from ...job.sections.calculation import Grid
+from ...job.sections.geometry import Sphere
+from .attraction import AdhesionLaw
 
 MOST_WORK = 1.0  # physics: largest work of dry solids [J/m^2]; rubber has 0.03 to 0.1
 MOST_STRAIN = 0.5  # physics: largest strain of the linear theory

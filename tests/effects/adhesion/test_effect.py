@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from parcontact.accuracy.constants import ENERGY
-from parcontact.effects.adhesion import adhesion_law
-from parcontact.effects.adhesive_energies import (
+from parcontact.effects.adhesion.adhesive_energies import (
     FORCE_DOUBT,
     JUMPS,
     PUSHED,
@@ -19,6 +18,7 @@ from parcontact.effects.adhesive_energies import (
     AdhesiveEnergies,
     advance_energies,
 )
+from parcontact.effects.adhesion.effect import adhesion_law
 from parcontact.effects.contact_protocol import SolvedContact
 from parcontact.errors import InputError
 from parcontact.job import Job

@@ -38,9 +38,9 @@ import math
 import numpy as np
 
 from ...parallel.slab import Array, Slab
-from .. import kernels
-from ..certificate import Certificate
-from ..problem import Approach, Control, MeanPressure
+from ...solve import kernels
+from ...solve.certificate import Certificate
+from ...solve.problem import Approach, Control, MeanPressure
 from . import gap_kernels
 from .gap_iterate import GapIterate, GapOperators, GapSolution, certify_gap
 from .law import Law

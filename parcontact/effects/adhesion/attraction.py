@@ -22,7 +22,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from ..job.sections.calculation import Grid
+from ...job.sections.calculation import Grid
 
 KINDS = ("exponential", "dugdale")
 

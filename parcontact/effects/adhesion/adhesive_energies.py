@@ -15,12 +15,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..accuracy.constants import ENERGY
-from ..physics.measures import Measures
-from .effect import Instant
+from ...accuracy.constants import ENERGY
+from ...physics.measures import Measures
+from ..effect import Instant
 
 if TYPE_CHECKING:
-    from ..solve.contact import Contact
+    from ...solve.contact import Contact
 
 LEAST_SNAP = 1e-4  # accuracy: least loss in a snap over the energies of the step
 FORCE_DOUBT = 0.3  # accuracy: relative error of the tangential force

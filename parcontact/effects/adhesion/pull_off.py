@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accuracy.constants import PULL_OFF
-from ..printed import quantity
+from ...accuracy.constants import PULL_OFF
+from ...printed import quantity
 
 SAME_LOAD = 1e-9  # rounding: relative difference below which loads are the same
 SOLVER = 0.25  # accuracy: relative error of the load over the tolerance of the solves

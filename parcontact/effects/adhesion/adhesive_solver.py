@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...parallel.slab import Array
-from ..contact import Contact
-from ..problem import Approach, Control, MeanPressure, Operator
-from ..workspace import Workspace
+from ...solve.contact import Contact
+from ...solve.problem import Approach, Control, MeanPressure, Operator
+from ...solve.workspace import Workspace
 from . import gap_kernels
 from .free_inverse import FreeInverse
 from .gap_iterate import SHARPER, GapSolution

@@ -11,26 +11,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..history.timeline import Step
-from ..parallel import rows
-from ..parallel.slab import Array
-from ..physics import loops
-from ..physics.attraction import cell_of, modulus_of
-from ..physics.body import Trial
-from ..physics.entries import Entry, Saved
-from ..physics.measures import SIDE, Measures
-from ..physics.motion import cells_between
-from ..physics.units import Units
-from ..solve.adhesive import gap_kernels
-from ..solve.adhesive.adhesive_solver import AdhesiveSolver
-from ..solve.adhesive.gap_iterate import GapOperators
-from ..solve.adhesive.gap_solver import GapSolver
-from ..solve.adhesive.law import DUGDALE, EXPONENTIAL, Law
-from ..solve.certificate import Certificate
-from ..solve.contact import Contact
-from ..solve.problem import Approach, Control, MeanPressure
+from ...history.timeline import Step
+from ...parallel import rows
+from ...parallel.slab import Array
+from ...physics import loops
+from ...physics.body import Trial
+from ...physics.entries import Entry, Saved
+from ...physics.measures import SIDE, Measures
+from ...physics.motion import cells_between
+from ...physics.units import Units
+from ...solve.certificate import Certificate
+from ...solve.contact import Contact
+from ...solve.problem import Approach, Control, MeanPressure
+from ..contact_protocol import Detached, EdgeMotion, End, PreviousContacts, SolvedContact
+from . import gap_kernels
 from .adhesive_energies import JUMPS, PUSHED, SURFACES, PathWork
-from .contact_protocol import Detached, EdgeMotion, End, PreviousContacts, SolvedContact
+from .adhesive_solver import AdhesiveSolver
+from .attraction import cell_of, modulus_of
+from .gap_iterate import GapOperators
+from .gap_solver import GapSolver
+from .law import DUGDALE, EXPONENTIAL, Law
 
 JUMP_STRIDE = 1.0 / 8.0  # accuracy: longest part of a jump that is solved at once
 LEAST_STRIDE = 1.0 / 16.0  # accuracy: shortest part of these, and of a step
@@ -94,7 +94,7 @@ class _Walk(NamedTuple):
 
 
 class AdhesiveLaw:
-    """The law `solve.adhesive.law` of the adhesion section, for the steps of a scene."""
+    """The law `effects.adhesion.law` of the adhesion section, for the steps of a scene."""
 
     may_shorten = True
 

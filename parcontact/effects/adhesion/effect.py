@@ -1,5 +1,4 @@
-"""Adhesion: surfaces that attract each other (`physics.attraction`, `solve.adhesive`), its section, columns and
-warnings."""
+"""Adhesion: surfaces that attract each other (`attraction`, `gap_solver`), its section, columns and warnings."""
 
 from __future__ import annotations
 
@@ -10,25 +9,25 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
 
-from ..columns import added_by
-from ..doubts import Doubt
-from ..job.checks import limits
-from ..job.sections.calculation import Grid
-from ..job.sections.geometry import Sphere, Wave
-from ..job.sections.part import Part, Rule
-from ..job.sections.quantities import Positive
-from ..job.text.fault import Fault
-from ..parallel.slab import Array
-from ..physics.attraction import AdhesionLaw, cell_of, modulus_of, ramp_of, smallest_range
-from ..physics.entries import Entry, Saved
-from ..physics.units import Units
-from ..solve.adhesive.law import Law
-from ..solve.constraint import Mask
+from ...columns import added_by
+from ...doubts import Doubt
+from ...job.checks import limits
+from ...job.sections.calculation import Grid
+from ...job.sections.geometry import Sphere, Wave
+from ...job.sections.part import Part, Rule
+from ...job.sections.quantities import Positive
+from ...job.text.fault import Fault
+from ...parallel.slab import Array
+from ...physics.entries import Entry, Saved
+from ...physics.units import Units
+from ...solve.constraint import Mask
+from ..contact_protocol import ContactLaw
+from ..effect import Changes, Decision, Effect, Instant
 from . import adhesive_energies
 from .adhesion_doubts import doubts_of_adhesion
 from .adhesive_energies import NO_ENERGIES, AdhesiveEnergies
-from .contact_protocol import ContactLaw
-from .effect import Changes, Decision, Effect, Instant
+from .attraction import AdhesionLaw, cell_of, modulus_of, ramp_of, smallest_range
+from .law import Law
 
 MOST_CELLS = 2.0  # physics: largest cell over the process zone of a viscoelastic body
 SAME = 1e-9  # rounding: relative tolerance on a range
