@@ -1,7 +1,7 @@
 """Capabilities: what a folder of `effects/` adds to the program. A folder that is deleted takes its capability with it.
 
-A folder has `SECTION`, the section of a job that asks for it, and `EFFECT`, its class in `effect.py`. Other rooms find
-what its further modules offer by `offers`, and so name no capability.
+A folder may have `SECTION`, the section of a job that asks for it, and `EFFECT`, its class in `effect.py`. Other rooms
+find what its further modules offer by `offers`, and so name no capability.
 """
 
 from functools import cache

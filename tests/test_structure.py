@@ -49,6 +49,8 @@ OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of anothe
     **dict.fromkeys((f"effects.heat.{name}" for name in ("flash", "heat", "heat_memory", "heat_unbounded")), "physics"),
     "effects.heat.heating": "steady_sliding",
     "effects.heat.band_heat": "bands",
+    **dict.fromkeys((f"effects.stick.{name}" for name in ("discs", "solver")), "solve"),
+    "effects.stick.shear_operator": "physics",
     "effects.adhesion.attraction": "physics",
     **dict.fromkeys(
         (f"effects.adhesion.{name}" for name in ("adhesive_solver", "free_inverse", "gap_iterate")), "solve"

@@ -68,8 +68,8 @@ def unusable() -> list[str]:
 
 @cache
 def _registered() -> dict[str, EntryPoint]:
-    others = {entry.name: entry for entry in entry_points(group=GROUP)}
-    return others | {each.SECTION: _entry_of(each) for each in capabilities.folders()}
+    others = {entry.name: entry for entry in entry_points(group=GROUP) if not _is_ours(entry)}
+    return others | {each.SECTION: _entry_of(each) for each in capabilities.folders() if hasattr(each, "SECTION")}
 
 
 def _entry_of(folder: ModuleType) -> EntryPoint:

@@ -8,8 +8,8 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-from parcontact.effects.adhesion.adhesive_solver import AdhesiveSolver
 from parcontact.effects.adhesion import gap_kernels, law
+from parcontact.effects.adhesion.adhesive_solver import AdhesiveSolver
 from parcontact.effects.adhesion.gap_iterate import GapOperators, GapSolution
 from parcontact.effects.adhesion.gap_solver import GapSolver
 from parcontact.effects.adhesion.law import Law

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from parcontact.effects.stick.shear_operator import ShearOperator, components, stacked
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics.shear_operator import ShearOperator, components, stacked
 
 NX, NY, SIZE, POISSON = 16, 12, (1.0, 1.5), 0.5
 

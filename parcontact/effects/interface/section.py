@@ -7,15 +7,15 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from ..job.checks import limits
-from ..job.sections.geometry import Rough, RoughSpectrum, Topography
-from ..job.sections.part import Part, Rule
-from ..job.sections.quantities import Flag, Positive
-from ..job.text.fault import Fault
-from ..physics.entries import Memory
-from ..physics.interface_friction import InterfaceFriction
-from .effect import Decision, Effect
-from .relaxation import time_factor_of
+from ...job.checks import limits
+from ...job.sections.geometry import Rough, RoughSpectrum, Topography
+from ...job.sections.part import Part, Rule
+from ...job.sections.quantities import Flag, Positive
+from ...job.text.fault import Fault
+from ...physics.entries import Memory
+from ...physics.interface_friction import InterfaceFriction
+from ..effect import Decision, Effect
+from ..relaxation import time_factor_of
 
 SAME = 1e-9  # rounding: tolerance on Poisson's ratio
 LEAST_POISSON = 0.49  # physics: least Poisson's ratio for which shear hardly moves the surface along its normal

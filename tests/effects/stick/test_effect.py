@@ -11,9 +11,9 @@ from marched_jobs import marched
 from mpi4py import MPI
 
 from parcontact.doubts import ParcontactWarning
-from parcontact.effects import stick_slip
+from parcontact.effects.stick import effect as stick_slip
+from parcontact.effects.stick.shear_operator import ShearOperator
 from parcontact.job import Job
-from parcontact.physics.shear_operator import ShearOperator
 from parcontact.python.simulation import Simulation
 
 G, RADIUS, FORCE, MU = 1e6, 1e-2, 1e-3, 0.5

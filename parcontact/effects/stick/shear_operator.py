@@ -22,11 +22,11 @@ from functools import partial
 
 import numpy as np
 
-from ..compiled import loop
-from ..parallel.fft import FFT, Spectrum
-from ..parallel.slab import Array, Slab, allocate
-from .convolution import padded_lengths, tabulate, travelling_wavenumbers, wavenumbers
-from .love import love
+from ...compiled import loop
+from ...parallel.fft import FFT, Spectrum
+from ...parallel.slab import Array, Slab, allocate
+from ...physics.convolution import padded_lengths, tabulate, travelling_wavenumbers, wavenumbers
+from ...physics.love import love
 
 Vector = tuple[float, float]
 

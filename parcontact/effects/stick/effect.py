@@ -10,12 +10,12 @@ there are no tractions, and the highest strength bounds them.
 
 A point in contact slips by `s = D - u`: its slip grows along t where `|t| = f`, and is constant where `|t| < f`. In an
 incompressible half space tractions and pressures move the surface independently of each other
-(`physics.shear_operator`), so that the tractions of a step follow from its pressures. The body obeys the law of
+(`effects.stick.shear_operator`), so that the tractions of a step follow from its pressures. The body obeys the law of
 `physics.body` in both components,
 
     A t = G_inf u + sum_k h_k,
 
-so that a step to the tractions `alpha t` is the problem of `solve.tangential`. A point that sticks ends at its `target`
+so that a step to the tractions `alpha t` is the problem of `solver`. A point that sticks ends at its `target`
 g, its last displacement plus the increment of D, and
 
     e = g + r/alpha,    w = e - A t = g - u.
@@ -47,23 +47,23 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..accuracy.constants import ROLLING, STICKING
-from ..columns import added_by
-from ..parallel.slab import Array
-from ..physics import loops
-from ..physics.body import BodyMemory, MovedHeights, surface_of
-from ..physics.energy import EnergyMemory, Pressed
-from ..physics.entries import Entry, Saved
-from ..physics.interface_friction import Vector
-from ..physics.measures import Measures
-from ..physics.shear_operator import ShearOperator, components, stacked
-from ..physics.units import Units
-from ..solve.preconditioner.extension import grids_for
-from ..solve.tangential import discs
-from ..solve.tangential.solver import TangentialSolver, TractionProblem
-from .effect import Changes, Instant, Sheared
-from .interface_section import InterfaceEffect
+from ...accuracy.constants import ROLLING, STICKING
+from ...columns import added_by
+from ...parallel.slab import Array
+from ...physics import loops
+from ...physics.body import BodyMemory, MovedHeights, surface_of
+from ...physics.energy import EnergyMemory, Pressed
+from ...physics.entries import Entry, Saved
+from ...physics.interface_friction import Vector
+from ...physics.measures import Measures
+from ...physics.units import Units
+from ...solve.preconditioner.extension import grids_for
+from ..effect import Changes, Instant, Sheared
+from ..interface.section import InterfaceEffect
+from . import discs
+from .shear_operator import ShearOperator, components, stacked
 from .slipping import settle_slips
+from .solver import TangentialSolver, TractionProblem
 
 UNIFORM = 1e-12  # rounding: share of the square of a pressure below which its waves are rounding
 LEAST_BOUND = 1e-12  # rounding: bound of tractions, in the run's units, that displacements hardly resolve: taken as 0

@@ -39,10 +39,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...parallel.slab import Array, Slab
-from ...physics.shear_operator import ShearOperator, components, stacked
-from ..preconditioner.extension import ExtendedPreconditioner, Grids
-from ..problem import Operator
+from ...solve.preconditioner.extension import ExtendedPreconditioner, Grids
+from ...solve.problem import Operator
 from . import discs
+from .shear_operator import ShearOperator, components, stacked
 
 # tuning
 STEP = 0.6  # least step along z; waves along q have half the stiffness that K assumes

@@ -7,7 +7,7 @@ import pytest
 from marched_jobs import marched
 
 from parcontact import scene
-from parcontact.effects.interface import shares
+from parcontact.effects.interface.effect import shares
 from parcontact.errors import InputError
 from parcontact.job import Job, load
 from parcontact.parallel.slab import Slab

@@ -2,7 +2,7 @@
 
 import math
 
-from ..compiled import loop
+from ...compiled import loop
 
 
 @loop

@@ -8,12 +8,12 @@ import pytest
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from parcontact.effects.stick.shear_operator import ShearOperator, components, stacked
+from parcontact.effects.stick.solver import TangentialSolver, TractionProblem
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.shear_operator import ShearOperator, components, stacked
 from parcontact.solve.preconditioner.extension import ALL, grids_for
-from parcontact.solve.tangential.solver import TangentialSolver, TractionProblem
 
 Map = NDArray[np.float64]
 SIZE, POISSON = (1.0, 1.0), 0.5

@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from ..columns import added_by
-from ..physics.interface_friction import InterfaceFriction
-from ..physics.measures import Measures
-from .effect import Changes, Instant
-from .interface_section import Interface, InterfaceEffect
+from ...columns import added_by
+from ...physics.interface_friction import InterfaceFriction
+from ...physics.measures import Measures
+from ..effect import Changes, Instant
+from .section import Interface, InterfaceEffect
 
 
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
@@ -28,10 +28,10 @@ class InterfaceColumns(InterfaceEffect[tuple[float, float]]):
     columns: ClassVar[tuple[str, ...]] = added_by("interface")
 
     def __new__(cls, scene: Any) -> Any:
-        """Return the effect of a job: with `stick` that of tractions (`effects.stick_slip`)."""
+        """Return the effect of a job: with `stick` that of tractions (`effects.stick.effect`)."""
         if not scene.job.section("interface").stick:
             return super().__new__(cls)
-        from .stick_slip import StickSlip  # what solves is not loaded to check a job
+        from ..stick.effect import StickSlip  # what solves is not loaded to check a job
 
         return StickSlip(scene)
 

@@ -1,0 +1,3 @@
+"""Friction of the contact area itself: a shear stress or a coefficient."""
+
+SECTION, EFFECT = "interface", "InterfaceColumns"

@@ -1,0 +1,1 @@
+"""Stick and slip: points of the contact stick until the traction reaches its bound."""
