@@ -14,7 +14,7 @@ HOUSE = Path(parcontact.__file__).parent
 ROOT = Path(__file__).parents[1]
 MODULES = {".".join(path.relative_to(HOUSE).with_suffix("").parts): path for path in sorted(HOUSE.rglob("*.py"))}
 FLOORS = [  # from the ground up; a room imports only from the floors below its own
-    {"capabilities", "errors", "printed", "private", "progress", "streams"},
+    {"capabilities", "column", "errors", "printed", "private", "progress", "streams"},
     {"columns", "compiled", "datafiles", "doubts"},
     {"rubber"},
     {"parallel", "job"},
@@ -45,7 +45,7 @@ KNOW_MPI = {"python", "parallel", "storage", "summary", "derived", "command"}
 
 OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of another room
     **dict.fromkeys((f"effects.leakage.{name}" for name in ("elimination", "flow", "fluids", "paths")), "physics"),
-    **dict.fromkeys((f"effects.leakage.{name}" for name in ("conductivity", "pictures")), "plotting"),
+    "effects.leakage.conductivity": "plotting",
     **dict.fromkeys((f"effects.heat.{name}" for name in ("flash", "heat", "heat_memory", "heat_unbounded")), "physics"),
     "effects.heat.heating": "steady_sliding",
     "effects.heat.band_heat": "bands",
@@ -57,13 +57,18 @@ OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of anothe
     ),
     **dict.fromkeys((f"effects.adhesion.{name}" for name in ("gap_kernels", "gap_solver", "law")), "solve"),
     "effects.adhesion.pull_off": "summary",
-    "effects.leakage.results": "summary",
     "effects.leakage.over_time": "derived",
 }
 
 
+FILES = {"columns": "column", "results": "summary", "pictures": "plotting"}  # modules that any capability may have
+
+
 def room(module: str) -> str:
-    return OF_A_CAPABILITY.get(module) or module.split(".")[0]
+    """The room on whose floor a module stands: its folder, but for modules of capabilities that other rooms ask."""
+    first, *rest = module.split(".")
+    file = FILES.get(rest[-1]) if first == "effects" and len(rest) == 2 else None
+    return OF_A_CAPABILITY.get(module) or file or first
 
 
 def imports(module: str) -> Iterator[str]:
@@ -217,10 +222,11 @@ FOR_USERS = {"theory", "command", "python"}  # rooms whose names are those that 
 
 
 def test_functions_have_a_name_of_their_own() -> None:
-    """A public function of a module has a name that no other module gives to one, but for those that users write, and
-    those of the same thing that users write."""
+    """A public function of a module has a name that no other module gives to one, but for those that users write, those
+    of the same thing that users write, and the answers of capabilities to one question."""
     found: dict[str, list[str]] = {}
-    for module, path in MODULES.items():
+    asked = [module for module in MODULES if module.startswith("effects.") and module.split(".")[-1] in FILES]
+    for module, path in ((module, path) for module, path in MODULES.items() if module not in asked):
         functions = [part.name for part in ast.parse(path.read_text()).body if isinstance(part, ast.FunctionDef)]
         for name in (name for name in functions if not name.startswith("_") and room(module) not in FOR_USERS):
             found.setdefault(name, []).append(module)

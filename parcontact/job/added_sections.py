@@ -32,12 +32,34 @@ def find_effects() -> dict[str, Any]:
 
 
 def effects_of(sections: Iterable[str]) -> dict[str, Any]:
-    """Return the effects registered for some sections, by section. Raises ValidationError for an unusable effect."""
+    """Return the effects registered for some sections, by section, in the order in which they follow a step. Raises
+    ValidationError for an unusable effect."""
     found = [section for section in sections if section in _registered()]
     for section in found:
         if reason := why_unusable(section):
             refuse(Fault(reason, (section,), at_key=True))
-    return {section: _load(section) for section in found}
+    ours = {each.SECTION: each for each in capabilities.folders() if hasattr(each, "SECTION")}
+    needs = {section: capabilities.needs_of(ours.get(section) or _load(section)) for section in found}
+    return {section: _load(section) for section in capabilities.in_order(needs)}
+
+
+def answers(module: str, name: str) -> list[Any]:
+    """Return what capabilities offer under a name: those of this package in modules of one name, others in their
+    classes."""
+    others = (section for section in _registered() if not is_ours(section) and not why_unusable(section))
+    found = [(section, getattr(_load(section), name)) for section in others if hasattr(_load(section), name)]
+    return [*capabilities.offers(module, name), *(_named(*each) for each in found)]
+
+
+def _named(section: str, offered: Any) -> Any:
+    """Return what an effect of another package offers; functions name it in their errors."""
+
+    def call(*given: Any) -> Iterator[Any]:
+        with naming_effect(section):
+            found = list(offered(*given))
+        yield from found
+
+    return call if callable(offered) else offered
 
 
 @contextmanager

@@ -8,13 +8,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..effects.adhesion import pull_off
 from ..errors import InputError
 from ..history.timeline import Timeline
 from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from ..storage import marker, read_back
+from ..summary.run_table import RunTable, find_telling_row
 from . import prefixes
 from .charts import FRACTION, Axis
 
@@ -71,7 +71,7 @@ class PlottedRun:
         """Return the step whose maps show the contact: the last one, or after a detachment the step of the pull-off or
         of the largest load."""
         columns = {name: values.tolist() for name, values in self._all.items()}
-        row = pull_off.choose_row(columns, bool(marker.detached(self.directory)))
+        row = find_telling_row(RunTable(self.directory, self.job, columns, bool(marker.detached(self.directory))))
         return int(self._all["step"][row])
 
     @property

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from ...accuracy.constants import PULL_OFF
 from ...printed import quantity
 
-SAME_LOAD = 1e-9  # rounding: relative difference below which loads are the same
 SOLVER = 0.25  # accuracy: relative error of the load over the tolerance of the solves
 SNAP = 0.5  # accuracy: change of load in a step, over the largest tension, above which no parabola is used
 LEAST_PULL = 1e-9  # rounding: least mean tension over the highest pressure
@@ -101,16 +100,6 @@ def _below(steps: Values, loads: Values) -> float:
     falls, rises = left / before, right / after
     slope = (rises * before - falls * after) / (before + after)
     return slope**2 * (before + after) / (4.0 * (falls + rises))
-
-
-def choose_row(columns: Columns, detached: bool = False) -> int:
-    """Return the row that shows the contact of a run: the last row; after a detachment the row of the last pull-off, or
-    without a pull-off the last row of the largest load. Arguments as for `find`."""
-    pressure, area = (np.asarray(columns[name], float) for name in ("pressure", "contact_area"))
-    if area[-1] > 0.0 and not detached:
-        return len(area) - 1
-    pulls = find(columns, detached)
-    return pulls[-1].row if pulls else int(np.flatnonzero(pressure >= (1.0 - SAME_LOAD) * pressure.max())[-1])
 
 
 def describe_pull_off(columns: Columns, area: float, tolerance: float, detached: bool = False) -> Iterator[str]:

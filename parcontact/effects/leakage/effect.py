@@ -26,6 +26,11 @@ class Leakage(Part):
     every: Count = Field(default=1, description="a positive whole number of steps")
 
 
+def compile_loops() -> None:
+    """Solve for a small flow, which compiles the loops."""
+    leak(np.random.default_rng(1).random((16, 16)), (1.0, 1.0))
+
+
 class LeakageColumns(Effect[tuple[float, ...]]):
     """The conductivity K [m^3] of the gap along x and along y, and its critical constriction [m].
 

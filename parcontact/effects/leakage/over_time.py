@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from ... import scene
-from ...columns import LEAK, choose_columns, names_of, to_csv, values_of
+from ...columns import choose_columns, names_of, to_csv, values_of
 from ...errors import InputError
 from ...job import reading
 from ...job.resolved import RESOLVED, shown_job
@@ -23,6 +23,7 @@ from ..contact_law import touching_of
 from . import conductivity
 from . import pictures as leakage_charts
 from . import results as leak_stop
+from .columns import LEAK
 from .flow import Flow, Leak, Map, flow_mesh_error, leak, solve_flow
 from .fluids import PressureDrop
 

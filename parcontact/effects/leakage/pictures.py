@@ -1,6 +1,6 @@
 """Picture of leakage: the flow through the gap, and conductivity over load or time."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,14 +11,29 @@ from matplotlib.colors import LogNorm
 
 from ...columns import UNITS
 from ...plotting import charts, prefixes, style
+from ...plotting.histories import Abscissa
+from ...plotting.plotted_run import PlottedRun
 from ...plotting.style import Panel
 from . import conductivity
 from .flow import Flow, Map
 
 DECADES = 3  # decades of the flow on the colour scale
 SAME = 1e-6  # rounding: relative difference below which pressures are the same
+FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # columns of a run
+KEYS = ("leakage",)  # names of panels for --panels
+SWEEP_PANELS = (("leakage", charts.Axis("conductivity", "m³"), {label: name for name, label in FLOWS.items()}),)
 KINDS = ("flow", "constriction")  # kinds of columns per direction
 LONG = 100.0  # ratio of times above which their axis is logarithmic
+
+
+def panels(run: PlottedRun, along: Abscissa) -> Iterator[charts.Chart]:
+    """Yield the chart of conductivities of a run over an axis, if the gap is open at any time."""
+    columns = run.columns
+    if "flow_x" in columns and max(np.nanmax(columns[name], initial=0.0) for name in FLOWS) > 0.0:
+        rows = slice(None) if along.rows is None else along.rows
+        flows = {label: columns[name][rows] for name, label in FLOWS.items()}
+        narrowest = dict.fromkeys(flows, columns["constriction"][rows])
+        yield conductivity.chart(along.axis, along.values, flows, narrowest)
 
 
 def draw_leakage(

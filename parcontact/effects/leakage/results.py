@@ -1,16 +1,58 @@
-"""Pressures, or instants, between which contact closes the gap along x and along y.
+"""Results of leakage in texts: conductivities, and the loads between which contact closes the gap along x and along y.
 
 Conductivities K are read from `leak.csv`, which is made from saved gaps, else from measures.csv.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from ...printed import quantity, span
+from ...printed import quantity, span, with_error
 from ...storage import read_back
+from ...summary.run_table import RunTable
 
+TABLE = "leak.csv"
+DATA = (TABLE,)  # tables of a run that a report keeps
+PICTURES = {"leak.png": "flow through the gap, and conductivity"}  # pictures of a run that a report shows
 Columns = Mapping[str, Sequence[float]]
+
+
+def headline(run: RunTable) -> Iterator[str]:
+    """Yield the last conductivities, from `leak.csv` with their errors, else from the run."""
+    table = run.directory / TABLE
+    columns = read_back.read_results(table) if table.is_file() else run.columns
+    stops = [text for text in describe_leak_stop(run.directory) if " between " in text]
+    known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
+    if known:
+        row = known[-1]
+        closed = [axis for axis in "xy" if not columns[f"flow_{axis}"][row]]
+        flows = [_flow(columns, row, axis) for axis in "xy" if axis not in closed]
+        yield from [f"the conductivity of the gap is {' and '.join(flows)}"] * bool(flows)
+        yield from [f"contact closes the gap along {' and '.join(closed)}"] * bool(closed)
+        yield from stops
+
+
+def _flow(columns: Columns, row: int, axis: str) -> str:
+    flow, error = columns[f"flow_{axis}"][row], _error(columns, axis, row)
+    return f"{with_error(flow, flow * error)} m³ along {axis}"
+
+
+def _error(columns: Columns, axis: str, row: int) -> float:
+    """Return the relative error of K, NaN if the table has none."""
+    errors = columns.get(f"error_{axis}")
+    return math.nan if errors is None else errors[row]
+
+
+def sentences(run: RunTable) -> list[str]:
+    """Return sentences on the loads at which leakage stops."""
+    return describe_leak_stop(run.directory)
+
+
+def _describe_table(path: Path, claims: object) -> Iterator[str]:
+    yield f"  leakage: {len(read_back.read_results(path)['time'])} instants in {path.name}"
+
+
+PARTS = {TABLE: _describe_table}  # descriptions of files of a run, by their names
 
 
 def describe_leak_stop(directory: Path) -> list[str]:
@@ -19,7 +61,7 @@ def describe_leak_stop(directory: Path) -> list[str]:
     A sentence has the pressures of the last instant with a flow and of the first one without, or their times if the
     pressure is constant. Raises InputError for an unreadable table.
     """
-    table = next((path for name in ("leak.csv", "measures.csv") if (path := directory / name).is_file()), None)
+    table = next((path for name in (TABLE, "measures.csv") if (path := directory / name).is_file()), None)
     columns = read_back.read_results(table) if table else {}
     found = [(axis, said) for axis in "xy" if (said := describe_axis(columns, axis))]
     if len({said for _, said in found}) == 1:
