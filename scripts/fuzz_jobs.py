@@ -47,7 +47,7 @@ from robustness import any_job
 
 from parcontact import __main__, mesh
 from parcontact import job as jobs
-from parcontact.effects.adhesion.effect import chosen_range
+from parcontact.effects.adhesion.section import chosen_range
 from parcontact.job.checks import limits
 from parcontact.job.text import yamltext
 

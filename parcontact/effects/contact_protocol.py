@@ -95,6 +95,14 @@ class Detached(NamedTuple):
     load: float
 
 
+UNITS_OF_LOADS = {"pressure": " Pa", "force": " N", "approach": " m"}
+
+
+def nothing_holds(control: str, load: float) -> str:
+    """Return the sentence on surfaces that detach under a prescribed load."""
+    return f"the surfaces detach under a {control} of {load:g}{UNITS_OF_LOADS[control]}"
+
+
 class ContactLaw(Protocol[Memory]):
     """A contact law, a part of the run. Methods are collective."""
 

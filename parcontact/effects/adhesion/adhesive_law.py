@@ -23,7 +23,7 @@ from ...physics.units import Units
 from ...solve.certificate import Certificate
 from ...solve.contact import Contact
 from ...solve.problem import Approach, Control, MeanPressure
-from ..contact_protocol import Detached, EdgeMotion, End, PreviousContacts, SolvedContact
+from ..contact_protocol import Detached, EdgeMotion, End, PreviousContacts, SolvedContact, nothing_holds
 from . import gap_kernels
 from .adhesive_energies import JUMPS, PUSHED, SURFACES, PathWork
 from .adhesive_solver import AdhesiveSolver
@@ -31,6 +31,7 @@ from .attraction import cell_of, modulus_of
 from .gap_iterate import GapOperators
 from .gap_solver import GapSolver
 from .law import DUGDALE, EXPONENTIAL, Law
+from .section import adhesion_law
 
 JUMP_STRIDE = 1.0 / 8.0  # accuracy: longest part of a jump that is solved at once
 LEAST_STRIDE = 1.0 / 16.0  # accuracy: shortest part of these, and of a step
@@ -39,7 +40,6 @@ OPEN = 10.0  # physics: gap of detached surfaces over the range
 LEAST_LOAD = 1e-9  # accuracy: least load over all tension, and over the strength of a point
 LEAST_TENSION = 1e-2  # physics: least tension over the strength in the area under tension
 NEVER = -1.0  # a time [s] in a checkpoint
-UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
 
 
 class PastGap(NamedTuple):
@@ -106,10 +106,13 @@ class AdhesiveLaw:
         self.solver = AdhesiveSolver(gaps, scene.solver.workspace, numerics.tolerance, free)
         self.scene, self.slab, self.grid = scene, setup.slab, scene.choices.grid
         self._goes_on_open = scene.job.section("adhesion").detached == "open"
+        law = adhesion_law(scene.job.section("adhesion"), scene.job.grid, scene.job.material)
+        assert law is not None
+        self._attraction = law
 
     def law(self, alpha: float) -> Law:
         """Return the law in a step with the modulus alpha, in the units of the solver."""
-        law = self.scene.choices.adhesion
+        law = self._attraction
         kind, unit = DUGDALE if law.kind == "dugdale" else EXPONENTIAL, self.scene.units.height
         return Law(kind, law.strength / (alpha * self.scene.units.pressure), law.range / unit, law.ramp / unit)
 
@@ -195,7 +198,7 @@ class AdhesiveLaw:
         In cells it is the number of points that came into contact or left it over the length of the edge, pi/4 of
         the cell sides along it. The remaining load of an `untouched` contact is an error of the solver.
         """
-        least = LEAST_LOAD * self.scene.choices.adhesion.strength
+        least = LEAST_LOAD * self._attraction.strength
         separate = not (before.contact_area or now.contact_area or solved.numbers["tensile_area"])
         if separate or (not solved.loaded and max(before.max_pressure, -before.pressure) <= least):
             return EdgeMotion(0.0, True)
@@ -205,7 +208,7 @@ class AdhesiveLaw:
         if sides <= 0.0:
             return EdgeMotion(begins=begins)
         moved = solved.numbers["points_changed"] / (0.25 * math.pi * sides) * cell_of(self.grid)
-        zone = self.scene.choices.adhesion.process_zone(modulus_of(self.scene.job.material))
+        zone = self._attraction.process_zone(modulus_of(self.scene.job.material))
         return EdgeMotion(2.0 * moved / zone if zone > 0.0 else 0.0, begins=begins)
 
     def _path(self, trial: Trial, control: Control, past: PreviousContacts, before: Measures) -> LoadPath:
@@ -351,8 +354,3 @@ def _place(saved: Array) -> tuple[float, float]:
 def _mark(job: Any) -> float:
     """Return a checksum of the history of a job."""
     return float(zlib.crc32(repr(job.history).encode()))
-
-
-def nothing_holds(control: str, load: float) -> str:
-    """Return the sentence on surfaces that detach under a prescribed load."""
-    return f"the surfaces detach under a {control} of {load:g}{UNITS[control]}"

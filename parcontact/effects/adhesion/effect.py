@@ -3,74 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal
-
-from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from ...columns import added_by
 from ...doubts import Doubt
 from ...job.checks import limits
-from ...job.sections.calculation import Grid
 from ...job.sections.geometry import Sphere, Wave
 from ...job.sections.part import Part, Rule
-from ...job.sections.quantities import Positive
 from ...job.text.fault import Fault
 from ...parallel.slab import Array
 from ...physics.entries import Entry, Saved
 from ...physics.units import Units
 from ...solve.constraint import Mask
-from ..contact_protocol import ContactLaw
-from ..effect import Changes, Decision, Effect, Instant
+from ..contact_protocol import ContactLaw, Detached
+from ..effect import BY_THEORY, EXTRAPOLATION, SINGLE, TOLERANCES, Changes, Decision, Effect, Instant
 from . import adhesive_energies
-from .adhesion_doubts import doubts_of_adhesion
+from .adhesion_doubts import doubt_range, doubts_of_adhesion
 from .adhesive_energies import NO_ENERGIES, AdhesiveEnergies
-from .attraction import AdhesionLaw, cell_of, modulus_of, ramp_of, smallest_range
+from .attraction import cell_of, modulus_of, smallest_range
 from .law import Law
+from .section import AUTO, Adhesion, adhesion_law, chosen_range
 
 MOST_CELLS = 2.0  # physics: largest cell over the process zone of a viscoelastic body
 SAME = 1e-9  # rounding: relative tolerance on a range
 JKR_LIKE, DMT_LIKE = 3.0, 0.3  # physics: Tabor's parameter above and below which these theories hold
 FULL_CONTACT = 0.56988  # physics: least Johnson's parameter for full contact of a wave without load
 SNAP_FRONT = 2.0  # accuracy: motion of an edge [half process zones] above which the shortest step is a snap
-CELLS = 2.0  # accuracy: process zone over the cell with the range `auto`; the error of pull-off is 0.6 %
-AUTO: Literal["auto"] = "auto"
-LENGTH: TypeAdapter[float] = TypeAdapter(Positive)
-
-
-def _range(value: Any, info: ValidationInfo) -> float | str:
-    return AUTO if value == AUTO else LENGTH.validate_python(value, context=info.context)
-
-
-Range = Annotated[float | Literal["auto"], PlainValidator(_range, json_schema_input_type=Positive | Literal["auto"])]
-
-
-class Adhesion(Part):
-    """The `adhesion` section: the work of adhesion, the range and the law of the attraction."""
-
-    work: Positive = Field(description="a positive work of adhesion [J/m^2]")
-    range: Range = Field(default=AUTO, description="a positive range [m], or auto")
-    law: Literal["exponential", "dugdale"] = "exponential"
-    detached: Literal["end", "open"] = "end"
-
-
-def adhesion_law(section: Adhesion | None, grid: Grid, material: Any) -> AdhesionLaw | None:
-    """Return the law of a section; the range `auto` is the smallest that the cells of the grid resolve."""
-    if section is None:
-        return None
-    reach = section.range
-    if not isinstance(reach, float):
-        reach = smallest_range(section.work, modulus_of(material), cell_of(grid), CELLS)
-    law = AdhesionLaw(section.work, reach, section.law)
-    return replace(law, ramp=ramp_of(law, modulus_of(material), cell_of(grid))) if law.kind == "dugdale" else law
-
-
-def chosen_range(job: Any) -> float | None:
-    """Return the range [m] that `auto` has on the mesh of a job; None if it is given, or without adhesion."""
-    section = job.section("adhesion")
-    law = None if section is None or section.range != AUTO else adhesion_law(section, job.grid, job.material)
-    return None if law is None else law.range
 
 
 def _bodies(adhesion: Adhesion | None, material: Any) -> Iterator[Fault]:
@@ -166,6 +126,38 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         Rule(("adhesion", "grid"), _no_strip),
     )
     lifts: ClassVar[tuple[Any, ...]] = (limits.loads_press, limits.some_load)
+    forbids: ClassVar[Mapping[str, str]] = {
+        EXTRAPOLATION: "contacts with adhesion start from the last gaps",
+        TOLERANCES: "contacts with adhesion are solved to the tolerance of the job",
+        SINGLE: "contacts with adhesion are solved in double precision",
+        BY_THEORY: "the theory excludes adhesion: leave out the section adhesion",
+    }
+
+    @staticmethod
+    def remembers(job: Any) -> bool:
+        return True
+
+    @staticmethod
+    def compares_heights(job: Any) -> bool:
+        return True
+
+    @staticmethod
+    def chosen_values(job: Any) -> Mapping[str, float]:
+        """Return the range that `auto` has on the mesh of the job."""
+        reach = chosen_range(job)
+        return {} if reach is None else {"adhesion.range": reach}
+
+    @staticmethod
+    def doubt_heights(job: Any, span: float) -> Iterator[Doubt]:
+        law = adhesion_law(job.adhesion, job.grid, job.material)
+        assert law is not None
+        yield from doubt_range(law, span)
+
+    @staticmethod
+    def ended(job: Any, saved: Saved) -> Detached | None:
+        from .adhesive_law import end_of  # what solves is not loaded to check a job
+
+        return end_of(job, saved)
 
     @staticmethod
     def touches(job: Any, pressure: Array, gap: Array) -> Mask:
@@ -230,6 +222,10 @@ class AdhesionColumns(Effect[AdhesionMemory]):
             "to half of one: use shorter steps, or time_step: auto; further steps are not checked"
         )
         return Changes(memory, remark if warns else "", not snapped)
+
+    def last_lines(self, memory: AdhesionMemory) -> Iterator[str]:
+        if memory.snaps:
+            yield f"the contact snapped in {memory.snaps} of the steps; no error is stated for them"
 
     def values(self, memory: AdhesionMemory) -> Sequence[float]:
         return memory.columns

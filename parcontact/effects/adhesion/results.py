@@ -17,6 +17,9 @@ def sentences(run: RunTable) -> Iterator[str]:
         yield from pull_off.describe_pull_off(run.columns, _box(run.job), tolerance, run.detached)
 
 
+said_at_end = sentences  # also at the end of a run
+
+
 def headline(run: RunTable) -> Iterator[str]:
     """Yield the force of the last pull-off and its error, where that is known."""
     lost = [pull for pull in pull_off.find(run.columns, run.detached) if pull.lost is not None]

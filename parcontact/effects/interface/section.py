@@ -126,6 +126,10 @@ class InterfaceEffect(Effect[Memory]):
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_traction, limits.no_rolling)
 
     @staticmethod
+    def remembers(job: Any) -> bool:
+        return bool(job.section("interface").stick)
+
+    @staticmethod
     def decide(job: Any) -> Decision:
         law: Interface | None = job.section("interface")
         if law is None:

@@ -18,7 +18,7 @@ from parcontact.effects.adhesion.adhesive_energies import (
     AdhesiveEnergies,
     advance_energies,
 )
-from parcontact.effects.adhesion.effect import adhesion_law
+from parcontact.effects.adhesion.section import adhesion_law
 from parcontact.effects.contact_protocol import SolvedContact
 from parcontact.errors import InputError
 from parcontact.job import Job
