@@ -44,6 +44,7 @@ import parcontact.steady_sliding.sliding as of_steady
 from parcontact import scene
 from parcontact.accuracy.budget import UNKNOWN, ErrorBudget, estimate, estimate_steady, weight_of
 from parcontact.accuracy.observation import RunProperties, StepObservation
+from parcontact.effects.adhesion import pull_off
 from parcontact.errors import InputError, RunError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
@@ -52,7 +53,6 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import Prony
 from parcontact.steady_sliding import curve
 from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.summary import pull_off
 
 SHARPER = 10.0  # accuracy of a scene over the accuracy of its reference
 SAME_TIME = 1e-9

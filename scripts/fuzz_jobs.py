@@ -50,7 +50,7 @@ from robustness import any_job
 from parcontact import ParcontactWarning, Simulation, __main__, mesh
 from parcontact import job as jobs
 from parcontact.bands.choice import cut_bands
-from parcontact.effects.adhesion import chosen_range
+from parcontact.effects.adhesion.section import chosen_range
 from parcontact.errors import InputError, RunError
 from parcontact.job.checks import limits
 from parcontact.job.text import yamltext

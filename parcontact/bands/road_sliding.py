@@ -11,6 +11,8 @@ import numpy as np
 from ..accuracy.budget import ErrorBudget, ErrorParts
 from ..columns import BANDS, names_of
 from ..doubts import Doubt
+from ..effects.heat.band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
+from ..effects.heat.heating import describe_beyond, describe_cold_state
 from ..effects.relaxation import feeds_back, highest_temperature_of, temperature_of
 from ..errors import InputError, RunError
 from ..job import Job
@@ -19,10 +21,8 @@ from ..physics.measures import Measures
 from ..scene import Setup, choices
 from ..solve.certificate import Certificate
 from ..steady_sliding.curve import States, on_one_grid
-from ..steady_sliding.heating import describe_beyond, describe_cold_state
 from ..steady_sliding.point import Point
 from .band import Rung, Vector
-from .band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
 from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, cut_bands, describe_cut, doubts_of_bands
 from .steep_waves import STRAIN

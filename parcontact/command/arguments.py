@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from .. import __version__
+from .. import __version__, capabilities
 from ..errors import InputError
 from . import ranks, values, verbs
 
@@ -176,7 +176,7 @@ VERBS: dict[Callable[[argparse.Namespace], int], tuple[Callable[[Add], None], ..
     verbs.surface: (_surface,),
     verbs.info: (_info,),
     verbs.plot: (_plot,),
-    verbs.leak: (_leak,),
+    **({verbs.leak: (_leak,)} if capabilities.has("leakage") else {}),
     verbs.report: (_report,),
     verbs.doctor: (_doctor,),
     verbs.manual: (_manual,),

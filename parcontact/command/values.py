@@ -99,7 +99,7 @@ def _spaced(text: str) -> tuple[float, ...]:
 
 def fluid(text: str) -> Any:
     """Return the fluid with a name, or with a viscosity [Pa s]."""
-    from ..leakage.fluids import FLUIDS, Fluid
+    from ..effects.leakage.fluids import FLUIDS, Fluid
 
     if text in FLUIDS:
         return FLUIDS[text]

@@ -262,8 +262,8 @@ def plot(options: argparse.Namespace) -> int:
 def leak(options: argparse.Namespace) -> int:
     """Calculate the leakage through the gaps of a run, into leak.csv; draw it."""
     world = ranks.start_ranks()
-    from ..derived.leakage_over_time import write_leakage
-    from ..leakage.fluids import PressureDrop
+    from ..effects.leakage.fluids import PressureDrop
+    from ..effects.leakage.over_time import write_leakage
 
     if (options.fluid is None) != (options.pressures is None):
         raise InputError("--fluid and --pressures HIGH:LOW [Pa] go together: give both, or none")

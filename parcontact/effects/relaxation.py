@@ -56,6 +56,6 @@ def factor_at(material: Material, rise: float) -> float:
 
 
 def feeds_back(job: Any) -> bool:
-    """Return whether the heat of sliding changes the relaxation times of a job's material (`effects.thermal`)."""
+    """Return whether the heat of sliding changes the relaxation times of a job's material (`effects.heat.effect`)."""
     section = job.section("thermal")
     return section is not None and section.feedback != "none"

@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from ..accuracy.budget import ErrorSums
-from ..effects.adhesive_law import nothing_holds
-from ..effects.contact_protocol import Detached
+from ..effects.contact_protocol import Detached, nothing_holds
 from ..errors import InputError
 from ..history.timeline import Step, Timeline
 from ..parallel.slab import Array

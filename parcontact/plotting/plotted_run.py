@@ -16,7 +16,7 @@ from ..parallel.slab import Array
 from ..storage import marker, read_back
 from ..storage.fields import UNITS
 from ..storage.hdf5 import MEND
-from ..summary import pull_off
+from ..summary.run_table import RunTable, find_telling_row
 from . import prefixes
 from .charts import FRACTION, Axis
 
@@ -73,7 +73,7 @@ class PlottedRun:
         """Return the step whose maps show the contact: the last one, or after a detachment the step of the pull-off or
         of the largest load."""
         columns = {name: values.tolist() for name, values in self._all.items()}
-        row = pull_off.choose_row(columns, bool(marker.detached(self.directory)))
+        row = find_telling_row(RunTable(self.directory, self.job, columns, bool(marker.detached(self.directory))))
         return int(self._all["step"][row])
 
     @property

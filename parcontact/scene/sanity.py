@@ -12,7 +12,6 @@ import numpy as np
 
 from ..accuracy.observation import RunProperties, StepObservation, properties_of, resolves
 from ..doubts import Doubt
-from ..effects.adhesion_doubts import doubt_range
 from ..errors import InputError, JobError, RunError
 from ..history.timeline import Timeline
 from ..job import Job, OnOneMesh
@@ -74,9 +73,9 @@ def _check_heights(setup: Setup) -> Iterator[Doubt]:
     body, span = setup.job.body, setup.heights.span
     if body is not None and setup.roughness and "high for a layer" not in known:
         yield from layer_warnings.doubt_height(span, body.thickness)
-    law = setup.choices.adhesion
-    if law and setup.roughness and not setup.surface.shapes:
-        yield from doubt_range(law, span)
+    if setup.roughness and not setup.surface.shapes:
+        for doubt_heights in setup.job.asked("doubt_heights"):
+            yield from doubt_heights(setup.job, span)
     if setup.shortest is not None and not (seams or setup.job.origin.mesh):  # a seam has further waves
         asked, spiky = setup.choices.numerics.asked, any(doubt.kind == "outliers" for doubt in setup.remarks.doubts)
         yield from advice.doubt_measured_waves(setup.grid, setup.shortest, asked, setup.job.directions, spiky)

@@ -14,7 +14,7 @@ import numpy as np
 from ..accuracy.controller import Controller
 from ..effects import contact_law
 from ..effects.contact_protocol import ContactLaw
-from ..effects.effect import Effect, Memories
+from ..effects.effect import TOLERANCES, Effect, Memories
 from ..effects.folded_branches import FoldedBranches, describe_folded_branches
 from ..errors import InputError
 from ..history.chosen import describe_steps
@@ -168,8 +168,8 @@ class Scene:
     def controller(self) -> Controller:
         """Controller of the tolerance of solves and of the length of steps."""
         choices = self.choices
-        energies, adhesive = self.energy is not None, choices.adhesion is not None
-        return Controller(self.job, choices.timeline, self.material, energies, adhesive)
+        energies, exact = self.energy is not None, bool(choices.forbidden(TOLERANCES))
+        return Controller(self.job, choices.timeline, self.material, energies, exact)
 
     @cached_property
     def in_double(self) -> tuple[ContactSolver, Operators]:

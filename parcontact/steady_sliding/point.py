@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ..accuracy.budget import ErrorBudget
 from ..accuracy.constants import FLASH
-from ..physics.flash import Flash
+from ..effects.heat.flash import Flash
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate
 

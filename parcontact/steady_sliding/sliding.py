@@ -11,12 +11,13 @@ import numpy as np
 from ..accuracy.budget import ErrorBudget, estimate_steady
 from ..accuracy.observation import RunProperties, StepObservation, properties_of
 from ..doubts import Doubt
+from ..effects.heat.flash import Flash
+from ..effects.heat.heating import Feedback, describe_cold_state, find_temperatures
 from ..effects.relaxation import highest_temperature_of, temperature_of
 from ..errors import InputError, RunError
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution
-from ..physics.flash import Flash
 from ..physics.measures import Measures
 from ..scene import Setup, choices, sanity
 from ..solve import kernels, nested
@@ -27,7 +28,6 @@ from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
 from ..solve.precision import reachable_certificate
 from ..solve.preconditioner.extension import pairs_for
-from .heating import Feedback, describe_cold_state, find_temperatures
 from .losses import branch_powers
 from .point import Point
 from .stiffness import loses_most, soft_stripes, stiffer_lines

@@ -9,6 +9,7 @@ from .. import progress
 from ..accuracy.budget import advice, describe, exceeds
 from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
 from ..doubts import Doubt
+from ..effects.heat.heating import describe_hot, describe_unmeasured
 from ..job import Job
 from ..job.checks.advice import describe_sample
 from ..job.sections.materials import describe_temperature
@@ -18,7 +19,6 @@ from ..storage import curve_points, files, tables
 from ..storage.console import Console, always
 from ..storage.curve_points import LOG, Wanted
 from ..storage.tables import GrowingTable
-from .heating import describe_hot, describe_unmeasured
 from .point import Point
 
 WAVES = ("steady_waves.csv", names_of(STEADY_WAVES))  # an additional table

@@ -12,7 +12,6 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
 
-from ..effects.adhesion import chosen_range
 from ..errors import InputError
 from ..job import AUTO, GeometricStep, Job, Stage
 from ..job.checks.cells import one_cell
@@ -102,7 +101,7 @@ def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
     words = [f"grid.points=[{case.mesh}, {ny}]", "output.fields=[]", "output.every=1", "output.energy=false"]
     words += ["output.branch_dissipation=false", f"numerics.integrator={case.integrator}"]
     words.append(f"numerics.tolerance={job.numerics.tolerance!r}")  # the job's tolerance, also if the accuracy chose it
-    words += [f"adhesion.range={reach!r}"] if (reach := chosen_range(job)) is not None else []
+    words += [f"{key}={value!r}" for key, value in _chosen_values(job)]
     factor = case.time_step / own.time_step
     replaced = _sliding(job) if job.study and job.study.cells_per_step else []
     for index, stage in enumerate(job.history):
@@ -137,12 +136,15 @@ def _sliding(job: Job) -> list[Stage]:
     return [stage for stage in job.history if stage.chooses and stage.speed]
 
 
+def _chosen_values(job: Job) -> list[tuple[str, float]]:
+    """Return the lengths [m] that effects choose by the mesh of the job, with their keys."""
+    return [pair for asked in job.asked("chosen_values") for pair in asked(job).items()]
+
+
 def describe_choices(job: Job) -> list[str]:
     """Return sentences on the settings that are equal, or chosen for the accuracy, in every case."""
-    lines, reach = list[str](), chosen_range(job)
-    if reach is not None:
-        own = f"{job.grid.nx} x {job.grid.ny} points, the job's own mesh"
-        lines.append(f"adhesion.range: {reach:.4g} m in every case, chosen by auto for {own}")
+    own = f"{job.grid.nx} x {job.grid.ny} points, the job's own mesh"
+    lines = [f"{key}: {value:.4g} m in every case, chosen by auto for {own}" for key, value in _chosen_values(job)]
     refined = _sliding(job) if job.study and job.study.cells_per_step else []
     if stages := [stage.name for stage in job.history if stage.chooses and stage not in refined]:
         bound = f"numerics.accuracy = {job.numerics.asked.of_steps:g}"

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
 from parcontact.accuracy.controller import RELAXING, SNAP_SHARE, cells_per_step
-from parcontact.effects.adhesion import AdhesionColumns, AdhesionMemory
-from parcontact.effects.adhesive_law import AdhesiveLaw
+from parcontact.effects.adhesion.adhesive_law import AdhesiveLaw
+from parcontact.effects.adhesion.effect import AdhesionColumns, AdhesionMemory
 from parcontact.effects.effect import Changes, Instant
 from parcontact.errors import InputError, RunError
 from parcontact.history.chosen import RAMP_STEPS, MadeStep

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
-from parcontact.effects.interface import shares
+from parcontact.effects.interface.effect import shares
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.interface_friction import InterfaceFriction

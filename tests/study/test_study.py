@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
+from parcontact.effects.adhesion.section import adhesion_law
 from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load
 from parcontact.mesh import load as load_job
 from parcontact.parallel.slab import Slab
-from parcontact.scene import choices
 from parcontact.study import outcome, study, verdict
 from parcontact.study.extrapolation import Limit, extrapolate
 from parcontact.study.ladders import Ladders, Settings, describe_choices, ladders, overrides
@@ -387,7 +387,8 @@ def test_the_range_of_adhesion_is_that_of_the_job_on_every_mesh(path: Path, reac
     job, found = refined(path, "{mesh: [32, 64, 128]}")
     cases = [load_job(path, overrides(job, found.own, case)) for case in found.combine()]
     assert {case.grid.nx for case in cases} == {32, 64, 128}
-    assert {choices(case).adhesion for case in cases} == {choices(job).adhesion}
+    attractions = {adhesion_law(case.section("adhesion"), case.grid, case.material) for case in cases}
+    assert attractions == {adhesion_law(job.section("adhesion"), job.grid, job.material)}
     stated = f"adhesion.range: {math.sqrt(2 * (1e-3 / 64) * 0.01 / 4e6):.4g} m in every case"
     assert [text.startswith(stated) for text in describe_choices(job)] == [True] * held
 

@@ -16,7 +16,7 @@ from ..sections.calculation import Grid
 from ..sections.geometry import OnOneMesh, Rough, RoughSpectrum, Sphere, Topography, Wave
 from ..sections.materials import Elastic, PronyBranch, Zener
 from ..sections.stages import Stage
-from . import Sections
+from . import Sections, limits
 
 STEEP = 0.5  # physics: largest rms slope that counts as small
 STEEPEST = 1.0  # physics: radius of contact over radius of the sphere, up to which slopes are small
@@ -122,10 +122,11 @@ def _pressures(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
 
 def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) -> Iterator[Doubt]:
     """Yield a warning if the largest load gives less than one point in contact by Persson, erf(sqrt(2) p/(E* h'))."""
-    sticks = getattr(job, "adhesion", None) is not None or any(stage.control == "approach" for stage in job.history)
+    pulled = any(limits.loads_press in lifted for lifted in job.asked("lifts"))
+    pulled |= any(stage.control == "approach" for stage in job.history)
     slopes = [shape.rms_slope or 0.0 if isinstance(shape, Rough) else math.inf for shape in job.surface]
     stiffness = 2.0 * material.long_modulus / (1.0 - material.poisson) * math.hypot(*slopes)
-    known = not sticks and pressure > 0.0 and 0.0 < stiffness < math.inf
+    known = not pulled and pressure > 0.0 and 0.0 < stiffness < math.inf
     touching = math.erf(math.sqrt(2.0) * pressure / stiffness) * math.prod(job.grid.points) if known else 1.0
     if touching < 1.0:
         yield Doubt("light", key, {"pressure": pressure, "touching": touching, "in_mega": 1e6 * pressure})
