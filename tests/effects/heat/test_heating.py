@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Main, RunParcontact
-from parcontact.physics.flash import Flash
+from parcontact.effects.heat.flash import Flash
 from scipy.special import lambertw
 
 from parcontact import job as jobs
