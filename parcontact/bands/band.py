@@ -1,13 +1,15 @@
 """One band of the spectrum on its own grid: a surface with its waves, and its steady states under many pressures."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..accuracy.observation import properties_of
-from ..effects.heat.band_heat import Warming, shares_of_depth, warming_of, waves_along_depth
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job
 from ..job.sections.height_arrays import GivenHeights
@@ -26,6 +28,9 @@ from ..steady_sliding.losses import branch_powers
 from ..steady_sliding.sliding import judge_state, tolerance_of
 from .choice import Cut
 from .ladder import PressureLadder
+
+if TYPE_CHECKING:  # found only for jobs that ask for it
+    from ..effects.heat.bands import Warming
 
 PARTS = 6  # accuracy: parts of a cell of wavenumbers, along each side, for sums of the spectrum
 MOST_STEPS = 20000  # tuning: limit on the steps of the splitting for one contact
@@ -79,7 +84,7 @@ class Band:
         slab = Slab.alone(*grid.points)
         surface = (HeightArray(heights=GivenHeights(np.asarray(heights))),)
         own = job.model_copy(update={"grid": grid, "surface": surface, "bands": None})
-        self._depth_waves = waves_along_depth(float(cut.edges[0]), float(cut.edges[-1]))[0]
+        self._wavenumbers = float(cut.edges[0]), float(cut.edges[-1])  # of all bands
         self.warming: Warming | None = None
         self._warmed_for: tuple[Vector, float] | None = None
         self._set_up(set_up(own, slab))
@@ -104,7 +109,10 @@ class Band:
             self._full = float(np.std(self._inverse.apply(self._heights, self.setup.slab.empty())))
             section = self.setup.job.section("thermal")
             if section is not None and self._warmed_for != (velocity, seconds):
-                self.warming = warming_of(self.setup, section, seconds, velocity, self._depth_waves)
+                from ..effects.heat.bands import warming_of, waves_along_depth
+
+                waves, _ = waves_along_depth(*self._wavenumbers)
+                self.warming = warming_of(self.setup, section, seconds, velocity, waves)
                 self._warmed_for = velocity, seconds
             self._velocity = velocity
 
@@ -157,7 +165,10 @@ class Band:
         """Return S_j and g of the heat for a map of pressure."""
         if self.warming is None:
             return np.zeros(1), np.zeros(1)
-        shares = shares_of_depth(self.setup, pressure, self._velocity, self._depth_waves)
+        from ..effects.heat.bands import shares_of_depth, waves_along_depth
+
+        waves, _ = waves_along_depth(*self._wavenumbers)
+        shares = shares_of_depth(self.setup, pressure, self._velocity, waves)
         return self.warming.apply(self.setup, pressure), shares
 
 
