@@ -60,7 +60,7 @@ OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of anothe
 
 
 FILES = {  # modules that any capability may have, and the rooms that ask them
-    **{"columns": "column", "results": "summary", "pictures": "plotting"},
+    **{"columns": "column", "sentences": "column", "results": "summary", "pictures": "plotting"},
     **{"steady": "steady_sliding", "bands": "bands"},
 }
 

@@ -43,7 +43,7 @@ class Rung:
 
     Friction of its waves by energy and by slopes [-]; area as a share, counted and corrected; approach [m] (in
     `Cascade.climb` including finer bands); highest pressure [Pa]; `weights` of the rungs of the next finer band, and
-    the share of the load above them; power [W/m^2] lost in each branch; S_j and g of its heat (`band_heat`), one 0
+    the share of the load above them; power [W/m^2] lost in each branch; S_j and g of its heat (`heat.bands`), one 0
     without `thermal`; relative errors of friction and area by solver and grid; residual, and operator calls.
     """
 

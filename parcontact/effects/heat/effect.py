@@ -144,6 +144,11 @@ def _rubs(job: Any) -> bool:
     return any(shears) or job.sticks
 
 
+def _pulls(job: Any) -> bool:
+    """Return whether an effect lets surfaces pull each other."""
+    return any(limits.loads_press in lifted for lifted in job.asked("lifts"))
+
+
 class ThermalColumns(Effect[ThermalMemory]):
     """Columns: the mean temperature rise of the contact, weighted by heat, and the highest rise of the surface [K].
 
@@ -187,7 +192,7 @@ class ThermalColumns(Effect[ThermalMemory]):
     def __init__(self, scene: Any) -> None:
         self._setup, self._slab, self._job = scene.setup, scene.slab, scene.job
         self._feeds_back = feeds_back(scene.job)
-        self._rubs, self._pulled = _rubs(scene.job), scene.job.section("adhesion") is not None
+        self._rubs, self._pulled = _rubs(scene.job), _pulls(scene.job)
 
     def at_rest(self) -> ThermalMemory:
         job, fft = self._job, self._setup.fft
