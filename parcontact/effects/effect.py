@@ -162,6 +162,11 @@ class Effect(Protocol[Memory]):
         return False
 
     @staticmethod
+    def sheared_first(job: Any) -> bool:
+        """Return True if it shears the contact before it slides, within far less than a wave."""
+        return False
+
+    @staticmethod
     def compares_heights(job: Any) -> bool:
         """Return True if warnings compare the heights of the surface with a length of the section."""
         return False

@@ -26,7 +26,7 @@ JOB: dict[str, Any] = {
     "steady": {"velocities": [0.2], "pressures": [1e5]},
     "output": {"fields": ["pressure", "gap"], "directory": "out"},
 }
-KEYS = {  # folder: what its section is refused with
+KEYS: dict[str, tuple[dict[str, Any], str]] = {  # folder: what its section is refused with
     "leakage": ({"leakage": {}}, "leakage is not a known key"),
     "heat": ({"thermal": {"conductivity": 0.2, "diffusivity": 1e-7}}, "thermal is not a known key"),
     "interface": ({"interface": {"shear_stress": 1e5}}, "interface is not a known key"),

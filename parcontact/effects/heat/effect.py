@@ -138,10 +138,10 @@ class ThermalMemory:
 
 
 def _rubs(job: Any) -> bool:
-    """Return whether the contact area itself makes heat, by the shear of any effect or by sticking."""
+    """Return whether the contact area itself makes heat, by the shear of any effect."""
     effects = effects_of(type(job).model_fields).values()
     shears = (effect.shear(job) is not None for effect in effects if effect.decide(job).on)
-    return any(shears) or job.sticks
+    return any(shears) or job.sheared_first
 
 
 def _pulls(job: Any) -> bool:

@@ -142,6 +142,10 @@ class InterfaceEffect(Effect[Memory]):
         return bool(job.section("interface").stick)
 
     @staticmethod
+    def sheared_first(job: Any) -> bool:
+        return bool(job.section("interface").stick)
+
+    @staticmethod
     def decide(job: Any) -> Decision:
         law: Interface | None = job.section("interface")
         if law is None:
