@@ -162,6 +162,8 @@ class SteadySliding:
         section = self.setup.job.section("thermal")
         if section is None:
             return None
+        from ..effects.heat.steady import find_temperatures
+
         touching = NonNegative().touches(contact.p)
         flash, self._rise = find_temperatures(self.setup, section, contact.p, touching, measures, friction, velocity)
         return flash
