@@ -166,7 +166,7 @@ def rise_in_round(friction_of: Callable[[float], float], guesses: list[float]) -
 
     def warmed(rise: float) -> Point:
         guesses.append(rise)
-        return Point((1.0, 0.0), 1e5, 0.0, 1.0, None, 0.1, None, None, 1.0, 1, 0.0, (), Flash(friction_of(rise)))  # type: ignore[arg-type]
+        return Point((1.0, 0.0), 1e5, 0.0, 1.0, None, 0.1, None, None, 1.0, 0.0, (), Flash(friction_of(rise)))  # type: ignore[arg-type]
 
     return warmed
 
