@@ -83,11 +83,15 @@ def reduced(data: Json) -> Json:
     if found.get("history"):
         found["history"] = [_short(stage) for stage in found["history"]]
     if found.get("steady"):
-        found["steady"] = {name: _few(value, 2) for name, value in found["steady"].items()}
+        count = 1 if found.get("bands") else 2
+        found["steady"] = {name: _few(value, count) for name, value in found["steady"].items()}
     if found.get("sweep"):
         found["sweep"] = [{key: _few(value, 2) for key, value in one.items()} for one in _list(found["sweep"])]
     if found.get("bands"):
-        found["bands"] = {"count": 2, "samples": 1}
+        found["bands"] = {"count": 1, "samples": 1}
+        found["surface"] = [part for part in _list(found["surface"]) if part["shape"] != "topography"]  # 128 x 128
+        if "thermal" in found:
+            found["thermal"] = {**found["thermal"], "feedback": "none"}
     return found
 
 
@@ -108,5 +112,5 @@ def _short(stage: Json) -> Json:
 def _few(value: Any, count: int) -> Any:
     """Return at most some of the values of a list or a range A:B:N."""
     if isinstance(value, str) and value.count(":") == 2:
-        return value.rpartition(":")[0] + f":{count}"
+        return value.rpartition(":")[0] + f":{count}" if count > 1 else [float(value.partition(":")[0])]
     return value[:count] if isinstance(value, list) else value
