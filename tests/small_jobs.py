@@ -88,7 +88,7 @@ def reduced(data: Json) -> Json:
     if found.get("sweep"):
         found["sweep"] = [{key: _few(value, 2) for key, value in one.items()} for one in _list(found["sweep"])]
     if found.get("bands"):
-        found["bands"] = {"count": 1, "samples": 1}
+        found["bands"] = {"samples": 1}
         found["surface"] = [part for part in _list(found["surface"]) if part["shape"] != "topography"]  # 128 x 128
         if "thermal" in found:
             found["thermal"] = {**found["thermal"], "feedback": "none"}

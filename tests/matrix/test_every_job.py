@@ -19,7 +19,6 @@ from parcontact.history.timeline import Timeline
 OF_JOBS = {"check", "plan", "run", "steady", "theory", "study", "surface"}
 OF_RESULTS = {"plot", "report", "leak", "info", "cite"}
 OTHERS = {"fit", "doctor", "manual", "schema"}  # take no job and no result
-CURVE = ["--velocities", "0.01,1", "--pressures", "1e5"]
 
 
 class Said(NamedTuple):
@@ -72,25 +71,40 @@ def middle(path: Path) -> float:
     return min(Timeline.from_job(case.job).end for case in mesh.load_cases(path)) / 2.0
 
 
+@pytest.fixture
+def place(shared_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working directory, the same on all ranks."""
+    monkeypatch.chdir(shared_path)
+    return shared_path
+
+
+def small(name: str, place: Path) -> Path:
+    """The path of the small version of a job."""
+    comm = MPI.COMM_WORLD
+    return comm.bcast(smallest(JOBS[name], place) if comm.rank == 0 else None)
+
+
+@pytest.mark.mpi(2)
 @pytest.mark.parametrize("name", JOBS)
-def test_check_plan_run_and_run_again(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_check_plan_run_and_run_again(name: str, place: Path) -> None:
     """The second run changes no result."""
-    monkeypatch.chdir(tmp_path)
-    job = smallest(JOBS[name], tmp_path)
-    assert done("check", job).out
-    assert done("plan", job, "--seconds", "0.01").out
+    job = small(name, place)
+    done("check", job)
+    done("plan", job, "--seconds", "0.01")
     done("run", job, "--out", "whole", "--quiet")
-    before = tables(tmp_path / "whole")
+    MPI.COMM_WORLD.Barrier()
+    before = tables(place / "whole")
+    MPI.COMM_WORLD.Barrier()
     assert any(name.endswith(("measures.csv", "steady.csv")) for name in before)
     done("run", job, "--out", "whole", "--quiet")
-    assert tables(tmp_path / "whole") == before
+    MPI.COMM_WORLD.Barrier()
+    assert tables(place / "whole") == before
 
 
 @pytest.mark.parametrize("name", JOBS)
-def test_stop_and_go_on(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stop_and_go_on(name: str, place: Path) -> None:
     """A run that is stopped in the middle goes on to the rows of one that was not."""
-    monkeypatch.chdir(tmp_path)
-    job = smallest(JOBS[name], tmp_path)
+    job = small(name, place)
     if not mesh.load_cases(job)[0].job.history:
         said = do("run", job, "--out", "part", "--until", "1.0")
         assert (said.code, "a friction curve has no time" in said.err) == (2, True)
@@ -98,4 +112,4 @@ def test_stop_and_go_on(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     done("run", job, "--out", "whole", "--quiet")
     done("run", job, "--out", "part", "--quiet", "--until", repr(middle(job)))
     done("run", job, "--out", "part", "--quiet")
-    assert tables(tmp_path / "part") == tables(tmp_path / "whole")
+    assert tables(place / "part") == tables(place / "whole")

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Main, RunParcontact
-from parcontact.effects.heat.flash import Flash
 from scipy.special import lambertw
 
 from parcontact import job as jobs
 from parcontact import scene
+from parcontact.effects.heat.flash import Flash
 from parcontact.effects.heat.heating import Feedback
 from parcontact.errors import InputError, JobError, RunError
 from parcontact.parallel.slab import Slab
