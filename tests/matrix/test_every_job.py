@@ -89,8 +89,9 @@ def small(name: str, place: Path) -> Path:
 def test_check_plan_run_and_run_again(name: str, place: Path) -> None:
     """The second run changes no result."""
     job = small(name, place)
-    done("check", job)
-    done("plan", job, "--seconds", "0.01")
+    if MPI.COMM_WORLD.size == 1:  # several ranks run it; what is checked and planned does not depend on them
+        done("check", job)
+        done("plan", job, "--seconds", "0.01")
     done("run", job, "--out", "whole", "--quiet")
     MPI.COMM_WORLD.Barrier()
     before = tables(place / "whole")
