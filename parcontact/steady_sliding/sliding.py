@@ -12,6 +12,9 @@ from ..accuracy.budget import ErrorBudget, estimate_steady
 from ..accuracy.observation import RunProperties, StepObservation, properties_of
 from ..doubts import Doubt
 from ..effects.relaxation import temperature_of
+from ..effects.softening.fixed_point import START, Round, settle
+from ..effects.softening.strain import strains_of
+from ..effects.softening.strain_table import Softened
 from ..errors import InputError, RunError
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
@@ -28,8 +31,8 @@ from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
 from ..solve.precision import reachable_certificate
 from ..solve.preconditioner.extension import pairs_for
 from .heating import Feedback, find_temperatures
-from .losses import branch_powers
-from .point import Point
+from .losses import branch_powers, count_octaves
+from .point import Point, in_rounds
 from .stiffness import loses_most, soft_stripes, stiffer_lines
 
 COARSE_TOLERANCE = 0.02  # tuning: tolerance on the certificate on all grids but the finest
@@ -72,6 +75,8 @@ class SteadySliding:
         self._speed = self._pressure = 0.0  # speed times shift factor, on which a state depends
         self.temperature, self._own_temperature = math.nan, temperature_of(setup.job.material)
         self._feedback = Feedback()
+        section = setup.job.section("softening")
+        self.softened = section and Softened(section.made, max(setup.size), (START,) * count_octaves(setup))
 
     def hold(self, velocity: Vector, sets: bool) -> tuple[Array, SteadySolver, Convolution]:
         """Allocate what a solve at a velocity [m/s] holds on the finest grid, with or without active `sets`."""
@@ -99,7 +104,7 @@ class SteadySliding:
         """
         section = self.setup.job.section("thermal")
         if section is None or section.feedback == "none":
-            return self._solve(velocity, pressure)
+            return self._soften(velocity, pressure)
 
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
 
@@ -108,13 +113,30 @@ class SteadySliding:
                 self._set_material(cold + rise)
             except InputError as error:
                 raise RunError(f"the flash temperature is outside the range of the material's shift: {error}") from None
-            return self._solve(velocity, pressure)
+            return self._soften(velocity, pressure)
 
         tolerance = self.setup.choices.numerics.tolerance
         return self._feedback.solve_fixed_point(warmed, math.hypot(*velocity), (pressure, cold), tolerance)
 
+    def _soften(self, velocity: Vector, pressure: float) -> Point:
+        """Return the steady state at the temperature that was set, with the moduli at its strain."""
+        if self.softened is None:
+            return self._solve(velocity, pressure)
+        points, rounds = list[Point](), list[Round]()
+
+        def once(softened: Softened) -> Round:
+            self.softened, self.setup = softened, replace(self.setup, factors=softened.factors)
+            points.append(self._solve(velocity, pressure))
+            assert self.contact is not None
+            strains, power = strains_of(self.setup, softened, self.contact.u, velocity)
+            rounds.append(Round(points[-1].friction, strains, power))
+            return rounds[-1]
+
+        settle(self.softened, once, self.setup.job.numerics.asked.both[0])
+        return replace(in_rounds(points), strain_amplitude=rounds[-1].amplitude)
+
     def _solve(self, velocity: Vector, pressure: float) -> Point:
-        """Return the steady state at the temperature that was set."""
+        """Return the steady state at the temperature and the strains that were set."""
         began, calls, speed = time.perf_counter(), 0.0, math.hypot(*velocity)
         what, factor = f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa", self.setup.choices.time_factor
         for start, solver in self._starts(velocity, pressure):

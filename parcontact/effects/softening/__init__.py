@@ -1,0 +1,1 @@
+"""Strain softening of filled rubber in steady sliding (the Payne effect)."""
