@@ -322,6 +322,9 @@ STEADY: Table = (  # rows are `steady_sliding.point.Point`
         "feedback",
     ),
     Column("rounds", "", "steady states solved until the temperature settled (with `feedback`)", when="feedback"),
+    Column(
+        "strain_amplitude", "", "strain that softens the rubber, over the power (with `softening`)", when="softening"
+    ),
     ERROR_FRICTION,
     replace(ERROR_AREA, of=attrgetter("errors.area.total")),
     Column(
@@ -354,6 +357,7 @@ BANDS: Table = (
     Column("load_lost", "", "share of the load at pressures above the highest one solved for the band"),
     Column("rms_slope_to", "", "of this and all coarser bands"),
     Column("strain_to", "", "rms strain of these waves in full contact, at the depth where it is largest"),
+    Column("strain_amplitude", "", "strain that softens the rubber of the band; empty without `softening`"),
 )
 
 THEORY: Table = (

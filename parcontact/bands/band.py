@@ -7,6 +7,8 @@ from itertools import product
 import numpy as np
 
 from ..accuracy.observation import properties_of
+from ..effects.softening.strain import depths_between, strains_of
+from ..effects.softening.strain_table import Softened, StrainTable
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job
 from ..job.sections.height_arrays import GivenHeights
@@ -38,7 +40,8 @@ class Rung:
     Friction of its waves by energy and by slopes [-]; area as a share, counted and corrected; approach [m] (in
     `Cascade.climb` including finer bands); highest pressure [Pa]; `weights` of the rungs of the next finer band, and
     the share of the load above them; power [W/m^2] lost in each branch; S_j and g of its heat (`band_heat`), one 0
-    without `thermal`; relative errors of friction and area by solver and grid; residual, and operator calls.
+    without `thermal`; squares of the strain of its waves at all depths and
+    their weights in its strain (`effects.softening.strain`), 0 without `softening`; relative errors of friction and area by solver and grid; residual, and operator calls.
     """
 
     pressure: float
@@ -53,6 +56,8 @@ class Rung:
     powers: Array
     warming: Array
     depths: Array
+    squares: Array
+    strain_weights: Array
     errors: Array  # friction by solver and by grid, area by solver and by grid
     residual: float
     penetration: float
@@ -81,6 +86,7 @@ class Band:
         self._depth_waves = waves_along_depth(float(cut.edges[0]), float(cut.edges[-1]))[0]
         self.warming: Warming | None = None
         self._warmed_for: tuple[Vector, float] | None = None
+        self._depths = depths_between(float(cut.edges[0]), float(cut.edges[-1]))
         self._set_up(set_up(own, slab))
         self._heights = self.setup.surface.heights((0.0, 0.0), slab.empty())
 
@@ -93,6 +99,10 @@ class Band:
     def set_temperature(self, temperature: float) -> None:
         """Set the temperature [deg C] of the material. Raises InputError if it has no shift."""
         self._set_up(replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature))))
+
+    def soften(self, softened: StrainTable, strain: float) -> None:
+        """Set the strain of all waves, and with it the factors of the moduli."""
+        self._set_up(replace(self.setup, factors=Softened(softened, max(self.setup.size), (strain,)).factors))
 
     def slide(self, velocity: Vector, seconds: float) -> None:
         """Set the velocity [m/s] and, for heat, the time of sliding [s]."""
@@ -145,6 +155,7 @@ class Band:
             above,
             branch_powers(setup, contact, velocity).sum(axis=1) / area,
             *self._heat_of(contact.p),
+            *self._strains_of(contact.u),
             np.array(parts).ravel(),
             contact.certificate.worst,
             contact.certificate.penetration,
@@ -157,6 +168,14 @@ class Band:
             return np.zeros(1), np.zeros(1)
         shares = shares_of_depth(self.setup, pressure, self._velocity, self._depth_waves)
         return self.warming.apply(self.setup, pressure), shares
+
+    def _strains_of(self, u: Array) -> tuple[Array, Array]:
+        """Return the squares of strains at all depths for a displacement, and their weights."""
+        if self.setup.factors is None:
+            return np.zeros(1), np.zeros(1)
+        setup, all_waves = self.setup, np.zeros(self.setup.fft.shape, np.int64)
+        found = strains_of(setup, u, self._velocity, self._depths / setup.units.length, all_waves, 1)
+        return found.squares, found.weights[0]
 
     def _resolvent(self, gamma: float) -> Convolution:
         return self.operator.mapped(lambda symbol: 1.0 / (1.0 + gamma * symbol), self.setup.fft.complex)

@@ -13,7 +13,7 @@ from ..accuracy.observation import RunProperties, StepObservation, properties_of
 from ..doubts import Doubt
 from ..effects.relaxation import temperature_of
 from ..effects.softening.fixed_point import START, Round, settle
-from ..effects.softening.strain import strains_of
+from ..effects.softening.strain import strains_at_octaves
 from ..effects.softening.strain_table import Softened
 from ..errors import InputError, RunError
 from ..parallel.fft import FFT
@@ -128,8 +128,9 @@ class SteadySliding:
             self.softened, self.setup = softened, replace(self.setup, factors=softened.factors)
             points.append(self._solve(velocity, pressure))
             assert self.contact is not None
-            strains, power = strains_of(self.setup, softened, self.contact.u, velocity)
-            rounds.append(Round(points[-1].friction, strains, power))
+            found = strains_at_octaves(self.setup, softened, self.contact.u, velocity)
+            strains = found.of_octaves(np.array(softened.strains))
+            rounds.append(Round(points[-1].friction, strains, found.power))
             return rounds[-1]
 
         settle(self.softened, once, self.setup.job.numerics.asked.both[0])

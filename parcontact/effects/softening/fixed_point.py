@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...errors import RunError
 from ...parallel.slab import Array
@@ -35,10 +36,10 @@ class Round:
         return math.sqrt(float(self.power @ self.strains**2) / whole) if whole > 0.0 else math.nan
 
 
-def next_strains(softened: Softened, found: Array) -> Softened:
-    """Return the strains of the next round after these were `found`."""
-    mixed = found**MIXED * np.array(softened.strains) ** (1.0 - MIXED)
-    return replace(softened, strains=tuple(mixed.tolist()))
+def mixed(found: ArrayLike, before: ArrayLike) -> Array:
+    """Return the strains of the next round; a strain that was not found (NaN, without power) stays."""
+    found, before = np.asarray(found, float), np.asarray(before, float)
+    return np.where(found > 0.0, found**MIXED * before ** (1.0 - MIXED), before)
 
 
 def settle(first: Softened, solve: Callable[[Softened], Round], accuracy: float) -> None:
@@ -49,6 +50,7 @@ def settle(first: Softened, solve: Callable[[Softened], Round], accuracy: float)
         change = abs(found.friction - last) / found.friction if found.friction > 0.0 else 0.0
         if change <= SHARE * accuracy:
             return
-        softened, last = next_strains(softened, found.strains), found.friction
+        strains = tuple(mixed(found.strains, softened.strains).tolist())
+        softened, last = replace(softened, strains=strains), found.friction
     sentence = f"the strain that softens the rubber did not settle in {MOST_ROUNDS} rounds: friction changes by"
     raise RunError(f"{sentence} {100 * change:.2g} % in the last one")

@@ -44,7 +44,9 @@ def only_in_steady_sliding(softening: Softening | None, history: Any, initial: A
     if softening is None:
         return
     if history:
-        sentence = "cannot be used with softening, which is for friction curves (parcontact steady): softened moduli are no"
+        sentence = (
+            "cannot be used with softening, which is for friction curves (parcontact steady): softened moduli are no"
+        )
         yield Fault(f"{sentence} Prony series; leave out the history and give steady.pressures", ("history",))
     if initial.state == "steady":
         yield Fault("cannot be used with softening: softened moduli are no Prony series", ("initial",))
@@ -55,7 +57,9 @@ def on_a_periodic_half_space(softening: Softening | None, grid: Any, body: Any) 
     if softening is None:
         return
     if not all(grid.cyclic):
-        yield Fault("must be periodic with softening: strains are those of waves in a periodic box", ("grid", "boundary"))
+        yield Fault(
+            "must be periodic with softening: strains are those of waves in a periodic box", ("grid", "boundary")
+        )
     if body is not None:
         yield Fault("cannot be used with softening: strains are those of a half space", ("body",))
 
@@ -65,9 +69,13 @@ def of_rubber(softening: Softening | None, material: Any) -> Iterator[Fault]:
     if softening is None:
         return
     if not material.fitted.branches:
-        yield Fault("needs a material that relaxes (model zener or dma): strains count where it dissipates", ("softening",))
+        yield Fault(
+            "needs a material that relaxes (model zener or dma): strains count where it dissipates", ("softening",)
+        )
     if material.poisson < LEAST_POISSON:
-        sentence = f"must be at least {LEAST_POISSON:g} with softening, whose strains are those of an incompressible body"
+        sentence = (
+            f"must be at least {LEAST_POISSON:g} with softening, whose strains are those of an incompressible body"
+        )
         yield Fault(f"{sentence}, got {material.poisson:g}", ("material", "poisson"))
 
 

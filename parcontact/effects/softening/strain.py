@@ -5,24 +5,26 @@ the depth z by a tensor e that turns with the constant magnitude
 
     gamma(z) = sqrt(2 e:e) = 2 q A (q z) exp(-q z).                                                               (1)
 
-The strain is local: it counts where power is dissipated. With the density of the power d(x, z) of a map of displacements
+The strain is local: it counts where power is dissipated. With the power d(x, z) dissipated by waves of the displacement,
 
     S(z) = <d gamma^2>/<d>/R(z),                                                                                  (2)
 
-where R is the same ratio `<d gamma^2>/(<d> <gamma^2>)` for waves with the same amplitudes and independent phases: in full
-contact S is the sum of (1) over all waves. The strain of a wave is its mean over depth, weighted by its dissipation,
+where R is the ratio <d gamma^2>/(<d> <gamma^2>) of waves with the same amplitudes and independent phases. In full contact
+S is the sum of gamma^2 over all waves. The strain of a wave is a mean over depth, weighted by its dissipation,
 
-    gamma_q^2 = int 4 s^2 exp(-2 s) S(s/q) ds,                                                                    (3)
+    gamma_q^2 = int 4 q^3 z^2 exp(-2 q z) S(z) dz,                                                                (3)
 
 which for one wave is 3/8 (q A)^2. The strain of an octave, or of a band, is the mean of (3) over its waves, weighted by
-their power.
+their power. S(z) of bands add up.
 """
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...parallel.fft import Spectrum
 from ...parallel.slab import Array
@@ -31,27 +33,80 @@ from ...scene import Setup
 from .strain_table import Softened
 
 SHALLOW, DEEP = 0.2, 4.0  # accuracy: least depth times the largest wavenumber, largest depth times the smallest
-SPACING = 2.5  # accuracy: largest ratio of two depths
-FARTHEST, PARTS = 12.0, 240  # accuracy: end and number of the steps of the integral (3)
-PER_OCTAVE = 4  # accuracy: wavenumbers per octave at which (3) is evaluated
+BEYOND = 4.0  # accuracy: ratio by which the depths of the integral (3) go beyond these
+SPACING = 1.5  # accuracy: ratio of two depths of the integral (3); S is found at every second one
 TINY = 1e-300  # rounding: least square of a strain, for logarithms
 Vector = tuple[float, float]
 
 
-def strains_of(setup: Setup, softened: Softened, u: Array, velocity: Vector) -> tuple[Array, Array]:
-    """Return the strain [-] of each octave of `softened` under a surface of this velocity [m/s], and the power of its
-    waves, to a common factor; collective. The displacement u is in the run's units.
+@dataclass(frozen=True)
+class StrainsAtDepth:
+    """Strains of a map of displacements: the `squares` S(z) [-] at given depths z, shape (depths,); the `weights` of
+    S(z) in the strain of each octave (3), shape (octaves, depths); and the `power` of each octave, to a common factor.
+    """
 
-    An octave without power keeps its strain in `softened`.
+    squares: Array
+    weights: Array
+    power: Array
+
+    def of_octaves(self, otherwise: Array) -> Array:
+        """Return the strain [-] of each octave; that of `otherwise` for an octave without power."""
+        found = np.sqrt(self.weights @ self.squares)
+        return np.where(found > 0.0, found, otherwise)
+
+
+def depths_between(low: float, high: float) -> Array:
+    """Return depths for waves between two wavenumbers, in the unit of their inverse."""
+    ends = np.log(SHALLOW / BEYOND / high), np.log(DEEP * BEYOND / low)
+    return np.exp(np.linspace(*ends, 2 + int((ends[1] - ends[0]) / math.log(SPACING))))
+
+
+def ends_of(setup: Setup) -> Vector:
+    """Return the smallest and the largest wavenumber of the grid [1/unit of length]."""
+    cells = setup.slab.nx / setup.size[0], setup.slab.ny / setup.size[1]
+    return 2.0 * math.pi / max(setup.size), math.pi * math.hypot(*cells)
+
+
+def strains_of(
+    setup: Setup, u: Array, velocity: Vector, depths: Array, octave: NDArray[np.int64], count: int
+) -> StrainsAtDepth:
+    """Return the strains at these depths [unit of length] under a surface of this velocity [m/s]; collective.
+
+    The displacement u is in the run's units. `octave` is the number of the octave of each wave, below `count`.
     """
     q = np.hypot(*wavenumbers(setup.fft, setup.size))
     spectrum = setup.fft.forward(u) * (setup.units.height / setup.units.length)
     power = _power(setup, q, velocity)
-    low, high = _ends(setup)
-    count = 2 + int(math.log(DEEP / SHALLOW * high / low) / math.log(SPACING))
-    depths = np.geomspace(SHALLOW / high, DEEP / low, count)
-    squares = np.array([_square_at(setup, spectrum, power, q, float(z)) for z in depths])
-    return _means(setup, softened, power * np.abs(spectrum) ** 2 * setup.fft.multiplicity, q, depths, squares)
+    low, high = ends_of(setup)
+    there = np.flatnonzero((depths >= SHALLOW / high) & (depths <= DEEP / low))[::2]
+    found = np.array([_square_at(setup, spectrum, power, q, float(depths[index])) for index in there])
+    whole = power * np.abs(spectrum) ** 2 * setup.fft.multiplicity
+    return StrainsAtDepth(_continued(depths, there, found), *_weights(setup, whole, q, depths, octave, count))
+
+
+def _continued(depths: Array, there: NDArray[np.int64], found: Array) -> Array:
+    """Return S at all depths: between those where it was `found` log S is a cubic spline in log z, above them S is in
+    proportion to z^2, and below them it is 0."""
+    from scipy.interpolate import CubicSpline  # slow to import, and of use to few
+
+    first, last = depths[there[0]], depths[there[-1]]
+    spline = CubicSpline(np.log(depths[there]), np.log(np.maximum(found, TINY)))
+    inside = np.exp(spline(np.log(np.clip(depths, first, last))))
+    return np.where(depths < first, found[0] * (depths / first) ** 2, np.where(depths > last, 0.0, inside))
+
+
+def _weights(
+    setup: Setup, power: Array, q: Array, depths: Array, octave: NDArray[np.int64], count: int
+) -> tuple[Array, Array]:
+    """Return the weights of S(z) in the strain of each octave, averaged over the `power` of its waves, and its power."""
+    step = math.log(depths[1] / depths[0])  # of the trapezoidal rule in ln z
+    sums = [np.bincount(octave.ravel(), power.ravel(), count)]
+    for z in depths:
+        s = q * z
+        sums.append(np.bincount(octave.ravel(), (power * 4.0 * step * s**3 * np.exp(-2.0 * s)).ravel(), count))
+    whole, *each = np.array(setup.slab.sum(*np.concatenate(sums))).reshape(-1, count)
+    weights = np.array(each).T
+    return np.divide(weights, whole[:, None], out=np.zeros_like(weights), where=whole[:, None] > 0.0), whole
 
 
 def _power(setup: Setup, q: Array, velocity: Vector) -> Array:
@@ -113,37 +168,7 @@ def _of_independent_waves(setup: Setup, waves: Spectrum, heavy: Spectrum) -> flo
     return 1.0 + (2.0 * squares - same) / (first * second)
 
 
-def _means(
-    setup: Setup, softened: Softened, power: Array, q: Array, depths: Array, squares: Array
-) -> tuple[Array, Array]:
-    """Return the strain of each octave, the mean of (3) over its waves weighted by `power`, and its power."""
-    octave = softened.octave(q)
-    low, high = np.log2(_ends(setup))
-    places = np.linspace(low, high, 2 + int(PER_OCTAVE * (high - low)))
-    known = _over_depth(2.0**places, depths, squares)
-    own = np.interp(np.log2(np.maximum(q, 2.0**low)), places, known)
-    count = len(softened.strains)
-    sums = [np.bincount(octave.ravel(), one.ravel(), count) for one in (power, power * own)]
-    weights, weighted = np.array(setup.slab.sum(*np.concatenate(sums))).reshape(2, count)
-    kept = np.array(softened.strains)
-    found = np.sqrt(np.divide(weighted, weights, out=kept**2, where=weights > 0.0))
-    return np.where(found > 0.0, found, kept), weights
-
-
-def _ends(setup: Setup) -> Vector:
-    """Return the smallest and the largest wavenumber of the grid."""
-    cells = setup.slab.nx / setup.size[0], setup.slab.ny / setup.size[1]
-    return 2.0 * math.pi / max(setup.size), math.pi * math.hypot(*cells)
-
-
-def _over_depth(q: Array, depths: Array, squares: Array) -> Array:
-    """Return the integral (3) for wavenumbers; between depths log S is a cubic spline in log z, above them S grows with
-    z^2, and below them it is 0."""
-    from scipy.interpolate import CubicSpline  # slow to import, and of use to few
-
-    s = FARTHEST / PARTS * (np.arange(PARTS) + 0.5)
-    z = s / q[:, None]
-    spline = CubicSpline(np.log(depths), np.log(np.maximum(squares, TINY)))
-    found = np.exp(spline(np.log(np.clip(z, depths[0], depths[-1]))))
-    found = np.where(z < depths[0], squares[0] * (z / depths[0]) ** 2, np.where(z > depths[-1], 0.0, found))
-    return np.asarray((FARTHEST / PARTS) * found @ (4.0 * s**2 * np.exp(-2.0 * s)))
+def strains_at_octaves(setup: Setup, softened: Softened, u: Array, velocity: Vector) -> StrainsAtDepth:
+    """Return the strains of the octaves of softened rubber on one grid, as `strains_of`; collective."""
+    octave = softened.octave(np.hypot(*wavenumbers(setup.fft, setup.size)))
+    return strains_of(setup, u, velocity, depths_between(*ends_of(setup)), octave, len(softened.strains))
