@@ -41,7 +41,8 @@ class Rung:
     `Cascade.climb` including finer bands); highest pressure [Pa]; `weights` of the rungs of the next finer band, and
     the share of the load above them; power [W/m^2] lost in each branch; S_j and g of its heat (`band_heat`), one 0
     without `thermal`; squares of the strain of its waves at all depths and
-    their weights in its strain (`effects.softening.strain`), 0 without `softening`; relative errors of friction and area by solver and grid; residual, and operator calls.
+    their weights in its strain (`effects.softening.strain`), 0 without `softening`; relative errors of friction and
+    area by solver and grid; residual, and operator calls.
     """
 
     pressure: float

@@ -62,8 +62,8 @@ class HalfSpace:
     With `free`, nothing surrounds the box, and the coefficients are Love's; with `repeats_along_x` the box is
     periodic along x only (`physics.strip`). Otherwise the box is periodic, with the `kernel`. `fft` parameters of
     methods are transforms of maps; operators compute in their precision, and symbols have their shape, or the shape
-    of the requested rows. A free half space makes its own padded transform for each operator. `factors` of storage and loss
-    modulus at wavenumbers, if any, are those of a body in steady sliding that is not linear.
+    of the requested rows. A free half space makes its own padded transform for each operator. `factors` multiply the
+    storage and the loss modulus of waves in steady sliding, by wavenumber; None for a linear body.
     """
 
     size: Vector
@@ -239,9 +239,9 @@ class HalfSpace:
         return np.asarray(qx * velocity[0] + qy * velocity[1])
 
     def sliding_modulus(self, fft: FFT, velocity: Vector, prony: Prony, rows: slice = ALL) -> Spectrum:
-        """Return G*(-q v) of each wave, times `factors`; at a Nyquist wavenumber, which has two signs, the mean of both.
-        The result broadcasts to the rows of a spectrum: if the surface slides along x, all rows are equal without
-        factors."""
+        """Return G*(-q v) of each wave, times `factors`; at a Nyquist wavenumber, which has two signs, the mean of
+        both. The result broadcasts to the rows of a spectrum: without factors all rows are equal if the surface slides
+        along x."""
         found = self._linear_modulus(fft, velocity, prony, rows if velocity[1] else slice(0, 1))
         if self.factors is None:
             return found

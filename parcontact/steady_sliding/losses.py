@@ -35,7 +35,7 @@ def branch_powers(setup: Setup, contact: SteadyContact, velocity: Vector) -> Arr
         waves = np.divide(waves, compliance, out=np.zeros_like(waves), where=compliance > 0.0)
         q = np.hypot(*wavenumbers(fft, grid.size, rows))
         if half_space.factors is not None:
-            waves *= half_space.factors(q)[1]
+            waves *= half_space.factors(q * setup.units.length)[1]
         octave = np.floor(np.log2(np.maximum(q * longest / (2 * np.pi), 1.0) * (1 + ROUNDING))).astype(np.int64)
         for branch, modulus, tau in zip(powers, prony.moduli, prony.relaxation_times, strict=True):
             loss = waves * omega * modulus * omega * tau / (1.0 + (omega * tau) ** 2)

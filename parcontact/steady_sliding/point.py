@@ -23,8 +23,8 @@ class Point:
     count applications on the finest grid; `sets` is 0 if projected steps sufficed. `dissipated` is the power [W] of
     each branch (empty for a free scene, whose wake continues outside the box). `flash` has the temperatures of the
     contact, None without `thermal`. With feedback, found in `rounds`, the shift factor is that of the flash
-    temperature, and `friction_cold` is friction without feedback. `strain_amplitude` is the strain that softens the rubber,
-    NaN without `softening`.
+    temperature, and `friction_cold` is friction without feedback. `strain_amplitude` is the strain that softens the
+    rubber, NaN without `softening`.
     """
 
     velocity: Vector

@@ -43,14 +43,15 @@ def mixed(found: ArrayLike, before: ArrayLike) -> Array:
 
 
 def settle(first: Softened, solve: Callable[[Softened], Round], accuracy: float) -> None:
-    """Solve rounds until friction changes by less than SHARE of `accuracy`. Raises RunError if it does not settle."""
+    """Solve rounds until friction changes by less than SHARE of `accuracy`, or factors do not change. Raises RunError
+    if friction does not settle."""
     softened, last = first, math.nan
     for _ in range(MOST_ROUNDS):
         found = solve(softened)
         change = abs(found.friction - last) / found.friction if found.friction > 0.0 else 0.0
-        if change <= SHARE * accuracy:
+        following = replace(softened, strains=tuple(mixed(found.strains, softened.strains).tolist()))
+        if change <= SHARE * accuracy or following.same_factors(softened):
             return
-        strains = tuple(mixed(found.strains, softened.strains).tolist())
-        softened, last = replace(softened, strains=strains), found.friction
+        softened, last = following, found.friction
     sentence = f"the strain that softens the rubber did not settle in {MOST_ROUNDS} rounds: friction changes by"
     raise RunError(f"{sentence} {100 * change:.2g} % in the last one")

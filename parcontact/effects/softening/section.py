@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any, ClassVar
 
 from pydantic import Field
 
 from ...job.sections.part import Part, Rule
-from ...job.sections.quantities import Number, Positive
+from ...job.sections.quantities import Positive
 from ...job.text.fault import Fault
 from .strain_table import StrainTable
 
@@ -20,7 +21,7 @@ def _rising(table: tuple[Any, ...] | None) -> Iterator[Fault]:
     if table is None or any(row is None or None in row for row in table):
         return
     strains = [row[0] for row in table]
-    if len(strains) < 2 or any(b <= a for a, b in zip(strains, strains[1:], strict=False)):
+    if len(strains) < 2 or any(b <= a for a, b in pairwise(strains)):
         yield Fault("must be at least two rows [strain, f, g] with rising strains [-]", ("table",))
 
 
@@ -49,7 +50,7 @@ def only_in_steady_sliding(softening: Softening | None, history: Any, initial: A
         )
         yield Fault(f"{sentence} Prony series; leave out the history and give steady.pressures", ("history",))
     if initial.state == "steady":
-        yield Fault("cannot be used with softening: softened moduli are no Prony series", ("initial",))
+        yield Fault("cannot be used with softening, as softened moduli are no Prony series", ("initial",))
 
 
 def on_a_periodic_half_space(softening: Softening | None, grid: Any, body: Any) -> Iterator[Fault]:

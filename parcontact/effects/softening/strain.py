@@ -5,12 +5,12 @@ the depth z by a tensor e that turns with the constant magnitude
 
     gamma(z) = sqrt(2 e:e) = 2 q A (q z) exp(-q z).                                                               (1)
 
-The strain is local: it counts where power is dissipated. With the power d(x, z) dissipated by waves of the displacement,
+The strain is local: it counts where power is dissipated. With the dissipated power d(x, z) of a map of displacements,
 
     S(z) = <d gamma^2>/<d>/R(z),                                                                                  (2)
 
-where R is the ratio <d gamma^2>/(<d> <gamma^2>) of waves with the same amplitudes and independent phases. In full contact
-S is the sum of gamma^2 over all waves. The strain of a wave is a mean over depth, weighted by its dissipation,
+where R is the ratio <d gamma^2>/(<d> <gamma^2>) of waves with the same amplitudes and independent phases. In full
+contact S is the sum of gamma^2 over all waves. The strain of a wave is a mean over depth, weighted by its dissipation,
 
     gamma_q^2 = int 4 q^3 z^2 exp(-2 q z) S(z) dz,                                                                (3)
 
@@ -98,7 +98,7 @@ def _continued(depths: Array, there: NDArray[np.int64], found: Array) -> Array:
 def _weights(
     setup: Setup, power: Array, q: Array, depths: Array, octave: NDArray[np.int64], count: int
 ) -> tuple[Array, Array]:
-    """Return the weights of S(z) in the strain of each octave, averaged over the `power` of its waves, and its power."""
+    """Return the weights of S(z) in the strain of each octave, averaged over the `power` of waves, and its power."""
     step = math.log(depths[1] / depths[0])  # of the trapezoidal rule in ln z
     sums = [np.bincount(octave.ravel(), power.ravel(), count)]
     for z in depths:

@@ -47,6 +47,11 @@ class Softened:
         ratio = np.maximum(q * self.longest / (2.0 * np.pi), 1.0)
         return np.minimum(np.floor(np.log2(ratio * (1.0 + 1e-9))).astype(np.int64), len(self.strains) - 1)
 
+    def same_factors(self, other: "Softened") -> bool:
+        """Return True if the octaves have the factors of other strains."""
+        own, others = (self.table.factors(np.array(one.strains)) for one in (self, other))
+        return bool(np.array_equal(own, others))
+
     def factors(self, q: Array) -> tuple[Array, Array]:
         """Return f and g of waves with these wavenumbers."""
         f, g = self.table.factors(np.array(self.strains))
