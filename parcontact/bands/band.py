@@ -3,13 +3,12 @@
 import math
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from ..accuracy.observation import properties_of
 from ..effects.heat.band_heat import Warming, shares_of_depth, warming_of, waves_along_depth
-from ..effects.softening.strain import depths_between, strains_of
-from ..effects.softening.strain_table import Softened, StrainTable
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job
 from ..job.sections.height_arrays import GivenHeights
@@ -87,7 +86,7 @@ class Band:
         self._depth_waves = waves_along_depth(float(cut.edges[0]), float(cut.edges[-1]))[0]
         self.warming: Warming | None = None
         self._warmed_for: tuple[Vector, float] | None = None
-        self._depths = depths_between(float(cut.edges[0]), float(cut.edges[-1]))
+        self._edges = float(cut.edges[0]), float(cut.edges[-1])
         self._set_up(set_up(own, slab))
         self._heights = self.setup.surface.heights((0.0, 0.0), slab.empty())
 
@@ -101,9 +100,9 @@ class Band:
         """Set the temperature [deg C] of the material. Raises InputError if it has no shift."""
         self._set_up(replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature))))
 
-    def soften(self, softened: StrainTable, strain: float) -> None:
-        """Set the strain of all waves, and with it the factors of the moduli."""
-        self._set_up(replace(self.setup, factors=Softened(softened, max(self.setup.size), (strain,)).factors))
+    def soften(self, table: Any, strain: float) -> None:
+        """Set the strain of all waves, and with it the factors of the moduli by a `StrainTable`."""
+        self._set_up(replace(self.setup, factors=table.at(strain)))
 
     def slide(self, velocity: Vector, seconds: float) -> None:
         """Set the velocity [m/s] and, for heat, the time of sliding [s]."""
@@ -174,8 +173,11 @@ class Band:
         """Return the squares of strains at all depths for a displacement, and their weights."""
         if self.setup.factors is None:
             return np.zeros(1), np.zeros(1)
+        from ..effects.softening.strain import depths_between, strains_of  # of use to few
+
         setup, all_waves = self.setup, np.zeros(self.setup.fft.shape, np.int64)
-        found = strains_of(setup, u, self._velocity, self._depths / setup.units.length, all_waves, 1)
+        depths = depths_between(*self._edges) / setup.units.length
+        found = strains_of(setup, u, self._velocity, depths, all_waves, 1)
         return found.squares, found.weights[0]
 
     def _resolvent(self, gamma: float) -> Convolution:

@@ -13,11 +13,10 @@ it, and the weights w_j of `ladder`. Contacts of one pass are independent: ranks
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..effects.softening.strain_table import StrainTable
 from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.slab import Array, Slab
@@ -79,7 +78,7 @@ class Cascade:
         self.job, self.cut, self.slab, self.store = job, cut, slab, ContactStore(slab)
         self._bands: dict[tuple[int, int], Band] = {}
         self._temperatures = [math.nan] * cut.count
-        self._strains: tuple[StrainTable, list[float]] | None = None
+        self._strains: tuple[Any, list[float]] | None = None
         self.velocity: Vector = (1.0, 0.0)
         self.ladders: list[PressureLadder] = []
         self.pressure = math.nan
@@ -110,7 +109,7 @@ class Cascade:
                 band.set_temperature(temperatures[number])
         self._temperatures = list(temperatures)
 
-    def soften(self, table: StrainTable, strains: Sequence[float]) -> None:
+    def soften(self, table: Any, strains: Sequence[float]) -> None:
         """Set the strain of each band, and with it the factors of its moduli."""
         self._strains = table, list(strains)
         for (number, _), band in self._bands.items():

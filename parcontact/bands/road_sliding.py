@@ -5,6 +5,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +15,6 @@ from ..doubts import Doubt
 from ..effects.heat.band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
 from ..effects.heat.heating import describe_beyond, describe_cold_state
 from ..effects.relaxation import feeds_back, highest_temperature_of, temperature_of
-from ..effects.softening.fixed_point import SHARE, START, mixed
-from ..effects.softening.strain_table import StrainTable
 from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.slab import Array, Slab
@@ -36,6 +35,7 @@ LEAST_METHOD = 0.03  # fitted: least relative error of the method (`scripts/band
 LEAST_OF_AREA = 0.09  # fitted: the same of a small area; it falls with the open share (`scripts/band_errors.py`)
 NEARLY_ALL = 0.1  # accuracy: open area below which errors fall to 0 with it
 SURE = 2.0  # accuracy: error by the scatter of surfaces over its standard error
+ROUND_SHARE = 0.2  # accuracy: change of friction in a round of strains over the accuracy of the job
 TINY = 1e-300  # rounding: least square of a change, to avoid division by 0
 TABLE = "bands.csv"
 
@@ -100,8 +100,8 @@ class RoadSliding:
         self._results: Results = ()
         self._rises: list[float] = []
         section = job.section("softening")
-        self._table: StrainTable | None = section and section.made
-        self._strains = np.full(self.cut.count, START)
+        self._table: Any = section and section.made
+        self._strains = np.full(self.cut.count, self._table.start if section else math.nan)
 
     def doubts(self, temperatures: Sequence[float]) -> list[Doubt]:
         """Return warnings about the job."""
@@ -184,8 +184,10 @@ class RoadSliding:
         temperature above the range of the material's shift is tried.
         """
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
-        highest, place = highest_temperature_of(self.job.material), (*self._place(), cold)
-        most, enough = highest - cold, SHARE * self.job.numerics.asked.both[0]
+        warms = feeds_back(self.job)
+        highest = highest_temperature_of(self.job.material) if warms else math.inf
+        place, most = (*self._place(), cold), highest - cold if warms else math.inf
+        enough = ROUND_SHARE * self.job.numerics.asked.both[0]
         rises, last, relax, seen = np.zeros(self.cut.count), np.zeros(0), 1.0, list[tuple[float, float]]()
         for rounds in range(1, MOST_ROUNDS + 1):
             self._set_state(np.minimum(cold + rises, highest))
@@ -204,7 +206,7 @@ class RoadSliding:
                 relax = float(np.clip(-relax * (last @ change) / max(change @ change, TINY), 0.1, 1.0))
             rises, last = np.clip(rises + relax * over, 0.0, most), over
             if self._table:
-                self._strains = mixed(self._strains_of(results), self._strains)
+                self._strains = self._table.mixed(self._strains_of(results), self._strains)
         raise RunError(
             f"{describe_cold_state(*place)}: temperatures and strains of bands did not settle in {MOST_ROUNDS} rounds. "
             "Try feedback: none"

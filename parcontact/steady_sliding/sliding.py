@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,6 @@ from ..doubts import Doubt
 from ..effects.heat.flash import Flash
 from ..effects.heat.heating import Feedback, describe_cold_state, find_temperatures
 from ..effects.relaxation import highest_temperature_of, temperature_of
-from ..effects.softening.fixed_point import START, Round, settle
-from ..effects.softening.strain import strains_at_octaves
-from ..effects.softening.strain_table import Softened
 from ..errors import InputError, RunError
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
@@ -31,8 +29,8 @@ from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
 from ..solve.precision import reachable_certificate
 from ..solve.preconditioner.extension import pairs_for
-from .losses import branch_powers, count_octaves
-from .point import Point, in_rounds
+from .losses import branch_powers
+from .point import Point
 from .stiffness import loses_most, soft_stripes, stiffer_lines
 
 COARSE_TOLERANCE = 0.02  # tuning: tolerance on the certificate on all grids but the finest
@@ -75,8 +73,7 @@ class SteadySliding:
         self._speed = self._pressure = 0.0  # speed times shift factor, on which a state depends
         self.temperature, self._own_temperature = math.nan, temperature_of(setup.job.material)
         self._feedback = Feedback()
-        section = setup.job.section("softening")
-        self.softened = section and Softened(section.made, max(setup.size), (START,) * count_octaves(setup))
+        self.loops = [make(setup) for make in setup.job.asked("steady_loop")]
 
     def hold(self, velocity: Vector, sets: bool) -> tuple[Array, SteadySolver, Convolution]:
         """Allocate what a solve at a velocity [m/s] holds on the finest grid, with or without active `sets`."""
@@ -104,7 +101,7 @@ class SteadySliding:
         """
         section = self.setup.job.section("thermal")
         if section is None or section.feedback == "none":
-            return self._soften(velocity, pressure)
+            return self._settle(velocity, pressure)
 
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
         highest, speed = highest_temperature_of(self.setup.job.material), math.hypot(*velocity)
@@ -115,31 +112,20 @@ class SteadySliding:
             except InputError as error:
                 place = describe_cold_state(speed, pressure, cold)
                 raise RunError(f"{place}: no material at the flash temperature: {error}") from None
-            return self._soften(velocity, pressure)
+            return self._settle(velocity, pressure)
 
         tolerance = self.setup.choices.numerics.tolerance
         return self._feedback.solve_fixed_point(warmed, speed, (pressure, cold), tolerance, highest - cold)
 
-    def _soften(self, velocity: Vector, pressure: float) -> Point:
-        """Return the steady state at the temperature that was set, with the moduli at its strain."""
-        if self.softened is None:
-            return self._solve(velocity, pressure)
-        points, rounds = list[Point](), list[Round]()
-
-        def once(softened: Softened) -> Round:
-            self.softened, self.setup = softened, replace(self.setup, factors=softened.factors)
-            points.append(self._solve(velocity, pressure))
-            assert self.contact is not None
-            found = strains_at_octaves(self.setup, softened, self.contact.u, velocity)
-            strains = found.of_octaves(np.array(softened.strains))
-            rounds.append(Round(points[-1].friction, strains, found.power))
-            return rounds[-1]
-
-        settle(self.softened, once, self.setup.job.numerics.asked.both[0])
-        return replace(in_rounds(points), strain_amplitude=rounds[-1].amplitude)
+    def _settle(self, velocity: Vector, pressure: float) -> Point:
+        """Return the steady state at the temperature that was set, in the loops of all effects that have one."""
+        solve = self._solve
+        for loop in self.loops:
+            solve = partial(loop.solve, self, solve)
+        return solve(velocity, pressure)
 
     def _solve(self, velocity: Vector, pressure: float) -> Point:
-        """Return the steady state at the temperature and the strains that were set."""
+        """Return the steady state at the temperature and with the factors of moduli that were set."""
         began, calls, speed = time.perf_counter(), 0.0, math.hypot(*velocity)
         what, factor = f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa", self.setup.choices.time_factor
         for start, solver in self._starts(velocity, pressure):

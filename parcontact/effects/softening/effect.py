@@ -17,6 +17,13 @@ class SofteningEffect(Effect[None]):
     rules: ClassVar[tuple[Rule, ...]] = RULES
 
     @staticmethod
+    def steady_loop(setup: Any) -> Any:
+        """Return the fixed point of strains, a loop around each steady state on one grid."""
+        from .fixed_point import StrainLoop  # what solves is not loaded to check a job
+
+        return StrainLoop(setup)
+
+    @staticmethod
     def decide(job: Any) -> Decision:
         section: Softening | None = job.section("softening")
         if section is None:

@@ -7,16 +7,20 @@ power mean, `gamma <- gamma_new^0.7 gamma^0.3`, until friction changes by less t
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...errors import RunError
 from ...parallel.slab import Array
+from ...scene import Setup
+from ...steady_sliding.losses import count_octaves
+from ...steady_sliding.point import Point, in_rounds
+from .strain import strains_at_octaves
 from .strain_table import Softened
 
-START = 0.02  # tuning: strain of the first round
-MIXED = 0.7  # tuning: exponent of the new strain in the next one
+Vector = tuple[float, float]
+
 SHARE = 0.2  # accuracy: allowed change of friction in a round over the accuracy of the job
 MOST_ROUNDS = 40  # tuning: limit on rounds
 
@@ -36,12 +40,6 @@ class Round:
         return math.sqrt(float(self.power @ self.strains**2) / whole) if whole > 0.0 else math.nan
 
 
-def mixed(found: ArrayLike, before: ArrayLike) -> Array:
-    """Return the strains of the next round; a strain that was not found (NaN, without power) stays."""
-    found, before = np.asarray(found, float), np.asarray(before, float)
-    return np.where(found > 0.0, found**MIXED * before ** (1.0 - MIXED), before)
-
-
 def settle(first: Softened, solve: Callable[[Softened], Round], accuracy: float) -> None:
     """Solve rounds until friction changes by less than SHARE of `accuracy`, or factors do not change. Raises RunError
     if friction does not settle."""
@@ -49,9 +47,33 @@ def settle(first: Softened, solve: Callable[[Softened], Round], accuracy: float)
     for _ in range(MOST_ROUNDS):
         found = solve(softened)
         change = abs(found.friction - last) / found.friction if found.friction > 0.0 else 0.0
-        following = replace(softened, strains=tuple(mixed(found.strains, softened.strains).tolist()))
+        following = replace(softened, strains=tuple(softened.table.mixed(found.strains, softened.strains).tolist()))
         if change <= SHARE * accuracy or following.same_factors(softened):
             return
         softened, last = following, found.friction
     sentence = f"the strain that softens the rubber did not settle in {MOST_ROUNDS} rounds: friction changes by"
     raise RunError(f"{sentence} {100 * change:.2g} % in the last one")
+
+
+class StrainLoop:
+    """The fixed point of the strains of the octaves on one grid; the next state starts from those of the last."""
+
+    def __init__(self, setup: Setup) -> None:
+        section = setup.job.section("softening")
+        self.softened = Softened(section.made, max(setup.size), (section.made.start,) * count_octaves(setup))
+
+    def solve(self, sliding: Any, solve: Callable[[Vector, float], Point], velocity: Vector, pressure: float) -> Point:
+        """Return the steady state with the moduli at its strain; collective. `solve` solves one with the `setup` of
+        `sliding`, a `steady_sliding.sliding.SteadySliding`. Raises RunError."""
+        points, rounds = list[Point](), list[Round]()
+
+        def once(softened: Softened) -> Round:
+            self.softened, sliding.setup = softened, replace(sliding.setup, factors=softened.factors)
+            points.append(solve(velocity, pressure))
+            found = strains_at_octaves(sliding.setup, softened, sliding.contact.u, velocity)
+            strains = found.of_octaves(np.array(softened.strains))
+            rounds.append(Round(points[-1].friction, strains, found.power))
+            return rounds[-1]
+
+        settle(self.softened, once, sliding.setup.job.numerics.asked.both[0])
+        return replace(in_rounds(points), strain_amplitude=rounds[-1].amplitude)

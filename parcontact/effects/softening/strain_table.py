@@ -4,17 +4,24 @@ The softened body is equivalent linear, `G*(omega, gamma) = f(gamma) G'(omega) +
 from a sweep of the strain and depend on gamma alone.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...parallel.slab import Array
+
+MIXED = 0.7  # tuning: exponent of the new strain in that of the next round
 
 
 @dataclass(frozen=True)
 class StrainTable:
     """Factors `storage` (f) and `loss` (g) [-] at rising amplitudes of the shear `strain` [-]; between them they are
     linear in the logarithm of the strain, outside they have the values of the ends."""
+
+    start: ClassVar[float] = 0.02  # tuning: strain of the first round of a fixed point
 
     strain: tuple[float, ...]
     storage: tuple[float, ...]
@@ -25,6 +32,16 @@ class StrainTable:
         place = np.log(strain)
         known = np.log(self.strain)
         return np.interp(place, known, self.storage), np.interp(place, known, self.loss)
+
+    @staticmethod
+    def mixed(found: ArrayLike, before: ArrayLike) -> Array:
+        """Return the strains of the next round of a fixed point; a strain that was not found (NaN or 0) stays."""
+        new, old = np.asarray(found, float), np.asarray(before, float)
+        return np.where(new > 0.0, new**MIXED * old ** (1.0 - MIXED), old)
+
+    def at(self, strain: float) -> Callable[[Array], tuple[Array, Array]]:
+        """Return the factors of all waves at one strain, as a function of their wavenumbers."""
+        return Softened(self, 1.0, (strain,)).factors
 
     def reaches(self, strain: float) -> bool:
         """Return True if a strain is within the table."""

@@ -55,8 +55,8 @@ def wave(slope: float, table: list[list[float]] | None, **changes: Any) -> jobs.
 def solved(job: jobs.Job, start: float | None = None, comm: MPI.Intracomm = MPI.COMM_SELF) -> Point:
     sliding = SteadySliding(scene.set_up(job, Slab(comm, *job.grid.points)))
     if start is not None:
-        assert sliding.softened is not None
-        sliding.softened = replace(sliding.softened, strains=(start,) * len(sliding.softened.strains))
+        (loop,) = sliding.loops
+        loop.softened = replace(loop.softened, strains=(start,) * len(loop.softened.strains))
     assert job.steady is not None
     assert job.steady.pressures is not None
     return sliding.solve((SPEED, 0.0), job.steady.pressures[0])
