@@ -20,7 +20,8 @@ from ..scene import Setup, choices, set_up
 from ..solve import kernels
 from ..solve.constraint import NonNegative
 from ..solve.interface_law import InterfaceLaw
-from ..solve.nonsymmetric.splitting import Splitting, step_for
+from ..solve.nonsymmetric.judge import Judge
+from ..solve.nonsymmetric.splitting import Splitting
 from ..solve.problem import MeanPressure
 from ..steady_sliding.losses import branch_powers
 from ..steady_sliding.sliding import judge_state, tolerance_of
@@ -109,10 +110,8 @@ class Band:
         if velocity != self._velocity:
             body, moved = self.setup.half_space, (self.setup.fft, self.setup.in_units(velocity), self.setup.prony)
             self.operator: Convolution = body.sliding_operator(*moved)
-            pressure = body.sliding_inverse(*moved).apply(self._heights, self.setup.slab.empty())
-            self._full = float(np.std(pressure))
-            sizes = np.abs(np.concatenate([np.abs(part).ravel() for part in self.operator.symbols]))
-            self._stiffest, self._softest = (sizes[sizes > 0.0].min(), sizes.max()) * np.full(2, self.setup.slab.points)
+            self._inverse = body.sliding_inverse(*moved)
+            self._full = float(np.std(self._inverse.apply(self._heights, self.setup.slab.empty())))
             section = self.setup.job.section("thermal")
             if section is not None and self._warmed_for != (velocity, seconds):
                 self.warming = warming_of(self.setup, section, seconds, velocity, self._depth_waves)
@@ -129,10 +128,13 @@ class Band:
         distribution over `below`, the ladder of the next finer band. Raises RunError if it is not found."""
         setup, velocity, units = self.setup, self._velocity, self.setup.units
         mean = pressure / units.pressure
-        gamma = step_for(self._stiffest, self._softest, mean / self._full)
-        what = setup.height / units.height, tolerance_of(setup.choices.numerics.tolerance), MOST_STEPS
-        solver = Splitting(setup.slab, self.operator, self._resolvent, *what)
-        contact = solver.solve(self._heights, MeanPressure(mean), law.in_units(units.pressure, units.height), gamma)
+        judge, tolerance = (
+            Judge(setup.slab, setup.height / units.height),
+            tolerance_of(setup.choices.numerics.tolerance),
+        )
+        solver = Splitting(judge, self.operator, self._inverse, tolerance, MOST_STEPS)
+        given = MeanPressure(mean), law.in_units(units.pressure, units.height)
+        contact = solver.solve(self._heights, *given, setup.slab.zeros())
         if contact.failure:
             raise RunError(f"a band of {max(setup.grid.size):.3g} m under {pressure:.3g} Pa {contact.failure}")
         seen = contact.u, self._heights, contact.d, NonNegative().touches(contact.p)
@@ -179,9 +181,6 @@ class Band:
         depths = depths_between(*self._edges) / setup.units.length
         found = strains_of(setup, u, self._velocity, depths, all_waves, 1)
         return found.squares, found.weights[0]
-
-    def _resolvent(self, gamma: float) -> Convolution:
-        return self.operator.mapped(lambda symbol: 1.0 / (1.0 + gamma * symbol), self.setup.fft.complex)
 
 
 def _make_waves(cut: Cut, number: int, seed: int, fft: FFT, side: float) -> Spectrum:

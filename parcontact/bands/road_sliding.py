@@ -319,7 +319,7 @@ class RoadSliding:
         factor = self.setup.choices.time_factor
         errors = self._errors(outcome, friction)
         return Point(
-            *(velocity, pressure, self.temperature, factor, measures, friction, errors, certificate, calls, 0, seconds),
+            *(velocity, pressure, self.temperature, factor, measures, friction, errors, certificate, calls, seconds),
             tuple(powers.tolist()),
         )
 

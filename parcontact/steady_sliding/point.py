@@ -20,11 +20,10 @@ class Point:
 
     `friction` is the dissipated power over load and velocity, plus that of an interface; `errors` is its budget. The
     friction of `measures` is by the slopes of the rigid surface; the difference is a mesh error. `operator_calls`
-    count applications on the finest grid; `sets` is 0 if projected steps sufficed. `dissipated` is the power [W] of
-    each branch (empty for a free scene, whose wake continues outside the box). `flash` has the temperatures of the
-    contact, None without `thermal`. With feedback, found in `rounds`, the shift factor is that of the flash
-    temperature, and `friction_cold` is friction without feedback. `strain_amplitude` is the strain that softens the
-    rubber, NaN without `softening`.
+    count applications on the finest grid. `dissipated` is the power [W] of each branch (empty for a free scene, whose
+    wake continues outside the box). `flash` has the temperatures of the contact, None without `thermal`. With
+    feedback, found in `rounds`, the shift factor is that of the flash temperature, and `friction_cold` is friction
+    without feedback. `strain_amplitude` is the strain that softens the rubber, NaN without `softening`.
     """
 
     velocity: Vector
@@ -36,7 +35,6 @@ class Point:
     errors: ErrorBudget
     certificate: Certificate
     operator_calls: float
-    sets: int
     seconds: float
     dissipated: tuple[float, ...]
     flash: Flash | None = None
