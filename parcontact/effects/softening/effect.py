@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 from ...job.sections.part import Part, Rule
@@ -22,6 +23,12 @@ class SofteningEffect(Effect[None]):
         from .fixed_point import StrainLoop  # what solves is not loaded to check a job
 
         return StrainLoop(setup)
+
+    @staticmethod
+    def facts(job: Any) -> Iterator[str]:
+        """Yield a sentence on the strain at which moduli are those of the material."""
+        if text := job.section("softening").fact:
+            yield text
 
     @staticmethod
     def decide(job: Any) -> Decision:

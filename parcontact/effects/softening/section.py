@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any, ClassVar
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field
+from pydantic import AfterValidator, Field, PrivateAttr
 
-from ...job.sections.part import Part, Rule
+from ...errors import InputError
+from ...job.sections.part import Part, Rule, existing_file
 from ...job.sections.quantities import Positive
-from ...job.text.fault import Fault
+from ...job.text.fault import Fault, refuse
 from .strain_table import StrainTable
+from .sweep_file import read_sweep
 
 Row = tuple[Positive, Positive, Positive]
 LEAST_POISSON = 0.45  # physics: Poisson's ratio from which the strain of an incompressible body holds to 10 %
@@ -25,19 +28,49 @@ def _rising(table: tuple[Any, ...] | None) -> Iterator[Fault]:
         yield Fault("must be at least two rows [strain, f, g] with rising strains [-]", ("table",))
 
 
+def _of_a_file(path: Path | None, reference: float | None) -> Iterator[Fault]:
+    if path is None and reference is not None:
+        yield Fault(
+            "is for the path of a strain sweep; factors of a table are given as they are", ("reference_strain",)
+        )
+
+
 class Softening(Part):
     """Factors of the storage and the loss modulus over the amplitude of the shear strain."""
 
     label: ClassVar[str] = "softening"
-    table: tuple[Row, ...] = Field(description="a list of rows [strain, f, g]: factors of G' and G'' at an amplitude")
+    table: tuple[Row, ...] | None = Field(
+        default=None, description="a list of rows [strain, f, g], factors of G' and G''"
+    )
+    path: Annotated[Path, AfterValidator(existing_file)] | None = Field(
+        default=None, description="the path of a strain sweep with the columns strain, f, g or strain and moduli"
+    )
+    reference_strain: Positive | None = Field(default=None, description="a positive strain [-] of the sweep")
 
-    rules = (Rule(("table",), _rising),)
+    one_of = (("table", "path"),)
+    rules = (Rule(("table",), _rising), Rule(("path", "reference_strain"), _of_a_file))
+
+    _made: tuple[StrainTable, str] = PrivateAttr()
+
+    def model_post_init(self, context: Any) -> None:
+        if self.table is not None:
+            self._made = StrainTable(*zip(*self.table, strict=True)), ""
+            return
+        assert self.path is not None
+        try:
+            self._made = read_sweep(self.path, self.reference_strain)
+        except InputError as error:
+            refuse(Fault(f"cannot be read: {error}", ("path",)))
 
     @property
     def made(self) -> StrainTable:
         """Return the factors over the strain."""
-        strain, storage, loss = zip(*self.table, strict=True)
-        return StrainTable(strain, storage, loss)
+        return self._made[0]
+
+    @property
+    def fact(self) -> str:
+        """Return a sentence on the strain at which the factors are 1; '' for given factors."""
+        return self._made[1]
 
 
 def only_in_steady_sliding(softening: Softening | None, history: Any, initial: Any) -> Iterator[Fault]:
