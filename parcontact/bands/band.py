@@ -1,14 +1,15 @@
 """One band of the spectrum on its own grid: a surface with its waves, and its steady states under many pressures."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..accuracy.observation import properties_of
-from ..effects.heat.band_heat import Warming, shares_of_depth, warming_of, waves_along_depth
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job
 from ..job.sections.height_arrays import GivenHeights
@@ -28,6 +29,9 @@ from ..steady_sliding.sliding import judge_state, tolerance_of
 from .choice import Cut
 from .ladder import PressureLadder
 
+if TYPE_CHECKING:  # found only for jobs that ask for it
+    from ..effects.heat.bands import Warming
+
 PARTS = 6  # accuracy: parts of a cell of wavenumbers, along each side, for sums of the spectrum
 MOST_STEPS = 20000  # tuning: limit on the steps of the splitting for one contact
 Vector = tuple[float, float]
@@ -39,10 +43,10 @@ class Rung:
 
     Friction of its waves by energy and by slopes [-]; area as a share, counted and corrected; approach [m] (in
     `Cascade.climb` including finer bands); highest pressure [Pa]; `weights` of the rungs of the next finer band, and
-    the share of the load above them; power [W/m^2] lost in each branch; S_j and g of its heat (`band_heat`), one 0
-    without `thermal`; squares of the strain of its waves at all depths and
-    their weights in its strain (`effects.softening.strain`), 0 without `softening`; relative errors of friction and
-    area by solver and grid; residual, and operator calls.
+    the share of the load above them; power [W/m^2] lost in each branch; S_j and g of its heat (`heat.bands`), one 0
+    without `thermal`; squares of the strain of its waves at all depths and their weights in its strain
+    (`softening.strain`), one 0 without `softening`; relative errors of friction and area by solver and grid; residual,
+    and operator calls.
     """
 
     pressure: float
@@ -84,10 +88,9 @@ class Band:
         slab = Slab.alone(*grid.points)
         surface = (HeightArray(heights=GivenHeights(np.asarray(heights))),)
         own = job.model_copy(update={"grid": grid, "surface": surface, "bands": None})
-        self._depth_waves = waves_along_depth(float(cut.edges[0]), float(cut.edges[-1]))[0]
+        self._wavenumbers = float(cut.edges[0]), float(cut.edges[-1])  # of all bands
         self.warming: Warming | None = None
         self._warmed_for: tuple[Vector, float] | None = None
-        self._edges = float(cut.edges[0]), float(cut.edges[-1])
         self._set_up(set_up(own, slab))
         self._heights = self.setup.surface.heights((0.0, 0.0), slab.empty())
 
@@ -114,7 +117,10 @@ class Band:
             self._full = float(np.std(self._inverse.apply(self._heights, self.setup.slab.empty())))
             section = self.setup.job.section("thermal")
             if section is not None and self._warmed_for != (velocity, seconds):
-                self.warming = warming_of(self.setup, section, seconds, velocity, self._depth_waves)
+                from ..effects.heat.bands import warming_of, waves_along_depth
+
+                waves, _ = waves_along_depth(*self._wavenumbers)
+                self.warming = warming_of(self.setup, section, seconds, velocity, waves)
                 self._warmed_for = velocity, seconds
             self._velocity = velocity
 
@@ -168,7 +174,10 @@ class Band:
         """Return S_j and g of the heat for a map of pressure."""
         if self.warming is None:
             return np.zeros(1), np.zeros(1)
-        shares = shares_of_depth(self.setup, pressure, self._velocity, self._depth_waves)
+        from ..effects.heat.bands import shares_of_depth, waves_along_depth
+
+        waves, _ = waves_along_depth(*self._wavenumbers)
+        shares = shares_of_depth(self.setup, pressure, self._velocity, waves)
         return self.warming.apply(self.setup, pressure), shares
 
     def _strains_of(self, u: Array) -> tuple[Array, Array]:
@@ -178,7 +187,7 @@ class Band:
         from ..effects.softening.strain import depths_between, strains_of  # of use to few
 
         setup, all_waves = self.setup, np.zeros(self.setup.fft.shape, np.int64)
-        depths = depths_between(*self._edges) / setup.units.length
+        depths = depths_between(*self._wavenumbers) / setup.units.length
         found = strains_of(setup, u, self._velocity, depths, all_waves, 1)
         return found.squares, found.weights[0]
 

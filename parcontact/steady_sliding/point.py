@@ -1,14 +1,19 @@
 """A steady state as data: its parameters, its measures, and its cost."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from ..accuracy.budget import ErrorBudget
 from ..accuracy.constants import FLASH
-from ..effects.heat.flash import Flash
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate
+
+if TYPE_CHECKING:  # found only for jobs that ask for it
+    from ..effects.heat.flash import Flash
 
 Vector = tuple[float, float]
 

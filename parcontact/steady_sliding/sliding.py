@@ -1,20 +1,20 @@
 """Steady sliding of a job's surface, solved directly: points of a friction curve, and starts of marches."""
 
+from __future__ import annotations
+
 import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..accuracy.budget import ErrorBudget, estimate_steady
 from ..accuracy.observation import RunProperties, StepObservation, properties_of
 from ..doubts import Doubt
-from ..effects.heat.flash import Flash
-from ..effects.heat.heating import Feedback, describe_cold_state, find_temperatures
 from ..effects.relaxation import highest_temperature_of, temperature_of
 from ..errors import InputError, RunError
 from ..parallel.fft import FFT
@@ -34,6 +34,10 @@ from ..solve.precision import reachable_certificate
 from ..solve.preconditioner.extension import pairs_for
 from .losses import branch_powers
 from .point import Point
+
+if TYPE_CHECKING:  # found only for jobs that ask for it
+    from ..effects.heat.flash import Flash
+    from ..effects.heat.steady import Feedback
 
 COARSE_TOLERANCE = 0.04  # tuning: tolerance on the certificate on all grids but the finest
 # accuracy: factors on tolerances above LOOSE, in periodic and in free boxes, by `scripts/random_steady.py --exact`:
@@ -74,8 +78,8 @@ class SteadySliding:
         self._rise: Array | None = None
         self._speed = self._pressure = 0.0  # speed times shift factor, on which a state depends
         self.temperature, self._own_temperature = math.nan, temperature_of(setup.job.material)
-        self._feedback = Feedback()
         self.loops = [make(setup) for make in setup.job.asked("steady_loop")]
+        self._feedback: Feedback | None = None
 
     def hold(self, velocity: Vector) -> tuple[Any, ...]:
         """Allocate and return all that a solve at a velocity [m/s] may hold on the finest grid."""
@@ -102,7 +106,9 @@ class SteadySliding:
         section = self.setup.job.section("thermal")
         if section is None or section.feedback == "none":
             return self._settle(velocity, pressure)
+        from ..effects.heat.steady import Feedback, describe_cold_state
 
+        self._feedback = self._feedback or Feedback()
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
         highest, speed = highest_temperature_of(self.setup.job.material), math.hypot(*velocity)
 
@@ -165,6 +171,8 @@ class SteadySliding:
         section = self.setup.job.section("thermal")
         if section is None:
             return None
+        from ..effects.heat.steady import find_temperatures
+
         touching = NonNegative().touches(contact.p)
         flash, self._rise = find_temperatures(self.setup, section, contact.p, touching, measures, friction, velocity)
         return flash
