@@ -31,6 +31,13 @@ class SofteningEffect(Effect[None]):
             yield text
 
     @staticmethod
+    def describe_bands(job: Any, cut: Any) -> Iterator[str]:
+        """Yield a sentence on the strains of bands in full contact."""
+        from .full_contact import describe_bands
+
+        return describe_bands(job, cut)
+
+    @staticmethod
     def decide(job: Any) -> Decision:
         section: Softening | None = job.section("softening")
         if section is None:

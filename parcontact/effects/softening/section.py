@@ -56,7 +56,8 @@ class Softening(Part):
         if self.table is not None:
             self._made = StrainTable(*zip(*self.table, strict=True)), ""
             return
-        assert self.path is not None
+        if self.path is None:
+            return  # `one_of` reports it
         try:
             self._made = read_sweep(self.path, self.reference_strain)
         except InputError as error:

@@ -10,6 +10,7 @@ FACTORS = ("f", "g")  # of the storage and of the loss modulus
 PAIRS = (("G_stor", "G_loss"), ("E_stor", "E_loss"), ("*_stor", "*_loss"))
 HELD = {"f": "frequency", "omega": "frequency", "T": "temperature"}  # of which a sweep has one
 NAMES = {"strain", *FACTORS, "omega", "T", *(name for pair in PAIRS for name in pair)}
+PLAIN = {"strain", *FACTORS}  # columns that need no unit
 UNITS = {"": 1.0, "%": 0.01}
 EXAMPLE = "strain,f,g or strain[%],G'[MPa],G''[MPa]"
 
@@ -20,7 +21,7 @@ def read_sweep(path: Path, reference: float | None) -> tuple[StrainTable, str]:
     Moduli are divided by those at the strain `reference` [-], by default the first row. Raises InputError with the file
     and what was expected.
     """
-    table = read_named_columns(path, f"a strain sweep ({EXAMPLE})", EXAMPLE, NAMES, _is_header)
+    table = read_named_columns(path, f"a strain sweep ({EXAMPLE})", EXAMPLE, NAMES, _is_header, PLAIN)
     pair = next((pair for pair in (FACTORS, *PAIRS) if {"strain", *pair} <= table.columns.keys()), None)
     if pair is None or len(table.lines) < 2:
         raise InputError(f"{path}: a strain sweep with at least two rows was expected ({EXAMPLE})")

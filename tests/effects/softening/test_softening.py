@@ -5,7 +5,9 @@ depth (homogeneous body 7e-4 off), for `f = 0.1 + 0.9/(1 + x^1.2)`, `g = 0.2 + 1
 """
 
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -220,9 +222,67 @@ def test_partial_contact_in_bands_and_on_one_grid() -> None:
         ({"material": {**RUBBER, "poisson": 0.3}}, "must be at least 0.45 with softening"),
         ({"softening": {"table": [[0.1, 1, 1]]}}, "at least two rows"),
         ({"softening": {"table": [[0.1, 1, 1], [0.01, 1, 1]]}}, "rising strains"),
-        ({"softening": {}}, "softening.table"),
+        ({"softening": {}}, "softening"),
+        ({"softening": {"table": TABLE, "reference_strain": 0.1}}, "is for the path of a strain sweep"),
     ],
 )
 def test_refused(changes: Json, sentence: str) -> None:
     with pytest.raises(JobError, match=sentence):
         wave(0.1, TABLE, **changes)
+
+
+SWEEPS = {
+    "factors.csv": "strain,f,g\n0.001,1,1\n0.01,0.8,1.1\n0.1,0.5,0.6\n",
+    "moduli.csv": "strain [%],G' (MPa),G'' (MPa)\n0.1,4,0.5\n1,3.2,0.55\n10,2,0.3\n",
+    "german.csv": "Dehnung\ngamma;E'/MPa;E''/MPa;f/Hz\n0,001;12;1,5;10\n0,01;9,6;1,65;10\n0,1;6;0,9;10\n",
+}
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_files_of_strain_sweeps(tmp_path: Path, name: str) -> None:
+    """Factors, moduli over a strain in per cent, and a file of an instrument with one frequency: the same table."""
+    (tmp_path / name).write_text(SWEEPS[name])
+    section = wave(0.1, None, softening={"path": str(tmp_path / name)}).section("softening")
+    assert_allclose(section.made.strain, [1e-3, 1e-2, 0.1], rtol=1e-14)
+    assert_allclose(section.made.storage, [1.0, 0.8, 0.5], rtol=1e-14)
+    assert_allclose(section.made.loss, [1.0, 1.1, 0.6], rtol=1e-14)
+    assert ("reference_strain is not given" in section.fact) == (name != "factors.csv")
+    if name != "factors.csv":
+        other = {"path": str(tmp_path / name), "reference_strain": 0.01}
+        assert_allclose(
+            wave(0.1, None, softening=other).section("softening").made.storage, [1.25, 1.0, 0.625], rtol=1e-14
+        )
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("strain,f,g\n0.1,1,1\n", "at least two rows"),
+        ("strain,f,g\n0.1,1,1\n0.1,1,1\n", "positive and different"),
+        ("strain,G'[MPa],G''[MPa],T[C]\n0.01,1,1,20\n0.1,1,1,40\n", "has one temperature, got 2, 20 to 40"),
+        ("strain,G'[MPa],G''[MPa],f[Hz]\n0.01,1,1,1\n0.1,1,1,10\n", "has one frequency, got 2, 1 to 10 Hz"),
+        ("strain[mm],f,g\n0.01,1,1\n0.1,1,1\n", "the unit of strain must be one of"),
+    ],
+)
+def test_files_that_are_refused(tmp_path: Path, text: str, sentence: str) -> None:
+    (tmp_path / "sweep.csv").write_text(text)
+    with pytest.raises(JobError, match=sentence):
+        wave(0.1, None, softening={"path": str(tmp_path / "sweep.csv")})
+
+
+def test_strains_of_bands_in_full_contact() -> None:
+    """`check` says the strains that bands have in full contact: within 15 %, as waves of surfaces scatter."""
+    data: Json = {
+        "surface": {**ROUGH, "long_wavelength": 1e-3, "short_wavelength": 2e-5},
+        "material": {"include": "synthetic_tyre"},
+        "bands": {"samples": 1, "count": 2, "points": 128},
+        "steady": {"velocities": [1e-3], "pressures": [1e9]},
+        "numerics": {"accuracy": 0.1},
+        "softening": {"table": NONE},
+    }
+    job = jobs.load(data)
+    bands = RoadSliding(job, Slab.alone(1, 1))
+    bands.solve((1e-3, 0.0), 1e9)
+    (sentence,) = [text for text in bands.notes() if text.startswith("softening")]
+    said = [float(number) for number in re.findall(r"([\d.e-]+) \(f 1, g 1\)", sentence)]
+    assert_allclose(said, bands._strains_of(bands._results), rtol=0.15)
