@@ -23,4 +23,4 @@ def describe_bands(job: Any, cut: Any) -> Iterator[str]:
     strains = np.sqrt([np.average(square, weights=weight) for square, weight in parts])
     f, g = job.section("softening").made.factors(strains)
     each = (f"{strain:.2g} (f {a:.2g}, g {b:.2g})" for strain, a, b in zip(strains, f, g, strict=True))
-    yield f"softening: strains of the bands in full contact {', '.join(each)}; they are larger in partial contact"
+    yield f"softening: strains of the bands in full contact {', '.join(each)}"
