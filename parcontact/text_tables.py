@@ -285,7 +285,9 @@ def _header(
             "and units"
         )
     units = _split_like(texts.get(at + 1, ""), dialect, len(head))
-    return [Column(each.name, plain_unit(unit)) for each, unit in zip(head, units, strict=True)], lines[at + (at + 1 in texts)][0]
+    return [Column(each.name, plain_unit(unit)) for each, unit in zip(head, units, strict=True)], lines[
+        at + (at + 1 in texts)
+    ][0]
 
 
 def _candidates(texts: dict[int, str], dialect: Dialect, enough: Callable[[set[str]], bool]) -> dict[int, list[Column]]:

@@ -1,4 +1,4 @@
-"""Softening as an effect: its section and its decision. It acts in steady sliding only (`fixed_point`)."""
+"""Softening as an effect: its section and its decision. It acts in steady sliding only (`steady`)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class SofteningEffect(Effect[None]):
     @staticmethod
     def steady_loop(setup: Any) -> Any:
         """Return the fixed point of strains, a loop around each steady state on one grid."""
-        from .fixed_point import StrainLoop  # what solves is not loaded to check a job
+        from .steady import StrainLoop  # what solves is not loaded to check a job
 
         return StrainLoop(setup)
 

@@ -1,6 +1,7 @@
 """Strains and factors of bands in full contact, from the spectrum alone.
 
-With r = k_j/q it is `gamma_q^2 = sum_j 12 (k_j A_j)^2 r^2/(1 + r)^5`; `(k A)^2` is twice the mean square slope of a wave.
+With r = k_j/q it is `gamma_q^2 = sum_j 12 (k_j A_j)^2 r^2/(1 + r)^5`; `(k A)^2` is twice the mean square slope of a
+wave.
 """
 
 from collections.abc import Iterator

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from parcontact import job as jobs
 from parcontact import scene
 from parcontact.bands.road_sliding import RoadSliding
+from parcontact.effects.softening.steady import doubts_of_points
 from parcontact.effects.softening.strain import strains_at_octaves
 from parcontact.effects.softening.strain_table import Softened, StrainTable
 from parcontact.errors import JobError
@@ -286,3 +287,12 @@ def test_strains_of_bands_in_full_contact() -> None:
     (sentence,) = [text for text in bands.notes() if text.startswith("softening")]
     said = [float(number) for number in re.findall(r"([\d.e-]+) \(f 1, g 1\)", sentence)]
     assert_allclose(said, bands._strains_of(bands._results), rtol=0.15)
+
+
+def test_strains_outside_of_the_table_are_said(tmp_path: Path) -> None:
+    """A sweep that ends at a strain of 1 %, and a wave of 6 %."""
+    short = [row for row in TABLE if row[0] < 0.01]
+    job = wave(0.1, short)
+    (doubt,) = doubts_of_points([solved(job)], job)
+    assert "the strain is 0.061 at 1 m/s, beyond the 1e-06 to 0.00964" in str(doubt)
+    assert not list(doubts_of_points([solved(wave(0.1, TABLE))], wave(0.1, TABLE)))

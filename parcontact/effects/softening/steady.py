@@ -5,12 +5,13 @@ power mean, `gamma <- gamma_new^0.7 gamma^0.3`, until friction changes by less t
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from ...doubts import Doubt
 from ...errors import RunError
 from ...parallel.slab import Array
 from ...scene import Setup
@@ -77,3 +78,14 @@ class StrainLoop:
 
         settle(self.softened, once, sliding.setup.job.numerics.asked.both[0])
         return replace(in_rounds(points), strain_amplitude=rounds[-1].amplitude)
+
+
+def doubts_of_points(points: Sequence[Point], job: Any) -> Iterator[Doubt]:
+    """Yield a warning if strains of a curve are outside of the table."""
+    section = job.section("softening")
+    beyond = [point for point in points if section and not section.made.reaches(point.strain_amplitude)]
+    if beyond:
+        low, high = section.made.strain[0], section.made.strain[-1]
+        worst = max(beyond, key=lambda point: abs(math.log(point.strain_amplitude / math.sqrt(low * high))))
+        facts = {"strain": worst.strain_amplitude, "speed": worst.speed, "low": low, "high": high}
+        yield Doubt("strains beyond the sweep", "softening", {**facts, "count": len(beyond), "points": len(points)})
