@@ -57,7 +57,6 @@ OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of anothe
     "effects.adhesion.pull_off": "summary",
     "effects.leakage.over_time": "derived",
     "effects.softening.strain": "scene",
-    "effects.softening.steady": "steady_sliding",
 }
 
 

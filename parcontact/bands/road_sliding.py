@@ -207,8 +207,8 @@ class RoadSliding:
                 raise RunError(describe_beyond(*place, most, most + float(over[rises == most].max())))
             if last.size:
                 change = over - last
-                relax = float(np.clip(-relax * (last @ change) / max(change @ change, TINY), 0.1, 1.0))
-            rises, last = np.clip(rises + relax * over, 0.0, most), over
+                relax = float(np.clip(-relax * float(last @ change) / max(float(change @ change), TINY), 0.1, 1.0))
+            rises, last = np.asarray(np.clip(rises + relax * over, 0.0, most), float), over
             if self._table:
                 self._strains = self._table.mixed(self._strains_of(results), self._strains)
         raise RunError(

@@ -17,6 +17,7 @@ from ..accuracy.observation import RunProperties, StepObservation, properties_of
 from ..doubts import Doubt
 from ..effects.relaxation import highest_temperature_of, temperature_of
 from ..errors import InputError, RunError
+from ..job.added_sections import answers
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution
@@ -78,7 +79,7 @@ class SteadySliding:
         self._rise: Array | None = None
         self._speed = self._pressure = 0.0  # speed times shift factor, on which a state depends
         self.temperature, self._own_temperature = math.nan, temperature_of(setup.job.material)
-        self.loops = [make(setup) for make in setup.job.asked("steady_loop")]
+        self.loops = [loop for loops in answers("steady", "loops") for loop in loops(setup)]
         self._feedback: Feedback | None = None
 
     def hold(self, velocity: Vector) -> tuple[Any, ...]:

@@ -18,24 +18,10 @@ class SofteningEffect(Effect[None]):
     rules: ClassVar[tuple[Rule, ...]] = RULES
 
     @staticmethod
-    def steady_loop(setup: Any) -> Any:
-        """Return the fixed point of strains, a loop around each steady state on one grid."""
-        from .steady import StrainLoop  # what solves is not loaded to check a job
-
-        return StrainLoop(setup)
-
-    @staticmethod
     def facts(job: Any) -> Iterator[str]:
         """Yield a sentence on the strain at which moduli are those of the material."""
         if text := job.section("softening").fact:
             yield text
-
-    @staticmethod
-    def describe_bands(job: Any, cut: Any) -> Iterator[str]:
-        """Yield a sentence on the strains of bands in full contact."""
-        from .full_contact import describe_bands
-
-        return describe_bands(job, cut)
 
     @staticmethod
     def decide(job: Any) -> Decision:

@@ -80,6 +80,12 @@ class StrainLoop:
         return replace(in_rounds(points), strain_amplitude=rounds[-1].amplitude)
 
 
+def loops(setup: Setup) -> Iterator[StrainLoop]:
+    """Yield the loop around steady states of a job with softening."""
+    if setup.job.section("softening") is not None:
+        yield StrainLoop(setup)
+
+
 def doubts_of_points(points: Sequence[Point], job: Any) -> Iterator[Doubt]:
     """Yield a warning if strains of a curve are outside of the table."""
     section = job.section("softening")

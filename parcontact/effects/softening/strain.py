@@ -22,6 +22,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,7 +138,7 @@ def _squared(setup: Setup, waves: Spectrum) -> Array:
     return total
 
 
-def _components(setup: Setup) -> Iterator[tuple[float, Array]]:
+def _components(setup: Setup) -> Iterator[tuple[float, NDArray[Any]]]:
     """Yield the components of the strain: their weights in `2 e:e`, and symbols."""
     qx, qy = wavenumbers(setup.fft, setup.size)
     q = np.hypot(qx, qy)
