@@ -56,6 +56,7 @@ OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of anothe
     **dict.fromkeys((f"effects.adhesion.{name}" for name in ("gap_kernels", "gap_solver", "law")), "solve"),
     "effects.adhesion.pull_off": "summary",
     "effects.leakage.over_time": "derived",
+    "effects.softening.strain": "scene",
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -44,7 +44,9 @@ class Rung:
     Friction of its waves by energy and by slopes [-]; area as a share, counted and corrected; approach [m] (in
     `Cascade.climb` including finer bands); highest pressure [Pa]; `weights` of the rungs of the next finer band, and
     the share of the load above them; power [W/m^2] lost in each branch; S_j and g of its heat (`heat.bands`), one 0
-    without `thermal`; relative errors of friction and area by solver and grid; residual, and operator calls.
+    without `thermal`; squares of the strain of its waves at all depths and their weights in its strain
+    (`softening.strain`), one 0 without `softening`; relative errors of friction and area by solver and grid; residual,
+    and operator calls.
     """
 
     pressure: float
@@ -59,6 +61,8 @@ class Rung:
     powers: Array
     warming: Array
     depths: Array
+    squares: Array
+    strain_weights: Array
     errors: Array  # friction by solver and by grid, area by solver and by grid
     residual: float
     penetration: float
@@ -99,6 +103,10 @@ class Band:
     def set_temperature(self, temperature: float) -> None:
         """Set the temperature [deg C] of the material. Raises InputError if it has no shift."""
         self._set_up(replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature))))
+
+    def soften(self, table: Any, strain: float) -> None:
+        """Set the strain of all waves, and with it the factors of the moduli by a `StrainTable`."""
+        self._set_up(replace(self.setup, factors=table.at(strain)))
 
     def slide(self, velocity: Vector, seconds: float) -> None:
         """Set the velocity [m/s] and, for heat, the time of sliding [s]."""
@@ -155,6 +163,7 @@ class Band:
             above,
             branch_powers(setup, contact, velocity).sum(axis=1) / area,
             *self._heat_of(contact.p),
+            *self._strains_of(contact.u),
             np.array(parts).ravel(),
             contact.certificate.worst,
             contact.certificate.penetration,
@@ -170,6 +179,17 @@ class Band:
         waves, _ = waves_along_depth(*self._wavenumbers)
         shares = shares_of_depth(self.setup, pressure, self._velocity, waves)
         return self.warming.apply(self.setup, pressure), shares
+
+    def _strains_of(self, u: Array) -> tuple[Array, Array]:
+        """Return the squares of strains at all depths for a displacement, and their weights."""
+        if self.setup.factors is None:
+            return np.zeros(1), np.zeros(1)
+        from ..effects.softening.strain import depths_between, strains_of  # of use to few
+
+        setup, all_waves = self.setup, np.zeros(self.setup.fft.shape, np.int64)
+        depths = depths_between(*self._wavenumbers) / setup.units.length
+        found = strains_of(setup, u, self._velocity, depths, all_waves, 1)
+        return found.squares, found.weights[0]
 
 
 def _make_waves(cut: Cut, number: int, seed: int, fft: FFT, side: float) -> Spectrum:

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from ..accuracy.observation import RunProperties, StepObservation, properties_of
 from ..doubts import Doubt
 from ..effects.relaxation import highest_temperature_of, temperature_of
 from ..errors import InputError, RunError
+from ..job.added_sections import answers
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution
@@ -77,6 +79,7 @@ class SteadySliding:
         self._rise: Array | None = None
         self._speed = self._pressure = 0.0  # speed times shift factor, on which a state depends
         self.temperature, self._own_temperature = math.nan, temperature_of(setup.job.material)
+        self.loops = [loop for loops in answers("steady", "loops") for loop in loops(setup)]
         self._feedback: Feedback | None = None
 
     def hold(self, velocity: Vector) -> tuple[Any, ...]:
@@ -103,7 +106,7 @@ class SteadySliding:
         """
         section = self.setup.job.section("thermal")
         if section is None or section.feedback == "none":
-            return self._solve(velocity, pressure)
+            return self._settle(velocity, pressure)
         from ..effects.heat.steady import Feedback, describe_cold_state
 
         self._feedback = self._feedback or Feedback()
@@ -116,13 +119,20 @@ class SteadySliding:
             except InputError as error:
                 place = describe_cold_state(speed, pressure, cold)
                 raise RunError(f"{place}: no material at the flash temperature: {error}") from None
-            return self._solve(velocity, pressure)
+            return self._settle(velocity, pressure)
 
         tolerance = self.setup.choices.numerics.tolerance
         return self._feedback.solve_fixed_point(warmed, speed, (pressure, cold), tolerance, highest - cold)
 
+    def _settle(self, velocity: Vector, pressure: float) -> Point:
+        """Return the steady state at the temperature that was set, in the loops of all effects that have one."""
+        solve = self._solve
+        for loop in self.loops:
+            solve = partial(loop.solve, self, solve)
+        return solve(velocity, pressure)
+
     def _solve(self, velocity: Vector, pressure: float) -> Point:
-        """Return the steady state at the temperature that was set."""
+        """Return the steady state at the temperature and with the factors of moduli that were set."""
         began, calls, speed = time.perf_counter(), 0.0, math.hypot(*velocity)
         what, factor = f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa", self.setup.choices.time_factor
         for start in self._starts(velocity, pressure):

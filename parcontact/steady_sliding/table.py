@@ -45,6 +45,7 @@ class CurveTable:
         there = {
             "temperatures": heated,
             "interface": bool(setup.choices.shears),
+            "softening": self._job.section("softening") is not None,
             "thermal": thermal is not None,
             "feedback": thermal is not None and thermal.feedback != "none",
         }
