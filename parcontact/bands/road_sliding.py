@@ -192,7 +192,9 @@ class RoadSliding:
         highest = highest_temperature_of(self.job.material) if warms else math.inf
         place, most = (*self._place(), cold), highest - cold if warms else math.inf
         enough = ROUND_SHARE * self.job.numerics.asked.both[0]
-        rises, last, relax, seen = np.zeros(self.cut.count), np.zeros(0), 1.0, list[tuple[float, float]]()
+        rises: Array = np.zeros(self.cut.count)
+        last: Array = np.zeros(0)
+        relax, seen = 1.0, list[tuple[float, float]]()
         for rounds in range(1, MOST_ROUNDS + 1):
             self._set_state(np.minimum(cold + rises, highest))
             rungs = self._cascade.climb([0])
@@ -208,7 +210,7 @@ class RoadSliding:
             if last.size:
                 change = over - last
                 relax = float(np.clip(-relax * float(last @ change) / max(float(change @ change), TINY), 0.1, 1.0))
-            rises, last = np.asarray(np.clip(rises + relax * over, 0.0, most), float), over
+            rises, last = np.clip(rises + relax * over, 0.0, most), over
             if self._table:
                 self._strains = self._table.mixed(self._strains_of(results), self._strains)
         raise RunError(
