@@ -272,7 +272,8 @@ def leak(options: argparse.Namespace) -> int:
         raise InputError("--load total needs a fluid: give --fluid and --pressures HIGH:LOW [Pa]")
     if options.ambient is not None and not total:
         raise InputError("--ambient goes with --load total only")
-    drop = PressureDrop(options.fluid, *options.pressures, total, options.ambient) if options.fluid else None
+    high, low = options.pressures or (0.0, 0.0)
+    drop = PressureDrop(options.fluid, high, low, total, options.ambient) if options.fluid else None
     for directory in options.directories:
         lines = write_leakage(directory, options.at or "", options.over, world, drop)
         print(*lines, sep="\n", end="\n" if world.rank == 0 else "")

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
 from ...errors import InputError
@@ -70,7 +70,7 @@ class LoadCurve:
         return np.where(loads[:, None] <= self.loads[opened - 1], np.exp(logs), 0.0)
 
 
-def load_curve(loads: Sequence[float], flows: Sequence[Sequence[float]]) -> LoadCurve:
+def load_curve(loads: ArrayLike, flows: ArrayLike) -> LoadCurve:
     """Return the curve through conductivities [m^3], shape (n, m), at saved loads [Pa], of which those above 0 count.
 
     Raises InputError if K is no function of the load.
@@ -84,7 +84,8 @@ def load_curve(loads: Sequence[float], flows: Sequence[Sequence[float]]) -> Load
     same, change = np.diff(load) <= SAME * load[1:], np.diff(flow[:, 0])
     wrong = np.where(same, np.abs(change), change) > RISE * np.maximum(flow[1:, 0], flow[:-1, 0])
     if wrong.any():
-        between = span(*load[(at := int(np.argmax(wrong))) : at + 2], "Pa")
+        at = int(np.argmax(wrong))
+        between = span(float(load[at]), float(load[at + 1]), "Pa")
         raise InputError(
             f"--load total needs K as a function of the load, and K does not fall between {between}: save the gap of "
             "one loading, without unloading"

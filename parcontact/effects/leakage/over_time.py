@@ -179,7 +179,7 @@ class Gaps:
         totals = [curve.conductivity(self.drop, row["pressure"]) for curve in curves if self.drop]
         along = list(zip((found.along_x.constriction, found.along_y.constriction), totals or (0.0, 0.0), strict=True))
         wider = int(along[1] > along[0])  # where contact closes both, the direction that the fluid opens more
-        flows = self._flows(solved.of_fluid[wider][0], wider) if self.drop else ()
+        flows = self._flows(solved.of_fluid[wider][0], wider) if self.drop else (np.nan, np.nan)
         parts = tuple(zip((through[0] for through in solved.of_fluid), totals, strict=True)) if totals else ()
         return LeakInstant(
             float(self.fields.times[index]),
@@ -196,8 +196,8 @@ class Gaps:
             found.along_y.constriction,
             *solved.errors,
             *flows,
-            *(self._flows(totals[wider], wider) if totals else ()),
-            parts=parts,
+            *(self._flows(totals[wider], wider) if totals else (np.nan, np.nan)),
+            parts,
         )
 
     def _flows(self, conductivity: float, axis: int) -> tuple[float, float]:
@@ -273,9 +273,8 @@ def _load_curves(gaps: Gaps, leaks: Mapping[int, SolvedLeak]) -> tuple[LoadCurve
     """Return K over the load along x and along y; raises InputError if they give the flow of no row."""
     drop, loads = gaps.drop, [gaps.load(index) for index in gaps.shown]
     assert drop is not None
-    along_x, along_y = (
-        load_curves.load_curve(loads, [leaks[index].of_fluid[axis] for index in gaps.shown]) for axis in (0, 1)
-    )
+    along_x = load_curves.load_curve(loads, [leaks[index].of_fluid[0] for index in gaps.shown])
+    along_y = load_curves.load_curve(loads, [leaks[index].of_fluid[1] for index in gaps.shown])
     load_curves.refuse_uncovered(along_x, drop, loads)
     return along_x, along_y
 
