@@ -66,8 +66,9 @@ class LoadCurve:
         opened = int(np.count_nonzero(self.flows[:, 0]))
         if opened < 2:
             return np.where(loads[:, None] <= self.loads[0], self.flows[0], 0.0)
-        logs = PchipInterpolator(self.loads[:opened], np.log(self.flows[:opened]))(loads)
-        return np.where(loads[:, None] <= self.loads[opened - 1], np.exp(logs), 0.0)
+        last = self.loads[opened - 1]
+        logs = PchipInterpolator(self.loads[:opened], np.log(self.flows[:opened]))(np.minimum(loads, last))
+        return np.where(loads[:, None] <= last, np.exp(logs), 0.0)
 
 
 def load_curve(loads: ArrayLike, flows: ArrayLike) -> LoadCurve:

@@ -223,7 +223,7 @@ def write_leakage(
         gaps.refuse_memory(at)
     gaps.shown = comm.bcast(gaps.shown)  # a run may save more while ranks read
     leaks, drawn, maps = _solve_all(gaps, comm)
-    curves = on_root(comm, lambda: _load_curves(gaps, leaks)) if total else ()
+    curves: Sequence[LoadCurve] = on_root(comm, lambda: _load_curves(gaps, leaks)) if total else ()
     if comm.rank > 0:
         return
     bare, missing = _bare_flow(gaps)
@@ -237,8 +237,7 @@ def write_leakage(
     leakage_charts.draw_leakage(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
     yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
     yield from (text for axis in "xy" for text in _describe(rows, axis))
-    known = [k for k, row in enumerate(rows) if not total or math.isfinite(row.parts[0][1])]
-    chosen = max((k for k in known if rows[k].percolates_x + rows[k].percolates_y), default=known[-1])
+    chosen = max(range(len(rows)), key=lambda k: _tells(rows[k], k))
     yield from _describe_fluid(gaps, rows[chosen], leaks[gaps.shown[chosen]]) if drop else ()
     if drop and total:
         yield from load_curves.describe_cover(curves[0], drop, [row.pressure for row in rows], rows[chosen].pressure)
@@ -246,6 +245,13 @@ def write_leakage(
     if missing:
         yield f"share_x and share_y are left empty, as the undeformed surface cannot be made: {missing}"
     yield f"picture: {picture}"
+
+
+def _tells(row: LeakInstant, number: int) -> tuple[int, ...]:
+    """Return a key, largest for the row whose flow is described: of known flows the last one through an open gap, else
+    the last one through a gap that the fluid opens."""
+    totals = [total for _, total in row.parts]
+    return not any(map(math.isnan, totals)), bool(row.percolates_x + row.percolates_y), any(totals), number
 
 
 def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, SolvedLeak], int, list[Map]]:

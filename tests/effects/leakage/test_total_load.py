@@ -149,7 +149,7 @@ COARSE = {"points": [32, 4], "size": [LENGTH, LENGTH / 8]}
 ZENER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1.0}]}
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi(2)
 def test_what_is_refused(comm: MPI.Intracomm, shared_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Loads outside the saved range, a seal that lifts off, one instant, no fluid: exit code 2 on all ranks, and no
     table."""
