@@ -39,5 +39,8 @@ def chart(
         if narrow.any():
             thin.append(ChartLine(THIN * (not thin), at[narrow], flow[narrow], THIN_LOOK))
     looks = [style.line(number) | {"linestyle": ":"} for number in range(len(dotted))]
-    lines += [ChartLine(name, at, flow, look) for (name, flow), look in zip(dotted.items(), looks, strict=True)]
+    lines += [
+        ChartLine(name, at[flow > 0.0], flow[flow > 0.0], look)
+        for (name, flow), look in zip(dotted.items(), looks, strict=True)
+    ]
     return Chart("leakage", over, Axis("conductivity K", "m³"), lines + thin, log_x=log_x, zeros="closed")
