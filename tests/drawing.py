@@ -5,6 +5,7 @@ from pathlib import Path
 
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.text import Text
 
 from parcontact import job
@@ -66,6 +67,11 @@ def asked(*words: str | Path) -> int:
 def panels(figure: Figure) -> list[str]:
     """The y axes of all panels, without those of the colours."""
     return [axes.get_ylabel() for axes in figure.axes if axes.get_xlabel()]
+
+
+def entries(figure: Figure) -> list[str]:
+    """The entries of all legends of a figure."""
+    return [text.get_text() for legend in figure.findobj(Legend) for text in legend.get_texts()]
 
 
 def touching(figure: Figure) -> list[tuple[str, str]]:

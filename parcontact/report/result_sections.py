@@ -66,7 +66,9 @@ def describe_run(directory: Path) -> ReportSection:
         *theory_comparison.describe_theory(directory, run.job.history, run.job.grid.dx),
         theory_settings.describe_settings(directory),
     ]
-    pictures = [draw_chart(chart) for chart in histories.chart_histories(run)] + _leakage(directory)
+    found = histories.chart_histories(run)
+    unnamed = [replace(chart, stages=[("", *ends) for _, *ends in chart.stages]) for chart in found[1:]]
+    pictures = [draw_chart(chart) for chart in (*found[:1], *unnamed)] + _leakage(directory)
     return ReportSection("Results of the run", list(filter(None, sentences)), [numbers], pictures, browse_run(run))
 
 

@@ -133,7 +133,7 @@ def test_a_contact_that_sticks_is_drawn_with_its_tension(tmp_path: Path, drawn: 
     assert legend is not None
     assert len(legend.get_texts()) == 5
     drawn[0].draw_without_rendering()
-    assert legend.get_window_extent().y0 >= found["energy"].get_window_extent().y1
+    assert legend.get_window_extent().y1 <= found["energy"].get_window_extent().y0
 
 
 def test_a_cycle_of_stick_is_drawn_as_a_loop(tmp_path: Path, drawn: list[Figure]) -> None:
