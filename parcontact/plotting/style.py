@@ -1,6 +1,7 @@
 """Style of all pictures: readable at a width of 8 cm, in colours for colour-blind readers."""
 
 import textwrap
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -17,6 +18,7 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.transforms import ScaledTranslation
 
 from ..storage import files
+from ..streams import printable
 
 Panel = Callable[[Axes], None]  # draws one panel
 
@@ -64,8 +66,10 @@ MARKED = {
 
 @contextmanager
 def drawing(settings: Mapping[Any, Any] = RC) -> Iterator[None]:
-    """Draw with these settings and Matplotlib's defaults; a user's matplotlibrc is ignored."""
-    with mpl.rc_context():
+    """Draw with these settings and Matplotlib's defaults; a user's matplotlibrc is ignored. Letters that the font lacks
+    become boxes without a warning."""
+    with mpl.rc_context(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
         mpl.rcdefaults()
         mpl.rcParams.update(settings)
         yield
@@ -80,7 +84,9 @@ def save_figure(figure: Figure, path: Path, kind: str = "png", dpi: int = DPI) -
 
 
 def plain(text: str, most: int = 1000) -> str:
-    """Return a text shortened to `most` letters, with dollar signs escaped."""
+    """Return a text shortened to `most` letters, with dollar signs escaped and control characters as their codes, which
+    neither fonts nor XML have."""
+    text = printable(text).replace("\t", " ")
     return (text if len(text) <= most else text[: most - 1] + "…").replace("$", r"\$")
 
 
