@@ -88,7 +88,8 @@ def outside(figure: Figure) -> list[str]:
 
 
 def _seen(figure: Figure) -> list[Text]:
-    figure.draw_without_rendering()
+    if figure.stale:  # has changed since it was drawn
+        figure.draw_without_rendering()
     texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
     hidden = {text for axis in figure.findobj(Axis) for text in _beyond(axis)}
     return [text for text in texts if text not in hidden]

@@ -75,7 +75,7 @@ class Chart:
 
 
 def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
-    """Draw a chart without its legend; `log` names its logarithmic axes, which stay linear if the chart has no point for
+    """Draw a chart without its legend; `log` names its logarithmic axes, which are linear if there is no point for
     them."""
     log_x, log_y = (
         "none" not in log and (chart.log_x or "x" in log),
@@ -87,7 +87,7 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
         log_x = log_y = False
         series = [_drop_hidden_points(one, log_x, log_y) for one in chart.series]
     lonely = all(np.isfinite(one.x * one.y).sum() < 2 for one in series)
-    _draw_bars(axes, [one for one in series if one.stack is not None])
+    _draw_bars(axes, series)
     if chart.edges:
         _draw_edges(axes, chart)
     for one in series:
@@ -110,17 +110,18 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
 
 def _draw_bars(axes: Axes, series: Sequence[ChartLine]) -> None:
     """Draw stacks of bars side by side, each from its first series at the bottom."""
-    if not series:
+    stacked = [(one.stack, one) for one in series if one.stack is not None]
+    if not stacked:
         return
-    stacks = sorted({one.stack for one in series if one.stack is not None})
-    steps = [float(np.diff(np.log(one.x)).min()) for one in series if one.x.size > 1]
+    stacks = sorted({stack for stack, _ in stacked})
+    steps = [float(np.diff(np.log(one.x)).min()) for _, one in stacked if one.x.size > 1]
     width = min(steps, default=1.0) * BAR_SHARE / len(stacks)
     bottoms = {stack: np.zeros(1) for stack in stacks}
-    for one in series:
-        left = one.x * np.exp(width * (stacks.index(one.stack) - 0.5 * len(stacks)))
+    for stack, one in stacked:
+        left = one.x * np.exp(width * (stacks.index(stack) - 0.5 * len(stacks)))
         look: dict[str, Any] = {"color": one.look["color"], "edgecolor": "white", "linewidth": 0.3}
-        axes.bar(left, one.y, left * np.expm1(width), bottoms[one.stack], align="edge", label=one.name or None, **look)
-        bottoms[one.stack] = bottoms[one.stack] + one.y
+        axes.bar(left, one.y, left * np.expm1(width), bottoms[stack], align="edge", label=one.name or None, **look)
+        bottoms[stack] = bottoms[stack] + one.y
 
 
 def _draw_edges(axes: Axes, chart: Chart) -> None:
@@ -131,7 +132,7 @@ def _draw_edges(axes: Axes, chart: Chart) -> None:
     bar = axes.figure.colorbar(ScalarMappable(norm, ListedColormap(colors)), ax=axes, ticks=list(shown), aspect=15)
     bar.ax.set_yticklabels([prefixes.quantity(chart.edges[k], "m") for k in shown], fontsize=style.SMALL)
     bar.ax.minorticks_off()
-    bar.set_label("waves")
+    bar.ax.set_title("waves", fontsize=style.SMALL)
 
 
 def _drop_hidden_points(one: ChartLine, log_x: bool, log_y: bool) -> ChartLine:
@@ -234,6 +235,11 @@ def _mark_stages(axes: Axes, stages: Sequence[tuple[str, float, float]]) -> None
         if number:
             axes.axvline(start, color=style.GREY, lw=0.8, ls=":", zorder=0)
     axes.set_xlim(limits)
+
+
+def hide_stages(chart: Chart) -> Chart:
+    """Return a chart whose stages keep their colours, but have names that Matplotlib leaves out of legends."""
+    return replace(chart, stages=[(f"_{name}", start, end) for name, start, end in chart.stages])
 
 
 def compare(runs: Sequence[tuple[str, Sequence[Chart]]], least: int = 1) -> list[Chart]:

@@ -14,7 +14,7 @@ from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
-from matplotlib.figure import Figure, FigureBase
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.transforms import ScaledTranslation
 
 from ..storage import files
@@ -104,7 +104,8 @@ def sequence(count: int) -> list[str]:
 
 def mix(color: str, white: float) -> str:
     """Return a colour mixed with a share of white."""
-    return to_hex([part + white * (1.0 - part) for part in to_rgb(color)])
+    red, green, blue = (part + white * (1.0 - part) for part in to_rgb(color))
+    return to_hex((red, green, blue))
 
 
 def line(number: int, count: int = 0) -> dict[str, Any]:
@@ -130,9 +131,18 @@ def figure_of(title: str, groups: Sequence[Sequence[Panel]], maps: Sequence[Pane
         for k, extra in enumerate(place_legends(drawn)):
             heights[row + k] += extra
         row += len(part)
-    figure.set_figheight(0.25 + 0.2 * (lines.count("\n") + 1) + sum(heights))
     grid.set_height_ratios(heights or [1.0])
+    set_height(figure, 0.25 + 0.2 * (lines.count("\n") + 1) + sum(heights))
     return figure
+
+
+def set_height(figure: Figure, height: float) -> None:
+    """Set the height [inch] of a figure, and lay it out once: the next layout, when it is saved, starts from there.
+
+    A single layout keeps margins that labels needed at the height before, and the lowest leave the page.
+    """
+    figure.set_figheight(height)
+    figure.draw_without_rendering()
 
 
 def wrap(text: str, most: int) -> str:
@@ -145,7 +155,7 @@ def _split_rows(group: Sequence[Panel], most: int) -> list[Sequence[Panel]]:
     return [group[len(group) * row // count : len(group) * (row + 1) // count] for row in range(count)]
 
 
-def _draw_row(place: FigureBase, panels: Sequence[Panel], rows: int, columns: int) -> list[Axes]:
+def _draw_row(place: SubFigure, panels: Sequence[Panel], rows: int, columns: int) -> list[Axes]:
     grid = place.add_gridspec(rows, columns)
     found = [place.add_subplot(grid[divmod(number, columns)]) for number in range(len(panels))]
     for panel, axes in zip(panels, found, strict=True):
@@ -190,7 +200,7 @@ def _find_look(handle: Any) -> tuple[str, ...]:
     return (to_hex(patch.get_facecolor()),)
 
 
-def _width(figure: FigureBase) -> float:
+def _width(figure: Figure | SubFigure) -> float:
     return float(figure.bbox.width / figure.dpi)
 
 
@@ -206,7 +216,7 @@ def _add_legend(axes: Axes, entries: dict[str, Artist]) -> float:
     return _add_below(axes, entries, width - MARGIN, **place)
 
 
-def _add_below(owner: Axes | FigureBase, entries: dict[str, Artist], width: float, **place: Any) -> float:
+def _add_below(owner: Axes | Figure | SubFigure, entries: dict[str, Artist], width: float, **place: Any) -> float:
     """Add a legend of a width [inch] in as many columns as fit, and return its height [inch]."""
     names = [wrap(name, int((width - ROOM) / LETTER)) for name in entries]
     longest = max(len(part) for name in names for part in name.split("\n"))

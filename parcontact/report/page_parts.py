@@ -79,7 +79,7 @@ def draw_panel(panel: style.Panel, caption: str) -> Picture:
         axes = figure.subplots()
         panel(axes)
         (extra,) = style.place_legends([[axes]])
-        figure.set_figheight(SIZE[1] + extra)
+        style.set_height(figure, SIZE[1] + extra)
         figure.savefig(file, format="svg", dpi=style.DPI, metadata={"Date": None})
     return to_uri(file.getvalue(), "image/svg+xml"), caption
 

@@ -1,7 +1,8 @@
 """Pictures with many of everything: each function draws one kind of picture into a directory, from tables with made-up
-numbers or from a small run."""
+numbers, from a small run, or from `run` in the directory, which `write_run` has made."""
 
 import csv
+import shutil
 from collections.abc import Callable, Sequence
 from itertools import product
 from pathlib import Path
@@ -41,6 +42,11 @@ def _save(path: Path, head: Sequence[str], rows: Sequence[Sequence[Any]]) -> Non
         csv.writer(file).writerows([head, *rows])
 
 
+def _read(path: Path) -> list[list[str]]:
+    with path.open(newline="") as file:
+        return list(csv.reader(file))
+
+
 def _save_job(directory: Path, text: str, name: str = "steady.resolved.yaml") -> None:
     directory.mkdir(parents=True, exist_ok=True)
     (directory / "job.yaml").write_text(f"title: {TITLE}\n{text}")
@@ -55,9 +61,10 @@ def write_curve(
     temperatures: Sequence[float] = TEMPERATURES,
 ) -> Path:
     """Write a friction curve with errors, heat and theory, and its bands."""
-    head = ("velocity", "pressure", "friction", "contact_area", "contact_area_corrected")
-    head = (*head, "error_friction", "error_area", "temperature", "shift_factor", "flash_temperature")
-    head = (*head, "seconds", "operator_calls")
+    head = [
+        *("velocity", "pressure", "friction", "contact_area", "contact_area_corrected", "error_friction", "error_area"),
+        *("temperature", "shift_factor", "flash_temperature", "seconds", "operator_calls"),
+    ]
     rows, parts = list[tuple[float, ...]](), list[tuple[float, ...]]()
     for t, p, v in product(temperatures, pressures, VELOCITIES):
         factor = 10.0 ** (-0.05 * (t - 20.0))
@@ -125,22 +132,18 @@ def compare_cases(path: Path) -> None:
     assert asked(*found, "--compare", "--out", path / "cases.png") == 0
 
 
-def write_run(path: Path, share: float = 1.0) -> Path:
+def write_run(path: Path) -> Path:
     """Run nine stages with energies, leakage and heat, with numbers of a longer run."""
     stages = ", ".join(
         f"{{name: {'a stage with a long name ' * (k % 2)}no. {k}, pressure: {k + 1}.0e3, velocity: {0.1 * (k + 1):g}, "
         "distance: 1.0e-4, cells_per_step: 1}"
         for k in range(9)
     )
-    path.mkdir(parents=True)
     saved = "leakage: {}\noutput: {fields: [pressure, gap, height], energy: true}\n"
     out = ran(path, f"title: {TITLE}\n{WAVE}{ZENER}history: [{stages}]\n{saved}")
-    with (out / "measures.csv").open(newline="") as file:
-        head, *rows = list(csv.reader(file))
+    head, *rows = _read(out / "measures.csv")
     more = ("flash_temperature", "max_temperature", "surface_energy", "snap_loss", "slip_loss")
-    scaled = head.index("friction")
     for k, row in enumerate(rows):
-        row[scaled] = str(share * float(row[scaled]))
         row += [str(value) for value in (2.0 * k, 5.0 * k, 1e-9 * k, 2e-9 * k, 3e-9 * k)]
     _save(out / "measures.csv", (*head, *more), rows)
     theory = [(1e-4 * k, 1e-4 * k, 1e3, 0.01, 0.5) for k in range(10)]
@@ -148,16 +151,25 @@ def write_run(path: Path, share: float = 1.0) -> Path:
     return out
 
 
+def _copy_run(run: Path, path: Path, share: float) -> Path:
+    """Copy a run with its friction multiplied by `share`."""
+    shutil.copytree(run, path)
+    head, *rows = _read(path / "measures.csv")
+    at = head.index("friction")
+    _save(path / "measures.csv", head, [[*row[:at], str(share * float(row[at])), *row[at + 1 :]] for row in rows])
+    return path
+
+
 def draw_run(path: Path) -> None:
-    plots.plot([write_run(path / "run")])
+    plots.plot([path / "run"])
 
 
 def draw_run_over_velocity(path: Path) -> None:
-    assert asked(write_run(path / "run"), "--over", "velocity", "--log", "x,y") == 0
+    assert asked(path / "run", "--over", "velocity", "--log", "x,y") == 0
 
 
 def compare_runs(path: Path) -> None:
-    found = [write_run(path / _name(k), 1.0 - 0.2 * k) for k in range(RUNS)]
+    found = [_copy_run(path / "run", path / _name(k), 1.0 - 0.2 * k) for k in range(RUNS)]
     assert asked(*found, "--compare", "--out", path / "runs.png") == 0
 
 
@@ -191,7 +203,7 @@ def draw_long_map(path: Path) -> None:
 
 
 def draw_movie(path: Path) -> None:
-    assert asked(write_run(path / "run"), "--movie", "pressure", "--out", path / "run.gif") == 0
+    assert asked(path / "run", "--movie", "pressure", "--out", path / "run.gif") == 0
 
 
 def draw_leakage(path: Path) -> None:
@@ -244,7 +256,7 @@ def draw_study(path: Path) -> None:
     """Draw the errors of all integrators along all ladders."""
     curves = [
         study_pictures.StudyCurve(
-            name, integrator, ladder, [1.0, 0.5, 0.25, 0.125], np.geomspace(0.1, 1e-4 * (k + 1), 4)
+            name, integrator, ladder, [1.0, 0.5, 0.25, 0.125], np.geomspace(0.1, 1e-4 * (k + 1), 4).tolist()
         )
         for name in study_pictures.NAMES
         for k, (integrator, ladder) in enumerate(product(study_pictures.INTEGRATORS, study_pictures.MARKS))
@@ -274,7 +286,7 @@ def report_curves(path: Path) -> None:
 
 def report_run(path: Path) -> None:
     """Draw the pictures of the results of a run."""
-    result_sections.describe_run(write_run(path / "run"))
+    result_sections.describe_run(path / "run")
 
 
 def report_sweep(path: Path) -> None:

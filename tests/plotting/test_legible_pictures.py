@@ -1,5 +1,6 @@
 """Every kind of picture is legible with many of everything, and what makes one illegible is found."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,8 +13,14 @@ from . import many
 TWELVE = [f"band {number}" for number in range(12)]
 
 
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return many.write_run(tmp_path_factory.mktemp("run"))
+
+
 @pytest.mark.parametrize("draw", many.KINDS, ids=lambda draw: draw.__name__)
-def test_pictures_with_many_of_everything(tmp_path: Path, draw: Callable[[Path], None]) -> None:
+def test_pictures_with_many_of_everything(tmp_path: Path, run: Path, draw: Callable[[Path], None]) -> None:
+    shutil.copytree(run, tmp_path / "run")
     with legible.watch_pictures() as figures:
         draw(tmp_path)
     assert figures
