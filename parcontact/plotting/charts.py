@@ -133,6 +133,7 @@ def _draw_edges(axes: Axes, chart: Chart) -> None:
     bar.ax.set_yticklabels([prefixes.quantity(chart.edges[k], "m") for k in shown], fontsize=style.SMALL)
     bar.ax.minorticks_off()
     bar.ax.set_title("waves", fontsize=style.SMALL)
+    axes.tick_params("x", labelsize=style.SMALL)  # the bar narrows the panel
 
 
 def _drop_hidden_points(one: ChartLine, log_x: bool, log_y: bool) -> ChartLine:
