@@ -44,7 +44,7 @@ class BandResult:
 
     Its weights and load [Pa]; friction of its waves over the whole load [-], by energy and by slopes; area at its
     shortest wave, counted and corrected; share of the load above its ladder; power [W/m^2] per branch; S_j and g of
-    its heat (`band_heat`), averaged over the load; absolute errors of friction and of area by solver and grid.
+    its heat (`effects.heat.bands`), averaged over the load; absolute errors of friction and of area by solver and grid.
     """
 
     weights: Array

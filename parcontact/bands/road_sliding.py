@@ -11,8 +11,6 @@ import numpy as np
 from ..accuracy.budget import ErrorBudget, ErrorParts
 from ..columns import BANDS, names_of
 from ..doubts import Doubt
-from ..effects.heat.band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
-from ..effects.heat.heating import describe_beyond, describe_cold_state
 from ..effects.relaxation import feeds_back, highest_temperature_of, temperature_of
 from ..errors import InputError, RunError
 from ..job import Job
@@ -130,6 +128,8 @@ class RoadSliding:
         self._results = outcome.results
         point = self._to_point(outcome, velocity, pressure, time.perf_counter() - began)
         if self.job.section("thermal") is not None:
+            from ..effects.heat.bands import flash_of_bands
+
             self._rises = self._rises_of(outcome.results, point.measures.force_interface)
             heats = [result.friction for result in outcome.results]
             heats[-1] += point.measures.friction_interface
@@ -156,6 +156,8 @@ class RoadSliding:
 
     def _rises_of(self, results: Results, rubbing: float) -> list[float]:
         """Return the rises [K] of all bands; `rubbing` [N] is the force of the interface on the coarsest box."""
+        from ..effects.heat.bands import rises_of, uniform, waves_along_depth
+
         cascade, section = self._cascade, self.job.section("thermal")
         speed, box = math.hypot(*cascade.velocity), self.setup.grid.lx * self.setup.grid.ly
         heats = [result.friction * cascade.pressure * speed for result in results]
@@ -171,6 +173,8 @@ class RoadSliding:
         Rounds use Aitken's relaxation; the first is for cold bands. No temperature above the range of the material's
         shift is tried.
         """
+        from ..effects.heat.steady import describe_beyond, describe_cold_state
+
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
         highest, place = highest_temperature_of(self.job.material), (*self._place(), cold)
         most = highest - cold
@@ -210,6 +214,8 @@ class RoadSliding:
             self.setup = replace(self.setup, choices=choices(finest))
             self._cascade.press(self._cascade.velocity, self._cascade.pressure)
         except InputError as error:
+            from ..effects.heat.steady import describe_cold_state
+
             place = describe_cold_state(*self._place(), self.temperature)
             raise RunError(f"{place}: no material at the flash temperature: {error}") from None
 
@@ -281,7 +287,7 @@ class RoadSliding:
         factor = self.setup.choices.time_factor
         errors = self._errors(outcome, friction)
         return Point(
-            *(velocity, pressure, self.temperature, factor, measures, friction, errors, certificate, calls, 0, seconds),
+            *(velocity, pressure, self.temperature, factor, measures, friction, errors, certificate, calls, seconds),
             tuple(powers.tolist()),
         )
 

@@ -218,10 +218,9 @@ class Job(Part):
         return self.material.fitted.remembers or any(asked(self) for asked in self.asked("remembers"))
 
     @property
-    def sticks(self) -> bool:
-        """Return True if points stick to the surface before they slide."""
-        interface = self.section("interface")
-        return interface is not None and interface.stick
+    def sheared_first(self) -> bool:
+        """Return True if an effect shears the contact before it slides."""
+        return any(asked(self) for asked in self.asked("sheared_first"))
 
     def resolved(self) -> str:
         """Return YAML text with every default, which loads back to an equal job.

@@ -12,7 +12,7 @@ from ..parallel.slab import Array, deal
 from ..physics.convolution import PARTS, wavenumbers
 from ..physics.prony import Prony
 from ..scene import Setup
-from ..solve.nonsymmetric.steady import SteadyContact
+from ..solve.nonsymmetric.judge import SteadyContact
 
 ROUNDING = 1e-9  # accuracy: relative rounding of wavelengths at the limits of octaves
 

@@ -1,13 +1,18 @@
 """A steady state as data: its parameters, its measures, and its cost."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ..accuracy.budget import ErrorBudget
 from ..accuracy.constants import FLASH
-from ..effects.heat.flash import Flash
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate
+
+if TYPE_CHECKING:  # found only for jobs that ask for it
+    from ..effects.heat.flash import Flash
 
 Vector = tuple[float, float]
 
@@ -19,10 +24,10 @@ class Point:
 
     `friction` is the dissipated power over load and velocity, plus that of an interface; `errors` is its budget. The
     friction of `measures` is by the slopes of the rigid surface; the difference is a mesh error. `operator_calls`
-    count applications on the finest grid; `sets` is 0 if projected steps sufficed. `dissipated` is the power [W] of
-    each branch (empty for a free scene, whose wake continues outside the box). `flash` has the temperatures of the
-    contact, None without `thermal`. With feedback, found in `rounds`, the shift factor is that of the flash
-    temperature, and `friction_cold` is friction without feedback.
+    count applications on the finest grid. `dissipated` is the power [W] of each branch (empty for a free scene, whose
+    wake continues outside the box). `flash` has the temperatures of the contact, None without `thermal`. With
+    feedback, found in `rounds`, the shift factor is that of the flash temperature, and `friction_cold` is friction
+    without feedback.
     """
 
     velocity: Vector
@@ -34,7 +39,6 @@ class Point:
     errors: ErrorBudget
     certificate: Certificate
     operator_calls: float
-    sets: int
     seconds: float
     dissipated: tuple[float, ...]
     flash: Flash | None = None
