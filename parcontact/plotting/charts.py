@@ -17,7 +17,7 @@ from . import prefixes, style
 
 SPIKE_SHARE = 0.02  # first part of the abscissa, whose spikes do not set the limits
 SPIKE_HEIGHT = 1.5  # least height of a spike over the highest other value
-STAGE_WHITE = 0.8  # share of white in the shade of a stage
+STAGE_WHITE = 0.87  # share of white in the shade of a stage
 MARKERS = "os^DvP*X<>"  # marks of the lines of a run in a comparison
 MARK_EVERY = 0.15  # distance of the marks of a line of many points, over the diagonal of a panel
 PALEST = 0.75  # share of white in the bars of the longest waves in a comparison
