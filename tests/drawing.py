@@ -5,6 +5,7 @@ from pathlib import Path
 
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.text import Text
 
 from parcontact import job
@@ -68,6 +69,11 @@ def panels(figure: Figure) -> list[str]:
     return [axes.get_ylabel() for axes in figure.axes if axes.get_xlabel()]
 
 
+def entries(figure: Figure) -> list[str]:
+    """The entries of all legends of a figure."""
+    return [text.get_text() for legend in figure.findobj(Legend) for text in legend.get_texts()]
+
+
 def touching(figure: Figure) -> list[tuple[str, str]]:
     """Pairs of texts of a figure that overlap."""
     boxes = [(text.get_text(), text.get_window_extent()) for text in _seen(figure)]
@@ -82,7 +88,8 @@ def outside(figure: Figure) -> list[str]:
 
 
 def _seen(figure: Figure) -> list[Text]:
-    figure.draw_without_rendering()
+    if figure.stale:  # has changed since it was drawn
+        figure.draw_without_rendering()
     texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
     hidden = {text for axis in figure.findobj(Axis) for text in _beyond(axis)}
     return [text for text in texts if text not in hidden]

@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from ..parallel.slab import Array
 from . import prefixes, style
 from .charts import Axis, Chart, ChartLine
-from .plotted_run import read_table
+from .plotted_run import count_different, read_table
 
 TABLE, THEORY = "bands.csv", "bands_theory.csv"
 NEEDED = ("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength")
 SHOWN = 4  # number of velocities that are drawn as lines
 THIN = 1.0  # tuning: width of the lines of the theory [points]
+THEORY_LOOK = {"color": style.GREY, "linestyle": ":", "linewidth": THIN}
+ENTRY = ChartLine("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
 
 
 def chart_bands(directory: Path) -> list[Chart]:
@@ -44,7 +46,7 @@ def chart_bands(directory: Path) -> list[Chart]:
 def _describe_first(columns: dict[str, Array]) -> str:
     """Return the first pressure and temperature as text, if the table has several."""
     firsts = [(name, columns[name][0], unit) for name, unit in (("pressure", "Pa"), ("temperature", "°C"))]
-    several = [one for one in firsts if np.unique(columns[one[0]].round(9)).size > 1]
+    several = [one for one in firsts if count_different(columns[one[0]]) > 1]
     return ", ".join(prefixes.quantity(float(value), unit) for _, value, unit in several)
 
 
@@ -62,19 +64,18 @@ def _choose(columns: dict[str, Array]) -> dict[str, Array]:
 def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Chart:
     """Return a chart of the friction of each band over velocity, stacked from the coarsest, with the theory's sum as a
     line."""
-    series = []
-    for band in np.unique(columns["band"]):
+    series, bands, edges = list[ChartLine](), np.unique(columns["band"]), list[float]()
+    for band, color in zip(bands, style.sequence(bands.size), strict=True):
         rows = _sorted(columns, columns["band"] == band)
-        ends = (columns[f"{end}_wavelength"][rows[0]] for end in ("long", "short"))
-        name = " to ".join(prefixes.quantity(float(end), "m") for end in ends)
-        series.append(ChartLine(name, columns["velocity"][rows], columns["friction"][rows], style.line(int(band))))
+        long, short = (float(columns[f"{end}_wavelength"][rows[0]]) for end in ("long", "short"))
+        edges += [short] if edges else [long, short]
+        series.append(ChartLine("", columns["velocity"][rows], columns["friction"][rows], {"color": color}, stack=0))
     if theory is not None:
         speeds = np.unique(theory["velocity"])
         sums = np.array([theory["friction"][theory["velocity"] == speed].sum() for speed in speeds])
-        look = {"color": style.GREY, "linestyle": ":", "linewidth": 2 * THIN}
-        series.append(ChartLine("theory", speeds, sums, look))
-    bands = len(series) - (theory is not None)
-    return Chart("bands", Axis("sliding velocity", "m/s"), Axis("friction by band"), series, log_x=True, stacked=bands)
+        series += [ENTRY, ChartLine("", speeds, sums, THEORY_LOOK)]
+    y = Axis("friction by band,\nlongest waves below")
+    return Chart("bands", Axis("sliding velocity", "m/s"), y, series, log_x=True, edges=edges)
 
 
 def _over_bands(columns: dict[str, Array], theory: dict[str, Array] | None, name: str) -> Chart:
@@ -87,8 +88,9 @@ def _over_bands(columns: dict[str, Array], theory: dict[str, Array] | None, name
             rows = np.flatnonzero(np.isclose(table["velocity"], speed, rtol=1e-6))
             rows = rows[np.argsort(table["band"][rows])]
             short = table["short_wavelength"][rows]
-            label = prefixes.quantity(speed, "m/s") if table is columns else "theory" if number == 0 else ""
+            label = prefixes.quantity(speed, "m/s") if table is columns else ""
             series.append(ChartLine(label, longest / short if area else short, table[name][rows], look))
+    series += [] if theory is None else [ENTRY]
     y = Axis("contact area /\nnominal area") if area else Axis("temperature rise", "K")
     return Chart("bands area" if area else "bands heat", x, y, series, log_x=True)
 
@@ -98,7 +100,7 @@ def _tables(
 ) -> Iterator[tuple[dict[str, Array], dict[str, object]]]:
     yield columns, style.line(number) | {"marker": "o"}
     if theory is not None:
-        yield theory, {"color": style.line(number)["color"], "linestyle": ":", "linewidth": THIN}
+        yield theory, THEORY_LOOK | {"color": style.line(number)["color"]}
 
 
 def _some(speeds: Array) -> Sequence[float]:

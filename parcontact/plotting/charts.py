@@ -1,12 +1,15 @@
 """Charts of runs and friction curves: their numbers, and how they are drawn."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.textpath import TextPath
+from matplotlib.axis import Axis as AnyAxis
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from ..parallel.slab import Array
@@ -14,12 +17,11 @@ from . import prefixes, style
 
 SPIKE_SHARE = 0.02  # first part of the abscissa, whose spikes do not set the limits
 SPIKE_HEIGHT = 1.5  # least height of a spike over the highest other value
-AXES_SHARE = 0.72  # width of the axes over the width of a panel
-NAMES, LINE = 9, 12  # size of the names of stages, and height of their lines [points]
-MAX_NAME = 24  # most letters of the name of a stage
-LEVELS = 3  # most rows of horizontal names of stages
-FEW_NAMES, MANY_NAMES = 2, 4  # most lines for a legend inside a narrow and a wide panel
-SMALL, NAMES_PER_ROW = 5.0, 2  # width of a small picture [inch]; names per row in its legend
+STAGE_WHITE = 0.87  # share of white in the shade of a stage
+MARKERS = "os^DvP*X<>"  # marks of the lines of a run in a comparison
+MARK_EVERY = 0.15  # distance of the marks of a line of many points, over the diagonal of a panel
+PALEST = 0.75  # share of white in the bars of the longest waves in a comparison
+MOST_EDGES = 7  # most labels of the bar of colours of bands
 HEADROOM, PEAK_ROOM = 1.08, 1.25  # upper limit over the highest value, without and with its name in the legend
 FRACTION = "contact area /\nnominal area"
 BAR_SHARE = 0.8  # width of a bar over the distance of bars, in the logarithm
@@ -31,13 +33,15 @@ FEW_DECADES = 1.5  # decades of a logarithmic axis below which minor ticks have 
 
 @dataclass(frozen=True)
 class ChartLine:
-    """A line: its name (or ''), values in SI units, and their relative errors if known."""
+    """A line: its name (or ''), values in SI units, and their relative errors if known; or bars, which stand on those
+    before in the same `stack`. A line without values is an entry of the legend only."""
 
     name: str
     x: Array
     y: Array
     look: dict[str, Any] = field(default_factory=lambda: style.line(0))
     error: Array | None = None
+    stack: int | None = None
 
 
 @dataclass(frozen=True)
@@ -52,9 +56,9 @@ class Axis:
 class Chart:
     """A panel, chosen by its `key`.
 
-    `spikes`: a spike at the beginning may be cut off. `stages`: names, starts and ends over `x`, shown if `named`.
-    `peak`: the legend names the highest point. `zeros`: label of values of 0 on a logarithmic axis. The first `stacked`
-    series are stacked bars.
+    `spikes`: a spike at the beginning may be cut off. `stages`: names, starts and ends over `x`.
+    `peak`: the legend names the highest point. `zeros`: label of values of 0 on a logarithmic axis. `edges` [m] are the
+    longest and shortest waves of the bands of stacked bars, from the longest on, for a bar of colours.
     """
 
     key: str
@@ -65,16 +69,14 @@ class Chart:
     spikes: bool = False
     peak: bool = False
     stages: Sequence[tuple[str, float, float]] = ()
-    named: bool = False
-    legend_title: str = ""
     log_x: bool = False
     zeros: str = ""
-    stacked: int = 0
+    edges: Sequence[float] = ()
 
 
 def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
-    """Draw a chart; `log` names its logarithmic axes, which stay linear if the chart has no point for them. A legend of
-    many lines is drawn outside of a panel of full width."""
+    """Draw a chart without its legend; `log` names its logarithmic axes, which are linear if there is no point for
+    them."""
     log_x, log_y = (
         "none" not in log and (chart.log_x or "x" in log),
         "none" not in log and bool(chart.zeros or "y" in log),
@@ -85,9 +87,12 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
         log_x = log_y = False
         series = [_drop_hidden_points(one, log_x, log_y) for one in chart.series]
     lonely = all(np.isfinite(one.x * one.y).sum() < 2 for one in series)
-    if chart.stacked:
-        _draw_bars(axes, series[: chart.stacked])
-    for one in series[chart.stacked :]:
+    _draw_bars(axes, series)
+    if chart.edges:
+        _draw_edges(axes, chart)
+    for one in series:
+        if one.stack is not None:
+            continue
         axes.plot(one.x, one.y, label=one.name or None, **one.look | ({"marker": "o"} if lonely else {}))
         if one.error is not None:
             _draw_errors(axes, one, one.error)
@@ -100,27 +105,35 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
         if chart.peak:
             _name_peak(axes, series[0], chart.x.unit)
         prefixes.label(axes.yaxis, chart.y.name, chart.y.unit)
-    _mark_stages(axes, chart.stages, chart.named)
-    if names := len(axes.get_legend_handles_labels()[1]):
-        axes.legend(title=chart.legend_title or None, **_place_legend(axes, names))
-
-
-def _place_legend(axes: Axes, names: int) -> dict[str, Any]:
-    """Return the place of a legend with this number of names: inside the panel, or at its side, above or below."""
-    small = axes.figure.bbox.width / axes.figure.dpi < SMALL
-    if names > (MANY_NAMES if small else FEW_NAMES) and _panels_per_row(axes) == 1:
-        return style.BELOW | {"ncols": NAMES_PER_ROW} if small else style.AT_SIDE
-    return style.ABOVE if names > MANY_NAMES else {}
+    _mark_stages(axes, chart.stages)
 
 
 def _draw_bars(axes: Axes, series: Sequence[ChartLine]) -> None:
-    """Draw stacked bars at common places, the first series at the bottom."""
-    x = series[0].x
-    half = (float(np.diff(np.log(x)).min()) if x.size > 1 else 1.0) * BAR_SHARE / 2.0
-    left, width, bottom = x * np.exp(-half), x * (np.exp(half) - np.exp(-half)), np.zeros_like(x)
-    for one in series:
-        axes.bar(left, one.y, width, bottom, align="edge", label=one.name, color=one.look["color"])
-        bottom = bottom + one.y
+    """Draw stacks of bars side by side, each from its first series at the bottom."""
+    stacked = [(one.stack, one) for one in series if one.stack is not None]
+    if not stacked:
+        return
+    stacks = sorted({stack for stack, _ in stacked})
+    steps = [float(np.diff(np.log(one.x)).min()) for _, one in stacked if one.x.size > 1]
+    width = min(steps, default=1.0) * BAR_SHARE / len(stacks)
+    bottoms = {stack: np.zeros(1) for stack in stacks}
+    for stack, one in stacked:
+        left = one.x * np.exp(width * (stacks.index(stack) - 0.5 * len(stacks)))
+        look: dict[str, Any] = {"color": one.look["color"], "edgecolor": "white", "linewidth": 0.3}
+        axes.bar(left, one.y, left * np.expm1(width), bottoms[stack], align="edge", label=one.name or None, **look)
+        bottoms[stack] = bottoms[stack] + one.y
+
+
+def _draw_edges(axes: Axes, chart: Chart) -> None:
+    """Draw the bar of colours of bands, with the waves between neighbouring bands."""
+    colors = [one.look["color"] for one in chart.series if one.stack is not None]
+    norm = BoundaryNorm(range(len(colors) + 1), len(colors))
+    shown = range(0, len(chart.edges), -(-len(chart.edges) // MOST_EDGES))
+    bar = axes.figure.colorbar(ScalarMappable(norm, ListedColormap(colors)), ax=axes, ticks=list(shown), aspect=15)
+    bar.ax.set_yticklabels([prefixes.quantity(chart.edges[k], "m") for k in shown], fontsize=style.SMALL)
+    bar.ax.minorticks_off()
+    bar.ax.set_title("waves", fontsize=style.SMALL)
+    axes.tick_params("x", labelsize=style.SMALL)  # the bar narrows the panel
 
 
 def _drop_hidden_points(one: ChartLine, log_x: bool, log_y: bool) -> ChartLine:
@@ -133,7 +146,7 @@ def _drop_hidden_points(one: ChartLine, log_x: bool, log_y: bool) -> ChartLine:
 def _mark_zeros(axes: Axes, chart: Chart) -> None:
     """Mark zeros of the lines at the lower edge, with one row of marks per line."""
     label = chart.zeros  # one label for all lines
-    for row, one in enumerate(chart.series):
+    for row, one in enumerate(one for one in chart.series if one.x.size):
         zeros = np.asarray(one.x)[np.asarray(one.y) == 0.0]
         if zeros.size:
             height = np.full(zeros.size, ZERO_ROW * (row + 0.5))
@@ -157,12 +170,9 @@ def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
         if 0.0 < low < high < low * (1.0 + SAME):  # Matplotlib finds no limits for values that differ by rounding
             axes.set(**{f"{which}lim": (low / 10.0, 10.0 * low)})
         axes.set(**{f"{which}scale": "log"})
-        low, high = axis.get_view_interval()
         if unit == "s" and prefixes.label_log_times(axis, name):
             return
-        few = high < 10.0**FEW_DECADES * low
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=5))
-        axis.set_minor_formatter(NullFormatter())
+        few = thin_log_ticks(axis)
     else:
         axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
     if few:
@@ -171,10 +181,20 @@ def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
         axis.set_label_text(f"{name} [{unit}]" if unit else name)
 
 
+def thin_log_ticks(axis: AnyAxis) -> bool:
+    """Set few ticks of a logarithmic axis; return True if it has few decades."""
+    low, high = axis.get_view_interval()
+    few = bool(high < 10.0**FEW_DECADES * low)
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=5))
+    axis.set_minor_formatter(NullFormatter())
+    return few
+
+
 def _set_limits(axes: Axes, chart: Chart, series: Sequence[ChartLine], log_x: bool) -> None:
     """Set limits that include 0 and error bars up to the value; cut off a spike, and print its height."""
-    whole = np.sum([one.y for one in series[: chart.stacked]], axis=0) if chart.stacked else np.zeros(0)
-    ys = np.concatenate([whole, *(one.y for one in series)])
+    stacks = {one.stack for one in series} - {None}
+    wholes = [np.sum([one.y for one in series if one.stack == stack], axis=0) for stack in stacks]
+    ys = np.concatenate([*wholes, *(one.y for one in series)])
     highest = _highest(ys)
     if chart.bottom and not (ys < 0.0).any():
         bars = [one.y * (1.0 + np.nan_to_num(np.minimum(one.error, 1.0))) for one in series if one.error is not None]
@@ -205,59 +225,72 @@ def _name_peak(axes: Axes, one: ChartLine, unit: str) -> None:
         axes.plot(one.x[at], one.y[at], "o", color=style.RED, label=label, scalex=False, scaley=False)
 
 
-def _mark_stages(axes: Axes, stages: Sequence[tuple[str, float, float]], named: bool) -> None:
-    """Mark the starts of stages, with names above in several rows, or turned if there are too many."""
-    for _, start, _ in stages[1:]:
-        axes.axvline(start, color=style.GREY, lw=0.8, ls=":", zorder=0)
-    if not named or len(stages) < 2:
-        return
-    width = AXES_SHARE * 72.0 * axes.figure.bbox.width / axes.figure.dpi / _panels_per_row(axes)
-    places = (axes.transScale + axes.transLimits).transform([(x, 1.0) for _, *ends in stages for x in ends])[:, 0]
-    ends = np.clip(places, 0.0, 1.0).reshape(-1, 2)  # from 0 at the left to 1 at the right
-    names = [style.plain(name, MAX_NAME) for name, _, _ in stages]
-    middles = width * ends.mean(axis=1)
-    widths = [TextPath((0, 0), name, size=NAMES).get_extents().width + NAMES / 2 for name in names]
-    levels = _choose_levels(middles, widths)
-    turned = max(levels) >= LEVELS
-    if turned:  # names of the longest stages, as near to them as possible
-        longest = np.sort(np.argsort(ends[:, 0] - ends[:, 1], kind="stable")[: int(width / LINE)])
-        names, offsets = [names[k] for k in longest], LINE * np.arange(longest.size)
-        middles = np.maximum.accumulate(middles[longest] - offsets) + offsets
-        middles, levels = np.minimum(middles, width - offsets[::-1]), [0] * len(names)
-    look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": style.GREY, "fontsize": NAMES}
-    look |= {"xycoords": "axes fraction", "textcoords": "offset points", "rotation": 90 if turned else 0}
-    for name, x, level in zip(names, middles, levels, strict=True):
-        axes.annotate(name, (x / width, 1.0), (0, 2 + LINE * level), **look)
+def _mark_stages(axes: Axes, stages: Sequence[tuple[str, float, float]]) -> None:
+    """Shade several stages, each name in its colour, and mark their starts."""
+    shown = [stage for stage in stages if stage[1] < stage[2]]
+    names = list(dict.fromkeys(name for name, _, _ in shown))
+    shades = dict(zip(names, style.sequence(len(names)), strict=True))
+    limits = axes.get_xlim()
+    for number, (name, start, end) in enumerate(shown if len(shown) > 1 else ()):
+        axes.axvspan(start, end, color=style.mix(shades[name], STAGE_WHITE), lw=0, zorder=-1, label=name or None)
+        if number:
+            axes.axvline(start, color=style.GREY, lw=0.8, ls=":", zorder=0)
+    axes.set_xlim(limits)
 
 
-def _panels_per_row(axes: Axes) -> int:
-    place = axes.get_subplotspec()
-    return place.get_gridspec().ncols if place else 1
+def hide_stages(chart: Chart) -> Chart:
+    """Return a chart whose stages keep their colours, but have names that Matplotlib leaves out of legends."""
+    return replace(chart, stages=[(f"_{name}", start, end) for name, start, end in chart.stages])
 
 
-def _choose_levels(middles: Array, widths: Sequence[float]) -> list[int]:
-    """Return the lowest rows in which texts of given middles and widths, in order, do not overlap."""
-    ends: list[float] = []
-    levels = []
-    for middle, width in zip(middles, widths, strict=True):
-        level = next((k for k, end in enumerate(ends) if end <= middle - width / 2), len(ends))
-        ends[level : level + 1] = [middle + width / 2]
-        levels.append(level)
-    return levels
-
-
-def compare(runs: Sequence[tuple[str, Sequence[Chart]]]) -> list[Chart]:
-    """Return charts that compare several runs: the lines of each run have its colour and its name."""
-    found: dict[tuple[str, Axis, Axis], Chart] = {}
-    for number, (name, charts) in enumerate(runs):
+def compare(runs: Sequence[tuple[str, Sequence[Chart]]], least: int = 1) -> list[Chart]:
+    """Return the charts that at least `least` of several runs have. The colour is the run; the lines of each run have
+    marks, and bands are shares of its bar. If no run has several lines in a chart, each has its own dashes."""
+    found: dict[tuple[str, Axis, Axis], list[tuple[int, Chart]]] = {}
+    for number, (_, charts) in enumerate(runs):
         for chart in charts:
-            key = chart.key, chart.x, chart.y
-            known = found.get(key, replace(chart, series=(), stages=(), peak=False, legend_title=""))
-            lines = list(known.series)
-            for k, one in enumerate(chart.series):
-                dashes = style.line(number + k)["linestyle"]
-                look = one.look | {"color": style.line(number)["color"], "linestyle": dashes}
-                lines.append(replace(one, name=", ".join(filter(None, (style.plain(name), one.name))), look=look))
-            spikes, log_x = known.spikes and chart.spikes, known.log_x and chart.log_x
-            found[key] = replace(known, series=lines, spikes=spikes, log_x=log_x)
-    return list(found.values())
+            found.setdefault((chart.key, chart.x, chart.y), []).append((number, chart))
+    names = [name for name, _ in runs]
+    lonely = all(len(chart.series) == 1 for group in found.values() for _, chart in group)
+    merge = _merge_lonely if lonely else _merge
+    return [_join(group, merge(group, names)) for group in found.values() if len(group) >= least]
+
+
+def _join(group: Sequence[tuple[int, Chart]], series: Sequence[ChartLine]) -> Chart:
+    charts = [chart for _, chart in group]
+    spikes, log_x = (all(getattr(chart, name) for chart in charts) for name in ("spikes", "log_x"))
+    return replace(charts[0], series=series, stages=(), peak=False, spikes=spikes, log_x=log_x, edges=())
+
+
+def _merge_lonely(group: Sequence[tuple[int, Chart]], names: Sequence[str]) -> list[ChartLine]:
+    """Return the only line of each run, with the colour and the dashes of the run."""
+    lines = ((number, chart.series[0]) for number, chart in group)
+    return [
+        replace(
+            one, name=", ".join(filter(None, (names[number], one.name))), look=one.look | style.line(number, len(names))
+        )
+        for number, one in lines
+    ]
+
+
+def _merge(group: Sequence[tuple[int, Chart]], names: Sequence[str]) -> list[ChartLine]:
+    """Return all lines of the runs in a chart, and entries of the legend for the runs and for the names of lines."""
+    colors, empty = style.colors(len(names)), np.zeros(0)
+    whole = [one for _, chart in group for one in chart.series]
+    marked = dict.fromkeys(one.name for one in whole if one.name and one.x.size and one.stack is None)
+    marks = dict(zip(marked, itertools.cycle(MARKERS), strict=False)) if len(marked) > 1 else {}
+    entries = [ChartLine(names[number], empty, empty, {"color": colors[number]}) for number, _ in group]
+    for name, mark in marks.items():
+        entries.append(ChartLine(name, empty, empty, {"color": style.GREY, "marker": mark, "linestyle": "none"}))
+    entries += {one.name: one for one in whole if not one.x.size}.values()
+    for number, chart in group:
+        bars = sum(one.stack is not None for one in chart.series)
+        for k, one in enumerate(chart.series):
+            look = one.look | {"color": colors[number]}
+            if one.stack is not None:
+                look["color"] = style.mix(colors[number], PALEST * (1.0 - (k + 1) / bars))
+            elif one.name in marks:
+                few = "marker" in one.look
+                look |= {"linestyle": "-", "marker": marks[one.name], **({} if few else {"markevery": MARK_EVERY})}
+            entries.append(replace(one, name="", look=look, stack=None if one.stack is None else number))
+    return entries

@@ -12,13 +12,13 @@ from ..job.resolved import STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from . import band_charts, prefixes, style
 from .charts import Axis, Chart, ChartLine
-from .plotted_run import find_free_area, read_table, to_contact_area, to_load
+from .plotted_run import count_different, find_free_area, read_table, round_digits, to_contact_area, to_load
 
 TABLE, THEORY = "steady.csv", "steady_theory.csv"
 NEEDED = ("velocity", "pressure", "friction", "contact_area")
-THIN = 1.0  # tuning: width of lines of the theory [points]
 COLD = "friction_cold"  # friction without feedback from heat
-DIGITS = 6  # significant digits of values that count as equal
+EMPTY = np.zeros(0)
+THIN = {"theory": ":", "without feedback": "--"}  # dashes of thin lines, drawn in addition to the simulation
 
 
 def chart_steady(directory: Path, over: str = "") -> list[Chart]:
@@ -37,26 +37,28 @@ def chart_steady(directory: Path, over: str = "") -> list[Chart]:
     }
     _add_derived(columns, area)
     x, by = "velocity", "load"
-    if over == "load" or (not over and _count(columns[x]) < 2 <= _count(columns[by])):
+    if over == "load" or (not over and count_different(columns[x]) < 2 <= count_different(columns[by])):
         x, by = by, x
-    warm = "temperature" in columns and _count(columns["temperature"]) > 1
-    by = "temperature" if warm else by
-    panels = [("steady friction", x, "friction", "steady, at"), ("steady area", x, "area", "")]
-    if warm and x == "velocity":
-        panels.append(("steady master", "reduced", "friction", ""))
+    several = [name for name in ("temperature", by) if name in columns and count_different(columns[name]) > 1]
+    lines = {name: axes[name].unit for name in several or [by]}
+    panels = [("steady friction", x, "friction"), ("steady area", x, "area")]
+    if "temperature" in several and x == "velocity":
+        panels.append(("steady master", "reduced", "friction"))
     if "flash_temperature" in columns:
-        panels.append(("steady flash", x, "flash_temperature", ""))
+        panels.append(("steady flash", x, "flash_temperature"))
     theory = {}
     if x == "velocity" and COLD not in columns and (directory / THEORY).is_file():  # the theory has no feedback
         theory = read_table(directory / THEORY, (*NEEDED, "shift_factor"))
         _add_derived(theory, area)
     found = []
-    for key, along, name, title in panels:
-        series = list(_make_lines(columns, along, name, by, axes[by].unit))
+    for key, along, name in panels:
+        series = list(_make_lines(columns, along, name, lines))
         if name == "friction" and along == x and COLD in columns:
-            series += _make_thin(columns | {name: columns[COLD]}, along, name, by, "without feedback", "--")
-        series += _make_theory(theory, along, name, by) if theory and name in theory else ()
-        found.append(Chart(key, axes[along], axes[name], series, log_x=True, legend_title=title))
+            series += _make_thin(columns | {name: columns[COLD]}, along, name, lines, "without feedback")
+        if name in theory:
+            one = along == "reduced" and "load" not in lines  # over a_T v the theory is one line
+            series += _make_thin(theory, along, name, {} if one else lines, "theory")
+        found.append(Chart(key, axes[along], axes[name], series, log_x=True))
     return found + (band_charts.chart_bands(directory) if x == "velocity" else [])
 
 
@@ -65,7 +67,7 @@ def steady_title(directory: Path) -> str:
     job = shown_job(directory / STEADY_RESOLVED) if (directory / STEADY_RESOLVED).is_file() else None
     axis, loads = to_load(read_table(directory / TABLE, ("pressure",))["pressure"], find_free_area(directory))
     name = (job.title if job else "") or "steady sliding"
-    return f"{name}: {prefixes.quantity(loads[0], axis.unit)}" if _count(loads) == 1 else name
+    return f"{name}: {prefixes.quantity(loads[0], axis.unit)}" if count_different(loads) == 1 else name
 
 
 def _add_derived(columns: dict[str, Array], area: float) -> None:
@@ -76,36 +78,22 @@ def _add_derived(columns: dict[str, Array], area: float) -> None:
         columns["reduced"] = columns["shift_factor"] * columns["velocity"]
 
 
-def _make_lines(columns: dict[str, Array], x: str, y: str, by: str, unit: str) -> Iterator[ChartLine]:
-    """Yield a line for each value of the column `by`."""
+def _make_lines(columns: dict[str, Array], x: str, y: str, by: dict[str, str]) -> Iterator[ChartLine]:
+    """Yield a line for each combination of the columns `by`, given with their units."""
     error = columns.get(f"error_{y}")
-    groups = _round(columns[by])
-    for number, value in enumerate(np.unique(groups)):
-        rows = np.flatnonzero(groups == value)
+    places = np.array([round_digits(columns[name]) for name in by]).reshape(len(by), columns[x].size)
+    values, groups = np.unique(places, axis=1, return_inverse=True)
+    for number, place in enumerate(values.T):
+        rows = np.flatnonzero(groups == number)
         rows = rows[np.argsort(columns[x][rows], kind="stable")]
-        shown = prefixes.quantity(value, unit), columns[x][rows], columns[y][rows], style.line(number) | {"marker": "o"}
-        yield ChartLine(*shown, None if error is None else error[rows])
+        label = ", ".join(prefixes.quantity(value, unit) for value, unit in zip(place, by.values(), strict=True))
+        look = style.line(number, values.shape[1]) | {"marker": "o"}
+        yield ChartLine(label, columns[x][rows], columns[y][rows], look, None if error is None else error[rows])
 
 
-def _make_theory(columns: dict[str, Array], x: str, y: str, by: str) -> Iterator[ChartLine]:
-    """Yield thin lines of Persson's theory, one per line of the simulation, or one over a_T v."""
-    one = {"one": np.zeros_like(columns[x])} if x == "reduced" else {}
-    yield from _make_thin(columns | one, x, y, "one" if one else by, "theory", ":", style.GREY if one else "")
-
-
-def _make_thin(
-    columns: dict[str, Array], x: str, y: str, by: str, label: str, dashes: str, color: str = ""
-) -> Iterator[ChartLine]:
-    """Yield thin lines, drawn in addition to the simulation; the first has the label."""
-    for number, line in enumerate(_make_lines(columns, x, y, by, "")):
-        own = {"color": color or style.line(number)["color"], "linestyle": dashes, "linewidth": THIN}
-        yield ChartLine("" if number else label, line.x, line.y, own)
-
-
-def _round(values: Array) -> Array:
-    return np.array([float(f"{value:.{DIGITS}g}") for value in values])
-
-
-def _count(values: Array) -> int:
-    """Return the number of values that differ by more than rounding."""
-    return np.unique(_round(values)).size
+def _make_thin(columns: dict[str, Array], x: str, y: str, by: dict[str, str], label: str) -> Iterator[ChartLine]:
+    """Yield thin lines, drawn in addition to the simulation, and their entry of the legend."""
+    look = {"color": style.GREY, "linestyle": THIN[label], "linewidth": band_charts.THIN}
+    yield ChartLine(label, EMPTY, EMPTY, look)
+    for line in _make_lines(columns, x, y, by):
+        yield ChartLine("", line.x, line.y, look | ({"color": line.look["color"]} if by else {}))

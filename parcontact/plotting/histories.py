@@ -57,7 +57,6 @@ def chart_histories(run: PlottedRun, over: str = "") -> list[Chart]:
     along = _choose_abscissa(run, over)
     log = along.axis.unit == "s" and _steps_grow(along.values)
     found = [replace(chart, stages=along.stages, log_x=log) for chart in _find_charts(run, along)]
-    found[0] = replace(found[0], named=True)
     if along.marked or along.loop:
         return found
     first, *others = (_add_theory(chart, run) for chart in found)

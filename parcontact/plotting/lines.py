@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -15,8 +14,7 @@ from . import prefixes, style
 from .plotted_run import Fields, PlottedRun
 
 INSTANTS = 5  # most lines in a panel
-MANY_LINES: dict[str, Any] = {"fontsize": 8, "labelspacing": 0.2}  # small legend that fits into a panel
-MOST_LETTERS = 16  # most letters of the name of a stage in a legend
+MOST_LETTERS = 30  # most letters of the name of a stage in a legend
 RANGE = 1.3  # shown range over the radius of contact
 
 Curve = tuple[str, Array, Array]  # name, positions [m] and pressures [Pa]
@@ -63,7 +61,6 @@ def _draw_pressures(
     axes.locator_params(nbins=5)
     prefixes.label(axes.xaxis, along, "m")
     prefixes.label(axes.yaxis, "pressure", "Pa")
-    axes.legend(**style.AT_SIDE, **MANY_LINES)
 
 
 def _make_strip(run: PlottedRun, fields: Fields) -> style.Panel:
@@ -101,7 +98,6 @@ def traction_panels(run: PlottedRun, fields: Fields) -> Iterator[style.Panel]:
         axes.locator_params(nbins=5)
         prefixes.label(axes.xaxis, along, "m")
         prefixes.label(axes.yaxis, "traction", "Pa")
-        axes.legend(**style.AT_SIDE, **MANY_LINES)
 
     yield draw
 

@@ -45,12 +45,15 @@ TRACTIONS = ("traction_x", "traction_y")
 STICK_MAPS = ("traction", "slip")  # drawn from both components and the pressure
 TENSION = "RdBu_r"  # colours of pressures of both signs
 STRIP = 8  # most points across of a map that is drawn as a line
+BAR = 0.9  # height of a bar of colours over that of its map
+WIDE = 2.0  # width over height of maps of which each has a row
 TICKS = 5  # most intervals of ticks, fixed so that the layout does not change
 BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile, and the ratio to it above which points do not set the colour range
 
 
-def map_panels(run: PlottedRun, at: str = "") -> tuple[list[style.Panel], list[style.Panel]]:
-    """Return panels of pressures on a line, and of the saved maps of one instant, or of tractions on a line.
+def map_panels(run: PlottedRun, at: str = "") -> tuple[list[list[style.Panel]], list[style.Panel]]:
+    """Return groups of panels, of pressures on a line and of wide maps, and panels of the other saved maps of one
+    instant, or of tractions on a line.
 
     The default instant is the last one; for contacts that end in detachment, the pull-off or the largest load. Raises
     InputError if nothing is saved at the instant `at`.
@@ -61,8 +64,10 @@ def map_panels(run: PlottedRun, at: str = "") -> tuple[list[style.Panel], list[s
             narrow = min(fields.x.size, fields.y.size) <= STRIP
             pressures = list(lines.line_panels(run, fields, narrow)) if fields.read("pressure") is not None else []
             if narrow:
-                return pressures, list(lines.traction_panels(run, fields))
-            return pressures, list(_panels(run, fields)) if fields.saved else []
+                return [pressures], list(lines.traction_panels(run, fields))
+            found = list(_panels(run, fields)) if fields.saved else []
+            wide = run.job.grid.lx > WIDE * run.job.grid.ly
+            return ([pressures, *([one] for one in found)], []) if wide else ([pressures], found)
     except (OSError, KeyError):
         if at:
             message = f"--at {at}: {run.directory} has no maps; save them by output: {{fields: [...]}}"
@@ -90,7 +95,7 @@ def _panel(fields: Fields, name: str, values: Array, instant: str, window: Windo
 
     def draw(axes: Axes) -> None:
         beyond = "max" if np.nanmax(part, initial=-np.inf) > limits[1] else "neither"
-        show = _draw_map(axes, name, (fields.x[columns], fields.y[rows]), limits, extend=beyond, shrink=0.9)
+        show = _draw_map(axes, name, (fields.x[columns], fields.y[rows]), limits, extend=beyond)
         show(part)
         axes.set_title(f"{name}{LOOKS[name].note}\n{instant}")
 
@@ -161,13 +166,12 @@ def _draw_map(
     axes.grid(False)
     empty = np.full((y.size - 1, x.size - 1), np.nan)
     mesh = axes.pcolormesh(x, y, empty, cmap=look.colors, norm=norm, rasterized=True)
-    axes.set_aspect("equal")
     for axis, along in ((axes.xaxis, "x"), (axes.yaxis, "y")):
         axis.set_major_locator(MaxNLocator(TICKS - (along == "x"), steps=[1, 2, 5, 10]))
-        prefixes.label(axis, along, "m")
+    height = prefixes.label_map(axes, (x[-1] - x[0], y[-1] - y[0]))
     if low <= high:
         ticks = [low] if low == high else MaxNLocator(TICKS, steps=[1, 2, 5, 10])
-        scale = axes.figure.colorbar(mesh, ax=axes, ticks=ticks, **bar).ax.yaxis
+        scale = axes.figure.colorbar(mesh, ax=axes, ticks=ticks, shrink=BAR * height, **bar).ax.yaxis
         prefixes.label(scale, name, look.unit)
     return mesh.set_array
 

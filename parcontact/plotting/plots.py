@@ -5,7 +5,6 @@ all stages are single solves, pressures along a line with Hertz's for a sphere.
 """
 
 import os
-import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -57,6 +56,11 @@ class PlotOptions:
         """Return the requested charts in the requested order."""
         return [chart for name in self.panels for chart in found if chart.key == name] if self.panels else list(found)
 
+    def group(self, found: Sequence[Chart]) -> list[list[style.Panel]]:
+        """Return the panels of a curve, and those of its bands."""
+        bands = [chart for chart in found if chart.key.startswith("bands")]
+        return [self.to_panels(part) for part in ([one for one in found if one not in bands], bands)]
+
     def to_panels(self, found: Sequence[Chart]) -> list[style.Panel]:
         return [partial(charts.draw, chart, log=self.log) for chart in found]
 
@@ -79,15 +83,8 @@ def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> l
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv into its directory; returns the path of the picture."""
     with style.drawing():
-        title, panels = (
-            _wrap(curve_charts.steady_title(table.parent)),
-            PlotOptions().to_panels(curve_charts.chart_steady(table.parent)),
-        )
-        return _save(style.figure_of(title, [panels], legend=True), table.with_suffix(""))
-
-
-def _wrap(title: str) -> str:
-    return "\n".join(textwrap.wrap(title, style.LINE))
+        panels = PlotOptions().group(curve_charts.chart_steady(table.parent))
+        return _save(style.figure_of(curve_charts.steady_title(table.parent), panels), table.with_suffix(""))
 
 
 def _save(figure: Figure, stem: Path, options: PlotOptions = PlotOptions()) -> Path:
@@ -109,20 +106,20 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
     titles, fields = list[str](), list[style.Panel]()
     if has_run:
         run = PlottedRun(directory)
-        found = _wrap(run.job.title or directory.absolute().name)
+        found = run.job.title or directory.absolute().name
         titles.append(found if run.curves else f"{found}\n{histories.describe_solve(run)}")
         groups.append(options.to_panels(options.choose(histories.chart_histories(run, options.over))))
     elif options.at:
         raise InputError(f"--at {options.at}: {directory} has no run, and therefore no maps")
     if has_curve and options.wants("steady"):
-        titles.append(_wrap(curve_charts.steady_title(directory)))
-        groups.append(options.to_panels(curve_charts.chart_steady(directory, options.over)))
+        titles.append(curve_charts.steady_title(directory))
+        groups += options.group(curve_charts.chart_steady(directory, options.over))
     if has_run and options.wants("maps"):
-        pressures, fields = maps.map_panels(run, options.at or "")
-        groups.append(pressures)
+        found_maps, fields = maps.map_panels(run, options.at or "")
+        groups += found_maps
     if has_sweep:
-        titles.append(_wrap(sweep_charts.sweep_title(directory) or directory.absolute().name))
-        groups += [options.to_panels([chart]) for chart in options.choose(sweep_charts.chart_sweep(directory))]
+        titles.append(sweep_charts.sweep_title(directory) or directory.absolute().name)
+        groups.append(options.to_panels(options.choose(sweep_charts.chart_sweep(directory))))
     if not (has_run or has_curve or has_sweep):
         if not directory.exists():
             raise InputError(f"{directory} is not a directory")
@@ -131,7 +128,7 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
     if options.panels and not any((*groups, fields)):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
     title = "\n".join(filter(None, (*titles[:1], theory_settings.describe_settings(directory))))
-    return style.figure_of(title, groups, legend=has_curve and len(groups) == 1, maps=fields)
+    return style.figure_of(title, groups, fields)
 
 
 def _suggest(path: Path) -> str:
@@ -151,13 +148,13 @@ def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figur
     for directory in directories:
         if not _find_charts(directory, options):
             raise InputError(f"{directory} has nothing to compare")
-    return style.figure_of("", [options.to_panels(compare_charts(directories, options))], legend=True)
+    return style.figure_of("", options.group(compare_charts(directories, options)))
 
 
-def compare_charts(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> list[Chart]:
-    """Return charts with the lines of all directories."""
+def compare_charts(directories: Sequence[Path], options: PlotOptions = PlotOptions(), least: int = 1) -> list[Chart]:
+    """Return the charts that at least `least` directories have, with the lines of all."""
     found = [_find_charts(directory, options) for directory in directories]
-    return charts.compare([each for each in zip(_name_directories(directories), found, strict=True) if each[1]])
+    return charts.compare([each for each in zip(_name_directories(directories), found, strict=True) if each[1]], least)
 
 
 def _find_charts(directory: Path, options: PlotOptions) -> list[Chart]:

@@ -24,6 +24,7 @@ MEASURED = (
     *("step", "time", "distance", "pressure", "friction", "friction_x", "contact_area", "contact_area_corrected"),
     *("approach", "mean_gap", "max_pressure", "work", "stored", "dissipated"),
 )
+DIGITS = 6  # significant digits of values that count as equal
 NEAREST = 3  # number of nearest steps with maps in a message
 
 
@@ -188,6 +189,16 @@ def find_free_area(directory: Path) -> float:
     """Return the area [m^2] of the box of a free scene whose friction curve is in a directory; 0 of any other scene."""
     job = find_curve_job(directory)
     return job.grid.lx * job.grid.ly if job and job.grid.boundary == "free" else 0.0
+
+
+def round_digits(values: Array) -> Array:
+    """Return values that count as equal as equal numbers."""
+    return np.array([float(f"{value:.{DIGITS}g}") for value in values])
+
+
+def count_different(values: Array) -> int:
+    """Return the number of values that differ by more than rounding."""
+    return np.unique(round_digits(values)).size
 
 
 def to_load(pressure: Array, area: float) -> tuple[Axis, Array]:

@@ -4,16 +4,18 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
 from ..printed import LONG_TIME, TIMES, prefixed, quantity
 
-__all__ = ["label", "label_log_times", "prefixed", "quantity"]
+__all__ = ["label", "label_log_times", "label_map", "prefixed", "quantity"]
 
 MARKS = {"1 ns": 1e-9, "1 µs": 1e-6, "1 ms": 1e-3, "1 s": 1.0, "1 min": 60.0, "1 h": 3600.0}
 MARKS |= {"1 day": TIMES["days"], "1 year": TIMES["years"]}  # ticks of a logarithmic axis [s]
 LETTER = 0.085  # width of a letter of a tick label [inch]
+LONGEST, TALLEST = 4.0, 1.25  # most width over height of a map, and most height over width, without stretching
 FEW_MARKS = 3  # least number of ticks
 
 
@@ -24,6 +26,17 @@ def label(axis: Axis, name: str, unit: str) -> None:
         axis.set_major_locator(_RoundTimes(size))
     axis.set_label_text(f"{name} [{shown}]" if shown else name)
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / size:.10g}".replace("-", "−")))
+
+
+def label_map(axes: Axes, size: tuple[float, float]) -> float:
+    """Set the labels and the aspect of a map of a `size` [m], and return its height over that of its panel; the short
+    side of a long map is stretched, and its label says so."""
+    ratio = size[0] / size[1]
+    stretched = "y" * bool(ratio > LONGEST) + "x" * bool(ratio < 1.0 / TALLEST)
+    axes.set_aspect("auto" if stretched else "equal")
+    for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y")):
+        label(axis, f"{name}, stretched" if name == stretched else name, "m")
+    return 1.0 if stretched else min(1.0, 1.0 / ratio)
 
 
 def label_log_times(axis: Axis, name: str) -> bool:

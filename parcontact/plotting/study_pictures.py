@@ -15,7 +15,7 @@ from ..parallel.slab import Array
 from . import style
 
 NAMES = {"mu_max": "largest friction", "mu_end": "friction in the end", "area_corrected": "contact area, corrected"}
-MARKS = {"mesh and time together": "o-", "mesh with auto steps": "o-", "mesh alone": "s--", "time alone": "^:"}
+MARKS = {"mesh and time together": "o-", "mesh with auto steps": "D-", "mesh alone": "s--", "time alone": "^:"}
 INTEGRATORS = {"exponential": style.BLUE, "exponential-linear": style.GREEN, "backward-euler": style.RED}
 BAND = 5.0  # ratio of the edges of the grey band
 LEAST = 1e-7  # smallest error on the axis; smaller ones are drawn there
@@ -49,7 +49,7 @@ def _convergence(curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> F
     for curve in curves:
         own.setdefault(curve.quantity, []).append(curve)
     panels = [partial(_draw_ladders, name=name, curves=found, doubt=doubts[name]) for name, found in own.items()]
-    return style.figure_of("", [[panel] for panel in panels], legend=True)
+    return style.figure_of("", [panels])
 
 
 def _draw_ladders(axes: Axes, name: str, curves: Sequence[StudyCurve], doubt: float) -> None:

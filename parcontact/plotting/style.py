@@ -1,16 +1,21 @@
 """Style of all pictures: readable at a width of 8 cm, in colours for colour-blind readers."""
 
+import textwrap
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
+from matplotlib.colors import to_hex, to_rgb
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.transforms import ScaledTranslation
 
 from ..storage import files
 from ..streams import printable
@@ -21,16 +26,16 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#00
 DASHES = ("-", "--", "-.", ":")  # with the colours, for black and white prints
 BLUE, RED, GREEN, *_ = COLORS
 GREY = "0.4"
-SEQUENCE = "viridis"  # colour map for lines in an order, such as instants
+SEQUENCE, LIGHTEST = "viridis", 0.9  # colour map for quantities in an order, such as instants, and its used part
 WIDTH, HEIGHT = 5.8, 2.25  # width of a picture, height of a row of panels [inch]
-COLUMNS = 2  # panels per row
+COLUMNS, MANY_PANELS = (2, 3), 8  # panels per row of few and of many panels, and the most panels that are few
 LINE = 68  # most letters in a line of a title
-LEGEND_LINE = 0.2  # height of each line of a legend [inch]
-DPI = 200
+DPI, SMALL = 200, 8  # points per inch of a picture; size of small letters [points]
 RC: dict[Any, Any] = {
     "axes.grid": True,
     "axes.spines.right": False,
     "axes.spines.top": False,
+    "axes.titlepad": 9,  # above the highest label of the vertical axis
     "axes.titlesize": 10,
     "axes.formatter.useoffset": False,
     "font.size": 10,
@@ -46,25 +51,12 @@ RC: dict[Any, Any] = {
     "svg.fonttype": "none",
     "pdf.fonttype": 42,
 }
-ABOVE: dict[str, Any] = {  # legend of a panel of half the width
-    "loc": "lower center",
-    "bbox_to_anchor": (0.5, 1.0),
-    "ncols": 3,
-    "columnspacing": 1.0,
-    "handlelength": 1.4,
-}
-AT_SIDE: dict[str, Any] = {  # legend at the right of a full panel
-    "loc": "upper left",
-    "bbox_to_anchor": (1.0, 1.0),
-    "borderaxespad": 0.0,
-    "handlelength": 1.8,
-}
-BELOW: dict[str, Any] = {  # legend of a small picture
-    "loc": "upper center",
-    "bbox_to_anchor": (0.5, -0.22),
-    "columnspacing": 1.0,
-    "handlelength": 1.8,
-}
+FEW_ENTRIES = 2, 4  # most entries of a legend inside a narrow panel and a wide one
+INSIDE = 0.6  # most width of a legend inside a panel, over that of the panel
+NARROW = 3.5  # width below which a panel is narrow [inch]
+ROOM, LETTER = 0.45, 0.075  # width of an entry of a legend without its name, and mean width of a letter [inch]
+MARGIN = 0.2  # least width of a panel that a legend below it leaves free [inch]
+UNDER_AXES, GAP = 0.5, 0.05  # height of the labels below axes, and around a legend [inch]
 MARKED = {
     "png": "Software",
     "pdf": "Creator",
@@ -98,58 +90,142 @@ def plain(text: str, most: int = 1000) -> str:
     return (text if len(text) <= most else text[: most - 1] + "…").replace("$", r"\$")
 
 
-def line(number: int) -> dict[str, Any]:
-    """Return colour and dashes of the line with this index."""
-    return {"color": COLORS[number % len(COLORS)], "linestyle": DASHES[number % len(DASHES)]}
+def colors(count: int) -> list[str]:
+    """Return different colours of lines: a sequence if there are more lines than colours for colour-blind readers."""
+    if count <= len(COLORS):
+        return list(COLORS[:count])
+    return sequence(count)
 
 
-def figure_of(
-    title: str, groups: Sequence[Sequence[Panel]], legend: bool = False, maps: Sequence[Panel] = ()
-) -> Figure:
-    """Draw groups of panels below each other in even rows, then `maps`, all of one size. With `legend` there is space
-    for one legend of all panels under the title."""
-    parts = [(row, 1, len(row)) for group in groups for row in _split_rows(group)]
-    parts += [(maps, -(-len(maps) // COLUMNS), COLUMNS)] if maps else []
-    heights = [rows for _, rows, _ in parts]
-    height = 0.25 + 0.2 * (title.count("\n") + 1) + HEIGHT * sum(heights)
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
-    if title and not legend:
-        figure.suptitle(plain(title), fontsize=11)
-    places = figure.subfigures(len(parts), 1, squeeze=False, height_ratios=heights)[:, 0] if parts else ()
-    for place, (panels, rows, columns) in zip(places, parts, strict=True):
-        grid = place.add_gridspec(rows, columns)
-        for number, panel in enumerate(panels):
-            panel(place.add_subplot(grid[divmod(number, columns)]))
-    if legend and parts:
-        _put_legend_above(figure, title)
+def sequence(count: int) -> list[str]:
+    """Return colours from dark to light for quantities in an order."""
+    return [to_hex(colormaps[SEQUENCE](share)) for share in np.linspace(0.0, LIGHTEST, count)]
+
+
+def mix(color: str, white: float) -> str:
+    """Return a colour mixed with a share of white."""
+    red, green, blue = (part + white * (1.0 - part) for part in to_rgb(color))
+    return to_hex((red, green, blue))
+
+
+def line(number: int, count: int = 0) -> dict[str, Any]:
+    """Return colour and dashes of the line with this index, of `count` lines."""
+    return {"color": colors(max(count, number + 1))[number], "linestyle": DASHES[number % len(DASHES)]}
+
+
+def figure_of(title: str, groups: Sequence[Sequence[Panel]], maps: Sequence[Panel] = ()) -> Figure:
+    """Draw groups of panels below each other in even rows, then `maps`, all of one size; legends are those of
+    `place_legends` for each group."""
+    most = COLUMNS[sum(map(len, (*groups, maps))) > MANY_PANELS]
+    width = WIDTH * most / COLUMNS[0]
+    parts = [[(row, 1, len(row)) for row in _split_rows(group, most)] for group in groups if group]
+    parts += [[(maps, -(-len(maps) // most), most)]] if maps else []
+    heights = [HEIGHT * rows for part in parts for _, rows, _ in part]
+    figure = Figure(figsize=(width, 1.0), layout="constrained")
+    lines = wrap(title, int(LINE * width / WIDTH))
+    if lines:
+        figure.suptitle(lines, fontsize=11)
+    grid, row = figure.add_gridspec(max(len(heights), 1), 1), 0
+    for part in parts:
+        drawn = [_draw_row(figure.add_subfigure(grid[row + k]), *each) for k, each in enumerate(part)]
+        for k, extra in enumerate(place_legends(drawn)):
+            heights[row + k] += extra
+        row += len(part)
+    grid.set_height_ratios(heights or [1.0])
+    set_height(figure, 0.25 + 0.2 * (lines.count("\n") + 1) + sum(heights))
     return figure
 
 
-def _split_rows(group: Sequence[Panel]) -> list[Sequence[Panel]]:
-    count = -(-len(group) // COLUMNS)
+def set_height(figure: Figure, height: float) -> None:
+    """Set the height [inch] of a figure, and lay it out once: the next layout, when it is saved, starts from there.
+
+    A single layout keeps margins that labels needed at the height before, and the lowest leave the page.
+    """
+    figure.set_figheight(height)
+    figure.draw_without_rendering()
+
+
+def wrap(text: str, most: int) -> str:
+    """Return a text in lines of at most `most` letters, with dollar signs escaped."""
+    return plain("\n".join(part for given in text.split("\n") for part in textwrap.wrap(given, most) or [""]))
+
+
+def _split_rows(group: Sequence[Panel], most: int) -> list[Sequence[Panel]]:
+    count = -(-len(group) // most)
     return [group[len(group) * row // count : len(group) * (row + 1) // count] for row in range(count)]
 
 
+def _draw_row(place: SubFigure, panels: Sequence[Panel], rows: int, columns: int) -> list[Axes]:
+    grid = place.add_gridspec(rows, columns)
+    found = [place.add_subplot(grid[divmod(number, columns)]) for number in range(len(panels))]
+    for panel, axes in zip(panels, found, strict=True):
+        panel(axes)
+    return found
+
+
+def place_legends(rows: Sequence[Sequence[Axes]]) -> list[float]:
+    """Add the legends of panels in rows, and return the height that each row needs for them [inch].
+
+    Entries of several panels stand once, below the last row. Other entries stand in their panel, or below it if there
+    are many.
+    """
+    entries = {axes: _find_entries(axes) for row in rows for axes in row}
+    counts = Counter((name, _find_look(handle)) for own in entries.values() for name, handle in own.items())
+    shared = {
+        name: handle for own in entries.values() for name, handle in own.items() if counts[name, _find_look(handle)] > 1
+    }
+    heights = []
+    for row in rows:
+        own = [{name: handle for name, handle in entries[axes].items() if name not in shared} for axes in row]
+        heights.append(max((_add_legend(axes, each) for axes, each in zip(row, own, strict=True) if each), default=0.0))
+    if shared:
+        figure = rows[-1][-1].figure
+        heights[-1] += _add_below(figure, shared, _width(figure), loc="outside lower center")
+    return heights
+
+
+def _find_entries(axes: Axes) -> dict[str, Artist]:
+    """Return the entries of the legend of a panel, also those of a second vertical axis."""
+    place = axes.get_subplotspec()
+    both = [one for one in axes.figure.axes if one.get_subplotspec() == place]
+    pairs = (zip(*one.get_legend_handles_labels(), strict=True) for one in both)
+    return {name: handle for each in pairs for handle, name in each}
+
+
 def _find_look(handle: Any) -> tuple[str, ...]:
-    """Return colour, dashes and marker of a legend entry, to compare entries."""
-    if hasattr(handle, "get_linestyle"):
+    """Return colour, and dashes and marker if it has any, of an entry of a legend."""
+    if hasattr(handle, "get_marker"):
         return to_hex(handle.get_color()), str(handle.get_linestyle()), str(handle.get_marker())
-    return (to_hex(handle.patches[0].get_facecolor()),) if hasattr(handle, "patches") else (repr(handle),)
+    patch = handle.patches[0] if hasattr(handle, "patches") else handle
+    return (to_hex(patch.get_facecolor()),)
 
 
-def _put_legend_above(figure: Figure, title: str) -> None:
-    """Replace the legends of all panels by one above them, with the title of the figure, unless two names look the
-    same."""
-    found: dict[str, Artist] = {}
-    for axes in figure.axes:
-        found |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    if len(set(map(_find_look, found.values()))) < len(found):
-        figure.suptitle(plain(title), fontsize=11)
-        return
-    for axes in figure.axes:
-        if legend := axes.get_legend():
-            legend.remove()
-    columns = max(1, min(len(found), LINE // (8 + max(map(len, found), default=0))))
-    figure.set_figheight(figure.get_figheight() + LEGEND_LINE * -(-len(found) // columns))
-    place: dict[str, Any] = {"loc": "outside upper center", "ncols": columns, "title_fontsize": 11}
-    figure.legend(list(found.values()), list(found), title=plain(title), **place)
+def _width(figure: Figure | SubFigure) -> float:
+    return float(figure.bbox.width / figure.dpi)
+
+
+def _add_legend(axes: Axes, entries: dict[str, Artist]) -> float:
+    """Add the legend of a panel, and return the height that it needs below the panel [inch]."""
+    width = _width(axes.figure) / panels_per_row(axes)
+    if len(entries) <= FEW_ENTRIES[width > NARROW] and ROOM + LETTER * max(map(len, entries)) < INSIDE * width:
+        top = next(one for one in reversed(axes.figure.axes) if one.get_subplotspec() == axes.get_subplotspec())
+        top.legend(entries.values(), entries)
+        return 0.0
+    under = axes.transAxes + ScaledTranslation(0.0, -UNDER_AXES, axes.figure.dpi_scale_trans)
+    place = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": under, "borderaxespad": 0.0}
+    return _add_below(axes, entries, width - MARGIN, **place)
+
+
+def _add_below(owner: Axes | Figure | SubFigure, entries: dict[str, Artist], width: float, **place: Any) -> float:
+    """Add a legend of a width [inch] in as many columns as fit, and return its height [inch]."""
+    names = [wrap(name, int((width - ROOM) / LETTER)) for name in entries]
+    longest = max(len(part) for name in names for part in name.split("\n"))
+    columns = max(1, min(len(names), int(width / (ROOM + LETTER * longest))))
+    legend = owner.legend(entries.values(), names, ncols=columns, columnspacing=1.0, **place)
+    return float(legend.get_window_extent().height / legend.figure.dpi) + GAP
+
+
+def panels_per_row(axes: Axes) -> int:
+    """Return the number of panels in the row of a panel."""
+    place = axes.get_subplotspec()
+    return place.get_gridspec().ncols if place else 1

@@ -1,23 +1,22 @@
 """Picture of a rigid surface: its map, the distribution of its heights, and its spectra with the limits of the grid."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ..parallel.slab import Array
 from ..physics.surface_statistics import Statistics
-from . import prefixes, style
+from . import charts, prefixes, style
 
 BINS = 60
 FEW, OUTLYING = (1e-3, 1.5)  # share of outlying points on either side, and the drawn range over the range of the others
 RESOLVED = 8  # cells of a wave that is resolved in a contact
 COARSEST = 800  # most points of the drawn map along a side
 ROUNDING = 1e-20  # rounding: smallest drawn power over the largest
-LEGEND = 8  # size of letters of the legend [points]
 
 
 @dataclass(frozen=True)
@@ -34,9 +33,7 @@ class Sketch:
 def draw_surface(sketch: Sketch, path: Path) -> None:
     """Write the picture, a png, pdf or svg; raises OSError."""
     with style.drawing():
-        figure = Figure(figsize=(style.WIDTH, 2 * style.HEIGHT), layout="constrained")
-        for axes, panel in zip(figure.subplots(2, 2).ravel(), PANELS.values(), strict=True):
-            panel(axes, sketch)
+        figure = style.figure_of("", [[partial(panel, sketch=sketch) for panel in PANELS.values()]])
         style.save_figure(figure, path, path.suffix[1:])
 
 
@@ -45,12 +42,11 @@ def _draw_map(axes: Axes, sketch: Sketch) -> None:
     lx, ly = sketch.size
     heights, place = sketch.heights[::step, ::step], (0.0, lx, 0.0, ly)
     low, high = _find_ends(heights)
-    look: dict[str, Any] = {"origin": "lower", "extent": place, "cmap": "cividis", "aspect": "equal"}
+    look: dict[str, Any] = {"origin": "lower", "extent": place, "cmap": "cividis"}
     image = axes.imshow(heights, vmin=low, vmax=high, **look)
     axes.grid(False)
-    prefixes.label(axes.figure.colorbar(image, ax=axes, shrink=min(1.0, ly / lx)).ax.yaxis, "height", "m")
-    prefixes.label(axes.xaxis, "x", "m")
-    prefixes.label(axes.yaxis, "y", "m")
+    height = prefixes.label_map(axes, sketch.size)
+    prefixes.label(axes.figure.colorbar(image, ax=axes, shrink=height).ax.yaxis, "height", "m")
 
 
 def _find_ends(heights: Array) -> tuple[float, float]:
@@ -70,9 +66,8 @@ def _draw_distribution(axes: Axes, sketch: Sketch) -> None:
     if rms > 0.0:
         x = np.linspace(-4 * rms, 4 * rms, 200)
         axes.plot(x, np.exp(-0.5 * (x / rms) ** 2) / (rms * np.sqrt(2 * np.pi)), color=style.RED, label="normal")
-    axes.set(xlabel=f"height over mean [{unit}]", ylabel=f"density [1/{unit}]")
     axes.margins(y=0.45)
-    axes.legend(loc="upper right")
+    axes.set(xlabel=f"height over mean [{unit}]", ylabel=f"density [1/{unit}]")
 
 
 def _draw_spectra(axes: Axes, sketch: Sketch, spectra: list[tuple[str, Array, Array, int]], name: str) -> None:
@@ -84,7 +79,8 @@ def _draw_spectra(axes: Axes, sketch: Sketch, spectra: list[tuple[str, Array, Ar
     axes.axvline(2 * np.pi / (RESOLVED * cell), color=style.GREY, ls=":", label=f"waves of {RESOLVED} cells")
     axes.axvline(np.pi / cell, color=style.GREY, ls="--", label="waves of 2 cells")
     axes.set(xlabel="wavenumber [1/m]", ylabel=name)
-    axes.legend(loc="lower left", fontsize=LEGEND)
+    for axis in (axes.xaxis, axes.yaxis):
+        charts.thin_log_ticks(axis)
 
 
 def _draw_profiles(axes: Axes, sketch: Sketch) -> None:

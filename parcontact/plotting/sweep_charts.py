@@ -27,6 +27,8 @@ UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N"
 UNITS |= {"duration": "s", "work": "J/m²", "range": "m", "shear_modulus": "Pa", "modulus_inf": "Pa"}
 UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m"}
 MARKERS, DASHES = ("o", "s"), ("--", ":")  # markers of means, dashes of theories, by column of a panel
+THIN = 1.0  # tuning: width of lines of the theory [points]
+GREY, EMPTY = {"color": style.GREY}, np.zeros(0)  # entries of legends that hold for all colours
 STYLES = ("-", "--", ":", "-.")  # dashes of lines, by the values of further keys
 WIDE = 10.0  # ratio of the largest to the smallest number above which an axis is logarithmic
 Panels = tuple[tuple[str, Axis, dict[str, str]], ...]
@@ -70,18 +72,8 @@ def chart_sweep(directory: Path) -> list[Chart]:
     word = key.split(".")[-1]
     x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
     for panel, y, columns in panels:
-        series, lines, hues = list[ChartLine](), _split(rows, key), dict[str, list[str]]()
-        for (hue, *rest), own in lines.items():
-            dashes = hues.setdefault(hue, [])
-            for k, (name, column) in enumerate(columns.items()):
-                color = style.line(list(hues).index(hue) if len(lines) > 1 else k)["color"]
-                look = {"color": color, "linestyle": STYLES[len(dashes) % len(STYLES)]}
-                theory = f"theory, {name}" if len(columns) > 1 else "theory"
-                label = ", ".join([*([name] if len(columns) > 1 else []), *filter(None, [hue, *rest])]) or name
-                series += _make_lines((label, theory), own, column, key, look, k)
-            dashes.append(", ".join(rest))
+        series = _make_series(rows, key, columns)
         if any(one.y.any() for one in series):  # after detachment there is neither friction nor area
-            series = list(_name_once(series))
             values = np.concatenate([one.x for one in series])
             wide = bool(values.min() > 0.0 and values.max() >= WIDE * values.min())
             found.append(Chart(panel, x, y, series, log_x=wide))
@@ -139,10 +131,35 @@ def _named(key: str, value: Any) -> str:
     return text if word in sweep_table.PLACES else f"{word.replace('_', ' ')} {text}"
 
 
+def _make_series(rows: Rows, key: str, columns: dict[str, str]) -> list[ChartLine]:
+    """Return entries of the legend, and the lines of all columns: colours for the values of the first further key,
+    dashes for those of the others, marks for the columns. Without further keys, columns have colours."""
+    lines = {(hue, ", ".join(rest)): own for (hue, *rest), own in _split(rows, key).items()}
+    if len({rest for _, rest in lines}) > len(STYLES):
+        lines = {(", ".join(names), ""): own for names, own in lines.items()}
+    hues, rests = (list(dict.fromkeys(names)) for names in zip(*lines, strict=True))
+    colors, found = style.colors(max(len(hues), len(columns))), list[ChartLine]()
+    names = dict[str, dict[str, Any]]()
+    names |= {hue: {"color": colors[k]} for k, hue in enumerate(hues) if len(hues) > 1}
+    names |= {rest: GREY | {"linestyle": STYLES[k]} for k, rest in enumerate(rests) if len(rests) > 1}
+    for (hue, rest), own in lines.items():
+        for k, (name, column) in enumerate(columns.items()):
+            color = colors[hues.index(hue) if len(lines) > 1 else k]
+            look = {"color": color, "linestyle": STYLES[rests.index(rest)]}
+            theory = f"theory, {name}" if len(columns) > 1 else "theory"
+            for one in _make_lines((name, theory), own, column, key, look, k):
+                if one.name != name or len(lines) == 1:
+                    names.setdefault(one.name, one.look if len(lines) == 1 else one.look | GREY)
+                elif len(columns) > 1:
+                    names.setdefault(name, GREY | {"marker": MARKERS[k], "linestyle": "none"})
+                found.append(replace(one, name=""))
+    return [*(ChartLine(name, EMPTY, EMPTY, look) for name, look in names.items()), *found]
+
+
 def _make_lines(
     names: tuple[str, str], rows: Rows, column: str, key: str, look: dict[str, Any], number: int
 ) -> Iterator[ChartLine]:
-    """Yield the means as a line with points, all cases as small dots, and the theory, of a column."""
+    """Yield the means of a column as a line with points, all cases as small dots, and the theory."""
     theirs = "contact_area" if column == CORRECTED else column
     x, y, theory = (_read_column(rows, wanted) for wanted in (key, column, f"theory_{theirs}"))
     if (there := np.isfinite(y)).any():
@@ -153,15 +170,8 @@ def _make_lines(
             dots = {"marker": ".", "linestyle": "none", "alpha": 0.5, "markersize": 3}
             yield ChartLine("each case", x[there], y[there], look | dots)
     if (there := np.isfinite(theory)).any():
-        yield ChartLine(names[1], *_average(x[there], theory[there]), look | {"linestyle": DASHES[number]})
-
-
-def _name_once(series: Sequence[ChartLine]) -> Iterator[ChartLine]:
-    """Yield lines; of lines with the same name only the first keeps it."""
-    known = set[str]()
-    for one in series:
-        yield replace(one, name="" if one.name in known else one.name)
-        known.add(one.name)
+        thin = {"linestyle": DASHES[number], "linewidth": THIN}
+        yield ChartLine(names[1], *_average(x[there], theory[there]), look | thin)
 
 
 def _average(x: Array, y: Array) -> tuple[Array, Array]:

@@ -73,8 +73,7 @@ def describe_directory(directory: Path) -> Chapter:
 def compare_directories(directories: Sequence[Path]) -> Iterator[Chapter]:
     """Yield a chapter that compares several directories in common pictures, with one colour per directory."""
     if len(directories) > 1:
-        found = plots.compare_charts(directories)
-        shared = [chart for chart in found if len({one.look["color"] for one in chart.series}) > 1]
+        shared = plots.compare_charts(directories, least=2)
         if shared:
             yield Chapter(
                 "Comparison", Path(), "", [ReportSection("Together", pictures=[draw_chart(one) for one in shared])]

@@ -101,5 +101,3 @@ def _draw_moduli(axes: Axes, job: Job) -> None:
     loss_axes.set_ylabel("tan δ")
     loss_axes.set_ylim(bottom=0.0)
     loss_axes.grid(False)
-    (handles, names), (more, other) = axes.get_legend_handles_labels(), loss_axes.get_legend_handles_labels()
-    loss_axes.legend([*handles, *more], [*names, *other], fontsize=8)

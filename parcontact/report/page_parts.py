@@ -2,7 +2,6 @@
 
 import base64
 import io
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -12,7 +11,6 @@ from matplotlib.figure import Figure
 
 from ..plotting import charts, style
 
-NAME_HEIGHT = 0.19  # height of a row of a legend [inch]
 SIZE = (4.2, 2.9)  # size of a chart, half the width of a laptop's screen [inch]
 RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes, independent of fonts
 
@@ -80,9 +78,8 @@ def draw_panel(panel: style.Panel, caption: str) -> Picture:
         figure = Figure(figsize=SIZE, layout="constrained")
         axes = figure.subplots()
         panel(axes)
-        names = len(axes.get_legend_handles_labels()[1])
-        if names > charts.MANY_NAMES:  # a legend below the panel enlarges the picture
-            figure.set_figheight(SIZE[1] + NAME_HEIGHT * math.ceil(names / charts.NAMES_PER_ROW))
+        (extra,) = style.place_legends([[axes]])
+        style.set_height(figure, SIZE[1] + extra)
         figure.savefig(file, format="svg", dpi=style.DPI, metadata={"Date": None})
     return to_uri(file.getvalue(), "image/svg+xml"), caption
 

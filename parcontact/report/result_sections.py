@@ -16,7 +16,7 @@ from .. import capabilities, progress
 from ..columns import STEADY, SWEEP, UNITS
 from ..job import Job
 from ..job.added_sections import answers
-from ..plotting import curve_charts, histories, maps, prefixes, style, sweep_charts
+from ..plotting import charts, curve_charts, histories, maps, prefixes, style, sweep_charts
 from ..plotting.plotted_run import (
     Fields,
     PlottedRun,
@@ -67,7 +67,9 @@ def describe_run(directory: Path) -> ReportSection:
         *theory_comparison.describe_theory(directory, run.job.history, run.job.grid.dx),
         theory_settings.describe_settings(directory),
     ]
-    pictures = [draw_chart(chart) for chart in histories.chart_histories(run)] + _more_pictures(directory)
+    found = histories.chart_histories(run)
+    pictures = [draw_chart(chart) for chart in (*found[:1], *map(charts.hide_stages, found[1:]))]
+    pictures += _more_pictures(directory)
     return ReportSection("Results of the run", list(filter(None, sentences)), [numbers], pictures, browse_run(run))
 
 

@@ -49,7 +49,7 @@ def test_the_title_has_the_load_of_all_points(
     table = curve(tmp_path, scene, pressures)
     plots.draw_steady(table)
     plots.plot([tmp_path])
-    assert [figure.legends[0].get_title().get_text() for figure in drawn] == [title, title]
+    assert [figure.get_suptitle() for figure in drawn] == [title, title]
     assert not [pair for figure in drawn for pair in touching(figure)]
 
 

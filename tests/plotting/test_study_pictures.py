@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from drawing import outside, touching
+from drawing import entries, outside, touching
 from matplotlib.figure import Figure
 
 from parcontact.plotting import study_pictures
@@ -23,7 +23,7 @@ def test_how_errors_fall(tmp_path: Path, drawn: list[Figure]) -> None:
     assert not touching(figure)
     assert not outside(figure)
     assert len(figure.axes) == 3
-    assert len(figure.legends[0].get_texts()) == 9
+    assert len(entries(figure)) == 9
     assert all(len(axes.patches) == 1 for axes in figure.axes)
 
 

@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawing import outside, touching
+from drawing import entries
+from legible import assert_legible
 from matplotlib.figure import Figure
 
 from parcontact.plotting import sweep_charts
+from parcontact.plotting.charts import Chart, ChartLine
 from parcontact.plotting.plots import PlotOptions, plot
 
 SIZES = (1e-3, 2e-3, 3e-3)
@@ -27,33 +29,41 @@ def case(velocity: float, seed: int, friction: float | str, size: float = 1.0, t
     return (0, velocity, velocity, seed, size, "done", friction, 0.1, 0.2, theory)
 
 
+def lines_of(chart: Chart) -> list[ChartLine]:
+    """Return the lines of a chart without the entries of its legend."""
+    return [one for one in chart.series if one.x.size]
+
+
+def names_of(chart: Chart) -> list[str]:
+    return [one.name for one in chart.series if one.name]
+
+
 def test_means_over_seeds_with_cases_and_theory(tmp_path: Path) -> None:
     """Cases that are not done yet are left out; keys that move together are one."""
     rows = [case(1.0, 1, 3.0), case(1.0, 2, 5.0), case(20.0, 1, 7.0, theory=0.7), case(20.0, 2, "", theory=0.7)]
     friction, area = sweep_charts.chart_sweep(saved(tmp_path, *rows))
     assert (friction.key, friction.x.name, friction.x.unit, friction.log_x) == ("friction", "velocity", "m/s", True)
-    highest, cases, theory, *dynamic = friction.series
+    highest, cases, theory, *_ = lines_of(friction)
     assert highest.y.tolist() == [4.0, 7.0]
     assert cases.y.tolist() == [3.0, 5.0, 7.0]
     assert theory.y.tolist() == [0.5, 0.7]
     assert {one.look["color"] for one in (highest, cases, theory)} == {highest.look["color"]}
-    assert [one.name for one in (highest, theory, *dynamic)] == ["highest", "theory, highest", "dynamic", ""]
-    assert np.allclose(area.series[0].y, 0.2)
+    assert names_of(friction) == ["highest", "each case", "theory, highest", "dynamic"]
+    assert np.allclose(lines_of(area)[0].y, 0.2)
 
 
 def test_a_second_key_tells_lines_apart(tmp_path: Path) -> None:
     rows = [case(v, 1, 10 * v + size, size) for v in (1.0, 2.0) for size in (1e-3, 2e-3)]
     friction, _ = sweep_charts.chart_sweep(saved(tmp_path, *rows))
-    lines = [one for one in friction.series if one.name.startswith("highest")]
-    assert [(one.name, one.y.tolist()) for one in lines] == [
-        ("highest, size 1 mm", [10.001, 20.001]),
-        ("highest, size 2 mm", [10.002, 20.002]),
-    ]
+    colors = {one.name: one.look["color"] for one in friction.series if one.name.startswith("size")}
+    found = {one.look["color"]: one.y.tolist() for one in lines_of(friction) if one.look.get("marker") == "o"}
+    assert found == {colors["size 1 mm"]: [10.001, 20.001], colors["size 2 mm"]: [10.002, 20.002]}
     assert not friction.log_x
 
 
 def test_every_value_of_every_other_key_has_a_line(tmp_path: Path) -> None:
-    """Texts, too, and more than three of them: two compounds and two sizes are four lines, each the mean over seeds."""
+    """Two compounds and two sizes are four lines, each the mean over seeds: a colour for each compound, and dashes for
+    each size."""
     head = ("case", "history.0.velocity", "material.include", "surface.0.seed", "grid.size", "state", *RESULTS)
     rows = [
         (0, v, compound, seed, size, "done", 10 * v + seed + friction + 1e3 * size, 0.1, 0.2)
@@ -63,16 +73,19 @@ def test_every_value_of_every_other_key_has_a_line(tmp_path: Path) -> None:
         for size in SIZES[:2]
     ]
     friction, _ = sweep_charts.chart_sweep(saved(tmp_path, *rows, head=head))
-    found = {one.name: one.y.tolist() for one in friction.series if one.name.startswith("highest")}
+    looks = {one.name: one.look for one in friction.series if one.name}
+    found = {
+        (one.look["color"], one.look["linestyle"]): one.y.tolist()
+        for one in lines_of(friction)
+        if one.look.get("marker") == "o"
+    }
     assert found == {
-        f"highest, {compound}, size {size:.0f} mm": pytest.approx([12.0 + own + size, 22.0 + own + size])
+        (looks[compound]["color"], looks[f"size {size} mm"]["linestyle"]): pytest.approx(
+            [12.0 + own + size, 22.0 + own + size]
+        )
         for compound, own in (("soft", 0.1), ("hard", 0.2))
         for size in (1, 2)
     }
-    looks = {one.name: (one.look["color"], one.look["linestyle"]) for one in friction.series}
-    of_compounds = [{looks[f"highest, {name}, size {size} mm"] for size in (1, 2)} for name in ("soft", "hard")]
-    assert [len({color for color, _ in found}) for found in of_compounds] == [1, 1]  # a colour for each compound
-    assert [len({dashes for _, dashes in found}) for found in of_compounds] == [2, 2]  # and dashes for each size
 
 
 def test_bars_of_errors(tmp_path: Path) -> None:
@@ -92,7 +105,7 @@ def test_what_a_sweep_with_adhesion_is_about(tmp_path: Path) -> None:
     head = (*HEAD[:2], "state", *RESULTS, "pull_off", "dissipated", "flow_x", "flow_y")
     rows = [(0, v, "done", "", "", 0.0, 1e-3 * v, 2e-9 * v, 3e-18, 4e-18) for v in (1.0, 2.0)]
     found = {
-        chart.key: [(one.name, one.y.tolist()) for one in chart.series]
+        chart.key: list(zip(names_of(chart), (one.y.tolist() for one in lines_of(chart)), strict=True))
         for chart in sweep_charts.chart_sweep(saved(tmp_path, *rows, head=head))
     }
     assert found == {
@@ -116,20 +129,11 @@ def test_the_picture(tmp_path: Path) -> None:
     assert picture.stat().st_size > 10_000
 
 
-def test_legend_of_many_lines_is_at_their_side(tmp_path: Path, drawn: list[Figure]) -> None:
-    """Three values of a second key, means, cases and theories of all: none is over a line or over another key, and a
-    colour means the same value in both panels."""
+def test_one_legend_of_all_panels_is_below_them(tmp_path: Path, drawn: list[Figure]) -> None:
+    """Three values of a second key, means, cases and theories of all."""
     head = (*HEAD, "theory_mu_max", "theory_mu_dyn", "theory_contact_area")
     rows = [case(v, seed, v * seed + 1e3 * size, size) for v in (1.0, 2.0) for seed in (1, 2) for size in SIZES]
     plot([saved(tmp_path, *((*row, 0.4, 0.3) for row in rows), head=head)], PlotOptions())
-    (figure,) = drawn
-    keys = [legend.get_window_extent() for axes in figure.axes if (legend := axes.get_legend())]
-    assert keys[1].y1 < keys[0].y0
-    colours = [{(str(line.get_label())[-4:], line.get_color()) for line in axes.lines} for axes in figure.axes]
-    assert {each for each in colours[0] if "mm" in each[0]} == {each for each in colours[1] if "mm" in each[0]}
-    assert not touching(figure)
-    assert not outside(figure)
-    for axes in figure.axes:
-        legend = axes.get_legend()
-        assert legend is not None
-        assert legend.get_window_extent().x0 >= axes.get_window_extent().x1
+    assert_legible(drawn[0])
+    sizes = [name for name in entries(drawn[0]) if name.startswith("size")]
+    assert sizes == ["size 1 mm", "size 2 mm", "size 3 mm"]

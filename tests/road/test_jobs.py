@@ -131,7 +131,7 @@ def test_the_verb_surface(road: Path, main: "Main", run_parcontact: "RunParconta
     assert "missing points (2" in done.stdout or "missing points (1.9" in done.stdout
     (slope,) = re.findall(r"rms slope +(\S+)", done.stdout)
     assert float(slope) == pytest.approx(SLOPE, rel=0.05)
-    assert matplotlib.image.imread(road / "road.png").shape[:2] == (900, 1160)
+    assert matplotlib.image.imread(road / "road.png").shape[1] == 1160  # the width of every picture
     code, _, err = main("surface", road / "job.yaml", "--out", road / "road.doc")
     assert code == 2
     assert err.startswith("parcontact: --out must end in .png, .pdf, .svg")

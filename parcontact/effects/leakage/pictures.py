@@ -17,6 +17,7 @@ from ...plotting.style import Panel
 from . import conductivity
 from .flow import Flow, Map
 
+BAR = 0.7  # height of the bar of colours over that of its map
 DECADES = 3  # decades of the flow on the colour scale
 SAME = 1e-6  # rounding: relative difference below which pressures are the same
 FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # columns of a run
@@ -92,13 +93,13 @@ def _draw_flow(axes: Axes, size: tuple[float, float], gap: Map, flow: Flow, flux
     if flow.position is not None:
         most = float(np.nanpercentile(flux, 99.9)) or 1.0  # all the flow may be in fewer cells
         drawn = axes.imshow(flux / most, cmap="viridis", norm=LogNorm(10.0**-DECADES, 1.0), **look)
-        axes.figure.colorbar(drawn, ax=axes, shrink=0.7, label="flow over its largest")
+        shrink = BAR * prefixes.label_map(axes, size)  # after the pictures, which set the aspect
+        axes.figure.colorbar(drawn, ax=axes, shrink=shrink, label="flow over its largest")
         row, column = flow.position
         cell = size[0] / gap.shape[1], size[1] / gap.shape[0]
         axes.plot((column + 0.5) * cell[0], (row + 0.5) * cell[1], "o", mfc="none", mec="r", ms=11, mew=1.5)
     axes.grid(False)
-    for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y")):
-        prefixes.label(axis, name, "m")
+    prefixes.label_map(axes, size)
 
 
 def flux(gap: Map, pressure: Map, size: tuple[float, float]) -> Map:
