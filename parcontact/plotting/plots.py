@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from ..errors import InputError
 from ..job.added_sections import answers
 from ..job.reading import CASES
-from ..storage import hdf5
+from ..storage import hdf5, lost_points
 from ..summary import sweep_table, theory_settings
 from . import charts, curve_charts, histories, maps, movie, prefixes, style, sweep_charts
 from .charts import Chart
@@ -25,6 +25,7 @@ from .plotted_run import PlottedRun
 
 PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy")
 MEASURES = "measures.csv"
+FAILED_CASES = 3  # most failed cases that a picture names
 
 
 @dataclass(frozen=True)
@@ -79,11 +80,16 @@ def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> l
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv into its directory; returns the path of the picture."""
     with style.drawing():
-        title, panels = (
-            _wrap(curve_charts.steady_title(table.parent)),
-            PlotOptions().to_panels(curve_charts.chart_steady(table.parent)),
-        )
+        lines = [_wrap(curve_charts.steady_title(table.parent)), *_name_missing(table.parent)]
+        panels = PlotOptions().to_panels(curve_charts.chart_steady(table.parent))
+        title = "\n".join(lines)
         return _save(style.figure_of(title, [panels], legend=True), table.with_suffix(""))
+
+
+def _name_missing(directory: Path) -> list[str]:
+    """Return lines on lost points of a curve and on failed cases of a sweep, which a picture lacks."""
+    found = [lost_points.name_lost(directory), *sweep_table.describe_failed(directory, FAILED_CASES)]
+    return [_wrap(text) for text in found if text]
 
 
 def _wrap(title: str) -> str:
@@ -130,7 +136,8 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
         raise InputError(f"{directory} has neither a run nor a friction curve: {lacking}")
     if options.panels and not any((*groups, fields)):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
-    title = "\n".join(filter(None, (*titles[:1], theory_settings.describe_settings(directory))))
+    lines = *titles[:1], theory_settings.describe_settings(directory), *_name_missing(directory)
+    title = "\n".join(filter(None, lines))
     return style.figure_of(title, groups, legend=has_curve and len(groups) == 1, maps=fields)
 
 
@@ -151,7 +158,9 @@ def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figur
     for directory in directories:
         if not _find_charts(directory, options):
             raise InputError(f"{directory} has nothing to compare")
-    return style.figure_of("", [options.to_panels(compare_charts(directories, options))], legend=True)
+    lost = zip(_name_directories(directories), map(lost_points.name_lost, directories), strict=True)
+    title = "\n".join(dict.fromkeys(_wrap(f"{name}: {text}") for name, text in lost if text))
+    return style.figure_of(title, [options.to_panels(compare_charts(directories, options))], legend=True)
 
 
 def compare_charts(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> list[Chart]:
