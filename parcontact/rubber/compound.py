@@ -239,7 +239,7 @@ def _refuse_misfit(path: Path, best: Any, data: Any) -> None:
 
 def _percents(errors: tuple[float, float, float]) -> str:
     inside, low, high = (per_cent(error) if error < UNKNOWN else "unknown" for error in errors)
-    return f"{inside} inside this band, {low} at its lower end and {high}"
+    return f"{inside} (rms) more than half a decade inside this band, {low} at its lower end and {high}"
 
 
 def _shift_section(shift: Any) -> dict[str, Any]:
