@@ -276,6 +276,16 @@ def test_branches_faster_than_a_relaxation_count_in_the_stated_error(tmp_path: P
     assert swept(tmp_path / "table.txt", body, 1e-5, 0.5, "both").loss_errors[2] < 0.04
 
 
+def test_a_table_with_a_loss_modulus_is_not_asked_for_it(tmp_path: Path) -> None:
+    """With 3 % of noise the storage modulus hardly determines the loss modulus, which the table has."""
+    f = np.geomspace(1e-3, 1e3, 49)
+    g = TEN.modulus(2 * np.pi * f)
+    table = write(tmp_path / "t.txt", "f[Hz] G'[Pa] G''[Pa]", f, noisy(g.real, 0.03), noisy(g.imag, 0.03, seed=2))
+    (text,) = compound.fitted(table, 0.5, None, "wlf", 0.02, "storage").doubts()
+    assert text.endswith("friction goes with it: leave out --weight storage")
+    assert compound.fitted(table, 0.5, None, "wlf", 0.02).doubts() == []
+
+
 def test_creep(tmp_path: Path) -> None:
     """J(t) of a standard solid in closed form, J_0 + J_1 (1 - exp(-t/lambda)): G* = 1/J* to 2 % in the band, also the
     loss; and the fit shows the same J(t). In tension D = J/3."""

@@ -134,8 +134,8 @@ def beyond_shift(speed: float, pressure: float, temperature: float, most: float,
 
 
 def describe_hot(points: Sequence[Point]) -> Iterator[Doubt]:
-    """Yield a warning if rubber would be so hot that it decomposes."""
-    hot = [(point.flash.mean, point.speed) for point in points if point.flash and point.flash.mean > HOTTEST]
+    """Yield a warning if rubber, in bands that of the hottest one, would be so hot that it decomposes."""
+    hot = [(rise, point.speed) for point in points if point.flash and (rise := point.flash.of_rubber) > HOTTEST]
     if hot:
         rise, speed = max(hot)
         facts = {"count": len(hot), "points": len(points), "most": HOTTEST, "rise": rise, "speed": speed}
@@ -143,13 +143,14 @@ def describe_hot(points: Sequence[Point]) -> Iterator[Doubt]:
 
 
 def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[Doubt]:
-    """Yield a warning if the flash temperature of relaxing rubber is outside its measured range."""
+    """Yield a warning if the flash temperature of relaxing rubber, in bands of the hottest one, is outside its measured
+    range."""
     body = job.material.fitted
     if not feeds_back(job) or not isinstance(body, Zener) or body.temperatures is None:
         return
     own, (low, high) = temperature_of(job.material), body.temperatures
     warm = [
-        ((own if math.isnan(point.temperature) else point.temperature) + point.flash.mean, point.speed)
+        ((own if math.isnan(point.temperature) else point.temperature) + point.flash.of_rubber, point.speed)
         for point in points
         if point.flash
     ]
