@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .capabilities import offers
-from .printed import per_cent, quantity
+from .printed import per_cent, quantity, rounded_down, rounded_up
 
 
 @dataclass(frozen=True)
@@ -75,13 +75,16 @@ class _WarningText(str):
 
 class _Formatter(string.Formatter):
     """Formats like `str.format`, and with `!p` (a share in per cent), `!m` and `!M` (a length with its unit in four and
-    three digits) and `!t` (a multiple)."""
+    three digits), `!t` (a multiple), and `!u` and `!d` (a number that is rounded up or down, so that a job that follows
+    the advice keeps the limit)."""
 
     def convert_field(self, value: Any, conversion: Any) -> Any:
         if conversion == "p":
             return per_cent(value)
         if conversion == "t":
             return f"{value:.3g} times" if math.isfinite(value) else "far above"
+        if conversion in ("u", "d"):
+            return (rounded_up if conversion == "u" else rounded_down)(value)
         if conversion in ("m", "M"):
             return quantity(value, "m", 4 if conversion == "m" else 3)
         return super().convert_field(value, conversion)
@@ -93,9 +96,8 @@ SENTENCES = {
     "said": "{text}",
     # a job: slopes, strains, relaxation
     "steep": (
-        "its rms slope is {slope:.3g}; the theory assumes small slopes, up to {most:g}. Are heights and lengths in m? "
-        "Heights in um need scale: 1.0e-6 (shape: file) or unit: um (shape: topography), and missing points must be "
-        "nan"
+        "its rms slope is {slope:.3g}; the theory assumes small slopes, up to {most:g}. Are heights and lengths in "
+        "m?{needed}"
     ),
     "soft": (
         "its instantaneous shear modulus is {modulus:.3g} Pa, below {least:g} Pa and as soft as a gel. Moduli are in "
@@ -147,12 +149,12 @@ SENTENCES = {
     ),
     "images": (
         "its images in the periodic box of {lx:g} x {ly:g} m change the load at a given radius of contact by "
-        "{change!p} or more (limit: {most!p}); use a grid.size {times:.3g} times as large, or boundary: free"
+        "{change!p} or more (limit: {most!p}); use a grid.size {times!u} times as large, or boundary: free"
     ),
     # a job: the mesh and the steps
     "few long waves": (
         "only {waves:.3g} of the longest waves fit into the box along {axis}; a representative surface needs at least "
-        "{least}: use a grid.size of {size:.4g} m or a long_wavelength of {wave:.4g} m"
+        "{least}: use a grid.size of {size!u} m or a long_wavelength of {wave!d} m"
     ),
     "large box": (
         "a side of {length:g} m, {times:.4g} times {key}, {wave:g} m; is it in m? {length:g} mm would be {in_milli:g}"
@@ -174,7 +176,7 @@ SENTENCES = {
     ),
     "skipped waves": (
         "the surface slides {slid:.3g} m in one step, {share:.2g} of its shortest wave; use time steps of at most "
-        "{step:.3g} s (cells_per_step of at most {cells:.3g})"
+        "{step!d} s (cells_per_step of at most {cells!d})"
     ),
     # a job: a layer
     "thin": (
@@ -252,7 +254,7 @@ SENTENCES = {
     "outliers": (
         "{count} points of the map differ from their neighbours by more than {deviations:g} times the median "
         "deviation{repeated}. Its rms slope is {slope:.3g} with them and {without:.3g} without, and they carry load; "
-        "if they are no part of the surface, give outliers: clip, or nodata: NUMBER if one number marks missing points"
+        "if they are no part of the surface, give outliers: clip{nodata}"
     ),
     # friction curves
     "unsolved point": "{where}",

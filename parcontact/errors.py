@@ -24,3 +24,14 @@ class InUseError(InputError):
 
 class RunError(Exception):
     """A run that cannot continue, described in one sentence: exit code 1."""
+
+
+class UnsolvedError(RunError):
+    """A steady state that cannot be solved: its `place` as text, and the `reason`."""
+
+    def __init__(self, place: str, reason: str) -> None:
+        super().__init__(f"{place}: {reason}")
+        self.place, self.reason = place, reason
+
+    def __reduce__(self) -> tuple[type["UnsolvedError"], tuple[str, str]]:
+        return UnsolvedError, (self.place, self.reason)  # for pickling, between ranks

@@ -8,6 +8,7 @@ import math
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 TIMES = {"years": 365.25 * 86400.0, "days": 86400.0, "h": 3600.0, "min": 60.0}  # [s]
 LONG_TIME = 2.0  # smallest number of minutes, hours, days or years that is printed in this unit
+ROUNDING = 1e-9  # rounding: relative difference of equal numbers
 MOST_DIGITS = 6  # limit on the digits of a number with an error
 
 
@@ -34,6 +35,29 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
     shown, size = prefixed(unit, rounded)
     number = value if shown in TIMES else rounded  # a time is rounded in its own unit
     return f"{float(f'{number / size:.{digits}g}'):g} {shown}".rstrip()
+
+
+def rounded_up(value: float, digits: int = 3) -> str:
+    """Return a number that is rounded to few digits, and not below the value: advice on a least value."""
+    return _round_towards(value, digits, 1)
+
+
+def rounded_down(value: float, digits: int = 3) -> str:
+    """Return a number that is rounded to few digits, and not above the value: advice on a largest value."""
+    return _round_towards(value, digits, -1)
+
+
+def _round_towards(value: float, digits: int, side: int) -> str:
+    """Return a rounded number that is at least the value (`side` 1), or at most (-1), but for the last digits."""
+    text = f"{value:.{digits}g}"
+    if not value or not math.isfinite(value) or side * (float(text) - value) >= -ROUNDING * abs(value):
+        return text
+    return f"{float(text) + side * 10.0 ** (_power(value) - digits + 1):.{digits}g}"
+
+
+def _power(value: float) -> int:
+    """Return the power of ten of the first digit."""
+    return math.floor(math.log10(abs(value)))
 
 
 def span(low: float, high: float, unit: str, digits: int = 3) -> str:

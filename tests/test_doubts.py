@@ -1,13 +1,20 @@
 """Warnings are data, and each kind of them has one sentence."""
 
 import ast
+import math
 import pickle
+import re
 from collections.abc import Iterator
 from pathlib import Path
+
+import numpy as np
+import pytest
 
 import parcontact
 from parcontact.doubts import SENTENCES, Doubt
 from parcontact.job import Job
+from parcontact.job.checks import meaning
+from parcontact.printed import rounded_down, rounded_up
 
 HOUSE = Path(parcontact.__file__).parent
 
@@ -47,6 +54,58 @@ def test_numbers_in_sentences() -> None:
     seam = {"axis": "x", "jump": 1e-6, "times": 3.14159, "tilt": 0.0}
     assert "3.14 times the largest step" in str(Doubt("seam", "surface", seam))
     assert "far above the largest step" in str(Doubt("seam", "surface", {**seam, "times": float("inf")}))
+
+
+def test_who_follows_rounded_advice_keeps_the_limit() -> None:
+    """Least values are rounded up and largest down, to three digits; a number of few digits stays as it is."""
+    for value, up, down in ((0.00133333, "0.00134", "0.00133"), (0.002, "0.002", "0.002"), (9.999, "10", "9.99")):
+        assert (rounded_up(value), rounded_down(value)) == (up, down)
+    assert (rounded_up(1.4e-3, 1), rounded_up(2e-3, 1), rounded_up(0.0), rounded_up(math.inf)) == (
+        "0.002",
+        "0.002",
+        "0",
+        "inf",
+    )
+
+
+@pytest.mark.parametrize("wave", [3.33333e-4, 2.71828e-4, 1e-4 / 7.0])
+def test_a_box_as_large_as_advised_gets_no_advice(wave: float) -> None:
+    """It was given the same size again, which had been rounded down."""
+    rough = {"shape": "rough", "hurst": 0.8, "short_wavelength": wave / 2, "rms_slope": 0.1}
+    data = {
+        "grid": {"points": 64, "size": 3.9 * wave},
+        "surface": {**rough, "long_wavelength": wave},
+        "material": {"model": "elastic", "shear_modulus": 1e6},
+        "history": [{"pressure": 1e4}],
+    }
+    (doubt,) = Job.model_validate(data).doubts
+    size, longest = re.findall(r"grid.size of (\S+) m or a long_wavelength of (\S+) m", str(doubt))[0]
+    larger, finer = {**data, "grid": {"points": 64, "size": float(size)}}, {**rough, "long_wavelength": float(longest)}
+    assert Job.model_validate(larger).doubts == ()
+    assert Job.model_validate({**data, "surface": finer}).doubts == ()
+
+
+def test_jobs_are_not_asked_for_keys_that_they_give(tmp_path: Path) -> None:
+    """Units of heights are for files, and for those without them."""
+    np.save(tmp_path / "road.npy", np.random.default_rng(1).normal(size=(16, 16)))
+    ask, surface = meaning.doubt_slope, {"shape": "file", "path": tmp_path / "road.npy"}
+    wave = {"shape": "wave", "amplitude": 1e-3, "waves": [1, 0]}
+    for part, words in (
+        (surface, "Heights in um need scale: 1.0e-6 (shape: file). Missing"),
+        ({**surface, "scale": 1e-6}, "in m? Missing points"),
+        ({**surface, "shape": "topography", "size": [1e-3, 1e-3]}, "need unit: um (shape: topography). Missing"),
+        ({**surface, "shape": "topography", "size": [1e-3, 1e-3], "unit": "um", "nodata": 0.0}, "in m?"),
+        (wave, "in m?"),
+    ):
+        data = {
+            "grid": {"points": 16, "size": 1e-3},
+            "surface": part,
+            "material": {"model": "elastic", "shear_modulus": 1e6},
+            "history": [{"pressure": 1e4}],
+        }
+        (doubt,) = ask(1.0, Job.model_validate(data).surface)
+        assert words in str(doubt)
+        assert not words.endswith("m?") or str(doubt).endswith(words)
 
 
 def test_jobs_have_doubts_and_their_sentences() -> None:

@@ -13,7 +13,7 @@ from ..accuracy.budget import ErrorBudget, ErrorParts
 from ..columns import BANDS, names_of
 from ..doubts import Doubt
 from ..effects.relaxation import feeds_back, highest_temperature_of, temperature_of
-from ..errors import InputError, RunError
+from ..errors import InputError, RunError, UnsolvedError
 from ..job import Job
 from ..parallel.slab import Array, Slab
 from ..physics.measures import Measures
@@ -207,9 +207,9 @@ class RoadSliding:
             if np.all(settled) and softened:
                 return BandSearch(rounds, friction_cold, changes)
             if not np.all(settled) and np.all(settled | ((rises == most) & (over > 0.0))):
-                from ..effects.heat.steady import describe_beyond
+                from ..effects.heat.steady import beyond_shift
 
-                raise RunError(describe_beyond(*place, most, most + float(over[rises == most].max())))
+                raise beyond_shift(*place, most, most + float(over[rises == most].max()))
             if last.any():
                 change = over - last
                 relax = float(np.clip(-relax * float(last @ change) / max(float(change @ change), TINY), 0.1, 1.0))
@@ -217,9 +217,9 @@ class RoadSliding:
             if self._table:
                 self._strains = self._table.mixed(self._strains_of(results), self._strains)
         at = "" if math.isnan(cold) else f" and {cold:.4g} C"
-        raise RunError(
-            f"steady sliding at {place[0]:.4g} m/s under {place[1]:.4g} Pa{at}: temperatures and strains of bands did "
-            f"not settle in {MOST_ROUNDS} rounds. Try feedback: none"
+        raise UnsolvedError(
+            f"steady sliding at {place[0]:.4g} m/s under {place[1]:.4g} Pa{at}",
+            f"temperatures and strains of bands did not settle in {MOST_ROUNDS} rounds. Try feedback: none",
         )
 
     def _place(self) -> tuple[float, float]:
@@ -261,7 +261,7 @@ class RoadSliding:
             from ..effects.heat.steady import describe_cold_state
 
             place = describe_cold_state(*self._place(), self.temperature)
-            raise RunError(f"{place}: no material at the flash temperature: {error}") from None
+            raise UnsolvedError(place, f"no material at the flash temperature: {error}") from None
 
     def _rub(self, results: Results) -> float:
         """Return the shear stress [Pa] of the interface, averaged over the nominal area."""

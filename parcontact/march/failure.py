@@ -10,6 +10,7 @@ from ..errors import RunError
 from ..history.timeline import Step
 from ..parallel.slab import Array
 from ..physics.measures import Measures
+from ..printed import rounded_up
 from ..scene import Scene, sanity
 from ..solve.contact import Contact
 from ..solve.precision import reachable_certificate
@@ -82,7 +83,7 @@ def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, moved: fl
     elif step.dt > 0.0:
         yield "try smaller steps"
     if last.certificate.worst <= USEFUL:
-        yield f"try numerics.tolerance above {last.certificate.worst:.1g}"
+        yield f"try numerics.tolerance above {rounded_up(last.certificate.worst, 1)}"
 
 
 def refuse_beyond_full_contact(scene: Scene, step: Step, effective: Array) -> None:

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from ..errors import InputError
 from ..job.added_sections import answers
 from ..job.reading import CASES
-from ..storage import hdf5
+from ..storage import hdf5, lost_points
 from ..summary import sweep_table, theory_settings
 from . import charts, curve_charts, histories, maps, movie, prefixes, style, sweep_charts
 from .charts import Chart
@@ -24,6 +24,7 @@ from .plotted_run import PlottedRun
 
 PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy")
 MEASURES = "measures.csv"
+FAILED_CASES = 3  # most failed cases that a picture names
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,14 @@ def draw_steady(table: Path) -> Path:
     """Draw steady.csv into its directory; returns the path of the picture."""
     with style.drawing():
         panels = PlotOptions().group(curve_charts.chart_steady(table.parent))
-        return _save(style.figure_of(curve_charts.steady_title(table.parent), panels), table.with_suffix(""))
+        title = "\n".join([curve_charts.steady_title(table.parent), *_name_missing(table.parent)])
+        return _save(style.figure_of(title, panels), table.with_suffix(""))
+
+
+def _name_missing(directory: Path) -> list[str]:
+    """Return lines on lost points of a curve and on failed cases of a sweep, which a picture lacks."""
+    found = [lost_points.name_lost(directory), *sweep_table.describe_failed(directory, FAILED_CASES)]
+    return [text for text in found if text]
 
 
 def _save(figure: Figure, stem: Path, options: PlotOptions = PlotOptions()) -> Path:
@@ -127,8 +135,8 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
         raise InputError(f"{directory} has neither a run nor a friction curve: {lacking}")
     if options.panels and not any((*groups, fields)):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
-    title = "\n".join(filter(None, (*titles[:1], theory_settings.describe_settings(directory))))
-    return style.figure_of(title, groups, fields)
+    lines = *titles[:1], theory_settings.describe_settings(directory), *_name_missing(directory)
+    return style.figure_of("\n".join(filter(None, lines)), groups, fields)
 
 
 def _suggest(path: Path) -> str:
@@ -148,7 +156,9 @@ def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figur
     for directory in directories:
         if not _find_charts(directory, options):
             raise InputError(f"{directory} has nothing to compare")
-    return style.figure_of("", options.group(compare_charts(directories, options)))
+    lost = zip(_name_directories(directories), map(lost_points.name_lost, directories), strict=True)
+    title = "\n".join(dict.fromkeys(f"{name}: {text}" for name, text in lost if text))
+    return style.figure_of(title, options.group(compare_charts(directories, options)))
 
 
 def compare_charts(directories: Sequence[Path], options: PlotOptions = PlotOptions(), least: int = 1) -> list[Chart]:

@@ -26,7 +26,7 @@ from ..plotting.plotted_run import (
     label_frames,
     to_load,
 )
-from ..storage import hdf5, marker, read_back
+from ..storage import hdf5, lost_points, marker, read_back
 from ..summary import slide, sweep_table, theory_comparison, theory_settings
 from ..summary.run_table import RunTable
 from .page_parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
@@ -92,7 +92,9 @@ def describe_curve(directory: Path) -> ReportSection:
     states = partial(_label_states, find_free_area(directory))
     job = find_curve_job(directory)
     browsers = _browse_file(directory / "steady.h5", states, job) if job else []
-    return ReportSection("Friction curve", (), [table, *_list_main_bands(directory)], pictures, browsers)
+    lost = lost_points.name_lost(directory)
+    sentences = [f"The curve has {lost}."] if lost else []
+    return ReportSection("Friction curve", sentences, [table, *_list_main_bands(directory)], pictures, browsers)
 
 
 def _list_main_bands(directory: Path) -> list[ReportTable]:
@@ -121,7 +123,8 @@ def describe_sweep(directory: Path) -> ReportSection:
     rows = sweep_table.read_cases(sweep_table.results(directory))
     used = [name for name in (rows[0] if rows else ()) if any(format_cell(row[name]) not in ("", "–") for row in rows)]
     table = _shorten(list(map(_add_unit, used)), [[row[name] for name in used] for row in rows])
-    sentences = list(filter(None, [theory_settings.describe_settings(directory)]))
+    settings, failed = theory_settings.describe_settings(directory), sweep_table.describe_failed(directory, MOST_ROWS)
+    sentences = list(filter(None, [settings, *failed]))
     return ReportSection(
         "Sweep", sentences, [table], [draw_chart(chart) for chart in sweep_charts.chart_sweep(directory)]
     )

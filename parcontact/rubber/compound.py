@@ -94,10 +94,13 @@ class Compound:
         counts = self.measured.kind == "frequency" and self.weigh != "storage"
         low, high = (frequency / (2 * math.pi) for frequency in series.band)
         if (inside := series.loss_errors[0]) > VAGUE and not counts:
+            remedy = "measure it, or more points per decade"
+            if self.measured.kind == "frequency":
+                remedy = "leave out --weight storage"
             known = f"known to {per_cent(inside)} only" if inside < UNKNOWN else "hardly known"
             yield (
                 f"the loss modulus that follows from the table is {known} between {low:.3g} and {high:.3g} Hz, and "
-                "friction goes with it: measure it, or more points per decade"
+                f"friction goes with it: {remedy}"
             )
         if series.modulus_inf < LIQUID * series.storage_at(series.band[0]):
             yield (
@@ -108,11 +111,12 @@ class Compound:
     def _describe_free(self) -> Iterator[str]:
         """Yield a warning if free factors b_T join the sweeps much better than the vertical law."""
         free = self.found.free if self.found else None
+        also = "" if isinstance(self.shift, Factors) else " and --shift free"
         if self.found and free:
             yield (
                 f"free vertical factors b_T would join the sweeps with a misfit of {per_cent(free.misfit)}, not "
                 f"{per_cent(self.found.misfit)}, and the shift would be {free.shift}: moduli do not go with density "
-                "times temperature, or the law of the shift is wrong; compare --vertical free and --shift free"
+                f"times temperature, or the law of the shift is wrong; compare --vertical free{also}"
             )
 
     def _gaps(self) -> Iterator[str]:
@@ -239,7 +243,7 @@ def _refuse_misfit(path: Path, best: Any, data: Any) -> None:
 
 def _percents(errors: tuple[float, float, float]) -> str:
     inside, low, high = (per_cent(error) if error < UNKNOWN else "unknown" for error in errors)
-    return f"{inside} inside this band, {low} at its lower end and {high}"
+    return f"{inside} (rms) more than half a decade inside this band, {low} at its lower end and {high}"
 
 
 def _shift_section(shift: Any) -> dict[str, Any]:

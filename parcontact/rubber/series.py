@@ -32,6 +32,7 @@ DENSE = 6  # accuracy: times per decade of the dense spectrum
 SPARE = 1.0  # accuracy: decades of the dense spectrum beyond the data on each side
 ROUGH = 3.0  # fitted: prior of second differences of the spectrum over its mean
 BEYOND = 0.7  # fitted: prior of the spectrum beyond the data over that in the last decade
+FASTER = 3  # accuracy: decades of branches faster than the dense spectrum that count in the error of the loss modulus
 LEAST_NOISE = 1e-4  # accuracy: least relative noise of a table
 PER_DECADE = 10  # accuracy: frequencies per decade at which series and dense spectrum are compared
 ENDS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # accuracy: decades beyond the data that a short series may have
@@ -208,7 +209,13 @@ class Spectrum:
             weights = scale * _non_negative(system, goal)
         if not columns[:, times.size].any():
             weights[times.size] = data.find_spring(kernel(data.at, data.kind, times)[: data.at.size] @ weights)
-        return Spectrum(data.kind, times, weights, noise * scale[:, None] * np.linalg.pinv(system))
+        fast, faster = _continue(times, scale)
+        more = (data.columns(fast)[:, : fast.size] @ faster)[:, None]
+        tail = np.vstack([more, np.zeros((len(prior), 1)), [[noise / math.hypot(1.0, BEYOND)]]])
+        spread = noise * np.linalg.pinv(np.hstack([np.pad(system, ((0, 1), (0, 0))), tail]))
+        deviations = np.vstack([faster[:, None] * spread[-1], scale[:, None] * spread[:-1]])
+        weights = np.concatenate([np.zeros(fast.size), weights])
+        return Spectrum(data.kind, np.concatenate([fast, times]), weights, deviations)
 
     def modulus(self, omega: Array) -> tuple[ComplexArray, Array]:
         """Return G* [Pa] at angular frequencies [rad/s], shape (n,), and the relative standard deviation of its
@@ -232,6 +239,16 @@ def _prior(inside: int, beyond: int, rest: int) -> Array:
     tails[:beyond, beyond : beyond + last] -= 1.0 / last
     tails[beyond:, beyond + inside - last : beyond + inside] -= 1.0 / last
     return np.pad(np.vstack([smooth, tails / BEYOND]), ((0, 0), (0, rest)))
+
+
+def _continue(times: Array, scale: Array) -> tuple[Array, Array]:
+    """Return times [s] faster than all of a spectrum, the fastest last, and the weights of its power law there.
+
+    They are 0 in the spectrum, as hardly any data determine them, but count in its covariance: weights with this mean
+    and the prior BEYOND deviate from 0 by hypot(1, BEYOND) times the mean, all together.
+    """
+    steps = np.arange(1, FASTER * DENSE + 1)
+    return times[0] * (times[0] / times[1]) ** steps, scale[0] * (scale[0] / scale[1]) ** steps
 
 
 def _scale(times: Array, weights: Array, inside: slice) -> Array:

@@ -70,5 +70,12 @@ def doubt_outliers(prepared: Prepared) -> Iterator[Doubt]:
     furthest = cut[odd][np.argmax(np.abs(cut[odd] - np.nanmedian(cut)))]
     count = int(np.count_nonzero(cut == furthest))
     repeated = f"; {quantity(furthest, 'm', 4)} occurs {count} times" if count > 1 else ""
-    numbers = {"count": int(odd.sum()), "deviations": treatment.OUTLIER, "slope": slope, "without": without}
+    nodata = ", or nodata: NUMBER if one number marks missing points" if prepared.part.nodata is None else ""
+    numbers = {
+        "nodata": nodata,
+        "count": int(odd.sum()),
+        "deviations": treatment.OUTLIER,
+        "slope": slope,
+        "without": without,
+    }
     yield Doubt("outliers", "surface", {**numbers, "repeated": repeated})

@@ -21,6 +21,7 @@ from ..job.checks.limits import MOST_STEPS
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
 from ..physics.measures import Measures
+from ..printed import rounded_up
 from .measured_range import doubt_band
 from .scene import Setup
 
@@ -64,7 +65,7 @@ def check_heights(setup: Setup) -> list[Doubt]:
 def _check_heights(setup: Setup) -> Iterator[Doubt]:
     known = {doubt.kind for doubt in setup.job.doubts}
     if setup.roughness and "steep" not in known:
-        yield from meaning.doubt_slope(setup.roughness.rms_slope)
+        yield from meaning.doubt_slope(setup.roughness.rms_slope, setup.job.surface)
     yield from setup.remarks.doubts
     seams: list[Doubt] = []
     if any(isinstance(shape, OnOneMesh) for shape in setup.job.surface) and setup.grid.boundary == "periodic":
@@ -111,7 +112,7 @@ def below_rounding(setup: Setup, approach: float) -> str:
         return ""
     return (
         f"an approach of {approach:.3g} m is lost in the rounding of heights that span {heights:.3g} m; give 0 or at "
-        f"least {least:.3g} m, check the unit of the heights, or prescribe a pressure"
+        f"least {rounded_up(least)} m, check the unit of the heights, or prescribe a pressure"
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from .. import scene
 from ..doubts import Doubt
-from ..errors import InputError, RunError
+from ..errors import InputError, RunError, UnsolvedError
 from ..history.timeline import Timeline
 from ..job import Job
 from ..job.checks.cells import more_points
@@ -19,7 +19,7 @@ from ..parallel.root import on_root
 from ..parallel.signals import Signals
 from ..parallel.slab import Array, Slab
 from ..scene import Setup, sanity
-from ..storage import curve_points, hdf5, marker, stopfile, wisdom
+from ..storage import curve_points, hdf5, lost_points, marker, stopfile, wisdom
 from ..storage.console import always
 from ..storage.curve_points import Wanted
 from ..storage.directory import ADVICE, Directory
@@ -248,6 +248,15 @@ class _Curve:
         if self.table:
             self.table.say(text)
 
+    def _lose(self, wanted: Wanted, error: RunError) -> None:
+        """Report and store a point that could not be solved."""
+        self.failures += 1
+        self._say(f"parcontact: {error}")
+        why = error.reason if isinstance(error, UnsolvedError) else str(error)
+        act = lambda: self.table.lose(wanted, why) if self.table else None  # noqa: E731
+        hdf5.write_on_root(self.slab, act, f"cannot write {self.directory.path / lost_points.FILE}")
+        self.sliding.forget()
+
     def _solve(self, index: int) -> None:
         """Solve and write a point; a failure is reported."""
         wanted, table = self.wanted.points[index], self.table
@@ -257,9 +266,7 @@ class _Curve:
                 self.sliding.set_temperature(wanted.temperature)
             point = self.sliding.solve(velocity, wanted.pressure)
         except RunError as error:
-            self.failures += 1
-            self._say(f"parcontact: {error}")
-            self.sliding.forget()
+            self._lose(wanted, error)
             return
         rows = self.sliding.rows(velocity) if self.wanted.waves or self.sliding.table else []
         if self.maps:

@@ -16,7 +16,7 @@ from ..accuracy.budget import ErrorBudget, estimate_steady
 from ..accuracy.observation import RunProperties, StepObservation, properties_of
 from ..doubts import Doubt
 from ..effects.relaxation import highest_temperature_of, temperature_of
-from ..errors import InputError, RunError
+from ..errors import InputError, UnsolvedError
 from ..job.added_sections import answers
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
@@ -118,7 +118,7 @@ class SteadySliding:
                 self._set_material(min(cold + rise, highest))
             except InputError as error:
                 place = describe_cold_state(speed, pressure, cold)
-                raise RunError(f"{place}: no material at the flash temperature: {error}") from None
+                raise UnsolvedError(place, f"no material at the flash temperature: {error}") from None
             return self._settle(velocity, pressure)
 
         tolerance = self.setup.choices.numerics.tolerance
@@ -141,13 +141,13 @@ class SteadySliding:
             if contact.converged:
                 break
         else:
-            raise RunError(f"{what}: {contact.failure}{self._advise(contact)}")
+            raise UnsolvedError(what, f"{contact.failure}{self._advise(contact)}")
         self.contact, self._speed, self._pressure = contact, factor * speed, pressure
         heights = self.levels[0].heights
         touching = NonNegative().touches(contact.p)
         measures = self.probe.measure(contact.p, 1.0, contact.u, heights, contact.d, touching, (0.0, 0.0), velocity)
         if not measures.finite:
-            raise RunError(f"{what}: its results would not be finite")
+            raise UnsolvedError(what, "its results would not be finite")
         powers = None if self.setup.half_space.free else branch_powers(self.setup, contact, velocity)
         lost = () if powers is None else tuple(powers.sum(axis=1).tolist())
         judged = self._known, contact.certificate, by_energy, velocity, measures

@@ -15,9 +15,10 @@ from ..job.checks.advice import describe_sample
 from ..job.sections.materials import describe_temperature
 from ..printed import per_cent
 from ..scene import Setup
-from ..storage import curve_points, files, tables
+from ..storage import curve_points, files, lost_points, tables
 from ..storage.console import Console, always
 from ..storage.curve_points import LOG, Wanted
+from ..storage.lost_points import LostPoint
 from ..storage.tables import GrowingTable
 from .point import Point
 
@@ -53,6 +54,7 @@ class CurveTable:
         self._names = names_of(self._columns)
         self.known = self._read()
         self._file = GrowingTable(self.path, self._names)
+        self._lost = lost_points.read(directory)
         if further:
             self._keep_known(directory / further[0], heated)
         self._further = GrowingTable(directory / further[0], further[1]) if further else None
@@ -138,6 +140,11 @@ class CurveTable:
             f"{point.certificate.worst:9.2e}{f' {point.temperature:7g}' if self.heated else ''}"
         )
 
+    def lose(self, at: Wanted, why: str) -> None:
+        """Store a point that could not be solved, unless it exists; raises OSError."""
+        self._lost = lost_points.without([*lost_points.without(self._lost, [at]), LostPoint(at, why)], self.known)
+        lost_points.write(self.path.parent, self._lost)
+
     def conclude(self, failures: int) -> None:
         """Sort a curve that was solved in parts, draw it, and report failures; raises OSError."""
         self._bar.close()
@@ -150,10 +157,13 @@ class CurveTable:
             self._console.warn(str(warning))
         if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
             self.say(text)
+        solved = [Wanted(point.speed, point.measures.pressure, point.temperature) for point in self._points]
+        lost_points.write(self.path.parent, lost_points.without(self._lost, solved))
         from ..plotting import plots  # matplotlib is slow to import, and for pictures only
 
         picture = plots.draw_steady(self.path)
-        failed = f"parcontact: {failures} of the points could not be solved; {self.path} has the others"
+        there = lost_points.name_lost(self.path.parent) or "all points"
+        failed = f"parcontact: {failures} of the points could not be solved; {self.path} has {there}"
         self.say(failed if failures else f"done: {self.path} and {picture}")
 
     def _earlier(self) -> list[EarlierPoint]:

@@ -19,7 +19,7 @@ from typing import Any
 from ..errors import InputError, InUseError
 from ..job.reading import CASES
 from ..parallel.slab import Slab
-from . import checkpoint, curve_points, files, hdf5, marker, stopfile
+from . import checkpoint, curve_points, files, hdf5, lost_points, marker, stopfile
 from .marker import SCENE, VERBS, Claim
 
 MAX_SECONDS_TO_RELEASE = 3.0  # tuning: longest wait for the lock of a killed run [s]
@@ -32,6 +32,7 @@ RESULTS = {
         "steady.h5",
         "steady_theory.csv",
         "bands_theory.csv",
+        lost_points.FILE,
         curve_points.LOG,
     ),
     "study": ("study.csv", "study.txt", "convergence.png"),

@@ -19,7 +19,7 @@ from ..job.added_sections import answers
 from ..job.resolved import RESOLVED, shown_job
 from ..parallel.slab import Slab
 from ..printed import quantity
-from ..storage import checkpoint, curve_points, fields, hdf5, marker, read_back
+from ..storage import checkpoint, curve_points, fields, hdf5, lost_points, marker, read_back
 from ..storage.console import meshes_of, warnings_of
 from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
@@ -207,6 +207,8 @@ def _curve(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
             asked = f"; requested: {_accuracy_text(numerics['accuracy'])}" if "accuracy" in numerics else ""
             yield f"  largest estimated errors of the curve: {parts}{asked}"
         yield from (f"  warning: {text}" for text in warnings_of(table.with_name(curve_points.LOG)))
+    if lost := lost_points.name_lost(table.parent):
+        yield f"  the curve has {lost}"
 
 
 def _accuracy_text(accuracy: Any) -> str:
@@ -233,10 +235,7 @@ def _sweep(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
     states = Counter(str(row["state"]) for row in rows)
     counts = ", ".join(f"{number} {'not begun' if state == '-' else state}" for state, number in states.items())
     yield f"  sweep of {states.total()} cases: {counts}"
-    failed = [int(row["case"]) for row in rows if row["state"] == "failed"]
-    yield from (f"  case {case} failed: {sweep_table.why_failed(path.parent, case)}" for case in failed[:SHOWN])
-    if len(failed) > SHOWN:
-        yield f"  and {len(failed) - SHOWN} more"
+    yield from (f"  {text}" for text in sweep_table.describe_failed(path.parent, SHOWN))
 
 
 def _study(path: Path, claims: dict[str, Claim]) -> Iterator[str]:

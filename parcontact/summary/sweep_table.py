@@ -19,7 +19,7 @@ from ..history.timeline import Timeline
 from ..job import Case, Steady
 from ..job.added_sections import answers
 from ..job.reading import CASES
-from ..storage import curve_points, files, marker, read_back, tables
+from ..storage import curve_points, files, lost_points, marker, read_back, tables
 from . import slide
 from .run_table import RunTable
 
@@ -118,10 +118,21 @@ def fail(case: Case, reason: str) -> None:
 
 
 def why_failed(directory: Path, number: int) -> str:
-    """Return the first sentence of the reason for the failure of a case, '' if unknown."""
-    with suppress(OSError):
-        return (directory / CASES / f"{number:03d}" / FAILURE).read_text(encoding="utf-8").strip().split("; ")[0]
+    """Return the lost points of a case, or the first sentence of the reason for its failure; '' if unknown."""
+    case = directory / CASES / f"{number:03d}"
+    with suppress(OSError, InputError):
+        return lost_points.name_lost(case) or (case / FAILURE).read_text(encoding="utf-8").strip().split("; ")[0]
     return ""
+
+
+def describe_failed(directory: Path, most: int) -> list[str]:
+    """Return sentences on the failed cases of a sweep, at most `most` and one on the number of others; raises
+    InputError for a damaged table."""
+    if not (directory / TABLE).is_file():
+        return []
+    failed = [int(row["case"]) for row in read_cases(directory / TABLE) if row["state"] == "failed"]
+    found = [": ".join(filter(None, (f"case {one} failed", why_failed(directory, one)))) for one in failed[:most]]
+    return found + [f"and {len(failed) - most} more"] * (len(failed) > most)
 
 
 def _row(case: Case) -> dict[str, Any]:

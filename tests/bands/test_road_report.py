@@ -13,8 +13,9 @@ from parcontact import job as jobs
 from parcontact.__main__ import main
 from parcontact.bands.band_plan import plan_bands
 from parcontact.bands.choice import cut_bands, doubts_of_bands, on_one_grid_of_all
+from parcontact.effects.heat.bands import flash_of_bands
 from parcontact.effects.heat.flash import Flash
-from parcontact.effects.heat.steady import describe_unmeasured
+from parcontact.effects.heat.steady import describe_hot, describe_unmeasured
 from parcontact.parallel.slab import Slab
 from parcontact.report import road_section
 from parcontact.scene.measured_range import excited_band
@@ -96,6 +97,33 @@ def test_heat_beyond_the_measurement() -> None:
         assert [bool(re.search("beyond the -20 to 60 C .* at 1 of 1 points, up to 70 C", text)) for text in found] == (
             [True] * (feedback == "mean")
         )
+
+
+def test_heat_of_the_hottest_band(tmp_path: Path) -> None:
+    """Each band has its own temperature: at 40 C on average 2 K warmer, one band leaves the measurement by 10 K; and
+    one decomposes where the mean does not."""
+    surface = {"shape": "rough", "hurst": 0.8, "rms_slope": 0.2, "long_wavelength": LONG, "short_wavelength": LONG / 8}
+    job = jobs.load(job_of(surface, thermal={"conductivity": 0.2, "diffusivity": 1e-7, "feedback": "mean"}))
+    for hottest, words, find in (
+        (30.0, "at 1 of 1 points, up to 70 C", lambda points: describe_unmeasured(points, job)),
+        (400.0, "of 1 of 1 points are above 200 K, up to 400 K", describe_hot),
+    ):
+        flash = flash_of_bands([1.0, hottest], [1.0, 1.0 / hottest])
+        assert flash.mean < 2.5
+        point: Any = SimpleNamespace(temperature=40.0, speed=1.0, flash=flash)
+        assert [words in str(doubt) for doubt in find([point])] == [True]
+
+
+def test_a_spectrum_that_is_cut_off_is_not_asked_to_be() -> None:
+    """The usual cut-off is no advice to a job that has it, whatever the rounding of the cut."""
+    for hurst in (0.6, 0.8, 0.9, 0.95):
+        for slope in (1.7, 2.0, 5.0):
+            rough = {"shape": "rough", "hurst": hurst, "rms_slope": slope, "long_wavelength": LONG}
+            surface = {**rough, "short_wavelength": LONG / 4096}
+            for bands, kind in (("auto", "steep waves, cut-off"), ({"cutoff_slope": 1.3}, "steep waves")):
+                job = jobs.load(job_of(surface, bands=bands))
+                found = [doubt.kind for doubt in doubts_of_bands(job, cut_bands(job)) if "steep waves" in doubt.kind]
+                assert found == [kind]
 
 
 def test_the_report_shows_bands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

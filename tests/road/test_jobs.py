@@ -173,6 +173,17 @@ def test_clipped_outliers_are_no_doubt(road: Path) -> None:
     assert "road: outliers set to the median of their neighbours: 1" in setup.remarks.notes
 
 
+@pytest.mark.parametrize("more", ["", ", nodata: -999.0"])
+def test_a_map_whose_missing_points_have_a_number_is_not_asked_for_it(road: Path, more: str) -> None:
+    heights = truth.rough(POINTS, LENGTH, 2.5e-4, 4e-5, SLOPE)
+    heights[60, 70] += 20e-6
+    np.save(road / "road.npy", heights * 1e6)
+    (road / "job.yaml").write_text(JOB.format(points=POINTS, size=LENGTH, more=more))
+    (doubt, *_) = scene.set_up(jobs.load(road / "job.yaml"), Slab.alone(POINTS, POINTS)).remarks.doubts
+    assert "give outliers: clip" in str(doubt)
+    assert ("or nodata: NUMBER" in str(doubt)) == (not more)
+
+
 def test_bands_have_no_direction() -> None:
     part = {"shape": "rough", "hurst": 0.8, "long_wavelength": 1e-3, "short_wavelength": 1e-5, "rms_slope": 0.1}
     job = {

@@ -277,6 +277,8 @@ def test_moduli_with_a_law_of_their_own(tmp_path: Path, law: str) -> None:
     so."""
     path = sweeps(tmp_path / "table.txt", "own")
     (text,) = compound.fitted(path, 0.5, None, "wlf", 0.02).doubts()[-1:]
+    asked = "compare --vertical free" + (" and --shift free" if law == "wlf" else "")
+    assert compound.fitted(path, 0.5, None, law, 0.02).doubts()[-1].endswith(asked)  # not for what is there already
     assert re.match(r"free vertical factors b_T would join the sweeps with a misfit of \S+ %, not 4\.\d %, and", text)
     made = compound.fitted(path, 0.5, None, law, 0.02, vertical="free")
     assert made.shift is not None

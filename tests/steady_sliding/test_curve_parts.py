@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 import yaml
 from conftest import WORLD
+from matplotlib.figure import Figure
 
 from parcontact import __main__
 from parcontact.mesh import load_cases
+from parcontact.report import page
 from parcontact.solve.nonsymmetric.steady import SteadySolver
 from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.storage.tables import read_columns
@@ -41,7 +43,7 @@ def main(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest
 
     def run(*words: str) -> tuple[int, str]:
         capsys.readouterr()
-        code = __main__.main([*words, "--quiet"])
+        code = __main__.main([*words] if words[0] in ("info", "plot") else [*words, "--quiet"])
         said = capsys.readouterr()
         assert "Traceback" not in said.err
         return code, said.out + said.err
@@ -61,6 +63,24 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
 
     monkeypatch.setattr(SteadySliding, "solve", noted)
     return found
+
+
+@pytest.fixture
+def losing(monkeypatch: pytest.MonkeyPatch) -> set[float]:
+    """Speeds [m/s] at which no solve succeeds."""
+    speed, solve, solve_on_grid, lost = [0.0], SteadySliding.solve, SteadySolver.solve, set[float]()
+
+    def noted(self: SteadySliding, velocity: tuple[float, float], pressure: float) -> Any:
+        speed[0] = velocity[0]
+        return solve(self, velocity, pressure)
+
+    def failing(self: SteadySolver, h: Any, mean: float, start: Any) -> Any:
+        contact = solve_on_grid(self, h, mean, start)
+        return replace(contact, failure="no contact was found") if round(speed[0], 9) in lost else contact
+
+    monkeypatch.setattr(SteadySliding, "solve", noted)
+    monkeypatch.setattr(SteadySolver, "solve", failing)
+    return lost
 
 
 def points(table: Path) -> list[tuple[float, float]]:
@@ -191,25 +211,62 @@ def test_curve_in_the_directory_of_a_run(main: Main, tmp_path: Path) -> None:
         assert "surface.0.amplitude was 5e-07, is 1e-06" in said
 
 
-def test_point_without_solution(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A point of the curve whose solve fails is left out, and the others are solved."""
-    speed, solve, solve_on_grid = [0.0], SteadySliding.solve, SteadySolver.solve
-
-    def noted(self: SteadySliding, velocity: tuple[float, float], pressure: float) -> Any:
-        speed[0] = velocity[0]
-        return solve(self, velocity, pressure)
-
-    def failing(self: SteadySolver, h: Any, mean: float, start: Any) -> Any:
-        contact = solve_on_grid(self, h, mean, start)
-        return replace(contact, failure="no contact was found") if 0.05 < speed[0] < 0.5 else contact
-
-    monkeypatch.setattr(SteadySliding, "solve", noted)
-    monkeypatch.setattr(SteadySolver, "solve", failing)
+def test_points_that_are_lost_are_named(main: Main, tmp_path: Path, losing: set[float], drawn: list[Figure]) -> None:
+    """A point of the curve whose solve fails is left out, and the others are solved. The end of the run, its
+    description, report and picture name it, until a later run solves it."""
+    out, why = tmp_path / "out", "no contact was found"
+    named = "4 of 6 points, without 0.1 m/s under 200 kPa, 0.1 m/s under 400 kPa: " + why
+    losing.add(0.1)
     code, said = main(*CURVE)
     assert code == FAILED
     assert said.count("steady sliding at 0.1 m/s under") == 2
-    assert "no contact was found" in said
-    assert points(tmp_path / "out" / "steady.csv") == [point for point in ALL if point[0] != 0.1]
+    assert named in said
+    assert points(out / "steady.csv") == [point for point in ALL if point[0] != 0.1]
+    assert title(drawn.pop()).endswith(named)
+    assert main("plot", "out")[0] == DONE
+    assert title(drawn.pop()).endswith(named)
+    assert main("plot", "out", "out", "--compare")[0] == DONE
+    assert named in title(drawn.pop())
+    assert named in main("info", "out")[1]
+    assert named in page.write_report([out]).read_text().replace("\xa0", " ").replace("<wbr>", "")
+    drawn.clear()
+
+    losing.clear()
+    code, said = main(*CURVE)
+    assert (code, points(out / "steady.csv")) == (DONE, ALL)
+    assert "points, without" not in title(drawn.pop())
+    assert "points, without" not in main("info", "out")[1]
+    assert not (out / "steady.lost.json").exists()
+
+
+def test_lost_points_of_earlier_runs_are_kept(main: Main, tmp_path: Path, losing: set[float]) -> None:
+    """A run of other points does not forget them; one from the beginning does."""
+    losing.add(0.1)
+    assert main(*CURVE)[0] == FAILED
+    assert main(*CURVE[:-3], "0.02", *CURVE[-2:])[0] == DONE
+    assert "6 of 8 points, without 0.1 m/s" in main("info", "out")[1]
+    assert main(*CURVE[:-3], "0.02", *CURVE[-2:], "--restart", "never")[0] == DONE
+    assert "points, without" not in main("info", "out")[1]
+
+
+def test_failed_cases_of_a_sweep_are_named(main: Main, tmp_path: Path, losing: set[float], drawn: list[Figure]) -> None:
+    """Curves that lack points, and those without any, of which tables and pictures of points have nothing."""
+    losing.add(0.1)
+    sweep = {**JOB, "sweep": [{"material.modulus_inf": [2.75e5, 3e5]}]}
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump(sweep))
+    assert main(*CURVE)[0] == FAILED
+    named = "case 1 failed: 4 of 6 points, without 0.1 m/s under 200 kPa"
+    assert named in main("info", "out")[1]
+    drawn.clear()
+    assert main("plot", "out")[0] == DONE
+    assert named in title(drawn.pop())
+    assert named in page.write_report([tmp_path / "out"]).read_text().replace("\xa0", " ").replace("<wbr>", "")
+
+
+def title(figure: Figure) -> str:
+    """Return the title of a picture, or that of its legend, in one line."""
+    found = figure.get_suptitle() or figure.legends[0].get_title().get_text()
+    return " ".join(found.split())
 
 
 def test_maps_of_each_point(main: Main, tmp_path: Path) -> None:

@@ -13,9 +13,11 @@ from typing import Any
 
 from ...doubts import Doubt
 from ...job.checks import meaning
+from ...job.checks.cells import more_points
 from ...job.sections.calculation import Grid
 from ...job.sections.geometry import Sphere
 from .attraction import AdhesionLaw
+from .section import AUTO
 
 MOST_WORK = 1.0  # physics: largest work of dry solids [J/m^2]; rubber has 0.03 to 0.1
 MOST_STRAIN = 0.5  # physics: largest strain of the linear theory
@@ -35,7 +37,7 @@ def doubts_of_adhesion(job: Any, law: AdhesionLaw, modulus: float, cell: float) 
         yield Doubt("strained edges", "adhesion", {**given, "strain": strain, "most": MOST_STRAIN})
     sides = [size for size, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1] or list(job.grid.size)
     if law.range > MOST_RANGE * min(sides):
-        yield Doubt("long range", "adhesion", {**given, "most": MOST_RANGE})
+        yield Doubt("long range", "adhesion", {**given, "most": MOST_RANGE, "remedy": _shorten(job)})
     for index, shape in enumerate(job.surface):
         if isinstance(shape, Sphere):
             yield from _sphere(f"surface.{index}", shape, job.grid, law, cell)
@@ -66,7 +68,14 @@ def _sphere(name: str, sphere: Sphere, grid: Grid, law: AdhesionLaw, cell: float
         yield Doubt("cut attraction" if edge else "attraction at an edge", name, numbers)
 
 
-def doubt_range(law: AdhesionLaw, span: float) -> Iterator[Doubt]:
+def doubt_range(job: Any, law: AdhesionLaw, span: float) -> Iterator[Doubt]:
     """Yield a warning about a range above the height of a rough surface, from its lowest to its highest point [m]."""
     if law.range > span > 0.0:
-        yield Doubt("range beyond heights", "adhesion", {"range": law.range, "span": span})
+        yield Doubt("range beyond heights", "adhesion", {"range": law.range, "span": span, "remedy": _shorten(job)})
+
+
+def _shorten(job: Any) -> str:
+    """Return the advice to use a shorter range, which `auto` has on finer cells."""
+    if job.adhesion.range == AUTO:
+        return f"{more_points(job.grid)}, which range: auto follows"
+    return "a shorter range (range: auto follows the cells)"

@@ -152,7 +152,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
     def doubt_heights(job: Any, span: float) -> Iterator[Doubt]:
         law = adhesion_law(job.adhesion, job.grid, job.material)
         assert law is not None
-        yield from doubt_range(law, span)
+        yield from doubt_range(job, law, span)
 
     @staticmethod
     def ended(job: Any, saved: Saved) -> Detached | None:

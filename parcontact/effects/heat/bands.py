@@ -106,4 +106,5 @@ def flash_of_bands(rises: Sequence[float], heats: Sequence[float]) -> Flash:
         return Flash()
     shares = (np.cumsum(weights) - 0.5 * weights) / whole
     lower, upper = np.interp([0.25, 0.75], shares, values)
-    return Flash(float(values @ weights) / whole, float(values[-1]), float(lower), float(upper))
+    hottest = float(values[-1])
+    return Flash(float(values @ weights) / whole, hottest, float(lower), float(upper), hottest)

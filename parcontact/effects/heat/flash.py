@@ -18,12 +18,18 @@ BINS = 512  # accuracy: bins of the histogram for quartiles, whose error is 1/51
 @dataclass(frozen=True)
 class Flash:
     """Temperature rises [K] of a contact, weighted by the heat where it is released, on the surface and in the body:
-    their mean (the flash temperature), the highest on the surface, and the lower and upper quartile."""
+    their mean (the flash temperature), the highest on the surface, and the lower and upper quartile. `of_rubber` is the
+    highest rise at which rubber relaxes: the mean, and in bands, each at its own temperature, that of the hottest."""
 
     mean: float = 0.0
     highest: float = 0.0
     lower: float = 0.0
     upper: float = 0.0
+    hottest_band: float | None = None
+
+    @property
+    def of_rubber(self) -> float:
+        return self.mean if self.hottest_band is None else self.hottest_band
 
 
 def spread_over(slab: Slab, weights: Array, total: float) -> Array:

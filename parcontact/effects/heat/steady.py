@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from ...doubts import Doubt
-from ...errors import RunError
+from ...errors import UnsolvedError
 from ...job import Job, Zener
 from ...parallel.slab import Array
 from ...physics.measures import Measures
@@ -101,7 +101,7 @@ class Feedback:
                 self._speed, self._rise, self._place = speed, rise, place
                 return replace(point, operator_calls=calls, seconds=seconds, rounds=rounds, friction_cold=cold)
             if rise == most and over > 0.0:
-                raise RunError(describe_beyond(speed, *place, most, most + over))
+                raise beyond_shift(speed, *place, most, most + over)
             if rounds == 1 and guess:  # the cold body may be far from the last fixed point
                 rise = min(guess, most)
                 continue
@@ -110,10 +110,10 @@ class Feedback:
             last, found = (rise, over), rise - over / slope if slope < 0.0 else rise + over
             middle = 0.5 * (low + high) if high < math.inf else 2.0 * max(found, rise)
             rise = min(found if low < found < high else middle, most)
-        raise RunError(
-            f"{describe_cold_state(speed, *place)}: the flash temperature did not settle in {MOST_ROUNDS} rounds: "
-            f"a rise of {last[0]:.4g} K gives a rise of {last[0] + last[1]:.4g} K. "
-            "Try feedback: none"
+        raise UnsolvedError(
+            describe_cold_state(speed, *place),
+            f"the flash temperature did not settle in {MOST_ROUNDS} rounds: a rise of {last[0]:.4g} K gives a rise of "
+            f"{last[0] + last[1]:.4g} K. Try feedback: none",
         )
 
 
@@ -122,20 +122,20 @@ def describe_cold_state(speed: float, pressure: float, temperature: float) -> st
     return f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa and {temperature:.4g} C"
 
 
-def describe_beyond(speed: float, pressure: float, temperature: float, most: float, rise: float) -> str:
-    """Return a sentence on a fixed point above the `most` [K] that the shift of the material allows, where sliding
-    warms the rubber by `rise` [K]."""
-    state = describe_cold_state(speed, pressure, temperature)
-    return (
-        f"{state}: the flash temperature is above {temperature + most:.4g} C, "
-        f"where the shift factors end; rubber of that temperature is warmed to {temperature + rise:.4g} C. Extend the "
-        "table of shift factors, or try feedback: none"
+def beyond_shift(speed: float, pressure: float, temperature: float, most: float, rise: float) -> UnsolvedError:
+    """Return the error of a fixed point above the `most` [K] that the shift of the material allows, where sliding warms
+    the rubber by `rise` [K]."""
+    return UnsolvedError(
+        describe_cold_state(speed, pressure, temperature),
+        f"the flash temperature is above {temperature + most:.4g} C, where the shift factors end; rubber of that "
+        f"temperature is warmed to {temperature + rise:.4g} C. Extend the table of shift factors, or try feedback: "
+        "none",
     )
 
 
 def describe_hot(points: Sequence[Point]) -> Iterator[Doubt]:
-    """Yield a warning if rubber would be so hot that it decomposes."""
-    hot = [(point.flash.mean, point.speed) for point in points if point.flash and point.flash.mean > HOTTEST]
+    """Yield a warning if rubber, in bands that of the hottest one, would be so hot that it decomposes."""
+    hot = [(rise, point.speed) for point in points if point.flash and (rise := point.flash.of_rubber) > HOTTEST]
     if hot:
         rise, speed = max(hot)
         facts = {"count": len(hot), "points": len(points), "most": HOTTEST, "rise": rise, "speed": speed}
@@ -143,13 +143,14 @@ def describe_hot(points: Sequence[Point]) -> Iterator[Doubt]:
 
 
 def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[Doubt]:
-    """Yield a warning if the flash temperature of relaxing rubber is outside its measured range."""
+    """Yield a warning if the flash temperature of relaxing rubber, in bands of the hottest one, is outside its measured
+    range."""
     body = job.material.fitted
     if not feeds_back(job) or not isinstance(body, Zener) or body.temperatures is None:
         return
     own, (low, high) = temperature_of(job.material), body.temperatures
     warm = [
-        ((own if math.isnan(point.temperature) else point.temperature) + point.flash.mean, point.speed)
+        ((own if math.isnan(point.temperature) else point.temperature) + point.flash.of_rubber, point.speed)
         for point in points
         if point.flash
     ]

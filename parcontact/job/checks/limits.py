@@ -8,6 +8,7 @@ from operator import itemgetter
 from typing import Any
 
 from ...errors import InputError
+from ...printed import rounded_up
 from ..sections.calculation import Body, Grid, Numerics, Output, Study
 from ..sections.geometry import Flat, OnOneMesh, Rough, RoughSpectrum, Topography
 from ..sections.height_arrays import SAME_CELL, HeightArray
@@ -45,7 +46,9 @@ def half_space_at_rest(grid: Grid, body: Body | None, initial: Initial, steady: 
 def layer_is_resolved(grid: Grid, body: Body | None) -> Iterator[Fault]:
     if body is not None and grid.boundary == "free" and body.thickness < 2 * max(grid.dx, grid.dy):
         least = 2 * max(grid.dx, grid.dy)
-        sentence = f"must be at least two cells, {least:.3g} m, when grid.boundary is free, got {body.thickness:g}"
+        sentence = (
+            f"must be at least two cells, {rounded_up(least)} m, when grid.boundary is free, got {body.thickness:g}"
+        )
         yield Fault(sentence, ("body", "thickness"))
 
 

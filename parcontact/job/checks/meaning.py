@@ -13,7 +13,7 @@ from typing import Any
 from ...doubts import Doubt
 from ...rubber.shift import doubt_kelvin
 from ..sections.calculation import Grid
-from ..sections.geometry import OnOneMesh, Rough, RoughSpectrum, Sphere, Topography, Wave
+from ..sections.geometry import HeightFile, OnOneMesh, Rough, RoughSpectrum, Sphere, Topography, Wave
 from ..sections.materials import Elastic, PronyBranch, Zener
 from ..sections.stages import Stage
 from . import Sections, limits
@@ -44,10 +44,21 @@ def doubts_of_scene(job: Sections) -> Iterator[Doubt]:
     yield from _room(job, material) if not any(job.grid.cyclic) else neighbours(job, material)
 
 
-def doubt_slope(slope: float) -> Iterator[Doubt]:
-    """Yield a warning about an rms slope above STEEP."""
+def doubt_slope(slope: float, surface: tuple[Any, ...]) -> Iterator[Doubt]:
+    """Yield a warning about an rms slope above STEEP, with the keys that heights of files may lack."""
     if slope > STEEP:
-        yield Doubt("steep", "surface", {"slope": slope, "most": STEEP})
+        yield Doubt("steep", "surface", {"slope": slope, "most": STEEP, "needed": _needed(surface)})
+
+
+def _needed(surface: tuple[Any, ...]) -> str:
+    """Return sentences on what heights of files may need and do not have."""
+    files = [shape for shape in surface if isinstance(shape, HeightFile)]
+    maps = [shape for shape in surface if isinstance(shape, Topography)]
+    keys = ["scale: 1.0e-6 (shape: file)"] * any(shape.scale == 1.0 for shape in files)
+    keys += ["unit: um (shape: topography)"] * any(shape.unit_of_heights in (None, "m") for shape in maps)
+    units = f" Heights in um need {' or '.join(keys)}." if keys else ""
+    missing = bool(files) or any(shape.nodata is None for shape in maps)
+    return units + " Missing points must be nan." * missing
 
 
 READ = OnOneMesh | RoughSpectrum | Topography  # shapes whose heights are read from files or arrays
@@ -69,7 +80,7 @@ def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Doubt]:
             square += (q * shape.amplitude) ** 2 / 2
         elif isinstance(shape, Rough):
             square += (shape.rms_slope or 0.0) ** 2
-    yield from doubt_slope(math.sqrt(square))
+    yield from doubt_slope(math.sqrt(square), surface)
 
 
 def doubt_moduli(material: Elastic | Zener) -> Iterator[Doubt]:

@@ -203,6 +203,18 @@ def test_a_range_above_the_roughness() -> None:
         assert any("more than the 2e-06 m from the lowest to the highest" in text for text in found) == stated
 
 
+def test_a_range_that_follows_the_cells_is_not_asked_to() -> None:
+    """Of `auto`, cells of 6.25e-6 m make a range of 0.5 um or so, which is far above a wave of 10 nm."""
+    wave, stated = {"shape": "wave", "amplitude": 1e-8, "waves": [4, 0]}, []
+    for reach in ("auto", 1e-6):
+        one = ball(surface=wave, grid={"points": 64, "size": 4e-4}, adhesion={"work": 0.05, "range": reach})
+        stated += [str(one) for one in sanity.find_doubts(set_up(one, Slab.alone(64, 64))) if "beyond" in one.kind]
+    assert [text.split("use ")[-1] for text in stated] == [
+        "more grid.points, which range: auto follows",
+        "a shorter range (range: auto follows the cells)",
+    ]
+
+
 @pytest.mark.parametrize("work", [None, 0.05])
 def test_neighbours_of_a_sphere_are_stated_from_a_per_cent_on(work: float | None) -> None:
     """By Hertz with `1.917 (a/L)^3`, 1.917 from Epstein's sum 4 zeta(3/2) beta(3/2) less what is far; with adhesion by
