@@ -1,0 +1,1 @@
+"""Counterbody that deforms, too."""
