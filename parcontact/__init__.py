@@ -16,7 +16,7 @@ from .doubts import ParcontactWarning
 from .errors import InputError, JobError, RunError
 
 if TYPE_CHECKING:
-    from .leakage.flow import Flow, Leak, leak
+    from .effects.leakage.flow import Flow, Leak, leak
     from .python.curves import Curve, steady
     from .python.results import open
     from .python.row import Row
@@ -36,9 +36,9 @@ _ROOMS = {
     "surface": "python.surface_and_material",
     "material": "python.surface_and_material",
     "Material": "python.surface_and_material",
-    "leak": "leakage.flow",
-    "Leak": "leakage.flow",
-    "Flow": "leakage.flow",
+    "leak": "effects.leakage.flow",
+    "Leak": "effects.leakage.flow",
+    "Flow": "effects.leakage.flow",
 }
 
 if not TYPE_CHECKING:  # type checkers would accept misspelt names

@@ -161,7 +161,7 @@ def _describe_refusal(error: OSError) -> str:
     """Return a sentence about a file that cannot be opened or written, or '' for other errors."""
     if error.errno not in REFUSALS or not isinstance(error.filename, str | Path):
         return ""
-    return f"{files.without_mark(Path(error.filename))} cannot be opened or written: {os.strerror(error.errno)}"
+    return f"{files.without_mark(Path(error.filename))} cannot be opened or written: {error.strerror}"
 
 
 def _describe_surroundings(error: BaseException) -> str:

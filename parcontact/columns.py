@@ -2,38 +2,21 @@
 
 Tables are the csv files, the rows of a run in Python, and the maps in `fields.h5`. The lists of columns on the manual's
 page `outputs` are generated from here. A column with `when` exists only if the job has that section or option.
+Capabilities add columns of their own (`capabilities`).
 """
 
 import csv
 import io
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from operator import attrgetter
 from typing import Any
 
+from .capabilities import offers
+from .column import COUNTED, Column, Table
+
 PER_BRANCH = "dissipated_K"  # replaced by a column for each branch K = 0, 1, ...
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column of a table: its name, SI unit (`""` if dimensionless), and meaning as printed in the manual.
-
-    `of` returns the value from a row (default: the attribute `name`); `when` is the section or option it requires.
-    """
-
-    name: str
-    unit: str
-    meaning: str
-    of: Callable[[Any], Any] | None = None
-    when: str = ""
-
-    def value(self, row: Any) -> Any:
-        """Return the value of this column in a row."""
-        return (self.of or attrgetter(self.name))(row)
-
-
-Table = Sequence[Column]
 
 
 def choose_columns(table: Table, branches: int = 0, when: Collection[str] = ()) -> list[Column]:
@@ -66,6 +49,11 @@ def added_by(section: str) -> tuple[str, ...]:
     return added_names(MEASURES, section)
 
 
+def _offered(name: str) -> list[Column]:
+    """Return the columns that capabilities offer under a name."""
+    return [column for table in offers("columns", name) for column in table]
+
+
 def cells(values: Iterable[Any]) -> list[str]:
     """Return the cells of a line: floats with all digits, `""` for NaN and None, other values as text."""
     return [_cell(value) for value in values]
@@ -96,15 +84,11 @@ def describe_columns(table: Table) -> str:
     return "\n".join(["| column | unit | is |", "|---|---|---|", *rows])
 
 
-def _worst(point: Any, name: str) -> float:
-    return getattr(point.flash, name) if point.flash else math.nan
-
-
 def _measured(name: str, unit: str, meaning: str) -> Column:
     return Column(name, unit, meaning, attrgetter(f"measures.{name}"))
 
 
-PRESSURE, AREA = "mean over the box", "number of points in contact over the number of all points"
+PRESSURE, AREA = "mean over the box", COUNTED
 FORCES = (
     _measured("force_x", "N", "on the rigid surface along x; negative for sliding along +x over a lossy body"),
     _measured("force_y", "N", "on the rigid surface along y"),
@@ -140,34 +124,15 @@ CORRECTED = _measured(
     "`contact_area` without the excess of cells at the edges of contact; at least pressure over hardness if a "
     "hardness is given",
 )
-FLASH = (
-    Column(
-        *("flash_temperature", "K"),
-        "mean temperature rise of the contact, weighted by heat flux, or by pressure at rest (with `thermal`, "
-        "{doc}`heat`)",
-        lambda point: _worst(point, "mean"),
-        "thermal",
-    ),
-    Column(
-        *("max_temperature", "K"),
-        "highest rise on the surface of the body (with `thermal`)",
-        lambda point: _worst(point, "highest"),
-        "thermal",
-    ),
-    Column(
-        *("error_flash", ""),
-        "estimated relative error of `flash_temperature`, three times the error of friction, the source of heat (with "
-        "`thermal`); empty where the rise is 0",
-        lambda point: point.error_flash,
-        "thermal",
-    ),
-)
 ERROR_FRICTION = Column(
     *("error_friction", ""),
     "estimated relative error of friction ({doc}`accuracy`); 1 or more where friction cannot be distinguished from 0, "
-    "empty where it is 0",
+    "empty where it is 0, and where spots of contact may be smaller than a cell",
 )
-ERROR_AREA = Column("error_area", "", "estimated relative error of the corrected contact area")
+ERROR_AREA = Column(
+    *("error_area", ""),
+    "estimated relative error of the corrected contact area; empty where spots of contact may be smaller than a cell",
+)
 
 MEASURES: Table = (
     Column("step", "", "number of the step, 0 for the initial state"),
@@ -195,60 +160,11 @@ MEASURES: Table = (
     ERROR_FRICTION,
     ERROR_AREA,
     Column(
-        *("friction_viscous", ""),
-        "`friction` minus `friction_interface` (with `interface`): component of the viscoelastic force along the total "
-        "force, over the load",
-        when="interface",
+        *("cut_off", ""),
+        "1 where the contact reaches the edge of a free box and is cut off there, so that the row is wrong, else 0",
+        lambda row: int(row.measures.at_edge),
     ),
-    Column(
-        *("friction_interface", ""),
-        "component of the shear force on the corrected contact area along the total force, over the load; it may be "
-        "negative after a reversal",
-        when="interface",
-    ),
-    Column(
-        *("stick_area", ""),
-        "share of the box that touches and does not slip (with `interface.stick`)",
-        when="interface.stick",
-    ),
-    Column(
-        *("slip_loss", "J"),
-        "energy lost in slip since the start (with `interface.stick` and `output.energy`); "
-        "`work` is `stored`, `dissipated` and this",
-        when="interface.stick",
-    ),
-    Column(
-        *("tensile_area", ""),
-        "share of all points with a tension above 1 % of the largest attraction (with `adhesion`)",
-        when="adhesion",
-    ),
-    Column("adhesive_force", "N", "sum of all tension (with `adhesion`)", when="adhesion"),
-    Column(
-        *("surface_energy", "J"),
-        "energy of adhesion: 0 for separated surfaces, negative for attracting ones (with `adhesion` and "
-        "`output.energy`)",
-        when="adhesion",
-    ),
-    Column(
-        *("snap_loss", "J"),
-        "energy lost in snaps since the start (with `adhesion` and `output.energy`)",
-        when="adhesion",
-    ),
-    Column(
-        *("error_energy", "J"),
-        "estimated error of `work` and `dissipated`: by how much the work of the load along its path and the energies "
-        "differ, summed over steps without snaps, and 0.4 of the error of the area in what each step dissipates (with "
-        "`adhesion` and `output.energy`)",
-        when="adhesion",
-    ),
-    Column("flow_x", "m³", "conductivity of the gap along x (with `leakage`, {doc}`seals`)", when="leakage"),
-    Column("flow_y", "m³", "conductivity of the gap along y (with `leakage`)", when="leakage"),
-    Column(
-        *("constriction", "m"),
-        "smallest gap on the widest path, in the direction that leaks more (with `leakage`)",
-        when="leakage",
-    ),
-    *FLASH,
+    *_offered("MEASURES"),
 )
 UNITS = {column.name: column.unit for column in MEASURES if column.unit}
 
@@ -257,9 +173,7 @@ FIELDS: Table = (
     Column("displacement", "m", "of the surface of the body, along z"),
     Column("gap", "m", "between body and rigid surface, 0 in contact"),
     Column("height", "m", "of the rigid surface in its position at that instant"),
-    Column("temperature", "K", "rise of the temperature of the body's surface (with `thermal`, {doc}`heat`)"),
-    Column("traction_x", "Pa", "traction on the body along x (with `interface.stick`)"),
-    Column("traction_y", "Pa", "traction on the body along y"),
+    *_offered("FIELDS"),
     Column("t", "s", "times of the maps"),
     Column("y", "m", "positions of the points along y"),
     Column("x", "m", "positions of the points along x"),
@@ -289,41 +203,9 @@ STEADY: Table = (  # rows are `steady_sliding.point.Point`
     Column(
         *("shift_factor", ""), "relaxation times over those at the reference (with `temperatures`)", when="temperatures"
     ),
-    Column(
-        *("friction_viscous", ""),
-        "part of friction from the body (with `interface`)",
-        lambda point: point.friction - point.measures.friction_interface,
-        "interface",
-    ),
-    Column(
-        *("friction_interface", ""),
-        "part of friction from the shear of the corrected contact area (with `interface`)",
-        attrgetter("measures.friction_interface"),
-        "interface",
-    ),
-    *FLASH,
-    Column(
-        *("lower_temperature", "K"),
-        "rise below which a quarter of the heat is generated (with `thermal`)",
-        lambda point: _worst(point, "lower"),
-        "thermal",
-    ),
-    Column(
-        *("upper_temperature", "K"),
-        "rise above which a quarter of the heat is generated (with `thermal`)",
-        lambda point: _worst(point, "upper"),
-        "thermal",
-    ),
-    Column("friction_cold", "", "friction without feedback (with `thermal.feedback`)", when="feedback"),
-    Column(
-        *("flash_shift", ""),
-        "relaxation times at the flash temperature over those at the reference (with `feedback`)",
-        attrgetter("shift_factor"),
-        "feedback",
-    ),
-    Column("rounds", "", "steady states solved until the temperature settled (with `feedback`)", when="feedback"),
+    *_offered("STEADY"),
     ERROR_FRICTION,
-    replace(ERROR_AREA, of=attrgetter("errors.area.total")),
+    ERROR_AREA,
     Column(
         *("friction_slopes", ""),
         "tangential force over normal force, from the slopes of the rigid surface. As in `measures.csv` it includes "
@@ -372,34 +254,6 @@ STEADY_THEORY: Table = (
     Column("contact_area", "", "by Persson's theory"),
 )
 
-LEAK: Table = (
-    Column("time", "s", "of the instant"),
-    Column("pressure", "Pa", "mean pressure"),
-    Column("contact_area", "", AREA),
-    Column("flow_x", "m³", "conductivity K of the gap along x ({doc}`seals`)"),
-    Column("flow_y", "m³", "conductivity K of the gap along y"),
-    Column("percolates_x", "", "1 where a path leads from end to end along x, else 0"),
-    Column("percolates_y", "", "the same along y"),
-    Column("constriction", "m", "smallest gap on the widest path, in the direction that leaks more"),
-    Column(
-        *("share_x", ""),
-        "K along x over K of the undeformed surface that just touches; empty if its file of heights no longer exists",
-    ),
-    Column("share_y", "", "the same along y"),
-    Column("constriction_x", "m", "smallest gap on the widest path along x, 0 where contact closes"),
-    Column("constriction_y", "m", "the same along y"),
-    Column(
-        *("error_x", ""),
-        "relative change of K along x if only every second point of the gap is used; empty where contact closes",
-    ),
-    Column("error_y", "", "the same along y"),
-    Column(
-        *("flow_rate", "m³/s", "flow of the `--fluid` at the low pressure, in the direction that leaks more"),
-        when="--fluid",
-    ),
-    Column(*("mass_flow", "kg/s", "the same flow as a mass, empty where no density is known"), when="--fluid"),
-)
-
 
 def _from_theory(name: str, unit: str) -> Column:
     return Column(f"theory_{name}", unit, "the same from theory.csv")
@@ -433,17 +287,9 @@ SWEEP: Table = tuple(
         Column("error_area", "", "the same for the corrected contact area; without a slide, its last value"),
         Column("seconds", "s", "wall time of all steps"),
         *(_from_theory(one.name, one.unit) for one in SWEEP_RESULTS if one.name != "contact_area_corrected"),
-        Column(
-            *("pull_off", "N"),
-            "with adhesion: force of the last pull-off; empty if contact is never lost ({doc}`adhesion`)",
-            when="adhesion",
-        ),
-        Column(*("pull_off_error", "N"), "error of `pull_off` by steps, solves and mesh", when="adhesion"),
-        Column("pull_off_approach", "m", "approach at the last pull-off", when="adhesion"),
+        *_offered("RESULTS"),
         Column("dissipated", "J", "with `output.energy`: dissipated energy in the end", when="output.energy"),
-        Column("flow_x", "m³", "with `leakage`: last calculated K along x", when="leakage"),
-        Column("flow_y", "m³", "the same along y", when="leakage"),
-        Column("constriction", "m", "the critical constriction at the same step", when="leakage"),
+        *_offered("LAST"),
     )
 )
 
@@ -481,10 +327,10 @@ TABLES: Mapping[str, Table] = {
     "steady.csv": STEADY,
     "steady_waves.csv": STEADY_WAVES,
     "bands.csv": BANDS,
-    "leak.csv": LEAK,
     "theory.csv": THEORY,
     "steady_theory.csv": STEADY_THEORY,
     "bands_theory.csv": BANDS_THEORY,
     "sweep.csv": SWEEP,
     "study.csv": STUDY,
+    **{name: table for tables in offers("columns", "TABLES") for name, table in tables.items()},
 }

@@ -135,12 +135,13 @@ SENTENCES = {
         "theory assumes small slopes: use a smaller load"
     ),
     "out of the box": (
-        "the contact has a radius of {contact:.3g} m or more and leaves the box of {lx:g} x {ly:g} m; use a "
-        "larger grid.size, a smaller load or a shorter distance"
+        "the contact has a radius of some {contact:.3g} m and leaves the box of {lx:g} x {ly:g} m, whose edge is "
+        "{room:.3g} m from its centre; use a larger grid.size, a smaller load or a shorter distance"
     ),
     "slides out of the box": (
-        "the contact ends at ({x:.4g}, {y:.4g}) m with a radius of {contact:.3g} m or more, and leaves the box of "
-        "{lx:g} x {ly:g} m; use a larger grid.size, a smaller load or a shorter distance"
+        "the contact ends at ({x:.4g}, {y:.4g}) m with a radius of some {contact:.3g} m, and leaves the box of "
+        "{lx:g} x {ly:g} m, whose edge is {room:.3g} m from its centre; use a larger grid.size, a smaller load "
+        "or a shorter distance"
     ),
     "images": (
         "its images in the periodic box of {lx:g} x {ly:g} m change the load at a given radius of contact by "
@@ -244,6 +245,11 @@ SENTENCES = {
         "auto depends on cells, work and modulus, and gives {least:.4g} to {most:.4g} m in these cases, which are "
         "different physics; to compare them give all one range: {most:.4g} m is resolved by the cells of each"
     ),
+    # temperatures
+    "kelvin": (
+        "{degrees:g} C is hotter than rubber endures (limit: {most:g} C). Temperatures are in deg C: if this is in "
+        "kelvin, give {celsius:g}"
+    ),
     # measured moduli
     "temperatures": (
         "{degrees} C is outside of the measured {low:g} to {high:g} C: the shift is an extrapolation there"
@@ -310,6 +316,10 @@ SENTENCES = {
     "whole box sticks": (
         "{where}: all of the periodic box is in contact, where no traction moves the mean of its surface: friction of "
         "the first steps that stick may be too small; use grid.boundary: free, a smaller load or rougher heights"
+    ),
+    "below a cell": (
+        "{where}: spots of contact may be smaller than a cell, so that their area and friction are not known and no "
+        "error is stated; use {more}, a smaller grid.size or a larger load"
     ),
     "cells": (
         "{where}: spots of contact are only a few cells wide: contact_area is about {excess!p} too large (limit: "

@@ -19,7 +19,7 @@ def prefixed(unit: str, largest: float) -> tuple[str, float]:
     """
     if unit == "s" and abs(largest) >= LONG_TIME * TIMES["min"]:
         return next((name, size) for name, size in TIMES.items() if abs(largest) >= LONG_TIME * size)
-    if unit in ("", "°C", "m³") or not largest:
+    if unit in ("", "°C", "m³") or not largest or not math.isfinite(largest):
         return unit, 1.0
     square = unit == "m²"
     order = math.log10(abs(largest)) + 1e-9

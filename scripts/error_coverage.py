@@ -44,6 +44,7 @@ import parcontact.steady_sliding.sliding as of_steady
 from parcontact import scene
 from parcontact.accuracy.budget import UNKNOWN, ErrorBudget, estimate, estimate_steady, weight_of
 from parcontact.accuracy.observation import RunProperties, StepObservation
+from parcontact.effects.adhesion import pull_off
 from parcontact.errors import InputError, RunError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
@@ -52,7 +53,6 @@ from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import Prony
 from parcontact.steady_sliding import curve
 from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.summary import pull_off
 
 SHARPER = 10.0  # accuracy of a scene over the accuracy of its reference
 SAME_TIME = 1e-9
@@ -247,6 +247,8 @@ def _means(line: Json, own: Json, reference: Json) -> Iterator[Json]:
         if not row["weight"] or not row.get("seen"):
             continue
         budget = judge(properties, StepObservation(**{**row["seen"], "way": tuple(row["seen"]["way"])}))
+        if not budget.resolved:
+            continue
         for name, parts in (("friction", budget.friction), ("area", budget.area)):
             if parts is not None and row[name]:
                 no_friction = name == "friction" and line["body"] == "elastic" and not row["seen"]["interface"]

@@ -6,13 +6,14 @@
 Jobs are drawn by tests/robustness/any_job.py, on grids of a few hundred points. Half of them stay as they are. In a
 quarter some values are changed to extreme ones or to values of another kind. In the others characters of the text are
 changed, cut, doubled or inserted; or a file of heights, or the job file, is damaged, of another type or length, no
-regular file, or a link. All jobs go through the command line, in this process: `check`, then the run. Small shares of
-the finished jobs go through `report`, `leak`, `plan` and `study`, too. With `--stick` contacts stick in all jobs.
+regular file, or a link. Some jobs are cut into bands. All jobs go through the command line, in this process: `check`,
+then the run. Small shares of the finished jobs go through `report`, `leak`, `plan`, `study` and `plot` with a pair of
+`--over` and `--log`, too, and are saved under odd names. With `--stick` contacts stick in all jobs.
 
 Faults are: a traceback, a warning of NumPy, a run that refuses a job that `check` accepts, a failure without a physical
 reason, a result that is not finite or out of its bounds (area, pressure, load, energies), a mistake without its place,
-a refusal that takes more than 3 s of CPU time or leaves files, and more than 1 GB of memory. The exit code is 0 without
-faults.
+a refusal that takes more than 3 s of CPU time or leaves files, a study that refuses what `check` accepts, a picture
+that is no XML, and more than 1 GB of memory. The exit code is 0 without faults.
 """
 
 import argparse
@@ -29,11 +30,12 @@ import tempfile
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Any
+from xml.etree import ElementTree
 
 import campaign
 import h5py
@@ -45,9 +47,11 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from robustness import any_job
 
-from parcontact import __main__, mesh
+from parcontact import ParcontactWarning, Simulation, __main__, mesh
 from parcontact import job as jobs
-from parcontact.effects.adhesion import chosen_range
+from parcontact.bands.choice import cut_bands
+from parcontact.effects.adhesion.section import chosen_range
+from parcontact.errors import InputError, RunError
 from parcontact.job.checks import limits
 from parcontact.job.text import yamltext
 
@@ -59,7 +63,15 @@ STEPS = 400  # most steps of a history that is run
 LATER = 8.0  # largest residual over the tolerance
 SLACK = 1e-6  # relative error of a load, by sums over all points
 DONE, FAILED, REFUSED = 0, 1, 2  # exit codes
-LATER_SHARES = {"report": 0.05, "leak": 0.5, "plan": 0.08, "study": 0.5}  # shares of the finished jobs
+LATER_SHARES = {"report": 0.05, "leak": 0.5, "plan": 0.08, "study": 0.5, "plot": 0.15}  # shares of the finished jobs
+SAVED = 0.15  # share of the finished histories that are saved under an odd name
+IN_BANDS = 0.04  # share of jobs in bands
+OVERS = ("", "time", "distance", "velocity", "load", "approach")
+LOGS = ("", "x", "y", "x,y", "none")
+ODD_NAMES = (
+    *("", ".", "directory", "directory/x.h5", "missing/x.h5", "unwritable/x.h5", "mine.txt", "mine.txt/x.h5", "pipe"),
+    *("a\nb.h5", "a\0b.h5", "\ud800.h5", "\udcff.h5", " ", "n" * 300, "dangling", "~nosuchuser/x.h5"),
+)  # to which a state is saved
 PLACE = re.compile(r"^(.+:\d+:\d+|--set .+|parcontact|.+job\.yaml: cannot be read): \S|^\.\.\. and \d+ more")
 PHYSICS = ("double precision reaches only", "the flash temperature", "an error with numerics.strict")  # of failures
 NOT_FINITE = re.compile(r"(?<![\w.-])-?(nan|inf)(?![\w])(?<!points must be nan)", re.IGNORECASE)
@@ -68,7 +80,7 @@ EXTREME = (
     2**63, 2**64), *(2**128, 10**40, -(10**40), math.inf, -math.inf, math.nan, True, False, None, "", "x",
     "~nosuchuser/x", "a\0b"), *("1e-3:1:1000000000", "1:2:x", "2026-01-01", "010", "\u202e\x1b[31m", "n" * 5000,
     [], {}, [[]], [None], {"a": 1}), *([1] * 1000, [1e-3, 2e-3], {"from": 1, "to": 2},
-    {"first": 1e-300, "growth": 1.0}, {"first": 1e-9, "growth": 1e300}),
+    "\ud800", {"first": 1e-300, "growth": 1.0}, {"first": 1e-9, "growth": 1e300}),
 )  # fmt: skip
 SPLICES = (
     *("\t", "\n", "\0", "\x1b", "\ufeff", "\ud800", "é", "[", "]", "{", "}", ":", ": ", "- ", "#", "&a ", "*a",
@@ -145,17 +157,61 @@ def later_faults(path: Path, here: Path, job: jobs.Job) -> Iterator[str]:
         "report": ("report", out),
         "leak": ("leak", directory) if "gap" in job.output.fields and job.history else (),
         "plan": ("plan", path, "--seconds", "0.01", "--ranks", "1,3"),
-        "study": ("study", path, "--out", here / "study", "--quiet") if job.study is not None else (),
+        "study": _study_words(path, here) if job.study is not None else (),
+        "plot": ("plot", out, "--out", here / "picture.svg", *_axes(dice)),
     }
     for verb, line in words.items():
         if line and dice.random() < LATER_SHARES[verb]:
             code, said = command(*line)
-            if code not in (DONE, REFUSED) or "Traceback" in said or NOT_FINITE.search(said):
-                yield f"{verb} ends with {code}: {said[-400:]}"
+            if verb == "study":
+                yield from (f"study: {fault}" for fault in run_faults(code, said))
+            elif code not in (DONE, REFUSED) or "Traceback" in said or NOT_FINITE.search(said):
+                yield f"{' '.join(map(str, line))} ends with {code}: {said[-400:]}"
+            if verb == "plot" and code == DONE:
+                ElementTree.parse(here / "picture.svg")
+    if job.history and dice.random() < SAVED:
+        yield from save_faults(path, here, dice.choice(ODD_NAMES))
+
+
+def _study_words(path: Path, here: Path) -> Sequence[str | Path]:
+    case = ("--case", "0") if len(mesh.load_cases(path)) > 1 else ()
+    return ("study", path, "--out", here / "study", "--quiet", *case)
+
+
+def _axes(dice: Random) -> Iterator[str]:
+    """Yield one of all pairs of `--over` and `--log`."""
+    for option, words in (("--over", OVERS), ("--log", LOGS)):
+        if word := dice.choice(words):
+            yield from (option, word)
+
+
+def save_faults(path: Path, here: Path, name: str) -> Iterator[str]:
+    """Yield faults of `Simulation.save` to an odd name in an otherwise empty directory."""
+    place = here / "saved"
+    for directory in ("directory", "unwritable"):
+        (place / directory).mkdir(parents=True)
+    (place / "unwritable").chmod(0o500)
+    (place / "mine.txt").write_text("mine")
+    (place / "dangling").symlink_to("nothing")
+    os.mkfifo(place / "pipe")
+    with contextlib.chdir(place), contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore", ParcontactWarning)
+        try:
+            Simulation(path, {"sweep": None}).save(name)
+        except (InputError, RunError):
+            pass
+        except Exception as error:
+            yield f"save to {name!a}: {type(error).__name__}: {error}"
+    kept = [one for one in place.glob("mine.txt*") if one.read_bytes() == b"mine"]
+    if not (kept and (place / "pipe").is_fifo() and (place / "directory").is_dir()) or [*place.rglob("*.part")]:
+        yield f"save to {name!a} leaves {sorted(one.name for one in place.rglob('*'))}"
 
 
 def is_large(job: jobs.Job) -> bool:
     """Return True if a job is too large for a campaign of thousands."""
+    if job.bands is not None:
+        cut = cut_bands(job)
+        return cut.points[0] * cut.points[1] > POINTS or cut.count > 2 or cut.samples == 0 or cut.samples > 2
     steps = limits.count_steps(job.grid, job.history)
     points = len(job.steady.velocities) * len(job.steady.pressures or (1,)) if job.steady else 0
     return job.grid.nx * job.grid.ny > POINTS or steps > STEPS or points > STEPS
@@ -294,7 +350,7 @@ def trial(asked: argparse.Namespace, counts: Counter[str], number: int) -> Itera
         warnings.simplefilter("error")
         dice, here = Random(f"{asked.seed} {number}"), Path(name)
         made = dice.choices([as_drawn, changed_values, changed_text, changed_file], [4, 2, 1, 1])[0]
-        path = made(partial(any_job.draw, stick=asked.stick), dice, here)
+        path = made(partial(_draw, stick=asked.stick), dice, here)
         try:
             with bounded():
                 ended, *faults = drive(path, here)
@@ -302,6 +358,13 @@ def trial(asked: argparse.Namespace, counts: Counter[str], number: int) -> Itera
             ended, faults = "hung", [str(error)]
         counts[f"{made.__name__.replace('_', ' ')}: {ended}"] += 1
         yield from faults
+
+
+def _draw(dice: Random, directory: Path, stick: bool) -> dict[str, Any]:
+    """Return a job with a grid, or one in bands."""
+    job = any_job.draw(dice, directory, stick)
+    bands = Random(repr(job))
+    return any_job.draw_in_bands(bands) if bands.random() < IN_BANDS and not stick else job
 
 
 # -- making them -------------------------------------------------------------------------------------------------------
@@ -356,7 +419,7 @@ def changed_values(draw: Draw, dice: Random, directory: Path) -> Path:
         elif dice.random() < 0.1:
             del node[last]
         elif dice.random() < 0.1 and isinstance(node, dict):
-            node[str(last) + "x"] = node.pop(last)
+            node[str(last) + dice.choice(["x", "\ud800"])] = node.pop(last)
         else:
             node[last] = dice.choice(EXTREME)
     return _write(directory, dice.choice([yamltext.dump, yaml.safe_dump])(data))

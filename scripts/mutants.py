@@ -31,11 +31,11 @@ OTHERS = {  # further tests of a part
     "march/step.py": f"march/test_adhesive_steps.py scenarios/test_viscoelastic.py {SLIDING}",
     "march/step_errors.py": SLIDING,
     "physics/body.py": "scenarios/test_viscoelastic.py",
-    "effects/adhesion_doubts.py": "effects/test_adhesion.py",
-    "solve/adhesive/gap_kernels.py": "solve/adhesive/test_gap_solver.py",
+    "effects/adhesion/adhesion_doubts.py": "effects/adhesion/test_effect.py",
+    "effects/adhesion/gap_kernels.py": "effects/adhesion/test_gap_solver.py",
     **dict.fromkeys(("solve/constraint.py", "solve/kernels.py"), "solve/test_contact.py"),
     "physics/loops.py": "physics/test_material.py physics/test_probe.py physics/test_surface.py physics/test_energy.py "
-    "physics/test_heat.py accuracy/test_embedded.py",
+    "effects/heat/test_heat.py accuracy/test_embedded.py",
 }
 PAIRS = ((ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.Lt, ast.GtE), (ast.Gt, ast.LtE), (ast.Eq, ast.NotEq))
 SWAPS: dict[type[ast.AST], type[ast.AST]] = {a: b for pair in PAIRS for a, b in (pair, pair[::-1])}

@@ -25,6 +25,7 @@ import numpy as np
 import runs
 from numpy.typing import NDArray
 
+from parcontact.effects.adhesion.section import adhesion_law
 from parcontact.errors import RunError
 from parcontact.job import Job
 from parcontact.march.loop import March
@@ -108,7 +109,7 @@ def history(random: Random, height: float, top: float, size: float, modulus: flo
 def violations(march: March, before: float) -> Iterator[str]:
     """Yield violations after a step; `before` is the energy lost in snaps before it [J]."""
     row, gap, p = march.row, march.field("gap"), march.field("pressure")
-    law = march.scene.choices.adhesion
+    law = adhesion_law(march.scene.job.section("adhesion"), march.scene.job.grid, march.scene.job.material)
     assert law is not None
     surfaces, lost = row.added[2], row.added[3]
     if gap.min() < 0.0:

@@ -24,6 +24,7 @@ ROUGH = {
     "rms_slope": 0.02,
     "seed": 3,
 }
+WAVE = {"shape": "wave", "amplitude": 1e-6, "waves": [2, 1]}
 SPHERE = {"shape": "sphere", "radius": 1e-2}
 ELASTIC = {"model": "elastic", "shear_modulus": 1e6}
 ZENER = {
@@ -38,9 +39,11 @@ OBLIQUE = {"name": "oblique", "pressure": 1e5, "velocity": [0.2, 0.1], "duration
 RAMP = {"name": "ramp", "pressure": {"from": 1e5, "to": 3e5}, "duration": 4e-4, "time_step": 1e-4}
 LIFT = {"name": "lift", "approach": {"from": 1e-6, "to": 5e-7}, "duration": 4e-4, "time_step": 1e-4}
 TOUCH = {"name": "touch", "pressure": 1e5}
+GLIDE = {"pressure": 1e5, "velocity": 0.1, "distance": 2e-4}  # chooses its steps, more of them than estimated
 SCENES: dict[str, tuple[str, Any, Any, list[Any], dict[str, Any]]] = {  # boundary, surface, material, history, numerics
     "elastic": ("periodic", ROUGH, ELASTIC, [TOUCH, SLIDE, FASTER], {}),
     "viscoelastic": ("periodic", ROUGH, ZENER, [PRESS, SLIDE, FASTER], {}),
+    "chosen": ("periodic", WAVE, {"include": "synthetic_tyre"}, [GLIDE], {"accuracy": 0.1}),
     "free": ("free", SPHERE, ZENER, [PRESS, {**OBLIQUE, "name": "slide"}], {}),
     "approach": ("free", SPHERE, ZENER, [LIFT, {**LIFT, "velocity": 0.1}], {}),
     "mixed": (

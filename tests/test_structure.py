@@ -14,11 +14,11 @@ HOUSE = Path(parcontact.__file__).parent
 ROOT = Path(__file__).parents[1]
 MODULES = {".".join(path.relative_to(HOUSE).with_suffix("").parts): path for path in sorted(HOUSE.rglob("*.py"))}
 FLOORS = [  # from the ground up; a room imports only from the floors below its own
-    {"errors", "printed", "private", "progress", "streams"},
-    {"columns", "compiled", "datafiles", "doubts"},
+    {"capabilities", "column", "column_names", "errors", "printed", "private", "progress", "streams"},
+    {"columns", "compiled", "datafiles", "doubts", "text_tables"},
     {"rubber"},
     {"parallel", "job"},
-    {"history", "road", "leakage"},
+    {"history", "road"},
     {"physics"},
     {"accuracy"},
     {"theory", "solve"},
@@ -43,8 +43,32 @@ FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
 KNOW_MPI = {"python", "parallel", "storage", "summary", "derived", "command"}
 
 
+OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of another room
+    **dict.fromkeys((f"effects.leakage.{name}" for name in ("elimination", "flow", "fluids", "paths")), "physics"),
+    "effects.leakage.conductivity": "plotting",
+    **dict.fromkeys((f"effects.heat.{name}" for name in ("flash", "heat", "heat_memory", "heat_unbounded")), "physics"),
+    "effects.heat.heating": "steady_sliding",
+    "effects.heat.band_heat": "bands",
+    **dict.fromkeys((f"effects.stick.{name}" for name in ("discs", "solver")), "solve"),
+    "effects.stick.shear_operator": "physics",
+    "effects.adhesion.attraction": "physics",
+    **dict.fromkeys(
+        (f"effects.adhesion.{name}" for name in ("adhesive_solver", "free_inverse", "gap_iterate")), "solve"
+    ),
+    **dict.fromkeys((f"effects.adhesion.{name}" for name in ("gap_kernels", "gap_solver", "law")), "solve"),
+    "effects.adhesion.pull_off": "summary",
+    "effects.leakage.over_time": "derived",
+}
+
+
+FILES = {"columns": "column", "results": "summary", "pictures": "plotting"}  # modules that any capability may have
+
+
 def room(module: str) -> str:
-    return module.split(".")[0]
+    """The room on whose floor a module stands: its folder, but for modules of capabilities that other rooms ask."""
+    first, *rest = module.split(".")
+    file = FILES.get(rest[-1]) if first == "effects" and len(rest) == 2 else None
+    return OF_A_CAPABILITY.get(module) or file or first
 
 
 def imports(module: str) -> Iterator[str]:
@@ -185,9 +209,9 @@ def test_classes_change_little() -> None:
 
 
 def test_modules_have_a_name_of_their_own() -> None:
-    """No two modules or folders of modules have one name, but a module may have that of its own folder, and one of an
-    effect that of its section."""
-    paths = [module.split(".") for module in MODULES if module != "effects.leakage"]
+    """No two modules or folders of modules have one name, but a module may have that of its own folder, and
+    capabilities have modules of the same names."""
+    paths = [path for module in MODULES if len(path := module.split(".")) < 3 or path[0] != "effects"]
     folders = {tuple(path[:-1]) for path in paths if len(path) > 1}
     names = [folder[-1] for folder in folders]
     names += [path[-1] for path in paths if path[-1] not in ("__init__", *path[-2:-1])]
@@ -198,10 +222,11 @@ FOR_USERS = {"theory", "command", "python"}  # rooms whose names are those that 
 
 
 def test_functions_have_a_name_of_their_own() -> None:
-    """A public function of a module has a name that no other module gives to one, but for those that users write, and
-    those of the same thing that users write."""
+    """A public function of a module has a name that no other module gives to one, but for those that users write, those
+    of the same thing that users write, and the answers of capabilities to one question."""
     found: dict[str, list[str]] = {}
-    for module, path in MODULES.items():
+    asked = [module for module in MODULES if module.startswith("effects.") and module.split(".")[-1] in FILES]
+    for module, path in ((module, path) for module, path in MODULES.items() if module not in asked):
         functions = [part.name for part in ast.parse(path.read_text()).body if isinstance(part, ast.FunctionDef)]
         for name in (name for name in functions if not name.startswith("_") and room(module) not in FOR_USERS):
             found.setdefault(name, []).append(module)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..physics.entries import Entry, Saved
 from ..printed import per_cent
-from .observation import RunProperties, StepObservation
+from .observation import RunProperties, StepObservation, resolves
 from .sources import MARCH_SOURCES, STEADY_SOURCES, ErrorSource
 
 UNKNOWN = 0.5  # accuracy: relative error of friction above which friction cannot be distinguished from 0
@@ -63,15 +63,17 @@ NAMES = ErrorParts._fields
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """Errors at one instant. `friction` is None without friction; its error may exceed 1."""
+    """Errors at one instant. `friction` is None without friction; its error may exceed 1. They are not stated unless
+    the mesh is `resolved`: spots of contact have more than a few cells."""
 
     friction: ErrorParts | None
     area: ErrorParts
+    resolved: bool = True
 
     def take_from_time(self, error: float) -> "ErrorBudget":
         """Return the budget with a smaller error of friction by the time steps."""
         friction = self.friction and self.friction._replace(time=self.friction.time - error)
-        return ErrorBudget(friction, self.area)
+        return replace(self, friction=friction)
 
 
 def estimate(run: RunProperties, observed: StepObservation) -> ErrorBudget:
@@ -91,11 +93,12 @@ def _estimate(sources: Sequence[ErrorSource], run: RunProperties, observed: Step
     pairs = {source.name: source.error(run, replace(observed, friction=body)) for source in sources}
     missing = dict.fromkeys(("solver", "time", "folded", "mesh"), 0.0)
     area = ErrorParts(**missing | {name: pair.area for name, pair in pairs.items()})
+    resolved = resolves(run, observed)
     if observed.friction <= 0.0:
-        return ErrorBudget(None, area)
+        return ErrorBudget(None, area, resolved)
     shares = body / observed.friction, observed.interface / observed.friction
     friction = {name: shares[0] * pair.friction + shares[1] * pair.area for name, pair in pairs.items()}
-    return ErrorBudget(ErrorParts(**missing | friction), area)
+    return ErrorBudget(ErrorParts(**missing | friction), area, resolved)
 
 
 def add_shear(

@@ -55,14 +55,14 @@ ROLLING = Fit(
     "tractions in rolling: times the shares of the contact that enter in a step and that stick",
     2.0,
     1.0,
-    "tests/effects/test_rolling.py",
+    "tests/effects/stick/test_rolling.py",
     "0.7 to 30 for cylinders, by where edges lie in a cell; 10 for a sphere",
 )
 STICKING = Fit(
     "tractions by a shear strength: times the excess of the counted area, the share that sticks, and t over its bound",
     3.0,
     1.0,
-    "tests/effects/test_stick_slip.py",
+    "tests/effects/stick/test_effect.py",
     "0.7 to 4 in two rough contacts, where t exceeds a quarter of its bound",
 )
 PASSING = Fit(

@@ -32,7 +32,7 @@ from ..history.chosen import Bounds, ChosenEnds, ChosenSteps, MadeStep, reached
 from ..history.timeline import Span, Step, Timeline
 from ..job import Job
 from ..job.checks.cells import one_cell
-from ..physics.body import Body
+from ..physics.body import Body, remembers
 from ..physics.entries import Entry, Saved
 from ..physics.units import Units
 from .budget import ErrorBudget, ErrorParts
@@ -80,26 +80,26 @@ class TolerancePart:
 
 @dataclass(frozen=True)
 class Controller:
-    """Controller of a run: of a job with its stages and `body`; `energies` is True if the job asks for them, `adhesive`
-    with adhesion."""
+    """Controller of a run: of a job with its stages and `body`; `energies` is True if the job asks for them, `exact`
+    if contacts are solved to the job's tolerance."""
 
     job: Job
     timeline: Timeline
     body: Body
     energies: bool = False
-    adhesive: bool = False
+    exact: bool = False
 
     @property
     def relaxes(self) -> bool:
-        return self.body.branched is not None
+        return remembers(self.body)
 
     # -- tolerance ----------------------------------------------------------------------------------------------------
 
     @property
     def follows(self) -> bool:
         """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen the tolerance of the
-        job, and stages have steps. Contacts with adhesion are solved to the job's tolerance."""
-        return "tolerance" in self.job.numerics.chosen and self.timeline.lasts and not self.adhesive
+        job, and stages have steps."""
+        return "tolerance" in self.job.numerics.chosen and self.timeline.lasts and not self.exact
 
     def tolerance(self, memory: StepTolerance, step: Step) -> float | None:
         """Return the tolerance of the solve of a step, None for the tolerance of the job, as in a jump. It is smaller
@@ -153,7 +153,7 @@ class Controller:
         """Return a shorter step to make instead of one with this error, or the record of the accepted step.
 
         The step ends at `end` [s] of the stage; `rejected` is True if a longer one was tried before. In contacts
-        with adhesion the edge has moved by `front` half process zones: one is allowed, unless it snaps. Steps in
+        with attraction the edge has moved by `front` half process zones: one is allowed, unless it snaps. Steps in
         which it snaps, `begins` or ends are limited to a share of the shortest relaxation time, so that a jump meets
         the body before it relaxes. With energies this also applies to points that close; the square root of the
         accuracy is then allowed.

@@ -20,6 +20,8 @@ from ..physics.prony import Prony
 
 REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are identical
 ROUND = 8.0 / math.pi  # physics: radius of a round spot [cells] over the ratio of its cells to sides on its edge
+MANY_RADIUS = 0.7  # accuracy: least resolved radius or half width [cells] of many spots: more than single cells
+ONE_RADIUS = 1.3  # accuracy: the same of one spot, and of identical ones: more than five cells, or strips two wide
 SPOTS_POWER = 0.25  # accuracy: power of the number of spots by which the error of their mean falls
 Vector = tuple[float, float]
 
@@ -64,7 +66,8 @@ class StepObservation:
 
     For steps also: `difference` of the embedded pair, and its `order`; cells (of mean sides) `slid` in `seconds`;
     the `angle` of the pair; `curved`: the displacement is quadratic in time; the `change` of friction since the step
-    before, infinite after a jump; `uneven`: largest minus mean pressure over the mean, at most 1.
+    before, infinite after a jump; `own_error`: error by the length of the step that a body without branches
+    states; `uneven`: largest minus mean pressure over the mean, at most 1.
     """
 
     complementarity: float
@@ -84,6 +87,7 @@ class StepObservation:
     angle: float = 0.0
     curved: bool = False
     change: float = 0.0
+    own_error: float | None = None
     uneven: float = 1.0
 
     @property
@@ -145,6 +149,14 @@ def count_spots(run: RunProperties, observed: StepObservation) -> float:
         radius = min(radius, 0.5 * run.cells_per_wave * (max(run.cell) / run.mean_cell))
     one = math.pi * radius**2 * run.mean_cell**2 / (run.cell[0] * run.cell[1])
     return max(1.0, share * run.points / one) if one > 0.0 else 1.0
+
+
+def resolves(run: RunProperties, observed: StepObservation) -> bool:
+    """Return False if the true spots of contact may be smaller than a cell, so that no error of their area is known.
+    Errors of many spots average out, except for single cells."""
+    if not 0.0 < observed.area < 0.5:
+        return True
+    return radius_of(run, observed) >= (ONE_RADIUS if count_spots(run, observed) < 2.0 else MANY_RADIUS)
 
 
 def mean_over_spots(run: RunProperties, observed: StepObservation) -> float:

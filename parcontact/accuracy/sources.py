@@ -103,8 +103,11 @@ def _solver_of_area(observed: StepObservation) -> float:
 
 
 def steps_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the errors by the length of a step, including a rise of friction within it."""
+    """Return the errors by the length of a step, including a rise of friction within it. The error that a body states
+    itself is also the one of the area."""
     error = time_error(run, observed)
+    if observed.own_error is not None:
+        return ErrorPair(error, error)
     return ErrorPair(max(error, error_of_rise(run, observed)), share_of_area(run, observed) * error)
 
 

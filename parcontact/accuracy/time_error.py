@@ -58,6 +58,8 @@ FIXED_EDGES = 0.9  # accuracy: share of the error of a linear pair that edges ca
 
 def time_error(run: RunProperties, observed: StepObservation) -> float:
     """Return the error of friction by the length of a time step, also at rest; at most 1."""
+    if observed.own_error is not None:
+        return observed.own_error
     if not run.exponential:
         return EULER.value * observed.difference**EULER.order
     pair = _error_by_pair(observed)

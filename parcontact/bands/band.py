@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 
 from ..accuracy.observation import properties_of
+from ..effects.heat.band_heat import Warming, shares_of_depth, warming_of, waves_along_depth
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job
 from ..job.sections.height_arrays import GivenHeights
@@ -22,7 +23,6 @@ from ..solve.nonsymmetric.splitting import Splitting, step_for
 from ..solve.problem import MeanPressure
 from ..steady_sliding.losses import branch_powers
 from ..steady_sliding.sliding import judge_state, tolerance_of
-from .band_heat import Warming, shares_of_depth, warming_of, waves_along_depth
 from .choice import Cut
 from .ladder import PressureLadder
 

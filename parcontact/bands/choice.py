@@ -98,10 +98,11 @@ def cut_bands(job: Job) -> Cut:
     along = fast_length(CELLS * waves * ratio * EDGE)
     points = asked.points or (along, along)
     least = LEAST_CELLS * waves * ratio * EDGE
-    if min(n for n in points if n > 1) < least:
+    side = min((n for n in points if n > 1), default=1)
+    if side < least:
         raise InputError(
             f"bands.points: a band from {spectrum.longest:.3g} to {spectrum.longest / ratio:.3g} m with {waves} of its "
-            f"longest waves needs {math.ceil(least)} points or more along a side, got {min(points)}"
+            f"longest waves needs {math.ceil(least)} points or more along a side, got {side}"
         )
     edges = spectrum.cut(count)
     if measured:

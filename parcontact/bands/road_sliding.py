@@ -11,7 +11,9 @@ import numpy as np
 from ..accuracy.budget import ErrorBudget, ErrorParts
 from ..columns import BANDS, names_of
 from ..doubts import Doubt
-from ..effects.relaxation import feeds_back, temperature_of
+from ..effects.heat.band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
+from ..effects.heat.heating import describe_beyond, describe_cold_state
+from ..effects.relaxation import feeds_back, highest_temperature_of, temperature_of
 from ..errors import InputError, RunError
 from ..job import Job
 from ..parallel.slab import Array, Slab
@@ -21,7 +23,6 @@ from ..solve.certificate import Certificate
 from ..steady_sliding.curve import States, on_one_grid
 from ..steady_sliding.point import Point
 from .band import Rung, Vector
-from .band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
 from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, cut_bands, describe_cut, doubts_of_bands
 from .steep_waves import STRAIN
@@ -30,6 +31,7 @@ MOST_ROUNDS = 20  # tuning: limit on rounds of the temperatures
 LEAST_ERROR, RELATIVE = 0.1, 0.02  # accuracy: error of the rise of a band [K], and relative
 HARD_SHARE = 0.25  # fitted: error of the method over the difference to hard walls; 1 for profiles
 LEAST_METHOD = 0.03  # fitted: least relative error of the method (`scripts/band_errors.py`)
+LEAST_OF_AREA = 0.09  # fitted: the same of a small area; it falls with the open share (`scripts/band_errors.py`)
 NEARLY_ALL = 0.1  # accuracy: open area below which errors fall to 0 with it
 SURE = 2.0  # accuracy: error by the scatter of surfaces over its standard error
 TABLE = "bands.csv"
@@ -58,13 +60,14 @@ class BandOutcome:
     @property
     def method(self) -> list[float]:
         """Error of the method in friction and in the corrected area: a share of the difference between hard walls and
-        laws, at least LEAST_METHOD, less near full contact; 0 for one band."""
+        laws, at least LEAST_METHOD, or LEAST_OF_AREA, less near full contact; 0 for one band."""
         if len(self.results) == 1:
             return [0.0, 0.0]
-        least = LEAST_METHOD * min(1.0, (1.0 - self.results[-1].contact_area_corrected) / NEARLY_ALL)
-        ends = zip(self.hard, self.with_laws, strict=True)
+        open_share = 1.0 - self.results[-1].contact_area_corrected
+        least = LEAST_METHOD * min(1.0, open_share / NEARLY_ALL)
+        ends = zip(self.hard, self.with_laws, (least, max(least, LEAST_OF_AREA * open_share)), strict=True)
         share = 1.0 if self.line else HARD_SHARE
-        return [max(share * abs(hard - law), least * law) for hard, law in ends]
+        return [max(share * abs(hard - law), lowest * law) for hard, law, lowest in ends]
 
 
 @dataclass(frozen=True)
@@ -165,13 +168,15 @@ class RoadSliding:
         """Find the fixed point of the temperatures of all bands, with one surface per band, and set them in the
         cascade. Raises RunError if it is not found.
 
-        Rounds use Aitken's relaxation. The first is for cold bands, the second starts from the temperatures of
-        the last state.
+        Rounds use Aitken's relaxation; the first is for cold bands. No temperature above the range of the material's
+        shift is tried.
         """
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
+        highest, place = highest_temperature_of(self.job.material), (*self._place(), cold)
+        most = highest - cold
         rises, last, relax, friction_cold = np.zeros(self.cut.count), np.zeros(0), 1.0, math.nan
         for rounds in range(1, MOST_ROUNDS + 1):
-            self._set_temperatures(cold + rises)
+            self._set_temperatures(np.minimum(cold + rises, highest))
             rungs = self._cascade.climb([0])
             results = self._cascade.fall(lambda band, _: rungs[band, 0])  # noqa: B023
             over = (
@@ -179,13 +184,23 @@ class RoadSliding:
             )
             if rounds == 1:
                 friction_cold = sum(result.friction for result in results)
-            if np.all(np.abs(over) <= np.maximum(LEAST_ERROR, RELATIVE * rises)):
+            settled = np.abs(over) <= np.maximum(LEAST_ERROR, RELATIVE * rises)
+            if np.all(settled):
                 return BandTemperatures(rounds, friction_cold)
+            if np.all(settled | ((rises == most) & (over > 0.0))):
+                raise RunError(describe_beyond(*place, most, most + float(over[rises == most].max())))
             if last.size:
                 change = over - last
                 relax = float(np.clip(-relax * (last @ change) / (change @ change), 0.1, 1.0))
-            rises, last = np.maximum(rises + relax * over, 0.0), over
-        raise RunError(f"temperatures of bands did not settle in {MOST_ROUNDS} rounds. Try feedback: none")
+            rises, last = np.clip(rises + relax * over, 0.0, most), over
+        raise RunError(
+            f"{describe_cold_state(*place)}: temperatures of bands did not settle in {MOST_ROUNDS} rounds. "
+            "Try feedback: none"
+        )
+
+    def _place(self) -> tuple[float, float]:
+        """Return the velocity [m/s] and the pressure [Pa] of the state."""
+        return math.hypot(*self._cascade.velocity), self._cascade.pressure
 
     def _set_temperatures(self, temperatures: Array) -> None:
         """Set the temperatures [deg C] of the bands; raises RunError outside the range of the material's shift."""
@@ -195,7 +210,8 @@ class RoadSliding:
             self.setup = replace(self.setup, choices=choices(finest))
             self._cascade.press(self._cascade.velocity, self._cascade.pressure)
         except InputError as error:
-            raise RunError(f"the flash temperature is outside the range of the material's shift: {error}") from None
+            place = describe_cold_state(*self._place(), self.temperature)
+            raise RunError(f"{place}: no material at the flash temperature: {error}") from None
 
     def _rub(self, results: Results) -> float:
         """Return the shear stress [Pa] of the interface, averaged over the nominal area."""
@@ -270,11 +286,13 @@ class RoadSliding:
         )
 
     def _errors(self, outcome: BandOutcome, friction: float) -> ErrorBudget:
-        """Return relative errors; those of grids and of loads beyond ladders are added over bands."""
+        """Return relative errors; those of grids and of loads beyond ladders are added over bands. Each band divides
+        the area that coarser bands leave, so that relative errors of areas by their grids add up."""
         area = outcome.results[-1].contact_area_corrected
         lost = sum(result.load_lost for result in outcome.results)
         of_bands = np.sum([result.errors for result in outcome.results], axis=0)[:2]
-        of_area = outcome.results[-1].errors[2:]
+        grids = [result.errors[3] / (result.contact_area_corrected or 1.0) for result in outcome.results]
+        of_area = outcome.results[-1].errors[2], sum(grids) * area
         method, scatter = outcome.method, [SURE * error for error in outcome.scatter]
         parts = [
             ErrorParts(

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from .. import __version__
+from .. import __version__, capabilities
 from ..errors import InputError
 from . import ranks, values, verbs
 
@@ -112,7 +112,7 @@ def _surface(add: Add) -> None:
 
 
 def _plot(add: Add) -> None:
-    add("directories", metavar="OUT", nargs="+", type=Path, help="output directory of a run or curve")
+    add("directories", metavar="OUT", nargs="+", type=values.results_path, help="output directory of a run or curve")
     add("--format", choices=("png", "pdf", "svg"), default="", help="format (default: by the name of --out, else png)")
     names = "friction,area,approach,gap,pressure,load,energy,leakage,steady,maps"
     text = f"panels, in this order: {names} (default: all)"
@@ -132,11 +132,12 @@ def _plot(add: Add) -> None:
 
 
 def _info(add: Add) -> None:
-    add("file", type=Path, nargs="+", help="file or output directory of a run")
+    add("file", type=values.results_path, nargs="+", help="file or output directory of a run")
 
 
 def _leak(add: Add) -> None:
-    add("directories", metavar="OUT", nargs="+", type=Path, help="output directory of a run with saved gaps")
+    text = "output directory of a run with saved gaps"
+    add("directories", metavar="OUT", nargs="+", type=values.results_path, help=text)
     text = "only the gap after this step (a whole number) or nearest to this time [s], such as 2.5 (default: all)"
     add("--at", metavar="TIME|STEP", type=values.instant, help=text)
     text = "quantity on the x axis (default: pressure, or time if the pressure is constant)"
@@ -148,7 +149,7 @@ def _leak(add: Add) -> None:
 
 
 def _report(add: Add) -> None:
-    add("directories", metavar="OUT", nargs="+", type=Path, help="output directory")
+    add("directories", metavar="OUT", nargs="+", type=values.results_path, help="output directory")
     add("--out", metavar="FILE", type=Path, help="report (default: report.html in the first directory)")
 
 
@@ -161,7 +162,7 @@ def _manual(add: Add) -> None:
 
 
 def _cite(add: Add) -> None:
-    add("directory", metavar="OUT", type=Path, help="output directory of a run or curve")
+    add("directory", metavar="OUT", type=values.results_path, help="output directory of a run or curve")
 
 
 VERBS: dict[Callable[[argparse.Namespace], int], tuple[Callable[[Add], None], ...]] = {  # verb: groups of arguments
@@ -175,7 +176,7 @@ VERBS: dict[Callable[[argparse.Namespace], int], tuple[Callable[[Add], None], ..
     verbs.surface: (_surface,),
     verbs.info: (_info,),
     verbs.plot: (_plot,),
-    verbs.leak: (_leak,),
+    **({verbs.leak: (_leak,)} if capabilities.has("leakage") else {}),
     verbs.report: (_report,),
     verbs.doctor: (_doctor,),
     verbs.manual: (_manual,),

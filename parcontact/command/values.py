@@ -65,6 +65,14 @@ def output_directory(text: str) -> str:
     return str(Path.cwd() / text) if text.startswith("~") else text  # the shell has expanded home directories
 
 
+def results_path(text: str) -> Path:
+    """Return the path of an output directory or of a file of results. Raises InputError for pipes and devices."""
+    from ..storage import files
+
+    files.refuse_pipes(Path(text))
+    return Path(text)
+
+
 def comma_names(text: str) -> tuple[str, ...]:
     return tuple(filter(None, (part.strip() for part in text.split(","))))
 
@@ -91,7 +99,7 @@ def _spaced(text: str) -> tuple[float, ...]:
 
 def fluid(text: str) -> Any:
     """Return the fluid with a name, or with a viscosity [Pa s]."""
-    from ..leakage.fluids import FLUIDS, Fluid
+    from ..effects.leakage.fluids import FLUIDS, Fluid
 
     if text in FLUIDS:
         return FLUIDS[text]

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..doubts import Doubt
-    from ..job import Job
+    from ..job import Case, Job
     from ..parallel.slab import Slab
     from .each_case import Shows
 
@@ -67,6 +67,7 @@ def check(options: argparse.Namespace) -> int:
 
     cases, chosen = cases_of(options)
     job = chosen[0].job
+    _check_study(options, chosen)
     print(jobs.describe_job(job))
     steps = describe_steps(job)
     steps = steps and f"chosen time steps: {steps}"
@@ -80,6 +81,22 @@ def check(options: argparse.Namespace) -> int:
         print("\nsweep; its first case is shown above" if len(chosen) > 1 else "\nsweep")
         print("\n".join(map(str, chosen)))
     return DONE
+
+
+def _check_study(options: argparse.Namespace, cases: Sequence[Case]) -> None:
+    """Read all jobs of a study, also of each case of a sweep; raises InputError with their mistakes."""
+    if cases[0].job.study is None:
+        return
+    from .. import mesh
+    from ..study.ladders import ladders, make_jobs
+
+    for case in cases:
+        number = case.number if case.settings else None
+
+        def make(changes: Sequence[str], number: int | None = number) -> Job:
+            return mesh.load(options.job, [*job_overrides(options), *changes], number)
+
+        make_jobs(case.job, ladders(case.job), make)
 
 
 def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
@@ -245,8 +262,8 @@ def plot(options: argparse.Namespace) -> int:
 def leak(options: argparse.Namespace) -> int:
     """Calculate the leakage through the gaps of a run, into leak.csv; draw it."""
     world = ranks.start_ranks()
-    from ..derived.leakage_over_time import write_leakage
-    from ..leakage.fluids import PressureDrop
+    from ..effects.leakage.fluids import PressureDrop
+    from ..effects.leakage.over_time import write_leakage
 
     if (options.fluid is None) != (options.pressures is None):
         raise InputError("--fluid and --pressures HIGH:LOW [Pa] go together: give both, or none")

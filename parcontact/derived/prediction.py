@@ -13,6 +13,7 @@ from .. import job as jobs
 from .. import scene
 from ..bands.choice import cut_bands
 from ..columns import BANDS_THEORY, STEADY_THEORY, THEORY, Table, names_of, to_csv, values_of
+from ..effects.effect import BY_THEORY
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import InputError
 from ..history.timeline import Span, Timeline
@@ -162,6 +163,7 @@ def write_steady(job: Job, wanted: Request) -> SteadyInstant:
 def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
     """Write theory.csv for a job on one rank, or steady_theory.csv for a friction curve. Return sentences about it,
     compared with the job's run if there is one."""
+    files.refuse_pipes(job.output.directory)
     settings = TheorySettings(gamma, waves)
     if not job.history:
         return _foretell_curve(job, settings)
@@ -292,8 +294,9 @@ def _longest_slide(timeline: Timeline) -> float:
 
 def _material(job: Job) -> Prony:
     """Return the incompressible body with the stiffness of the job's half space, to which nu contributes a factor."""
-    if job.section("adhesion") is not None:
-        raise InputError("the theory excludes adhesion: leave out the section adhesion")
+    for forbidden in job.asked("forbids"):
+        if BY_THEORY in forbidden:
+            raise InputError(forbidden[BY_THEORY])
     if job.material.hardness is not None:
         raise InputError("the theory excludes counterbodies that yield: leave out material.hardness")
     series, factor = relaxation_of(job.material), 0.5 / (1.0 - job.material.poisson)

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 
-from .. import private
+from .. import capabilities, private
 from ..job import Job, load
-from ..leakage.flow import leak
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..plan.costs import measure_write_rate
@@ -58,7 +57,8 @@ def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:
 def prepare_loops(comm: "MPI.Intracomm") -> str:
     """Run small jobs so that the loops that checks do not need are compiled too; return a line. Collective.
 
-    The jobs slide steadily, slide in mixed precision, adhere in both boundaries, and leak.
+    The jobs slide steadily, slide in mixed precision, and adhere in both boundaries. Capabilities have loops of their
+    own.
     """
     began = time.perf_counter()
     touch = {"pressure": 3e4, "duration": 1e-3, "time_step": 5e-4}
@@ -74,7 +74,8 @@ def prepare_loops(comm: "MPI.Intracomm") -> str:
     for adhesion in ({}, sticking):
         Bench(comm).march(crossed([touch], **adhesion, output=energy, numerics=rough["numerics"]))
         Bench(comm).march(sphere([touch], **adhesion, output=energy, numerics=rough["numerics"]))
-    leak(np.random.default_rng(1).random((16, 16)), (1.0, 1.0))
+    for compile_loops in capabilities.offers("effect", "compile_loops"):
+        compile_loops()
     place = private.directory("compiled")
     kept = f"kept in {place}" if place else "not kept, as there is no private cache directory"
     return f"compiled loops: ready after {time.perf_counter() - began:.2g} s, {kept}"

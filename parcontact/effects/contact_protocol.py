@@ -1,7 +1,8 @@
 """Interface of contact laws: how a step is solved, its memory, and where surfaces touch.
 
 `ContactLaw` is the interface that a march uses. Without adhesion the law is a constraint on pressures
-(`march.dry_law`); with adhesion the gap is the unknown (`effects.adhesive_law`). Effects may provide other laws.
+(`march.dry_law`); with adhesion the gap is the unknown (`effects.adhesion.adhesive_law`). Effects may provide
+other laws.
 """
 
 from __future__ import annotations
@@ -92,6 +93,14 @@ class Detached(NamedTuple):
 
     time: float
     load: float
+
+
+UNITS_OF_LOADS = {"pressure": " Pa", "force": " N", "approach": " m"}
+
+
+def nothing_holds(control: str, load: float) -> str:
+    """Return the sentence on surfaces that detach under a prescribed load."""
+    return f"the surfaces detach under a {control} of {load:g}{UNITS_OF_LOADS[control]}"
 
 
 class ContactLaw(Protocol[Memory]):

@@ -5,7 +5,7 @@ it. It may provide the contact law, and it is called after each step.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import wraps
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar
 
 from numpy.typing import DTypeLike, NDArray
 
+from ..doubts import Doubt
 from ..errors import InputError
 from ..history.timeline import Step
 from ..job import added_sections
@@ -23,12 +24,14 @@ from ..physics.entries import Entry, Memory, Saved
 from ..physics.interface_friction import Shear, Vector
 from ..physics.measures import Measures
 from ..physics.units import Units
-from .contact_protocol import ContactLaw, SolvedContact
+from .contact_protocol import ContactLaw, Detached, SolvedContact
 
 if TYPE_CHECKING:  # what computes is not loaded to check a job
     from ..physics.energy import EnergyMemory
 
 Remembered = TypeVar("Remembered", covariant=True)
+EXTRAPOLATION, TOLERANCES = "extrapolated starts", "looser tolerances"  # see `Effect.forbids`
+SINGLE, BY_THEORY = "single precision", "Persson's theory"
 
 
 @dataclass(frozen=True)
@@ -123,6 +126,7 @@ class Effect(Protocol[Memory]):
     columns: ClassVar[tuple[str, ...]]  # columns that it adds to measures.csv
     fields: ClassVar[tuple[str, ...]] = ()  # maps that effects of this package add to those of output.fields
     brings_law: ClassVar[bool] = False  # True for classes with a `law`; they exclude steady sliding
+    forbids: ClassVar[Mapping[str, str]] = {}  # what is not done with it (EXTRAPOLATION, SINGLE, ...), with reasons
 
     def __init_subclass__(cls, **others: Any) -> None:
         super().__init_subclass__(**others)
@@ -152,7 +156,36 @@ class Effect(Protocol[Memory]):
         is None without a law. Local."""
         return None
 
+    @staticmethod
+    def remembers(job: Any) -> bool:
+        """Return True if the contact depends on its history, also that of an elastic body."""
+        return False
+
+    @staticmethod
+    def compares_heights(job: Any) -> bool:
+        """Return True if warnings compare the heights of the surface with a length of the section."""
+        return False
+
+    @staticmethod
+    def chosen_values(job: Any) -> Mapping[str, float]:
+        """Return the lengths [m] that it chooses by the mesh, by their keys."""
+        return {}
+
+    @staticmethod
+    def doubt_heights(job: Any, span: float) -> Iterator[Doubt]:
+        """Yield warnings about a rough surface by its height from the lowest to the highest point [m]."""
+        yield from ()
+
+    @staticmethod
+    def ended(job: Any, saved: Saved) -> Detached | None:
+        """Return the end of the run in the entries of its law in a checkpoint; None if the run goes on."""
+        return None
+
     def __init__(self, scene: Any) -> None: ...
+
+    def last_lines(self, memory: Memory) -> Iterator[str]:
+        """Yield sentences for the end of a run; local."""
+        yield from ()
 
     def law(self) -> ContactLaw[Any] | None:
         """Return the contact law of the steps; None if the effect has none."""

@@ -8,15 +8,17 @@ import numpy as np
 from .. import job as jobs
 from ..job.sections.materials import heated
 from ..physics.prony import Prony, normal_form, zener_to_prony
+from ..rubber.shift import highest_temperature
 
 Material = jobs.Elastic | jobs.Zener | jobs.Dma
 
 
 def relaxation_of(material: Material) -> Prony:
-    """Return the relaxation function of a material [Pa, s]; one modulus and no terms if it is elastic."""
+    """Return the relaxation function of a material [Pa, s]; its long-term modulus and no terms if it has no
+    branches."""
     body = material.fitted
-    if isinstance(body, jobs.Elastic):
-        return Prony(body.shear_modulus, np.zeros(0), np.zeros(0))
+    if isinstance(body, jobs.Elastic) or not body.branches:
+        return Prony(body.long_modulus, np.zeros(0), np.zeros(0))
     zener = [b for b in body.branches if isinstance(b, jobs.ZenerBranch)]
     plain = [b for b in body.branches if isinstance(b, jobs.PronyBranch)]
     series, kelvin, viscosity = ([getattr(b, name) for b in zener] for name in ("G0", "G1", "eta1"))
@@ -41,6 +43,12 @@ def temperature_of(material: Material) -> float:
     return body.shift.reference if body.temperature is None else body.temperature
 
 
+def highest_temperature_of(material: Material) -> float:
+    """Return the temperature [deg C] at which the tables of a material's shift end; inf without tables."""
+    body = material.fitted
+    return highest_temperature(body.shift.made) if isinstance(body, jobs.Zener) and body.shift else math.inf
+
+
 def factor_at(material: Material, rise: float) -> float:
     """Return relaxation times of a material after a temperature rise [K] over those at its own temperature [-]. Raises
     InputError outside the range of its shift."""
@@ -48,6 +56,6 @@ def factor_at(material: Material, rise: float) -> float:
 
 
 def feeds_back(job: Any) -> bool:
-    """Return whether the heat of sliding changes the relaxation times of a job's material (`effects.thermal`)."""
+    """Return whether the heat of sliding changes the relaxation times of a job's material (`effects.heat.effect`)."""
     section = job.section("thermal")
     return section is not None and section.feedback != "none"

@@ -1,7 +1,7 @@
 """Sections that effects add to a job.
 
-An effect, also of this package, is registered under the name of its section by an entry point that names its class
-(`effects.effect`):
+An effect of this package is found by its folder (`capabilities`). One of another package is registered under the name
+of its section by an entry point that names its class (`effects.effect`):
 
     [project.entry-points."parcontact.effects"]
     wear = "tread_wear:Wear"
@@ -15,8 +15,10 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from types import ModuleType
 from typing import Any
 
+from .. import capabilities
 from ..errors import InputError, RunError
 from .sections.part import Part
 from .text.fault import Fault, refuse
@@ -30,12 +32,34 @@ def find_effects() -> dict[str, Any]:
 
 
 def effects_of(sections: Iterable[str]) -> dict[str, Any]:
-    """Return the effects registered for some sections, by section. Raises ValidationError for an unusable effect."""
+    """Return the effects registered for some sections, by section, in the order in which they follow a step. Raises
+    ValidationError for an unusable effect."""
     found = [section for section in sections if section in _registered()]
     for section in found:
         if reason := why_unusable(section):
             refuse(Fault(reason, (section,), at_key=True))
-    return {section: _load(section) for section in found}
+    ours = {each.SECTION: each for each in capabilities.folders() if hasattr(each, "SECTION")}
+    needs = {section: capabilities.needs_of(ours.get(section) or _load(section)) for section in found}
+    return {section: _load(section) for section in capabilities.in_order(needs)}
+
+
+def answers(module: str, name: str) -> list[Any]:
+    """Return what capabilities offer under a name: those of this package in modules of one name, others in their
+    classes."""
+    others = (section for section in _registered() if not is_ours(section) and not why_unusable(section))
+    found = [(section, getattr(_load(section), name)) for section in others if hasattr(_load(section), name)]
+    return [*capabilities.offers(module, name), *(_named(*each) for each in found)]
+
+
+def _named(section: str, offered: Any) -> Any:
+    """Return what an effect of another package offers; functions name it in their errors."""
+
+    def call(*given: Any) -> Iterator[Any]:
+        with naming_effect(section):
+            found = list(offered(*given))
+        yield from found
+
+    return call if callable(offered) else offered
 
 
 @contextmanager
@@ -66,11 +90,16 @@ def unusable() -> list[str]:
 
 @cache
 def _registered() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=_is_ours)}
+    others = {entry.name: entry for entry in entry_points(group=GROUP) if not _is_ours(entry)}
+    return others | {each.SECTION: _entry_of(each) for each in capabilities.folders() if hasattr(each, "SECTION")}
+
+
+def _entry_of(folder: ModuleType) -> EntryPoint:
+    return EntryPoint(folder.SECTION, f"{folder.__name__}.effect:{folder.EFFECT}", GROUP)
 
 
 def _is_ours(entry: EntryPoint) -> bool:
-    """Return True for an effect of this package; such effects are sorted last, so that no other one replaces them."""
+    """Return True for an effect of this package."""
     return entry.value.startswith(f"{__package__.partition('.')[0]}.")
 
 

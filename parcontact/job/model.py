@@ -76,6 +76,7 @@ class Job(Part):
         Rule(("output",), limits.no_traction),
         Rule(("history",), limits.no_rolling),
         Rule(("bands", "surface", "steady", "output"), limits.bands_fit),
+        Rule(("study", "grid", "surface", "history"), limits.study_fits),
         *BAND_RULES,
     )
     at_most_one = (("grid", "bands"),)
@@ -146,13 +147,14 @@ class Job(Part):
     def doubts(self) -> tuple[Doubt, ...]:
         """Return all warnings about the job; they are errors with `numerics.strict`."""
         of_fit = self.material.doubts if isinstance(self.material, Dma) else ()
+        of_material = (*of_fit, *meaning.doubt_temperatures(self))
         of_effects = [
             each if isinstance(each, Doubt) else Doubt("said", "", {"text": str(each)}) for each in self._said("doubts")
         ]
         if self.bands is not None:
-            return (*of_fit, *meaning.doubt_moduli(self.material.fitted), *of_effects)
+            return (*of_material, *meaning.doubt_moduli(self.material.fitted), *of_effects)
         return (
-            *of_fit,
+            *of_material,
             *advice.doubts_of_resolution(self, self.directions, chosen=bool(self._origin.mesh)),
             *meaning.doubts_of_scene(self),
             *layer_warnings.doubts_of_layer(self),
@@ -167,8 +169,7 @@ class Job(Part):
 
     def _said(self, what: str) -> Iterator[Any]:
         """Yield the `doubts` or `facts` of the effects whose sections are given."""
-        sections = [name for name in type(self).model_fields if name not in Job.model_fields and self.section(name)]
-        for section, effect in added_sections.effects_of(sections).items():
+        for section, effect in added_sections.effects_of(self._added_sections()).items():
             with added_sections.naming_effect(section):
                 found = list(getattr(effect, what, lambda job: ())(self))
             yield from found
@@ -187,8 +188,9 @@ class Job(Part):
     @property
     def depends_on_heights(self) -> bool:
         """Return True if warnings need the heights of the surface: to find its slope, or to compare them with an
-        approach or the range of adhesion."""
-        compared = self.section("adhesion") is not None or any(stage.control == "approach" for stage in self.history)
+        approach or a length of an effect."""
+        compared = any(compares(self) for compares in self.asked("compares_heights"))
+        compared |= any(stage.control == "approach" for stage in self.history)
         return compared or not meaning.says_all(self.surface)
 
     def at_temperature(self, temperature: float) -> Job:
@@ -202,10 +204,18 @@ class Job(Part):
         """Return the section of an effect, or None if the job does not have it."""
         return getattr(self, name, None)
 
+    def asked(self, name: str) -> list[Any]:
+        """Return what the effects whose sections are given have under a name (`effects.effect.Effect`)."""
+        found = added_sections.effects_of(self._added_sections()).values()
+        return [getattr(effect, name) for effect in found if hasattr(effect, name)]
+
+    def _added_sections(self) -> list[str]:
+        return [name for name in type(self).model_fields if name not in Job.model_fields and self.section(name)]
+
     @property
     def remembers(self) -> bool:
-        """Return True if the result depends on the history: relaxing branches, adhesion, or contacts that stick."""
-        return bool(self.material.fitted.branches) or self.section("adhesion") is not None or self.sticks
+        """Return True if the result depends on the history: by a body that relaxes, or by an effect."""
+        return self.material.fitted.remembers or any(asked(self) for asked in self.asked("remembers"))
 
     @property
     def sticks(self) -> bool:

@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from ..accuracy.budget import ErrorSums
-from ..effects.adhesive_law import nothing_holds
-from ..effects.contact_protocol import Detached
+from ..effects.contact_protocol import Detached, nothing_holds
 from ..errors import InputError
 from ..history.timeline import Step, Timeline
 from ..parallel.slab import Array
+from ..physics.body import remembers
 from ..physics.entries import Entry
 from ..scene import Scene
 from ..storage.checkpoint import Contents, Facts
@@ -136,7 +136,7 @@ def next_step(scene: Scene, state: State, timeline: Timeline, stop: int) -> Step
     span = timeline.span(number)
     if state.chosen is not None and span.stage.chooses and span.place(number) > 0:
         return scene.controller.propose(state.chosen, span, number)
-    if scene.material.branched is not None or not span.rests or span.place(number) < 1:
+    if remembers(scene.material) or not span.rests or span.place(number) < 1:
         return span.step(number)
     output = scene.choices.output
     due = [-(-number // output.every) * output.every] if output.fields else []

@@ -16,7 +16,7 @@ from ..effects.effect import Memories, effect_values
 from ..errors import InputError
 from ..history.chosen import ChosenSteps
 from ..parallel.slab import Array
-from ..physics.body import BodyMemory
+from ..physics.body import BodyMemory, remembers
 from ..physics.energy import EnergyMemory
 from ..physics.entries import Entry, RunPart, Saved, part_of, with_part
 from ..physics.measures import Measures
@@ -115,7 +115,7 @@ def parts_of(scene: Scene) -> dict[str, RunPart[Any]]:
         "contact": _ContactPart(scene),
         "law": choose_contact_law(scene),
         "material": scene.material,
-        "errors": BudgetPart(scene.material.branched is not None),
+        "errors": BudgetPart(remembers(scene.material)),
     }
     if scene.energy is not None:
         found["energy"] = scene.energy

@@ -68,7 +68,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         *energies_of(scene, energy, followed),
         seconds=time.perf_counter() - began,
         remark="; ".join(f"{failure.describe_place(scene, step)}: {remark}" for remark in remarks if remark),
-        errors=_budget_of(made, sheared) if states_errors else None,
+        errors=_budget_of(made, sheared) if states_errors and errors.resolved else None,
         added=effect_values(scene.effects, followed),
     )
     pressure = PreviousPressure(contact.p, solved.trial.alpha, step.position)

@@ -12,7 +12,7 @@ from ..accuracy.observation import RunProperties, StepObservation, properties_of
 from ..accuracy.time_error import error_of_rise, time_error
 from ..effects.contact_protocol import SolvedContact
 from ..history.timeline import Step
-from ..physics.body import BodyMemory, Trial, surface_of
+from ..physics.body import BodyMemory, Trial, remembers, states_errors
 from ..physics.entries import Entry, Saved
 from ..physics.measures import Measures
 from ..physics.slopes import friction_by_energy
@@ -42,6 +42,11 @@ class StepErrors:
     def of_friction(self) -> float:
         """Relative error of friction; infinite without friction."""
         return math.inf if self.budget is None or self.budget.friction is None else self.budget.friction.of_friction
+
+    @property
+    def resolved(self) -> bool:
+        """True unless spots of contact may be smaller than a cell."""
+        return self.budget is None or self.budget.resolved
 
     @property
     def of_area(self) -> float:
@@ -102,6 +107,8 @@ def estimate_errors(scene: Scene, friction: float, solved: SolvedStep) -> StepEr
     branches = scene.material.branched
     prony = None if branches is None else branches.prony
     run = properties_of(scene.job, scene.setup.shortest, scene.folded.bound, prony)
+    if not states_errors(scene.material):
+        return StepErrors(None, 0.0, math.inf, None)
     body = measures.friction - measures.friction_interface
     observed = replace(_observe(scene, run, solved), change=body - friction)
     time, last = time_error(run, observed), math.inf if step.jump else body
@@ -118,6 +125,8 @@ def _observe(scene: Scene, run: RunProperties, solved: SolvedStep) -> StepObserv
     pair, mismatch, grid = _compare_integrators(scene, solved), _compare_views(scene, solved), scene.choices.grid
     curved = scene.choices.numerics.integrator == "exponential" and step.growth > 0.0
     of_steps: dict[str, Any] = {"difference": pair.difference, "order": pair.order, "seconds": step.dt}
+    if remembers(scene.material) and scene.material.branched is None:
+        of_steps["own_error"] = scene.material.time_error(solved.body, solved.trial, step.dt)  # type: ignore[attr-defined]
     if not solved.touches:
         return StepObservation(0.0, 0.0, 0.0, 0.0, curved=curved, **of_steps)
     return StepObservation(
@@ -167,10 +176,11 @@ def _compare_views(scene: Scene, solved: SolvedStep) -> float:
     """Return the difference of friction by the slopes of the rigid surface and of the body; collective. For an elastic
     body the latter is 0."""
     step, measures, grid = solved.step, solved.measures, scene.choices.grid
-    if scene.material.branched is None or measures.friction == 0.0:
+    if not remembers(scene.material) or measures.friction == 0.0:
         return max(measures.friction - measures.friction_interface, 0.0)
     direction, own = _viscous(step.velocity, measures)
-    maps, cyclic = (solved.contact.p, surface_of(solved.body)), grid.cyclic
+    displacement = scene.material.displacement(solved.body, solved.contact.u.copy, solved.trial.alpha)
+    maps, cyclic = (solved.contact.p, displacement), grid.cyclic
     other = friction_by_energy(scene.slab, *maps, (grid.dx, grid.dy), direction, cyclic)
     return abs(other * scene.units.height - own)
 

@@ -24,7 +24,9 @@ elastic body of modulus alpha under the effective heights `h + r/alpha` (paper, 
 points of the body, not of the moving surface.
 
 A body has the methods `begin` and `commit`, which take and return a `BodyMemory`; after a dropped step, the memory
-from which it began is still valid.
+from which it began is still valid. A step of length 0 is a jump of the load: the body answers with its modulus at once.
+A body without relaxing branches (`branched` is None) may have a method `time_error(memory, trial, dt)`, which returns
+the relative error of a step by its length.
 
 Two kinds of branches have no map (`effects.folded_branches` selects them and bounds the error): memoryless ones, for
 which `h_k = gain du + back du_before`, and frozen ones, which are springs `h_k = G_k u`.
@@ -96,7 +98,7 @@ class ElasticBody:
     """A body with one modulus. It has no memory and allocates at most the moved heights."""
 
     branched: "ZenerBody | None" = None
-    shortest_time = math.inf
+    shortest_time = math.inf  # of the relaxation [s]
 
     def __init__(self, slab: Slab, modulus: float, moves: bool = True) -> None:
         """Make a body; `moves` is False if the heights never move by an offset."""
@@ -281,3 +283,13 @@ def surface_of(memory: BodyMemory) -> Array:
 
 
 Body = ElasticBody | ZenerBody
+
+
+def remembers(body: Body) -> bool:
+    """Return False for an elastic body; any other body has a memory."""
+    return type(body) is not ElasticBody
+
+
+def states_errors(body: Body) -> bool:
+    """Return True unless the body has a memory, and neither branches nor a `time_error`."""
+    return not remembers(body) or body.branched is not None or hasattr(body, "time_error")

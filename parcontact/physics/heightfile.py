@@ -1,14 +1,15 @@
 """Heights from a file: each rank reads its own rows."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import datafiles
+from .. import datafiles, text_tables
 from ..errors import InputError
 from ..parallel.slab import Array, Slab
 
@@ -67,22 +68,29 @@ def _rows(path: Path, dataset: str, slab: Slab) -> Values:
 
 
 def _text(path: Path, slab: Slab) -> Values:
-    """Read a text file: one row per line, numbers separated by blanks; text after # is ignored."""
-    mine, count, longest = np.empty(slab.shape), 0, LONGEST_NUMBER * (1 + slab.nx)
-    with path.open() as lines:
-        for number, line in enumerate(iter(lambda: lines.readline(longest), ""), 1):
-            if len(line) == longest:
-                raise InputError(f"{path}:{number} has {longest} characters or more; {slab.nx} numbers were expected")
-            words = line.partition("#")[0].split()
-            if words and len(words) != slab.nx and (foreign := datafiles.foreign_numbers(path)):
-                raise InputError(f"{path} cannot be read: {foreign}")
-            if words and len(words) != slab.nx:
-                raise InputError(f"{path}:{number} has {len(words)} numbers, but the grid has nx = {slab.nx}")
-            if words and slab.rows.start <= count < slab.rows.stop:
-                mine[count - slab.rows.start] = words
-            count += bool(words)
+    """Read the rows of this rank from a text file with one row per line, see `text_tables`."""
+    mine, count = np.empty(slab.shape), 0
+    with text_tables.open_text(path) as file:
+        head, rows = text_tables.number_rows(path, _short_lines(path, file, slab.nx))
+        if wrong := [line for line in head if text_tables.COMMENT.sub("", line).strip()]:
+            raise InputError(f"{path}: {slab.nx} numbers a line were expected, got {wrong[0].strip()[:60]!r}")
+        for number, row in rows:
+            if len(row) != slab.nx:
+                raise InputError(f"{path}:{number} has {len(row)} numbers, but the grid has nx = {slab.nx}")
+            if slab.rows.start <= count < slab.rows.stop:
+                mine[count - slab.rows.start] = row
+            count += 1
     _check(path, (count, slab.nx), slab)
     return mine
+
+
+def _short_lines(path: Path, file: TextIO, count: int) -> Iterator[str]:
+    """Yield the lines of a file. Raises InputError for a line too long for `count` numbers."""
+    longest = LONGEST_NUMBER * (1 + count)
+    for number, line in enumerate(iter(lambda: file.readline(longest), ""), 1):
+        if len(line) == longest:
+            raise InputError(f"{path}:{number} has {longest} characters or more; {count} numbers were expected")
+        yield line
 
 
 def _check(path: Path, shape: tuple[int, ...], slab: Slab) -> None:

@@ -114,9 +114,10 @@ def measure_yielded(p, u, h, above, below, cyclic, highest):
     """Return sums over the points of this rank for a contact whose pressures end at `highest`, where points have
     yielded.
 
-    They are the excess cells on sharp edges, `sum 1 - p/highest` over points between one that has yielded and one
-    without pressure; the sides between other points below `highest` and points without pressure; the number of points
-    that have yielded, and their sum of `u - h`. `above` and `below` are the rows of p around those of this rank.
+    They are the excess cells if edges at yielded points are sharp, `sum 1 - p/highest` over points between one that has
+    yielded and one without pressure; the sides between other points below `highest` and points without pressure; the
+    number of points that have yielded, and their sum of `u - h`. `above` and `below` are the rows of p around those of
+    this rank.
     """
     ny, nx = p.shape
     sharp, sides, count, gaps = 0.0, 0.0, 0.0, 0.0
@@ -261,7 +262,7 @@ def displace(h, rows, along_x, along_y, out):
 @loop
 def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
     """Advance all waves of heat, put the spectrum of the temperature into `out`, and store the present sources. Return
-    the sum of the temperature at depth times the pressure (`physics.heat_memory`), without the mean.
+    the sum of the temperature at depth times the pressure (`effects.heat.heat_memory`), without the mean.
 
     `known` has rates, weights, shares of heat at depth, decays and the end of the sum; `spread` the squared
     wavenumbers times the diffusivity, and the multiplicity of columns; `sources` the spectra of rubbing and

@@ -5,9 +5,10 @@ of all edges of contact along the sides of cells of length dx, the area is on av
 A. Yastrebov, G. Anciaux, J.-F. Molinari, Tribology International 114 (2017) 161, arXiv:1701.02727). In cells this is
 `SIDE` for each side between a point in contact and one that is not, and less on long cells (`measures.excess_of`).
 
-This holds if the pressure falls to 0 at the edge. Where a counterbody yields, it ends at the hardness H, and a point on
-the edge carries the share p/H of it: the excess is `1 - p/H` of a cell, and 0 at points that have yielded. Where the
-pressure falls from H to 0 over several cells, the edge is as without yielding.
+This holds if the pressure falls to 0 at the edge. Where a stiff counterbody yields, it ends at the hardness H, and a
+point on the edge carries the share p/H of it: the excess is `1 - p/H` of a cell, and 0 at points that have yielded.
+Where the pressure falls from H to 0 over a cell or more, the edge is as without yielding, although points on it may
+have neighbours that have yielded. The smaller excess of the two holds for both.
 """
 
 import math
@@ -29,8 +30,8 @@ YIELDED = 1e-6  # accuracy: relative distance of a pressure to the hardness up t
 
 
 class _Yielding(NamedTuple):
-    """Sums over all points of a contact that may yield: excess cells on its edge, points that have yielded, and their
-    gaps, which are negative."""
+    """Sums over all points of a contact that may yield: excess cells on its edge if pressures end at the hardness
+    there, points that have yielded, and their gaps, which are negative."""
 
     excess: float
     points: float
@@ -82,7 +83,7 @@ class Probe:
             highest = self.hardness / unit_pressure
             yielding = self._measure_yielded(p, u, h, highest)
             gaps -= yielding.gaps - yielding.points * d
-            excess, least = yielding.excess, min(load / highest, count)
+            excess, least = min(excess, yielding.excess), min(load / highest, count)
         area = self.surface.size[0] * self.surface.size[1]
         force_x, force_y = 0.0, 0.0
         if load > 0.0 or least_load > 0.0:

@@ -1,1 +1,1 @@
-"""The plan of a job before it runs: effects, memory, steps, time, and the price of other accuracies."""
+"""The plan of a job before it runs: effects, memory, steps and time."""

@@ -37,11 +37,6 @@ class Costs:
         )
         return max(float(known), self.sample.held * _points(self.job) / _points(self.sample.job))
 
-    def on_mesh(self, nx: int, ny: int) -> "Costs":
-        """Return the costs with the same steps on another mesh."""
-        grid = self.job.grid.model_copy(update={"points": (nx, ny)})
-        return replace(self, job=self.job.model_copy(update={"grid": grid}))
-
     @property
     def resident(self) -> float:
         """Return the resident memory of a rank [bytes]."""

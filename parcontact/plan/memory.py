@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..accuracy.controller import tolerance_before
+from ..effects.effect import EXTRAPOLATION
 from ..job import Job
 from ..job.checks.size import machines
 from ..march.state import parts_of
@@ -89,7 +90,7 @@ def on_tiles(job: Job) -> int:
     """Return the largest additional memory of rank 0 [bytes] while a dilute first contact is solved on tiles; 0 for a
     run without tiles."""
     chosen, (nx, ny) = choices(job), job.grid.points
-    cold = bool(job.history) and not chosen.steady_start.on and chosen.adhesion is None
+    cold = bool(job.history) and not chosen.steady_start.on and not chosen.forbidden(EXTRAPOLATION)
     large = nx * ny >= WORTHWHILE and max(nx, ny) > BLOCKS
     if not (cold and large):
         return 0

@@ -16,7 +16,7 @@ from ..parallel.slab import Slab
 from ..scene import choices
 from ..steady_sliding.curve import request
 from ..storage import wisdom
-from . import price, printed_plan
+from . import printed_plan
 from .costs import Costs, costs_of, measure_write_rate
 from .sample import measure_program, sample
 from .trial_grids import choose_grid
@@ -41,10 +41,10 @@ class Planner:
         if job.history:
             yield from printed_plan.maps(job, self.ranks, measure_program(job, slab))
             yield ""
-            yield from self._describe(job, slab, job)
+            yield from self._describe(job, slab)
         if job.steady:
             yield from [""] * bool(job.history)
-            yield from self._describe(only_steady_states(job), slab, job)
+            yield from self._describe(only_steady_states(job), slab)
 
     def plan_sweep(self, cases: Sequence[Case], groups: Groups) -> Iterator[str]:
         """Yield the plan of all cases, of which each group of ranks runs one at a time; collective like `plan`."""
@@ -81,8 +81,8 @@ class Planner:
         wisdom.keep(choices(tried).transforms, own)
         return costs_of(job, seen, slab.agree(measure_write_rate(job.output.directory) if slab.root else 0.0))
 
-    def _describe(self, job: Job, slab: Slab, whole: Job) -> Iterator[str]:
-        """Yield lines on the costs of `job`, the steps or the steady states of the `whole` job; collective."""
+    def _describe(self, job: Job, slab: Slab) -> Iterator[str]:
+        """Yield lines on the costs of the steps of a job, or of its steady states; collective."""
         bar = progress.Bar(1, f"trying the job for about {self.seconds:g} s", "trial", slab.root)
         try:
             costs = self.try_job(job, slab)
@@ -94,8 +94,6 @@ class Planner:
         self.found.append(costs)
         yield from printed_plan.steps(costs)
         yield from printed_plan.times(costs)
-        yield ""
-        yield from price.table(costs, whole)
 
 
 def only_steady_states(job: Job) -> Job:

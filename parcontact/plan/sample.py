@@ -7,28 +7,23 @@ steps of a stage, where the load may jump, are not used for the others.
 import re
 import resource
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import TypeVar
 
 from .. import scene
-from ..accuracy.budget import ErrorBudget, weight_of
 from ..errors import InputError, RunError
-from ..history.timeline import Step
 from ..job import Job
 from ..march.loop import March
 from ..parallel.slab import Slab
 from ..steady_sliding import start
 from ..steady_sliding.curve import request
-from ..steady_sliding.point import Point
 from ..steady_sliding.sliding import SteadySliding
 from .trial_grids import make_tiny
 
-T = TypeVar("T")
 FIRST = 2  # tuning: first steps of a stage that are not used for the cost of others
 FEWEST = 8  # tuning: least steps of a stage before a long one ends it
 KILO = 1024  # unit of resident memory in `getrusage` [bytes]
@@ -179,16 +174,14 @@ def _slide_steadily(job: Job, slab: Slab, seconds: float) -> tuple[float, list[S
         speed, pressure, temperature = states[index]
         if temperature == temperature:
             sliding.set_temperature(temperature)
-        point, cost = _cost(slab, partial(_solve, sliding, wanted.velocity(speed), pressure))
-        stage.add(cost | (dict(_errors(point.errors, 1.0, 1.0)) if point else {}))
+        stage.add(_cost(slab, partial(_solve, sliding, wanted.velocity(speed), pressure)))
     return building, [stage]
 
 
-def _solve(sliding: SteadySliding, velocity: tuple[float, float], pressure: float) -> Point | None:
-    """Return the steady state, or None if the solver fails; the time of a failure counts, too."""
+def _solve(sliding: SteadySliding, velocity: tuple[float, float], pressure: float) -> None:
+    """Solve a steady state; a failure counts, too."""
     with suppress(RunError):
-        return sliding.solve(velocity, pressure)
-    return None
+        sliding.solve(velocity, pressure)
 
 
 def _spread(count: int) -> list[int]:
@@ -213,34 +206,15 @@ def _try(march: March, seconds: float) -> list[StageCost]:
             march.advance(span.leap(step.number, span.last))
             continue
         stage.steps -= step.passed
-        stage.add(_make(march, step))
+        stage.add(_cost(slab, partial(march.advance, step)))
     for stage, span in zip(stages, timeline.spans, strict=True):
         if timeline.chooses and span.stage.chooses:  # steps chosen so far, and an estimate of the others
             stage.steps = span.jumps + span.count
     return stages
 
 
-def _make(march: March, step: Step) -> dict[str, float]:
-    """Make a step; return its costs and its errors."""
-    _, cost = _cost(march.scene.slab, partial(march.advance, step))
-    far = weight_of(march.scene.job.history[step.stage].speed * step.dt, step.dt)
-    friction = march.row.measures.friction if march.scene.job.directions else 0.0  # noise without sliding
-    return cost | dict(_errors(march.row.errors, far, friction))
-
-
-def _errors(errors: ErrorBudget | None, far: float, friction: float) -> Iterator[tuple[str, float]]:
-    """Yield the errors of friction and area by time steps and mesh, times their weights in the mean over a run, and the
-    weights."""
-    for name, weight in (("friction", far * friction), ("area", far)):
-        if (parts := getattr(errors, name, None)) is not None:
-            yield f"{name} weight", weight
-            yield f"{name} time error", weight * parts.time
-            yield f"{name} mesh error", weight * parts.mesh
-
-
-def _cost(slab: Slab, call: Callable[[], T]) -> tuple[T, dict[str, float]]:
-    """Return the result of a call, and its time [s] and counts."""
+def _cost(slab: Slab, call: Callable[[], object]) -> dict[str, float]:
+    """Return the time [s] and the counts of a call."""
     before, began = slab.tally.copy(), time.perf_counter()
-    found = call()
-    seconds = time.perf_counter() - began
-    return found, {"operator": 0, **slab.tally.since(before), "seconds": seconds}
+    call()
+    return {"operator": 0, **slab.tally.since(before), "seconds": time.perf_counter() - began}

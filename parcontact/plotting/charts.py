@@ -25,6 +25,7 @@ FRACTION = "contact area /\nnominal area"
 BAR_SHARE = 0.8  # width of a bar over the distance of bars, in the logarithm
 LEAST = 0.99  # largest downward error bar over the value
 ZERO_ROW = 0.05  # height of the row of marks at 0, over the height of the panel
+SAME = 1e-9  # rounding: relative difference of equal values on a logarithmic axis
 FEW_DECADES = 1.5  # decades of a logarithmic axis below which minor ticks have labels
 
 
@@ -72,13 +73,17 @@ class Chart:
 
 
 def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
-    """Draw a chart; `log` names its logarithmic axes. A legend of many lines is drawn outside of a panel of full
-    width."""
+    """Draw a chart; `log` names its logarithmic axes, which stay linear if the chart has no point for them. A legend of
+    many lines is drawn outside of a panel of full width."""
     log_x, log_y = (
         "none" not in log and (chart.log_x or "x" in log),
         "none" not in log and bool(chart.zeros or "y" in log),
     )
+    marks_zeros = chart.zeros and log_y
     series = [_drop_hidden_points(one, log_x, log_y) for one in chart.series]
+    if not any(np.isfinite(one.x * one.y).any() for one in series):
+        log_x = log_y = False
+        series = [_drop_hidden_points(one, log_x, log_y) for one in chart.series]
     lonely = all(np.isfinite(one.x * one.y).sum() < 2 for one in series)
     if chart.stacked:
         _draw_bars(axes, series[: chart.stacked])
@@ -86,7 +91,7 @@ def draw(chart: Chart, axes: Axes, log: Sequence[str] = ()) -> None:
         axes.plot(one.x, one.y, label=one.name or None, **one.look | ({"marker": "o"} if lonely else {}))
         if one.error is not None:
             _draw_errors(axes, one, one.error)
-    if chart.zeros and log_y:
+    if marks_zeros:
         _mark_zeros(axes, chart)
     set_scale(axes, "x", chart.x.name, chart.x.unit, log_x)
     set_scale(axes, "y", chart.y.name, chart.y.unit, log_y)
@@ -148,6 +153,9 @@ def set_scale(axes: Axes, which: str, name: str, unit: str, log: bool) -> None:
     """Set name, unit and scale of an axis, with few ticks so that labels do not overlap."""
     axis, few = axes.xaxis if which == "x" else axes.yaxis, True
     if log:
+        low, high = axis.get_data_interval()
+        if 0.0 < low < high < low * (1.0 + SAME):  # Matplotlib finds no limits for values that differ by rounding
+            axes.set(**{f"{which}lim": (low / 10.0, 10.0 * low)})
         axes.set(**{f"{which}scale": "log"})
         low, high = axis.get_view_interval()
         if unit == "s" and prefixes.label_log_times(axis, name):

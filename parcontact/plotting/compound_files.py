@@ -42,7 +42,8 @@ def write_compound(compound: Compound, target: Path, job_band: tuple[float, floa
         files.replace_file(target, text)
         draw_compound(compound, picture, job_band)
     except OSError as error:
-        raise InputError(f"{target} cannot be written: {hdf5.reason(error)}") from error
+        wrong = files.without_mark(Path(error.filename or target))
+        raise InputError(f"{wrong} cannot be written: {hdf5.reason(error)}") from error
     yield from (line.removeprefix("# ") for line in text.splitlines() if line.startswith("#"))
     yield f"material file: {target}, picture: {picture}"
     yield from (f"warning: {text}" for text in compound.doubts())

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from ..columns import UNITS
 from ..errors import InputError
+from ..job.added_sections import answers
 from ..parallel.slab import Array
 from ..storage import read_back
-from . import conductivity, prefixes, style
+from . import prefixes, style
 from .charts import Axis, Chart, ChartLine
 from .plotted_run import PlottedRun
 
@@ -25,7 +26,6 @@ ENERGIES = {
     "snaps": "snap_loss",
     "slip": "slip_loss",
 }
-FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # columns of a run with leakage
 VISCOUS = "friction_viscous"  # friction of the body; in tables of runs with an interface
 
 
@@ -143,11 +143,8 @@ def _find_charts(run: PlottedRun, along: Abscissa) -> Iterator[Chart]:
             found = Chart(key, along.axis, axis, along.series(lines), bottom=key != "approach")
             peak = key == "friction"
             yield found if along.marked or along.loop else replace(found, peak=peak, spikes=not peak)
-    if "flow_x" in columns and max(np.nanmax(columns[name], initial=0.0) for name in FLOWS) > 0.0:
-        rows = slice(None) if along.rows is None else along.rows
-        flows = {label: columns[name][rows] for name, label in FLOWS.items()}
-        narrowest = dict.fromkeys(flows, columns["constriction"][rows])
-        yield conductivity.chart(along.axis, along.values, flows, narrowest)
+    for panels_of in answers("pictures", "panels"):
+        yield from panels_of(run, along)
 
 
 def describe_solve(run: PlottedRun) -> str:

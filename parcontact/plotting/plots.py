@@ -15,6 +15,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from ..errors import InputError
+from ..job.added_sections import answers
 from ..job.reading import CASES
 from ..storage import hdf5
 from ..summary import sweep_table, theory_settings
@@ -22,7 +23,7 @@ from . import charts, curve_charts, histories, maps, movie, prefixes, style, swe
 from .charts import Chart
 from .plotted_run import PlottedRun
 
-PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy", "leakage", "steady", "maps")
+PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy")
 MEASURES = "measures.csv"
 
 
@@ -41,8 +42,9 @@ class PlotOptions:
     out: Path | None = None
 
     def __post_init__(self) -> None:
-        if unknown := [name for name in self.panels if name not in PANELS]:
-            raise InputError(f"--panels: there is no {unknown[0]!r}; choose from {', '.join(PANELS)}")
+        known = *PANELS, *(key for keys in answers("pictures", "KEYS") for key in keys), "steady", "maps"
+        if unknown := [name for name in self.panels if name not in known]:
+            raise InputError(f"--panels: there is no {unknown[0]!r}; choose from {', '.join(known)}")
         if unknown := [name for name in self.log if name not in ("x", "y", "none")]:
             raise InputError(f"--log: there is no axis {unknown[0]!r}; give x, y, x,y or none")
         if self.at and (self.movie or self.compare):

@@ -14,7 +14,9 @@ from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from ..storage import marker, read_back
-from ..summary import pull_off
+from ..storage.fields import UNITS
+from ..storage.hdf5 import MEND
+from ..summary.run_table import RunTable, find_telling_row
 from . import prefixes
 from .charts import FRACTION, Axis
 
@@ -71,7 +73,7 @@ class PlottedRun:
         """Return the step whose maps show the contact: the last one, or after a detachment the step of the pull-off or
         of the largest load."""
         columns = {name: values.tolist() for name, values in self._all.items()}
-        row = pull_off.choose_row(columns, bool(marker.detached(self.directory)))
+        row = find_telling_row(RunTable(self.directory, self.job, columns, bool(marker.detached(self.directory))))
         return int(self._all["step"][row])
 
     @property
@@ -126,6 +128,10 @@ class Fields:
         self.steps: NDArray[np.int64] = file["step"][...]
         self.x, self.y = file["x"][...], file["y"][...]
         self.times: Array = file["t"][...]
+        lengths = self.times.shape, self.y.shape, self.x.shape
+        maps = [file[name] for name in UNITS if name in file]
+        if self.steps.shape != lengths[0] or any(one.shape != sum(lengths, ()) for one in maps):
+            raise InputError(f"{file.filename} is damaged: the numbers of its maps and coordinates differ; {MEND}")
         self.saved = np.flatnonzero(~np.isnan(self.times)).tolist()
         self.shown = [self._index(at)] if at else self.saved
         before = [k for k in self.shown if until is None or self.steps[k] <= until]

@@ -1,5 +1,6 @@
 """Style of all pictures: readable at a width of 8 cm, in colours for colour-blind readers."""
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from ..storage import files
+from ..streams import printable
 
 Panel = Callable[[Axes], None]  # draws one panel
 
@@ -72,8 +74,10 @@ MARKED = {
 
 @contextmanager
 def drawing(settings: Mapping[Any, Any] = RC) -> Iterator[None]:
-    """Draw with these settings and Matplotlib's defaults; a user's matplotlibrc is ignored."""
-    with mpl.rc_context():
+    """Draw with these settings and Matplotlib's defaults; a user's matplotlibrc is ignored. Letters that the font lacks
+    become boxes without a warning."""
+    with mpl.rc_context(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
         mpl.rcdefaults()
         mpl.rcParams.update(settings)
         yield
@@ -88,7 +92,9 @@ def save_figure(figure: Figure, path: Path, kind: str = "png", dpi: int = DPI) -
 
 
 def plain(text: str, most: int = 1000) -> str:
-    """Return a text shortened to `most` letters, with dollar signs escaped."""
+    """Return a text shortened to `most` letters, with dollar signs escaped and control characters as their codes, which
+    neither fonts nor XML have."""
+    text = printable(text).replace("\t", " ")
     return (text if len(text) <= most else text[: most - 1] + "…").replace("$", r"\$")
 
 

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ..columns import SWEEP, names_of
+from ..job.added_sections import answers
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from ..summary import sweep_table
@@ -32,9 +34,7 @@ FRICTION, AREA = Axis("friction coefficient"), Axis(FRACTION)
 PANELS: Panels = (  # panels: columns by the names of lines
     ("friction", FRICTION, {"highest": "mu_max", "dynamic": "mu_dyn"}),
     ("area", AREA, {"simulation": CORRECTED}),
-    ("pull-off", Axis("pull-off force", "N"), {"pull-off": "pull_off"}),
     ("energy", Axis("dissipated energy", "J"), {"dissipated": "dissipated"}),
-    ("leakage", Axis("conductivity", "m³"), {"along x": "flow_x", "along y": "flow_y"}),
 )
 CURVE_PANELS: Panels = (
     ("friction", FRICTION, {"steady sliding": "friction"}),
@@ -42,16 +42,23 @@ CURVE_PANELS: Panels = (
 )
 SHARES = {"friction": "error_friction", CORRECTED: "error_area"}  # columns with the relative error of a column
 SIZES = {
-    name: f"{name}_error" for name in ("mu_max", "mu_dyn", "pull_off")
+    name: f"{name}_error" for name in names_of(SWEEP) if f"{name}_error" in names_of(SWEEP)
 }  # columns with the absolute error of a column
 
 Rows = Sequence[dict[str, Any]]
 
 
+def all_panels() -> Panels:
+    """Return the panels of a sweep, with those of capabilities, in the order of the columns of sweep.csv."""
+    found = (*PANELS, *(panel for panels in answers("pictures", "SWEEP_PANELS") for panel in panels))
+    place = names_of(SWEEP).index
+    return tuple(sorted(found, key=lambda panel: place(next(iter(panel[2].values())))))
+
+
 def chart_sweep(directory: Path) -> list[Chart]:
     """Return panels of a sweep; none without results, or without a swept key of numbers."""
     table = sweep_table.results(directory)
-    rows, panels = sweep_table.read_cases(table), PANELS
+    rows, panels = sweep_table.read_cases(table), all_panels()
     keys = _find_keys(rows)
     if table.name == sweep_table.CURVES:
         panels = CURVE_PANELS

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..bands.road_sliding import make_states
 from ..columns import STEADY
 from ..doubts import Doubt
+from ..effects.heat.heating import describe_hot, describe_unmeasured
 from ..errors import JobError, RunError
 from ..job import log_range
 from ..job.checks.cells import more_points
@@ -20,7 +21,6 @@ from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
 from ..scene.sanity import ContactWatch
 from ..steady_sliding import curve
-from ..steady_sliding.heating import describe_hot, describe_unmeasured
 from ..steady_sliding.point import Point
 from ..steady_sliding.table import describe_missed
 from ..storage import wisdom

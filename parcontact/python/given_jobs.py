@@ -102,7 +102,13 @@ def path_of(path: object) -> Path:
     """Return a path. Raises InputError for other objects."""
     if not isinstance(path, str | os.PathLike):
         raise InputError(f"a path must be a text or a pathlib.Path, got {path!r:.60}")
-    return Path(path)
+    try:
+        usable = b"\0" not in os.fsencode(path)
+    except UnicodeEncodeError:
+        usable = False
+    if not usable:
+        raise InputError(f"a path must be a name that the file system can store, got {path!r:.60}")
+    return Path(os.fsdecode(path))
 
 
 def of_parts(**parts: Any) -> Job:

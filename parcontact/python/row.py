@@ -39,18 +39,19 @@ class Row(Mapping[str, float]):
     contact_area_corrected: float
     error_friction: float
     error_area: float
-    friction_viscous: float
-    friction_interface: float
-    stick_area: float
-    slip_loss: float
+    cut_off: int
     tensile_area: float
     adhesive_force: float
     surface_energy: float
     snap_loss: float
     error_energy: float
+    friction_viscous: float
+    friction_interface: float
     flow_x: float
     flow_y: float
     constriction: float
+    stick_area: float
+    slip_loss: float
     flash_temperature: float
     max_temperature: float
     error_flash: float

@@ -163,6 +163,8 @@ class Simulation:
         wrong path.
         """
         file, march, slab = path_of(path), self._march, self._slab
+        if on_root(self.comm, lambda: os.path.isdir(file)):
+            raise InputError(f"{file} is a directory: give the name of a file in it")
         self._wait_for_all(f"saves {file}")
         plain = on_root(self.comm, lambda: plain_job(self.job))
         last = ",".join(cells(self.row.values()))

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from .. import job as jobs
+from ..capabilities import offers
 from ..errors import InputError
 from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
@@ -22,7 +23,8 @@ KINDS = {  # kinds of results, by their table
 }
 JOBS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
 MORE_TABLES = (
-    *("leak.csv", "theory.csv", "steady_waves.csv", "steady_theory.csv", "bands.csv", "bands_theory.csv"),
+    *(name for names in offers("results", "DATA") for name in names),
+    *("theory.csv", "steady_waves.csv", "steady_theory.csv", "bands.csv", "bands_theory.csv"),
     *("sweep_mean.csv", "sweep_curves.csv", "sweep_curves_mean.csv"),
 )
 ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys that are shown in other sections
@@ -52,6 +54,7 @@ def describe_directory(directory: Path) -> Chapter:
         if there == ["sweep.csv"]:
             of_job[0] = replace(asked, sentences=[_describe_swept(directory)])
             of_job = [replace(one, title=f"{one.title} of the first case") for one in of_job]
+            warnings = log.warnings_of_cases(directory) or warnings
         sections += of_job
         if there[0] in ("measures.csv", "steady.csv"):
             sections += origin.costs(directory / there[0], found, job)

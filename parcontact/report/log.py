@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..job.reading import CASES
+from ..run.sweep_warnings import name_cases
 from ..storage.console import WARNING, log_lines
 from ..storage.curve_points import LOG
 
@@ -12,6 +14,9 @@ LOGS = ("run.log", LOG)
 COUNTS = "counts on root: "
 ESTIMATE = "estimated error of "
 MACHINE = re.compile(r"parcontact |machine: |batch job: |\d+ ranks?, ")  # beginnings of lines about the machine
+
+
+BEYOND = "; more than the "  # in an estimate that exceeds numerics.accuracy
 
 
 @dataclass(frozen=True)
@@ -34,3 +39,16 @@ def read_logs(directory: Path) -> Log:
     machine = [line for line in lines if MACHINE.match(line)]
     estimates = {line.partition(":")[0]: line for line in lines if line.startswith(ESTIMATE)}
     return Log(list(dict.fromkeys(warnings)), list(estimates.values()), counts, machine)
+
+
+def warnings_of_cases(directory: Path) -> list[str]:
+    """Return the warnings in the logs of the cases of a sweep, and the errors beyond numerics.accuracy, each once with
+    its cases."""
+    found: dict[str, list[int]] = {}
+    for path in sorted(directory.glob(f"{CASES}/*")):
+        if path.name.isdecimal():
+            logs = read_logs(path)
+            beyond = [line.partition(":")[0] for line in logs.estimates if BEYOND in line]
+            for text in [*logs.warnings, *(f"the {name} exceeds numerics.accuracy" for name in beyond)]:
+                found.setdefault(text, []).append(int(path.name))
+    return [f"{text} ({name_cases(cases)})" for text, cases in found.items()]

@@ -12,9 +12,10 @@ import h5py
 import numpy as np
 from PIL import Image
 
-from .. import progress
+from .. import capabilities, progress
 from ..columns import STEADY, SWEEP, UNITS
 from ..job import Job
+from ..job.added_sections import answers
 from ..plotting import curve_charts, histories, maps, prefixes, style, sweep_charts
 from ..plotting.plotted_run import (
     Fields,
@@ -26,14 +27,15 @@ from ..plotting.plotted_run import (
     to_load,
 )
 from ..storage import hdf5, marker, read_back
-from ..summary import leak_stop, pull_off, slide, sweep_table, theory_comparison, theory_settings
+from ..summary import slide, sweep_table, theory_comparison, theory_settings
+from ..summary.run_table import RunTable
 from .page_parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement"}
 INTERFACE = ("friction_viscous", "friction_interface")
 SHOWN = (
-    *("friction", "contact_area", "approach", "mean_gap", "max_pressure", *INTERFACE),
-    *("flow_x", "flow_y", "constriction"),
+    *("friction", "contact_area", "approach", "mean_gap", "max_pressure"),
+    *(name for names in capabilities.offers("columns", "SHOWN") for name in names),
 )
 POINTS = (
     *("velocity", "temperature", "pressure", "friction", "error_friction", *INTERFACE),
@@ -58,24 +60,22 @@ def describe_run(directory: Path) -> ReportSection:
         if values and (run.job.directions or not name.startswith("friction"))
     ]
     numbers = ReportTable(("measure", "last", "smallest", "largest", "unit"), rows)
-    box = run.job.grid.lx * run.job.grid.ly
+    table = RunTable(directory, run.job, columns, bool(marker.detached(directory)))
     sentences = [
         *slide.describe_slide(run.job.history, run.job.initial, run.job.grid.dx, columns),
-        *pull_off.describe_pull_off(columns, box, run.job.numerics.tolerance, bool(marker.detached(directory))),
-        *leak_stop.describe_leak_stop(directory),
+        *(text for sentences in answers("results", "sentences") for text in sentences(table)),
         *theory_comparison.describe_theory(directory, run.job.history, run.job.grid.dx),
         theory_settings.describe_settings(directory),
     ]
-    pictures = [draw_chart(chart) for chart in histories.chart_histories(run)] + _leakage(directory)
+    pictures = [draw_chart(chart) for chart in histories.chart_histories(run)] + _more_pictures(directory)
     return ReportSection("Results of the run", list(filter(None, sentences)), [numbers], pictures, browse_run(run))
 
 
-def _leakage(directory: Path) -> list[tuple[str, str]]:
-    """Return the picture of `parcontact leak`, if it exists."""
-    picture = directory / "leak.png"
-    if not picture.is_file() or picture.is_symlink():
-        return []
-    return [(to_uri(picture.read_bytes(), "image/png"), "flow through the gap, and conductivity")]
+def _more_pictures(directory: Path) -> list[tuple[str, str]]:
+    """Return the pictures of capabilities that exist."""
+    known = {directory / name: words for found in answers("results", "PICTURES") for name, words in found.items()}
+    there = {path: words for path, words in known.items() if path.is_file() and not path.is_symlink()}
+    return [(to_uri(path.read_bytes(), "image/png"), words) for path, words in there.items()]
 
 
 def describe_curve(directory: Path) -> ReportSection:

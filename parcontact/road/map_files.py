@@ -3,15 +3,16 @@
 Heights point up, out of the road: the highest points touch first.
 """
 
-import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .. import datafiles
+from .. import datafiles, text_tables
+from ..column_names import Column
 from ..errors import InputError
 from ..job import Topography
 from ..parallel.slab import Array
@@ -20,8 +21,8 @@ UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 UNITS |= {"km": 1e3, "cm": 1e-2, "Å": 1e-10, "A": 1e-10, "pm": 1e-12, "in": 0.0254}
 TO_GIVE = "m | mm | um | nm"  # as a job writes them; files may have the others
 OF_NUMPY = ("npy", "npz")  # formats that SurfaceTopography reads with the first axis along x
+ROWS_ALONG_X = ("h5", "mat")  # arrays without axes, whose first index is of x for SurfaceTopography and of y here
 LARGEST_FILE = 4_000_000_000  # tuning: largest file of a map [bytes]
-LONGEST_HEAD = 200  # tuning: most lines before the first number of a text
 IRREGULAR = 0.1  # accuracy: largest relative difference between steps of rounded positions
 FEWEST = 4  # tuning: least points along a direction
 
@@ -111,36 +112,57 @@ def _array(part: Topography) -> MapContents:
 def _text(part: Topography) -> MapContents:
     """Read a matrix of heights, rows of x, y, z, an ESRI grid, or a line (rows of x, z or z); a text with any other
     header is read by SurfaceTopography."""
-    with part.path.open(encoding="latin-1") as file:
-        start = [*islice(file, LONGEST_HEAD)]
-    first = next((number for number, line in enumerate(start) if _numbers(line)), None)
-    if first is None:
-        return _instrument(part)
-    if datafiles.has_decimal_commas(start[first]):
-        raise InputError(f"{part.path} cannot be read: its numbers have decimal commas; write them with points")
-    head, columns = [line.strip() for line in start[:first] if line.strip()], len(_numbers(start[first]))
-    said = {line.split()[0].lower(): _numbers(line.partition(" ")[2]) for line in head}
-    known = all(line.startswith("#") for line in head) and part.unit_of_heights and (part.size or part.pixel)
-    if head and columns > 3 and "cellsize" not in said and not known:
-        return _instrument(part)
-    mark = next((mark for mark in ";," if mark in start[first]), None)
-    table = np.loadtxt(part.path, delimiter=mark, skiprows=first, ndmin=2, usecols=range(columns), encoding="latin-1")
-    if "cellsize" in said:  # an ESRI grid, whose first row has the largest y
-        missing, (cell,) = said.get("nodata_value") or [np.nan], said["cellsize"]
+    path = part.path
+    with text_tables.open_text(path) as file:
+        head, rows = text_tables.number_rows(path, file)
+        head = [line.strip() for line in head if line.strip()]
+        first = next(rows, None)
+        columns = len(first[1]) if first else 0
+        esri = {line.split()[0].lower(): line.split()[1:] for line in head}
+        comments = not any(text_tables.COMMENT.sub("", line) for line in head)
+        known = comments and part.unit_of_heights and (part.size or part.pixel)
+        if first is None or (head and columns > 3 and "cellsize" not in esri and not known):
+            return _instrument(part)
+        table = _table(path, chain([first], rows), columns in (2, 3))
+    if "cellsize" in esri:  # an ESRI grid, whose first row has the largest y
+        missing, cell = (float(esri.get(key, ["nan"])[0]) for key in ("nodata_value", "cellsize"))
         return MapContents(np.where(table == missing, np.nan, table)[::-1], None, (cell * columns, cell * len(table)))
-    if columns > 3 or columns == 1:
+    if columns not in (2, 3):
         return MapContents(table.squeeze())
-    words = re.findall(r"[\[(]\s*([mnuµμ]?m)\s*[\])]", head[-1] if head else "")
-    units = [UNITS[word] for word in words] if len(words) == columns else [None, None]
-    return _positions(part.path, table, units[0], units[-1])
+    named = text_tables.header_of(head[-1], columns) if head else []
+    axes, units = "xyz" if columns == 3 else "xz", [UNITS.get(column.unit or "") for column in named]
+    places = [[column.name.lower() for column in named].index(name) for name in axes] if _name(named, axes) else None
+    if places is not None:
+        table, units = table[:, places], [units[k] for k in places]
+    if None in units or not units:
+        units = [None, None]
+    if units[0] != units[-2 if columns == 3 else 0]:
+        raise InputError(f"{path}: its positions along x and y have two units; one was expected")
+    return _positions(path, table, units[0], units[-1])
 
 
-def _numbers(line: str) -> list[float]:
-    """Return the numbers of a line; none if it holds anything else."""
-    try:
-        return [float(word) for word in re.split(r"[,;\s]+", line.strip(" ,;\t\r\n"))]
-    except ValueError:
-        return []
+def _name(columns: Sequence[Column], axes: str) -> bool:
+    """Return True if columns have the names of all axes."""
+    return sorted(column.name.lower() for column in columns) == list(axes)
+
+
+def _table(path: Path, rows: Iterable[tuple[int, list[float]]], positions: bool) -> Array:
+    """Return rows of numbers as an array; rows of a matrix must be one block. Raises InputError."""
+    numbers, values = [], []
+    for number, row in rows:
+        numbers.append(number)
+        values.append(np.array(row))
+        if len(row) != len(values[0]):
+            raise InputError(
+                f"{path}:{number}: {len(row)} numbers; {len(values[0])} were expected, as in line {numbers[0]}"
+            )
+    breaks = np.flatnonzero(np.diff(numbers) > 1)
+    if not positions and 0 < breaks.size < len(values) - 1:  # text between all rows makes no blocks
+        raise InputError(
+            f"{path}:{numbers[breaks[0] + 1]}: a second block of numbers begins after a blank line or a comment; a map "
+            "is one block: keep one of them"
+        )
+    return np.stack(values)
 
 
 def _positions(path: Path, table: Array, unit_xy: float | None, unit: float | None) -> MapContents:
@@ -153,7 +175,11 @@ def _positions(path: Path, table: Array, unit_xy: float | None, unit: float | No
         if not np.ptp(gaps := np.diff(places)) <= IRREGULAR * np.mean(gaps):
             raise InputError(f"{path}: its positions along {name} are not equally spaced")
     heights = np.full([places.size for places, _ in axes[::-1]], np.nan)
-    heights[tuple(index for _, index in axes[::-1])] = table[:, -1]
+    where = tuple(index for _, index in axes[::-1])
+    count = np.bincount(np.ravel_multi_index(where, heights.shape))
+    if count.max() > 1:
+        raise InputError(f"{path}: {np.count_nonzero(count > 1)} positions have two heights or more; one was expected")
+    heights[where] = table[:, -1]
     size = tuple(float(np.ptp(places)) * places.size / (places.size - 1) for places, _ in axes)
     return MapContents(heights, unit, size, unit_xy)
 
@@ -190,7 +216,8 @@ def _instrument(part: Topography) -> MapContents:
         x, z = topography.positions_and_heights()
         places = np.linspace(x[0], x[-1], len(x))
         return MapContents(np.interp(places, x, z), unit, (places[1] * len(x) - x[0] * len(x),), unit)
-    heights = np.ma.filled(np.ma.masked_invalid(topography.heights()), np.nan).T
+    heights = np.ma.filled(np.ma.masked_invalid(topography.heights()), np.nan)
+    heights = heights if reader.format() in ROWS_ALONG_X else heights.T
     return MapContents(heights, unit, None if size is None else tuple(topography.physical_sizes), unit)
 
 

@@ -39,7 +39,8 @@ def prepare(part: Topography, grid: Grid, found: map_files.Map) -> Prepared:
         raise InputError(f"{part.path}: {int(np.isnan(cut).sum())} of its points are missing; give fill: true")
     done, short = treatment.treat(cut, part.detrend, periodic, part.outliers == "clip"), part.short_wavelength
     most = (grid.ly / short * (1.0 + SLACK), grid.lx / short * (1.0 + SLACK)) if short else None
-    heights = treatment.resample(done.heights, (grid.ny, grid.nx), periodic != "none", most)
+    joined = periodic != "none" or (all(grid.cyclic) and treatment.is_periodic(done.heights))
+    heights = treatment.resample(done.heights, (grid.ny, grid.nx), joined, most)
     return Prepared(heights - heights.mean(), part, found, cut, done, size)
 
 

@@ -13,16 +13,15 @@ Between its points a spectrum is a power law. For Abel's integral, C1D is extrap
 q^-(1 + 2 hurst) with the given Hurst exponent, or else by the power law of its last decade.
 """
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..datafiles import read_lines
 from ..errors import InputError
 from ..job import RoughSpectrum, Topography
 from ..parallel.slab import Array
+from ..text_tables import read_named_columns
 from . import treatment
 from .map_files import UNITS, Map
 
@@ -35,8 +34,8 @@ ABEL_POINTS = 20_001  # accuracy: points of the trapezoidal rule for Abel's inte
 ABEL_DECADES = 4.0  # accuracy: decades of q beyond the last point, over which C1D' falls by more than 8 decades
 NOTHING = 1e-20  # rounding: smallest C2D, over the largest one: (relative rounding error of heights)^2
 EDGE = 1e-9  # rounding: relative difference below which wavelengths are the same
-HEADER = re.compile(r"q\[1/([^\]]+)\] (C1D|C2D)\[([^\]^]+)\^(\d)\]")
-FORMS = "the columns q[1/m] C1D[m^3] or q[1/m] C2D[m^4] (or mm, um, nm)"
+WAVE_UNITS = "1/{}", "rad/{}", "{}^-1", "{}-1"
+FORMS = "q[1/m] C2D[m^4] or q[1/m] C1D[m^3] (or mm, um, nm)"
 
 
 @dataclass(frozen=True)
@@ -107,29 +106,26 @@ def of_line(part: Topography, line: Map) -> tuple[MeasuredSpectrum, tuple[float,
 
 def _read(path: Path) -> tuple[Array, Array, int]:
     """Return wavenumbers [rad/m], the spectrum [m^3 or m^4], and the power of m in its unit."""
-    (number, head), *lines = [
-        (number, re.split(r"[,;\s]+", line.strip())) for number, line in read_lines(path, f"a table with {FORMS}")
-    ]
-    found = HEADER.fullmatch(" ".join(head))
-    if not found or not {found[1], found[3]} <= UNITS.keys() or int(found[4]) != POWERS[found[2]]:
-        raise InputError(f"{path}, line {number}: {FORMS} were expected, got {' '.join(head)[:60]!r}")
-    rows = np.array([_numbers(path, number, cells) for number, cells in lines])
-    if len(rows) < FEWEST:
-        raise InputError(f"{path} has {len(rows)} rows of numbers; at least {FEWEST} were expected")
-    if (wrong := np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)).size:
-        raise InputError(f"{path}, line {lines[wrong[0] + 1][0]}: q must rise from line to line")
-    power = POWERS[found[2]]
-    return rows[:, 0] / UNITS[found[1]], rows[:, 1] * UNITS[found[3]] ** power, power
+    table = read_named_columns(path, f"a table of {FORMS}", FORMS, {"q", *POWERS}, _are_enough)
+    if not _are_enough(set(table.columns)):
+        raise InputError(f"{path}: {FORMS} were expected, got {', '.join(table.columns)}")
+    if len(table.lines) < FEWEST:
+        raise InputError(f"{path} has {len(table.lines)} rows of numbers; at least {FEWEST} were expected")
+    (kind,) = POWERS.keys() & table.columns
+    power = POWERS[kind]
+    q, values = np.array(table.columns["q"]), np.array(table.columns[kind])
+    if (wrong := np.flatnonzero((q <= 0.0) | (values <= 0.0))).size:
+        raise InputError(f"{path}:{table.lines[wrong[0]]}: two positive numbers were expected")
+    if (wrong := np.flatnonzero(np.diff(q) <= 0.0)).size:
+        raise InputError(f"{path}:{table.lines[wrong[0] + 1]}: q must rise from line to line")
+    waves = {form.format(unit): 1.0 / size for unit, size in UNITS.items() for form in WAVE_UNITS}
+    powers = {form.format(unit, power): size**power for unit, size in UNITS.items() for form in ("{}^{}", "{}{}")}
+    return q * table.unit("q", waves), values * table.unit(kind, powers), power
 
 
-def _numbers(path: Path, number: int, cells: list[str]) -> tuple[float, float]:
-    try:
-        q, value = map(float, cells)
-        if 0.0 < q < np.inf and 0.0 < value < np.inf:
-            return q, value
-    except ValueError:
-        pass
-    raise InputError(f"{path}, line {number}: two positive numbers were expected, got {' '.join(cells)[:60]!r}")
+def _are_enough(names: set[str]) -> bool:
+    """Return True if names are those of a spectrum: q, and one of C1D and C2D."""
+    return "q" in names and len(names & POWERS.keys()) == 1
 
 
 def _over_directions(path: Path, q: Array, c1: Array, hurst: float | None) -> tuple[Array, Array]:

@@ -66,6 +66,16 @@ def find_outliers(heights: Array) -> tuple[NDArray[np.bool_], Array]:
     return np.asarray(deviation > OUTLIER * typical), around
 
 
+def is_periodic(heights: Array) -> bool:
+    """Return True if the rms jump across opposite edges of a map is at most the largest rms increment inside it, along
+    both directions."""
+    for rows in (heights, heights.T):
+        jumps = np.sqrt(np.mean((np.roll(rows, -1, axis=0) - rows) ** 2, axis=1))
+        if jumps[-1] > jumps[:-1].max(initial=0.0):
+            return False
+    return True
+
+
 def make_periodic(heights: Array) -> Array:
     """Return the map minus the smoothest map with the same jumps across its edges.
 

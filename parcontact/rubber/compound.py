@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..printed import per_cent
-from .shift import WLF, Arrhenius, Density, Factors, Shift, log_vertical
+from .shift import WLF, Arrhenius, Density, Factors, Shift, doubt_kelvin, log_vertical
 
 if TYPE_CHECKING:
     from .series import Weigh
@@ -83,7 +83,10 @@ class Compound:
                 f"{per_cent(storage)} and {per_cent(loss)}, and neighbouring points of a sweep scatter by "
                 f"{per_cent(noise)}. Check the table, or fit one of them: --weight storage, or --weight loss"
             )
-        return [*found, *self._describe_loss(), *self._describe_free(), *self._gaps(), *odd_moduli(self.measured.sets)]
+        found += [*self._describe_loss(), *self._describe_free(), *self._gaps(), *odd_moduli(self.measured.sets)]
+        given = () if self.found else (getattr(self.shift, "reference", None), *getattr(self.shift, "temperatures", ()))
+        of_table = doubt_kelvin("temperatures of the table", self.measured.temperatures)
+        return [*found, *map(str, of_table), *map(str, doubt_kelvin("temperatures of the shift", given))]
 
     def _describe_loss(self) -> Iterator[str]:
         """Yield warnings about a loss modulus that the table hardly determines, and about a body without a spring."""

@@ -1,32 +1,31 @@
 """Tables of measured moduli, converted to SI units, or refused in one sentence with file and line.
 
-Lines of a laboratory may precede the names of the columns. These have one of two forms; nothing is guessed.
+Headers, units and numbers are read by `text_tables`: two header rows, as in pyvisco's files, or units in brackets or
+behind a slash. The columns are:
 
-* Two header rows, the names and the units of the columns, as in pyvisco's files (comma, semicolon or tab between
-  them): `f, omega, t, f_set` (Hz, rad/s, s), `E_stor, E_loss, E_relax` or `G_...` (Pa, kPa, MPa, GPa), `T` (C, K),
-  `tan_del`. E(t) and G(t) are relaxation moduli, D(t) and J(t) creep compliances in tension and shear (1/MPa, ...),
-  |E*| and |G*| absolute values, and delta the phase angle (deg, rad).
-* One header row with units in brackets: `f[Hz] E'[MPa] E''[MPa] T[C]`, separated by white space or commas; or words
-  with units, `Frequency (Hz), Storage Modulus (MPa), Loss Modulus (MPa)`, separated by commas, semicolons or tabs.
+* `f, omega, t, f_set` (Hz, rad/s, s) and `T` (C, K);
+* `E_stor, E_loss, E_relax`, or E', E'', E(t), or G instead of E (Pa, kPa, MPa, GPa), or in words, Storage Modulus;
+* `tan_del`; |E*| and |G*|, absolute values, and delta, the phase angle (deg, rad);
+* D(t) and J(t), creep compliances in tension and shear (1/MPa, ...).
 
 A modulus named by words alone is Young's. With rates in rad/s, as from rheometers, and for compliances, it is taken as
-shear, with a warning. Missing moduli follow from tan delta or the phase angle. Lines that begin with # are
-comments; columns with other names are ignored. Rows of one temperature are one set; without T all rows are one set,
+shear, with a warning. Missing moduli follow from tan delta or the phase angle. Columns with other names are
+ignored. Rows of one temperature are one set; without T all rows are one set,
 and rows of one frequency at many temperatures are one set each.
 """
 
 import math
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..datafiles import has_decimal_commas, read_lines, split_cells
+from ..column_names import MODULI, TEMPERATURES
 from ..errors import InputError
+from ..text_tables import read_named_columns, unit_size
 from .sane import refuse_odd, refuse_rising
 
 Array = NDArray[np.float64]
@@ -40,24 +39,8 @@ RATES_OF = {"f", "omega"}  # one of them is needed
 RATES = {"Hz": 2 * math.pi, "rad/s": 1.0, "1/s": 1.0}
 TIMES = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 ANGLES = {"deg": math.pi / 180, "°": math.pi / 180, "degrees": math.pi / 180, "rad": 1.0}
-TEMPERATURES = {"C": 0.0, "°C": 0.0, "degC": 0.0, "deg C": 0.0, "K": -273.15}
-PRIMES = {"'": "stor", "''": "loss", '"': "loss"}  # E', E'', E"
-WORDS = {  # lower case, as instruments write them; * is an unknown letter
-    **{"frequency": "f", "f_set": "f", "angular frequency": "omega", "w": "omega", "ω": "omega", "time": "t"},
-    **{"step time": "t", "temperature": "T", "temp": "T", "temp.": "T"},
-    **{"storage modulus": "*_stor", "loss modulus": "*_loss", "relaxation modulus": "*_relax"},
-    **{"complex modulus": "*_abs", "creep compliance": "*_creep", "compliance": "*_creep"},
-    **{f"shear {word} modulus": f"G_{short}" for word, short in (("storage", "stor"), ("loss", "loss"))},
-    **{f"shear {word} modulus": f"G_{short}" for word, short in (("relaxation", "relax"), ("complex", "abs"))},
-    **{"complex shear modulus": "G_abs", "shear creep compliance": "G_creep", "tensile creep compliance": "E_creep"},
-    **{"e(t)": "E_relax", "g(t)": "G_relax", "d(t)": "E_creep", "j(t)": "G_creep"},
-    **dict.fromkeys(("tan delta", "tan(delta)", "tan_delta", "tan d", "tan δ", "tanδ", "loss factor"), "tan_del"),
-    **dict.fromkeys(("tan(δ)", "damping factor"), "tan_del"),
-    **dict.fromkeys(("delta", "δ", "phase angle", "phase", "loss angle", "phase shift angle"), "delta"),
-}
-KNOWN = {f"{letter}_{part}" for letter in "EG*" for part in ("stor", "loss", "relax", "abs", "creep")}
 OTHERS = {*RATES_OF, "t", "T", "tan_del", "delta"}
-WITH_UNIT = re.compile(r"(.+?)\s*(?:\[([^\]]*)\]|\(([^()]*)\))")  # Storage Modulus (MPa), E'[MPa]
+EXAMPLE = "f[Hz] E'[MPa] E''[MPa]"
 
 
 @dataclass(frozen=True)
@@ -117,95 +100,20 @@ class Measurement:
         return replace(self, sets=long, doubts=self.doubts + lost)
 
 
-class _Column(NamedTuple):
-    name: str
-    unit: str | None  # None in a one-row header without a unit
-
-
 def read_moduli(path: Path, poisson: float = 0.5) -> Measurement:
     """Read a table; Young's moduli are converted to shear, `G = E/(2 (1 + nu))`. Raises InputError."""
-    lines = read_lines(path, "a table of moduli")
-    columns, first = _columns(path, lines)
-    rows = np.array([_numbers(path, number, text, columns) for number, text in lines[first:]])
-    if len(rows) < LEAST_ROWS:
-        raise InputError(f"{path} has {len(rows)} rows of numbers; at least {LEAST_ROWS} were expected")
-    names = [column.name for column in columns]
-    for name in KNOWN | OTHERS:
-        if names.count(name) > 1 or (name in RATES_OF and len(RATES_OF & set(names)) > 1):
-            raise InputError(f"{path}: two columns mean the same: {name} is given twice; remove one")
-    values = {name: rows[:, k] for k, name in enumerate(names)}
-    units = {column.name: column.unit or "" for column in columns}
-    return _Table(path, values, units, [number for number, _ in lines[first:]]).measurement(poisson)
+    table = read_named_columns(path, "a table of moduli", EXAMPLE, MODULI | OTHERS, _are_enough)
+    if len(table.lines) < LEAST_ROWS:
+        raise InputError(f"{path} has {len(table.lines)} rows of numbers; at least {LEAST_ROWS} were expected")
+    if set(table.columns) >= RATES_OF:
+        raise InputError(f"{path}: two columns mean the same: f and omega; remove one")
+    values = {name: np.array(column) for name, column in table.columns.items()}
+    return _Table(path, values, dict(table.units), table.lines).measurement(poisson)
 
 
-def _columns(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[list[_Column], int]:
-    """Return the columns, and the number of lines down to the last header row: the first row that names a modulus and a
-    rate, time or temperature, else the first of all."""
-    heads = [_head(text) for _, text in lines]
-    named = (at for at, head in enumerate(heads) if (names := {each.name for each in head}) & KNOWN and names & OTHERS)
-    at = next(named, 0)
-    (number, text), head = lines[at], heads[at]
-    if any(each.unit for each in head):
-        for each in head:
-            if each.unit is None and each.name in (KNOWN | OTHERS) - {"tan_del"}:
-                cell = next(cell for cell in _cells(text) if _name(cell) == each.name)
-                raise InputError(f"{path}:{number}: {cell!r} must be a name with its unit in brackets, such as f[Hz]")
-        return head, at + 1
-    units = split_cells(lines[at + 1][1]) if len(lines) > at + 1 else []
-    units += [""] * (len(head) - len(units))
-    if not (math.isnan(_number(head[0].name)) and math.isnan(_number(units[0]))):
-        raise InputError(
-            f"{path}:{number}: names and units of the columns were expected, such as f[Hz] E'[MPa] E''[MPa], or two "
-            "rows with names and units"
-        )
-    return [_Column(each.name, unit) for each, unit in zip(head, units, strict=False)], at + 2
-
-
-def _cells(text: str) -> list[str]:
-    return split_cells(re.sub(r"\s+(?=[\[(])", "", text))
-
-
-def _head(text: str) -> list[_Column]:
-    """Return the names in a line, with the units in brackets."""
-    return [_with_unit(cell) for cell in _cells(text)]
-
-
-def _with_unit(cell: str) -> _Column:
-    match = WITH_UNIT.fullmatch(cell)
-    if match is None or _name(cell) in KNOWN | OTHERS:  # E(t), tan(delta)
-        return _Column(_name(cell), None)
-    return _Column(_name(match[1]), (match[2] or match[3] or "").strip())
-
-
-def _name(text: str) -> str:
-    """Return the name of a column in pyvisco's spelling: E' is E_stor, f_set is f; |E*| is E_abs."""
-    text = text.strip().replace("″", "''").replace("′", "'").replace("’", "'")
-    if match := re.fullmatch(r"([EG])('{1,2}|\")", text):
-        return f"{match[1]}_{PRIMES[match[2]]}"
-    if match := re.fullmatch(r"\|?([EG])\*\|?", text):
-        return f"{match[1]}_abs"
-    return WORDS.get(re.sub(r"\s+", " ", text.lower()), text)
-
-
-def _number(text: str) -> float:
-    """Return the number in a text; nan if it is not a number."""
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
-
-
-def _numbers(path: Path, number: int, text: str, columns: Sequence[_Column]) -> list[float]:
-    """Return the numbers of a row; nan in ignored columns."""
-    parts = split_cells(text)
-    if has_decimal_commas(text) and (";" in text or "\t" in text or len(parts) != len(columns)):
-        raise InputError(f"{path}:{number}: its numbers have decimal commas; write them with points")
-    if len(parts) != len(columns):
-        raise InputError(f"{path}:{number}: {len(parts)} values where {len(columns)} columns are named")
-    for part, column in zip(parts, columns, strict=True):
-        if column.name in KNOWN | OTHERS and not math.isfinite(_number(part)):
-            raise InputError(f"{path}:{number}: {column.name} must be a finite number, got {part!r}")
-    return [_number(part) for part in parts]
+def _are_enough(names: set[str]) -> bool:
+    """Return True if names are those of a table: a modulus, and a rate, time or temperature."""
+    return bool(names & MODULI and names & OTHERS)
 
 
 @dataclass
@@ -311,12 +219,7 @@ class _Table:
         return self.values[name]
 
     def _unit(self, name: str, known: dict[str, float]) -> float:
-        unit = self.units[name]
-        if unit not in known:
-            raise InputError(
-                f"{self.path}: the unit of {name} must be one of {', '.join(known)}, got {unit or 'none'!r}"
-            )
-        return known[unit]
+        return unit_size(self.path, name, self.units[name], known)
 
 
 def _sets(path: Path, at: Array, moduli: list[Array], temperatures: Array | None) -> Iterator[Set]:

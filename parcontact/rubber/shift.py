@@ -13,17 +13,20 @@ table       log10 b_T given at some temperatures, likewise
 """
 
 import math
-import re
 from bisect import bisect_left
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..datafiles import read_lines, split_cells
+from ..column_names import TEMPERATURES
+from ..doubts import Doubt
 from ..errors import InputError
+from ..text_tables import read_named_columns
 
 GAS = 8.314462618  # physics: J/(mol K)
 ENERGY = 1e3, 1e7  # physics: limits on the activation energy [J/mol]
 CONSTANT = 1e-3, 1e4  # physics: limits on C1 [-] and C2 [K] of WLF
+HOTTEST = 200.0  # physics: limit on temperatures of rubber [deg C], which decomposes beyond; 200 K is -73 C
 SHOWN = 12  # largest number of factors that are printed
 ZERO = 273.15  # physics: K at 0 deg C
 
@@ -117,9 +120,22 @@ class Factors:
 Shift = WLF | Arrhenius | Factors  # shift of relaxation times, which are given at `reference` [deg C]
 
 
+def highest_temperature(shift: Shift) -> float:
+    """Return the temperature [deg C] at which the tables of a shift end; inf for laws."""
+    tables = [law for law in (shift, shift.vertical) if isinstance(law, Factors)]
+    return min((law.temperatures[-1] for law in tables), default=math.inf)
+
+
 def log_vertical(shift: Shift, temperature: float) -> float:
     """Return log10 of b_T at a temperature [deg C], 0 without a vertical law; raises InputError outside its range."""
     return 0.0 if shift.vertical is None else shift.vertical.log_factor(temperature)
+
+
+def doubt_kelvin(place: str, temperatures: Iterable[float | None]) -> Iterator[Doubt]:
+    """Yield a warning if the highest of some temperatures [deg C] is hotter than rubber endures."""
+    highest = max((value for value in temperatures if value is not None), default=0.0)
+    if highest > HOTTEST:
+        yield Doubt("kelvin", place, {"degrees": highest, "most": HOTTEST, "celsius": round(highest - ZERO, 6)})
 
 
 def read_shift(text: str, reference: float | None) -> str | Shift:
@@ -151,27 +167,23 @@ def _within(text: str, value: float, low: float, high: float) -> float:
     return value
 
 
-NAMES = {"t": "T", "temperature": "T", "log_at": "a", "log at": "a", "log_bt": "b", "log bt": "b"}
+NAMES = {"T", "log_aT", "log_bT"}
+EXAMPLE = "T[C],log_aT or T[C],log_aT,log_bT"
 
 
 def _table(path: Path, reference: float | None) -> Factors:
     if not path.is_file():
         laws = "wlf, arrhenius, free, wlf:C1,C2, arrhenius:J/mol or a readable file"
         raise InputError(f"--shift must be {laws}: there is no file {path}")
-    rows = [split_cells(line) for _, line in read_lines(path, "a table of T[C],log_aT")]
-    heads = [re.fullmatch(r"(.*?)\s*(?:[\[(](.*)[\])])?", cell) for cell in rows[0]]
-    names = [NAMES.get(head[1].lower(), head[1]) if head else "" for head in heads]
-    in_row = len(rows) > 1 and rows[1][:1] in (["C"], ["°C"])  # as in pyvisco's files
-    unit = rows[1][0] if in_row else next((head[2] for head in heads if head), None)
-    if names not in (["T", "a"], ["T", "a", "b"]) or unit not in ("C", "°C") or len(rows) < 3 + in_row:
-        raise InputError(f"{path}: a table of T[C],log_aT, or T[C],log_aT,log_bT, with at least two rows was expected")
-    try:
-        values = sorted(tuple(float(cell) for cell in row) for row in rows[1 + in_row :])
-        temperatures, *logs = zip(*values, strict=True)
-    except ValueError:
-        raise InputError(f"{path}: each row must hold a temperature [deg C] and log10 of each factor") from None
-    if len(logs) != len(names) - 1 or not all(math.isfinite(value) for row in values for value in row):
-        raise InputError(f"{path}: each row must hold a temperature [deg C] and log10 of each factor")
+    table = read_named_columns(path, "a table of T[C],log_aT", EXAMPLE, NAMES, {"T", "log_aT"}.issubset)
+    if not {"T", "log_aT"} <= table.columns.keys() or len(table.lines) < 2:
+        raise InputError(f"{path}: a table of {EXAMPLE}, with at least two rows was expected")
+    zero = table.unit("T", TEMPERATURES)
+    for name in table.columns.keys() - {"T"}:
+        table.unit(name, {"": 1.0})
+    columns = [table.columns[name] for name in ("T", "log_aT", "log_bT") if name in table.columns]
+    rows = sorted((row[0] + zero, *row[1:]) for row in zip(*columns, strict=True))
+    temperatures, *logs = zip(*rows, strict=True)
     if len(set(temperatures)) < len(temperatures):
         raise InputError(f"{path}: a temperature has two factors")
     at = (

@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -20,7 +21,7 @@ from scipy.optimize import least_squares
 
 from .. import progress
 from ..errors import InputError
-from .measured_moduli import Measurement
+from .measured_moduli import Measurement, Set
 from .series import DENSE, ReducedData, Weigh, best_residuals, reduce_sets
 from .shift import WLF, Arrhenius, Density, Factors, Shift, log_vertical
 
@@ -35,6 +36,8 @@ ENERGIES: Ranges = ((1e4, 1e6, 40),)  # physics: J/mol
 EXPANSION = 6e-4  # physics: expansion of rubbers [1/K], 5e-4 to 7e-4
 COARSE = 3  # accuracy: times per decade of the series for first constants and warnings
 STEP = 1e-4  # accuracy: relative step of finite differences
+OVERLAP = 0.1  # accuracy: least overlap of two sweeps in a start, over the length of the shorter one
+STEPS = 25  # accuracy: shifts that are tried between two neighbouring sweeps
 ROUNDING = 1e-6  # accuracy: difference of misfits below which no law is better
 BETTER = 0.7  # accuracy: misfit with free vertical factors over that without, below which there is a warning
 
@@ -88,9 +91,11 @@ class _Search:
         return self.measured.temperatures
 
     def start(self) -> Array:
-        """Return logarithms of initial constants of the horizontal law, of WLF for free factors."""
+        """Return initial constants of the horizontal law: their logarithms, or log10 of free factors over the first."""
         if not isinstance(self.law, str):
             return np.zeros(0)
+        if self.law == "free":
+            return self._join_neighbours()
         ranges = ENERGIES if self.law == "arrhenius" else WLF_CONSTANTS
         grid = [np.array(point) for point in itertools.product(*(np.log(np.geomspace(*each)) for each in ranges))]
         first = Density(EXPANSION, self.reference)
@@ -101,6 +106,25 @@ class _Search:
                 f"{self.measured.path}: no constants of this law join the sweeps to one curve at {self.reference:g} C"
             )
         return grid[int(np.argmin(errors))]
+
+    def _join_neighbours(self) -> Array:
+        """Return log10 of a_T over that of the coldest sweep. Each sweep continues its colder neighbour, since no law
+        holds on both sides of a glass transition; sweeps that do not overlap are shifted as by WLF."""
+        steps = np.array([self._step(*pair) for pair in pairwise(self.measured.sets)])
+        if np.isnan(steps).any():
+            law = replace(self, law="wlf")
+            logs = log_factors(law.refine(law.start(), "none", COARSE).shift, self._known)[0]
+            steps = np.where(np.isnan(steps), -np.diff(logs), steps)
+        return -np.cumsum(steps)
+
+    def _step(self, cold: Set, warm: Set) -> float:
+        """Return log10 of a_T of the first sweep over that of the second for which both fit one series best;
+        NaN if they would hardly overlap."""
+        length = min(float(np.log10(each.at.max() / each.at.min())) for each in (cold, warm))
+        steps = np.linspace(0.0, (1.0 - OVERLAP) * length, STEPS)
+        pairs = (reduce_sets((cold, warm), self.measured.kind, ([s, 0.0], [0.0, 0.0]), self.weigh) for s in steps)
+        best = int(np.argmin([np.sum(best_residuals(pair, COARSE) ** 2) for pair in pairs]))
+        return float(steps[best]) if best < STEPS - 1 else math.nan
 
     def _named(self, constants: Array) -> WLF | Arrhenius:
         values = [float(value) for value in np.exp(constants)]
@@ -121,12 +145,28 @@ class _Search:
     def refine(self, start: Array, kind: Vertical, per_decade: int = DENSE) -> Superposition:
         """Return the best shift near initial constants, with a vertical law of a kind. Shifts are compared by series of
         `per_decade` times per decade."""
-        count = len(self._known) - 1
-        begin = np.concatenate([start, np.zeros(count if kind == "free" else 0)])
-        if self.law == "free":  # start from WLF with the same vertical law
-            logs = log_factors(replace(self, law="wlf").refine(start, kind, per_decade).shift, self._known)
-            begin = np.concatenate([np.array(log[1:]) - log[0] for log in logs[: 2 if kind == "free" else 1]])
-            start = begin[:count]
+        if self.law == "free" and kind == "free":
+            return self._refine_both(start, per_decade)
+        return self._refine(start, np.zeros(len(self._known) - 1 if kind == "free" else 0), kind, per_decade)
+
+    def _refine_both(self, start: Array, per_decade: int) -> Superposition:
+        """Return free factors of both kinds, from those without b_T or from WLF with b_T, whichever leaves more sweeps
+        overlapping, or else fits better."""
+        law = replace(self, law="wlf")
+        shifts = [self.refine(start, "none", per_decade).shift, law.refine(law.start(), "free", per_decade).shift]
+        logs = [[np.array(log[1:]) - log[0] for log in log_factors(shift, self._known)] for shift in shifts]
+        found = [self._refine(a, b, "free", per_decade) for a, b in logs]
+        return min(found, key=lambda each: (self._separate(each.shift), each.misfit))
+
+    def _separate(self, shift: Shift) -> int:
+        """Return how many sweeps do not overlap their warmer neighbour after a shift."""
+        sign, ends = 1.0 if self.measured.kind == "frequency" else -1.0, []
+        for each, log in zip(self.measured.sets, log_factors(shift, self._known)[0], strict=True):
+            ends.append(np.log10([each.at.min(), each.at.max()]) + sign * log)
+        return sum(bool(max(cold[0], warm[0]) > min(cold[1], warm[1])) for cold, warm in pairwise(ends))
+
+    def _refine(self, start: Array, verticals: Array, kind: Vertical, per_decade: int) -> Superposition:
+        begin = np.concatenate([start, verticals])
 
         def shift(constants: Array) -> Shift:
             return replace(

@@ -15,6 +15,7 @@ from ..history.timeline import Step, Timeline
 from ..job import Job, Stage
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
+from ..physics.entries import part_of
 from ..storage import checkpoint, marker
 from ..storage.checkpoint import Contents
 from ..storage.directory import ADVICE, Directory
@@ -146,10 +147,10 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
 
 def find_changed_step(contents: Contents, job: Job) -> str:
     """Return a message on the first completed step that differs in this job, or ''; later steps may differ."""
-    number, until = contents.step, contents.time
+    number, until, chosen = contents.step, contents.time, part_of("steps", contents.numbers)
     history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
     old, new = (
-        Timeline.from_job(each, until, ChosenSteps.from_job(each, contents.numbers))
+        Timeline.from_job(each, until, ChosenSteps.from_job(each, chosen))
         for each in (job.model_copy(update={"history": history}), job)
     )
     count = min(number, len(old), len(new))

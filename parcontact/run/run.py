@@ -7,15 +7,16 @@ from dataclasses import dataclass, replace
 
 from .. import scene
 from ..doubts import Doubt
-from ..effects.adhesion import AdhesionMemory
 from ..errors import InputError, RunError
 from ..history.chosen import reached
 from ..job import Job
+from ..job.added_sections import answers
 from ..job.checks.advice import describe_sample
 from ..job.sections.listing import plain_data
 from ..march import loop
 from ..march.failure import StepError
 from ..march.loop import March
+from ..physics.body import states_errors
 from ..scene import sanity
 from ..storage import tables
 from ..storage.checkpoint import Contents, Facts
@@ -23,7 +24,8 @@ from ..storage.console import always
 from ..storage.directory import Directory
 from ..storage.recorder import Recorder
 from ..storage.stopfile import StopFile
-from ..summary import pull_off, slide
+from ..summary import slide
+from ..summary.run_table import RunTable
 from .watch import Watch
 
 DONE, STOPPED_EARLY = 0, 3  # exit codes: success; stopped early with a good checkpoint, run again
@@ -196,28 +198,33 @@ class Run:
     def _log_summary(self) -> int:
         """Report the end of the run and its errors, and note the end in its directory; returns the exit code."""
         row, console, errors = self.march.row, self.console, self.march.state.errors
-        adhesion: AdhesionMemory | None = self.march.state.memories.get("adhesion")
         slides = any(stage.speed for stage in self.job.history)
         self._log_counts()
-        if self.slab.root and (slides or adhesion is not None) and not self.stop:
-            grid, tolerance = self.job.grid, self.job.numerics.tolerance
-            box = grid.lx * grid.ly
+        if self.slab.root and (slides or self.march.scene.law is not None) and not self.stop:
             with suppress(OSError, InputError):  # an unreadable table does not end a run
                 rows = tables.read_columns(self.directory.path / "measures.csv")
-                sentences = slide.describe_slide(self.job.history, self.job.initial, grid.dx, rows)
-                for text in (*sentences, *pull_off.describe_pull_off(rows, box, tolerance, bool(self.march.detached))):
+                table = RunTable(self.directory.path, self.job, rows, bool(self.march.detached))
+                sentences = list(slide.describe_slide(self.job.history, self.job.initial, self.job.grid.dx, rows))
+                for said in answers("results", "said_at_end"):
+                    sentences += said(table)
+                for text in sentences:
                     console.say(text)
         for line in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
             console.say(line)
         sample = describe_sample(self.job.grid, self.job.surface, slides)
         if errors.area is not None and (text := sample):
             console.say(text)
+        if not states_errors(self.march.scene.material):
+            console.say("the body has no estimate of the error by the time steps: no errors are stated")
         if "edge" in self.contacts.seen:
             console.say(
                 "no error is stated for steps whose contact reaches the edge of the box: their results are wrong"
             )
-        if adhesion is not None and adhesion.snaps:
-            console.say(f"the contact snapped in {adhesion.snaps} of the steps; no error is stated for them")
+        if "below a cell" in self.contacts.seen:
+            console.say("no error is stated for steps whose spots of contact may be smaller than a cell")
+        for name, effect in self.march.scene.effects.items():
+            for text in effect.last_lines(self.march.state.memories[name]):
+                console.say(text)
         if self.stop:
             of = f"at least {len(self.timeline)}" if self.timeline.chooses else str(len(self.timeline))
             console.say(f"stopped after step {row.step} of {of}: {self.stop}; run again to go on")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..effects.adhesive_law import end_of
+from ..effects.contact_protocol import Detached
 from ..effects.effect import columns_of
 from ..errors import InputError
 from ..history.chosen import ChosenSteps, reached
@@ -16,7 +16,7 @@ from ..march.loop import March
 from ..parallel.root import on_root
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..physics.entries import part_of
+from ..physics.entries import Saved, part_of
 from ..scene import choices, sanity
 from ..steady_sliding import start as steadystart
 from ..storage import hdf5, header, heights, read_back, step_row, wisdom
@@ -101,7 +101,7 @@ def _find_origin(
     if origin and origin.contents.step >= len(timeline):
         when = f"at t = {origin.contents.time:g} s"
         reason = f"finished before, {when} (--restart never: run it again; --until T: continue it)"
-    elif origin and (end := end_of(job, part_of("law", origin.contents.numbers))):
+    elif origin and (end := _end_of(job, part_of("law", origin.contents.numbers))):
         reason = f"detached before, at t = {end.time:g} s (--restart never: run it again)"
     elif origin and until is not None and reached(origin.contents.time, until):
         reason = f"has already reached t = {origin.contents.time:g} s, and --until {until:g} is not later"
@@ -150,3 +150,8 @@ def _open_files(
         open_ended=timeline.chooses,
     )
     return Recorder(directory, recording, facts.provenance, origin.contents if origin else None, options.quiet)
+
+
+def _end_of(job: Job, saved: Saved) -> Detached | None:
+    """Return the end of a run in the entries of its law in a checkpoint; None if it goes on."""
+    return next(filter(None, (ended(job, saved) for ended in job.asked("ended"))), None)

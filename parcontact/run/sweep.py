@@ -18,7 +18,7 @@ from ..parallel.groups import Groups
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..printed import per_cent
-from ..storage import marker, stopfile
+from ..storage import files, marker, stopfile
 from ..storage.directory import refuse_files, refuse_other_jobs
 from ..storage.stopfile import StopFile
 from ..summary import sweep_table
@@ -26,9 +26,9 @@ from . import watch
 from .run import DONE, STOPPED_EARLY
 from .sweep_warnings import SweepWarnings, name_cases
 
-FAILED = 1
+FAILED, REFUSED = 1, 2
 ELSEWHERE = -1  # in place of an exit code: another program runs the case
-ENDS = {DONE: "done", STOPPED_EARLY: "stopped early", FAILED: "failed", ELSEWHERE: "passed over"}
+ENDS = {DONE: "done", STOPPED_EARLY: "stopped early", FAILED: "failed", REFUSED: "refused", ELSEWHERE: "passed over"}
 
 Shows = Callable[[Doubt], bool]
 Act = Callable[[Job, Slab, Shows], int]
@@ -60,27 +60,30 @@ class SweepRun:
     def run(self, chosen: Sequence[Case]) -> int:
         """Run the selected cases and collect the results of all cases; returns the exit code.
 
-        A failed case does not stop the others, but gives exit code 1. Finished cases, and those that another program
-        runs, are skipped; if only such a running case is selected, InUseError is raised. A case that stops early with a
-        checkpoint stops the sweep and the cases at the same time, but no other program; so do signals, the end of the
-        wall time, and the file `stop`, which also stops other programs and is not removed. The same command continues
-        the sweep.
+        A failed case does not stop the others, but gives exit code 1; if all cases are refused as bad input, it is 2.
+        Finished cases, and those that another program runs, are skipped; if only such a running case is selected,
+        InUseError is raised. A case that stops early with a checkpoint stops the sweep and the cases at the same time,
+        but no other program; so do signals, the end of the wall time, and the file `stop`, which also stops other
+        programs and is not removed. The same command continues the sweep.
         """
         with Signals().noted() as signals:  # also on waiting ranks, whose end would end the others
-            code = self._take(_deal(chosen, self.groups), signals)
-            found = self.groups.from_all((code, self.doubts.kinds))
-        codes = [one for one, _ in found]
+            ends = self._take(_deal(chosen, self.groups), signals)
+            found = self.groups.from_all((ends, self.doubts.kinds))
+        codes = [code for ends, _ in found for code in ends]
+        refused = set(codes) == {REFUSED}
         if self.groups.root:
             self.stop.forget_own()
             for text in self.doubts.summary([kinds for _, kinds in found]):
                 print_line(f"warning: {text}", sys.stderr)
-            if STOPPED_EARLY not in codes and not self.quiet:
+            if STOPPED_EARLY not in codes and not self.quiet and not refused:
                 print_line(f"results of all cases: {sweep_table.results(_directory(self.cases))}")
-            elif self.groups.count > 1 and not self.quiet:
+            elif STOPPED_EARLY in codes and self.groups.count > 1 and not self.quiet:
                 print_line("stopped early; run again to go on")
             if self.runs and STOPPED_EARLY not in codes and len(chosen) > 1:
                 self._report_errors(chosen)
-        return STOPPED_EARLY if STOPPED_EARLY in codes else max(codes)
+        if STOPPED_EARLY in codes:
+            return STOPPED_EARLY
+        return REFUSED if refused else FAILED if {FAILED, REFUSED} & set(codes) else DONE
 
     def _report_errors(self, chosen: Sequence[Case]) -> None:
         """Print the largest estimated errors, and warn about cases whose errors exceed their accuracy; root only."""
@@ -95,27 +98,27 @@ class SweepRun:
                 more = f"the estimated error of {what} exceeds numerics.accuracy in {name_cases(beyond)}"
                 print_line(f"warning: {more}; the log of each case says how to reduce it", sys.stderr)
 
-    def _take(self, own: Sequence[Case], signals: Signals) -> int:
-        """Run the cases of this group; returns the exit code. If it stops early, the other groups stop too."""
-        code, side_by_side = DONE, self.groups.count > 1
+    def _take(self, own: Sequence[Case], signals: Signals) -> list[int]:
+        """Run the cases of this group; returns their exit codes. If it stops early, the other groups stop too."""
+        codes, side_by_side = list[int](), self.groups.count > 1
         for case in own:
             slab = Slab(self.groups.comm, *case.job.grid.points)
             speaks = slab.root and not self.quiet
             if reason := self._reason_to_stop(slab, signals):
                 if speaks:
                     print_line(f"stopped before case {case.number}: {reason}; run again to go on")
-                return self._stop_others(slab)
+                return [*codes, self._stop_others(slab)]
             if speaks:
                 print_line(f"{case} (of {len(self.cases)})")
             ended = self._attempt(case, slab, alone=not side_by_side and len(own) == 1)
-            if slab.root:
-                code = max(code, self._collect())
+            codes.append(ended)
+            if slab.root and (self.runs or ended != REFUSED) and self._collect() == FAILED:
+                codes.append(FAILED)
             if speaks and side_by_side:
                 print_line(f"case {case.number}: {ENDS[ended]}")
             if ended == STOPPED_EARLY:
-                return self._stop_others(slab)
-            code = max(code, ended)
-        return code
+                return [*codes, self._stop_others(slab)]
+        return codes
 
     def _collect(self) -> int:
         """Write the tables of the sweep; returns the exit code, FAILED if they cannot be written. Root only."""
@@ -156,7 +159,7 @@ class SweepRun:
                 print_line(f"parcontact: case {case.number} is being run by another program: {error}", sys.stderr)
             return ELSEWHERE
         except (InputError, RunError) as error:
-            code, reason = FAILED, str(error)
+            code, reason = REFUSED if isinstance(error, InputError) else FAILED, str(error)
         if slab.root and self.runs:
             sweep_table.fail(case, reason or ("some points have failed" if code == FAILED else ""))
         if slab.root and reason:
@@ -195,6 +198,7 @@ def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
     for path in (directory / CASES, *(case.job.output.directory for case in cases)):
         if path.is_symlink():
             raise InputError(f"{path} is a symbolic link, which is not followed: remove it, or give --out")
+    files.refuse_pipes(directory)
     try:
         claims = marker.read_claims(directory)
         entries = [path.name for path in directory.iterdir()] if directory.is_dir() else []
@@ -203,7 +207,7 @@ def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
     refuse_other_jobs(directory, claims, plain_job(first.job))
     for case in cases:
         there = case.job.output.directory
-        refuse_other_jobs(there, marker.read_claims(there), plain_job(case.job))
+        refuse_other_jobs(there, marker.sound_claims(there), plain_job(case.job))
     if not claims and not {CASES, sweep_table.TABLE} & set(entries):
         refuse_files(directory, entries)
 

@@ -56,14 +56,14 @@ def sentences_of(cases: Sequence[Case], doubts: Callable[[Job], Iterable[Doubt]]
 
 
 def _doubt_ranges(cases: Sequence[Case]) -> Iterator[Doubt]:
-    """Yield a warning about cases that have different ranges of adhesion although none is given."""
-    if not any(case.job.section("adhesion") for case in cases):
-        return
-    from ..effects.adhesion import chosen_range  # not needed for jobs without adhesion
-
-    reaches = {reach for case in cases if (reach := chosen_range(case.job)) is not None}
-    if len(reaches) > 1:
-        yield Doubt("range follows cells", "adhesion.range", {"least": min(reaches), "most": max(reaches)})
+    """Yield a warning about cases for which an effect chooses different lengths by the mesh."""
+    found: dict[str, set[float]] = {}
+    for case in cases:
+        for key, value in (pair for asked in case.job.asked("chosen_values") for pair in asked(case.job).items()):
+            found.setdefault(key, set()).add(value)
+    for key, values in found.items():
+        if len(values) > 1:
+            yield Doubt("range follows cells", key, {"least": min(values), "most": max(values)})
 
 
 def warn_once(cases: Sequence[Case]) -> list[Doubt]:

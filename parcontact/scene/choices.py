@@ -10,15 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ..effects.adhesion import adhesion_law
-from ..effects.effect import Decision, Effect, guarded
+from ..effects.effect import EXTRAPOLATION, SINGLE, Decision, Effect, guarded
 from ..effects.folded_branches import FoldedBranches, bounded_error, fold_branches, time_scales
 from ..effects.relaxation import feeds_back, relaxation_of, time_factor_of
 from ..history.chosen import describe_steps
 from ..history.timeline import Timeline
 from ..job import Grid, Job, Numerics, Output, Spectral, added_sections
 from ..job.sections import listing
-from ..physics.attraction import AdhesionLaw
 from ..physics.interface_friction import Shear
 from ..physics.prony import Prony
 from ..solve.precision import LOOSE, VERY_LOOSE
@@ -79,10 +77,9 @@ class Choices:
         """Bound on the pressure [Pa]; None without one."""
         return self.job.material.hardness
 
-    @cached_property
-    def adhesion(self) -> AdhesionLaw | None:
-        """Law of adhesion; None without adhesion."""
-        return adhesion_law(self.job.section("adhesion"), self.grid, self.job.material)
+    def forbidden(self, what: str) -> str:
+        """Return why an effect forbids something (`effects.effect.Effect.forbids`); '' if none does."""
+        return next((effect.forbids[what] for effect in self.effects.values() if what in effect.forbids), "")
 
     @cached_property
     def shears(self) -> tuple[Shear, ...]:
@@ -169,8 +166,8 @@ class Choices:
     @decided("extrapolated starts")
     def extrapolated_starts(self) -> Verdict:
         """The pressure before the last one, for extrapolation to the next step."""
-        if self.adhesion is not None:
-            return False, "contacts with adhesion start from the last gaps"
+        if reason := self.forbidden(EXTRAPOLATION):
+            return False, reason
         return (on := self.timeline.lasts), "stages have steps" if on else "every stage is a single solve"
 
     @decided("starts from a whole cell earlier")
@@ -212,8 +209,8 @@ class Choices:
     @decided("preconditioner in single precision")
     def mixed_precision(self) -> Verdict:
         """A preconditioner in single precision with its own transforms; it needs no further iterations."""
-        if self.adhesion is not None:
-            return False, "contacts with adhesion are solved in double precision"
+        if reason := self.forbidden(SINGLE):
+            return False, reason
         if self.numerics.precision != "double":
             return True, f"numerics.precision is {self.numerics.precision}"
         if self.numerics.tolerance < LOOSE:
@@ -225,8 +222,8 @@ class Choices:
     @decided("operator in single precision")
     def single_operator(self) -> Verdict:
         """The operator in single precision, too, with the transforms of the preconditioner."""
-        if self.adhesion is not None:
-            return False, "contacts with adhesion are solved in double precision"
+        if reason := self.forbidden(SINGLE):
+            return False, reason
         if self.numerics.precision != "mixed":
             return False, f"numerics.precision is {self.numerics.precision}"
         if self.numerics.tolerance < VERY_LOOSE:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from ..doubts import Doubt
 from ..effects.relaxation import time_factor_of
 from ..job import Flat, Grid, Job, Rough, Wave, Zener
+from ..rubber.shift import doubt_kelvin
 
 NEAR = 0.5  # accuracy: decades beyond the measured band without a warning
 
@@ -76,6 +77,8 @@ def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
     belong to a friction curve; without them the temperature of the material counts."""
     if (body := _body(job)) is None:
         return
+    if job.steady is None or tuple(temperatures) != job.steady.temperatures:  # given apart from the job
+        yield from doubt_kelvin("temperatures", temperatures)
     degrees = [value for value in temperatures or (body.temperature,) if value is not None]
     if body.temperatures is not None:
         low, high = body.temperatures

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..accuracy.observation import RunProperties, StepObservation, properties_of, resolves
 from ..doubts import Doubt
-from ..effects.adhesion_doubts import doubt_range
 from ..errors import InputError, JobError, RunError
 from ..history.timeline import Timeline
 from ..job import Job, OnOneMesh
@@ -73,9 +73,9 @@ def _check_heights(setup: Setup) -> Iterator[Doubt]:
     body, span = setup.job.body, setup.heights.span
     if body is not None and setup.roughness and "high for a layer" not in known:
         yield from layer_warnings.doubt_height(span, body.thickness)
-    law = setup.choices.adhesion
-    if law and setup.roughness and not setup.surface.shapes:
-        yield from doubt_range(law, span)
+    if setup.roughness and not setup.surface.shapes:
+        for doubt_heights in setup.job.asked("doubt_heights"):
+            yield from doubt_heights(setup.job, span)
     if setup.shortest is not None and not (seams or setup.job.origin.mesh):  # a seam has further waves
         asked, spiky = setup.choices.numerics.asked, any(doubt.kind == "outliers" for doubt in setup.remarks.doubts)
         yield from advice.doubt_measured_waves(setup.grid, setup.shortest, asked, setup.job.directions, spiky)
@@ -180,19 +180,21 @@ def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
 @dataclass
 class ContactWatch:
     """Checks of the contact of each step; each kind of warning is given once. `sticks` is True for a periodic box whose
-    contact may stick."""
+    contact may stick; `mesh` has the points of the grid."""
 
     strict: bool
     timeline: Timeline
     seen: set[str] = field(default_factory=set)
     more: str = "more grid.points"
     sticks: bool = False
+    mesh: RunProperties = field(default_factory=lambda: RunProperties(1))
 
     @classmethod
     def of(cls, job: Job, timeline: Timeline) -> "ContactWatch":
         """Return the checks of a job."""
         sticks = job.sticks and all(job.grid.cyclic)
-        return cls(job.numerics.strict, timeline, more=more_points(job.grid), sticks=sticks)
+        mesh = properties_of(job, None)
+        return cls(job.numerics.strict, timeline, more=more_points(job.grid), sticks=sticks, mesh=mesh)
 
     def check_step(self, step: int, measures: Measures) -> list[Doubt]:
         """Return warnings about a step; raises RunError if these are errors."""
@@ -201,7 +203,7 @@ class ContactWatch:
 
     def check_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
         """Return warnings about a contact, about its cells if it is `final`; raises RunError if these are errors."""
-        found = [*doubt_edge(measures, where), *(doubt_cells(measures, where, self.more) if final else ())]
+        found = [*doubt_edge(measures, where), *(doubt_cells(measures, self.mesh, where, self.more) if final else ())]
         if self.sticks and measures.contact_area == 1.0:
             found.append(Doubt("whole box sticks", "", {"where": where}))
         new = [doubt for doubt in found if doubt.kind not in self.seen]
@@ -217,9 +219,13 @@ def doubt_edge(measures: Measures, where: str) -> Iterator[Doubt]:
         yield Doubt("edge", "", {"where": where})
 
 
-def doubt_cells(measures: Measures, where: str, more: str) -> Iterator[Doubt]:
-    """Yield a warning about contacts that consist mainly of edge cells; `more` states how to refine them."""
-    area = measures.contact_area
+def doubt_cells(measures: Measures, mesh: RunProperties, where: str, more: str) -> Iterator[Doubt]:
+    """Yield a warning about contacts that consist mainly of edge cells, or of parts of a cell; `more` states how to
+    refine them."""
+    area, corrected = measures.contact_area, measures.contact_area_corrected
+    if not resolves(mesh, StepObservation(0.0, 0.0, area, corrected, spared=measures.spared)):
+        yield Doubt("below a cell", "", {"where": where, "more": more})
+        return
     excess = 1.0 - measures.contact_area_corrected / area if area > 0.0 else 0.0
     if excess > FEW_CELLS:
         yield Doubt("cells", "", {"where": where, "excess": excess, "most": FEW_CELLS, "more": more})

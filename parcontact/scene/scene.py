@@ -14,14 +14,15 @@ import numpy as np
 from ..accuracy.controller import Controller
 from ..effects import contact_law
 from ..effects.contact_protocol import ContactLaw
-from ..effects.effect import Effect, Memories
+from ..effects.effect import TOLERANCES, Effect, Memories
 from ..effects.folded_branches import FoldedBranches, describe_folded_branches
+from ..errors import InputError
 from ..history.chosen import describe_steps
 from ..job import Grid, Job
 from ..job.added_sections import is_ours
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
-from ..physics.body import Body, ElasticBody, ZenerBody
+from ..physics.body import Body, ElasticBody, ZenerBody, states_errors
 from ..physics.energy import AppliedInverse, ElasticEnergy, ElasticPressure, ZenerEnergy
 from ..physics.halfspace import HalfSpace
 from ..physics.layer import Layer
@@ -167,8 +168,8 @@ class Scene:
     def controller(self) -> Controller:
         """Controller of the tolerance of solves and of the length of steps."""
         choices = self.choices
-        energies, adhesive = self.energy is not None, choices.adhesion is not None
-        return Controller(self.job, choices.timeline, self.material, energies, adhesive)
+        energies, exact = self.energy is not None, bool(choices.forbidden(TOLERANCES))
+        return Controller(self.job, choices.timeline, self.material, energies, exact)
 
     @cached_property
     def in_double(self) -> tuple[ContactSolver, Operators]:
@@ -224,6 +225,11 @@ def build_on(setup: Setup) -> Scene:
     inverse = AppliedInverse(operators.preconditioner, lambda: solver.workspace.other_displacement)
     tally.purpose = "heights"
     material, energy = _body_and_energy(setup, folded, inverse)
+    if chosen.timeline.chooses and not states_errors(material):
+        raise InputError(
+            "the body states no error by its steps, by which stages could choose them: give time_step or "
+            "cells_per_step in each stage with a duration"
+        )
     scene = Scene(setup, _motion(setup), folded, material, solver, operators, setup.probe(), energy)
     for name, effect in chosen.effects.items():
         if setup.slab.only_counts and not is_ours(name):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ..accuracy.budget import ErrorBudget
 from ..accuracy.constants import FLASH
-from ..physics.flash import Flash
+from ..effects.heat.flash import Flash
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate
 
@@ -48,8 +48,14 @@ class Point:
 
     @property
     def error_friction(self) -> float:
-        """Relative error of friction, 1 or more if friction is smaller than its error; NaN without friction."""
-        return self.errors.friction.of_friction if self.errors.friction else math.nan
+        """Relative error of friction, 1 or more if friction is smaller than its error; NaN without friction, and if
+        spots may be smaller than a cell."""
+        return self.errors.friction.of_friction if self.errors.friction and self.errors.resolved else math.nan
+
+    @property
+    def error_area(self) -> float:
+        """Relative error of the corrected area; NaN if spots may be smaller than a cell."""
+        return self.errors.area.total if self.errors.resolved else math.nan
 
     @property
     def error_flash(self) -> float:

@@ -11,12 +11,13 @@ import numpy as np
 from ..accuracy.budget import ErrorBudget, estimate_steady
 from ..accuracy.observation import RunProperties, StepObservation, properties_of
 from ..doubts import Doubt
-from ..effects.relaxation import temperature_of
+from ..effects.heat.flash import Flash
+from ..effects.heat.heating import Feedback, describe_cold_state, find_temperatures
+from ..effects.relaxation import highest_temperature_of, temperature_of
 from ..errors import InputError, RunError
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution
-from ..physics.flash import Flash
 from ..physics.measures import Measures
 from ..scene import Setup, choices, sanity
 from ..solve import kernels, nested
@@ -27,7 +28,6 @@ from ..solve.nonsymmetric.proximal import Proximal
 from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
 from ..solve.precision import reachable_certificate
 from ..solve.preconditioner.extension import pairs_for
-from .heating import Feedback, find_temperatures
 from .losses import branch_powers
 from .point import Point
 from .stiffness import loses_most, soft_stripes, stiffer_lines
@@ -102,16 +102,18 @@ class SteadySliding:
             return self._solve(velocity, pressure)
 
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
+        highest, speed = highest_temperature_of(self.setup.job.material), math.hypot(*velocity)
 
         def warmed(rise: float) -> Point:
             try:
-                self._set_material(cold + rise)
+                self._set_material(min(cold + rise, highest))
             except InputError as error:
-                raise RunError(f"the flash temperature is outside the range of the material's shift: {error}") from None
+                place = describe_cold_state(speed, pressure, cold)
+                raise RunError(f"{place}: no material at the flash temperature: {error}") from None
             return self._solve(velocity, pressure)
 
         tolerance = self.setup.choices.numerics.tolerance
-        return self._feedback.solve_fixed_point(warmed, math.hypot(*velocity), (pressure, cold), tolerance)
+        return self._feedback.solve_fixed_point(warmed, speed, (pressure, cold), tolerance, highest - cold)
 
     def _solve(self, velocity: Vector, pressure: float) -> Point:
         """Return the steady state at the temperature that was set."""

@@ -48,7 +48,7 @@ def _from_steady_sliding(setup: Setup) -> March:
         measures=point.measures,
         iterations=iterations,
         certificate=point.certificate,
-        errors=point.errors,
+        errors=point.errors if point.errors.resolved else None,
         operator_calls=round(point.operator_calls),
         seconds=point.seconds,
     )

@@ -9,6 +9,7 @@ from .. import progress
 from ..accuracy.budget import advice, describe, exceeds
 from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
 from ..doubts import Doubt
+from ..effects.heat.heating import describe_hot, describe_unmeasured
 from ..job import Job
 from ..job.checks.advice import describe_sample
 from ..job.sections.materials import describe_temperature
@@ -18,7 +19,6 @@ from ..storage import curve_points, files, tables
 from ..storage.console import Console, always
 from ..storage.curve_points import LOG, Wanted
 from ..storage.tables import GrowingTable
-from .heating import describe_hot, describe_unmeasured
 from .point import Point
 
 WAVES = ("steady_waves.csv", names_of(STEADY_WAVES))  # an additional table
@@ -131,7 +131,7 @@ class CurveTable:
         self._file.append(cells(float(column.value(point)) for column in self._columns))
         self._points.append(point)
         self.say(
-            f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area_corrected:9.5f} {_percent(point.errors.area.total)} "
+            f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area_corrected:9.5f} {_percent(point.error_area)} "
             f"{point.friction:9.6f} "
             f"{_percent(point.error_friction)} {point.operator_calls:6.0f} "
             f"{point.certificate.worst:9.2e}{f' {point.temperature:7g}' if self.heated else ''}"
@@ -185,8 +185,9 @@ def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[Earlier
     """Yield warnings about friction and the corrected area of points whose error exceeds the accuracy of the job, also
     of `earlier` ones, for which the parts of the error are not known."""
     chosen = ["solver"] * ("tolerance" in job.numerics.chosen) + ["mesh"] * bool(job.origin.mesh)
-    friction = [(point, point.errors.friction) for point in points if point.errors.friction is not None]
-    area = [(point, point.errors.area) for point in points]
+    known = [point for point in points if point.errors.resolved]
+    friction = [(point, point.errors.friction) for point in known if point.errors.friction is not None]
+    area = [(point, point.errors.area) for point in known]
     names = ("friction", "the corrected contact area")
     for column, (name, each) in enumerate(zip(names, (friction, area), strict=True)):
         accuracy = job.numerics.asked.both[column]

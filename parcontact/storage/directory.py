@@ -193,6 +193,7 @@ class Directory:
 
     def _lock_and_read(self) -> None:
         self._made = [path for path in (self.path, *self.path.parents) if not path.exists()]
+        files.refuse_pipes(self.path)
         self._take_lock()
         try:
             self.claims = marker.read_claims(self.path)

@@ -4,6 +4,7 @@ import errno
 import os
 import re
 import secrets
+import stat
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -11,6 +12,9 @@ from io import FileIO
 from pathlib import Path
 from typing import BinaryIO
 
+from ..errors import InputError
+
+PLACES = ("*", "checkpoint/*", "cases/*/*", "cases/*/checkpoint/*")  # of files in an output directory
 MARK = "made by the program parcontact"  # mark in the metadata of pages and pictures
 
 
@@ -54,6 +58,15 @@ def open_to_append(path: Path) -> FileIO:
     return FileIO(handle, "ab")
 
 
+def refuse_pipes(path: Path) -> None:
+    """Raise InputError if a path, or a file in an output directory or in one of its cases, is a pipe or a device:
+    reading it might never end."""
+    for one in (path, *(found for pattern in PLACES for found in path.glob(pattern))):
+        with suppress(OSError):
+            if (mode := one.stat().st_mode) and (stat.S_ISFIFO(mode) or stat.S_ISCHR(mode) or stat.S_ISBLK(mode)):
+                raise InputError(f"{one} is a device or a pipe, which is not read: move it away")
+
+
 def replace_file(path: Path, text: str) -> None:
     """Replace a file by a text, in UTF-8."""
     with replaced(path) as file:
@@ -66,7 +79,12 @@ def is_marked(path: Path) -> bool:
 
 
 def make_room(path: Path, is_ours: Callable[[Path], bool]) -> None:
-    """Rename an existing file with a warning, unless it is a regular file of this program."""
+    """Rename an existing file with a warning, unless it is a regular file of this program.
+
+    Raises PermissionError for a device or a pipe, such as /dev/null, which others use.
+    """
+    if os.path.lexists(path) and not (path.is_symlink() or path.is_file() or path.is_dir()):
+        raise PermissionError(errno.EPERM, "it is a device or a pipe, which is not replaced", str(path))
     with suppress(OSError):
         if path.is_file() and not path.is_symlink() and is_ours(path):
             return

@@ -19,6 +19,7 @@ from ..errors import InputError, RunError
 from ..parallel import root
 from ..parallel.mpi import MPI
 from ..parallel.slab import Array, Slab
+from .files import without_mark
 
 T = TypeVar("T")
 MPI_IO = h5py.get_config().mpi  # else ranks act in turn
@@ -123,7 +124,9 @@ def reason(error: BaseException) -> str:
     if "file signature not found" in text:
         return "it is not an HDF5 file, or incomplete"
     if isinstance(error, OSError) and error.strerror and error.errno:
-        return TOO_LARGE if error.errno == errno.EFBIG else os.strerror(error.errno)
+        return (
+            TOO_LARGE if error.errno == errno.EFBIG else error.strerror if error.filename else os.strerror(error.errno)
+        )
     return text.splitlines()[0] if text else type(error).__name__
 
 
@@ -213,7 +216,7 @@ def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], size: in
             path.unlink(missing_ok=True)
             raise
 
-    write_on_root(slab, make, f"cannot create {path}")
+    write_on_root(slab, make, f"cannot create {without_mark(path)}")
 
 
 def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:

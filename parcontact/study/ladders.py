@@ -8,12 +8,15 @@ sliding stages.
 """
 
 import itertools
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
 
-from ..effects.adhesion import chosen_range
 from ..errors import InputError
-from ..job import AUTO, GeometricStep, Job, OnOneMesh, Stage
+from ..job import AUTO, GeometricStep, Job, Stage
 from ..job.checks.cells import one_cell
+
+MakeJob = Callable[[Sequence[str]], Job]  # returns the job changed by overrides
 
 
 @dataclass(frozen=True)
@@ -75,17 +78,10 @@ def _cells_of_time_steps(job: Job) -> float:
 
 
 def ladders(job: Job) -> Ladders:
-    """Return the ladders of a job's study. Raises InputError without ladders, or if its surface has one mesh only."""
+    """Return the ladders of a job's study. Raises InputError without ladders."""
     study, numerics = job.study, job.numerics
     if study is None:
         raise InputError("no ladders: add a study section to the job, like study: {mesh: [256, 512, 1024]}")
-    if not job.history:
-        raise InputError("a study compares histories: the job needs a history")
-    if len(study.mesh) > 0 and any(isinstance(shape, OnOneMesh) for shape in job.surface):
-        raise InputError("study.mesh: the heights of a file are given on one mesh; leave this ladder out")
-    for mesh in study.mesh:
-        if job.grid.ny > 1 and mesh * job.grid.ny % job.grid.nx:
-            raise InputError(f"study.mesh: {mesh} points along x give no whole number along y in this box")
     own = next((stage.cells_per_step for stage in job.history if stage.cells_per_step is not None), None)
     if own is None and not _sliding(job):
         own = _cells_of_time_steps(job)
@@ -105,7 +101,7 @@ def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
     words = [f"grid.points=[{case.mesh}, {ny}]", "output.fields=[]", "output.every=1", "output.energy=false"]
     words += ["output.branch_dissipation=false", f"numerics.integrator={case.integrator}"]
     words.append(f"numerics.tolerance={job.numerics.tolerance!r}")  # the job's tolerance, also if the accuracy chose it
-    words += [f"adhesion.range={reach!r}"] if (reach := chosen_range(job)) is not None else []
+    words += [f"{key}={value!r}" for key, value in _chosen_values(job)]
     factor = case.time_step / own.time_step
     replaced = _sliding(job) if job.study and job.study.cells_per_step else []
     for index, stage in enumerate(job.history):
@@ -123,17 +119,32 @@ def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
     return words
 
 
+def make_jobs(job: Job, refined: Ladders, make: MakeJob) -> dict[Settings, Job]:
+    """Return the jobs of all cases of a study. Raises InputError with the mistakes of the first case that has any."""
+    jobs = dict[Settings, Job]()
+    for case in refined.combine():
+        try:
+            jobs[case] = make(overrides(job, refined.own, case))
+        except InputError as error:
+            said = re.sub(r"(?m)^--set [^:]*: ", "", str(error))
+            raise InputError(f"study, case {case}: {said}") from error
+    return jobs
+
+
 def _sliding(job: Job) -> list[Stage]:
     """Return the sliding stages that choose their steps."""
     return [stage for stage in job.history if stage.chooses and stage.speed]
 
 
+def _chosen_values(job: Job) -> list[tuple[str, float]]:
+    """Return the lengths [m] that effects choose by the mesh of the job, with their keys."""
+    return [pair for asked in job.asked("chosen_values") for pair in asked(job).items()]
+
+
 def describe_choices(job: Job) -> list[str]:
     """Return sentences on the settings that are equal, or chosen for the accuracy, in every case."""
-    lines, reach = list[str](), chosen_range(job)
-    if reach is not None:
-        own = f"{job.grid.nx} x {job.grid.ny} points, the job's own mesh"
-        lines.append(f"adhesion.range: {reach:.4g} m in every case, chosen by auto for {own}")
+    own = f"{job.grid.nx} x {job.grid.ny} points, the job's own mesh"
+    lines = [f"{key}: {value:.4g} m in every case, chosen by auto for {own}" for key, value in _chosen_values(job)]
     refined = _sliding(job) if job.study and job.study.cells_per_step else []
     if stages := [stage.name for stage in job.history if stage.chooses and stage not in refined]:
         bound = f"numerics.accuracy = {job.numerics.asked.of_steps:g}"

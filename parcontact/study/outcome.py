@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..columns import STUDY, names_of, to_csv
+from ..errors import InputError
 from ..job import AUTO, Job
 from ..march import loop
 from ..march.loop import March
@@ -104,14 +105,18 @@ def transform_work(counted: Tally) -> float:
 
 
 def read_outcomes(path: Path, wanted: Mapping[Settings, str]) -> dict[Settings, Outcome]:
-    """Return the outcomes of wanted cases from an existing table, if the fingerprints of their jobs agree."""
+    """Return the outcomes of wanted cases from an existing table, if the fingerprints of their jobs agree. Raises
+    InputError for a file that is no table."""
     found = {}
-    with contextlib.suppress(FileNotFoundError), path.open(newline="") as file:
-        for row in csv.DictReader(line for line in file if line.endswith("\n")):
-            if set(row) == set(COLUMNS) and None not in row.values():
-                settings = Settings(**{name: _value(name, row[name]) for name in SETTINGS})
-                if wanted.get(settings) == row["fingerprint"]:
-                    found[settings] = Outcome(**{name: _value(name, row[name]) for name in RESULTS})
+    try:
+        with contextlib.suppress(FileNotFoundError), path.open(newline="", encoding="utf-8") as file:
+            for row in csv.DictReader(line for line in file if line.endswith("\n")):
+                if set(row) == set(COLUMNS) and None not in row.values():
+                    settings = Settings(**{name: _value(name, row[name]) for name in SETTINGS})
+                    if wanted.get(settings) == row["fingerprint"]:
+                        found[settings] = Outcome(**{name: _value(name, row[name]) for name in RESULTS})
+    except (ValueError, csv.Error) as error:
+        raise InputError(f"{path} cannot be read: {error}; correct it, or move it away") from error
     return found
 
 

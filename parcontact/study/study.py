@@ -13,11 +13,10 @@ from ..plotting import study_pictures as study_plots
 from ..storage import files, marker, stopfile
 from ..storage.directory import Directory
 from . import outcome, verdict
-from .ladders import Ladders, Settings, describe_choices, ladders, overrides
+from .ladders import Ladders, MakeJob, Settings, describe_choices, ladders, make_jobs
 from .outcome import Outcome, read_outcomes, write_outcomes
 
 DONE, AGAIN = 0, 3  # exit codes
-MakeJob = Callable[[Sequence[str]], Job]
 
 
 def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
@@ -26,7 +25,7 @@ def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
     All jobs are read before the first case runs. After a stop the same command continues with the missing cases.
     """
     refined = ladders(job)
-    jobs = {case: make(overrides(job, refined.own, case)) for case in refined.combine()}
+    jobs = make_jobs(job, refined, make)
     directory = Directory(job.output.directory, slab, "study")
     with Signals().noted() as signals, directory.claimed():
         plain = plain_job(job) if slab.root else {}

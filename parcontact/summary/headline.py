@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from ..job import Job
+from ..job.added_sections import answers
 from ..job.resolved import RESOLVED, shown_job
 from ..printed import quantity, with_error
 from ..storage import marker, read_back
-from . import leak_stop, pull_off, slide, sweep_table
+from . import slide, sweep_table
+from .run_table import RunTable, find_telling_row
 
-SWEPT = (  # results of a sweep in order of preference: column, words, unit, column of the error
-    ("pull_off", "the pull-off force", "N", "pull_off_error"),
+SWEPT = (  # results of a sweep, after those of capabilities: column, words, unit, column of the error
     ("mu_dyn", "the mean friction", "", "mu_dyn_error"),
     ("friction", "friction", "", slide.ERRORS[0]),
     (slide.CORRECTED, "the contact area over the nominal area", "", slide.ERRORS[1]),
@@ -29,7 +30,7 @@ def find_headline(directory: Path) -> str:
 
 
 def _run(directory: Path) -> str:
-    """Return friction, pull-off force, leakage and contact area of a run, as far as its job determines them."""
+    """Return friction, results of capabilities and contact area of a run, as far as its job determines them."""
     if not (directory / RESOLVED).is_file():
         return ""
     job = shown_job(directory / RESOLVED)
@@ -37,8 +38,10 @@ def _run(directory: Path) -> str:
     if not columns["time"]:
         return ""
     detached = bool(marker.detached(directory))
-    parts = [*_friction(job, columns), *_pull_off(job, columns, detached), *_leakage(directory, columns)]
-    return _to_sentence([*parts, _area(job, columns, detached)])
+    run, parts = RunTable(directory, job, columns, detached), [*_friction(job, columns)]
+    for headline in answers("results", "headline"):
+        parts += headline(run)
+    return _to_sentence([*parts, _area(job, run)])
 
 
 def _friction(job: Job, columns: Columns) -> Iterator[str]:
@@ -50,43 +53,16 @@ def _friction(job: Job, columns: Columns) -> Iterator[str]:
     yield f"the mean friction is {mean} and the highest {peak}"
 
 
-def _pull_off(job: Job, columns: Columns, detached: bool) -> Iterator[str]:
-    """Yield the force of the last pull-off and its error, where that is known."""
-    lost = [pull for pull in pull_off.find(columns, detached) if pull.lost is not None]
-    if lost:
-        box = job.grid.lx * job.grid.ly
-        force, within = -lost[-1].pressure * box, lost[-1].error(job.numerics.tolerance) * box
-        known = "" if math.isnan(within) else f" ± {quantity(within, 'N', 2)}"
-        yield f"the pull-off force is {quantity(force, 'N', 4)}{known}"
-
-
-def _leakage(directory: Path, columns: Columns) -> Iterator[str]:
-    """Yield the last conductivities, from `leak.csv` with their errors, else from the run."""
-    table = directory / "leak.csv"
-    columns = read_back.read_results(table) if table.is_file() else columns
-    stops = [text for text in leak_stop.describe_leak_stop(directory) if " between " in text]
-    known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
-    if known:
-        row = known[-1]
-        closed = [axis for axis in "xy" if not columns[f"flow_{axis}"][row]]
-        flows = [_flow(columns, row, axis) for axis in "xy" if axis not in closed]
-        yield from [f"the conductivity of the gap is {' and '.join(flows)}"] * bool(flows)
-        yield from [f"contact closes the gap along {' and '.join(closed)}"] * bool(closed)
-        yield from stops
-
-
-def _flow(columns: Columns, row: int, axis: str) -> str:
-    flow, error = columns[f"flow_{axis}"][row], _error(columns, f"error_{axis}", row)
-    return f"{with_error(flow, flow * error)} m³ along {axis}"
-
-
-def _area(job: Job, columns: Columns, detached: bool) -> str:
+def _area(job: Job, run: RunTable) -> str:
     """Return the mean contact area of the slide; without a slide the area in the row chosen by
-    `pull_off.choose_row`."""
+    `run_table.find_telling_row`."""
+    columns = run.columns
     if (found := slide.measure_slide(job.history, columns)) is not None:
+        if math.isnan(found.contact_area):
+            return "the box cuts the contact off in the whole slide"
         error = slide.absolute_errors(job.history, columns, job.grid.dx).get("contact_area", math.nan)
         return f"the mean contact area is {_size(job, found.contact_area_corrected, error)}"
-    row = pull_off.choose_row(columns, detached)
+    row = find_telling_row(run)
     area, when = columns[slide.CORRECTED][row], ""
     if len(columns["time"]) > 1:
         time = f"t = {quantity(columns['time'][row], 's', 4)}" if columns["time"][-1] else ""
@@ -122,9 +98,9 @@ def _curve(directory: Path) -> str:
 
 
 def _sweep(directory: Path) -> str:
-    """Return a sentence on the range of the first result of `SWEPT` that the cases have; '' without any."""
+    """Return a sentence on the range of the first of the results that the cases have; '' without any."""
     rows = sweep_table.read_cases(sweep_table.results(directory))
-    for name, words, unit, error in SWEPT:
+    for name, words, unit, error in (*(one for some in answers("results", "SWEPT") for one in some), *SWEPT):
         known = sorted((row for row in rows if math.isfinite(row.get(name, math.nan))), key=itemgetter(name))
         if known and known[-1][name]:
             ends = [f"{_with_unit(row, name, unit, error)} (case {row['case']:g})" for row in (known[0], known[-1])]

@@ -12,8 +12,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import capabilities
 from ..errors import InputError
 from ..job import Job
+from ..job.added_sections import answers
 from ..job.resolved import RESOLVED, shown_job
 from ..parallel.slab import Slab
 from ..printed import quantity
@@ -21,7 +23,8 @@ from ..storage import checkpoint, curve_points, fields, hdf5, marker, read_back
 from ..storage.console import meshes_of, warnings_of
 from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
-from . import leak_stop, pull_off, slide, sweep_table, theory_comparison, theory_settings
+from . import slide, sweep_table, theory_comparison, theory_settings
+from .run_table import RunTable
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
 SHOWN = 20  # tuning: most numbers of one name, or failed cases, that are shown
@@ -167,12 +170,9 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield f"  last row: {', '.join(last)}"
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.3g} s"
     if job is not None:
-        box = job.grid.lx * job.grid.ly
         yield from (f"  {text}" for text in slide.describe_slide(job.history, job.initial, job.grid.dx, columns))
-        yield from (
-            f"  {text}" for text in pull_off.describe_pull_off(columns, box, job.numerics.tolerance, bool(detachment))
-        )
-    yield from (f"  {text}" for text in leak_stop.describe_leak_stop(table.parent))
+    run = RunTable(table.parent, job, columns, bool(detachment))
+    yield from (f"  {text}" for sentences in answers("results", "sentences") for text in sentences(run))
 
 
 def _slides(job: Job | None) -> bool:
@@ -228,10 +228,6 @@ def _saved_maps(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield f"  fields: {', '.join(layout.names)} at {saved} of {layout.times.size} instants"
 
 
-def _leakage(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    yield f"  leakage: {len(read_back.read_results(path)['time'])} instants in leak.csv"
-
-
 def _sweep(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
     rows = sweep_table.read_cases(path)
     states = Counter(str(row["state"]) for row in rows)
@@ -247,15 +243,14 @@ def _study(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield "  study: errors and costs of settings are in study.txt"
 
 
-PARTS: dict[
-    str, Callable[[Path, dict[str, Claim]], Iterator[str]]
-] = {  # descriptions of the parts of an output directory, by their file
+Describe = Callable[[Path, dict[str, Claim]], Iterator[str]]
+PARTS: dict[str, Describe] = {  # descriptions of the parts of an output directory, by their file
     "measures.csv": _run,
     theory_settings.TABLE: _theory,
     "steady.csv": _curve,
     "checkpoint": _saved_states,
     "fields.h5": _saved_maps,
-    "leak.csv": _leakage,
+    **{name: part for parts in capabilities.offers("results", "PARTS") for name, part in parts.items()},
     sweep_table.TABLE: _sweep,
     "study.txt": _study,
 }

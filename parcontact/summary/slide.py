@@ -2,7 +2,8 @@
 
 The slide of a history is its last part at one non-zero velocity, over all stages with it. As in the paper (Sec. 3.1),
 mu_max is the highest friction of the slide, and mu_dyn the mean over the last three quarters of its distance. Steady
-sliding may need a longer slide (`parcontact steady` solves it directly).
+sliding may need a longer slide (`parcontact steady` solves it directly). Rows in which the box cuts the contact off do
+not count. Without them the slide is not whole, so that no errors are known.
 """
 
 import math
@@ -21,12 +22,14 @@ DYNAMIC = 0.75  # physics: share of the distance, counted from its end, over whi
 SAME_INSTANT = 1e-9  # rounding: relative difference below which instants are the same
 CORRECTED = "contact_area_corrected"
 ERRORS = ("error_friction", "error_area")  # columns of the error budget of each row
+CUT_OFF = "cut_off"
 
 
 class Slide(NamedTuple):
     """`mu_max` and its distance [m] from the start of the slide; means over the last three quarters of the slide.
 
-    Friction is NaN if it is undefined (steps without load), the corrected area if it is unknown.
+    Friction is NaN if it is undefined (steps without load), the corrected area if it is unknown, and all of them if the
+    box cuts the contact off from the start.
     """
 
     mu_max: float
@@ -51,7 +54,10 @@ def measure_slide(history: Sequence[Stage], columns: Mapping[str, Sequence[float
 
     None if nothing slides, or has slid yet.
     """
-    rows = _during(history, np.asarray(columns["time"], float))
+    every = _during(history, columns)
+    rows = _inside(columns, every)
+    if rows.size < min(every.size, 2):
+        return Slide(*[math.nan] * len(Slide._fields))
     unknown = [math.nan] * len(columns["time"])
     series = columns["distance"], columns["friction"], columns["contact_area"], columns.get(CORRECTED, unknown)
     distance, friction, *areas = (np.asarray(each)[rows] for each in series)
@@ -83,7 +89,7 @@ def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[flo
     """Return the known absolute errors of mu_max, mu_dyn and the corrected contact area of a slide; `cell` is the
     spacing of the grid along x [m]."""
     known, slid = slide_errors(history, columns), measure_slide(history, columns)
-    rows, found = _during(history, np.asarray(columns["time"], float)), dict[str, float]()
+    rows, found = _during(history, columns), dict[str, float]()
     if slid is None:
         return {}
     if not math.isnan(known.get(ERRORS[0], math.nan) + slid.mu_dyn):
@@ -97,9 +103,9 @@ def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[flo
 def slide_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
     """Return the largest relative errors of friction and contact area in the rows of the slide, or in the last row
     without a slide, by existing columns; NaN if unknown."""
-    rows = (
-        _during(history, np.asarray(columns["time"], float))[1:].tolist() if measure_slide(history, columns) else [-1]
-    )
+    rows = _during(history, columns)[1:].tolist() if measure_slide(history, columns) else [-1]
+    if _cuts(columns, rows):
+        return {name: math.nan for name in ERRORS if name in columns}
     return {name: largest(columns[name][row] for row in rows) for name in ERRORS if name in columns}
 
 
@@ -109,7 +115,9 @@ def mean_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]
     unknown."""
     if measure_slide(history, columns) is None:
         return {ERRORS[1]: columns[ERRORS[1]][-1]} if ERRORS[1] in columns else {}
-    rows, found = _during(history, np.asarray(columns["time"], float)), dict[str, float]()
+    rows, found = _during(history, columns), dict[str, float]()
+    if _cuts(columns, rows):
+        return dict.fromkeys(ERRORS, math.nan)
     far, friction = np.diff(np.asarray(columns["distance"], float)[rows]), np.asarray(columns["friction"], float)
     for name, weight in zip(ERRORS, (friction, np.ones(friction.size)), strict=True):
         error = np.asarray(columns.get(name, np.full(weight.size, np.nan)), float)[rows[1:]]
@@ -142,7 +150,7 @@ def _highest(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cel
     at = int(np.argmax(friction[1:])) + 1
     error = float(columns[ERRORS[0]][rows[at]]) * friction[at] if ERRORS[0] in columns else math.nan
     wave = ripple(np.asarray(columns["distance"], float)[rows], friction, at, cell)
-    return float(friction[at]), wave + (0.0 if math.isnan(error) else float(error)), wave
+    return float(friction[at]), wave + float(error), wave
 
 
 def _mean(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str, error: str) -> tuple[float, float]:
@@ -168,7 +176,16 @@ def describe_slide(
     if not_begun:
         ends_with = _slide(so_far).stop - 1
         yield f"the last slide has not begun; these numbers are of the previous one, ending with history.{ends_with}"
-    rows = _during(so_far, np.asarray(columns["time"], float))
+    every = _during(so_far, columns)
+    rows = _inside(columns, every)
+    if cut := every.size - rows.size:
+        yield (
+            f"in {cut} of {every.size} rows of the slide the contact is cut off by the edge of the box: they do not "
+            "count below, and no error is known"
+        )
+        columns = {name: column for name, column in columns.items() if name not in ERRORS}
+    if math.isnan(found.contact_area):
+        return
     yield from (
         _describe_friction(found, cell, columns, rows)
         if found.mu_dyn == found.mu_dyn
@@ -201,6 +218,7 @@ def _describe_friction(
     late = ", in its last tenth: friction may still rise" if found.mu_max_distance > LATE * way else ""
     after = f"{quantity(found.mu_max_distance, 'm')} after its start{late}"
     mu_max, error, wave = _highest(columns, rows, cell)
+    error = wave if math.isnan(error) else error
     rippled = f" ({wave:.2g} of it a ripple with the period of a cell)" if wave > 0.1 * error else ""
     yield f"mu_max, the highest friction of the slide, is {with_error(mu_max, error)}{rippled}, {after}"
     length, dynamic = quantity(way, "m"), with_error(*_mean(columns, rows, "friction", ERRORS[0]))
@@ -266,8 +284,19 @@ def _slide(history: Sequence[Stage]) -> range:
     return range(min(same, default=0), last + 1)
 
 
-def _during(history: Sequence[Stage], time: NDArray[np.float64]) -> NDArray[np.intp]:
+def _inside(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the rows in which the box does not cut the contact off."""
+    return rows[np.asarray(columns[CUT_OFF], float)[rows] != 1.0] if CUT_OFF in columns else rows
+
+
+def _cuts(columns: Mapping[str, Sequence[float]], rows: Sequence[int] | NDArray[np.intp]) -> bool:
+    """Return True if the box cuts the contact off in one of the rows."""
+    return CUT_OFF in columns and any(columns[CUT_OFF][row] == 1.0 for row in rows)
+
+
+def _during(history: Sequence[Stage], columns: Mapping[str, Sequence[float]]) -> NDArray[np.intp]:
     """Return the rows of the slide, from the last row before it to its end."""
+    time = np.asarray(columns["time"], float)
     ends = np.cumsum([0.0, *(stage.seconds for stage in history)])
     slide = _slide(history)
     if not slide:

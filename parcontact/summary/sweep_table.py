@@ -17,9 +17,11 @@ from ..columns import SWEEP, SWEEP_RESULTS, added_names, choose_columns, names_o
 from ..errors import InputError
 from ..history.timeline import Timeline
 from ..job import Case, Steady
+from ..job.added_sections import answers
 from ..job.reading import CASES
 from ..storage import curve_points, files, marker, read_back, tables
-from . import pull_off, slide
+from . import slide
+from .run_table import RunTable
 
 TABLE = "sweep.csv"
 CURVES = "sweep_curves.csv"
@@ -27,7 +29,7 @@ PLACES = ("velocity", "pressure", "temperature")  # coordinates of a point of a 
 CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
 CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *slide.ERRORS, "residual")
 RESULTS = names_of(SWEEP_RESULTS)
-SECTIONS = {section: added_names(SWEEP, section) for section in ("adhesion", "output.energy", "leakage")}
+SECTIONS = {column.when: added_names(SWEEP, column.when) for column in SWEEP if column.when}
 FRICTION_ERRORS = ("mu_max_error", "mu_dyn_error")
 THEORY = tuple(name for name in names_of(SWEEP) if name.startswith("theory_"))
 NUMBERS = {*names_of(SWEEP), *CURVE_COLUMNS} - {"state"}
@@ -142,8 +144,9 @@ def _results(case: Case) -> dict[str, Any]:
             known = ends if found is None else {key: value for key, value in found._asdict().items() if value == value}
             row |= {f"{prefix}{key}": value for key, value in known.items()}
         if not prefix:
-            row |= _pull_off(case, columns) if case.job.section("adhesion") else {}
-            asked = [name for key in ("output.energy", "leakage") if _asks_for(case, key) for name in SECTIONS[key]]
+            run = RunTable(directory, case.job, columns, bool(marker.detached(directory)))
+            row |= dict(pair for swept in answers("results", "swept") for pair in swept(run))
+            asked = [name for key, names in SECTIONS.items() if _asks_for(case, key) for name in names]
             row |= {name: _last(columns[name]) for name in asked if name in columns}
             row["seconds"] = math.fsum(columns["seconds"])
             row["residual"] = slide.largest(columns["residual"])
@@ -156,16 +159,6 @@ def _results(case: Case) -> dict[str, Any]:
 def _last(values: Sequence[float]) -> float:
     """Return the last value that is not NaN, or NaN."""
     return next((value for value in reversed(values) if value == value), math.nan)
-
-
-def _pull_off(case: Case, columns: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Return the last pull-off of a case and its error [N], and its approach [m]; {} if the contact holds."""
-    lost = [each for each in pull_off.find(columns, bool(marker.detached(case.job.output.directory))) if each.lost]
-    if not lost:
-        return {}
-    area, pull, approach = case.job.grid.lx * case.job.grid.ly, lost[-1], columns["approach"][lost[-1].row]
-    error = pull.error(case.job.numerics.tolerance)
-    return dict(zip(SECTIONS["adhesion"], (-pull.pressure * area, error * area, approach), strict=True))
 
 
 def _points(case: Case) -> Iterator[dict[str, Any]]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from parcontact.leakage.flow import Flow, solve_flow
+from parcontact.effects.leakage.flow import Flow, solve_flow
 
 from .table import Line
 from .work import Cold

@@ -13,11 +13,11 @@ from parcontact import job as jobs
 from parcontact.__main__ import main
 from parcontact.bands.band_plan import plan_bands
 from parcontact.bands.choice import cut_bands, doubts_of_bands, on_one_grid_of_all
+from parcontact.effects.heat.flash import Flash
+from parcontact.effects.heat.heating import describe_unmeasured
 from parcontact.parallel.slab import Slab
-from parcontact.physics.flash import Flash
 from parcontact.report import road_section
 from parcontact.scene.measured_range import excited_band
-from parcontact.steady_sliding.heating import describe_unmeasured
 
 LONG = 4e-3
 MEASURED = {

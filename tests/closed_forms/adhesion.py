@@ -10,7 +10,7 @@ as it is without. In between is Maugis' sphere, whose attraction is constant up 
     wave       p/(pi E* h/lambda) = sin^2 psi - alpha sqrt(tan psi),   alpha^2 = 2 w lambda/(pi^2 E* h^2)
 
 with contact radius or half width a, force P, approach d, radius R, contact modulus E* (`hertz.contact_modulus`), height
-h cos(2 pi x/lambda) of the wave, psi = pi a/lambda. Tabor's parameter (`physics.attraction`) is large where a law of
+h cos(2 pi x/lambda) of the wave, psi = pi a/lambda. Tabor's parameter (`adhesion.attraction`) is large where a law of
 attraction is near to JKR, and small where it is near to DMT. Maugis' parameter is
 lambda = 2 sigma0 (R/(pi w K^2))^(1/3) for an attraction sigma0 that reaches as far as w/sigma0, K = 4 E*/3.
 

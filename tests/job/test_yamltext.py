@@ -35,6 +35,8 @@ def test_a_scalar_where_a_list_of_stages_or_branches_is_due(tmp_path: Path, valu
         (SMALL + "title: !!float ''\n", "6:8: !!float does not belong in a job"),
         (SMALL + "title: !!bool ''\n", "6:8: !!bool does not belong in a job"),
         (SMALL + "title: \ud800\n", "1:1: is not a text file in UTF-8: invalid continuation byte"),
+        (SMALL + r'output: {"\ud800": 1}', "6:10: a key must be a word, got '\\ud800'"),
+        (SMALL + r'"\udfff": 1', "6:1: a key must be a word, got '\\udfff'"),
         (SMALL + "numerics: {tolerence: }\n", "6:12: numerics.tolerence is not a known key; did you mean tolerance?"),
         (with_material("{include: ~nosuchuser/x.yaml}"), "3:21: material.include must name a material file, got '~no"),
         (with_material("{include: " + "x" * 5000 + "}"), "3:21: material.include must name a material file, got 'xxx"),

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from restarting import ELASTIC, ROUGH, ZENER, Bench, cut, rows, same
 
 from parcontact import Simulation
-from parcontact.leakage.flow import leak
+from parcontact.effects.leakage.flow import leak
 from parcontact.summary import info
 
 STICK = {"work": 0.05, "range": 1e-6}
@@ -134,9 +134,11 @@ def test_no_adhesion_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*given: Any, **named: Any) -> None:
         raise AssertionError("called without an adhesion section")
 
-    places = ["solve.adhesive.gap_solver.GapSolver.__init__", "physics.halfspace.HalfSpace.gap_operators"]
-    places += ["effects.adhesive_energies.advance_energies"]
-    places += [f"effects.adhesive_law.AdhesiveLaw.{name}" for name in ("__init__", "at_rest", "solve", "motion")]
+    places = ["effects.adhesion.gap_solver.GapSolver.__init__", "physics.halfspace.HalfSpace.gap_operators"]
+    places += ["effects.adhesion.adhesive_energies.advance_energies"]
+    places += [
+        f"effects.adhesion.adhesive_law.AdhesiveLaw.{name}" for name in ("__init__", "at_rest", "solve", "motion")
+    ]
     for place in places:
         monkeypatch.setattr(f"parcontact.{place}", refuse)
     grid, history = {"points": [20, 14], "size": [1e-3, 7e-4]}, [{**LOAD, "pressure": 2e3}, SLIDE]

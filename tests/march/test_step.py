@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
 from parcontact.accuracy.controller import RELAXING, SNAP_SHARE, cells_per_step
-from parcontact.effects.adhesion import AdhesionColumns, AdhesionMemory
-from parcontact.effects.adhesive_law import AdhesiveLaw
+from parcontact.effects.adhesion.adhesive_law import AdhesiveLaw
+from parcontact.effects.adhesion.effect import AdhesionColumns, AdhesionMemory
 from parcontact.effects.effect import Changes, Instant
 from parcontact.errors import InputError, RunError
 from parcontact.history.chosen import RAMP_STEPS, MadeStep
@@ -352,7 +352,7 @@ def test_what_would_do_is_solved_in_double_precision(comm: MPI.Intracomm, limit:
 
 def test_no_errors_are_stated_of_a_contact_that_reaches_the_edge_of_its_box() -> None:
     """They are known of a light contact in the middle, and of none that the box cuts off."""
-    history = [{"force": force, "duration": 1e-3, "time_step": 1e-3} for force in (1e-4, 10.0)]
+    history = [{"force": force, "duration": 1e-3, "time_step": 1e-3} for force in (3e-3, 10.0)]
     grid = {"points": 16, "size": 1e-3, "boundary": "free"}
     _, made = marched({"grid": grid, "surface": SPHERE, "material": ZENER, "history": history})
     assert [row.measures.at_edge for row in made[1:]] == [False, False, True, True]

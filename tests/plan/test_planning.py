@@ -11,7 +11,6 @@ import pytest
 import yaml
 from mpi4py import MPI
 
-import parcontact as pc
 from parcontact import __main__
 from parcontact.history.timeline import Timeline
 from parcontact.job import load_cases
@@ -42,6 +41,7 @@ def test_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: p
     assert re.search(r"memory per rank \[MB\] +1 rank +2 ranks +1000 ranks", said)
     assert re.search(r"time on 1 rank: \S+ s\*? per step, .* in all", said)
     assert "tried: 1 steps on 1 rank in" in said
+    assert said.splitlines()[-1].startswith("memory of a rank: ")  # it offers no other accuracies
     assert sorted(path.name for path in tmp_path.iterdir()) == ["job.yaml", "parcontact.py"]
 
 
@@ -108,7 +108,7 @@ def test_steady_states_of_a_job_with_history() -> None:
 def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: Any) -> None:
     """As a user reads it, for the steady section of a job with a history."""
     monkeypatch.chdir(tmp_path)
-    planned = job(grid={"points": 20}, material=TWO, steady={"velocities": [1e-2, 0.1]}, numerics={"accuracy": 0.5})
+    planned = job(grid={"points": 20}, material=TWO, steady={"velocities": [1e-2, 0.1]})
     (tmp_path / "job.yaml").write_text(planned.resolved())
     assert __main__.main(["plan", "job.yaml", "--ranks", "1,2", "--seconds", "1"]) == 0
     said = capsys.readouterr().out
@@ -116,11 +116,6 @@ def test_plan_of_steady_states(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert "parcontact steady: 2 steady states, 2 velocities" in said
     assert re.search(r"tried: [12] states on 1 rank in", said)
     assert re.search(r"time on 1 rank: \S+ s\*? per state, ", said)
-    steady = said[said.index("parcontact steady:") :]
-    stated = re.search(r"from the errors of the trial: friction ([\d.]+) % by mesh, area ", steady)
-    assert stated
-    found = pc.steady(planned)
-    assert 0.01 * float(stated[1]) == pytest.approx(found.error_friction.mean(), rel=0.2)  # the rest is the solver's
 
 
 def test_plan_of_a_whole_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

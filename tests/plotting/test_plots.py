@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from drawing import (
 )
 from matplotlib.figure import Figure
 
-from parcontact.plotting import style
+from parcontact.plotting import charts, style
 from parcontact.storage import tables
 
 BACK = SLIDE.replace("}]", "}, {name: back, pressure: 1.0e3, velocity: -0.1, distance: 1.0e-3, cells_per_step: 1}]")
@@ -48,6 +49,47 @@ def test_wide_names_of_stages_do_not_touch(tmp_path: Path, drawn: list[Figure]) 
     assert asked(ran(tmp_path, f"title: a $^ b$\n{WAVE}{ELASTIC}history: [{stages}]\n")) == 0
     assert len(drawn[0].axes[0].texts) == 4
     assert touching(drawn[0]) == []
+
+
+@pytest.mark.rendered
+@pytest.mark.parametrize("text", [r"\e[31m", r"\t", r"\0", r"\ud800", r"\uffff", r"\x85", "轮胎"])
+def test_pictures_are_xml(tmp_path: Path, text: str) -> None:
+    """Whatever characters title and names of stages have; and no letter that the font lacks makes a warning."""
+    stages = ", ".join(f'{{name: "{text} {k}", pressure: {k}.0e3, duration: 1.0, time_step: 1.0}}' for k in (1, 2))
+    out = ran(tmp_path, f'title: "{text}"\n{WAVE}{ELASTIC}history: [{stages}]\n')
+    assert asked(out, "--format", "svg") == 0
+    assert len(list(ElementTree.parse(out / "picture.svg").iter())) > 100
+    assert asked(out, out, "--compare", "--out", tmp_path / "both.png") == 0
+
+
+@pytest.mark.rendered
+@pytest.mark.parametrize("zeros", ["", "closed"])
+@pytest.mark.parametrize("log", ["x", "y", "x,y"])
+@pytest.mark.parametrize(
+    ("x", "y", "shown"),
+    [
+        ((0.0, 0.0), (1.0, 2.0), "y"),
+        ((1.0, 2.0), (0.0, 0.0), "x"),
+        ((-1.0, 2.0), (1.0, -2.0), "x y"),  # positive on both axes, but at no common point
+        ((1.0, 2.0), (1.0, 2.0), "x y x,y"),
+        ((1e5, 1e5 * (1.0 + 4e-16)), (0.3, 0.3), "x y x,y"),  # one load, of which one result is rounded
+    ],
+)
+def test_logarithmic_axes_without_a_point(
+    tmp_path: Path, x: tuple[float, ...], y: tuple[float, ...], shown: str, log: str, zeros: str
+) -> None:
+    """A panel that has points for the logarithmic axes has them, another keeps linear axes; it is drawn either way."""
+    figure = Figure()
+    line = charts.ChartLine("", np.array(x), np.array(y))
+    with style.drawing():
+        axes = figure.add_subplot()
+        chart = charts.Chart("leakage", charts.Axis("load", "Pa"), charts.Axis("K", "m³"), [line], zeros=zeros)
+        charts.draw(chart, axes, log.split(","))
+        style.save_figure(figure, tmp_path / "picture.png")
+    logs = set(log.split(",")) | ({"y"} if zeros else set())
+    there = ",".join(sorted(logs)) in shown.split(" ")
+    expected = ["log" if there and axis in logs else "linear" for axis in "xy"]
+    assert [axes.get_xscale(), axes.get_yscale()] == expected
 
 
 @pytest.mark.parametrize("kind", ["loads", "creep", "sliding"])

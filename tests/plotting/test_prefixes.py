@@ -16,6 +16,12 @@ def test_prefixes(largest: float, label: str) -> None:
     assert not largest or 1.0 <= largest / size < 1e3 or label == "nm"
 
 
+@pytest.mark.parametrize("value", [float("inf"), float("-inf"), float("nan")])
+def test_no_prefix_without_a_size(value: float) -> None:
+    """A table that somebody edited may have such cells."""
+    assert prefixes.quantity(value, "m") == f"{value:g} m"
+
+
 @pytest.mark.parametrize(
     ("value", "unit", "stated"),
     [

@@ -65,6 +65,36 @@ def test_other_mistakes(call: Callable[[], Any], said: str) -> None:
         call()
 
 
+@pytest.mark.parametrize("name", ["", ".", "..", "there", "there/"])
+def test_a_state_is_saved_to_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """No directory is renamed for it, and nothing is left."""
+    monkeypatch.chdir(tmp_path)
+    Path("there").mkdir()
+    with pytest.raises(pc.InputError, match=r"is a directory: give the name of a file in it"):
+        simulation().save(name)
+    assert list(tmp_path.iterdir()) == [tmp_path / "there"]
+
+
+@pytest.mark.parametrize("name", ["a\0b.h5", "\ud800.h5"])
+@pytest.mark.parametrize("act", [lambda name: simulation().save(name), pc.Simulation.restore, pc.open])
+def test_names_that_no_file_has(act: Callable[[str], Any], name: str) -> None:
+    with pytest.raises(pc.InputError, match="a path must be a name that the file system can store, got "):
+        act(name)
+
+
+def test_a_state_in_a_missing_directory(tmp_path: Path) -> None:
+    """The sentence has the name that was given, not a temporary one."""
+    with pytest.raises(pc.RunError, match=r"^cannot create .*missing/state\.h5: No such file or directory$"):
+        simulation().save(tmp_path / "missing" / "state.h5")
+
+
+def test_half_a_surrogate_pair_in_a_key() -> None:
+    """The sentence can be printed and written."""
+    with pytest.raises(pc.JobError, match="is not a known key") as said:
+        simulation(BALL, {"output.\ud800": 1})
+    assert str(said.value).encode()
+
+
 def test_run_again_and_in_a_thread(tmp_path: Path) -> None:
     """A run that was stopped goes on when it is called again; one that has finished says the same again."""
     stopped = simulation(BALL, {"output.directory": str(tmp_path / "out")})

@@ -212,6 +212,20 @@ def test_a_report_of_a_sweep_says_what_differs_between_cases(tmp_path: Path, mon
     assert str(tmp_path) not in found.text
 
 
+def test_a_report_of_a_sweep_has_the_warnings_of_its_cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each once, with its cases; and errors beyond the accuracy, about which the run of the sweep warns at its end."""
+    monkeypatch.chdir(tmp_path)
+    slide = "history: [{pressure: 1.0e+3, velocity: 0.1, distance: 2.5e-4, cells_per_step: 1}]\n"
+    text = f"{WAVE}{ZENER}{slide}sweep: [{{numerics.accuracy: [1.0e-3, 1.0e-2, 0.9]}}]\n"
+    Path("job.yaml").write_text(text)
+    assert __main__.main(["job.yaml", "--quiet"]) == 0
+    (out := Path("out/job/cases/001/run.log")).write_text(out.read_text() + "warning: hot\n")
+    found = Page(page.write_report([Path("out/job")]).read_text())
+    assert "There was no warning" not in found.text
+    assert "the estimated error of friction exceeds numerics.accuracy (cases 0-1)" in found.text
+    assert "hot (case 1)" in found.text
+
+
 def test_long_words_break_after_their_parts_alone(tmp_path: Path) -> None:
     """On a phone and on paper: names of columns, keys and paths. A number stays whole, and with its unit."""
     head = ("case", "surface.0.short_wavelength", "state", "contact_area_corrected")

@@ -15,6 +15,7 @@ from parcontact import job as jobs
 from parcontact import mesh, scene
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
+from parcontact.road import treatment
 from parcontact.scene import sanity
 
 from . import truth
@@ -346,3 +347,20 @@ def test_a_profile_is_one_point_wide(fine_map: dict[str, object]) -> None:
     heights = pc.surface(fine_map, {"points": [8, 1], "size": [8 * APART, APART]})
     assert heights.shape == (1, 8)
     assert np.ptp(heights) > 0.0
+
+
+def test_a_periodic_map_is_filtered_periodically(tmp_path: Path) -> None:
+    """A low-pass of a map that is periodic leaves its long waves exactly, to rounding, in a periodic box; a map with a
+    jump at its edge is no such map."""
+    x = 2 * np.pi * np.arange(48) / 48
+    long = 1e-6 * np.cos(3 * x)[None, :] * np.cos(2 * x)[:, None]
+    np.save(tmp_path / "map.npy", long + 1e-7 * np.cos(16 * x + 0.4)[None, :] * np.cos(17 * x)[:, None])
+    surface = {"shape": "topography", "path": str(tmp_path / "map.npy"), "unit": "m", "size": [1e-3, 1e-3]}
+    surface |= {"detrend": "mean", "periodic": "none", "short_wavelength": 1e-4}
+    rest = {"material": {"model": "elastic", "shear_modulus": 1e6}, "history": [{"pressure": 1e3}]}
+    job = jobs.load({"grid": {"points": 48, "size": 1e-3}, "surface": surface, **rest})
+    setup = scene.set_up(job, Slab.alone(48, 48))
+    heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
+    np.testing.assert_allclose(heights - heights.mean(), long, atol=1e-15)
+    assert treatment.is_periodic(long)
+    assert not treatment.is_periodic(long + 1e-6 * x)

@@ -4,8 +4,10 @@ import math
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
+import scipy.io
 import SurfaceTopography
 from numpy.testing import assert_allclose
 
@@ -148,6 +150,76 @@ def test_missing_points(tmp_path: Path) -> None:
         assert np.array_equal(np.isnan(found.heights), np.isnan(holed))
 
 
+@pytest.mark.parametrize("word", ["", "---", "#N/A", "NaN", "No Data", "n/a", "null"])
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_words_for_missing_points(tmp_path: Path, word: str, mark: str) -> None:
+    """One point is missing, in a matrix and in rows of positions; a mark ends each row."""
+    cells = [[f"{z!r}" for z in row] for row in HEIGHTS.tolist()]
+    cells[3][5] = word
+    (tmp_path / "matrix.txt").write_text("".join(mark.join(row) + mark + "\n" for row in cells))
+    table = "".join(f"{x}{mark}{y}{mark}{z}\n" for y, row in enumerate(cells) for x, z in enumerate(row))
+    (tmp_path / "table.xyz").write_text(table)
+    for name, size in (("matrix.txt", SIZE), ("table.xyz", None)):
+        found = read(tmp_path / name, "m", size)
+        assert np.argwhere(np.isnan(found.heights)).tolist() == [[3, 5]]
+        assert_allclose(np.delete(found.heights, 77), np.delete(HEIGHTS, 77), rtol=1e-12)
+
+
+def test_a_word_between_blanks(tmp_path: Path) -> None:
+    (tmp_path / "road.xyz").write_text(rows().replace(f"{float(HEIGHTS[3, 5] * 1e6)!r}", "No Data"))
+    assert np.argwhere(np.isnan(read(tmp_path / "road.xyz", "um").heights)).tolist() == [[3, 5]]
+
+
+@pytest.mark.parametrize("ending", ["h5", "mat"])
+def test_arrays_without_axes(tmp_path: Path, ending: str) -> None:
+    """Rows are along x, as in .npy and in a height file."""
+    if ending == "h5":
+        with h5py.File(tmp_path / "road.h5", "w") as file:
+            file["heights"] = HEIGHTS
+    else:
+        scipy.io.savemat(tmp_path / "road.mat", {"heights": HEIGHTS})
+    assert np.array_equal(read(tmp_path / f"road.{ending}", "m", SIZE).heights, HEIGHTS)
+
+
+def test_a_file_of_matlab_7_3_is_refused(tmp_path: Path) -> None:
+    """It is HDF5 behind 512 bytes, with the axes in the other order."""
+    with h5py.File(tmp_path / "road.mat", "w", userblock_size=512) as file:
+        file["heights"] = HEIGHTS.T
+    with (tmp_path / "road.mat").open("r+b") as start:
+        start.write(b"MATLAB 7.3 MAT-file".ljust(512))
+    with pytest.raises(InputError, match=r"road\.mat has no channel of heights"):
+        read(tmp_path / "road.mat", "m", SIZE)
+
+
+def test_columns_in_another_order(tmp_path: Path) -> None:
+    """The names of columns count, not their places."""
+    y, x = np.indices(HEIGHTS.shape)
+    table = np.stack([HEIGHTS.ravel() * 1e9, y.ravel() * 2.5, x.ravel() * 2.5], axis=1)
+    np.savetxt(tmp_path / "road.txt", table, fmt="%.17g", header="z/nm y/um x/um")
+    found = read(tmp_path / "road.txt")
+    assert_allclose(found.heights, HEIGHTS, rtol=1e-12)
+    assert_allclose(found.size, SIZE, rtol=1e-12)
+
+
+BLOCK = "".join(" ".join(f"{z!r}" for z in row) + "\n" for row in HEIGHTS.tolist())
+
+
+@pytest.mark.parametrize("between", ["\n", "\n\n", "# channel 2\n"])
+def test_a_second_block_is_refused(tmp_path: Path, between: str) -> None:
+    (tmp_path / "road.txt").write_text(BLOCK + between + BLOCK)
+    line = 17 + between.count("\n")
+    with pytest.raises(InputError, match=rf"road\.txt:{line}: a second block of numbers"):
+        read(tmp_path / "road.txt", "m", SIZE)
+    (tmp_path / "road.txt").write_text(BLOCK.replace("\n", "\n\n"))  # blank lines between all rows
+    assert np.array_equal(read(tmp_path / "road.txt", "m", SIZE).heights, HEIGHTS)
+
+
+def test_positions_given_twice_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "road.xyz").write_text(rows() + "\n" + rows())
+    with pytest.raises(InputError, match="384 positions have two heights"):
+        read(tmp_path / "road.xyz", "um")
+
+
 def save(path: Path, values: object) -> None:
     with path.open("wb") as file:
         np.save(file, np.asarray(values), allow_pickle=True)
@@ -189,16 +261,16 @@ BAD = {
         (None, None, None),
         "in a format that SurfaceTopography does not know",
     ),
-    "ragged": ("road.txt", "1 2 3\n4 5\n", ("m", SIZE, None), "cannot be read"),
+    "ragged": ("road.txt", "1 2 3\n4 5\n", ("m", SIZE, None), "road.txt:2: 2 numbers; 3 were expected, as in line 1"),
     "no bytes": ("road.npy", b"", ("m", SIZE, None), "it is empty"),
     "no values": ("road.npy", np.empty((0, 8)), ("m", SIZE, None), "an array of shape (0, 8), without values"),
     "no heights": ("road.nms", "\0" * 3468, (None, None, None), "in a format that SurfaceTopography does not know"),
     "bytes": ("road.bin", bytes(range(200)) * 25, ("m", SIZE, None), "has no channel of heights"),
     "decimal commas": (
         "road.txt",
-        "1,25 3,4 0 -2,1\n" * 4,
+        "1,25 3,4 0 -2.1\n" * 4,
         ("m", SIZE, None),
-        "decimal commas; write them with points",
+        "road.txt:1: a number was expected, got '25 3'",
     ),
     "one row": ("road.xyz", "1 2\n3 4\n", ("m", None, None), "has 2 positions along x"),
     "no grid": (

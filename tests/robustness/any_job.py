@@ -15,6 +15,7 @@ import numpy as np
 from .scenes import Json, decades
 
 SIDES = (1, 2, 3, 5, 8, 8, 12, 12, 13, 16, 16, 16, 20)  # points
+TITLES = ("\x1b[31m red", "tab\tand\nline", "half \ud800 a pair", "\ufffe", "轮胎", "$x^$ & <b>", "w" * 300)
 FIELDS = ("pressure", "displacement", "gap", "height")
 
 
@@ -92,6 +93,19 @@ def draw(dice: Random, directory: Path, stick: bool = False) -> Json:
     return _with_rare_keys(Random(repr(job)), job)
 
 
+def draw_in_bands(dice: Random) -> Json:
+    """Return a job whose spectrum is cut into bands, often too few points for its waves."""
+    longest = decades(dice, -4, -1)
+    surface = {"shape": "rough", "hurst": dice.uniform(0.3, 1.0), "rms_slope": decades(dice, -2, -0.5)}
+    surface |= {"long_wavelength": longest, "short_wavelength": longest / dice.choice([2.0, 4.0, 20.0])}
+    asked = {"count": dice.choice([1, 2]), "waves": dice.choice([1, 2, 2, 4]), "samples": dice.choice([1, 2])}
+    points = dice.choice([1, 2, 32, 48, 64, [64, 1], [48, 64]])
+    bands = {"points": points, **{key: value for key, value in asked.items() if dice.random() < 0.8}}
+    steady = {"velocities": [decades(dice, -3, 1)], "pressures": [decades(dice, 3, 6)]}
+    job: Json = {"surface": surface, "material": {"include": "synthetic_tyre"}, "bands": bands, "steady": steady}
+    return job | {"numerics": {"accuracy": 0.3}}
+
+
 def _with_rare_keys(dice: Random, job: Json) -> Json:
     """Return a job with what few jobs have: from dice of its own, so that other jobs stay as they were."""
     if dice.random() < 0.05:
@@ -100,7 +114,10 @@ def _with_rare_keys(dice: Random, job: Json) -> Json:
         job["grid"]["points"] = "auto"
     elif dice.random() < 0.03 and "history" in job:
         nx = job["grid"]["points"][0]
-        job["study"] = dice.choice([{"mesh": [nx, 2 * nx]}, {"integrator": ["exponential", "backward-euler"]}])
+        meshes = [{"mesh": [nx, 2 * nx]}, {"mesh": sorted({nx // 2 or 1, nx})}]
+        job["study"] = dice.choice([*meshes, {"integrator": ["exponential", "backward-euler"]}])
+    if dice.random() < 0.05:
+        job["title"] = dice.choice(TITLES)
     return job
 
 

@@ -1,8 +1,11 @@
 """Results that were cut off, as a copy that breaks off leaves them: whatever reads them says so, with exit code 2."""
 
+import re
 import shutil
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 from conftest import WORLD, Main
 from drawing import ELASTIC, MAPS, WAVE, ZENER
@@ -36,6 +39,7 @@ READ = {  # by which verbs, of which job
     ("curve", "steady.h5"): ("report",),
     ("curve", "steady.resolved.yaml"): ("plot", "report"),
     ("sweep", "sweep.csv"): ("info", "plot", "report"),
+    ("sweep", "cases/000/.parcontact"): ("run",),
 }
 AT_ONCE = ("leak.csv", "theory.csv", "sweep.csv")  # of these a cut between two lines does not show
 
@@ -76,3 +80,31 @@ def test_files_that_were_cut_off(whole: Path, main: Main, name: str, file: str) 
             assert "sblock" not in text
     path.write_bytes(data)
     assert {main(verb, name)[0] for verb in READ[name, file] if verb != "run"} <= {0}
+
+
+@pytest.mark.parametrize("name", ["step", "t", "x", "y", "pressure"])
+@pytest.mark.parametrize("shape", [(0,), (1, 2)])
+def test_maps_that_do_not_fit_their_coordinates(whole: Path, main: Main, name: str, shape: tuple[int, ...]) -> None:
+    """A file of maps that another program has changed."""
+    shutil.copytree(whole / "run", "run")
+    with h5py.File("run/fields.h5", "r+") as file:
+        del file[name]
+        file[name] = np.zeros(shape)
+    for words in (("plot", "run"), ("plot", "run", "--at", "2"), ("report", "run")):
+        code, said, errors = main(*words)
+        assert (code, "run/fields.h5 is damaged" in errors) == (2, True), (words, said + errors)
+
+
+@pytest.mark.parametrize("content", [b"\x89PNG\r\n", b"\xff", None])
+def test_a_table_of_a_study_that_is_none(tmp_path: Path, main: Main, content: bytes | None) -> None:
+    """Bytes of another file, or a cell that is no number."""
+    (tmp_path / "job.yaml").write_text(JOBS["run"].replace("32, size", "16, size") + "study: {mesh: [16, 32]}\n")
+    study = ("study", "job.yaml", "--out", "study", "--quiet")
+    assert main(*study)[0] == 0
+    table = tmp_path / "study" / "study.csv"
+    number = re.compile(rb"(?<=,)\d\.\d+")
+    wrong = content if content is not None else number.sub(b"1.5x", table.read_bytes())
+    table.write_bytes(wrong)
+    code, _, errors = main(*study)
+    assert (code, "study.csv cannot be read" in errors) == (2, True), errors
+    assert table.read_bytes() == wrong

@@ -1,11 +1,15 @@
 """Whose an output directory is: nothing of another run or of a user is replaced, followed or lost."""
 
 import json
+import os
+import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -333,6 +337,75 @@ def test_by_commands(
     assert asides(here) == [f"{name}.aside"]
     assert f"{name} existed and was not written by this program: it was renamed to {Path(name).name}.aside" in said[0]
     assert said[1] == ""
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if not name.startswith("out/theory")])
+def test_a_pipe_is_not_renamed(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    """Nor a device, such as /dev/null, which every program uses and root may rename."""
+    monkeypatch.chdir(here)
+    (here / name).unlink(missing_ok=True)
+    os.mkfifo(here / name)
+    assert __main__.main(COMMANDS[name]) == BAD_INPUT
+    assert name in (said := capsys.readouterr().err)
+    assert re.search("is a device or a pipe, which is not|is not a regular file", said)
+    assert (here / name).is_fifo()
+    assert asides(here) == []
+    assert [*here.rglob("*.part")] == []
+
+
+PIPES = (
+    "measures.csv",
+    "fields.h5",
+    "theory.csv",
+    "theory.yaml",
+    "job.resolved.yaml",
+    "run.log",
+    ".parcontact",
+    ".lock",
+)
+READERS: dict[str, Sequence[str]] = {
+    "run": ("run", "job.yaml", "--out", "out"),
+    "theory": ("theory", "job.yaml", "--out", "out"),
+    **{verb: (verb, "out") for verb in ("plot", "report", "info", "leak", "cite")},
+}
+
+
+@pytest.mark.parametrize("verb", READERS)
+@pytest.mark.parametrize("name", PIPES)
+def test_a_pipe_in_an_output_directory_is_not_read(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], verb: str, name: str
+) -> None:
+    """Reading it might never end; before anything is read or written. Of a case, too; a link to it is as bad."""
+    monkeypatch.chdir(here)
+    for place in ("out", "out/cases/000"):
+        Path(place).mkdir(parents=True, exist_ok=True)
+        path = Path(place, name)
+        path.unlink(missing_ok=True)
+        os.mkfifo(pipe := here / "pipe")
+        path.symlink_to(pipe)
+        with _bounded():
+            assert __main__.main(READERS[verb]) == BAD_INPUT
+        assert f"{path} is a device or a pipe, which is not read: move it away" in capsys.readouterr().err
+        path.unlink()
+        pipe.unlink()
+
+
+@contextmanager
+def _bounded() -> Iterator[None]:
+    """Fail after ten seconds instead of waiting for a writer."""
+
+    def stop(*_: Any) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.alarm(10)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
 
 
 # -- rows of measures.csv that were edited, before a run or a plot ----------------------------------------------------

@@ -234,3 +234,34 @@ def test_a_curve_from_python_warns_at_its_own_temperatures() -> None:
         pc.steady(rubber(0.1, band=None), velocities=[0.1], pressures=[1e4], temperatures=[-40.0])
     beyond = "material: -40 C is outside of the measured -20 to 60 C"
     assert [str(one.message).startswith(beyond) for one in stated].count(True) == 1
+
+
+def test_temperatures_that_look_like_kelvin(tmp_path: Path) -> None:
+    """Each key is named with its value, the limit and the value in deg C; 200 C, the limit, is not."""
+    shift = {"law": "arrhenius", "energy": 5e4, "reference": 293.15}
+    material = {
+        "model": "zener",
+        "modulus_inf": 1e6,
+        "branches": [{"modulus": 3e6, "relaxation_time": 1e-3}],
+        "shift": shift,
+        "temperature": 313.15,
+    }
+    data = {
+        "grid": {"points": 16, "size": 1e-3},
+        "surface": {"shape": "wave", "amplitude": 1e-6, "waves": [1, 0]},
+        "material": material,
+        "steady": {"velocities": [1.0], "pressures": [1e4], "temperatures": [253.15, 353.15]},
+    }
+    found = {doubt.place: str(doubt) for doubt in Job.model_validate(data).doubts if doubt.kind == "kelvin"}
+    assert found.keys() == {"material.temperature", "material.shift.reference", "steady.temperatures"}
+    assert "313.15 C is hotter than rubber endures (limit: 200 C)" in found["material.temperature"]
+    assert found["material.temperature"].endswith("in kelvin, give 40")
+    assert found["steady.temperatures"].endswith("give 80")
+    sound = data | {
+        "material": material | {"shift": shift | {"reference": 20.0}, "temperature": 200.0},
+        "steady": {"velocities": [1.0], "pressures": [1e4]},
+    }
+    job = Job.model_validate(sound)
+    assert not [doubt for doubt in job.doubts if doubt.kind == "kelvin"]
+    (given,) = (doubt for doubt in doubt_band(job, [293.15]) if doubt.kind == "kelvin")
+    assert str(given).startswith("temperatures: 293.15 C")

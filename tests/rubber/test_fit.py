@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from conftest import Main
 from matplotlib.figure import Figure
+from numpy.testing import assert_allclose
 
 from parcontact import job as jobs
 from parcontact.errors import InputError
@@ -14,6 +15,7 @@ from parcontact.plotting import compound_files as pictures
 from parcontact.rubber import compound
 from parcontact.rubber.series import PronySeries, Weigh
 from parcontact.rubber.shift import WLF, Arrhenius, Factors, read_shift
+from parcontact.rubber.superposition import Vertical
 
 from . import measured
 from .bodies import BROAD, DENSE, STEEP, TEN, Body, noisy, write
@@ -107,12 +109,12 @@ def test_laws_given(tmp_path: Path) -> None:
         ("arrhenius:much", 20.0, "", "must be of the form arrhenius:J/mol"),
         ("none.csv", None, "", "or a readable file"),
         ("factors.csv", None, "", "a table of T"),
-        ("factors.csv", None, "T[K],log_aT\n0,1\n1,2\n", "a table of T"),
+        ("factors.csv", None, "T[F],log_aT\n0,1\n1,2\n", "the unit of T must be one of C,"),
+        ("factors.csv", None, "T[C],aT\n0,1\n1,2\n", "a table of T"),
         ("factors.csv", None, "T[C],log_aT\n0,1\n", "a table of T"),
-        ("factors.csv", None, "T[C],log_aT\n0,1\n1\n", "each row must hold"),
-        ("factors.csv", None, "T[C],log_aT\n0,1\n1,nan\n", "each row must hold"),
-        ("factors.csv", None, "T[C],log_aT,log_bT\n0,1,0\n1,0\n", "each row must hold"),
-        ("factors.csv", None, "T[C],log_aT,other\n0,1,0\n1,0,0\n", "a table of T"),
+        ("factors.csv", None, "T[C],log_aT\n0,1\n1\n", ":3: 1 values where 2 columns"),
+        ("factors.csv", None, "T[C],log_aT\n0,1\n1,nan\n", ":3: log_aT must be a finite number, got 'nan'"),
+        ("factors.csv", None, "T[C],log_aT,log_bT\n0,1,0\n1,0\n", ":3: 2 values where 3 columns"),
         ("factors.csv", None, "T[C],log_aT\n0,1\n0,2\n", "has two factors"),
         ("factors.csv", 50.0, "T[C],log_aT\n0,1\n20,0\n", "50 C is outside"),
     ],
@@ -125,6 +127,49 @@ def test_laws_that_will_not_do(
     with pytest.raises(InputError) as failure:
         read_shift(text, reference)
     assert sentence in str(failure.value)
+
+
+def glass(temperature: float) -> float:
+    """log10 of a_T: WLF above -10 C, and Arrhenius below, as in a glass."""
+    above = max(temperature, -10.0) - 20.0
+    return -9.375 * above / (80.0 + above) + 0.11 * max(0.0, -10.0 - temperature)
+
+
+@pytest.mark.parametrize("vertical", ["none", "free"])
+def test_free_factors_below_a_glass_transition(tmp_path: Path, vertical: Vertical) -> None:
+    """Sweeps that overlap by more than a decade with 0.3 % noise: factors to 0.3 decades where no WLF holds."""
+    dice, lines = np.random.default_rng(2), ["T[C] f[Hz] G'[Pa] G''[Pa]"]
+    f = np.geomspace(0.1, 31.6, 6)
+    temperatures = np.arange(-50.0, 101.0, 10.0)
+    for temperature in map(float, temperatures):
+        g = measured.complex_modulus(2 * np.pi * f * 10.0 ** glass(temperature))
+        for at, storage, loss in zip(
+            f, g.real * dice.normal(1, 0.003, 6), g.imag * dice.normal(1, 0.003, 6), strict=True
+        ):
+            lines.append(f"{temperature} {at} {storage} {loss}")
+    (tmp_path / "glass.txt").write_text("\n".join(lines))
+    made = compound.fitted(tmp_path / "glass.txt", 0.5, 20.0, "free", 0.02, vertical=vertical)
+    assert made.shift is not None
+    assert_allclose([made.shift.log_factor(t) for t in temperatures], list(map(glass, temperatures)), atol=0.3)
+    assert not any("overlap" in doubt for doubt in made.doubts())
+
+
+def test_a_table_in_kelvin_that_says_degrees(tmp_path: Path, main: "Main") -> None:
+    """A measurement of 253 to 333 K with the unit C gets a warning, and with the unit K none; a table of factors in
+    kelvin does not reach the measurement."""
+    path = measured.write_sweeps(tmp_path / "table.csv")
+    head, *body = path.read_text().splitlines()
+    unit, kelvin = body[0], [f"{line.rsplit(',', 1)[0]},{float(line.rsplit(',', 1)[1]) + 273.15}" for line in body[1:]]
+    for name, units in (("C", unit), ("K", unit.replace("°C", "K"))):
+        (tmp_path / f"{name}.csv").write_text("\n".join([head, units, *kelvin]))
+    wrong = compound.fitted(tmp_path / "C.csv", 0.5, None, "wlf", 0.05).doubts()
+    assert any(
+        "333.15 C is hotter than rubber endures (limit: 200 C)" in doubt and "give 60" in doubt for doubt in wrong
+    )
+    assert not any("hotter" in doubt for doubt in compound.fitted(tmp_path / "K.csv", 0.5, None, "wlf", 0.05).doubts())
+    (tmp_path / "factors.csv").write_text("T[C],log_aT\n250,3\n293.15,0\n340,-2\n")
+    code, _, err = main("fit", path, "--shift", tmp_path / "factors.csv", "--out", tmp_path / "a.yaml")
+    assert (code, "outside the shift factors" in err) == (2, True)
 
 
 # -- the loss modulus that follows from a table, which friction depends on: also where it was not measured ------------

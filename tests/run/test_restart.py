@@ -38,9 +38,21 @@ def cut_anywhere(bench: Bench, data: dict[str, Any], everywhere: bool = True) ->
 @pytest.mark.mpi(2)
 @pytest.mark.parametrize("name", SCENES)
 def test_cut_anywhere(bench: Bench, name: str) -> None:
-    """k steps, and the other N - k after a restart, equal all N at once; for every k of one scene, that of the initial
+    """k steps, and the other N - k after a restart, equal all N at once; for every k of two scenes, that of the initial
     state too, and for some k of the others."""
-    cut_anywhere(bench, bench.job(name), name == "viscoelastic")
+    cut_anywhere(bench, bench.job(name), name in ("viscoelastic", "chosen"))
+
+
+@pytest.mark.mpi(2)
+def test_a_finished_run_of_chosen_steps_has_nothing_to_do(bench: Bench) -> None:
+    """The same command a second time ends with 0 and changes no file."""
+    out = bench.where / "out"
+    assert bench.run(bench.job("chosen"), out) == 0
+    bench.comm.Barrier()
+    before = {path: path.read_bytes() for path in sorted(out.rglob("*")) if path.is_file()}
+    bench.comm.Barrier()
+    assert bench.run(bench.job("chosen"), out) == 0
+    assert {path: path.read_bytes() for path in sorted(out.rglob("*")) if path.is_file()} == before
 
 
 def test_the_error_budget_is_that_of_the_whole_run(bench: Bench) -> None:

@@ -8,7 +8,7 @@ import re
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -27,10 +27,18 @@ from parcontact.parallel.signals import Signals
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
 from parcontact.run import sweep, watch
-from parcontact.storage import directory, files
+from parcontact.storage import directory, files, tables
 from parcontact.storage.stopfile import StopFile
 from parcontact.summary import info, slide, sweep_table
 
+LEAVING = """
+grid: {points: 32, size: 1.0e-3, boundary: free}
+surface: {shape: sphere, radius: 1.0e-3}
+material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e6, relaxation_time: 1.0}]}
+history: [{force: 2.0e-2}, {force: 2.0e-2, velocity: 1.0e-3, distance: 5.0e-4}]
+sweep: [{history.1.velocity: [1.0e-3]}]
+numerics: {accuracy: 0.1}
+"""
 CELLS = {"excess": 0.2, "most": 0.15, "more": "more points"}  # of a doubt about contacts of few cells
 
 
@@ -93,6 +101,35 @@ def test_a_case_that_fails_does_not_stop_the_others(
     assert [row["state"] for row in table()] == ["-"] * 6
 
 
+@pytest.mark.parametrize(("refused", "code"), [(range(6), 2), (range(5), 1), ((), 0)])
+def test_a_sweep_is_bad_input_if_all_of_its_cases_are(
+    cases: tuple[Case, ...], refused: Sequence[int], code: int
+) -> None:
+    """2 if no case can be run, as for a job without a sweep; 1 if some of them can."""
+    begun = list[Job]()
+
+    def act(job: Job, slab: Slab) -> int:
+        begun.append(job)
+        if len(begun) - 1 in refused:
+            raise InputError("the third law does not hold")
+        return 0
+
+    assert go(cases, act) == code
+    assert len(begun) == 6
+
+
+def test_a_refused_theory_of_a_sweep_writes_nothing(
+    cases: tuple[Case, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A wave has no isotropic spectrum, in no case of the sweep."""
+    words = ["theory", "job.yaml", "--set", "surface={shape: wave, amplitude: 1.0e-6, waves: [2, 1]}"]
+    assert main([*words, "--set", "sweep=[{history.0.pressure: [1.0e5, 2.0e5]}]"]) == 2
+    said = capsys.readouterr()
+    assert said.err.count("the theory takes the power spectrum of one isotropic rough surface") == 2
+    assert "results of all cases" not in said.out
+    assert [path.name for path in tmp_path.iterdir()] == ["job.yaml"]
+
+
 @pytest.mark.parametrize("damage", [lambda text: text[: len(text) // 2], lambda text: text + "x\n", None])
 def test_a_finished_case_whose_table_lacks_rows_is_damaged(
     cases: tuple[Case, ...], capsys: pytest.CaptureFixture[str], damage: Callable[[str], str] | None
@@ -103,7 +140,7 @@ def test_a_finished_case_whose_table_lacks_rows_is_damaged(
     csv = directory / "measures.csv"
     whole = csv.read_text()
     csv.unlink() if damage is None else csv.write_text(damage(whole))
-    assert main(["job.yaml", "--case", "0", "--quiet"]) == 1
+    assert main(["job.yaml", "--case", "0", "--quiet"]) == 2  # as for a job without a sweep
     assert f"lacks rows; correct it, or move {directory} away to run the job again" in capsys.readouterr().err
     assert [row["state"] for row in table()] == ["damaged", *"-----"]
     directory.rename("aside")
@@ -309,6 +346,21 @@ material: {model: elastic, shear_modulus: 1.0e6}
 history: [{pressure: 1.0e4}]
 sweep: [{surface.seed: [1, 2, 3, 4], surface.short_wavelength: [2.5e-4, 2.5e-4, 5.0e-4, 2.5e-4]}]
 """
+
+
+def test_a_ball_that_leaves_its_box_has_no_stated_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its highest friction is the one of the rows in which the box does not cut the contact off."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "job.yaml").write_text(LEAVING)
+    assert main(["job.yaml", "--quiet"]) == 0
+    rows = tables.read_columns(Path("out/job/cases/000/measures.csv"))
+    inside = [friction for friction, cut in zip(rows["friction"], rows["cut_off"], strict=True) if not cut]
+    (row,) = table()
+    assert float(row["mu_max"]) == max(inside) < max(rows["friction"])
+    assert [row[name] for name in ("mu_max_error", "mu_dyn_error", "error_friction", "error_area")] == [""] * 4
+    log = Path("out/job/cases/000/run.log").read_text()
+    assert f"in {len(rows['friction']) - len(inside)} of " in log
+    assert "the contact is cut off by the edge of the box: they do not count" in log
 
 
 # -- several programs on the cases of one sweep: a job array, or the same command given twice -------------------------

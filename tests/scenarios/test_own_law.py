@@ -16,8 +16,8 @@ from marched_jobs import column, marched
 from numpy.testing import assert_allclose
 
 import parcontact as pc
-from parcontact.derived.leakage_over_time import Gaps
 from parcontact.effects import contact_law
+from parcontact.effects.leakage.over_time import Gaps
 from parcontact.job import Job
 from parcontact.parallel.slab import Array, Slab
 from parcontact.plotting import maps

@@ -313,3 +313,18 @@ def test_a_periodic_box_that_sticks_as_a_whole(pressure: float, interface: bool)
     said = run(job_of(WAVE, [{"pressure": pressure}, {"pressure": pressure}], **section))
     assert [text for text in said if "all of the periodic box is in contact" in text] == said
     assert len(said) == (1 if interface and pressure > 2.5e4 else 0)
+
+
+def test_a_contact_that_creeps_out_of_its_box() -> None:
+    """At once Hertz' contact, (3 F R/(4 E*))^(1/3), is within the box; with the long-term modulus it slides out of it.
+    It stays within if it slides before the rubber relaxes."""
+    sphere = {"shape": "sphere", "radius": 8e-3}
+    rubber = {"model": "zener", "modulus_inf": 1e4, "branches": [{"modulus": 3e4, "relaxation_time": 0.1}]}
+    grid = {"points": 16, "size": 1.2e-2, "boundary": "free"}
+    for speed, warned in ((1e-3, True), (1e2, False)):
+        slide = {"force": 0.2, "velocity": speed, "distance": 3e-3}
+        job = job_of(sphere, [{"force": 0.2}, slide], material=rubber, grid=grid)
+        texts = [str(doubt) for doubt in job.doubts if "leaves the box" in str(doubt)]
+        assert [text.partition(":")[0] for text in texts] == ["history.1"] * warned
+        radius = (0.75 * 0.2 * 8e-3 / 4e4) ** (1 / 3)  # E* = 4 G of an incompressible body
+        assert all(f"a radius of some {radius:.3g} m" in text and "edge is 0.003 m" in text for text in texts)

@@ -30,7 +30,7 @@ class Small(NamedTuple):
 
 
 SMALL = {
-    "band_errors": Small(["--cases", "1"], r"(?m)^2 bands, friction: .*within 5 % in \d of 1"),
+    "band_errors": Small(["--cases", "1", "--points", "64"], r"(?m)^2 bands, friction: .*within 5 % in \d of 1"),
     "bench": Small(
         ["--points", "64", "--rounds", "1", "--json", "bench.json"],
         r"(?s)double: operator calls +\d\d .*tolerance 0.005: operator calls per step +[4-9](\.| ).*"
@@ -42,7 +42,7 @@ SMALL = {
     "chosen_mesh": Small(
         ["--only", "5", "--seed", "100", "--finest", "240"], r"(?m)^1 made: \d with faults; 3 accuracies", (0, 1)
     ),
-    "error_coverage": Small(["--scenes", "2", "--from", "13"], r"(?s)fitted: 2 \| area .*2 scenes; written: ", (0, 1)),
+    "error_coverage": Small(["--scenes", "2", "--from", "15"], r"(?s)fitted: 2 \| area .*2 scenes; written: ", (0, 1)),
     "fuzz_jobs": Small(["--jobs", "40"], r"(?m)^40 made: 0 with faults; "),
     "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_faults.py
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^\d\d pages in pages"),

@@ -1,6 +1,7 @@
 """Whole studies: of a wave in full contact, whose friction has a closed form, and as a user runs them."""
 
 import math
+import re
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -14,12 +15,12 @@ from hypothesis import strategies as st
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
+from parcontact.effects.adhesion.section import adhesion_law
 from parcontact.errors import InputError
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load
 from parcontact.mesh import load as load_job
 from parcontact.parallel.slab import Slab
-from parcontact.scene import choices
 from parcontact.study import outcome, study, verdict
 from parcontact.study.extrapolation import Limit, extrapolate
 from parcontact.study.ladders import Ladders, Settings, describe_choices, ladders, overrides
@@ -293,14 +294,30 @@ def test_steps_of_all_kinds_change_alike(path: Path, mesh: int, cells: float, fa
     ("changes", "sentence"),
     [
         ([], "no ladders"),
-        (["study={mesh: [48, 33]}"], "33 points along x give no whole number along y"),
+        (["study={mesh: [48, 33]}"], r"study\.mesh\.1 must give a whole number of points along y in a box of 64 x 32"),
         (["study={mesh: [32, 64]}", "surface={shape: file, path: h.npy}"], "given on one mesh"),
+        (["study={mesh: [32]}", "history=[]", "steady={velocities: 1.0, pressures: 1.0e4}"], "the job needs a history"),
     ],
 )
-def test_refused(path: Path, changes: list[str], sentence: str) -> None:
+def test_refused(path: Path, changes: list[str], sentence: str, main: Main) -> None:
+    """Also by `check`, except that a job without ladders is a sound job."""
     np.save(path.with_name("h.npy"), np.zeros((32, 64)))
     with pytest.raises(InputError, match=sentence):
         ladders(load_job(path, changes))
+    code, _, said = main("check", path, *(word for change in changes for word in ("--set", change)))
+    assert code == (2 if changes else 0)
+    assert not changes or re.search(sentence, said)
+
+
+def test_check_reads_the_jobs_of_a_study(path: Path, main: Main) -> None:
+    """A mesh too coarse for the shortest wave: check and study refuse it with the same sentence, with the case."""
+    surface = "{shape: rough, hurst: 0.8, rms_slope: 0.1, long_wavelength: 2.5e-4, short_wavelength: 4.0e-5}"
+    words = (path, "--set", f"surface={surface}", "--set", "study={mesh: [16, 32]}")
+    (code, _, said), (ends, _, same) = main("check", *words), main("study", *words)
+    assert (code, ends) == (2, 2)
+    assert said == same
+    assert "study, case mesh 16, " in said
+    assert "short_wavelength must be at least two cells" in said
 
 
 @pytest.mark.parametrize(
@@ -370,7 +387,8 @@ def test_the_range_of_adhesion_is_that_of_the_job_on_every_mesh(path: Path, reac
     job, found = refined(path, "{mesh: [32, 64, 128]}")
     cases = [load_job(path, overrides(job, found.own, case)) for case in found.combine()]
     assert {case.grid.nx for case in cases} == {32, 64, 128}
-    assert {choices(case).adhesion for case in cases} == {choices(job).adhesion}
+    attractions = {adhesion_law(case.section("adhesion"), case.grid, case.material) for case in cases}
+    assert attractions == {adhesion_law(job.section("adhesion"), job.grid, job.material)}
     stated = f"adhesion.range: {math.sqrt(2 * (1e-3 / 64) * 0.01 / 4e6):.4g} m in every case"
     assert [text.startswith(stated) for text in describe_choices(job)] == [True] * held
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from parcontact.job import Job, Stage
-from parcontact.summary.slide import describe_slide, mean_over_end, measure_slide, ripple
+from parcontact.summary.slide import absolute_errors, describe_slide, mean_errors, mean_over_end, measure_slide, ripple
 
 REST = {"pressure": 1.0, "duration": 1.0, "time_step": 0.5}
 CLIMB = {"pressure": 1.0, "velocity": 2.0, "duration": 0.5, "time_step": 0.1}
@@ -51,6 +51,36 @@ def test_all_stages_at_one_velocity_are_one_slide() -> None:
     assert found.mu_dyn == pytest.approx((3.0 * 1 + 2.0 * 2) / 3, rel=1e-14)  # over the last 3 of 4 m
     assert found.contact_area == pytest.approx(found.mu_dyn / 10, rel=1e-14)
     assert math.isnan(found.contact_area_corrected)
+
+
+def test_rows_that_the_box_cuts_off_do_not_count() -> None:
+    """The results are those of the rows before, and no error is known: the slide is not whole."""
+    table = rows((0, 0, 9), (1, 0, 8), (1.1, 0.2, 3), (1.5, 1, 4), (2.0, 2, 2), (3.0, 4, 7))
+    table |= {"error_friction": [math.nan, 0.5, 0.02, 0.03, 0.01, math.nan], "error_area": [0.1] * 5 + [math.nan]}
+    history, table["contact_area_corrected"] = stages(REST, CLIMB, SETTLE), table["contact_area"]
+    short = {name: column[:-1] for name, column in table.items()}
+    whole, before = measure_slide(history, table), measure_slide(history, short)
+    assert whole is not None
+    assert whole.mu_max == 7.0
+    table["cut_off"] = [0, 0, 0, 0, 0, 1]
+    assert measure_slide(history, table) == before
+    assert absolute_errors(history, short, 0.1).keys() == {"mu_max", "mu_dyn", "contact_area"}
+    assert absolute_errors(history, table, 0.1) == {}
+    assert all(map(math.isnan, mean_errors(history, table).values()))
+    first, *others = said([REST, CLIMB, SETTLE], table)
+    assert first.startswith("in 1 of 5 rows of the slide the contact is cut off by the edge of the box")
+    assert not any("±" in text or "error" in text for text in others)
+    table["cut_off"] = [0, 1, 1, 1, 1, 1]
+    found = measure_slide(history, table)
+    assert found is not None
+    assert all(map(math.isnan, found))
+    assert len(said([REST, CLIMB, SETTLE], table)) == 1
+
+
+def test_the_error_of_the_highest_friction_may_be_unknown() -> None:
+    """As in the row of a snap: it is not 0."""
+    table = rows((0, 0, 0), (0.5, 1, 4), (1.0, 2, 2)) | {"error_friction": [math.nan, math.nan, 0.01]}
+    assert math.isnan(absolute_errors(stages({**CLIMB, "duration": 1.0}), table, 0.1)["mu_max"])
 
 
 @pytest.mark.parametrize("before", [SLOW, BACK])

@@ -23,3 +23,6 @@ class Sections(Protocol):
     @property
     def sticks(self) -> bool:
         """Return True if points stick to the surface before they slide."""
+
+    def asked(self, name: str) -> list[Any]:
+        """Return what the effects whose sections are given have under a name."""

@@ -8,8 +8,8 @@ from operator import itemgetter
 from typing import Any
 
 from ...errors import InputError
-from ..sections.calculation import Body, Grid, Numerics, Output
-from ..sections.geometry import Flat, Rough, RoughSpectrum, Topography
+from ..sections.calculation import Body, Grid, Numerics, Output, Study
+from ..sections.geometry import Flat, OnOneMesh, Rough, RoughSpectrum, Topography
 from ..sections.height_arrays import SAME_CELL, HeightArray
 from ..sections.materials import AnyMaterial, heated
 from ..sections.part import Rule
@@ -113,6 +113,22 @@ def bands_fit(bands: Any, surface: tuple[Any, ...], steady: Steady | None, outpu
         yield Fault("cannot be used with bands: bands.csv has the friction of each band", ("steady", "waves"))
     if output.fields:
         yield Fault("cannot be used with bands: no grid has all waves; leave it out", ("output", "fields"))
+
+
+def study_fits(
+    study: Study | None, grid: Grid, surface: tuple[Any, ...], history: tuple[Stage, ...]
+) -> Iterator[Fault]:
+    """Check that a study has a history to compare, and whole numbers of points on all its meshes."""
+    if study is None:
+        return
+    if not history:
+        yield Fault("compares histories: the job needs a history", ("study",))
+    if study.mesh and any(isinstance(shape, OnOneMesh) for shape in surface):
+        yield Fault("must be left out: the heights of a file are given on one mesh", ("study", "mesh"))
+    for index, mesh in enumerate(study.mesh):
+        if grid.ny > 1 and mesh * grid.ny % grid.nx:
+            sentence = f"must give a whole number of points along y in a box of {grid.nx} x {grid.ny}, got {mesh}"
+            yield Fault(sentence, ("study", "mesh", index))
 
 
 def some_shape(surface: tuple[Any, ...]) -> Iterator[Fault]:

@@ -11,11 +11,12 @@ from itertools import groupby
 from typing import Any
 
 from ...doubts import Doubt
+from ...rubber.shift import doubt_kelvin
 from ..sections.calculation import Grid
 from ..sections.geometry import OnOneMesh, Rough, RoughSpectrum, Sphere, Topography, Wave
 from ..sections.materials import Elastic, PronyBranch, Zener
 from ..sections.stages import Stage
-from . import Sections
+from . import Sections, limits
 
 STEEP = 0.5  # physics: largest rms slope that counts as small
 STEEPEST = 1.0  # physics: radius of contact over radius of the sphere, up to which slopes are small
@@ -80,6 +81,17 @@ def doubt_moduli(material: Elastic | Zener) -> Iterator[Doubt]:
         yield Doubt("hard", "material", {"modulus": modulus, "most": HARDEST})
 
 
+def doubt_temperatures(job: Sections) -> Iterator[Doubt]:
+    """Yield a warning for each key with a temperature that may be in kelvin."""
+    material, steady = job.material, job.steady
+    shift = getattr(material, "shift", None)
+    yield from doubt_kelvin("material.temperature", [getattr(material, "temperature", None)])
+    yield from doubt_kelvin("material.reference", [getattr(material, "reference", None)])
+    yield from doubt_kelvin("material.shift.reference", [getattr(shift, "reference", None)])
+    yield from doubt_kelvin("material.shift.temperatures", getattr(shift, "temperatures", ()))
+    yield from doubt_kelvin("steady.temperatures", (steady.temperatures if steady else None) or ())
+
+
 def instant_contact_modulus(material: Elastic | Zener) -> float:
     """Return the instantaneous contact modulus E* = 2 G/(1 - nu) [Pa], the largest at any time."""
     return 2.0 * material.instant_modulus / (1.0 - material.poisson)
@@ -110,10 +122,11 @@ def _pressures(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
 
 def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) -> Iterator[Doubt]:
     """Yield a warning if the largest load gives less than one point in contact by Persson, erf(sqrt(2) p/(E* h'))."""
-    sticks = getattr(job, "adhesion", None) is not None or any(stage.control == "approach" for stage in job.history)
+    pulled = any(limits.loads_press in lifted for lifted in job.asked("lifts"))
+    pulled |= any(stage.control == "approach" for stage in job.history)
     slopes = [shape.rms_slope or 0.0 if isinstance(shape, Rough) else math.inf for shape in job.surface]
     stiffness = 2.0 * material.long_modulus / (1.0 - material.poisson) * math.hypot(*slopes)
-    known = not sticks and pressure > 0.0 and 0.0 < stiffness < math.inf
+    known = not pulled and pressure > 0.0 and 0.0 < stiffness < math.inf
     touching = math.erf(math.sqrt(2.0) * pressure / stiffness) * math.prod(job.grid.points) if known else 1.0
     if touching < 1.0:
         yield Doubt("light", key, {"pressure": pressure, "touching": touching, "in_mega": 1e6 * pressure})
@@ -171,28 +184,41 @@ def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
 
 
 def _room(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
-    """Yield warnings if the least contact of a single sphere is too large for its radius, or leaves the box."""
+    """Yield warnings if the least contact of a single sphere is too large for its radius, or the relaxed one leaves the
+    box."""
     grid, sphere = job.grid, job.surface[0]
     if len(job.surface) != 1 or not isinstance(sphere, Sphere) or min(grid.points) == 1:
         return
     x, y = sphere.center or (grid.lx / 2, grid.ly / 2)
-    modulus, found = instant_contact_modulus(material), set()
+    modulus, found, elapsed = instant_contact_modulus(material), set(), 0.0
     for index, stage in enumerate(job.history):
+        elapsed += stage.seconds
         x, y = x + stage.velocity[0] * stage.seconds, y + stage.velocity[1] * stage.seconds
         radius = _hertz(stage, sphere.radius, modulus, grid)
         if radius / sphere.radius > STEEPEST and "steep" not in found:
             found.add("steep")
             yield Doubt("large contact", f"history.{index}", {"contact": radius, "radius": sphere.radius})
         room = min(x, grid.lx - x, y, grid.ly - y)
+        radius = _hertz(stage, sphere.radius, _relaxed_contact_modulus(material, elapsed), grid)
         if radius > room and radius > 0.0 and "room" not in found:
             found.add("room")
             kind = "slides out of the box" if stage.speed and stage.seconds else "out of the box"
-            numbers = {"contact": radius, "lx": grid.lx, "ly": grid.ly, "x": x, "y": y}
+            numbers = {"contact": radius, "lx": grid.lx, "ly": grid.ly, "x": x, "y": y, "room": max(room, 0.0)}
             yield Doubt(kind, f"history.{index}", numbers)
 
 
+def _relaxed_contact_modulus(material: Elastic | Zener, seconds: float) -> float:
+    """Return E*(t) [Pa] after `seconds` of relaxation. Under a constant load 1/E*(t) bounds the creep compliance from
+    above, and with it the contact."""
+    modulus = material.long_modulus
+    for branch in material.branches:
+        ratio = seconds / (material.time_factor * branch.relaxation_time) if branch.relaxation_time else math.inf
+        modulus += material.modulus_factor * (branch.instant_modulus - branch.long_modulus) * math.exp(-ratio)
+    return 2.0 * max(modulus, LEAST * material.instant_modulus) / (1.0 - material.poisson)
+
+
 def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
-    """Return the contact radius [m] at the end of a stage by Hertz (1882), a lower bound for a creeping body."""
+    """Return the contact radius [m] at the end of a stage by Hertz (1882) for a contact modulus [Pa]."""
     if stage.control == "approach":
         return math.sqrt(max(stage.load.end, 0.0) * radius)
     force = _mean(stage, stage.load.end, grid) * grid.lx * grid.ly

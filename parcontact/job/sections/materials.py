@@ -114,6 +114,7 @@ class Elastic(Part):
     hardness: Hardness = None
 
     branches: ClassVar[tuple[()]] = ()
+    remembers: ClassVar[bool] = False
     time_factor: ClassVar[float] = 1.0
     modulus_factor: ClassVar[float] = 1.0
     foreign = dict.fromkeys(YOUNG, Instead(BY_THREE.format("shear_modulus"), ("shear_modulus",)))
@@ -217,6 +218,11 @@ class Zener(Part):
     def fitted(self) -> Zener:
         """Return the body itself."""
         return self
+
+    @property
+    def remembers(self) -> bool:
+        """Return True if the body relaxes."""
+        return bool(self.branches)
 
     @property
     def time_factor(self) -> float:

@@ -25,7 +25,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, ErrorDetails
 
-from ..text.fault import AT_KEY, AT_VALUE, Fault, closest, did_you_mean, in_si, list_words, quote, refuse
+from ..text.fault import AT_KEY, AT_VALUE, Fault, closest, did_you_mean, in_si, is_storable, list_words, quote, refuse
 from ..text.overrides import Included
 from .quantities import from_home
 
@@ -104,6 +104,8 @@ class Part(BaseModel):
             return data
         if not isinstance(data, dict):
             refuse(Fault(f"must be a mapping of keys, got {quote(data)}"))
+        if odd := [key for key in data if isinstance(key, str) and not is_storable(key)]:
+            refuse(*(Fault("is not a known key", (key,), at_key=True) for key in odd))
         known = cls.words()  # a key without a value is absent if it is known, and a mistake otherwise
         given = {key: value for key, value in data.items() if value is not None or key not in known}
         filled = cls.filled(dict(given), info.context)

@@ -13,6 +13,7 @@ from .quantities import Count, Positive, Whole, both
 
 Auto = Literal["auto"]
 AUTO: Auto = "auto"
+LEAST_WAVES = 2  # longest waves along a box whose cells of wavenumbers do not reach 0
 LEAST_CELLS = 2.0  # accuracy: least cells per shortest wave of a band (Nyquist)
 
 
@@ -25,8 +26,8 @@ class Bands(Part):
     points: Annotated[tuple[Count, Count], BeforeValidator(both)] | None = Field(
         default=None, description="a positive whole number of points"
     )
-    waves: Annotated[Whole, Field(ge=1)] | None = Field(
-        default=None, description="a positive whole number of the longest waves of a band along a side of its box"
+    waves: Annotated[Whole, Field(ge=LEAST_WAVES)] | None = Field(
+        default=None, description="a whole number of at least 2 of the longest waves of a band along a side of its box"
     )
     samples: Count | None = Field(default=None, description="a positive whole number of surfaces of each band")
     cutoff_slope: Positive | None = Field(default=None, description="a positive rms slope [-]")

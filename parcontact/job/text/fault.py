@@ -51,6 +51,11 @@ def shorten(text: str, most: int = 200) -> str:
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"
 
 
+def is_storable(text: str) -> bool:
+    """Return False for a text with half of a surrogate pair, which UTF-8 does not have."""
+    return text.isascii() or not re.search("[\ud800-\udfff]", text)
+
+
 def quote(value: Any) -> str:
     """Return a value as shown after "got"."""
     if value is None or isinstance(value, dict):

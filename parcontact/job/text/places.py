@@ -26,7 +26,8 @@ class Mistake(NamedTuple):
     sentence: str
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.sentence}" if self.place.origin else self.sentence
+        text = f"{self.place}: {self.sentence}" if self.place.origin else self.sentence
+        return text.encode(errors="backslashreplace").decode()  # without halves of surrogate pairs
 
 
 class _Unreadable:

@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from .fault import shorten
+from .fault import is_storable, shorten
 from .places import UNREADABLE, Key, Place, Source
 
 YAML_TAG = "tag:yaml.org,2002:"
@@ -162,7 +162,7 @@ class _Reader:
         for key, child in node.value:
             if key.tag == YAML_TAG + "merge":
                 merged += child.value if isinstance(child, yaml.SequenceNode) else [child]
-            elif not isinstance(key, yaml.ScalarNode) or key.tag != YAML_TAG + "str" or _follows_a_comma(key, child):
+            elif not isinstance(key, yaml.ScalarNode) or key.tag != YAML_TAG + "str" or _is_no_word(key, child):
                 got = repr(shorten(key.value)) if isinstance(key, yaml.ScalarNode) else "a list or a mapping"
                 comma = "; write decimals with a point" if _follows_a_comma(key, child) else ""
                 self.refuse(key, f"a key must be a word, got {got}{comma}")
@@ -177,6 +177,10 @@ class _Reader:
             else:
                 self.refuse(other, "<< must be a mapping, or a list of mappings")
         return found
+
+
+def _is_no_word(key: yaml.ScalarNode, child: yaml.Node) -> bool:
+    return not is_storable(key.value) or _follows_a_comma(key, child)
 
 
 def _follows_a_comma(key: yaml.Node, child: yaml.Node) -> bool:

@@ -1,0 +1,3 @@
+"""Adhesion: surfaces that attract each other."""
+
+SECTION, EFFECT = "adhesion", "AdhesionColumns"

@@ -1,0 +1,244 @@
+"""Adhesion: surfaces that attract each other (`attraction`, `gap_solver`), its section, columns and warnings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from ...columns import added_by
+from ...doubts import Doubt
+from ...job.checks import limits
+from ...job.sections.geometry import Sphere, Wave
+from ...job.sections.part import Part, Rule
+from ...job.text.fault import Fault
+from ...parallel.slab import Array
+from ...physics.body import remembers
+from ...physics.entries import Entry, Saved
+from ...physics.units import Units
+from ...solve.constraint import Mask
+from ..contact_protocol import ContactLaw, Detached
+from ..effect import BY_THEORY, EXTRAPOLATION, SINGLE, TOLERANCES, Changes, Decision, Effect, Instant
+from . import adhesive_energies
+from .adhesion_doubts import doubt_range, doubts_of_adhesion
+from .adhesive_energies import NO_ENERGIES, AdhesiveEnergies
+from .attraction import cell_of, modulus_of, smallest_range
+from .law import Law
+from .section import AUTO, Adhesion, adhesion_law, chosen_range
+
+MOST_CELLS = 2.0  # physics: largest cell over the process zone of a viscoelastic body
+SAME = 1e-9  # rounding: relative tolerance on a range
+JKR_LIKE, DMT_LIKE = 3.0, 0.3  # physics: Tabor's parameter above and below which these theories hold
+FULL_CONTACT = 0.56988  # physics: least Johnson's parameter for full contact of a wave without load
+SNAP_FRONT = 2.0  # accuracy: motion of an edge [half process zones] above which the shortest step is a snap
+
+
+def _bodies(adhesion: Adhesion | None, material: Any) -> Iterator[Fault]:
+    if adhesion is None:
+        return
+    if material.hardness is not None:
+        yield Fault("cannot be used with adhesion: leave one of them out", ("material", "hardness"))
+    if adhesion.range == AUTO and material.fitted.long_modulus == 0.0:
+        yield Fault("must be a length [m] for a body without long-term modulus, got auto", ("adhesion", "range"))
+
+
+def _zone_is_resolved(adhesion: Adhesion | None, grid: Any, material: Any) -> Iterator[Fault]:
+    """Refuse viscoelastic bodies whose process zone the mesh does not resolve."""
+    if adhesion is None or grid is None or not material.fitted.branches:
+        return
+    if adhesion.range == AUTO or material.fitted.long_modulus == 0.0:
+        return
+    cell, modulus = cell_of(grid), modulus_of(material)
+    least = smallest_range(adhesion.work, modulus, cell, 1.0 / MOST_CELLS)
+    if float(adhesion.range) < least * (1.0 - SAME):
+        sentence = (
+            f"must be at least {least:.3g} m for a viscoelastic body on cells of {cell:.3g} m, got {adhesion.range:g}: "
+            f"with less the mesh pins the edges of contact, and the rate of pulling has no meaning"
+        )
+        yield Fault(sentence, ("adhesion", "range"))
+
+
+def _facts(job: Any) -> Iterator[str]:
+    law, modulus, cell = adhesion_law(job.adhesion, job.grid, job.material), modulus_of(job.material), cell_of(job.grid)
+    assert law is not None
+    if modulus == 0.0:
+        yield "adhesion: a body without long-term modulus has no process zone of its own"
+        return
+    zone = law.process_zone(modulus)
+    yield (
+        f"adhesion: range {law.range:.4g} m, strength {law.strength:.4g} Pa, process zone l = {zone:.4g} m, "
+        f"cell h = {cell / zone:.3g} l; rates are velocity times relaxation time over l"
+    )
+    at_once = float(2.0 * job.material.fitted.instant_modulus / (1.0 - job.material.poisson))
+    for index, shape in enumerate(job.surface):
+        if isinstance(shape, Sphere):
+            slow, fast = law.tabor(modulus, shape.radius), law.tabor(at_once, shape.radius)
+            yield f"surface.{index}: Tabor's parameter {slow:.3g}{_also(slow, fast)}: {_kind(slow)}"
+        elif isinstance(shape, Wave) and any(shape.waves) and shape.amplitude:
+            length = 1.0 / math.hypot(*(count / size for count, size in zip(shape.waves, job.grid.size, strict=True)))
+            slow, fast = (law.johnson(each, length, shape.amplitude) for each in (modulus, at_once))
+            full = "full contact without load" if slow > FULL_CONTACT else "no full contact without load"
+            yield f"surface.{index}: Johnson's parameter {slow:.3g}{_also(slow, fast)}: {full}"
+
+
+def _also(slow: float, fast: float) -> str:
+    return "" if math.isclose(slow, fast) else f" relaxed, {fast:.3g} at once"
+
+
+def _kind(tabor: float) -> str:
+    if tabor > JKR_LIKE:
+        return "as in the theory of Johnson, Kendall and Roberts, pull-off near 1.5 pi w R"
+    if tabor < DMT_LIKE:
+        return "as in that of Derjaguin, Muller and Toporov, pull-off near 2 pi w R"
+    return "between the theories of Johnson, Kendall and Roberts (1.5 pi w R) and of Derjaguin, Muller and Toporov (2)"
+
+
+@dataclass(frozen=True)
+class AdhesionMemory:
+    """Memory of energies, of the number of steps in which the contact `snaps`, of the warning about fronts, and of the
+    values of the columns."""
+
+    energies: AdhesiveEnergies = NO_ENERGIES
+    snaps: int = 0
+    front_warning_given: bool = False
+    columns: tuple[float, ...] = (0.0, 0.0, math.nan, math.nan, math.nan)
+
+
+def _no_strip(adhesion: Any, grid: Any) -> Iterator[Fault]:
+    return limits.no_strip("adhesion", grid) if adhesion is not None else iter(())
+
+
+def _no_bands(adhesion: Any, bands: Any) -> Iterator[Fault]:
+    if adhesion is not None and bands is not None:
+        yield Fault("cannot be used with bands: they are coupled by pressures alone", ("adhesion",))
+
+
+class AdhesionColumns(Effect[AdhesionMemory]):
+    """Columns: share of the area under tension, force of all tension [N], energy of the surfaces [J], energy lost in
+    snaps [J], and error of energies [J]."""
+
+    section: ClassVar[type[Part]] = Adhesion
+    columns: ClassVar[tuple[str, ...]] = added_by("adhesion")
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(("adhesion", "material"), _bodies),
+        Rule(("adhesion", "grid", "material"), _zone_is_resolved),
+        Rule(("adhesion", "bands"), _no_bands),
+        Rule(("adhesion", "grid"), _no_strip),
+    )
+    lifts: ClassVar[tuple[Any, ...]] = (limits.loads_press, limits.some_load)
+    forbids: ClassVar[Mapping[str, str]] = {
+        EXTRAPOLATION: "contacts with adhesion start from the last gaps",
+        TOLERANCES: "contacts with adhesion are solved to the tolerance of the job",
+        SINGLE: "contacts with adhesion are solved in double precision",
+        BY_THEORY: "the theory excludes adhesion: leave out the section adhesion",
+    }
+
+    @staticmethod
+    def remembers(job: Any) -> bool:
+        return True
+
+    @staticmethod
+    def compares_heights(job: Any) -> bool:
+        return True
+
+    @staticmethod
+    def chosen_values(job: Any) -> Mapping[str, float]:
+        """Return the range that `auto` has on the mesh of the job."""
+        reach = chosen_range(job)
+        return {} if reach is None else {"adhesion.range": reach}
+
+    @staticmethod
+    def doubt_heights(job: Any, span: float) -> Iterator[Doubt]:
+        law = adhesion_law(job.adhesion, job.grid, job.material)
+        assert law is not None
+        yield from doubt_range(law, span)
+
+    @staticmethod
+    def ended(job: Any, saved: Saved) -> Detached | None:
+        from .adhesive_law import end_of  # what solves is not loaded to check a job
+
+        return end_of(job, saved)
+
+    @staticmethod
+    def touches(job: Any, pressure: Array, gap: Array) -> Mask:
+        return Law.touches(gap)
+
+    @staticmethod
+    def decide(job: Any) -> Decision:
+        section: Adhesion | None = job.section("adhesion")
+        if section is None:
+            return Decision("adhesion", False, "there is no adhesion section")
+        law = adhesion_law(section, job.grid, job.material)
+        assert law is not None
+        return Decision("adhesion", True, f"{law.work:g} J/m^2 over a range of {law.range:.4g} m ({law.kind})")
+
+    @staticmethod
+    def doubts(job: Any) -> Iterator[Doubt]:
+        """Yield warnings about physically implausible values, and about a mesh that does not resolve the attraction."""
+        law = adhesion_law(job.adhesion, job.grid, job.material)
+        assert law is not None
+        modulus, cell = modulus_of(job.material), cell_of(job.grid)
+        zone = law.process_zone(modulus)
+        yield from doubts_of_adhesion(job, law, modulus, cell)
+        if 0.0 < zone < cell * (1.0 - SAME):
+            least = smallest_range(law.work, modulus, cell, 1.0)
+            numbers = {"cell": cell, "ratio": cell / zone, "enough": least, "zone": zone}
+            yield Doubt("coarse process zone", "adhesion", numbers)
+
+    @staticmethod
+    def facts(job: Any) -> Iterator[str]:
+        """Yield sentences on the process zone, Tabor's and Johnson's parameters."""
+        yield from _facts(job)
+
+    def __init__(self, scene: Any) -> None:
+        self._scene, self._area = scene, scene.choices.grid.lx * scene.choices.grid.ly
+
+    def law(self) -> ContactLaw[Any]:
+        from .adhesive_law import AdhesiveLaw  # what solves is not loaded to check a job
+
+        return AdhesiveLaw(self._scene)
+
+    def at_rest(self) -> AdhesionMemory:
+        return AdhesionMemory()
+
+    def follow(self, instant: Instant, memory: AdhesionMemory) -> Changes[AdhesionMemory]:
+        """Return the energies after a step. Errors are not stated across a snap. The first step in which edges of
+        contact of a viscoelastic body move too far gives a warning."""
+        solved, energies = instant.solved, memory.energies
+        columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan, math.nan
+        if self._scene.energy is not None:
+            if solved.end != "open":
+                energies = adhesive_energies.advance_energies(energies, instant, self._area)
+            columns = (*columns[:2], energies.surfaces, energies.lost, energies.error)
+        far = instant.front > SNAP_FRONT and not instant.untouched
+        chosen = instant.step.decide is not None
+        snapped = solved.snapped or (chosen and far)
+        snapped |= energies.lost > memory.energies.lost and not instant.untouched
+        warns = far and not (chosen or memory.front_warning_given or instant.step.jump)
+        warns = warns and remembers(self._scene.material)
+        memory = AdhesionMemory(energies, memory.snaps + snapped, memory.front_warning_given or warns, columns)
+        remark = (
+            f"the edge of contact moves by {0.5 * instant.front:.2g} times a process zone, and rates are resolved up "
+            "to half of one: use shorter steps, or time_step: auto; further steps are not checked"
+        )
+        return Changes(memory, remark if warns else "", not snapped)
+
+    def last_lines(self, memory: AdhesionMemory) -> Iterator[str]:
+        if memory.snaps:
+            yield f"the contact snapped in {memory.snaps} of the steps; no error is stated for them"
+
+    def values(self, memory: AdhesionMemory) -> Sequence[float]:
+        return memory.columns
+
+    def work(self, memory: AdhesionMemory) -> float:
+        return memory.energies.work
+
+    def entries(self, memory: AdhesionMemory, units: Units) -> dict[str, Entry]:
+        """Return the energies, and the number of steps in which the contact snapped."""
+        energies = {name: Entry(value, 1.0, "J") for name, value in memory.energies._asdict().items()}
+        return energies | {"snaps": Entry(float(memory.snaps))}
+
+    def restored(self, memory: AdhesionMemory, saved: Saved) -> AdhesionMemory:
+        energies = AdhesiveEnergies(*(float(saved[name]) for name in AdhesiveEnergies._fields))
+        return AdhesionMemory(energies, int(saved["snaps"]))

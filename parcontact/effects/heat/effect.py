@@ -1,0 +1,321 @@
+"""Heat of sliding: temperatures of the rubber below the contact (`effects.heat.heat`, `effects.heat.heat_memory`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import DTypeLike
+from pydantic import Field
+
+from ...accuracy.constants import FLASH
+from ...columns import added_by
+from ...errors import InputError, RunError
+from ...history.timeline import Timeline
+from ...job import Grid
+from ...job.added_sections import effects_of
+from ...job.checks import limits
+from ...job.sections.part import Part, Rule
+from ...job.sections.quantities import Positive
+from ...job.text.fault import Fault
+from ...parallel import spectra
+from ...parallel.fft import Spectrum
+from ...parallel.slab import Array
+from ...physics.entries import Entry, Saved
+from ...physics.exponentials import Exponentials, fit_exponentials
+from ...physics.prony import Prony
+from ...physics.units import Units
+from ..effect import Changes, Decision, Effect, Instant
+from ..relaxation import factor_at, feeds_back, temperature_of
+from .heat import Conductor, Depths, depths_of
+from .heat_memory import Heating, HeatMemory
+
+LOOSEST, SHARE = 1e-3, 0.1  # accuracy: error of the memory of heat: at most, and as a share of the job's accuracy
+DECAYED = 10.0  # accuracy: duration of the memory of heat over the diffusion time of the longest wave
+
+
+def _shifts(thermal: Thermal | None, material: Any) -> Iterator[Fault]:
+    if thermal is not None and thermal.feedback != "none" and math.isnan(temperature_of(material)):
+        yield Fault(
+            "needs a material whose relaxation times depend on temperature: give material a shift, or feedback: none",
+            ("thermal", "feedback"),
+        )
+
+
+def _no_warm_start(thermal: Thermal | None, initial: Any) -> Iterator[Fault]:
+    if thermal is not None and thermal.feedback != "none" and initial.state == "steady":
+        yield Fault("cannot be used with thermal.feedback: slide into the steady state with a stage", ("initial",))
+
+
+def _in_curves(thermal: Thermal | None, history: Any, grid: Grid, bands: Any) -> Iterator[Fault]:
+    if thermal is None or thermal.counterbody is None:
+        return
+    if bands is not None:
+        yield Fault("cannot be used with bands: all heat goes into the rubber", ("thermal", "counterbody"))
+    if history:
+        yield Fault(
+            "is for friction curves: leave out the history, or the counterbody, and all heat goes into the rubber",
+            ("thermal", "counterbody"),
+        )
+    if grid.boundary == "free":
+        yield Fault("needs grid.boundary: periodic", ("thermal", "counterbody"))
+
+
+def _no_strip_of_heat(thermal: Thermal | None, grid: Grid) -> Iterator[Fault]:
+    return limits.no_strip("thermal", grid) if thermal is not None else iter(())
+
+
+class Counterbody(Part):
+    """The rigid body as a conductor of heat."""
+
+    label: ClassVar[str] = "counterbody"
+    conductivity: Positive = Field(description="a positive conductivity of the rigid body [W/(m K)]")
+    diffusivity: Positive = Field(description="a positive thermal diffusivity of the rigid body [m^2/s]")
+
+    @property
+    def conductor(self) -> Conductor:
+        """The rigid body as a conductor."""
+        return Conductor(self.conductivity, self.diffusivity)
+
+
+class Thermal(Part):
+    """The `thermal` section: conduction of heat in the rubber, and whether warm rubber relaxes faster."""
+
+    label: ClassVar[str] = "thermal"
+    conductivity: Positive = Field(description="a positive conductivity of the rubber [W/(m K)]")
+    diffusivity: Positive = Field(description="a positive thermal diffusivity of the rubber [m^2/s]")
+    feedback: Literal["none", "mean"] = "none"
+    distance: Positive | None = Field(default=None, description="a positive distance [m]")
+    counterbody: Counterbody | None = Field(default=None, description="a mapping with conductivity and diffusivity")
+
+    @property
+    def conductor(self) -> Conductor:
+        """The rubber as a conductor."""
+        return Conductor(self.conductivity, self.diffusivity)
+
+    def sliding_time(self, grid: Grid, speed: float) -> float:
+        """Return the time [s] for which steady sliding has warmed the rubber: over the distance, or once through a
+        periodic box; infinite in a free one."""
+        free = grid.boundary == "free"
+        return (self.distance or (math.inf if free else max(grid.size))) / speed
+
+
+def exponentials_of(job: Any) -> Exponentials:
+    """Return the sum of exponentials of a job, from its shortest sliding step to the diffusion time of the longest
+    wave."""
+    body = job.section("thermal").conductor
+    longest = DECAYED / (body.diffusivity * (2.0 * np.pi / max(job.grid.size)) ** 2)
+    steps, slides = [longest / 10.0], False
+    for span in Timeline.from_job(job).spans:
+        slides = slides or span.moves
+        if slides and span.count:
+            steps += span.extremes
+    return fit_exponentials(
+        min(step for step in steps if step > 0.0), longest, min(LOOSEST, SHARE * job.numerics.asked.strictest)
+    )
+
+
+@dataclass(frozen=True)
+class ThermalMemory:
+    """Memory of heat: the waves of `heat`; the map `rise` of the surface [K]; the flash temperature and the highest
+    rise [K]; the force of the body [N] and the contact area at the end of the last step; whether there was any heat;
+    the depths of the last heat and the share of it in the body; and the relative error of friction, infinite if
+    unknown."""
+
+    heat: HeatMemory
+    rise: Array
+    flash: float = 0.0
+    highest: float = 0.0
+    force: tuple[float, float] = (0.0, 0.0)
+    area: float = 0.0
+    warmed: bool = False
+    depths: Depths = field(default_factory=lambda: Depths(np.zeros(0), np.zeros(0)))
+    share: float = 0.0
+    error: float = math.inf
+
+
+def _rubs(job: Any) -> bool:
+    """Return whether the contact area itself makes heat, by the shear of any effect or by sticking."""
+    effects = effects_of(type(job).model_fields).values()
+    shears = (effect.shear(job) is not None for effect in effects if effect.decide(job).on)
+    return any(shears) or job.sticks
+
+
+class ThermalColumns(Effect[ThermalMemory]):
+    """Columns: the mean temperature rise of the contact, weighted by heat, and the highest rise of the surface [K].
+
+    At rest the weights are taken from the last sliding.
+    """
+
+    section: ClassVar[type[Part]] = Thermal
+    columns: ClassVar[tuple[str, ...]] = added_by("thermal")
+    fields: ClassVar[tuple[str, ...]] = ("temperature",)
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(("thermal", "material"), _shifts),
+        Rule(("thermal", "initial"), _no_warm_start),
+        Rule(("thermal", "history", "grid", "bands"), _in_curves),
+        Rule(("thermal", "grid"), _no_strip_of_heat),
+    )
+    lifts: ClassVar[tuple[Any, ...]] = (limits.no_temperature,)
+
+    @staticmethod
+    def decide(job: Any) -> Decision:
+        section: Thermal | None = job.section("thermal")
+        if section is None:
+            return Decision("thermal", False, "there is no thermal section")
+        why = f"feedback is {section.feedback}"
+        return Decision("thermal", True, f"{why}; {exponentials_of(job).kept} exponentials" if job.history else why)
+
+    @staticmethod
+    def facts(job: Any) -> Iterator[str]:
+        """Yield a sentence on the distance of steady sliding if the job gives none."""
+        if job.section("thermal").distance is None:
+            free = job.grid.boundary == "free"
+            way = "without end" if free else f"{max(job.grid.size):g} m, the longer side of the box, since it was cold"
+            way = "the box of the coarsest band, since it was cold" if job.bands is not None else way
+            yield f"thermal.distance is not given: in friction curves the rubber has slid {way}"
+
+    @staticmethod
+    def maps(job: Any) -> Sequence[DTypeLike]:
+        """Return the types of the map of temperatures, and of those that hold its spectra in a checkpoint."""
+        count = 2 + exponentials_of(job).kept
+        return [np.float64] * (count + _rubs(job) + math.ceil(count / spectra.per_map(job.grid.nx)))
+
+    def __init__(self, scene: Any) -> None:
+        self._setup, self._slab, self._job = scene.setup, scene.slab, scene.job
+        self._feeds_back = feeds_back(scene.job)
+        self._rubs, self._pulled = _rubs(scene.job), scene.job.section("adhesion") is not None
+
+    def at_rest(self) -> ThermalMemory:
+        job, fft = self._job, self._setup.fft
+        body = job.section("thermal").conductor
+        heat = HeatMemory(fft, job.grid.size, body, exponentials_of(job), self._rubs)
+        return ThermalMemory(heat, self._slab.zeros())
+
+    def follow(self, instant: Instant, memory: ThermalMemory) -> Changes[ThermalMemory]:
+        """Return the temperatures after a step; the waves of heat and the map of temperatures are advanced in place."""
+        step, pressure = instant.step, instant.pressure
+        if self._pulled:
+            pressure = np.maximum(pressure, 0.0)
+        rubbed = np.where(instant.touching, 1.0, 0.0) if self._rubs else None
+        if instant.sheared is not None:
+            rubbed = instant.sheared.slipping
+        sums = [0.0 if one is None else float(one.sum(dtype=np.float64)) for one in (rubbed, pressure)]
+        of_rubbed, of_pressure = (self._slab.points / one if one > 0.0 else 0.0 for one in self._slab.sum(*sums))
+        scales = of_rubbed, of_pressure
+        begins = any(step.velocity) and not memory.warmed
+        now = replace(memory, warmed=memory.warmed or begins)
+        heating, now = self._heat(instant, now)
+        if begins or (now.warmed and not step.dt):
+            now.heat.set_heating(rubbed, pressure, scales)
+        if now.warmed and step.dt:
+            pressed = self._setup.fft.forward(pressure)
+            if any(step.velocity):
+                at = self._setup.half_space, self._setup.units.length, step.velocity, self._prony(memory)
+                share = heating.pressed[1] / (heating.whole[1] or 1.0)
+                now = replace(now, depths=depths_of(pressed, self._setup.fft, *at), share=share)
+                now = replace(now, error=instant.error_friction)
+            heating = replace(heating, depths=now.depths)
+            inside = now.heat.advance(step.dt, heating, rubbed, pressed, scales, now.rise)
+            outside = 0.0 if rubbed is None else float((now.rise * rubbed).sum()) * scales[0] / self._slab.points
+            outside, highest = self._slab.reduce([outside], [float(now.rise.max(initial=-math.inf))])
+            now = replace(now, flash=now.share * inside + (1.0 - now.share) * outside, highest=highest)
+        return Changes(now)
+
+    def _prony(self, memory: ThermalMemory) -> Prony:
+        """Return the relaxation function of the last step, in the run's units."""
+        cold = self._setup.prony
+        return cold._replace(relaxation_times=cold.relaxation_times * self.time_factor(memory))
+
+    def time_factor(self, memory: ThermalMemory) -> float:
+        """Return relaxation times at the flash temperature over the relaxation times of the job, if the job has
+        feedback. Raises RunError."""
+        if not (self._feeds_back and memory.warmed):
+            return 1.0
+        try:
+            return factor_at(self._job.material, memory.flash)
+        except InputError as error:
+            raise RunError(f"the flash temperature is outside the range of the material's shift: {error}") from None
+
+    def _heat(self, instant: Instant, memory: ThermalMemory) -> tuple[Heating, ThermalMemory]:
+        """Return the heat of a step from the forces at both ends, and the memory with those of its end."""
+        measures, velocity, sheared = instant.measures, instant.step.velocity, instant.sheared
+        speed, box = math.hypot(*velocity), self._setup.grid.lx * self._setup.grid.ly
+        own = measures.force_interface
+        along = tuple(own * each / (speed or 1.0) for each in velocity)
+        force = measures.force_x + along[0], measures.force_y + along[1]
+        pressed = tuple(max(0.0, -float(np.dot(each, velocity))) / box for each in (memory.force, force))
+        share = memory.area / measures.contact_area if measures.contact_area > 0.0 else 0.0
+        rubbed = own * speed / box * (share if memory.warmed else 1.0), own * speed / box
+        if sheared is not None:
+            mean = sheared.lost / (box * instant.step.dt) if instant.step.dt else 0.0
+            rubbed = mean, mean
+        return Heating(rubbed, pressed), replace(memory, force=force, area=measures.contact_area)
+
+    def values(self, memory: ThermalMemory) -> Sequence[float]:
+        """Return the flash temperature, the highest rise, and the relative error of the former, FLASH times that of
+        friction; NaN if unknown."""
+        known = memory.flash != 0.0 and math.isfinite(memory.error)
+        return memory.flash, memory.highest, FLASH.value * memory.error if known else math.nan
+
+    def field(self, memory: ThermalMemory, name: str) -> Array:
+        """Return this rank's rows of the temperature rise [K]."""
+        return memory.rise.copy()
+
+    # -- checkpoints --------------------------------------------------------------------------------------------------
+
+    def entries(self, memory: ThermalMemory, units: Units) -> dict[str, Entry]:
+        """Return the map, all spectra as maps, and their columns without room there; collective."""
+        known, depths = memory.heat.sum, memory.depths
+        found = {
+            "rise": Entry(memory.rise, 1.0, "K"),
+            "mean": Entry(memory.heat.mean.waves, 1.0, "J/m^2"),
+            "flash temperature": Entry(memory.flash, 1.0, "K"),
+            "highest temperature": Entry(memory.highest, 1.0, "K"),
+            "force": Entry(np.array(memory.force), 1.0, "N"),
+            "is warmed": Entry(float(memory.warmed)),
+            "contact area": Entry(memory.area),
+            "share of the body": Entry(memory.share),
+            "error of friction": Entry(memory.error, optional=True),
+            "depths": Entry(np.concatenate([depths.wavenumbers, depths.shares])),
+            "grid": Entry(np.array([known.first, known.spacing]), given=True),
+        }
+        per = spectra.per_map(self._slab.nx)
+        columns = spectra.edges(self._slab.nx)
+        for number, name, spectrum in self._spectra(memory):
+            rest = found.setdefault(f"edges {number // per}", Entry(np.zeros(self._slab.shape), optional=True))
+            where, field = columns * (number % per), np.empty(self._slab.shape)
+            spectra.to_map(self._setup.fft, spectrum, field, np.asarray(rest.value)[:, where : where + columns])
+            found[name] = Entry(field, optional=True)
+        return found
+
+    def _spectra(self, memory: ThermalMemory) -> Iterator[tuple[int, str, Spectrum]]:
+        """Yield all spectra with a number and a name; additional waves along the depth come last."""
+        yield 0, "pressed", memory.heat.pressed
+        if self._rubs:
+            yield 1, "rubbed", memory.heat.rubbed
+        yield from ((2 + number, f"wave {number}", wave) for number, wave in enumerate(memory.heat.waves))
+
+    def restored(self, memory: ThermalMemory, saved: Saved) -> ThermalMemory:
+        """Return the memory of a checkpoint; collective. Missing waves, of shorter steps than before, start at 0."""
+        per, columns = spectra.per_map(self._slab.nx), spectra.edges(self._slab.nx)
+        for number, name, spectrum in self._spectra(memory):
+            if name in saved:
+                rest, where = saved[f"edges {number // per}"], columns * (number % per)
+                spectra.from_map(self._setup.fft, saved[name], rest[:, where : where + columns], spectrum)
+        memory.heat.mean.waves[...] = saved["mean"]
+        x, y = saved["force"].tolist()
+        return replace(
+            memory,
+            flash=float(saved["flash temperature"]),
+            highest=float(saved["highest temperature"]),
+            force=(x, y),
+            area=float(saved["contact area"]),
+            warmed=bool(saved["is warmed"]),
+            share=float(saved["share of the body"]),
+            error=float(saved.get("error of friction", math.inf)),
+            depths=Depths(*np.split(np.array(saved["depths"]), 2)),
+        )

@@ -1,0 +1,159 @@
+"""Temperatures of steady sliding: the map below the contact, and the one temperature of the rubber that follows.
+
+The map is exact for its heat (`heat`, `flash`). With feedback all rubber relaxes as at the flash
+temperature, `T = T_0 + F(T)`: a fixed point, found by secants within a bracket. Each round is a steady state.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from ...doubts import Doubt
+from ...errors import RunError
+from ...job import Job, Zener
+from ...parallel.slab import Array
+from ...physics.measures import Measures
+from ...scene import Setup
+from ...solve.constraint import Mask
+from ...steady_sliding.point import Point
+from ..relaxation import feeds_back, temperature_of
+from .effect import Thermal
+from .flash import Flash, flash_of, share_of, spread_over
+from .heat import depths_of, sliding_heat
+from .heat_unbounded import sliding_heat_unbounded
+
+MOST_ROUNDS = 10  # tuning: limit on the rounds of the fixed point
+LEAST_ERROR = 0.02  # accuracy: least error of the flash temperature [K]
+FINEST, COARSEST = 1e-3, 3e-2  # accuracy: limits on its relative error
+HOTTEST = 200.0  # physics: rise of the temperature [K] above which rubber decomposes
+Vector = tuple[float, float]
+
+
+def find_temperatures(
+    setup: Setup,
+    section: Thermal,
+    pressure: Array,
+    touching: Mask,
+    measures: Measures,
+    friction: float,
+    velocity: Vector,
+) -> tuple[Flash, Array]:
+    """Return the temperatures of a steady state, and this rank's rows of the map of rises [K]; collective.
+
+    `pressure` is a map in the run's units, `touching` is not 0 where the surfaces touch, and `friction` is the
+    friction of the body, without the interface.
+    """
+    slab, fft, size, speed = setup.slab, setup.fft, setup.grid.size, math.hypot(*velocity)
+    if not speed:  # no dissipation
+        return Flash(), slab.zeros()
+    place = fft, size, section.conductor, velocity
+    made = sliding_heat_unbounded if setup.half_space.free else sliding_heat
+    operator = partial(made, *place, time=section.sliding_time(setup.grid, speed))
+    surface, inside, pairs = slab.zeros(), slab.zeros(), list[tuple[Array, Array]]()
+    at = setup.half_space, setup.units.length, velocity, setup.prony
+    depths = depths_of(fft.forward(pressure), fft, *at)
+    if (power := friction * measures.pressure * speed) > 0.0:  # [W/m^2], mean over the box
+        heat = spread_over(slab, pressure, power)
+        surface += operator(depths).apply(heat, slab.empty())
+        inside += operator(depths, felt=True).apply(heat, slab.empty())
+        pairs.append((inside, heat))
+    if (power := measures.friction_interface * measures.pressure * speed) > 0.0:
+        rubbed = spread_over(slab, np.where(touching, 1.0, 0.0), power)
+        rise = operator().apply(rubbed, slab.empty())
+        if section.counterbody is not None:
+            still = sliding_heat(fft, size, section.counterbody.conductor, (0.0, 0.0), time=operator.keywords["time"])
+            share = share_of(slab, rubbed, rise, surface, still.apply(rubbed, slab.empty()))
+            rubbed, rise = share * rubbed, share * rise
+        surface += rise
+        inside += operator(depths).apply(rubbed, slab.empty())
+        pairs.append((surface, rubbed))
+    return flash_of(slab, surface, pairs), surface
+
+
+class Feedback:
+    """The fixed point of the temperature. The first round is for the cold body; the second starts from the last
+    fixed point if only the velocity differs."""
+
+    def __init__(self) -> None:
+        self._speed, self._rise, self._place = 1.0, 0.0, (math.nan, math.nan)
+
+    def solve_fixed_point(
+        self, warmed: Callable[[float], Point], speed: float, place: Vector, tolerance: float, most: float = math.inf
+    ) -> Point:
+        """Return the point `warmed(rise)` whose flash temperature is `rise` [K], to the relative `tolerance`, limited
+        to FINEST and COARSEST. `place` is pressure and temperature of the body.
+
+        No rise above `most` [K], where the material's shift ends, is tried. Raises RunError if the fixed point is above
+        it, or is not found in MOST_ROUNDS rounds.
+        """
+        relative = min(max(tolerance, FINEST), COARSEST)
+        guess = self._rise * math.sqrt(speed / self._speed) if place == self._place else 0.0
+        low, high, rise, last, cold, calls, seconds = 0.0, math.inf, 0.0, (math.nan, math.nan), 0.0, 0.0, 0.0
+        for rounds in range(1, MOST_ROUNDS + 1):
+            point = warmed(rise)
+            assert point.flash is not None
+            calls, seconds, over = calls + point.operator_calls, seconds + point.seconds, point.flash.mean - rise
+            cold = point.friction if rounds == 1 else cold
+            if abs(over) <= max(LEAST_ERROR, relative * rise):
+                self._speed, self._rise, self._place = speed, rise, place
+                return replace(point, operator_calls=calls, seconds=seconds, rounds=rounds, friction_cold=cold)
+            if rise == most and over > 0.0:
+                raise RunError(describe_beyond(speed, *place, most, most + over))
+            if rounds == 1 and guess:  # the cold body may be far from the last fixed point
+                rise = min(guess, most)
+                continue
+            low, high = (rise, high) if over > 0.0 else (low, rise)
+            slope = (over - last[1]) / (rise - last[0])
+            last, found = (rise, over), rise - over / slope if slope < 0.0 else rise + over
+            middle = 0.5 * (low + high) if high < math.inf else 2.0 * max(found, rise)
+            rise = min(found if low < found < high else middle, most)
+        raise RunError(
+            f"{describe_cold_state(speed, *place)}: the flash temperature did not settle in {MOST_ROUNDS} rounds: "
+            f"a rise of {last[0]:.4g} K gives a rise of {last[0] + last[1]:.4g} K. "
+            "Try feedback: none"
+        )
+
+
+def describe_cold_state(speed: float, pressure: float, temperature: float) -> str:
+    """Return a text on a state: its velocity [m/s], pressure [Pa] and the temperature of the cold body [deg C]."""
+    return f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa and {temperature:.4g} C"
+
+
+def describe_beyond(speed: float, pressure: float, temperature: float, most: float, rise: float) -> str:
+    """Return a sentence on a fixed point above the `most` [K] that the shift of the material allows, where sliding
+    warms the rubber by `rise` [K]."""
+    state = describe_cold_state(speed, pressure, temperature)
+    return (
+        f"{state}: the flash temperature is above {temperature + most:.4g} C, "
+        f"where the shift factors end; rubber of that temperature is warmed to {temperature + rise:.4g} C. Extend the "
+        "table of shift factors, or try feedback: none"
+    )
+
+
+def describe_hot(points: Sequence[Point]) -> Iterator[Doubt]:
+    """Yield a warning if rubber would be so hot that it decomposes."""
+    hot = [(point.flash.mean, point.speed) for point in points if point.flash and point.flash.mean > HOTTEST]
+    if hot:
+        rise, speed = max(hot)
+        facts = {"count": len(hot), "points": len(points), "most": HOTTEST, "rise": rise, "speed": speed}
+        yield Doubt("decomposes", "", facts)
+
+
+def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[Doubt]:
+    """Yield a warning if the flash temperature of relaxing rubber is outside its measured range."""
+    body = job.material.fitted
+    if not feeds_back(job) or not isinstance(body, Zener) or body.temperatures is None:
+        return
+    own, (low, high) = temperature_of(job.material), body.temperatures
+    warm = [
+        ((own if math.isnan(point.temperature) else point.temperature) + point.flash.mean, point.speed)
+        for point in points
+        if point.flash
+    ]
+    if beyond := [one for one in warm if not low <= one[0] <= high]:
+        hottest, speed = max(beyond)
+        facts = {"low": low, "high": high, "count": len(beyond), "points": len(points)}
+        yield Doubt("flash temperatures", "material", {**facts, "hottest": hottest, "speed": speed})

@@ -1,0 +1,140 @@
+"""The `interface` section of a job, friction of the contact area itself, and the base of both of its effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from ...job.checks import limits
+from ...job.sections.geometry import Rough, RoughSpectrum, Topography
+from ...job.sections.part import Part, Rule
+from ...job.sections.quantities import Flag, Positive
+from ...job.text.fault import Fault
+from ...physics.entries import Memory
+from ...physics.interface_friction import InterfaceFriction
+from ..effect import Decision, Effect
+from ..relaxation import time_factor_of
+
+SAME = 1e-9  # rounding: tolerance on Poisson's ratio
+LEAST_POISSON = 0.49  # physics: least Poisson's ratio for which shear hardly moves the surface along its normal
+
+
+def _whole_bell(velocity: float | None, width: float | None) -> Iterator[Fault]:
+    if (velocity is None) != (width is None):
+        missing, given = ("velocity", "width") if velocity is None else ("width", "velocity")
+        yield Fault(f"is missing; a bell over the velocity needs it in addition to {given}", (missing,))
+
+
+def _coefficient(coefficient: float | None, velocity: float | None, stick: bool) -> Iterator[Fault]:
+    if coefficient is not None and not stick:
+        yield Fault("needs stick: true", ("coefficient",))
+    if coefficient is not None and velocity is not None:
+        yield Fault("cannot be used with coefficient: a bell over the velocity needs shear_stress", ("velocity",))
+
+
+def _incompressible(interface: Any, material: Any) -> Iterator[Fault]:
+    if interface is None:
+        return
+    if interface.stick and abs(material.poisson - 0.5) > SAME:
+        yield Fault(
+            f"needs material.poisson of 0.5, got {material.poisson:g}: pressure on a compressible body moves its "
+            "surface sideways, too, which is not solved for",
+            ("interface", "stick"),
+        )
+    elif material.poisson < LEAST_POISSON:
+        yield Fault(
+            f"needs material.poisson of at least {LEAST_POISSON:g}, got {material.poisson:g}: shear on a compressible "
+            "body moves its surface, which is not solved for (see parcontact manual limits)",
+            ("interface",),
+        )
+
+
+def _sticks(interface: Any, grid: Any, body: Any, initial: Any, steady: Any) -> Iterator[Fault]:
+    """Refuse what stick is not solved for."""
+    if interface is None or not interface.stick:
+        return
+    place = ("interface", "stick")
+    if body is not None:
+        yield Fault("needs a half space: pressure on a layer moves its surface sideways; leave out body", place)
+    if grid is not None and grid.cyclic[0] != grid.cyclic[1]:
+        yield Fault("needs grid.boundary: periodic or free, got [periodic, free]", place)
+    for key, asked in (("initial", initial.state == "steady"), ("steady", steady is not None)):
+        if asked:
+            yield Fault("cannot be used with interface.stick: slide into the steady state with a stage", (key,))
+
+
+def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
+    """Refuse rolling without stick, of a rough surface, and in chosen steps."""
+    if interface is None or not interface.stick:
+        yield from limits.no_rolling(history)
+        return
+    rough = any(isinstance(shape, Rough | RoughSpectrum | Topography) for shape in surface)
+    for index, stage in enumerate(history):
+        place = ("history", index, "creep")
+        if stage is not None and stage.rolls and rough:
+            yield Fault("needs a smooth surface: heights travel with the contact, those of a rough wheel do not", place)
+        if stage is not None and stage.rolls and stage.chooses:
+            yield Fault("needs cells_per_step or a time_step: chosen steps do not follow the error of rolling", place)
+
+
+def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
+    if interface is not None and interface.stick and adhesion is not None:
+        yield Fault("cannot be used with adhesion: leave one of them out", ("interface", "stick"))
+
+
+def _has_tractions(interface: Any, output: Any) -> Iterator[Fault]:
+    if interface is None or not interface.stick:
+        yield from limits.no_traction(output)
+
+
+class Interface(Part):
+    """The `interface` section: a shear stress, constant or a bell over the logarithm of the velocity, or a coefficient
+    of friction; with `stick` points stick until the traction reaches it."""
+
+    label: ClassVar[str] = "interface"
+    shear_stress: Positive | None = Field(
+        default=None, description="a positive shear stress on the area in contact [Pa]"
+    )
+    coefficient: Positive | None = Field(default=None, description="a positive coefficient of friction [-]")
+    velocity: Positive | None = Field(default=None, description="a positive velocity [m/s], where the bell is highest")
+    width: Positive | None = Field(default=None, description="a positive number of decades, the width of the bell [-]")
+    stick: Flag = False
+
+    one_of = (("shear_stress", "coefficient"),)
+    rules = (Rule(("velocity", "width"), _whole_bell), Rule(("coefficient", "velocity", "stick"), _coefficient))
+
+    def friction(self, material: Any) -> InterfaceFriction | None:
+        """Return the shear stress, shifted to the temperature of a material; None with a coefficient."""
+        if self.shear_stress is None:
+            return None
+        return InterfaceFriction(self.shear_stress, self.velocity, self.width or 1.0, time_factor_of(material))
+
+
+class InterfaceEffect(Effect[Memory]):
+    """An effect of the section."""
+
+    section: ClassVar[type[Part]] = Interface
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(("interface", "material"), _incompressible),
+        Rule(("interface", "grid", "body", "initial", "steady"), _sticks),
+        Rule(("interface", "history", "surface"), _rolls),
+        Rule(("interface", "adhesion"), _no_adhesion),
+        Rule(("interface", "output"), _has_tractions),
+    )
+    lifts: ClassVar[tuple[Any, ...]] = (limits.no_traction, limits.no_rolling)
+
+    @staticmethod
+    def remembers(job: Any) -> bool:
+        return bool(job.section("interface").stick)
+
+    @staticmethod
+    def decide(job: Any) -> Decision:
+        law: Interface | None = job.section("interface")
+        if law is None:
+            return Decision("interface", False, "there is no interface section")
+        bound = f"a coefficient of {law.coefficient or 0.0:g}"
+        if law.shear_stress is not None:
+            bound = f"a shear stress of {law.shear_stress:g} Pa at most"
+        return Decision("interface", True, bound + ", below which points stick" * law.stick)

@@ -1,0 +1,3 @@
+"""Leakage through the gap of a contact."""
+
+SECTION, EFFECT = "leakage", "LeakageColumns"

@@ -1,0 +1,294 @@
+"""Leakage of a run: the flow through its saved gaps, as leak.csv and a picture."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+from typing import NamedTuple
+
+import h5py
+import numpy as np
+
+from ... import scene
+from ...columns import choose_columns, names_of, to_csv, values_of
+from ...errors import InputError
+from ...job import reading
+from ...job.resolved import RESOLVED, shown_job
+from ...parallel.mpi import MPI
+from ...parallel.slab import Slab
+from ...plotting.plotted_run import Fields, PlottedRun
+from ...printed import per_cent, quantity, stated_error
+from ...storage import files, hdf5, read_back
+from ..contact_law import touching_of
+from . import conductivity
+from . import pictures as leakage_charts
+from . import results as leak_stop
+from .columns import LEAK
+from .flow import Flow, Leak, Map, flow_mesh_error, leak, least_section, solve_flow
+from .fluids import PressureDrop
+
+NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
+INERTIA = 0.2  # accuracy: viscous flow of a gas over its bound by inertia, above which viscous flow is 10 % too large
+MOST_CELLS = 4e6  # tuning: largest map of which every rank solves one; 2048 x 2048 takes 1.4 GB
+
+
+class LeakInstant(NamedTuple):
+    """One row of leak.csv.
+
+    `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` their ratios to K of the surface that
+    just touches, NaN if unknown; `constriction` [m] is the smallest gap on the widest path of the direction that leaks
+    more; `error_x` and `error_y` are the relative changes of K on half the mesh (`flow.flow_mesh_error`); `flow_rate`
+    [m^3/s] and `mass_flow` [kg/s] are those of a fluid in this direction (`fluids`), NaN without a fluid.
+    """
+
+    time: float
+    pressure: float
+    contact_area: float
+    flow_x: float
+    flow_y: float
+    percolates_x: int
+    percolates_y: int
+    constriction: float
+    share_x: float
+    share_y: float
+    constriction_x: float
+    constriction_y: float
+    error_x: float
+    error_y: float
+    flow_rate: float = np.nan
+    mass_flow: float = np.nan
+
+
+class SolvedLeak(NamedTuple):
+    """The flow at an instant, without maps, and along x and y its mesh errors, the conductivities [m^3] for a fluid
+    with slip, and the smallest open sections [m^2]."""
+
+    leak: Leak
+    errors: tuple[float, float]
+    of_fluid: tuple[float, float]
+    sections: tuple[float, float]
+
+
+class Gaps:
+    """Saved gaps of a run, 0 in contact, of all instants or one; `drop` is the pressure drop of a fluid."""
+
+    def __init__(self, directory: Path, at: str = "", drop: PressureDrop | None = None) -> None:
+        self.drop = drop
+        if not (directory / "measures.csv").is_file():
+            what = (
+                "output directory of a run; those of a sweep are in its cases/" if directory.is_dir() else "directory"
+            )
+            raise InputError(f"{directory} is no {what}")
+        self.directory, self.job = directory, shown_job(directory / RESOLVED)
+        job = self.job
+        self.size, self.periodic = job.grid.size, job.grid.cyclic
+        self.cells = job.grid.nx * job.grid.ny
+        self.columns = read_back.read_results(directory / "measures.csv")
+        try:
+            with self._open() as file:
+                if not {"gap", "pressure"} <= set(file):
+                    raise InputError(f"{directory / 'fields.h5'}: {NEEDS}")
+                self.fields = Fields(file, at)
+                self.shown = self.fields.shown
+        except hdf5.FAILURES as error:
+            raise InputError(f"{directory / 'fields.h5'} cannot be read: {hdf5.reason(error)}; {NEEDS}") from None
+        if not self.shown:
+            raise InputError(f"{directory}: no map is saved yet")
+
+    def _open(self) -> h5py.File:
+        return hdf5.open_results(self.directory / "fields.h5")
+
+    def read(self, index: int) -> Map:
+        """Return the gap [m] at a saved instant; raises InputError if the maps are incomplete."""
+        with self._open() as file:
+            gap, pressure = file["gap"][index], file["pressure"][index]
+        if gap.shape != pressure.shape or not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
+            step = int(self.fields.steps[index])
+            raise InputError(f"{self.directory / 'fields.h5'}: the maps after step {step} are incomplete or not finite")
+        return np.where(touching_of(self.job, pressure, gap), 0.0, np.maximum(gap, 0.0))
+
+    def bare(self) -> Map:
+        """Return the gap [m] of the undeformed surface that just touches; raises InputError if its heights no longer
+        exist."""
+        job = reading.load(self.directory / RESOLVED)
+        setup = scene.set_up(job, Slab.alone(*job.grid.points))
+        heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
+        return np.asarray(heights.max() - heights, dtype=float)
+
+    def solve(self, index: int) -> tuple[SolvedLeak, list[Map]]:
+        """Return the flow at a saved instant, and its maps for both directions."""
+        gap, flows, errors, shown = self.read(index), list[Flow](), list[float](), list[Map]()
+        of_fluid, sections = list[float](), list[float]()
+        for axis in ("x", "y"):
+            flow = solve_flow(gap, self.size, axis, self._sides(axis))
+            shown.append(leakage_charts.flux(gap, flow.pressure, self.size))
+            sections.append(least_section(gap, flow, self.size, axis))
+            flows.append(replace(flow, pressure=np.empty((0, 0))))
+            of_fluid.append(self._conductivity(gap, flow, axis))
+            errors.append(flow_mesh_error(gap, flow, self.size, axis, self._sides(axis)))
+        pairs = ((found[0], found[1]) for found in (errors, of_fluid, sections))
+        return SolvedLeak(Leak(*flows), *pairs), shown
+
+    def _sides(self, axis: str) -> bool:
+        """Return whether the sides along a flow are periodic."""
+        return self.periodic["yx".index(axis)]
+
+    def _conductivity(self, gap: Map, flow: Flow, axis: str) -> float:
+        """Return the conductivity for the fluid along an axis [m^3], NaN without one."""
+        if self.drop is None or not self.drop.mean_free_path:
+            return np.nan if self.drop is None else flow.conductivity
+        return solve_flow(self.drop.conducting_gap(gap), self.size, axis, self._sides(axis)).conductivity
+
+    def row(self, index: int, solved: SolvedLeak, bare: Leak | None) -> LeakInstant:
+        found = solved.leak
+        wider = int(found.along_y.constriction > found.along_x.constriction)
+        through = solved.of_fluid[wider], *self.size[:: -1 if wider else 1]
+        flows = (self.drop.flow_rate(*through), self.drop.mass_flow(*through)) if self.drop else ()
+        rows = np.flatnonzero(self.columns["step"] == self.fields.steps[index])
+        row = {name: float(self.columns[name][rows[-1]]) if rows.size else np.nan for name in LeakInstant._fields[1:3]}
+        return LeakInstant(
+            float(self.fields.times[index]),
+            row["pressure"],
+            row["contact_area"],
+            found.flow_x,
+            found.flow_y,
+            int(found.along_x.percolates),
+            int(found.along_y.percolates),
+            found.constriction,
+            found.flow_x / bare.flow_x if bare and bare.flow_x else np.nan,
+            found.flow_y / bare.flow_y if bare and bare.flow_y else np.nan,
+            found.along_x.constriction,
+            found.along_y.constriction,
+            *solved.errors,
+            *flows,
+        )
+
+
+def write_leakage(
+    directory: Path, at: str, over: str, comm: MPI.Intracomm, drop: PressureDrop | None = None
+) -> Iterator[str]:
+    """Solve for the flow at the saved instants and write leak.csv and leak.png, or leak.STEP.csv and leak.STEP.png for
+    one instant; collective. Each rank takes an instant at a time.
+
+    K is drawn `over` pressure or time, "" for an automatic choice; `drop` adds the flow of a fluid. Yields sentences
+    on root. Raises InputError for a directory without gaps.
+    """
+    gaps = Gaps(directory, at, drop)
+    gaps.shown = comm.bcast(gaps.shown)  # a run may save more while ranks read
+    leaks, drawn, maps = _solve_all(gaps, comm)
+    if comm.rank > 0:
+        return
+    bare, missing = _bare_flow(gaps)
+    rows = [gaps.row(index, leaks[index], bare) for index in gaps.shown]
+    name = f"leak.{gaps.fields.steps[gaps.shown[0]]}" if at else "leak"
+    table, picture = (directory / f"{name}.{kind}" for kind in ("csv", "png"))
+    columns = choose_columns(LEAK, when={"--fluid"} if drop else ())
+    files.replace_file(table, to_csv(names_of(columns), (values_of(columns, row) for row in rows)))
+    instant = PlottedRun(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
+    flows = leaks[drawn].leak.along_x, leaks[drawn].leak.along_y
+    leakage_charts.draw_leakage(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
+    yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
+    yield from (text for axis in "xy" for text in _describe(rows, axis))
+    chosen = max((k for k, row in enumerate(rows) if row.percolates_x + row.percolates_y), default=len(rows) - 1)
+    yield from _describe_fluid(gaps, rows[chosen], leaks[gaps.shown[chosen]]) if drop else ()
+    yield from _describe_missing(gaps, at)
+    if missing:
+        yield f"share_x and share_y are left empty, as the undeformed surface cannot be made: {missing}"
+    yield f"picture: {picture}"
+
+
+def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, SolvedLeak], int, list[Map]]:
+    """Return, on root, the flow at all instants, the instant to draw and its maps: the last one with a flow in both
+    directions, or in one; collective."""
+    mine, drawn, maps, problem = dict[int, SolvedLeak](), (-1, -1), list[Map](), ""
+    working = max(1, int(comm.size * min(1.0, MOST_CELLS / gaps.cells)))
+    try:
+        for index in gaps.shown[comm.rank :: working] if comm.rank < working else []:
+            mine[index], found = gaps.solve(index)
+            directions = mine[index].leak.along_x.percolates + mine[index].leak.along_y.percolates
+            if (directions, index) > drawn:
+                drawn, maps = (directions, index), found
+    except (InputError, *hdf5.FAILURES) as error:
+        problem = str(error)
+    if problems := [text for text in comm.allgather(problem) if text]:
+        raise InputError(problems[0])
+    chosen = max(comm.allgather(drawn))
+    parts = comm.gather((mine, maps if drawn == chosen else [])) or []
+    leaks = {index: one for part, _ in parts for index, one in part.items()}
+    return leaks, chosen[1], next((found for _, found in parts if found), [])
+
+
+def _bare_flow(gaps: Gaps) -> tuple[Leak | None, str]:
+    """Return the flow of the undeformed surface that just touches, or None and the reason."""
+    try:
+        return leak(gaps.bare(), gaps.size, gaps.periodic), ""
+    except (InputError, OSError) as error:
+        return None, " ".join(str(error).split())
+
+
+def _describe(rows: Sequence[LeakInstant], axis: str) -> Iterator[str]:
+    """Yield sentences on when contact closes the gap along an axis, on the mesh error of K, and where K has
+    no meaning."""
+    yield _describe_closure(rows, axis)
+    errors = [error for row in rows if (error := getattr(row, f"error_{axis}")) == error]
+    if errors:
+        much = stated_error(median(errors))
+        if len(errors) > 1:
+            much += f" in the median of the instants, at worst {stated_error(max(errors))}"
+        yield f"along {axis} the error of K by the mesh, from every second point of the gap: {much}"
+    thin = [row for row in rows if conductivity.is_thin(getattr(row, f"constriction_{axis}"))]
+    if thin:
+        where = f"{len(thin)} of {len(rows)} instants, first at t = {quantity(thin[0].time, 's')}"
+        yield f"along {axis} the constriction is below 10 nm at {where}: K means little, as no fluid is a continuum"
+
+
+def _describe_fluid(gaps: Gaps, last: LeakInstant, solved: SolvedLeak) -> Iterator[str]:
+    """Yield sentences on the flow of the fluid at the last instant with a flow, and where it is not a continuum."""
+    drop = gaps.drop
+    assert drop is not None
+    pressures = f"from {quantity(drop.high, 'Pa')} to {quantity(drop.low, 'Pa')}"
+    sizes = gaps.size, gaps.size[::-1]
+    for axis, through, size, section in zip("xy", solved.of_fluid, sizes, solved.sections, strict=True):
+        box = f"a length of {quantity(size[0], 'm')} and a width of {quantity(size[1], 'm')}"
+        flows = f"along {axis} {drop.describe_rate(through, *size)}, over {box}"
+        yield f"{drop.fluid.name} {pressures} at t = {quantity(last.time, 's')}: {flows}"
+        yield from _describe_inertia(drop, axis, drop.mass_flow(through, *size), drop.inertial_bound(section))
+        narrow, path = getattr(last, f"constriction_{axis}"), drop.mean_free_path
+        if 0.0 < narrow < path:
+            yield (
+                f"along {axis} the constriction, {quantity(narrow, 'm')}, is below the mean free path of "
+                f"{drop.fluid.name}, {quantity(path, 'm')}: the flow is stated for a gas that slips, and is larger"
+            )
+
+
+def _describe_inertia(drop: PressureDrop, axis: str, viscous: float, bound: float) -> Iterator[str]:
+    """Yield a warning if the viscous flow of a gas [kg/s] is close to its bound by inertia [kg/s], or above."""
+    if viscous > INERTIA * bound:
+        both = 1.0 / (1.0 / viscous + 1.0 / bound)
+        yield (
+            f"warning: along {axis} inertia limits the flow of {drop.fluid.name}: at most {1e6 * bound:.3g} mg/s pass "
+            f"the smallest open section, and viscous flow alone would be {1e6 * viscous:.3g} mg/s; expect some "
+            f"{1e6 * both:.3g} mg/s, 1/(1/viscous + 1/bound), within 14 %; leak.csv holds the viscous flow"
+        )
+
+
+def _describe_missing(gaps: Gaps, at: str) -> Iterator[str]:
+    """Yield a sentence on stages at whose end no gap is saved."""
+    run = PlottedRun(gaps.directory)
+    saved = set(gaps.fields.steps[gaps.shown].tolist())
+    ends = {index: int(run.columns["step"][rows[-1]]) for index, rows in run.rows_of_stages.items()}
+    names = [run.job.history[index].name for index, step in ends.items() if step not in saved]
+    if names and not at:
+        yield f"no gap is saved at the end of {', '.join(names)}: output: {{every: 1}} saves those of all steps"
+
+
+def _describe_closure(rows: Sequence[LeakInstant], axis: str) -> str:
+    """Return a sentence on where leakage along an axis stops, and at how many instants contact closes the gap."""
+    names = (f"flow_{axis}", "pressure", "time")
+    stop = leak_stop.describe_axis({name: [getattr(row, name) for row in rows] for name in names}, axis)
+    closed = [row for row in rows if not getattr(row, f"percolates_{axis}")]
+    found = [f"along {axis} leakage {stop}"] if stop else []
+    if closed and len(rows) > 1:
+        under = f", at the first with {per_cent(closed[0].contact_area)} of the area in contact" if stop else ""
+        found.append(f"along {axis} contact closes the gap at {len(closed)} of {len(rows)} instants{under}")
+    return "; ".join(found) or f"along {axis} contact leaves the gap open"

@@ -1,0 +1,111 @@
+"""Picture of leakage: the flow through the gap, and conductivity over load or time."""
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+
+from ...columns import UNITS
+from ...plotting import charts, prefixes, style
+from ...plotting.histories import Abscissa
+from ...plotting.plotted_run import PlottedRun
+from ...plotting.style import Panel
+from . import conductivity
+from .flow import Flow, Map
+
+DECADES = 3  # decades of the flow on the colour scale
+SAME = 1e-6  # rounding: relative difference below which pressures are the same
+FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # columns of a run
+KEYS = ("leakage",)  # names of panels for --panels
+SWEEP_PANELS = (("leakage", charts.Axis("conductivity", "m³"), {label: name for name, label in FLOWS.items()}),)
+KINDS = ("flow", "constriction")  # kinds of columns per direction
+LONG = 100.0  # ratio of times above which their axis is logarithmic
+
+
+def panels(run: PlottedRun, along: Abscissa) -> Iterator[charts.Chart]:
+    """Yield the chart of conductivities of a run over an axis, if the gap is open at any time."""
+    columns = run.columns
+    if "flow_x" in columns and max(np.nanmax(columns[name], initial=0.0) for name in FLOWS) > 0.0:
+        rows = slice(None) if along.rows is None else along.rows
+        flows = {label: columns[name][rows] for name, label in FLOWS.items()}
+        narrowest = dict.fromkeys(flows, columns["constriction"][rows])
+        yield conductivity.chart(along.axis, along.values, flows, narrowest)
+
+
+def draw_leakage(
+    path: Path,
+    size: tuple[float, float],
+    gap: Map,
+    flows: Sequence[Flow],
+    fluxes: Sequence[Map],
+    instant: str,
+    rows: Sequence[Any],
+    over: str = "",
+) -> Path:
+    """Draw the flow along x and along y on the map of the gap at an instant, and K of all instants."""
+
+    def flow_map(axis: str, flow: Flow, flux: Map) -> Panel:
+        def panel(axes: Axes) -> None:
+            _draw_flow(axes, size, gap, flow, flux)
+            axes.set_title(f"along {axis}" if flow.percolates else f"along {axis}: closed, no path")
+
+        return panel
+
+    with style.drawing():
+        circled = ", constriction circled" * any(flow.percolates for flow in flows)
+        title = f"flow through the gap, {instant}\ncontact black{circled}"
+        curve = [partial(charts.draw, chart_of(rows, over))] if any(row.constriction > 0.0 for row in rows[1:]) else []
+        maps = [flow_map(axis, flow, flux) for axis, flow, flux in zip("xy", flows, fluxes, strict=True)]
+        return style.save_figure(style.figure_of(title, [maps, curve] if curve else [maps]), path)
+
+
+def chart_of(rows: Sequence[Any], over: str) -> charts.Chart:
+    """Return the chart of K `over` pressure or time (default: time if a pressure occurs more than once).
+
+    Over pressure, the last of consecutive instants at one pressure is drawn.
+    """
+    columns = {name: np.array([getattr(row, name) for row in rows]) for name in rows[0]._fields}
+    pressure, time = columns["pressure"], columns["time"]
+    same = SAME * float(np.nanmax(np.abs(pressure), initial=0.0))
+    different = np.abs(np.diff(pressure)) > same
+    over = over or ("pressure" if different.all() or not np.ptp(time) else "time")
+    kept = np.append(different, True) if over == "pressure" else np.full(len(rows), True)
+    at = columns[over][kept]
+    flows, narrowest = ({f"along {axis}": columns[f"{name}_{axis}"][kept] for axis in "xy"} for name in KINDS)
+    later = at[at > 0.0]
+    log_x = over == "time" and later.size > 0 and bool(later.max() > LONG * later.min())
+    return conductivity.chart(charts.Axis(over, UNITS[over]), at, flows, narrowest, log_x)
+
+
+def _draw_flow(axes: Axes, size: tuple[float, float], gap: Map, flow: Flow, flux: Map) -> None:
+    """Draw the flow through a gap over its largest value, and circle the constriction."""
+    axes.set_facecolor("k")
+    look: dict[str, Any] = {"extent": (0.0, size[0], 0.0, size[1]), "origin": "lower", "interpolation": "nearest"}
+    axes.imshow(np.where(gap > 0.0, gap, np.nan), cmap="Greys_r", alpha=0.5, **look)
+    if flow.position is not None:
+        most = float(np.nanpercentile(flux, 99.9)) or 1.0  # all the flow may be in fewer cells
+        drawn = axes.imshow(flux / most, cmap="viridis", norm=LogNorm(10.0**-DECADES, 1.0), **look)
+        axes.figure.colorbar(drawn, ax=axes, shrink=0.7, label="flow over its largest")
+        row, column = flow.position
+        cell = size[0] / gap.shape[1], size[1] / gap.shape[0]
+        axes.plot((column + 0.5) * cell[0], (row + 0.5) * cell[1], "o", mfc="none", mec="r", ms=11, mew=1.5)
+    axes.grid(False)
+    for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y")):
+        prefixes.label(axis, name, "m")
+
+
+def flux(gap: Map, pressure: Map, size: tuple[float, float]) -> Map:
+    """Return the magnitude of g^3 grad p in open cells over the largest, NaN elsewhere; in single precision."""
+    slopes = []
+    for axis, length in ((0, size[1]), (1, size[0])):
+        faces = np.nan_to_num(np.diff(pressure, axis=axis)) * (pressure.shape[axis] / length)  # no flow into walls
+        none = np.zeros_like(np.take(pressure, [0], axis))
+        slopes.append(0.5 * (np.concatenate([none, faces], axis) + np.concatenate([faces, none], axis)))
+    shape = gap / (np.nanmax(gap, initial=0.0) or 1.0)  # the cube of a small gap [m] underflows
+    found = np.where(np.isfinite(pressure), shape**3 * np.hypot(*slopes), np.nan)
+    most = np.nanmax(found, initial=0.0)
+    return np.asarray(found / most if most > 0.0 else found, dtype=np.float32)

@@ -1,0 +1,95 @@
+"""Results of leakage in texts: conductivities, and the loads between which contact closes the gap along x and along y.
+
+Conductivities K are read from `leak.csv`, which is made from saved gaps, else from measures.csv.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from ...printed import quantity, span, with_error
+from ...storage import read_back
+from ...summary.run_table import RunTable
+
+TABLE = "leak.csv"
+DATA = (TABLE,)  # tables of a run that a report keeps
+PICTURES = {"leak.png": "flow through the gap, and conductivity"}  # pictures of a run that a report shows
+Columns = Mapping[str, Sequence[float]]
+
+
+def headline(run: RunTable) -> Iterator[str]:
+    """Yield the last conductivities, from `leak.csv` with their errors, else from the run."""
+    table = run.directory / TABLE
+    columns = read_back.read_results(table) if table.is_file() else run.columns
+    stops = [text for text in describe_leak_stop(run.directory) if " between " in text]
+    known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
+    if known:
+        row = known[-1]
+        closed = [axis for axis in "xy" if not columns[f"flow_{axis}"][row]]
+        flows = [_flow(columns, row, axis) for axis in "xy" if axis not in closed]
+        yield from [f"the conductivity of the gap is {' and '.join(flows)}"] * bool(flows)
+        yield from [f"contact closes the gap along {' and '.join(closed)}"] * bool(closed)
+        yield from stops
+
+
+def _flow(columns: Columns, row: int, axis: str) -> str:
+    flow, error = columns[f"flow_{axis}"][row], _error(columns, axis, row)
+    return f"{with_error(flow, flow * error)} m³ along {axis}"
+
+
+def _error(columns: Columns, axis: str, row: int) -> float:
+    """Return the relative error of K, NaN if the table has none."""
+    errors = columns.get(f"error_{axis}")
+    return math.nan if errors is None else errors[row]
+
+
+def sentences(run: RunTable) -> list[str]:
+    """Return sentences on the loads at which leakage stops."""
+    return describe_leak_stop(run.directory)
+
+
+def _describe_table(path: Path, claims: object) -> Iterator[str]:
+    yield f"  leakage: {len(read_back.read_results(path)['time'])} instants in {path.name}"
+
+
+PARTS = {TABLE: _describe_table}  # descriptions of files of a run, by their names
+
+
+def describe_leak_stop(directory: Path) -> list[str]:
+    """Return a sentence on leakage for each direction with known conductivity; one sentence if both agree.
+
+    A sentence has the pressures of the last instant with a flow and of the first one without, or their times if the
+    pressure is constant. Raises InputError for an unreadable table.
+    """
+    table = next((path for name in (TABLE, "measures.csv") if (path := directory / name).is_file()), None)
+    columns = read_back.read_results(table) if table else {}
+    found = [(axis, said) for axis in "xy" if (said := describe_axis(columns, axis))]
+    if len({said for _, said in found}) == 1:
+        found = [(" and ".join(axis for axis, _ in found), found[0][1])]
+    return [f"leakage along {axis} {said}" for axis, said in found]
+
+
+def describe_axis(columns: Columns, axis: str) -> str:
+    """Return how leakage along an axis changes over the rows of a table: `stops between 1.05 and 1.10 MPa`; '' if
+    unknown."""
+    flows, pressures = (columns.get(name, ()) for name in (f"flow_{axis}", "pressure"))
+    pairs = enumerate(zip(flows, pressures, strict=False))
+    known = [row for row, pair in pairs if not any(map(math.isnan, pair))]
+    stopped = next((place for place, row in enumerate(known) if flows[row] == 0.0), None)
+    if not known:
+        return ""
+    if stopped is None:
+        return f"does not stop up to {quantity(max(pressures[row] for row in known), 'Pa')}"
+    closed = max(place for place, row in enumerate(known) if flows[row] == 0.0)
+    opens = f", and begins again {_between(columns, *known[closed : closed + 2])}" if known[closed + 1 :] else ""
+    if stopped == 0:
+        return f"has already stopped at the first instant, under {quantity(pressures[known[0]], 'Pa')}{opens}"
+    return f"stops {_between(columns, *known[stopped - 1 : stopped + 1])}{opens}"
+
+
+def _between(columns: Columns, before: int, after: int) -> str:
+    """Return the pressures of two rows as text; their times if the pressure is constant."""
+    ends = columns["pressure"][before], columns["pressure"][after]
+    if ends[0] != ends[1]:
+        return f"between {span(min(ends), max(ends), 'Pa')}"
+    return f"between {span(columns['time'][before], columns['time'][after], 's')}, under {quantity(ends[1], 'Pa')}"

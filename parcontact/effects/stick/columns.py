@@ -1,0 +1,21 @@
+"""Columns of stick and slip."""
+
+from ...column import Column, Table
+
+MEASURES: Table = (
+    Column(
+        *("stick_area", ""),
+        "share of the box that touches and does not slip (with `interface.stick`)",
+        when="interface.stick",
+    ),
+    Column(
+        *("slip_loss", "J"),
+        "energy lost in slip since the start (with `interface.stick` and `output.energy`); "
+        "`work` is `stored`, `dissipated` and this",
+        when="interface.stick",
+    ),
+)
+FIELDS: Table = (
+    Column("traction_x", "Pa", "traction on the body along x (with `interface.stick`)"),
+    Column("traction_y", "Pa", "traction on the body along y"),
+)

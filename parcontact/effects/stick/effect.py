@@ -1,0 +1,320 @@
+"""Stick and slip of the contact area: shear of a body before it slides, and while parts of the contact slide.
+
+The rigid surface moves by D along itself, the points of the body by u under tractions t that are bounded,
+
+    |t| <= f,    f = mu p (Coulomb) or a shear strength at all points in contact.
+
+A shear strength that depends on velocity is that of the velocity of the surface along itself in each step, at all
+points, so that a step has one solution. While the surface rests the last strength stays. Before the surface has moved
+there are no tractions, and the highest strength bounds them.
+
+A point in contact slips by `s = D - u`: its slip grows along t where `|t| = f`, and is constant where `|t| < f`. In an
+incompressible half space tractions and pressures move the surface independently of each other
+(`effects.stick.shear_operator`), so that the tractions of a step follow from its pressures. The body obeys the law of
+`physics.body` in both components,
+
+    A t = G_inf u + sum_k h_k,
+
+so that a step to the tractions `alpha t` is the problem of `solver`. A point that sticks ends at its `target`
+g, its last displacement plus the increment of D, and
+
+    e = g + r/alpha,    w = e - A t = g - u.
+
+Points of the body keep their positions on the grid, as in a march without stick: u, t and the branches belong to them,
+and nothing is shifted. The surface moves over them and carries the bounds f, which follow from the pressure of each
+step. A point without contact has g = u, so that its slip counts from its first contact. Targets of points that stick
+are not reset to u, and those of points that slip keep what the tractions lack of their bounds, so that residuals of
+solves do not add up over many steps.
+
+A surface that rolls moves as a shape, while its points move along the body by a share of that way, the creep (F. W.
+Carter, Proc. R. Soc. Lond. A 112 (1926) 151): D grows by the creep times the motion of the shape. Sliding has the creep
+1, free rolling the creep 0.
+
+With output.energy the work of the tractions on the body is added to the work of the pressures, and the loss in slip is
+
+    sum max(0, (t_old + t)/2 (s - s_old)),
+
+so that work = stored + dissipated + slip_loss. At each point slip loses energy. If the motion turns back within a
+step, the trapezoidal rule may give less than 0, and then 0 is closer to the loss.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from ...accuracy.constants import ROLLING, STICKING
+from ...columns import added_by
+from ...parallel.slab import Array
+from ...physics import loops
+from ...physics.body import BodyMemory, MovedHeights, surface_of
+from ...physics.energy import EnergyMemory, Pressed
+from ...physics.entries import Entry, Saved
+from ...physics.interface_friction import Vector
+from ...physics.measures import Measures
+from ...physics.units import Units
+from ...solve.preconditioner.extension import grids_for
+from ..effect import Changes, Instant, Sheared
+from ..interface.section import InterfaceEffect
+from . import discs
+from .shear_operator import ShearOperator, components, stacked
+from .slipping import settle_slips
+from .solver import TangentialSolver, TractionProblem
+
+UNIFORM = 1e-12  # rounding: share of the square of a pressure below which its waves are rounding
+LEAST_BOUND = 1e-12  # rounding: bound of tractions, in the run's units, that displacements hardly resolve: taken as 0
+
+
+class BoundedTraction(NamedTuple):
+    """Tractions `alpha traction`, stacked, and their bounds, `alpha bound`."""
+
+    traction: Array
+    bound: Array
+
+
+class _Settled(NamedTuple):
+    """Sums over the points of a step: the energy lost in slip [J], the force on the rigid surface [N], the mean
+    traction over the mean bound, the number of points that stick, and the sum of the map `slipping`."""
+
+    lost: float
+    force: Vector
+    share: Vector
+    stuck: int
+    power: float
+
+
+@dataclass(frozen=True)
+class StickMemory:
+    """Memory of stick and slip. Maps are in the run's units; all but bounds have two stacked components.
+
+    `body` is the memory of the displacements along the surface, `last` the tractions of the last step, with the
+    modulus `alpha`; `spare` receives the next ones. `target` is where points that stick end. `strength` is the shear
+    strength of the last step in which the surface moved [Pa]. `share` is the mean traction over the mean bound.
+    `energy` is the memory of the energies, None without them; `lost` is the energy lost in slip [J]. `columns` are the
+    columns of the last row without `slip_loss`.
+    """
+
+    body: BodyMemory
+    last: BoundedTraction
+    spare: BoundedTraction
+    target: Array
+    strength: float
+    alpha: float = 0.0
+    share: Vector = (0.0, 0.0)
+    energy: EnergyMemory | None = None
+    lost: float = 0.0
+    columns: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+
+class StickSlip(InterfaceEffect[StickMemory]):
+    """Tractions of a contact that sticks and slips, and the columns that follow from them."""
+
+    columns: ClassVar[tuple[str, ...]] = (*added_by("interface"), *added_by("interface.stick"))
+    fields: ClassVar[tuple[str, ...]] = ("traction_x", "traction_y")
+
+    def __init__(self, scene: Any) -> None:
+        setup, slab, grid, numerics = scene.setup, scene.slab, scene.choices.grid, scene.choices.numerics
+        self._scene, self._slab, self._law = scene, slab, scene.job.section("interface")
+        self._friction = self._law.friction(scene.job.material)
+        self._both = stacked(slab)
+        self._body, self._energy = scene.body_for_shear(self._both)
+        self._slipping = slab.zeros() if scene.job.section("thermal") is not None else np.zeros((0, 0))
+        self._cell_force = grid.dx * grid.dy * scene.units.pressure
+        self._free = setup.half_space.free
+        operator = ShearOperator(setup.fft, setup.size, scene.job.material.poisson, self._free)
+        grids = grids_for(setup.size[0] / slab.nx, setup.size[1] / slab.ny)
+        self._tolerance, inverse = numerics.tolerance, scene.operators.preconditioner
+        self._solver = TangentialSolver(slab, operator, inverse, grids, numerics.max_iterations)
+
+    def at_rest(self) -> StickMemory:
+        last, spare = (BoundedTraction(self._both.zeros(), self._slab.zeros()) for _ in range(2))
+        energy = None if self._energy is None else self._energy.at_rest()
+        strength = self._law.shear_stress or 0.0
+        return StickMemory(self._body.at_rest(), last, spare, self._both.zeros(), strength, energy=energy)
+
+    def follow(self, instant: Instant, memory: StickMemory) -> Changes[StickMemory]:
+        """Return the tractions after a step, in the maps of a memory; collective."""
+        step, alpha, target = instant.step, instant.modulus, memory.target
+        (x, y), (along, across) = instant.moved, self._scene.job.history[step.stage].creep
+        way = along * x - across * y, along * y + across * x
+        for part, moved in zip(components(target), way, strict=True):
+            part += moved / self._scene.units.height
+        strength = self._strength(step.dt, math.hypot(*way), memory.strength)
+        trial = self._body.begin(memory.body, step.dt, MovedHeights(target), step.growth)
+        new = self._start(instant, memory, strength)
+        stiffness = self._stiffness(instant)
+        tolerance = min(self._tolerance, self._scene.controller.largest_tolerance(step))
+        pulled, last = TractionProblem(new.bound, trial.effective, stiffness, tolerance), memory.last.traction
+        solved = self._solver.solve(pulled, new.traction, last, memory.alpha / alpha)
+        body = self._body.commit(memory.body, trial, solved.displacement, surface_of(memory.body))
+        now, before = Pressed(new.traction, alpha), Pressed(memory.last.traction, memory.alpha)
+        energy = memory.energy
+        if self._energy is not None and energy is not None:
+            energy = self._energy.advance(energy, step.dt, now, before, solved.displacement, body, step.growth)
+        settled = self._settle(now, before, new.bound, stiffness, surface_of(body), target)
+        sheared = self._sheared(instant, settled, solved.certificate, memory.last.bound, new.bound)
+        columns = *parts_of_friction(sheared), settled.stuck / self._slab.points
+        lost = memory.lost + sheared.lost
+        after = StickMemory(body, new, memory.last, target, strength, alpha, settled.share, energy, lost, columns)
+        whole = not self._free and instant.measures.contact_area == 1.0  # no step resolves how it begins to slide
+        turned = 0.0 if whole else math.dist(settled.share, memory.share)
+        return Changes(after, solved.failure, sheared=sheared, turned=turned)
+
+    def _strength(self, dt: float, way: float, last: float) -> float:
+        """Return the shear strength [Pa] of a step in which the surface moves by a way [m] along itself; `last` is the
+        strength before."""
+        if self._friction is None or dt == 0.0 or way == 0.0:
+            return last
+        return self._friction.shifted(self._scene.time_factor).stress(way / dt)
+
+    def _start(self, instant: Instant, memory: StickMemory, strength: float) -> BoundedTraction:
+        """Return the bounds of a step and tractions to start from, in the spare maps; local."""
+        (t, bound), last = memory.spare, memory.last
+        self._fill_bound(instant, strength, bound)
+        scale = memory.alpha / instant.modulus, instant.step.growth
+        discs.extrapolate_tractions(
+            *components(last.traction), last.bound, *scale, bound, *memory.share, *components(t)
+        )
+        return memory.spare
+
+    def _fill_bound(self, instant: Instant, strength: float, bound: Array) -> None:
+        """Put `f/alpha` into a map. A shear strength acts on the corrected contact area, as without stick."""
+        if self._law.coefficient is not None:
+            np.multiply(instant.pressure, self._law.coefficient, out=bound)
+        else:
+            measures = instant.measures
+            share = measures.contact_area_corrected / measures.contact_area if measures.contact_area > 0.0 else 0.0
+            bound[:] = strength * share / (instant.modulus * self._scene.units.pressure)
+        bound[(instant.touching == 0) | (bound < LEAST_BOUND)] = 0.0
+
+    def _stiffness(self, instant: Instant) -> float:
+        """Return pressure over displacement of the contact as a whole, `<p, p>/<p, A p>`; collective.
+
+        In a periodic box p is without its mean, which does not move the surface. Where nothing is left, any number will
+        do.
+        """
+        p, u = instant.pressure, instant.solved.contact.u
+        square, work, total = self._slab.sum(loops.dot(p, p), loops.dot(p, u), float(p.sum(dtype=np.float64)))
+        waves = square if self._free else square - total**2 / self._slab.points
+        return waves / work if work > 0.0 and waves > UNIFORM * square else 1.0
+
+    def _settle(
+        self, now: Pressed, before: Pressed, bound: Array, stiffness: float, u: Array, target: Array
+    ) -> _Settled:
+        """Renew the targets of points that slip or are not touched, and return sums over all points; collective."""
+        t, old = ((each.modulus, *components(each.p)) for each in (now, before))
+        sums = settle_slips(bound, stiffness, *t, *old, *components(u), *components(target), self._slipping)
+        lost, total_x, total_y, most, stuck, power = self._slab.sum(*sums)
+        unit = self._cell_force * now.modulus
+        force = 0.0 - unit * total_x, 0.0 - unit * total_y
+        share = (total_x / most, total_y / most) if most > 0.0 else (0.0, 0.0)
+        return _Settled(lost * self._cell_force * self._scene.units.height, force, share, round(stuck), power)
+
+    def _sheared(self, instant: Instant, settled: _Settled, error: float, before: Array, bound: Array) -> Sheared:
+        """Return what the tractions add to the measures of a step, from the bounds before and after it; collective.
+
+        The share of the tractions that is wrong as the area is: all of those by a shear strength; by a coefficient
+        where points stick, as those that slip add up to a share of the load. Spots that stick slip first at their
+        edges, and edge cells make them too stiff; by a coefficient tractions are small there. In rolling, points that
+        enter the contact in a step move with the surface for all of it."""
+        area, corrected = instant.measures.contact_area, instant.measures.contact_area_corrected
+        touching = area * self._slab.points
+        sticking, time = settled.stuck / touching if touching else 0.0, 0.0
+        share, mesh = sticking, 0.0
+        if touching and self._law.coefficient is None:
+            share, mesh = 1.0, STICKING.value * (1.0 - corrected / area) * sticking * math.hypot(*settled.share)
+        if touching and self._scene.job.history[instant.step.stage].rolls:
+            entered = self._slab.sum(float(np.count_nonzero((bound > 0.0) & (before <= 0.0))))[0]
+            time = ROLLING.value * (entered / touching) * sticking
+        measures = _with_force(instant, settled.force)
+        slipping = self._slipping if instant.slid and settled.power > 0.0 else bound
+        return Sheared(measures, settled.force, settled.lost, slipping, error, share, time, mesh)
+
+    def values(self, memory: StickMemory) -> Sequence[float]:
+        """Return the parts of friction, the share of the box that sticks, and the energy lost in slip [J], NaN without
+        energies."""
+        return *memory.columns, math.nan if memory.energy is None else memory.lost
+
+    def field(self, memory: StickMemory, name: str) -> Array:
+        """Return this rank's rows of a component of the tractions on the body [Pa]."""
+        traction = components(memory.last.traction)[self.fields.index(name)]
+        return traction * (memory.alpha * self._scene.units.pressure)
+
+    def further_energies(self, memory: StickMemory) -> tuple[EnergyMemory, float] | None:
+        return None if memory.energy is None else (memory.energy, memory.lost)
+
+    # -- checkpoints --------------------------------------------------------------------------------------------------
+
+    def entries(self, memory: StickMemory, units: Units) -> dict[str, Entry]:
+        """Return the maps of both components, and the sums that the energies go on from."""
+        pressure = units.height / units.length
+        both = {
+            "traction": Entry(memory.last.traction, pressure),
+            "earlier traction": Entry(memory.spare.traction, pressure),
+            "target": Entry(memory.target, units.height, "m"),
+            **self._body.memory_entries(memory.body, units.height, "m", units.modulus * units.height, "Pa m"),
+        }
+        if self._energy is not None and memory.energy is not None:
+            energies = self._energy.entries(memory.energy, units)
+            both |= {f"energy {name}": entry for name, entry in energies.items()}
+            both["lost"] = Entry(memory.lost, 1.0, "J")
+        found = {"bound": Entry(memory.last.bound, pressure), "modulus": Entry(memory.alpha, units.modulus, "Pa")}
+        found |= {"share": Entry(np.array(memory.share)), "columns": Entry(np.array(memory.columns))}
+        found["strength"] = Entry(memory.strength, 1.0, "Pa")
+        for name, entry in both.items():
+            found |= _split(name, entry) if entry.is_map else {name: entry}
+        return found
+
+    def restored(self, memory: StickMemory, saved: Saved) -> StickMemory:
+        """Return the memory of a checkpoint, whose maps have been read into `memory`."""
+        joined = {name.removesuffix(" x"): value for name, value in saved.items()}
+        energy = memory.energy
+        if self._energy is not None and energy is not None:
+            of_energy = {name.removeprefix("energy "): value for name, value in joined.items()}
+            energy = self._energy.restored(energy, of_energy)
+        x, y = saved["share"].tolist()
+        return replace(
+            memory,
+            body=self._body.restored(memory.body, joined),
+            strength=float(saved["strength"]),
+            alpha=float(saved["modulus"]),
+            share=(x, y),
+            energy=energy,
+            lost=float(saved.get("lost", 0.0)),
+            columns=tuple(saved["columns"].tolist()),
+        )
+
+
+def _split(name: str, entry: Entry) -> dict[str, Entry]:
+    """Return the entries of both components of a stacked map."""
+    parts = zip("xy", components(np.asarray(entry.value)), strict=True)
+    return {f"{name} {axis}": replace(entry, value=part) for axis, part in parts}
+
+
+def _with_force(instant: Instant, force: Vector) -> Measures:
+    """Return the measures of a step with a force of the interface [N]."""
+    measures, own = instant.measures, math.hypot(*force)
+    x, y, normal = measures.force_x + force[0], measures.force_y + force[1], measures.normal_force
+    presses = normal > instant.solved.least_load and measures.contact_area > 0.0
+    return replace(
+        measures,
+        force_x=x,
+        force_y=y,
+        friction=math.hypot(x, y) / normal if presses else 0.0,
+        friction_interface=own / normal if presses else 0.0,
+        force_interface=own,
+    )
+
+
+def parts_of_friction(sheared: Sheared) -> tuple[float, float]:
+    """Return what the body and the interface make of friction: their forces in the direction of both together, over
+    the normal force."""
+    measures, (x, y) = sheared.measures, sheared.force
+    whole = math.hypot(measures.force_x, measures.force_y)
+    along = x * measures.force_x + y * measures.force_y
+    own = along / (whole * measures.normal_force) if measures.friction > 0.0 else 0.0
+    return measures.friction - own, own

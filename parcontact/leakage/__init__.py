@@ -1,1 +1,0 @@
-"""Leakage through the gap of a contact."""

@@ -1,1 +1,0 @@
-"""Tractions of a contact that sticks and slips."""

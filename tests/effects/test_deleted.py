@@ -1,0 +1,60 @@
+"""A capability is a folder: a copy of the program without it runs jobs of others, and refuses its own keys."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from conftest import WORLD
+from csv_rows import rows
+
+import parcontact
+from parcontact import __main__
+
+pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
+
+HOUSE = Path(parcontact.__file__).parent
+JOB: dict[str, Any] = {
+    "grid": {"points": [24, 10], "size": [1e-3, 0.4e-3]},
+    "surface": [{"shape": "wave", "amplitude": 4e-6, "waves": [2, 0]}],
+    "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
+    "history": [{"pressure": 1e5, "velocity": 0.2, "distance": 1e-4, "cells_per_step": 1}],
+    "output": {"fields": ["pressure", "gap"], "directory": "out"},
+}
+KEYS = {  # folder: what its section is refused with
+    "leakage": ({"leakage": {}}, "leakage is not a known key"),
+    "adhesion": ({"adhesion": {"work": 0.05}}, "adhesion is not a known key"),
+}
+CHECKED = ("time", "friction", "contact_area", "mean_gap", "max_pressure", "operator_calls", "error_friction")
+
+
+@pytest.mark.parametrize("folder", KEYS)
+def test_a_deleted_folder(folder: str, tmp_path: Path) -> None:
+    """Numbers are the same to the last digit; its keys are refused; pictures, reports and descriptions are made."""
+    copy = tmp_path / "copy" / HOUSE.name
+    shutil.copytree(HOUSE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.rmtree(copy / "effects" / folder)
+    environment = {**os.environ, "PYTHONPATH": str(copy.parent), "MPLBACKEND": "agg"}
+
+    def program(*words: str) -> tuple[int, str]:
+        command = [sys.executable, "-m", "parcontact", *words]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+        return done.returncode, done.stdout + done.stderr
+
+    keys, refusal = KEYS[folder]
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
+    (tmp_path / "other.yaml").write_text(yaml.safe_dump({**JOB, **keys}))
+    for words in (("job.yaml", "--quiet"), ("plot", "out"), ("report", "out"), ("info", "out"), ("plan", "job.yaml")):
+        code, said = program(*words)
+        assert code == 0, said
+        assert "Traceback" not in said
+    code, said = program("check", "other.yaml")
+    assert code == 2
+    assert refusal in said
+    assert __main__.main([str(tmp_path / "job.yaml"), "--quiet", "--out", str(tmp_path / "whole")]) == 0
+    without, whole = (rows(tmp_path / name / "measures.csv") for name in ("out", "whole"))
+    assert [[row[name] for name in CHECKED] for row in without] == [[row[name] for name in CHECKED] for row in whole]
