@@ -162,7 +162,7 @@ def _collect(place: str, annotation: Any, found: dict[type[Part], SectionSchema]
 
 def _keys(part: type[Part]) -> Iterator[Key]:
     found = part.model_json_schema(schema_generator=SchemaOfKeys)
-    for word, schema in found["properties"].items():
+    for word, schema in found.get("properties", {}).items():
         words = literal_words(part.model_fields[word].annotation)
         text = schema.get("description") or (list_words(words) if words else "a mapping of the keys below")
         units = [unit for unit in re.findall(r"\[([^\]]+)\]", text) if "," not in unit]

@@ -27,6 +27,7 @@ JOB: dict[str, Any] = {
 }
 KEYS = {  # folder: what its section is refused with
     "leakage": ({"leakage": {}}, "leakage is not a known key"),
+    "counterbody": ({"counterbody": {"model": "elastic", "shear_modulus": 5e6}}, "counterbody is not a known key"),
     "adhesion": ({"adhesion": {"work": 0.05}}, "adhesion is not a known key"),
 }
 CHECKED = ("time", "friction", "contact_area", "mean_gap", "max_pressure", "operator_calls", "error_friction")

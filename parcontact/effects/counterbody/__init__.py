@@ -1,1 +1,4 @@
-"""Counterbody that deforms, too."""
+"""A rough counterbody that deforms, too: both bodies as one."""
+
+SECTION, EFFECT = "counterbody", "CounterbodyThatDeforms"
+MATERIAL = True  # see `capabilities`

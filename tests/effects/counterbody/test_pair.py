@@ -1,4 +1,4 @@
-"""Two bodies in contact: the Prony series of the pair, and jobs with a counterbody that deforms."""
+"""Two bodies in contact: the Prony series of the pair."""
 
 import numpy as np
 import pytest
