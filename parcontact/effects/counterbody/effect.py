@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...job.checks.frequencies import excited_band
+from ...job.sections.geometry import Rough
 from ...job.sections.materials import Dma, describe_temperature
 from ...job.sections.part import Part, Rule
 from ...job.text.fault import Fault
@@ -125,9 +126,7 @@ class CounterbodyThatDeforms(Effect[None]):
         yield describe_temperature(job.counterbody, "counterbody")
         series = relaxation_of(job.material)
         text = f"both bodies as one: shear modulus {series.modulus_inf:.4g} Pa after all relaxation"
-        values = frequencies(job)
-        moduli = np.atleast_1d(complex_modulus(2.0 * math.pi * np.array(values), *series)) if values else []
-        shown = zip(values, moduli, strict=True)
+        shown = ((value, complex(complex_modulus(2.0 * math.pi * value, *series))) for value in frequencies(job))
         yield "; ".join([text, *(f"{m.real:.4g} + {m.imag:.4g}i Pa at {f:.4g} Hz" for f, m in shown)])
 
     def __init__(self, scene: Any) -> None: ...
@@ -145,6 +144,7 @@ def frequencies(job: Any) -> list[float]:
     times = relaxation_of(job.material).relaxation_times
     if not times.size:
         return []
-    band = None if job.bands is not None else excited_band(job)
+    known = job.bands is None or all(isinstance(shape, Rough) for shape in job.surface)
+    band = excited_band(job) if known else None
     low, high = band or (0.5 / (math.pi * times.max()), 0.5 / (math.pi * times.min()))
     return [low] if low == high else list(map(float, np.geomspace(low, high, SHOWN)))

@@ -22,7 +22,8 @@ def pair(first: Moduli, second: Moduli) -> Prony:
     function.
     """
     one, other = normal_form(*first), normal_form(*second)
-    whole = normal_form(*(np.append(a, b) if np.ndim(a) else a + b for a, b in zip(one, other, strict=True)))
+    terms, times = np.append(one.moduli, other.moduli), np.append(one.relaxation_times, other.relaxation_times)
+    whole = normal_form(one.modulus_inf + other.modulus_inf, terms, times)
     a, b = (_on_times(body, whole) for body in (one, other))
     zeros = retardation(whole)
     products = [
@@ -31,8 +32,8 @@ def pair(first: Moduli, second: Moduli) -> Prony:
     moduli = [product / (zero.time * zero.slope) for product, zero in zip(products, zeros, strict=True)]
     shared = a * b / (a + b)
     spring = one.modulus_inf * other.modulus_inf / whole.modulus_inf if whole.modulus_inf else 0.0
-    times = [zero.time for zero in zeros]
-    return normal_form(spring, np.append(shared, moduli), np.append(whole.relaxation_times, times))
+    slow = [zero.time for zero in zeros]
+    return normal_form(spring, np.append(shared, moduli), np.append(whole.relaxation_times, slow))
 
 
 def _on_times(body: Prony, whole: Prony) -> Array:

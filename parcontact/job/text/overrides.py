@@ -57,9 +57,8 @@ def read_job(path: Path, changes: Changes, case: int = 0, given: Source | None =
     elif sweep:
         refuse_overrides(sweep, overrides, source)
         overrides += sweep.case(min(max(case, 0), len(sweep) - 1))
-    names = ["material", *(each.SECTION for each in capabilities.folders() if getattr(each, "MATERIAL", False))]
-    owns = {name: dict(_material(source, name)) for name in names}
-    first = [key for name in names for key in ((name,), (name, "include"))]
+    owns = {name: dict(_material(source, name)) for name in materials()}
+    first = [key for name in owns for key in ((name,), (name, "include"))]
     for override in overrides:
         if override.path in first:
             _apply(source, override)
@@ -131,6 +130,11 @@ def _dead_end(node: Any, shown: str, name: str) -> str:
 
 
 # -- materials from other files ---------------------------------------------------------------------------------------
+
+
+def materials() -> list[str]:
+    """Return the sections that are materials."""
+    return ["material", *(each.SECTION for each in capabilities.folders() if getattr(each, "MATERIAL", False))]
 
 
 def _material(source: Source, section: str) -> dict[str, Any]:

@@ -1,26 +1,30 @@
 """Jobs with a counterbody that deforms: closed forms, what is refused, and that a rigid or absent one costs nothing."""
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from conftest import WORLD
 from marched_jobs import column, marched
 
 from parcontact import scene
 from parcontact.derived import prediction
-from parcontact.effects.counterbody.effect import CounterbodyThatDeforms
+from parcontact.effects.counterbody.effect import CounterbodyThatDeforms, frequencies
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import InputError, JobError
 from parcontact.job import Job, load
+from parcontact.job.schema import json_schema
 from parcontact.job.sections.listing import plain_job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
 from parcontact.steady_sliding.curve import request
 from parcontact.steady_sliding.sliding import SteadySliding
 
+BODIES = ("material", "counterbody")
 LENGTH, PRESSURE, AMPLITUDE, TIME = 1e-3, 1e5, 4e-8, 1e-3
 WAVE = 2.0 * math.pi * 2.0 / LENGTH  # [rad/m]
 RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 9e6, "relaxation_time": TIME}]}
@@ -257,3 +261,30 @@ def test_the_theory_takes_the_pair() -> None:
     both, alone = ([row.friction for row in prediction.predict_steady(each, request(each))] for each in found)
     assert both[0] > 0.0
     assert both == pytest.approx(alone, rel=1e-10)
+
+
+def test_editors_know_its_keys() -> None:
+    """Those of `material`, with `include`."""
+    found = json_schema()["properties"]
+    assert found["counterbody"]["anyOf"][0] == found["material"]["anyOf"][0]
+    kinds = [set(re.findall(r"defs/(\w+)", str(found[name]["anyOf"][1]))) for name in BODIES]
+    assert kinds[0] == kinds[1] == {"Elastic", "Zener", "Dma"}
+
+
+def test_frequencies_of_a_road_in_bands() -> None:
+    """Its longest wave at the lowest velocity, and its shortest one at the highest."""
+    rough = {"shape": "rough", "hurst": 0.8, "long_wavelength": 1e-3, "short_wavelength": 1e-4, "rms_slope": 0.1}
+    bands = {"count": 2, "points": 16}
+    steady = {"velocities": [0.1, 1.0], "pressures": [PRESSURE]}
+    found = frequencies(job(grid=None, bands=bands, surface=rough, history=None, steady=steady))
+    assert found == pytest.approx([1e2, 1e3, 1e4])
+
+
+@pytest.mark.mpi
+def test_ranks_get_the_pair() -> None:
+    """Friction of one wave on all ranks."""
+    found = WORLD.bcast(job(history=None, steady=STEADY))
+    sliding = SteadySliding(scene.set_up(found, Slab(WORLD, *found.grid.points)))
+    soft = moduli(0.2 * WAVE, 1e6, 9e6, TIME)
+    friction = sliding.solve((0.2, 0.0), PRESSURE).measures.friction
+    assert of_surface(friction) * 1e6 == pytest.approx((soft * 5e6 / (soft + 5e6)).imag, rel=1e-6)
