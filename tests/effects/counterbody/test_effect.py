@@ -18,11 +18,12 @@ from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import InputError, JobError
 from parcontact.job import Job, load
 from parcontact.job.schema import json_schema
-from parcontact.job.sections.listing import plain_job
+from parcontact.job.sections.listing import plain_data, plain_job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
 from parcontact.steady_sliding.curve import request
 from parcontact.steady_sliding.sliding import SteadySliding
+from parcontact.storage.provenance import references_of
 
 BODIES = ("material", "counterbody")
 LENGTH, PRESSURE, AMPLITUDE, TIME = 1e-3, 1e5, 4e-8, 1e-3
@@ -288,3 +289,8 @@ def test_ranks_get_the_pair() -> None:
     soft = moduli(0.2 * WAVE, 1e6, 9e6, TIME)
     friction = sliding.solve((0.2, 0.0), PRESSURE).measures.friction
     assert of_surface(friction) * 1e6 == pytest.approx((soft * 5e6 / (soft + 5e6)).imag, rel=1e-6)
+
+
+def test_a_relaxing_counterbody_has_its_references() -> None:
+    pressed = job(material=STIFF, counterbody=OTHER, history=LOAD)
+    assert references_of(plain_data(pressed)) == references_of(plain_data(job(counterbody=None, history=LOAD)))
