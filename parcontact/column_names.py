@@ -19,7 +19,8 @@ WORDS = {  # lower case; * is an unknown letter
     **dict.fromkeys(("tan(δ)", "damping factor"), "tan_del"),
     **dict.fromkeys(("delta", "δ", "phase angle", "phase", "loss angle", "phase shift angle"), "delta"),
     **dict.fromkeys(("q", "wavenumber", "wave number", "wavevector", "wave vector"), "q"),
-    **{"c1d": "C1D", "c2d": "C2D", "x": "x", "y": "y", "z": "z", "height": "z", "heights": "z"},
+    **dict.fromkeys(("strain", "strain amplitude", "shear strain", "dynamic strain", "gamma", "γ"), "strain"),
+    **{"g": "g", "c1d": "C1D", "c2d": "C2D", "x": "x", "y": "y", "z": "z", "height": "z", "heights": "z"},
 }
 MODULI = {f"{letter}_{part}" for letter in "EG*" for part in ("stor", "loss", "relax", "abs", "creep")}
 TEMPERATURES = {"C": 0.0, "°C": 0.0, "degC": 0.0, "deg C": 0.0, "K": -273.15}  # added to them for deg C

@@ -244,6 +244,7 @@ BANDS: Table = (
     Column("load_lost", "", "share of the load at pressures above the highest one solved for the band"),
     Column("rms_slope_to", "", "of this and all coarser bands"),
     Column("strain_to", "", "rms strain of these waves in full contact, at the depth where it is largest"),
+    Column("strain_amplitude", "", "strain that softens the rubber of the band; empty without `softening`"),
 )
 
 THEORY: Table = (

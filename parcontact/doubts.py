@@ -1,6 +1,7 @@
 """Warnings as data (kind, place, numbers), and the sentences that users read.
 
-Code that checks a job, a surface or a contact returns `Doubt`s. No code compares or parses the sentences.
+Code that checks a job, a surface or a contact returns `Doubt`s. No code compares or parses the sentences. Those of
+capabilities are in their folders.
 """
 
 import math
@@ -9,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from .capabilities import offers
 from .printed import per_cent, quantity
 
 
@@ -200,51 +202,6 @@ SENTENCES = {
         "{instants:.4g} instants need {needed:.3g} GB, but {directory} has {free:.3g} GB left; use an output.every "
         "above {every}, or fewer fields"
     ),
-    # a job: adhesion
-    "work": (
-        "adhesion.work is {work:g} J/m^2 and the range {range:.3g} m: dry surfaces have a work of adhesion of at most "
-        "{most:g} J/m^2, rubber about 0.05; the material adds what the body dissipates"
-    ),
-    "strained edges": (
-        "strains at the edges of contact are about work/(E* range) = {strain:.2g}; the theory assumes small strains, "
-        "up to {most:g}. adhesion.work is {work:g} J/m^2 and the range {range:.3g} m; use a longer range or a smaller "
-        "work"
-    ),
-    "long range": (
-        "adhesion.work is {work:g} J/m^2 and the range {range:.3g} m, more than {most:g} of the box: points then also "
-        "attract points that are not opposite, which the law neglects; use a shorter range"
-    ),
-    "coarse tip": (
-        "a cell, {cell:.3g} m, is {ratio:.2g} times sqrt(radius range), the radius within which {sphere} is attracted; "
-        "at {most:g} times the sum over points is wrong by 3 %; use cells of {fine:.3g} m, or a range of {enough:.3g} m"
-    ),
-    "small sphere": (
-        "it attracts out to sqrt(2 radius range), more than its radius, {radius:g} m; the theory assumes small slopes: "
-        "use an adhesion.range of at most {most:.3g} m"
-    ),
-    "cut attraction": (
-        "{share!p} of its attraction over an adhesion.range of {range:.3g} m comes from beyond {room:.3g} m, where "
-        "the box ends (limit: {most!p}); use a range of at most {shorter:.3g} m, or {more:.3g} m of room around the "
-        "sphere"
-    ),
-    "attraction at an edge": (
-        "{share!p} of its attraction over an adhesion.range of {range:.3g} m comes from beyond {room:.3g} m, where "
-        "the box ends (limit: {most!p}); use {more:.3g} m of room around the sphere"
-    ),
-    "coarse process zone": (
-        "a cell, {cell:.3g} m, is {ratio:.2g} times as long as the process zone, so the forces at edges of contact are "
-        "not resolved: pull-off is wrong by 4 % at 1.2 times and by 23 % at 1.8 times; use a range of {enough:.3g} m "
-        "or more, or cells of {zone:.3g} m"
-    ),
-    "range beyond heights": (
-        "the range, {range:.3g} m, is more than the {span:.3g} m from the lowest to the highest point of the surface, "
-        "so the attraction is nearly uniform and adhesion acts as a pressure of work/range; use a shorter range "
-        "(range: auto follows the cells)"
-    ),
-    "range follows cells": (
-        "auto depends on cells, work and modulus, and gives {least:.4g} to {most:.4g} m in these cases, which are "
-        "different physics; to compare them give all one range: {most:.4g} m is resolved by the cells of each"
-    ),
     # temperatures
     "kelvin": (
         "{degrees:g} C is hotter than rubber endures (limit: {most:g} C). Temperatures are in deg C: if this is in "
@@ -299,23 +256,11 @@ SENTENCES = {
     ),
     # friction curves
     "unsolved point": "{where}",
-    "decomposes": (
-        "flash temperatures of {count} of {points} points are above {most:g} K, up to {rise:.3g} K at {speed:g} m/s: "
-        "rubber decomposes there; take a smaller thermal.distance, velocity or pressure"
-    ),
-    "flash temperatures": (
-        "with its flash temperature the rubber is beyond the {low:g} to {high:g} C of its measurement at {count} of "
-        "{points} points, up to {hottest:.3g} C at {speed:g} m/s: the shift is an extrapolation there"
-    ),
     "inaccurate points": "estimated error of {of} {where}",
     # contacts
     "edge": (
         "{where}: the contact reaches the edge of the box and is cut off there, so its results are wrong; use a "
         "larger grid.size, a smaller load or a shorter distance"
-    ),
-    "whole box sticks": (
-        "{where}: all of the periodic box is in contact, where no traction moves the mean of its surface: friction of "
-        "the first steps that stick may be too small; use grid.boundary: free, a smaller load or rougher heights"
     ),
     "below a cell": (
         "{where}: spots of contact may be smaller than a cell, so that their area and friction are not known and no "
@@ -325,4 +270,5 @@ SENTENCES = {
         "{where}: spots of contact are only a few cells wide: contact_area is about {excess!p} too large (limit: "
         "{most!p}); use {more}, a smaller grid.size or a larger load"
     ),
+    **{kind: text for texts in offers("sentences", "SENTENCES") for kind, text in texts.items()},
 }

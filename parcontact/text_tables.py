@@ -208,19 +208,24 @@ def unit_size(path: Path, name: str, unit: str, known: dict[str, float]) -> floa
 
 
 def read_named_columns(
-    path: Path, expected: str, example: str, names: Set[str], enough: Callable[[set[str]], bool]
+    path: Path,
+    expected: str,
+    example: str,
+    names: Set[str],
+    enough: Callable[[set[str]], bool],
+    plain: Set[str] = NUMBERS,
 ) -> Table:
     """Return the columns of a table with names.
 
     Columns with a name of `names` must hold numbers, and others are ignored. `enough` decides whether the names in a
-    line are those of a header. Raises InputError with file and line.
+    line are those of a header. Columns with a name of `plain` need no unit. Raises InputError with file and line.
     """
     lines = _read_lines(path, expected)
     rows = [(number, text) for number, text in lines if COMMENT.sub("", text).strip(" \t,;")]
     if not rows:
         raise InputError(f"{path} is empty; {expected} was expected")
     dialect = find_dialect(path, [text for _, text in rows if is_row(text)] or [rows[-1][1]])
-    columns, last = _header(path, lines, dialect, example, names, enough)
+    columns, last = _header(path, lines, dialect, example, names, enough, plain)
     rows = [(number, text) for number, text in rows if number > last]
     columns = [each if each.name in names else Column("", None) for each in columns]
     values = [_numbers(path, number, text, columns, dialect) for number, text in rows]
@@ -256,6 +261,7 @@ def _header(
     example: str,
     names: Set[str],
     enough: Callable[[set[str]], bool],
+    plain: Set[str],
 ) -> tuple[list[Column], int]:
     """Return the columns and the number of the last line of the header."""
     texts = {at: re.sub(r"^\s*(#|%|//)+", "", text) for at, (_, text) in enumerate(lines) if not is_row(text)}
@@ -269,17 +275,19 @@ def _header(
         if columns != head:
             raise InputError(f"{path}:{lines[other][0]}: its names of columns differ from those in line {number}")
     if any(each.unit is not None for each in head):
-        without = [each.name for each in head if each.unit is None and each.name in names - NUMBERS]
+        without = [each.name for each in head if each.unit is None and each.name in names - plain]
         if without:
             raise InputError(f"{path}:{number}: {without[0]} must be a name with its unit in brackets, such as f[Hz]")
         return head, number
-    if at + 1 not in texts and not {each.name for each in head} & NAMES <= NUMBERS:
+    if at + 1 not in texts and not {each.name for each in head} & NAMES <= plain:
         raise InputError(
             f"{path}:{number}: names and units of the columns were expected, such as {example}, or two rows with names "
             "and units"
         )
     units = _split_like(texts.get(at + 1, ""), dialect, len(head))
-    return [Column(each.name, plain_unit(unit)) for each, unit in zip(head, units, strict=True)], lines[at + 1][0]
+    return [Column(each.name, plain_unit(unit)) for each, unit in zip(head, units, strict=True)], lines[
+        at + (at + 1 in texts)
+    ][0]
 
 
 def _candidates(texts: dict[int, str], dialect: Dialect, enough: Callable[[set[str]], bool]) -> dict[int, list[Column]]:

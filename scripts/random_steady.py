@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Steady sliding of random bodies at high pressures and velocities: costs, and failed solves.
 
-    .venv/bin/python scripts/random_steady.py [--bodies 200] [--seed 1] [--only NUMBER] [--most 600]
+    .venv/bin/python scripts/random_steady.py [--bodies 200] [--seed 1] [--only NUMBER] [--most 600] [--exact]
 
 Rubbers have 2 to 12 branches and instantaneous moduli of 3 to 1000 times the long-term modulus. They slide on
 self-affine surfaces under 1 to 100 MPa at 0.3 to 100 m/s. Each result is checked by an independent operator made with
 numpy. The exit code is 1 if a solve fails, a result is wrong, or a solve takes more than `--most` operator calls.
+`--exact` also solves to a tolerance of 1e-4, and prints the rms differences of friction and of the corrected area.
 """
 
 import sys
@@ -55,7 +56,9 @@ def drawn(random: np.random.Generator) -> tuple[dict[str, Any], float, float]:
     return made, speed, pressure
 
 
-def trial(asked: Any, counts: Counter[str], calls: list[float], number: int) -> Iterator[str]:
+def trial(
+    asked: Any, counts: Counter[str], calls: list[float], differences: list[list[float]], number: int
+) -> Iterator[str]:
     made, speed, pressure = drawn(np.random.default_rng([asked.seed, number]))
     points = made["grid"]["points"]
     sliding = SteadySliding(scene.set_up(job.load(made), Slab.alone(points, points)))
@@ -65,16 +68,24 @@ def trial(asked: Any, counts: Counter[str], calls: list[float], number: int) -> 
     if point.operator_calls > asked.most:
         yield f"{point.operator_calls:.0f} operator calls, contact {point.measures.contact_area:.4f}"
     found, allowed = certificate(sliding, speed, pressure), sliding.setup.job.numerics.tolerance
+    if asked.exact:
+        tight = job.load(made, ["numerics.tolerance=1.0e-4"])
+        exact = SteadySliding(scene.set_up(tight, Slab.alone(points, points))).solve((speed, 0.0), pressure)
+        areas = point.measures.contact_area_corrected, exact.measures.contact_area_corrected
+        differences.append([point.friction / exact.friction - 1.0, areas[0] / areas[1] - 1.0])
     if found > allowed * (1 + 1e-6):
         yield f"WRONG, certificate {found:.3g} instead of {allowed:g}"
 
 
 def main() -> int:
-    options = campaign.parser(__doc__, trials=200, what="bodies", most=(600.0, "operator calls"))
+    more = {"most": (600.0, "operator calls"), "exact": (False, "differences from a tolerance of 1e-4")}
+    options = campaign.parser(__doc__, trials=200, what="bodies", **more)
     options.set_defaults(seed=1)
-    asked, counts, calls = options.parse_args(), Counter[str](), list[float]()
-    faulty = campaign.go(asked, partial(trial, asked, counts, calls), counts)
+    asked, counts, calls, differences = options.parse_args(), Counter[str](), list[float](), list[list[float]]()
+    faulty = campaign.go(asked, partial(trial, asked, counts, calls, differences), counts)
     print("operator calls, median, 90 %, most:", *np.percentile(calls, [50, 90, 100]).round())
+    if differences:
+        print("rms differences of friction and area:", *np.sqrt(np.mean(np.square(differences), axis=0)))
     return 1 if faulty else 0
 
 

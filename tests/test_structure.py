@@ -47,8 +47,6 @@ OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of anothe
     **dict.fromkeys((f"effects.leakage.{name}" for name in ("elimination", "flow", "fluids", "paths")), "physics"),
     "effects.leakage.conductivity": "plotting",
     **dict.fromkeys((f"effects.heat.{name}" for name in ("flash", "heat", "heat_memory", "heat_unbounded")), "physics"),
-    "effects.heat.heating": "steady_sliding",
-    "effects.heat.band_heat": "bands",
     **dict.fromkeys((f"effects.stick.{name}" for name in ("discs", "solver")), "solve"),
     "effects.stick.shear_operator": "physics",
     "effects.adhesion.attraction": "physics",
@@ -58,10 +56,14 @@ OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of anothe
     **dict.fromkeys((f"effects.adhesion.{name}" for name in ("gap_kernels", "gap_solver", "law")), "solve"),
     "effects.adhesion.pull_off": "summary",
     "effects.leakage.over_time": "derived",
+    "effects.softening.strain": "scene",
 }
 
 
-FILES = {"columns": "column", "results": "summary", "pictures": "plotting"}  # modules that any capability may have
+FILES = {  # modules that any capability may have, and the rooms that ask them
+    **{"columns": "column", "sentences": "column", "results": "summary", "pictures": "plotting"},
+    **{"steady": "steady_sliding", "bands": "bands"},
+}
 
 
 def room(module: str) -> str:

@@ -1,9 +1,9 @@
 """A road and a rubber as a laboratory would deliver them, made up, so that the truth is known: python jobs/road/make.py
 
-Writes into measured/ in its own directory: road.npy, 1.8 x 1.8 mm of a larger road in um, tilted, 2 % of its points
-missing, its edges fitting nowhere; spectrum.csv, the spectrum of its finer waves down to 1 um; compound.csv, Young's
-moduli at five temperatures with 2 % noise. In truth/: the whole road of 2 x 2 mm, periodic, in m; compound.yaml with
-the relaxation function and the shift that the table was made from.
+It writes into measured/ in its own directory, which is part of the project: road.npy, 1.8 x 1.8 mm of a larger road in
+um, tilted, 2 % of its points missing, its edges fitting nowhere; spectrum.csv, the spectrum of its finer waves down to
+1 um; compound.csv, Young's moduli at five temperatures with 2 % noise. In truth/: the whole road of 2 x 2 mm, periodic,
+in m; compound.yaml with the relaxation function and the shift that the table was made from.
 """
 
 from pathlib import Path
@@ -81,7 +81,7 @@ def main() -> None:
         (HERE / name).mkdir(exist_ok=True)
     heights = road()
     np.save(HERE / "truth" / "road.npy", heights)
-    np.save(HERE / "measured" / "road.npy", measured(heights))
+    np.save(HERE / "measured" / "road.npy", measured(heights).astype(np.float32))
     (HERE / "measured" / "compound.csv").write_text(table())
     (HERE / "measured" / "spectrum.csv").write_text(spectrum())
     (HERE / "truth" / "compound.yaml").write_text(compound())

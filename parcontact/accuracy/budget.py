@@ -75,6 +75,11 @@ class ErrorBudget:
         friction = self.friction and self.friction._replace(time=self.friction.time - error)
         return replace(self, friction=friction)
 
+    def with_rounds(self, friction: float, area: float) -> "ErrorBudget":
+        """Return the budget with relative errors by the rounds of a fixed point, as part of the solver's."""
+        own = self.friction and self.friction._replace(solver=self.friction.solver + friction)
+        return ErrorBudget(own, self.area._replace(solver=self.area.solver + area))
+
 
 def estimate(run: RunProperties, observed: StepObservation) -> ErrorBudget:
     """Return the budget of a step."""

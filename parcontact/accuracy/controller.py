@@ -48,7 +48,7 @@ NAME = "mean logarithm"  # its name in a checkpoint
 SAFETY = 0.98  # tuning: length of a step over that with the allowed error
 REJECTED = 1.19  # accuracy: error of a rejected step over the allowed one
 MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0  # tuning: limits on a step over the one before, or over a rejected one
-LEAST_SHEAR = 1.0 / 1024.0  # accuracy: cells in the first step if elastic points stick; spots slide in a hundredth
+LEAST_SHEAR = 1.0 / 1024.0  # accuracy: cells in the first step if shear comes first; spots slide in a hundredth
 LEVELS = 2  # tuning: log2 of the number of lengths per factor of two, for steps below a quarter of a cell
 REST_LEVELS = 4  # tuning: number of lengths per factor of two at rest
 LEAST_WAY = 0.35  # tuning: least length of a step that ends at a multiple, over its nominal length
@@ -213,12 +213,12 @@ class Controller:
             return self._level(span, chosen.next)
         if span.stage.speed:
             cell = one_cell(span.stage, self.job.grid)
-            return min(limits.most, max(limits.least, self._first_shear() * cell) if self.job.sticks else cell)
+            return min(limits.most, max(limits.least, self._first_shear() * cell) if self.job.sheared_first else cell)
         return self._level(span, RELAXING * self.body.shortest_time)
 
     def _first_shear(self) -> float:
-        """Return the cells slid in the first step of a stage if points stick. A body that is stiffer at once reaches
-        the bounds of tractions, which belong to the relaxed body, after a shorter way."""
+        """Return the cells slid in the first step of a stage if points are sheared first. A body that is stiffer at
+        once reaches the bounds of tractions, which belong to the relaxed body, after a shorter way."""
         body = self.job.material.fitted
         return LEAST_SHEAR * body.long_modulus / body.instant_modulus
 

@@ -1,13 +1,15 @@
 """One band of the spectrum on its own grid: a surface with its waves, and its steady states under many pressures."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..accuracy.observation import properties_of
-from ..effects.heat.band_heat import Warming, shares_of_depth, warming_of, waves_along_depth
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job
 from ..job.sections.height_arrays import GivenHeights
@@ -19,12 +21,16 @@ from ..scene import Setup, choices, set_up
 from ..solve import kernels
 from ..solve.constraint import NonNegative
 from ..solve.interface_law import InterfaceLaw
-from ..solve.nonsymmetric.splitting import Splitting, step_for
+from ..solve.nonsymmetric.judge import Judge
+from ..solve.nonsymmetric.splitting import Splitting
 from ..solve.problem import MeanPressure
 from ..steady_sliding.losses import branch_powers
 from ..steady_sliding.sliding import judge_state, tolerance_of
 from .choice import Cut
 from .ladder import PressureLadder
+
+if TYPE_CHECKING:  # found only for jobs that ask for it
+    from ..effects.heat.bands import Warming
 
 PARTS = 6  # accuracy: parts of a cell of wavenumbers, along each side, for sums of the spectrum
 MOST_STEPS = 20000  # tuning: limit on the steps of the splitting for one contact
@@ -37,8 +43,10 @@ class Rung:
 
     Friction of its waves by energy and by slopes [-]; area as a share, counted and corrected; approach [m] (in
     `Cascade.climb` including finer bands); highest pressure [Pa]; `weights` of the rungs of the next finer band, and
-    the share of the load above them; power [W/m^2] lost in each branch; S_j and g of its heat (`band_heat`), one 0
-    without `thermal`; relative errors of friction and area by solver and grid; residual, and operator calls.
+    the share of the load above them; power [W/m^2] lost in each branch; S_j and g of its heat (`heat.bands`), one 0
+    without `thermal`; squares of the strain of its waves at all depths and their weights in its strain
+    (`softening.strain`), one 0 without `softening`; relative errors of friction and area by solver and grid; residual,
+    and operator calls.
     """
 
     pressure: float
@@ -53,6 +61,8 @@ class Rung:
     powers: Array
     warming: Array
     depths: Array
+    squares: Array
+    strain_weights: Array
     errors: Array  # friction by solver and by grid, area by solver and by grid
     residual: float
     penetration: float
@@ -78,7 +88,7 @@ class Band:
         slab = Slab.alone(*grid.points)
         surface = (HeightArray(heights=GivenHeights(np.asarray(heights))),)
         own = job.model_copy(update={"grid": grid, "surface": surface, "bands": None})
-        self._depth_waves = waves_along_depth(float(cut.edges[0]), float(cut.edges[-1]))[0]
+        self._wavenumbers = float(cut.edges[0]), float(cut.edges[-1])  # of all bands
         self.warming: Warming | None = None
         self._warmed_for: tuple[Vector, float] | None = None
         self._set_up(set_up(own, slab))
@@ -94,18 +104,23 @@ class Band:
         """Set the temperature [deg C] of the material. Raises InputError if it has no shift."""
         self._set_up(replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature))))
 
+    def soften(self, table: Any, strain: float) -> None:
+        """Set the strain of all waves, and with it the factors of the moduli by a `StrainTable`."""
+        self._set_up(replace(self.setup, factors=table.at(strain)))
+
     def slide(self, velocity: Vector, seconds: float) -> None:
         """Set the velocity [m/s] and, for heat, the time of sliding [s]."""
         if velocity != self._velocity:
             body, moved = self.setup.half_space, (self.setup.fft, self.setup.in_units(velocity), self.setup.prony)
             self.operator: Convolution = body.sliding_operator(*moved)
-            pressure = body.sliding_inverse(*moved).apply(self._heights, self.setup.slab.empty())
-            self._full = float(np.std(pressure))
-            sizes = np.abs(np.concatenate([np.abs(part).ravel() for part in self.operator.symbols]))
-            self._stiffest, self._softest = (sizes[sizes > 0.0].min(), sizes.max()) * np.full(2, self.setup.slab.points)
+            self._inverse = body.sliding_inverse(*moved)
+            self._full = float(np.std(self._inverse.apply(self._heights, self.setup.slab.empty())))
             section = self.setup.job.section("thermal")
             if section is not None and self._warmed_for != (velocity, seconds):
-                self.warming = warming_of(self.setup, section, seconds, velocity, self._depth_waves)
+                from ..effects.heat.bands import warming_of, waves_along_depth
+
+                waves, _ = waves_along_depth(*self._wavenumbers)
+                self.warming = warming_of(self.setup, section, seconds, velocity, waves)
                 self._warmed_for = velocity, seconds
             self._velocity = velocity
 
@@ -119,10 +134,13 @@ class Band:
         distribution over `below`, the ladder of the next finer band. Raises RunError if it is not found."""
         setup, velocity, units = self.setup, self._velocity, self.setup.units
         mean = pressure / units.pressure
-        gamma = step_for(self._stiffest, self._softest, mean / self._full)
-        what = setup.height / units.height, tolerance_of(setup.choices.numerics.tolerance), MOST_STEPS
-        solver = Splitting(setup.slab, self.operator, self._resolvent, *what)
-        contact = solver.solve(self._heights, MeanPressure(mean), law.in_units(units.pressure, units.height), gamma)
+        judge, tolerance = (
+            Judge(setup.slab, setup.height / units.height),
+            tolerance_of(setup.choices.numerics.tolerance),
+        )
+        solver = Splitting(judge, self.operator, self._inverse, tolerance, MOST_STEPS)
+        given = MeanPressure(mean), law.in_units(units.pressure, units.height)
+        contact = solver.solve(self._heights, *given, setup.slab.zeros())
         if contact.failure:
             raise RunError(f"a band of {max(setup.grid.size):.3g} m under {pressure:.3g} Pa {contact.failure}")
         seen = contact.u, self._heights, contact.d, NonNegative().touches(contact.p)
@@ -145,6 +163,7 @@ class Band:
             above,
             branch_powers(setup, contact, velocity).sum(axis=1) / area,
             *self._heat_of(contact.p),
+            *self._strains_of(contact.u),
             np.array(parts).ravel(),
             contact.certificate.worst,
             contact.certificate.penetration,
@@ -155,11 +174,22 @@ class Band:
         """Return S_j and g of the heat for a map of pressure."""
         if self.warming is None:
             return np.zeros(1), np.zeros(1)
-        shares = shares_of_depth(self.setup, pressure, self._velocity, self._depth_waves)
+        from ..effects.heat.bands import shares_of_depth, waves_along_depth
+
+        waves, _ = waves_along_depth(*self._wavenumbers)
+        shares = shares_of_depth(self.setup, pressure, self._velocity, waves)
         return self.warming.apply(self.setup, pressure), shares
 
-    def _resolvent(self, gamma: float) -> Convolution:
-        return self.operator.mapped(lambda symbol: 1.0 / (1.0 + gamma * symbol), self.setup.fft.complex)
+    def _strains_of(self, u: Array) -> tuple[Array, Array]:
+        """Return the squares of strains at all depths for a displacement, and their weights."""
+        if self.setup.factors is None:
+            return np.zeros(1), np.zeros(1)
+        from ..effects.softening.strain import depths_between, strains_of  # of use to few
+
+        setup, all_waves = self.setup, np.zeros(self.setup.fft.shape, np.int64)
+        depths = depths_between(*self._wavenumbers) / setup.units.length
+        found = strains_of(setup, u, self._velocity, depths, all_waves, 1)
+        return found.squares, found.weights[0]
 
 
 def _make_waves(cut: Cut, number: int, seed: int, fft: FFT, side: float) -> Spectrum:

@@ -13,7 +13,7 @@ it, and the weights w_j of `ladder`. Contacts of one pass are independent: ranks
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from .choice import Cut
 from .contact_store import ContactStore
 from .ladder import PressureLadder
 
+TINY = 1e-300  # rounding: least power, to avoid division by 0
 NEGLIGIBLE = 1e-12  # accuracy: least share of the load of a rung that is solved without laws
 
 
@@ -44,7 +45,8 @@ class BandResult:
 
     Its weights and load [Pa]; friction of its waves over the whole load [-], by energy and by slopes; area at its
     shortest wave, counted and corrected; share of the load above its ladder; power [W/m^2] per branch; S_j and g of
-    its heat (`band_heat`), averaged over the load; absolute errors of friction and of area by solver and grid.
+    its heat (`effects.heat.bands`), averaged over the load; squares of strains at all depths and their weights
+    (`Rung`), averaged over the power; absolute errors of friction and of area by solver and grid.
     """
 
     weights: Array
@@ -57,6 +59,8 @@ class BandResult:
     powers: Array
     warming: Array
     depths: Array
+    squares: Array
+    strain_weights: Array
     errors: Array
 
 
@@ -74,6 +78,7 @@ class Cascade:
         self.job, self.cut, self.slab, self.store = job, cut, slab, ContactStore(slab)
         self._bands: dict[tuple[int, int], Band] = {}
         self._temperatures = [math.nan] * cut.count
+        self._strains: tuple[Any, list[float]] | None = None
         self.velocity: Vector = (1.0, 0.0)
         self.ladders: list[PressureLadder] = []
         self.pressure = math.nan
@@ -84,6 +89,8 @@ class Cascade:
             self._bands[number, sample] = Band(self.job, self.cut, number, sample)
             if not math.isnan(temperature := self._temperatures[number]):
                 self._bands[number, sample].set_temperature(temperature)
+            if self._strains is not None:
+                self._bands[number, sample].soften(self._strains[0], self._strains[1][number])
         found = self._bands[number, sample]
         found.slide(self.velocity, self.seconds)
         return found
@@ -101,6 +108,12 @@ class Cascade:
             if temperatures[number] != self._temperatures[number]:
                 band.set_temperature(temperatures[number])
         self._temperatures = list(temperatures)
+
+    def soften(self, table: Any, strains: Sequence[float]) -> None:
+        """Set the strain of each band, and with it the factors of its moduli."""
+        self._strains = table, list(strains)
+        for (number, _), band in self._bands.items():
+            band.soften(table, strains[number])
 
     def press(self, velocity: Vector, pressure: float) -> None:
         """Set the velocity [m/s] and the mean pressure [Pa]."""
@@ -160,6 +173,8 @@ class Cascade:
             np.sum([w * rung.warming for w, rung in zip(loads * ladder.rungs, rungs, strict=True)], axis=0)
             / self.pressure**2,
             np.sum([w * rung.depths for w, rung in zip(loads / loads.sum(), rungs, strict=True)], axis=0),
+            _mean_over(loads * energy, [rung.squares for rung in rungs]),
+            _mean_over(loads * energy, [rung.strain_weights for rung in rungs]),
             np.array([*((loads * energy) @ errors[:, :2] / self.pressure), *(areas @ errors[:, 2:])]),
         )
 
@@ -181,7 +196,7 @@ class Cascade:
     def solve_tasks(self, tasks: Sequence[Task]) -> list[Rung]:
         """Return the solved contacts in the order of the tasks. Raises RunError on all ranks if one is not found."""
         laws = [(task.law.pressures.tobytes(), task.law.closings.tobytes()) for task in tasks]
-        here = self.velocity, self.pressure, self._temperatures
+        here = self.velocity, self.pressure, self._temperatures, self._strains and self._strains[1]
         states = [(here, task[:3], law) for task, law in zip(tasks, laws, strict=True)]
         return self.store.find(states, lambda lacking: self._share([tasks[number] for number in lacking]))
 
@@ -210,6 +225,12 @@ class Cascade:
         below = self.ladders[task.band + 1] if task.band + 1 < self.cut.count else None
         pressure = float(self.ladders[task.band].rungs[task.rung])
         return self.band(task.band, task.sample).solve(pressure, task.law, below)
+
+
+def _mean_over(power: Array, each: Sequence[Array]) -> Array:
+    """Return the mean of arrays of rungs, weighted by their power; 0 without power."""
+    weights = np.maximum(power, 0.0)
+    return np.asarray(weights @ np.array(each) / max(float(weights.sum()), TINY))
 
 
 def mean_rungs(found: Solved, band: int, samples: Sequence[int]) -> list[Rung]:

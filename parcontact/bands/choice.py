@@ -9,6 +9,7 @@ import numpy as np
 from ..doubts import Doubt
 from ..errors import InputError
 from ..job import Grid, Job
+from ..job.added_sections import answers
 from ..job.checks.cells import fast_length
 from ..job.sections.spectral_bands import AUTO, LEAST_CELLS, Bands
 from ..parallel.slab import Array
@@ -129,6 +130,7 @@ def describe_cut(cut: Cut, job: Job) -> list[str]:
         f"surfaces of each: {many}",
         f"surface: rms height {quantity(cut.rms_height, 'm', 4)}, rms slope {cut.rms_slope(cut.count - 1, 0):.4g}; "
         f"rms slopes of the bands: {', '.join(f'{cut.rms_slope(band):.3g}' for band in range(cut.count))}",
+        *(text for describe in answers("bands", "describe_bands") for text in describe(job, cut)),
     ]
 
 

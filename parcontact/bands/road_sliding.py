@@ -5,14 +5,13 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..accuracy.budget import ErrorBudget, ErrorParts
 from ..columns import BANDS, names_of
 from ..doubts import Doubt
-from ..effects.heat.band_heat import flash_of_bands, rises_of, uniform, waves_along_depth
-from ..effects.heat.heating import describe_beyond, describe_cold_state
 from ..effects.relaxation import feeds_back, highest_temperature_of, temperature_of
 from ..errors import InputError, RunError
 from ..job import Job
@@ -34,6 +33,8 @@ LEAST_METHOD = 0.03  # fitted: least relative error of the method (`scripts/band
 LEAST_OF_AREA = 0.09  # fitted: the same of a small area; it falls with the open share (`scripts/band_errors.py`)
 NEARLY_ALL = 0.1  # accuracy: open area below which errors fall to 0 with it
 SURE = 2.0  # accuracy: error by the scatter of surfaces over its standard error
+ROUND_SHARE = 0.2  # accuracy: change of friction in a round of strains over the accuracy of the job
+TINY = 1e-300  # rounding: least square of a change, to avoid division by 0
 TABLE = "bands.csv"
 
 
@@ -71,11 +72,13 @@ class BandOutcome:
 
 
 @dataclass(frozen=True)
-class BandTemperatures:
-    """Search for the temperatures of bands: the number of `rounds`, and friction without heat."""
+class BandSearch:
+    """Search for the temperatures and the strains of bands: the number of `rounds`, friction of cold rubber, and the
+    relative `changes` of friction and area in the last round."""
 
     rounds: int = 1
     friction_cold: float = math.nan
+    changes: tuple[float, float] = (0.0, 0.0)
 
 
 class RoadSliding:
@@ -94,6 +97,9 @@ class RoadSliding:
         self._point: Point | None = None
         self._results: Results = ()
         self._rises: list[float] = []
+        section = job.section("softening")
+        self._table: Any = section and section.made
+        self._strains = np.full(self.cut.count, self._table.start if section else math.nan)
 
     def doubts(self, temperatures: Sequence[float]) -> list[Doubt]:
         """Return warnings about the job."""
@@ -125,16 +131,21 @@ class RoadSliding:
         """Return the steady state at a velocity [m/s] under a mean pressure [Pa]; raises RunError."""
         began = time.perf_counter()
         self._cascade.press(velocity, pressure)
-        search = self._solve_fixed_point() if feeds_back(self.job) else BandTemperatures()
+        search = self._solve_fixed_point() if feeds_back(self.job) or self._table else BandSearch()
         outcome = self._solve()
         self._results = outcome.results
         point = self._to_point(outcome, velocity, pressure, time.perf_counter() - began)
         if self.job.section("thermal") is not None:
+            from ..effects.heat.bands import flash_of_bands
+
             self._rises = self._rises_of(outcome.results, point.measures.force_interface)
             heats = [result.friction for result in outcome.results]
             heats[-1] += point.measures.friction_interface
             flash = flash_of_bands(self._rises, heats)
             point = replace(point, flash=flash, rounds=search.rounds, friction_cold=search.friction_cold)
+        if self._table:
+            errors = point.errors.with_rounds(*search.changes)
+            point = replace(point, errors=errors, strain_amplitude=self._amplitude(outcome.results))
         self._point = point
         return point
 
@@ -149,13 +160,16 @@ class RoadSliding:
             place = point.speed, point.measures.pressure, point.temperature, float(number)
             rise = self._rises[number] if self._rises else math.nan
             found = friction, result.contact_area, cut.rms_slope(number), rise, result.load_lost
-            rows.append([*place, *cut.wavelengths(number), *found, slope_to, STRAIN * slope_to])
+            strains = slope_to, STRAIN * slope_to, self._strains_of(self._results)[number] if self._table else math.nan
+            rows.append([*place, *cut.wavelengths(number), *found, *strains])
         return rows
 
     # -- temperatures -------------------------------------------------------------------------------------------------
 
     def _rises_of(self, results: Results, rubbing: float) -> list[float]:
         """Return the rises [K] of all bands; `rubbing` [N] is the force of the interface on the coarsest box."""
+        from ..effects.heat.bands import rises_of, uniform, waves_along_depth
+
         cascade, section = self._cascade, self.job.section("thermal")
         speed, box = math.hypot(*cascade.velocity), self.setup.grid.lx * self.setup.grid.ly
         heats = [result.friction * cascade.pressure * speed for result in results]
@@ -164,37 +178,43 @@ class RoadSliding:
         shares, warmings = [result.depths for result in results], [result.warming for result in results]
         return rises_of(weights, whole, shares, warmings, heats, rubbing / box * speed)
 
-    def _solve_fixed_point(self) -> "BandTemperatures":
-        """Find the fixed point of the temperatures of all bands, with one surface per band, and set them in the
-        cascade. Raises RunError if it is not found.
+    def _solve_fixed_point(self) -> BandSearch:
+        """Find the fixed point of the temperatures and the strains of all bands, with one surface per band, and set
+        them in the cascade. Raises RunError if it is not found.
 
-        Rounds use Aitken's relaxation; the first is for cold bands. No temperature above the range of the material's
-        shift is tried.
+        Rounds use Aitken's relaxation for temperatures, and a power mean for strains; the first is for cold bands. No
+        temperature above the range of the material's shift is tried.
         """
+        from ..effects.heat.steady import describe_beyond, describe_cold_state
+
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
-        highest, place = highest_temperature_of(self.job.material), (*self._place(), cold)
-        most = highest - cold
-        rises, last, relax, friction_cold = np.zeros(self.cut.count), np.zeros(0), 1.0, math.nan
+        warms = feeds_back(self.job)
+        highest = highest_temperature_of(self.job.material) if warms else math.inf
+        place, most = (*self._place(), cold), highest - cold if warms else math.inf
+        enough = ROUND_SHARE * self.job.numerics.asked.both[0]
+        rises: Array = np.zeros(self.cut.count)
+        last: Array = np.zeros(0)
+        relax, seen = 1.0, list[tuple[float, float]]()
         for rounds in range(1, MOST_ROUNDS + 1):
-            self._set_temperatures(np.minimum(cold + rises, highest))
+            self._set_state(np.minimum(cold + rises, highest))
             rungs = self._cascade.climb([0])
             results = self._cascade.fall(lambda band, _: rungs[band, 0])  # noqa: B023
-            over = (
-                np.array(self._rises_of(results, self._rub(results) * self.setup.grid.lx * self.setup.grid.ly)) - rises
-            )
-            if rounds == 1:
-                friction_cold = sum(result.friction for result in results)
+            seen.append(_sums(results))
+            changes = _changes(seen[-2], seen[-1]) if rounds > 1 else (math.inf, math.inf)
+            over = self._rises_beyond(rises, results)
             settled = np.abs(over) <= np.maximum(LEAST_ERROR, RELATIVE * rises)
-            if np.all(settled):
-                return BandTemperatures(rounds, friction_cold)
-            if np.all(settled | ((rises == most) & (over > 0.0))):
+            if np.all(settled) and (not self._table or changes[0] <= enough):
+                return BandSearch(rounds, seen[0][0], changes)
+            if not np.all(settled) and np.all(settled | ((rises == most) & (over > 0.0))):
                 raise RunError(describe_beyond(*place, most, most + float(over[rises == most].max())))
             if last.size:
                 change = over - last
-                relax = float(np.clip(-relax * (last @ change) / (change @ change), 0.1, 1.0))
+                relax = float(np.clip(-relax * float(last @ change) / max(float(change @ change), TINY), 0.1, 1.0))
             rises, last = np.clip(rises + relax * over, 0.0, most), over
+            if self._table:
+                self._strains = self._table.mixed(self._strains_of(results), self._strains)
         raise RunError(
-            f"{describe_cold_state(*place)}: temperatures of bands did not settle in {MOST_ROUNDS} rounds. "
+            f"{describe_cold_state(*place)}: temperatures and strains of bands did not settle in {MOST_ROUNDS} rounds. "
             "Try feedback: none"
         )
 
@@ -202,14 +222,40 @@ class RoadSliding:
         """Return the velocity [m/s] and the pressure [Pa] of the state."""
         return math.hypot(*self._cascade.velocity), self._cascade.pressure
 
+    def _rises_beyond(self, rises: Array, results: Results) -> Array:
+        """Return the rises [K] of all bands that results cause, over these rises; 0 without feedback."""
+        if not feeds_back(self.job):
+            return np.zeros(self.cut.count)
+        rubbing = self._rub(results) * self.setup.grid.lx * self.setup.grid.ly
+        return np.array(self._rises_of(results, rubbing)) - rises
+
+    def _set_state(self, temperatures: Array) -> None:
+        """Set the temperatures [deg C] and the strains of the bands, as far as the job has them."""
+        if self._table:
+            self._cascade.soften(self._table, self._strains.tolist())
+        if feeds_back(self.job):
+            self._set_temperatures(temperatures)
+        self._cascade.press(self._cascade.velocity, self._cascade.pressure)
+
+    def _amplitude(self, results: Results) -> float:
+        """Return the root of the mean square strain of all bands, weighted by friction; NaN without friction."""
+        weights = np.maximum([result.friction for result in results], 0.0)
+        return math.sqrt(np.average(self._strains_of(results) ** 2, weights=weights)) if weights.any() else math.nan
+
+    def _strains_of(self, results: Results) -> Array:
+        """Return the strain of each band, by the waves of all bands."""
+        squares = np.sum([result.squares for result in results], axis=0)
+        return np.sqrt([result.strain_weights @ squares for result in results])
+
     def _set_temperatures(self, temperatures: Array) -> None:
         """Set the temperatures [deg C] of the bands; raises RunError outside the range of the material's shift."""
         try:
             self._cascade.set_temperatures(temperatures.tolist())
             finest = self.setup.job.at_temperature(float(temperatures[-1]))
             self.setup = replace(self.setup, choices=choices(finest))
-            self._cascade.press(self._cascade.velocity, self._cascade.pressure)
         except InputError as error:
+            from ..effects.heat.steady import describe_cold_state
+
             place = describe_cold_state(*self._place(), self.temperature)
             raise RunError(f"{place}: no material at the flash temperature: {error}") from None
 
@@ -281,7 +327,7 @@ class RoadSliding:
         factor = self.setup.choices.time_factor
         errors = self._errors(outcome, friction)
         return Point(
-            *(velocity, pressure, self.temperature, factor, measures, friction, errors, certificate, calls, 0, seconds),
+            *(velocity, pressure, self.temperature, factor, measures, friction, errors, certificate, calls, seconds),
             tuple(powers.tolist()),
         )
 
@@ -311,6 +357,12 @@ class RoadSliding:
 def make_states(job: Job, slab: Slab) -> States:
     """Return the steady states of a job, in bands or on its grid; collective."""
     return on_one_grid(job, slab) if job.bands is None else RoadSliding(job, slab)
+
+
+def _changes(before: tuple[float, float], now: tuple[float, float]) -> tuple[float, float]:
+    """Return relative changes of friction and area."""
+    friction, area = (abs(b - a) / b if b > 0.0 else 0.0 for a, b in zip(before, now, strict=True))
+    return friction, area
 
 
 def _sums(results: Sequence[BandResult]) -> tuple[float, float]:

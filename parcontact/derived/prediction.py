@@ -12,7 +12,8 @@ import numpy as np
 from .. import job as jobs
 from .. import scene
 from ..bands.choice import cut_bands
-from ..columns import BANDS_THEORY, STEADY_THEORY, THEORY, Table, names_of, to_csv, values_of
+from ..column import Table
+from ..columns import BANDS_THEORY, STEADY_THEORY, THEORY, names_of, to_csv, values_of
 from ..effects.effect import BY_THEORY
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import InputError

@@ -10,8 +10,8 @@ from ..solve.constraint import Constraint, Mask, NonNegative
 
 
 def constraint_of(job: Job, unit: float = 1.0, most: float = math.inf) -> Constraint:
-    """Return the constraint of a job without adhesion, for a `unit` of pressure [Pa]; pressures are at most `most`
-    units."""
+    """Return the constraint of a job without a law of its own, for a `unit` of pressure [Pa]; pressures are at
+    most `most` units."""
     hardness = job.material.hardness
     return NonNegative() if hardness is None or hardness / unit >= most else Bounded(hardness / unit)
 

@@ -1,8 +1,7 @@
 """Interface of contact laws: how a step is solved, its memory, and where surfaces touch.
 
-`ContactLaw` is the interface that a march uses. Without adhesion the law is a constraint on pressures
-(`march.dry_law`); with adhesion the gap is the unknown (`effects.adhesion.adhesive_law`). Effects may provide
-other laws.
+`ContactLaw` is the interface that a march uses. By itself it is a constraint on pressures
+(`march.dry_law`). Effects may provide other laws, in which, say, the gap is the unknown.
 """
 
 from __future__ import annotations
@@ -81,7 +80,7 @@ class SolvedContact(Generic[Remembered]):
 
 class EdgeMotion(NamedTuple):
     """Motion of a contact in a step: of its edges [half process zones]; `untouched` if nothing touches or is under
-    tension before and after the step; `begins` if an adhesive contact begins or ends."""
+    tension before and after the step; `begins` if a contact that attracts begins or ends."""
 
     front: float = 0.0
     untouched: bool = False

@@ -68,7 +68,7 @@ class Instant:
     The pressure on this rank's rows is `modulus pressure`, `displacement` is the displacement of the body, and
     `touching` is not 0 where the surfaces touch; their shape is (ny_loc, nx). `before` and `measures` belong to the
     step before and to this one. In this step the surface moved by `moved` [m], and the stored plus dissipated energy
-    of the body changed by `gained` [J], NaN without energies. Edges of an adhesive contact moved by `front` half
+    of the body changed by `gained` [J], NaN without energies. Edges of a contact that attracts moved by `front` half
     process zones; `untouched` if nothing touched or was under tension before and after the step. `error_friction` is
     the estimated relative error of friction, infinite without friction.
     """
@@ -160,6 +160,11 @@ class Effect(Protocol[Memory]):
     @staticmethod
     def remembers(job: Any) -> bool:
         """Return True if the contact depends on its history, also that of an elastic body."""
+        return False
+
+    @staticmethod
+    def sheared_first(job: Any) -> bool:
+        """Return True if it shears the contact before it slides, within far less than a wave."""
         return False
 
     @staticmethod

@@ -25,7 +25,8 @@ class Step(NamedTuple):
     `dt` = 0 is a jump of the load. `control` names what `load` prescribes (Pa, N or m). `growth` is dt over the dt of
     the step before, 0 after a jump: the factor for extrapolation. `passed` is the number of further steps that this one
     replaces. `decide`, for a step that may be too long, gets the error of the step and the motion of the edge of an
-    adhesive contact, in half process zones; it returns the shorter step to make instead, or the record of this one.
+    contact that attracts, in half process zones; it returns the shorter step to make instead, or the record of
+    this one.
     """
 
     number: int

@@ -220,10 +220,9 @@ class Job(Part):
         return self.material.fitted.remembers or any(asked(self) for asked in self.asked("remembers"))
 
     @property
-    def sticks(self) -> bool:
-        """Return True if points stick to the surface before they slide."""
-        interface = self.section("interface")
-        return interface is not None and interface.stick
+    def sheared_first(self) -> bool:
+        """Return True if an effect shears the contact before it slides."""
+        return any(asked(self) for asked in self.asked("sheared_first"))
 
     def resolved(self) -> str:
         """Return YAML text with every default, which loads back to an equal job.
@@ -247,9 +246,10 @@ def extended_model(sections: tuple[str, ...]) -> type[Job]:
         for name, effect in effects.items()
     }
     made = create_model(SEPARATOR.join(("Job", *sections)), __base__=Job, __module__=__name__, **fields)
-    absent = set(Job.words()) - set(made.model_fields)
     every = ((name, rule) for name, effect in effects.items() for rule in getattr(effect, "rules", ()))
-    own: Iterator[Any] = (_named_rule(name, rule) for name, rule in every if absent.isdisjoint(rule.needs))
+    own: Iterator[Any] = (
+        _named_rule(name, rule) for name, rule in every if made.model_fields.keys() >= set(rule.needs)
+    )
     laws = (limits.refuse_steady(name) for name, effect in effects.items() if getattr(effect, "brings_law", False))
     lifted = [check for effect in effects.values() for check in getattr(effect, "lifts", ())]
     kept = (rule for rule in Job.rules if rule.check not in lifted)

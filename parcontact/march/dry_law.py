@@ -1,4 +1,5 @@
-"""Contact law without adhesion: a constraint on pressures (`solve.constraint`), solved from the last pressures."""
+"""Contact law of surfaces that do not attract: a constraint on pressures (`solve.constraint`), solved from the last
+pressures."""
 
 import math
 from dataclasses import dataclass

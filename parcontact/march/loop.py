@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from ..accuracy.budget import ErrorSums
+from ..capabilities import offers
 from ..effects.contact_protocol import Detached, nothing_holds
 from ..errors import InputError
 from ..history.timeline import Step, Timeline
@@ -19,10 +20,7 @@ from .state import State, entries, first_state, restored, save_state
 from .step import make_step
 from .step_errors import ErrorMemory
 
-FIELDS_OF_EFFECTS = {
-    "temperature": "a thermal section",
-    **dict.fromkeys(("traction_x", "traction_y"), "interface.stick"),
-}
+FIELDS_OF_EFFECTS = {name: key for fields in offers("columns", "FIELDS_NEED") for name, key in fields.items()}
 
 
 class March:

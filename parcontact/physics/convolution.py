@@ -34,7 +34,7 @@ class Convolution:
         even: bool = True,
         later: bool = False,
     ) -> None:
-        self.fft, self.even = fft, even
+        self.fft, self.even, self.dtype = fft, even, dtype
         self._make: Make | None = partial(_in_blocks, fft, part, dtype, fft.my // 2 + 1 if even else fft.my)
         if not later:
             self.symbols = self._made()
@@ -63,6 +63,12 @@ class Convolution:
         """Put the convolution of `field` into `out`; collective."""
         self.fft.slab.tally["operator"] += 1
         return self.fft.convolve(field, self.symbols, out)
+
+    def mean(self) -> float:
+        """Return the image of a uniform field 1; collective."""
+        owns = self.fft.columns.start == 0 < self.fft.columns.stop
+        own = float(self.symbols[0][0, 0].real) * self.fft.mx * self.fft.my if owns else 0.0
+        return self.fft.slab.sum(own)[0]
 
     def loss(self, field: Array, size: tuple[float, float], direction: tuple[float, float]) -> float:
         """Return `-sum p du/ds` for a field p and its image u, with the slope along a unit `direction`; collective.

@@ -19,6 +19,7 @@ The wake of an isolated contact is not periodic: its influence coefficients are 
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Literal
@@ -61,7 +62,8 @@ class HalfSpace:
     With `free`, nothing surrounds the box, and the coefficients are Love's; with `repeats_along_x` the box is
     periodic along x only (`physics.strip`). Otherwise the box is periodic, with the `kernel`. `fft` parameters of
     methods are transforms of maps; operators compute in their precision, and symbols have their shape, or the shape
-    of the requested rows. A free half space makes its own padded transform for each operator.
+    of the requested rows. A free half space makes its own padded transform for each operator. `factors` multiply the
+    storage and the loss modulus of waves in steady sliding, by wavenumber; None for a linear body.
     """
 
     size: Vector
@@ -70,6 +72,7 @@ class HalfSpace:
     free: bool = False
     layer: Layer | None = None
     repeats_along_x: bool = False
+    factors: Callable[[Array], tuple[Array, Array]] | None = None
 
     @property
     def moves_in_the_mean(self) -> bool:
@@ -236,9 +239,16 @@ class HalfSpace:
         return np.asarray(qx * velocity[0] + qy * velocity[1])
 
     def sliding_modulus(self, fft: FFT, velocity: Vector, prony: Prony, rows: slice = ALL) -> Spectrum:
-        """Return G*(-q v) of each wave; at a Nyquist wavenumber, which has two signs, the mean of both. The result
-        broadcasts to the rows of a spectrum: if the surface slides along x, all rows are equal."""
-        rows = rows if velocity[1] else slice(0, 1)
+        """Return G*(-q v) of each wave, times `factors`; at a Nyquist wavenumber, which has two signs, the mean of
+        both. The result broadcasts to the rows of a spectrum: without factors all rows are equal if the surface slides
+        along x."""
+        found = self._linear_modulus(fft, velocity, prony, rows if velocity[1] else slice(0, 1))
+        if self.factors is None:
+            return found
+        storage, loss = self.factors(np.hypot(*wavenumbers(fft, self.size, rows)))
+        return np.asarray(storage * found.real + 1j * (loss * found.imag))
+
+    def _linear_modulus(self, fft: FFT, velocity: Vector, prony: Prony, rows: slice) -> Spectrum:
         qx, qy = wavenumbers(fft, self.size, rows)
         at_x, at_y = 2 * np.abs(fft.modes[0]) == fft.mx, 2 * np.abs(fft.modes[1][rows]) == fft.my
         result = np.zeros((len(qy), fft.shape[1]), dtype=np.complex128)

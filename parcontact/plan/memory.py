@@ -31,7 +31,6 @@ MEMINFO = Path("/proc/meminfo")
 MOST_POINTS = 2**20  # tuning: largest number of points of a case that runs on one rank of a sweep
 SPARE = 2.0  # tuning: memory of the first contact or steady state on nested grids, over the memory of steps
 NESTED = 2.5  # accuracy: largest number of maps of a first solve on coarser grids, in addition to maps of steps
-FAILED_SETS = 1.25  # accuracy: times the maps of a steady state with sets, at most, after these have failed
 SPECTRUM = "surface spectrum"
 
 
@@ -61,18 +60,14 @@ def total_bytes(job: Job, ranks: int = 1, rank: int | None = None) -> int:
     return sum(holdings(job, ranks, rank).values())
 
 
-def steady_start(job: Job, ranks: int = 1, rank: int | None = None, sets: bool = False) -> int:
-    """Return the memory of a rank in maps [bytes] during the initial steady state, before `holdings` exist; 0 for a run
-    without it. `sets`: with the solver that changes sets of points.
-
-    The table of the wake of a free box may briefly take more; so may the fallback after a failure of sets, up to a
-    quarter more.
-    """
+def steady_start(job: Job, ranks: int = 1, rank: int | None = None) -> int:
+    """Return the largest memory of a rank in maps [bytes] during the initial steady state, before `holdings` exist; 0
+    for a run without it. The table of the wake of a free box may briefly take more."""
     if not choices(job).steady_start.on:
         return 0
     slab = _slab(job, ranks, rank)
     sliding = SteadySliding(outline(job, slab), tolerance_before(job, 0, choices(job).viscoelasticity.on))
-    held = sliding.hold(job.initial.velocity, sets)
+    held = sliding.hold(job.initial.velocity)
     bytes_held = slab.tally["map bytes"]
     del held
     return bytes_held
@@ -83,7 +78,7 @@ def most_bytes(job: Job, ranks: int) -> int:
     fields, or in the steady state from which a run starts."""
     (nx, ny), one_map = job.grid.points, 8 * job.grid.nx * job.grid.ny / ranks
     steps = total_bytes(job, ranks) + len(job.output.fields) * one_map + NESTED * one_map * (nx * ny >= WORTHWHILE)
-    return int(max(steps, FAILED_SETS * steady_start(job, ranks, sets=True))) + on_tiles(job)
+    return int(max(steps, steady_start(job, ranks))) + on_tiles(job)
 
 
 def on_tiles(job: Job) -> int:

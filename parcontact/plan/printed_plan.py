@@ -19,10 +19,7 @@ OF_STEADY_STATES = (
 )
 ON_TILES = "more on rank 0 (tiles), at most"
 TO_ASK_FOR = "to ask a batch system for"
-STEADY_STARTS = (
-    ("steady start, before", False),
-    ("steady start, with sets", True),
-)  # and True if solved by sets of points
+STEADY_START = "steady start, before"
 
 
 def effects(job: Job) -> Iterator[str]:
@@ -37,18 +34,18 @@ def effects(job: Job) -> Iterator[str]:
 def maps(job: Job, ranks: Sequence[int], program: int) -> Iterator[str]:
     """Yield a table of the memory of a rank by purpose; `program` is its memory without maps [bytes]."""
     columns = [memory.holdings(job, count) for count in ranks]
-    before = STEADY_STARTS if choices(job).steady_start.on else ()
+    before = [STEADY_START] * choices(job).steady_start.on
     tiles = memory.on_tiles(job)
-    width = max(map(len, (*columns[0], *(what for what, _ in before), *[ON_TILES] * bool(tiles), TO_ASK_FOR)))
+    width = max(map(len, (*columns[0], *before, *[ON_TILES] * bool(tiles), TO_ASK_FOR)))
     totals = [sum(column.values()) for column in columns]
     unit, size = unit_of(max(totals))
     yield f"{f'memory per rank [{unit}]':{width + 2}}" + "".join(f" {ranks_text(count):>12}" for count in ranks)
     for what in columns[0]:
         yield f"  {what:{width}}" + "".join(f"{column[what] / size:13.4g}" for column in columns)
     yield f"  {'in all':{width}}" + "".join(f"{total / size:13.4g}" for total in totals)
-    for what, sets in before:
-        held = (memory.steady_start(job, count, sets=sets) / size for count in ranks)
-        yield f"  {what:{width}}" + "".join(f"{number:13.4g}" for number in held)
+    if before:
+        held = (memory.steady_start(job, count) / size for count in ranks)
+        yield f"  {STEADY_START:{width}}" + "".join(f"{number:13.4g}" for number in held)
     if tiles:
         yield f"  {ON_TILES:{width}}" + f"{tiles / size:13.4g}" * len(ranks)
     yield f"  {'program without maps':{width}}" + f"{program / size:13.4g}" * len(ranks)

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from ..bands.road_sliding import make_states
 from ..columns import STEADY
 from ..doubts import Doubt
-from ..effects.heat.heating import describe_hot, describe_unmeasured
 from ..errors import JobError, RunError
 from ..job import log_range
+from ..job.added_sections import answers
 from ..job.checks.cells import more_points
 from ..parallel.mpi import MPI
 from ..parallel.slab import Slab
@@ -120,7 +120,8 @@ def steady(
         points.append(point)
         doubts += contacts.check_point(point.measures, str(at)) if point else []
     solved = [point for point in points if point]
-    of_points = *describe_hot(solved), *describe_unmeasured(solved, found), *describe_missed(solved, found)
+    of_points = [doubt for doubts_of in answers("steady", "doubts_of_points") for doubt in doubts_of(solved, found)]
+    of_points += describe_missed(solved, found)
     for doubt in (*doubts, *of_points) if slab.root else ():
         warn(doubt)
     return _curve(wanted.points, points, tuple(failures))

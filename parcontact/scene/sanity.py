@@ -192,7 +192,7 @@ class ContactWatch:
     @classmethod
     def of(cls, job: Job, timeline: Timeline) -> "ContactWatch":
         """Return the checks of a job."""
-        sticks = job.sticks and all(job.grid.cyclic)
+        sticks = job.sheared_first and all(job.grid.cyclic)
         mesh = properties_of(job, None)
         return cls(job.numerics.strict, timeline, more=more_points(job.grid), sticks=sticks, mesh=mesh)
 

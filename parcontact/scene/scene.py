@@ -4,7 +4,7 @@ Steady sliding takes the setup from here and has its own solver.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -51,7 +51,8 @@ class Setup:
 
     `heights` [m] is the range of the surface, `height` its span (the shorter side of a cell if it is flat);
     `shortest` [m] is the shortest measured wave, or None; `size` and `prony` are the box and the relaxation function
-    in the run's units (and seconds); `remarks` are those on measured maps.
+    in the run's units (and seconds); `remarks` are those on measured maps; `factors` are those of softened rubber
+    (`physics.halfspace`).
     """
 
     choices: Choices
@@ -63,6 +64,7 @@ class Setup:
     heights: HeightRange
     units: Units
     remarks: Remarks
+    factors: Callable[[Array], tuple[Array, Array]] | None = None
 
     @property
     def job(self) -> Job:
@@ -91,7 +93,8 @@ class Setup:
         poisson, kernel = self.job.material.poisson, self.choices.numerics.kernel
         body = self.job.body
         layer = None if body is None else Layer(body.thickness / self.units.length, body.base, poisson)
-        return HalfSpace(self.size, poisson, kernel, self.choices.isolated.on, layer, self.grid.cyclic[0])
+        free, cyclic = self.choices.isolated.on, self.grid.cyclic[0]
+        return HalfSpace(self.size, poisson, kernel, free, layer, cyclic, self.factors)
 
     def in_units(self, velocity: tuple[float, float]) -> tuple[float, float]:
         """Return a velocity [m/s] in the run's units of length per second."""

@@ -107,15 +107,6 @@ class NonNegative:
     def next_set(self, x: Array, gap: Array, working: Set) -> Set:
         return np.where(working, x > 0.0, gap < 0.0)
 
-    def choose_active(self, x: Array, u: Array, h: Array, d: float, kappa: float, working: Set) -> tuple[float, ...]:
-        """Mark the points with `x > kappa g`, where x need not be admissible (a primal-dual active set).
-
-        Return the sums of x > 0, of -x < 0 and of |x g|, the number of marked points, the number of points whose
-        mark has changed, and max(-g).
-        """
-        found: tuple[float, ...] = choose(x, u, h, d, kappa, working)
-        return found
-
 
 @loop
 def mark_working_set(p, u, h, d, working):
@@ -191,30 +182,3 @@ def clip(p):
             row += kept
         load += row
     return load
-
-
-@loop
-def choose(x, u, h, d, kappa, working):
-    """Mark points with `x > kappa g`. Return the sums of x > 0, of -x < 0 and of |x g|, the numbers of marked points
-    and of changed marks, and max(-g)."""
-    positive, negative, wrong, count, changed, deepest = 0.0, 0.0, 0.0, 0.0, 0.0, -np.inf
-    for j in range(x.shape[0]):
-        row_positive, row_negative, row_wrong = 0.0, 0.0, 0.0
-        row_count, row_changed, row_deepest = 0.0, 0.0, -np.inf
-        for i in range(x.shape[1]):
-            gap = u[j, i] - h[j, i] - d
-            inside = x[j, i] > kappa * gap
-            row_changed += 1.0 if inside != working[j, i] else 0.0
-            working[j, i] = inside
-            row_positive += max(x[j, i], 0.0)
-            row_negative += max(-x[j, i], 0.0)
-            row_wrong += abs(x[j, i] * gap)
-            row_count += 1.0 if inside else 0.0
-            row_deepest = max(row_deepest, -gap)
-        positive += row_positive
-        negative += row_negative
-        wrong += row_wrong
-        count += row_count
-        changed += row_changed
-        deepest = max(deepest, row_deepest)
-    return positive, negative, wrong, count, changed, deepest

@@ -93,8 +93,9 @@ def resolve(s, h, gamma, pressures, sums, p, reflected):
 
 
 @loop
-def update_split(s, y, p, shift):
-    """`s <- s + y + shift - p`."""
+def begin_split(p, closing, u, h, d, gamma, s):
+    """Put `p + gamma c(p) - gamma h` where there is pressure, and `-gamma (u - d)` elsewhere, into s."""
     for j in range(s.shape[0]):
         for i in range(s.shape[1]):
-            s[j, i] += y[j, i] + shift - p[j, i]
+            pressed = p[j, i] + gamma * (closing[j, i] - h[j, i])
+            s[j, i] = pressed if p[j, i] > 0.0 else gamma * (d - u[j, i])

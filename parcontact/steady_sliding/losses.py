@@ -12,7 +12,7 @@ from ..parallel.slab import Array, deal
 from ..physics.convolution import PARTS, wavenumbers
 from ..physics.prony import Prony
 from ..scene import Setup
-from ..solve.nonsymmetric.steady import SteadyContact
+from ..solve.nonsymmetric.judge import SteadyContact
 
 ROUNDING = 1e-9  # accuracy: relative rounding of wavelengths at the limits of octaves
 
@@ -27,20 +27,27 @@ def branch_powers(setup: Setup, contact: SteadyContact, velocity: Vector) -> Arr
     """
     fft, prony, grid, half_space = setup.fft, setup.prony, setup.grid, setup.half_space
     spectrum, speed, longest = fft.forward(contact.u), setup.in_units(velocity), max(grid.size)
-    cells = max(longest / grid.dx, longest / grid.dy)  # along the longer side, of the smaller length
-    powers = np.zeros((prony.moduli.size, 2 + int(np.log2(cells * (1 + ROUNDING)))))
+    powers = np.zeros((prony.moduli.size, count_octaves(setup)))
     for rows in deal(fft.my, PARTS):
         omega = np.abs(half_space.frequencies(fft, speed, rows))
         compliance = half_space.symbol(fft, rows)
         waves = fft.multiplicity * np.abs(spectrum[rows]) ** 2
         waves = np.divide(waves, compliance, out=np.zeros_like(waves), where=compliance > 0.0)
         q = np.hypot(*wavenumbers(fft, grid.size, rows))
+        if half_space.factors is not None:
+            waves *= half_space.factors(q * setup.units.length)[1]
         octave = np.floor(np.log2(np.maximum(q * longest / (2 * np.pi), 1.0) * (1 + ROUNDING))).astype(np.int64)
         for branch, modulus, tau in zip(powers, prony.moduli, prony.relaxation_times, strict=True):
             loss = waves * omega * modulus * omega * tau / (1.0 + (omega * tau) ** 2)
             branch += np.bincount(octave.ravel(), loss.ravel(), branch.size)
     unit = setup.units.pressure * setup.units.height * grid.lx * grid.ly / (grid.nx * grid.ny) ** 2
     return np.array(setup.slab.sum(*powers.ravel())).reshape(powers.shape) * unit
+
+
+def count_octaves(setup: Setup) -> int:
+    """Return the number of octaves of wavelengths from the longer side of the box to the shortest waves of the grid."""
+    cells = max(setup.grid.size) / min(setup.grid.dx, setup.grid.dy)  # along the longer side, of the smaller length
+    return 2 + int(np.log2(cells * (1 + ROUNDING)))
 
 
 def branch_maps(setup: Setup, contact: SteadyContact, velocity: Vector, out: Array) -> Iterator[Array]:

@@ -1,13 +1,19 @@
 """A steady state as data: its parameters, its measures, and its cost."""
 
+from __future__ import annotations
+
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from ..accuracy.budget import ErrorBudget
 from ..accuracy.constants import FLASH
-from ..effects.heat.flash import Flash
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate
+
+if TYPE_CHECKING:  # found only for jobs that ask for it
+    from ..effects.heat.flash import Flash
 
 Vector = tuple[float, float]
 
@@ -19,10 +25,10 @@ class Point:
 
     `friction` is the dissipated power over load and velocity, plus that of an interface; `errors` is its budget. The
     friction of `measures` is by the slopes of the rigid surface; the difference is a mesh error. `operator_calls`
-    count applications on the finest grid; `sets` is 0 if projected steps sufficed. `dissipated` is the power [W] of
-    each branch (empty for a free scene, whose wake continues outside the box). `flash` has the temperatures of the
-    contact, None without `thermal`. With feedback, found in `rounds`, the shift factor is that of the flash
-    temperature, and `friction_cold` is friction without feedback.
+    count applications on the finest grid. `dissipated` is the power [W] of each branch (empty for a free scene, whose
+    wake continues outside the box). `flash` has the temperatures of the contact, None without `thermal`. With
+    feedback, found in `rounds`, the shift factor is that of the flash temperature, and `friction_cold` is friction
+    without feedback. `strain_amplitude` is the strain that softens the rubber, NaN without `softening`.
     """
 
     velocity: Vector
@@ -34,12 +40,12 @@ class Point:
     errors: ErrorBudget
     certificate: Certificate
     operator_calls: float
-    sets: int
     seconds: float
     dissipated: tuple[float, ...]
     flash: Flash | None = None
     rounds: int = 1
     friction_cold: float = math.nan
+    strain_amplitude: float = math.nan
 
     @property
     def speed(self) -> float:
@@ -61,3 +67,18 @@ class Point:
     def error_flash(self) -> float:
         """The relative error of the flash temperature, FLASH times that of friction; NaN where there is none."""
         return FLASH.value * self.error_friction if self.flash and self.flash.mean else math.nan
+
+
+def in_rounds(points: Sequence[Point]) -> Point:
+    """Return the last round of a fixed point, with the cost of all rounds, and with the relative changes in the last
+    round as errors."""
+    *_, before, last = [*points[-1:], *points]
+    friction, area = (
+        abs(one - other) / one if one > 0.0 else 0.0
+        for one, other in (
+            (last.friction, before.friction),
+            (last.measures.contact_area_corrected, before.measures.contact_area_corrected),
+        )
+    )
+    calls, seconds = (sum(getattr(point, name) for point in points) for name in ("operator_calls", "seconds"))
+    return replace(last, errors=last.errors.with_rounds(friction, area), operator_calls=calls, seconds=seconds)

@@ -1,41 +1,52 @@
 """Steady sliding of a job's surface, solved directly: points of a friction curve, and starts of marches."""
 
+from __future__ import annotations
+
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..accuracy.budget import ErrorBudget, estimate_steady
 from ..accuracy.observation import RunProperties, StepObservation, properties_of
 from ..doubts import Doubt
-from ..effects.heat.flash import Flash
-from ..effects.heat.heating import Feedback, describe_cold_state, find_temperatures
 from ..effects.relaxation import highest_temperature_of, temperature_of
 from ..errors import InputError, RunError
+from ..job.added_sections import answers
 from ..parallel.fft import FFT
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution
 from ..physics.measures import Measures
+from ..physics.prony import complex_modulus
 from ..scene import Setup, choices, sanity
 from ..solve import kernels, nested
 from ..solve.certificate import Certificate
-from ..solve.local_load import LEAST_CUT
-from ..solve.nonsymmetric import proximal
-from ..solve.nonsymmetric.proximal import Proximal
-from ..solve.nonsymmetric.steady import SteadyContact, SteadySolver
+from ..solve.constraint import NonNegative
+from ..solve.iterate import Lines
+from ..solve.nonsymmetric.judge import Judge, SteadyContact
+from ..solve.nonsymmetric.proximal import FreeSteadySolver
+from ..solve.nonsymmetric.steady import SteadySolver
 from ..solve.precision import reachable_certificate
 from ..solve.preconditioner.extension import pairs_for
 from .losses import branch_powers
 from .point import Point
-from .stiffness import loses_most, soft_stripes, stiffer_lines
 
-COARSE_TOLERANCE = 0.02  # tuning: tolerance on the certificate on all grids but the finest
-LOOSE, AS_RIGHT = 1e-3, 0.6  # accuracy: factor AS_RIGHT on tolerances above LOOSE, for areas as accurate as in marches
-GIVE_UP = 250  # tuning: limit on linear steps of the usual solver on a grid with stripes
+if TYPE_CHECKING:  # found only for jobs that ask for it
+    from ..effects.heat.flash import Flash
+    from ..effects.heat.steady import Feedback
+
+COARSE_TOLERANCE = 0.04  # tuning: tolerance on the certificate on all grids but the finest
+# accuracy: factors on tolerances above LOOSE, in periodic and in free boxes, by `scripts/random_steady.py --exact`:
+# friction and areas as accurate as in marches
+LOOSE, AS_RIGHT, AS_RIGHT_FREE = 1e-3, 0.3, 0.6
+STEPS_RATIO = 20  # tuning: limit on steps of the splitting over max_iterations
 NEAR = 1.1  # tuning: largest ratio of a velocity to the last one for a start from the last state
+HIGHEST = 1e3  # rounding: largest contrast of lines, as larger displacements between them have rounding errors
 Vector = tuple[float, float]
 
 
@@ -48,9 +59,6 @@ class SteadyLevel:
     heights: Array
 
 
-Make = Callable[[SteadyLevel, Vector], tuple[SteadySolver | Proximal, Convolution]]
-
-
 class SteadySliding:
     """Steady states of one job's surface and body; the constructor and the methods are collective.
 
@@ -60,7 +68,7 @@ class SteadySliding:
 
     def __init__(self, setup: Setup, most: float = math.inf) -> None:
         self.setup = setup
-        self._tolerance = min(tolerance_of(setup.choices.numerics.tolerance), most)
+        self._tolerance = min(tolerance_of(setup.choices.numerics.tolerance, setup.half_space.free), most)
         self.probe = setup.probe()
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty())
         finest, *coarser = nested.coarser_levels(setup.slab, heights)
@@ -71,14 +79,13 @@ class SteadySliding:
         self._rise: Array | None = None
         self._speed = self._pressure = 0.0  # speed times shift factor, on which a state depends
         self.temperature, self._own_temperature = math.nan, temperature_of(setup.job.material)
-        self._feedback = Feedback()
+        self.loops = [loop for loops in answers("steady", "loops") for loop in loops(setup)]
+        self._feedback: Feedback | None = None
 
-    def hold(self, velocity: Vector, sets: bool) -> tuple[Array, SteadySolver, Convolution]:
-        """Allocate what a solve at a velocity [m/s] holds on the finest grid, with or without active `sets`."""
+    def hold(self, velocity: Vector) -> tuple[Any, ...]:
+        """Allocate and return all that a solve at a velocity [m/s] may hold on the finest grid."""
         p, (solver, operator) = self.setup.slab.empty(), self._solver(self.levels[0], velocity)
-        if sets:
-            solver.hold_all()
-        return p, solver, operator
+        return p, solver, operator, solver.hold_all()
 
     def set_temperature(self, temperature: float) -> None:
         """Set the temperature [deg C] of further solves; raises InputError if the material has no shift."""
@@ -99,8 +106,10 @@ class SteadySliding:
         """
         section = self.setup.job.section("thermal")
         if section is None or section.feedback == "none":
-            return self._solve(velocity, pressure)
+            return self._settle(velocity, pressure)
+        from ..effects.heat.steady import Feedback, describe_cold_state
 
+        self._feedback = self._feedback or Feedback()
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
         highest, speed = highest_temperature_of(self.setup.job.material), math.hypot(*velocity)
 
@@ -110,17 +119,24 @@ class SteadySliding:
             except InputError as error:
                 place = describe_cold_state(speed, pressure, cold)
                 raise RunError(f"{place}: no material at the flash temperature: {error}") from None
-            return self._solve(velocity, pressure)
+            return self._settle(velocity, pressure)
 
         tolerance = self.setup.choices.numerics.tolerance
         return self._feedback.solve_fixed_point(warmed, speed, (pressure, cold), tolerance, highest - cold)
 
+    def _settle(self, velocity: Vector, pressure: float) -> Point:
+        """Return the steady state at the temperature that was set, in the loops of all effects that have one."""
+        solve = self._solve
+        for loop in self.loops:
+            solve = partial(loop.solve, self, solve)
+        return solve(velocity, pressure)
+
     def _solve(self, velocity: Vector, pressure: float) -> Point:
-        """Return the steady state at the temperature that was set."""
+        """Return the steady state at the temperature and with the factors of moduli that were set."""
         began, calls, speed = time.perf_counter(), 0.0, math.hypot(*velocity)
         what, factor = f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa", self.setup.choices.time_factor
-        for start, solver in self._starts(velocity, pressure):
-            contact, more, by_energy = self._descend(velocity, pressure / self.setup.units.pressure, start, solver)
+        for start in self._starts(velocity, pressure):
+            contact, more, by_energy = self._descend(velocity, pressure / self.setup.units.pressure, start)
             calls += more
             if contact.converged:
                 break
@@ -128,7 +144,7 @@ class SteadySliding:
             raise RunError(f"{what}: {contact.failure}{self._advise(contact)}")
         self.contact, self._speed, self._pressure = contact, factor * speed, pressure
         heights = self.levels[0].heights
-        touching = SteadySolver.constraint.touches(contact.p)
+        touching = NonNegative().touches(contact.p)
         measures = self.probe.measure(contact.p, 1.0, contact.u, heights, contact.d, touching, (0.0, 0.0), velocity)
         if not measures.finite:
             raise RunError(f"{what}: its results would not be finite")
@@ -138,7 +154,7 @@ class SteadySliding:
         friction, errors = judge_state(self.setup, *judged)
         flash = self._find_temperatures(contact, by_energy, velocity, measures)
         seconds, place = time.perf_counter() - began, (velocity, pressure, self.temperature, factor)
-        return Point(*place, measures, friction, errors, contact.certificate, calls, contact.sets, seconds, lost, flash)
+        return Point(*place, measures, friction, errors, contact.certificate, calls, seconds, lost, flash)
 
     def _advise(self, contact: SteadyContact) -> str:
         """Return advice for a contact that was not solved; collective."""
@@ -156,7 +172,9 @@ class SteadySliding:
         section = self.setup.job.section("thermal")
         if section is None:
             return None
-        touching = SteadySolver.constraint.touches(contact.p)
+        from ..effects.heat.steady import find_temperatures
+
+        touching = NonNegative().touches(contact.p)
         flash, self._rise = find_temperatures(self.setup, section, contact.p, touching, measures, friction, velocity)
         return flash
 
@@ -206,48 +224,28 @@ class SteadySliding:
 
     # -- starts and levels --------------------------------------------------------------------------------------------
 
-    def _starts(self, velocity: Vector, pressure: float) -> Iterator[tuple[Array | None, Make]]:
-        """Yield pressures on the finest grid to start from, None for coarser grids from a uniform pressure, each with
-        the function that makes its solver.
+    def _starts(self, velocity: Vector, pressure: float) -> Iterator[Array | None]:
+        """Yield pressures on the finest grid to start from, None for coarser grids from a uniform pressure.
 
-        The usual solver comes first, the solver of proximal points last, or first for a body with a very large loss
-        tangent. The last state is the better start only at nearly the same velocity. Extrapolating it is no better,
-        as contact spots appear and vanish.
+        The last state is the better start only at nearly the same velocity. Extrapolating it is no better, as contact
+        spots appear and vanish.
         """
         speed = self.setup.choices.time_factor * math.hypot(*velocity)
-        lossy = loses_most(self.setup, velocity)
-        if lossy:
-            yield None, self._proximal
-        if self.contact is None:
-            yield None, self._solver
-        elif pressure == self._pressure and max(speed, self._speed) <= NEAR * min(speed, self._speed):
-            yield from ((self.contact.p, self._solver), (None, self._solver))
-        else:
-            yield from ((None, self._solver), (self.contact.p, self._solver))
-        if not lossy:
-            yield None, self._proximal
+        near = max(speed, self._speed) <= NEAR * min(speed, self._speed)
+        if self.contact is not None and pressure == self._pressure and near:
+            yield self.contact.p
+        yield None
 
-    def _descend(
-        self, velocity: Vector, mean: float, start: Array | None, make: Make
-    ) -> tuple[SteadyContact, float, float]:
+    def _descend(self, velocity: Vector, mean: float, start: Array | None) -> tuple[SteadyContact, float, float]:
         """Solve on all grids, the coarsest first, or on the finest from `start`. Return the contact, the operator
-        calls, and friction by energy without an interface.
-
-        If the usual solver fails where the body is soft along stripes, proximal points continue on this and all
-        finer grids.
-        """
+        calls, and friction by energy without an interface."""
         tally, calls = self.setup.slab.tally, 0.0
 
         def solve(level: SteadyLevel, p: Array) -> tuple[SteadyContact, Convolution]:
-            nonlocal calls, make
+            nonlocal calls
             before = tally["operator"]
-            solver, operator = make(level, velocity)
+            solver, operator = self._solver(level, velocity)
             contact = solver.solve(level.heights, mean, p)
-            if contact.failure and make == self._solver and soft_stripes(self.setup, velocity) is not None:
-                del solver, operator  # frees their maps before others are made
-                make = self._proximal
-                solver, operator = make(level, velocity)
-                contact = solver.solve(level.heights, mean, p)
             calls += (tally["operator"] - before) * level.slab.points / self.setup.slab.points
             return contact, operator
 
@@ -261,37 +259,17 @@ class SteadySliding:
         lost = max(operator.loss(p, self.setup.size, _direction(velocity)), 0.0)  # rounding for an elastic body
         return contact, calls, lost / (self.setup.slab.sum(load)[0] or math.nan) * unit
 
-    def _solver(self, level: SteadyLevel, velocity: Vector) -> tuple[SteadySolver, Convolution]:
-        operator, inverse = self._operators(level, velocity)
-        limit = GIVE_UP if soft_stripes(self.setup, velocity) is not None else math.inf
-        return self._solver_for(level, velocity, operator, inverse, LEAST_CUT, limit), operator
-
-    def _proximal(self, level: SteadyLevel, velocity: Vector) -> tuple[Proximal, Convolution]:
-        operator, inverse = self._operators(level, velocity)
-        kind = self.setup.fft.complex
-        nearer, nearer_inverse = operator.mapped(proximal.nearer, kind), inverse.mapped(proximal.nearer_inverse, kind)
-        solver = self._solver_for(level, velocity, nearer, nearer_inverse, proximal.LEAST_CUT)
-        pull = operator.mapped(proximal.pull, np.float64)
-        return Proximal(solver, operator, pull), operator
-
-    def _solver_for(
-        self,
-        level: SteadyLevel,
-        velocity: Vector,
-        operator: Convolution,
-        preconditioner: Convolution,
-        least_cut: float,
-        limit: float = math.inf,
-    ) -> SteadySolver:
-        numerics, height = self.setup.choices.numerics, self.setup.height / self.setup.units.height
-        finest = level is self.levels[0]
+    def _solver(self, level: SteadyLevel, velocity: Vector) -> tuple[SteadySolver | FreeSteadySolver, Convolution]:
+        setup, slab, finest = self.setup, level.slab, level is self.levels[0]
+        operators = operator, _ = self._operators(level, velocity)
+        lines = stiffer_lines(setup, velocity) if finest else None  # coarse grids only give starts
+        judge = Judge(slab, setup.height / setup.units.height, lines)
         tolerance = max(self._tolerance, 0.0 if finest else COARSE_TOLERANCE)
-        most, along = int(min(limit, 20 * numerics.max_iterations)), soft_stripes(self.setup, velocity)
-        slab, grid = level.slab, self.setup.grid
-        pairs = pairs_for(grid.lx / slab.nx, grid.ly / slab.ny)
-        what = slab, operator, preconditioner, height, tolerance, most
-        lines = stiffer_lines(self.setup, velocity) if finest else None  # coarse grids only give starts
-        return SteadySolver(*what, along=along, pairs=pairs, least_cut=least_cut, lines=lines)
+        pairs = pairs_for(setup.grid.lx / slab.nx, setup.grid.ly / slab.ny)
+        if setup.half_space.free:
+            return FreeSteadySolver(judge, *operators, tolerance, pairs), operator
+        most = STEPS_RATIO * setup.choices.numerics.max_iterations
+        return SteadySolver(judge, *operators, tolerance, most, pairs), operator
 
     def _operators(self, level: SteadyLevel, velocity: Vector) -> tuple[Convolution, Convolution]:
         """Return the operator at a velocity [m/s], and its inverse, approximate for a free body."""
@@ -316,9 +294,24 @@ def judge_state(
     return friction, estimate_steady(replace(known, prony=setup.prony), seen)
 
 
-def tolerance_of(asked: float) -> float:
-    """Return the tolerance on the certificate of a steady state for the tolerance of a job."""
-    return max(AS_RIGHT * asked, min(LOOSE, asked))
+def stiffer_lines(setup: Setup, velocity: Vector) -> Lines | None:
+    """Return the lines along a velocity [m/s], with |G| of the longest wave along them over the modulus G_inf of waves
+    that do not vary along them; None for an elastic body, on a line of points, in a free box, and for oblique
+    velocities."""
+    grid = setup.grid
+    if setup.half_space.free or 1 in (grid.nx, grid.ny) or np.count_nonzero(velocity) != 1:
+        return None
+    if not setup.prony.moduli.size:
+        return None
+    along = 0 if velocity[0] else 1
+    frequency = 2.0 * np.pi * abs(velocity[along]) / grid.size[along]
+    modulus = float(np.abs(complex_modulus(np.array([frequency]), *setup.prony))[0])
+    return Lines(1 - along, min(modulus / setup.prony.modulus_inf, HIGHEST))
+
+
+def tolerance_of(asked: float, free: bool = False) -> float:
+    """Return the tolerance on the certificate of a steady state for the tolerance of a job, in a free box or not."""
+    return max((AS_RIGHT_FREE if free else AS_RIGHT) * asked, min(LOOSE, asked))
 
 
 def _direction(velocity: Vector) -> tuple[float, float]:

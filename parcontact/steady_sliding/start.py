@@ -8,7 +8,7 @@ from ..march.loop import March
 from ..march.state import first_state, pressed_state
 from ..parallel.slab import Slab
 from ..scene import Setup, build_on, sanity, set_up
-from ..solve.nonsymmetric.steady import SteadyContact
+from ..solve.nonsymmetric.judge import SteadyContact
 from ..storage.checkpoint import Contents
 from .losses import branch_maps
 from .point import Point

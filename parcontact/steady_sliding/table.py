@@ -9,8 +9,8 @@ from .. import progress
 from ..accuracy.budget import advice, describe, exceeds
 from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
 from ..doubts import Doubt
-from ..effects.heat.heating import describe_hot, describe_unmeasured
 from ..job import Job
+from ..job.added_sections import answers
 from ..job.checks.advice import describe_sample
 from ..job.sections.materials import describe_temperature
 from ..printed import per_cent
@@ -45,6 +45,7 @@ class CurveTable:
         there = {
             "temperatures": heated,
             "interface": bool(setup.choices.shears),
+            "softening": self._job.section("softening") is not None,
             "thermal": thermal is not None,
             "feedback": thermal is not None and thermal.feedback != "none",
         }
@@ -143,8 +144,9 @@ class CurveTable:
         self._file.sync()
         if self.known:
             self._sort()
-        hot = *describe_hot(self._points), *describe_unmeasured(self._points, self._job)
-        for warning in (*hot, *describe_missed(self._points, self._job, self._earlier())):
+        found = [asked(self._points, self._job) for asked in answers("steady", "doubts_of_points")]
+        of_points = [doubt for doubts in found for doubt in doubts]
+        for warning in (*of_points, *describe_missed(self._points, self._job, self._earlier())):
             self._console.warn(str(warning))
         if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
             self.say(text)

@@ -8,7 +8,8 @@ from functools import cache
 from pathlib import Path
 
 from ..accuracy.budget import ErrorBudget
-from ..columns import MEASURES, Column, cells, choose_columns, names_of, values_of
+from ..column import Column
+from ..columns import MEASURES, cells, choose_columns, names_of, values_of
 from ..errors import InputError
 from ..physics.measures import Measures
 from ..solve.certificate import Certificate

@@ -14,7 +14,7 @@ from parcontact.__main__ import main
 from parcontact.bands.band_plan import plan_bands
 from parcontact.bands.choice import cut_bands, doubts_of_bands, on_one_grid_of_all
 from parcontact.effects.heat.flash import Flash
-from parcontact.effects.heat.heating import describe_unmeasured
+from parcontact.effects.heat.steady import describe_unmeasured
 from parcontact.job.checks.frequencies import excited_band
 from parcontact.parallel.slab import Slab
 from parcontact.report import road_section

@@ -23,11 +23,15 @@ JOB: dict[str, Any] = {
     "surface": [{"shape": "wave", "amplitude": 4e-6, "waves": [2, 0]}],
     "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
     "history": [{"pressure": 1e5, "velocity": 0.2, "distance": 1e-4, "cells_per_step": 1}],
+    "steady": {"velocities": [0.2], "pressures": [1e5]},
     "output": {"fields": ["pressure", "gap"], "directory": "out"},
 }
-KEYS = {  # folder: what its section is refused with
+KEYS: dict[str, tuple[dict[str, Any], str]] = {  # folder: what its section is refused with
     "leakage": ({"leakage": {}}, "leakage is not a known key"),
     "counterbody": ({"counterbody": {"model": "elastic", "shear_modulus": 5e6}}, "counterbody is not a known key"),
+    "heat": ({"thermal": {"conductivity": 0.2, "diffusivity": 1e-7}}, "thermal is not a known key"),
+    "interface": ({"interface": {"shear_stress": 1e5}}, "interface is not a known key"),
+    "stick": ({"interface": {"shear_stress": 1e5, "stick": True}}, "interface.stick is not a key of interface"),
     "adhesion": ({"adhesion": {"work": 0.05}}, "adhesion is not a known key"),
 }
 CHECKED = ("time", "friction", "contact_area", "mean_gap", "max_pressure", "operator_calls", "error_friction")
@@ -49,7 +53,14 @@ def test_a_deleted_folder(folder: str, tmp_path: Path) -> None:
     keys, refusal = KEYS[folder]
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
     (tmp_path / "other.yaml").write_text(yaml.safe_dump({**JOB, **keys}))
-    for words in (("job.yaml", "--quiet"), ("plot", "out"), ("report", "out"), ("info", "out"), ("plan", "job.yaml")):
+    for words in (
+        ("job.yaml", "--quiet"),
+        ("steady", "job.yaml", "--quiet"),
+        ("plot", "out"),
+        ("report", "out"),
+        ("info", "out"),
+        ("plan", "job.yaml"),
+    ):
         code, said = program(*words)
         assert code == 0, said
         assert "Traceback" not in said

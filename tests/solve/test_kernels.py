@@ -55,25 +55,6 @@ def test_mark(shape: tuple[int, int], dtype: type[np.floating]) -> None:
 
 
 @SHAPES
-def test_choose(shape: tuple[int, int], dtype: type[np.floating]) -> None:
-    """Points where x outweighs its gap, and how far x is from a solution."""
-    maps = Maps(shape, dtype)
-    working = np.random.default_rng(2).random(shape) < 0.5
-    before = working.copy()
-    positive, negative, wrong, count, changed, deepest = NonNegative().choose_active(
-        maps.z, maps.u, maps.h, 0.25, 0.5, working
-    )
-    x, gap = maps.wide("z"), maps.wide("u") - maps.wide("h") - 0.25
-    assert np.array_equal(working, x > 0.5 * gap)
-    assert maps.close(positive, np.maximum(x, 0.0))
-    assert maps.close(negative, np.maximum(-x, 0.0))
-    assert maps.close(wrong, np.abs(x * gap))
-    assert count == np.count_nonzero(working)
-    assert changed == np.count_nonzero(working != before)
-    assert deepest == -np.inf if gap.size == 0 else abs(deepest + gap.min()) <= 4 * ROUNDING[dtype]
-
-
-@SHAPES
 def test_next_set(shape: tuple[int, int], dtype: type[np.floating]) -> None:
     """Pressed points of the set, and others that penetrate."""
     maps = Maps(shape, dtype)

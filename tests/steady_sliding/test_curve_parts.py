@@ -3,6 +3,7 @@
 import os
 import signal
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from conftest import WORLD
 
 from parcontact import __main__
 from parcontact.mesh import load_cases
-from parcontact.solve import constraint
+from parcontact.solve.nonsymmetric.steady import SteadySolver
 from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.storage.tables import read_columns
 from parcontact.summary import sweep_table
@@ -190,26 +191,24 @@ def test_curve_in_the_directory_of_a_run(main: Main, tmp_path: Path) -> None:
         assert "surface.0.amplitude was 5e-07, is 1e-06" in said
 
 
-def test_point_without_load(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where no point is left that carries load, this point of the curve fails, and the others are solved."""
-    clip, speed = constraint.clip, [0.0]
-    solve = SteadySliding.solve
+def test_point_without_solution(main: Main, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A point of the curve whose solve fails is left out, and the others are solved."""
+    speed, solve, solve_on_grid = [0.0], SteadySliding.solve, SteadySolver.solve
 
     def noted(self: SteadySliding, velocity: tuple[float, float], pressure: float) -> Any:
         speed[0] = velocity[0]
         return solve(self, velocity, pressure)
 
-    def cut(x: Any) -> Any:
-        if 0.05 < speed[0] < 0.5:
-            x.fill(0.0)
-        return clip(x)
+    def failing(self: SteadySolver, h: Any, mean: float, start: Any) -> Any:
+        contact = solve_on_grid(self, h, mean, start)
+        return replace(contact, failure="no contact was found") if 0.05 < speed[0] < 0.5 else contact
 
     monkeypatch.setattr(SteadySliding, "solve", noted)
-    monkeypatch.setattr(constraint, "clip", cut)
+    monkeypatch.setattr(SteadySolver, "solve", failing)
     code, said = main(*CURVE)
     assert code == FAILED
     assert said.count("steady sliding at 0.1 m/s under") == 2
-    assert "no point is left that carries load" in said
+    assert "no contact was found" in said
     assert points(tmp_path / "out" / "steady.csv") == [point for point in ALL if point[0] != 0.1]
 
 

@@ -1,16 +1,15 @@
-"""Steady sliding of bodies a thousand times as stiff at once as in the end, whose loss tangent goes up to 16: sets of
-points come and go there without an end, and proximal points lead to a solution."""
+"""Steady sliding of bodies a thousand times as stiff at once as in the end, whose loss tangent goes up to 16;
+and free boxes, where proximal points follow projected steps."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 from steady_scenes import CREEP_TIME, certificate, sliding
 
+from parcontact.errors import RunError
 from parcontact.solve.nonsymmetric import proximal
-from parcontact.steady_sliding.sliding import SteadySliding
 
 from .test_sliding import LINE, cylinder_on
 
@@ -23,78 +22,56 @@ ROUGH = (
     f"relaxation_time: {TIME!r}}}]}}\n"
     "history: [{pressure: 1.0}]\nnumerics: {tolerance: 1.0e-4}\n"
 )
-COARSE = ROUGH.replace("tolerance: 1.0e-4", "tolerance: 5.0e-3")
 
 
-@pytest.fixture
-def _alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No other way is tried: whether one does depends on the rounding of the transforms."""
-    monkeypatch.setattr(SteadySliding, "_starts", lambda states, *_: iter([(None, states._proximal)]))
-
-
-@pytest.mark.usefixtures("_alone")
-@pytest.mark.parametrize(("speed", "share"), [(0.1, 0.1), (0.3, 0.6), (1.0, 0.1)])
+@pytest.mark.parametrize(("speed", "share"), [(0.1, 0.1), (0.2, 0.1), (0.3, 0.6), (1.0, 0.1), (1.0, 0.4)])
 def test_rough(shared_path: Path, comm: MPI.Intracomm, speed: float, share: float) -> None:
-    """By an operator of numpy's own, the contact conditions are met."""
+    """By an operator of numpy's own, the contact conditions are met; 275 to 445 operator calls were seen."""
     states = sliding(shared_path, ROUGH, comm)
     pressure = share * 0.05 * MODULUS * float(np.sqrt(RATIO))
     point = states.solve((speed * PEAK, 0.0), pressure)
     assert point.certificate.worst <= 1e-4
     assert certificate(states, speed * PEAK, pressure) <= 1e-4 * (1 + 1e-6)
+    assert point.operator_calls <= 600
 
 
-def test_operator_calls_of_a_contact(shared_path: Path) -> None:
-    """At most 530 are taken: 504 were seen. With the cut of other bodies there are 554."""
-    finer = COARSE.replace("points: 64", "points: 128").replace("1.25e-4", "6.25e-5")
-    states = sliding(shared_path, finer, MPI.COMM_SELF)
-    assert states.solve((0.3 * PEAK, 0.0), 0.6 * 0.05 * MODULUS * float(np.sqrt(RATIO))).operator_calls <= 530
-
-
-def test_proximal_points_go_on_where_sets_do_not_settle(shared_path: Path) -> None:
-    """Waves are soft nowhere, so that sets of points come first: 520 calls were seen, and 5364 with these alone."""
-    states = sliding(shared_path, COARSE, MPI.COMM_SELF)
-    assert states.solve((PEAK, 0.0), 0.4 * 0.05 * MODULUS * float(np.sqrt(RATIO))).operator_calls <= 1000
-
-
-@pytest.mark.usefixtures("_alone")
 @pytest.mark.parametrize("speed", [2.0, 10.0])
 def test_line(shared_path: Path, comm: MPI.Intracomm, speed: float) -> None:
-    """The contact fills up to 0.8 of the box, and what is left of a set that is wrong does not tell where it ends."""
+    """The contact fills up to 0.8 of the box."""
     states, pressure = cylinder_on(shared_path, comm, RATIO, 60.0)
     velocity = speed * LINE / CREEP_TIME
     states.solve((velocity, 0.0), pressure)
     assert certificate(states, velocity, pressure) <= 1e-7 * (1 + 1e-6)
 
 
-def test_proximal_points_come_first_where_losses_are_large(
+FREE = """\
+grid: {points: 48, size: 1.0e-3, boundary: free}
+surface: {shape: sphere, radius: 1.0e-2}
+material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e8, relaxation_time: 1.0e-4}]}
+history: [{pressure: 1.0}]
+numerics: {tolerance: 1.0e-3}
+"""
+
+
+@pytest.mark.mpi(2)
+def test_proximal_points_agree_with_projected_steps(
     shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """At a fifth of `PEAK` the loss tangent of the shortest waves is 14, and |G| of the longest 1.9 G_inf; at a
-    hundredth no loss tangent is above 2.5."""
-    states, made = sliding(shared_path, ROUGH, comm), list[bool]()
-    usual = SteadySliding._solver
-
-    def noted(*given: Any, **more: Any) -> Any:
-        made.append(True)
-        return usual(*given, **more)
-
-    monkeypatch.setattr(SteadySliding, "_solver", noted)
-    states.solve((0.2 * PEAK, 0.0), 0.1 * 0.05 * MODULUS * float(np.sqrt(RATIO)))
-    assert not made
-    sliding(shared_path, ROUGH, comm).solve((1e-2 * PEAK, 0.0), 0.1 * 0.05 * MODULUS)
-    assert made
+    """In a free box, to ten times the tolerance of both, 1e-3."""
+    states = sliding(shared_path, FREE, comm)
+    projected = states.solve((0.1, 0.0), 2e5)
+    monkeypatch.setattr(proximal, "PATIENCE", 0)
+    points = sliding(shared_path, FREE, comm).solve((0.1, 0.0), 2e5)
+    assert points.operator_calls > projected.operator_calls
+    assert points.friction == pytest.approx(projected.friction, rel=1e-2)
+    assert points.certificate.worst <= 1e-3
 
 
-@pytest.mark.parametrize("constant", ["MAX_STEPS_TO_HALVE", "MOST_STEPS"])
 def test_what_cannot_be_solved_is_given_up(
-    shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, constant: str
+    shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """When a given number of contacts have not halved the certificate, and when all have taken a given number of
-    steps."""
-    states = sliding(shared_path, ROUGH, comm)
-    level, mean = states.levels[0], 1e6 / states.setup.units.pressure
-    solver, _ = states._proximal(level, (0.3 * PEAK, 0.0))
-    monkeypatch.setattr(proximal, constant, 0)
-    contact = solver.solve(level.heights, mean, level.slab.zeros())
-    assert contact.failure.startswith("no progress in ")
-    assert contact.certificate.worst > solver.tolerance
+    """When the certificate has not halved in a given number of contacts, here none."""
+    monkeypatch.setattr(proximal, "PATIENCE", 0)
+    monkeypatch.setattr(proximal, "MAX_CONTACTS_TO_HALVE", 0)
+    with pytest.raises(RunError, match="no progress in 0 contacts: the residual is"):
+        sliding(shared_path, FREE, comm).solve((0.1, 0.0), 2e5)

@@ -1,5 +1,6 @@
 """Steady sliding against tables of other methods, closed forms, and its own residual recomputed."""
 
+from functools import partialmethod
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,10 @@ from parcontact.parallel.slab import Slab
 from parcontact.plan import memory, printed_plan
 from parcontact.scene import Setup
 from parcontact.solve.nonsymmetric import steady
-from parcontact.steady_sliding import sliding as solver
-from parcontact.steady_sliding import start, stiffness
+from parcontact.solve.nonsymmetric.projected import Projected
+from parcontact.steady_sliding import start
 from parcontact.steady_sliding.point import Point
-from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.steady_sliding.stiffness import loses_most, soft_stripes, stiffer_lines
+from parcontact.steady_sliding.sliding import SteadySliding, stiffer_lines
 from parcontact.theory import full_contact
 
 FORCE = 0.15  # N
@@ -92,7 +92,8 @@ steady: {velocities: [0.1], pressures: [1.0e+3]}
 
 def test_a_line_of_a_body_that_flows(shared_path: Path) -> None:
     """A wave in full contact with a Maxwell body has friction q^2 A^2 G''(q v)/p, q^2 A^2 (G'' of one branch at w tau =
-    0.628); the mean of the displacement, which nothing holds, is 0. Exact but for rounding."""
+    0.628); the mean of the displacement, which nothing holds, is 0. To 1e-6, as friction is
+    wrong by the square of the certificate."""
     text = """\
 grid: {points: [64, 1], size: [1.0e-3, 1.5625e-5]}
 surface: {shape: wave, amplitude: 1.0e-6, waves: [1, 0]}
@@ -104,7 +105,7 @@ steady: {velocities: [0.1], pressures: [1.0e+5]}
         point = sliding(shared_path, text, MPI.COMM_SELF).solve((speed, 0.0), pressure)
     loss = complex_modulus(np.array([q * speed]), 0.0, np.array([1e6]), np.array([1e-3]))[0].imag
     assert point.measures.contact_area == 1.0
-    assert point.friction == pytest.approx((q * 1e-6) ** 2 * loss / pressure, rel=1e-9)
+    assert point.friction == pytest.approx((q * 1e-6) ** 2 * loss / pressure, rel=1e-6)
 
 
 @pytest.mark.mpi(4)
@@ -116,12 +117,28 @@ def test_ranks_agree(shared_path: Path, communicators: list[MPI.Intracomm]) -> N
 
 @pytest.mark.mpi(2)
 def test_both_methods_agree(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Projected steps, and the active set that goes on where they do not help: to ten times the certificate's 1e-5."""
-    projected = sphere_at(shared_path, comm, 1.0, 64)
-    monkeypatch.setattr(steady, "MAX_STEPS_TO_HALVE", 0)
-    changed = sphere_at(shared_path, comm, 1.0, 64)
-    assert projected.sets == 0 < changed.sets
-    assert projected.measures.friction == pytest.approx(changed.measures.friction, rel=1e-4)
+    """Splitting, and projected steps: to ten times the certificate's 1e-4."""
+    text = "grid: {points: 64, size: 1.0e-3}\nnumerics: {tolerance: 1.0e-4}\n" + WAVY
+    frictions = list[float]()
+    for light, patience in ((0.0, 0), (1.1, 1000)):
+        monkeypatch.setattr(steady, "LIGHT", light)
+        monkeypatch.setattr(steady, "PATIENCE", patience)
+        frictions.append(sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5).friction)
+    assert frictions[0] != frictions[1]
+    assert frictions[0] == pytest.approx(frictions[1], rel=1e-3)
+
+
+@pytest.mark.mpi(4)
+def test_ranks_without_rows(shared_path: Path, comm: MPI.Intracomm) -> None:
+    """Three rows of points: the state of one rank, to ten times the certificate's 1e-4, by as many calls."""
+    text = "grid: {points: [64, 3], size: [1.0e-3, 4.6875e-5]}\nnumerics: {tolerance: 1.0e-4}\n" + WAVY.replace(
+        "{shape: rough, hurst: 0.8, long_wavelength: 5.0e-4, short_wavelength: 1.25e-4, rms_slope: 0.05}",
+        "[{shape: wave, amplitude: 2.0e-6, waves: [2, 0]}, {shape: wave, amplitude: 2.0e-7, waves: [5, 1]}]",
+    )
+    point, alone = (sliding(shared_path, text, each).solve((0.1, 0.03), 5e4) for each in (comm, MPI.COMM_SELF))
+    assert 0.1 < alone.measures.contact_area < 0.9
+    assert point.friction == pytest.approx(alone.friction, rel=1e-3)
+    assert point.operator_calls == alone.operator_calls
 
 
 @pytest.mark.mpi
@@ -168,9 +185,9 @@ WAVY = (
 
 @pytest.mark.parametrize("speed", [0.03, 0.1, 0.3, 1.0])
 def test_loose_tolerances_are_met_with_a_margin(shared_path: Path, comm: MPI.Intracomm, speed: float) -> None:
-    """The certificate is below 0.6 of the default tolerance, 5e-3, by which it would end between the two here."""
+    """The certificate is below 0.3 of the default tolerance, 5e-3, by which it would end between the two here."""
     states = sliding(shared_path, "grid: {points: 64, size: 1.0e-3}\n" + WAVY, comm)
-    assert states.solve((speed, 0.0), 1e5).certificate.worst <= 0.6 * 5e-3
+    assert states.solve((speed, 0.0), 1e5).certificate.worst <= 0.3 * 5e-3
 
 
 STIFF = """\
@@ -196,41 +213,32 @@ def test_loose_tolerances_suffice_for_stiff_bodies(
     assert loose.friction == pytest.approx(friction, rel=loose.error_friction, abs=0.0)
 
 
-@pytest.mark.mpi(2)
-def test_soft_stripes(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A body 400 times as stiff at 20 m/s as along the sliding, along both axes: with stripes it takes less than a
-    third of the calls. Friction agrees to ten times the tolerance, by which both may be wrong."""
+def test_soft_along_the_sliding(shared_path: Path, comm: MPI.Intracomm) -> None:
+    """A body 400 times as stiff at 20 m/s as along the sliding, along both axes: 64 operator calls were seen."""
     text = "grid: {points: 64, size: 1.0e-3}\n" + WAVY.replace("1.0e7, relax", "4.0e8, relax")
-
-    def solved(velocity: tuple[float, float]) -> Point:
-        return sliding(shared_path, text, comm, "numerics.tolerance=1.0e-4").solve(velocity, 4e7)
-
-    velocities = (20.0, 0.0), (0.0, -20.0)
-    with_stripes = [solved(velocity) for velocity in velocities]
-    monkeypatch.setattr(stiffness, "CONTRAST", np.inf)
-    for velocity, found in zip(velocities, with_stripes, strict=True):
-        plain = solved(velocity)
-        assert found.sets > 0
-        assert 3.0 * found.operator_calls < plain.operator_calls
-        assert found.friction == pytest.approx(plain.friction, rel=1e-3)
+    for velocity in ((20.0, 0.0), (0.0, -20.0)):
+        states = sliding(shared_path, text, comm, "numerics.tolerance=1.0e-4")
+        point = states.solve(velocity, 4e7)
+        assert point.operator_calls <= 100
+        if velocity[0]:
+            assert certificate(states, velocity[0], 4e7) <= 1e-4 * (1 + 1e-6)
 
 
 def test_load_is_taken_back_near_by(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Scaling all pressures for what is cut off at edges disturbs waves as long as the box, which takes more than ten
-    times the calls of projected steps here. Friction agrees to 1e-3, what it is wrong by as a rule where certificates
-    are 5e-3."""
+    """Scaling all pressures for what is cut off at edges disturbs waves as long as the box, which takes more than five
+    times the calls of projected steps here. Friction agrees to 1e-3, its usual error where certificates are 5e-3."""
     text = (
         "grid: {points: 256, size: 1.0e-3}\n"
         "surface: {shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: 6.25e-5, rms_slope: 0.02}\n"
         "material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e7, relaxation_time: 1.0e-3}]}\n"
         "history: [{pressure: 1.0}]\n"
     )
-    monkeypatch.setattr(steady, "MAX_STEPS_TO_HALVE", 1000)  # projected steps alone
+    monkeypatch.setattr(steady, "LIGHT", 1.1)
+    monkeypatch.setattr(steady, "PATIENCE", 1000)  # projected steps alone
     near_by = sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5)
-    monkeypatch.setattr(solver, "LEAST_CUT", np.inf)
+    monkeypatch.setattr(Projected, "solve", partialmethod(Projected.solve, near_by=False))
     everywhere = sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5)
-    assert near_by.sets == everywhere.sets == 0
-    assert 10.0 * near_by.operator_calls < everywhere.operator_calls
+    assert 5.0 * near_by.operator_calls < everywhere.operator_calls
     assert near_by.measures.friction == pytest.approx(everywhere.measures.friction, rel=1e-3)
 
 
@@ -272,7 +280,7 @@ def test_a_load_beyond_all_digits_is_named(shared_path: Path, comm: MPI.Intracom
         sliding(shared_path, WAVE, comm).solve((0.02, 0.0), 1e22)
 
 
-# -- which way is taken to a steady state, by the moduli of a body of one branch --------------------------------------
+# -- lines along which a body is stiffer, by the moduli of a body of one branch --------------------------------------
 
 TIME, SIZE = 1e-3, 1e-3
 
@@ -294,12 +302,6 @@ def body(ratio: float, points: tuple[int, int] = (32, 48), boundary: str = "peri
     return scene.set_up(made, Slab.alone(*points))
 
 
-@pytest.mark.parametrize("velocity", [(0.0, 0.0), (1e-9, 0.0)])
-def test_a_body_at_rest_is_relaxed(velocity: tuple[float, float]) -> None:
-    assert not loses_most(body(1000.0), velocity)
-    assert soft_stripes(body(1000.0), velocity) is None
-
-
 def test_lines_have_the_contrast_of_the_longest_wave() -> None:
     """For that wave `omega tau = 1` at this velocity: `|G| = G_inf |1 + (r - 1) i/(1 + i)|`."""
     speed = SIZE / (2 * np.pi * TIME)
@@ -313,7 +315,7 @@ def test_lines_have_the_contrast_of_the_longest_wave() -> None:
     assert stiffer_lines(body(300.0), (speed, speed)) is None
 
 
-# -- steady sliding of a cylinder, on one row of points, against its theory; and sets of points that stall ------------
+# -- steady sliding of a cylinder, on one row of points, against its theory ------------
 
 LINE_LOAD = 10.0  # N/m
 LINE = float(np.sqrt(4 * LINE_LOAD * RADIUS / (np.pi * 4 * G0)))  # a0, Hertz with the instantaneous modulus [m]
@@ -349,30 +351,6 @@ def test_cylinder(shared_path: Path, comm: MPI.Intracomm, ratio: float, speed: f
     assert extrapolated == pytest.approx(exact, rel=1e-2)
 
 
-def test_points_left_out_are_taken_in_again(shared_path: Path, comm: MPI.Intracomm) -> None:
-    """From sets with holes, in which three of a hundred starts stalled for ever: linear solves next to points that are
-    left out by mistake are slow, and do not tell that they belong in. Pressures agree to 1e-3 of the largest: in the
-    tail of the contact, next to which the gap hardly opens, some 2e-4 of it make no more than the tolerance, 1e-7."""
-    states, pressure = cylinder_on(shared_path, comm, 100.0, 60.0)
-    velocity = (2.7 * LINE / CREEP_TIME, 0.0)
-    states.solve(velocity, pressure)
-    level, mean = states.levels[0], pressure / states.setup.units.pressure
-    solver, _ = states._solver(level, velocity)
-    assert states.contact is not None
-    solution = states.contact.p.copy()
-    random = np.random.default_rng(1)
-    for _ in range(50):
-        left = random.random((1, level.slab.nx))[level.slab.rows] < 0.25
-        start = np.where(left, solution, 0.0)
-        solver._admit(start, mean)
-        solver._certify(start, level.heights, mean)
-        found = solver._change_sets(start, level.heights, mean, 0)
-        assert found.converged
-        np.testing.assert_allclose(
-            found.p, solution, rtol=0, atol=1e-3 * comm.allreduce(solution.max(initial=0.0), MPI.MAX)
-        )
-
-
 # -- a steady start holds what is planned, and comes before the maps of the march; a start at rest --------------------
 
 Json = dict[str, Any]
@@ -406,23 +384,21 @@ def job(
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", SCENES)
 def test_what_is_held_while_it_is_solved(comm: MPI.Intracomm, name: str) -> None:
-    """To the byte, by projected steps alone; or more, in a free box, for a moment, as the table of the wake is made."""
+    """To the byte by splitting; less by projected steps alone, unless, in a free box for a moment, the table of the
+    wake takes more."""
     grid, surface, velocity = SCENES[name]
     planned = job(grid, surface, velocity)
     slab = Slab(comm, *planned.grid.points)
-    sliding = SteadySliding(scene.set_up(planned, slab))
-    assert sliding.solve(velocity, 1e5).sets == 0
-    few, most = (memory.steady_start(planned, comm.size, comm.rank, sets) for sets in (False, True))
-    held = slab.tally["map bytes at most"]
-    assert held == few < most or (name == "free" and few < held)
+    SteadySliding(scene.set_up(planned, slab)).solve(velocity, 1e5)
+    held, most = slab.tally["map bytes at most"], memory.steady_start(planned, comm.size, comm.rank)
+    assert held == most or name == "free"
 
 
-def test_plan_tells_both() -> None:
-    """In rows of their own, where there is a steady start."""
+def test_plan_tells_the_steady_start() -> None:
+    """In a row of its own, where there is one."""
     planned = job(*SCENES["along x"])
     rows = {text[2:26].rstrip(): text[26:].split() for text in printed_plan.maps(planned, [1, 2], 0)}
-    for what, sets in (("steady start, before", False), ("steady start, with sets", True)):
-        assert rows[what] == [f"{memory.steady_start(planned, ranks, sets=sets) / 1e6:.4g}" for ranks in (1, 2)]
+    assert rows["steady start, before"] == [f"{memory.steady_start(planned, ranks) / 1e6:.4g}" for ranks in (1, 2)]
     virgin = planned.model_copy(update={"initial": type(planned.initial)()})
     assert not any("steady" in text for text in printed_plan.maps(virgin, [1], 0))
     assert memory.steady_start(virgin) == 0

@@ -58,6 +58,12 @@ def _no_heat(counterbody: Any, thermal: Any) -> Iterator[Fault]:
         yield Fault(f"{sentence}; leave one of them out", ("thermal",))
 
 
+def _no_softening(counterbody: Any, softening: Any) -> Iterator[Fault]:
+    if None not in (counterbody, softening):
+        sentence = "cannot be used with counterbody: only the rubber softens, and factors would count for both bodies"
+        yield Fault(f"{sentence}; leave one of them out", ("softening",))
+
+
 def _does_not_yield(counterbody: Any) -> Iterator[Fault]:
     if counterbody is not None and counterbody.hardness is not None:
         yield Fault("is a key of material, also with a counterbody: give it there", ("counterbody", "hardness"))
@@ -82,6 +88,7 @@ class CounterbodyThatDeforms(Effect[None]):
         Rule(("counterbody", "body"), _lies_on),
         Rule(("counterbody", "material", "interface"), _sticks),
         Rule(("counterbody", "thermal"), _no_heat),
+        Rule(("counterbody", "softening"), _no_softening),
         Rule(("counterbody",), _does_not_yield),
     )
 

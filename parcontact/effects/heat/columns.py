@@ -59,3 +59,4 @@ STEADY: Table = (
 FIELDS: Table = (
     Column("temperature", "K", "rise of the temperature of the body's surface (with `thermal`, {doc}`heat`)"),
 )
+FIELDS_NEED = {"temperature": "a thermal section"}  # what the maps need

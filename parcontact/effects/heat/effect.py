@@ -138,10 +138,15 @@ class ThermalMemory:
 
 
 def _rubs(job: Any) -> bool:
-    """Return whether the contact area itself makes heat, by the shear of any effect or by sticking."""
+    """Return whether the contact area itself makes heat, by the shear of any effect."""
     effects = effects_of(type(job).model_fields).values()
     shears = (effect.shear(job) is not None for effect in effects if effect.decide(job).on)
-    return any(shears) or job.sticks
+    return any(shears) or job.sheared_first
+
+
+def _pulls(job: Any) -> bool:
+    """Return whether an effect lets surfaces pull each other."""
+    return any(limits.loads_press in lifted for lifted in job.asked("lifts"))
 
 
 class ThermalColumns(Effect[ThermalMemory]):
@@ -187,7 +192,7 @@ class ThermalColumns(Effect[ThermalMemory]):
     def __init__(self, scene: Any) -> None:
         self._setup, self._slab, self._job = scene.setup, scene.slab, scene.job
         self._feeds_back = feeds_back(scene.job)
-        self._rubs, self._pulled = _rubs(scene.job), scene.job.section("adhesion") is not None
+        self._rubs, self._pulled = _rubs(scene.job), _pulls(scene.job)
 
     def at_rest(self) -> ThermalMemory:
         job, fft = self._job, self._setup.fft

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
+from ... import capabilities
 from ...job.checks import limits
 from ...job.sections.geometry import Rough, RoughSpectrum, Topography
 from ...job.sections.part import Part, Rule
@@ -89,6 +90,13 @@ def _has_tractions(interface: Any, output: Any) -> Iterator[Fault]:
         yield from limits.no_traction(output)
 
 
+def _needs_its_folder(stick: bool, coefficient: float | None) -> Iterator[Fault]:
+    """Refuse keys of `effects.stick` in a program without this folder."""
+    asked = {"stick": stick, "coefficient": coefficient is not None}
+    for key in (key for key, given in asked.items() if given and not capabilities.has("stick")):
+        yield Fault("is not a key of interface; known keys: shear_stress, velocity, width", (key,), at_key=True)
+
+
 class Interface(Part):
     """The `interface` section: a shear stress, constant or a bell over the logarithm of the velocity, or a coefficient
     of friction; with `stick` points stick until the traction reaches it."""
@@ -103,7 +111,11 @@ class Interface(Part):
     stick: Flag = False
 
     one_of = (("shear_stress", "coefficient"),)
-    rules = (Rule(("velocity", "width"), _whole_bell), Rule(("coefficient", "velocity", "stick"), _coefficient))
+    rules = (
+        Rule(("stick", "coefficient"), _needs_its_folder),
+        Rule(("velocity", "width"), _whole_bell),
+        Rule(("coefficient", "velocity", "stick"), _coefficient),
+    )
 
     def friction(self, material: Any) -> InterfaceFriction | None:
         """Return the shear stress, shifted to the temperature of a material; None with a coefficient."""
@@ -127,6 +139,10 @@ class InterfaceEffect(Effect[Memory]):
 
     @staticmethod
     def remembers(job: Any) -> bool:
+        return bool(job.section("interface").stick)
+
+    @staticmethod
+    def sheared_first(job: Any) -> bool:
         return bool(job.section("interface").stick)
 
     @staticmethod

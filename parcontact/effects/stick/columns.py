@@ -19,3 +19,4 @@ FIELDS: Table = (
     Column("traction_x", "Pa", "traction on the body along x (with `interface.stick`)"),
     Column("traction_y", "Pa", "traction on the body along y"),
 )
+FIELDS_NEED = dict.fromkeys(("traction_x", "traction_y"), "interface.stick")  # what the maps need

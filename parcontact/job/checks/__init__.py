@@ -21,8 +21,8 @@ class Sections(Protocol):
     body: Body | None
 
     @property
-    def sticks(self) -> bool:
-        """Return True if points stick to the surface before they slide."""
+    def sheared_first(self) -> bool:
+        """Return True if an effect shears the contact before it slides."""
 
     def asked(self, name: str) -> list[Any]:
         """Return what the effects whose sections are given have under a name."""

@@ -160,7 +160,7 @@ def _instants(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
 def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     """Yield a warning if the angular frequencies q v of the sliding waves are far from all 1/relaxation time.
 
-    A contact that sticks is sheared before it slides, within far less than a wave. So its highest frequency is not
+    An effect may shear a contact before it slides, within far less than a wave. Then its highest frequency is not
     known, and slow sliding gives no warning.
     """
     branches = [one for one in material.branches if isinstance(one, PronyBranch) or one.G0 > 0.0]
@@ -174,7 +174,7 @@ def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
         return  # relaxation times are given at another temperature
     low, high = 2 * math.pi * min(speeds) / max(lengths), 2 * math.pi * max(speeds) / min(lengths)
     slow, fast = 1.0 / max(times), 1.0 / min(times)
-    if (high * BEYOND < slow and not job.sticks) or low > fast * BEYOND:
+    if (high * BEYOND < slow and not job.sheared_first) or low > fast * BEYOND:
         how, modulus = ("slower", "long-term") if high < slow else ("faster", "instantaneous")
         rates = {"low": low, "high": high, "slow": slow, "fast": fast}
         yield Doubt("elastic", "material", {**rates, "times": BEYOND, "how": how, "modulus": modulus})

@@ -1,24 +1,27 @@
-"""Minimal residual steps, each projected onto the admissible pressures.
+"""Minimal residual steps, each projected onto the admissible pressures, for light contact and free boxes.
 
 On the working set c (pressure or penetration) of an admissible pressure x, a step combines the preconditioned
 residual t and the last two changes of x so that the sum of squares of `C R (A x - h)` is smallest (R: restrict to c,
 C: subtract the mean over c). Then negative pressures are put to 0, the load is restored, near by first
 (`local_load`), and A is applied to x, so that the stored changes have exact images. A need not be symmetric.
-Convergence is not guaranteed; the caller must detect steps that no longer help. Restoring the load from all points
-by one factor may then help, but is usually slower.
+Convergence is not guaranteed: a solve is given up when its certificate no longer halves.
 """
+
+import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import loop
-from ...parallel.slab import Array, Slab
+from ...parallel.slab import Array
 from .. import kernels
-from ..constraint import Constraint
+from ..certificate import Certificate
+from ..constraint import NonNegative
 from ..local_load import LEAST_CUT, LocalLoad
 from ..preconditioner.extension import ExtendedPreconditioner, Grids
-from ..problem import Operator
-from .gcr import centred_residual, gaps_on, sum_on
+from ..problem import MeanPressure, Operator
+from .judge import Judge, SteadyContact, describe_failure
 
 Set = NDArray[np.bool_]
 DIRECTIONS = 3  # the residual and the last two changes
@@ -36,45 +39,72 @@ def extension_on(nx: int, ny: int, pairs: int) -> tuple[Grids, float]:
 
 
 class Projected:
-    """Projected steps on one grid. It holds DIRECTIONS maps t, their images w, and the maps of
-    `ExtendedPreconditioner`.
+    """Projected steps on one grid. It holds DIRECTIONS maps t, their images w, the displacement, a byte per point, and
+    the maps of `ExtendedPreconditioner`.
 
     `pairs` doublings make cells square. `least_cut` is LEAST_CUT of `LocalLoad` on squares, as a share of the load; the
     smaller cells of `pairs` reduce it.
     """
 
+    constraint = NonNegative()  # steady sliding has no other constraint
+
     def __init__(
-        self,
-        slab: Slab,
-        operator: Operator,
-        preconditioner: Operator,
-        constraint: Constraint,
-        pairs: int = 0,
-        least_cut: float = LEAST_CUT,
+        self, judge: Judge, operator: Operator, preconditioner: Operator, pairs: int = 0, least_cut: float = LEAST_CUT
     ) -> None:
-        self.slab, self.operator, self.preconditioner, self.constraint = slab, operator, preconditioner, constraint
+        self.judge, self.operator, self.preconditioner = judge, operator, preconditioner
+        self.slab = slab = judge.slab
         self.t, self.w = ([slab.empty() for _ in range(DIRECTIONS)] for _ in range(2))
+        self._u = slab.zeros()
+        self._working: NDArray[Any] = slab.zeros(np.bool_)
         grids, floor = extension_on(slab.nx, slab.ny, pairs)
         self.extended = ExtendedPreconditioner(slab, floor, grids)
         self.local_load, self._least_cut = LocalLoad(slab, pairs), least_cut / 2.0 ** abs(pairs)
 
-    @property
-    def pairs(self) -> list[tuple[Array, Array]]:
-        """The maps of directions and of their images; others may use them until the next `begin`."""
-        return list(zip(self.t, self.w, strict=True))
+    def solve(
+        self, h: Array, mean: float, p: Array, tolerance: float, patience: int, near_by: bool = True
+    ) -> SteadyContact:
+        """Solve for heights h under the mean pressure `mean`; the solution overwrites the start p. A start that is 0
+        everywhere is replaced by a uniform pressure. Restore the load `near_by` first, or from all points by one
+        factor. Give up if the certificate does not halve in `patience` steps. Collective."""
+        steps, best, since = 0, math.inf, 0
+        try:
+            d, certificate = self._begin(h, mean, p)
+            while certificate.worst > tolerance and since < patience:
+                self.step(p, self._u, h, self._working, mean * self.slab.points, near_by)
+                d, certificate = self._certify(h, mean, p)
+                halved, steps = certificate.worst <= 0.5 * best, steps + 1
+                best, since = (certificate.worst, 0) if halved else (best, since + 1)
+        except ZeroDivisionError:  # no load or no points in a set; all ranks have the same sums
+            p.fill(0.0)
+            d, certificate = math.nan, Certificate(math.nan, math.nan, math.nan)
+            return SteadyContact(p, self._u, d, certificate, steps, "no point is left that carries load")
+        failure = describe_failure(f"no progress in {since} projected steps", certificate, tolerance)
+        return SteadyContact(p, self._u, d, certificate, steps, failure)
 
-    def begin(self, near_by: bool = True) -> None:
-        """Forget earlier changes. Restore the load in the next steps `near_by` first, or from all points by
-        one factor."""
-        self.near_by = near_by
+    def _begin(self, h: Array, mean: float, p: Array) -> tuple[float, Certificate]:
+        """Scale the start to the load, and forget earlier changes. Return its approach and certificate."""
+        (load,) = self.slab.sum(kernels.sum_of(p))
+        if load > 0.0:
+            self.constraint.rescale_to_load(self.slab, p, load, mean * self.slab.points)
+        else:
+            p.fill(mean)
+        self.forget()
+        self.operator.apply(p, self._u)
+        return self._certify(h, mean, p)
+
+    def forget(self) -> None:
+        """Forget earlier changes."""
         for field in (*self.t, *self.w):
             field.fill(0.0)
 
-    def step(self, x: Array, u: Array, h: Array, working: Set, load: float) -> None:
+    def _certify(self, h: Array, mean: float, p: Array) -> tuple[float, Certificate]:
+        return self.judge.certify(p, self._u, h, MeanPressure(mean), self._working)
+
+    def step(self, x: Array, u: Array, h: Array, working: Set, load: float, near_by: bool = True) -> None:
         """Move x to an admissible pressure with the sum `load`, and update its image u; collective."""
         members, total = self.slab.sum(*gaps_on(working, u, h))
         level, t = total / members, self.t[0]
-        centred_residual(working, u, h, level, t)
+        kernels.gap_residual(working, u, h, level, t)
         self.extended.apply(self.preconditioner, working, t)
         (mean,) = self.slab.sum(sum_on(working, t))
         kernels.turn(working, t, 0.0, mean / members, t)
@@ -88,7 +118,7 @@ class Projected:
             np.multiply(self.t[0], sums[3] / (sums[6] - sums[0] ** 2 / members), out=x, where=working)
             np.subtract(self.t[2], x, out=x, where=working)
             now, cut = self.local_load.advance(self.constraint, x, x, 0.0, x)
-        self.local_load.restore(self.constraint, x, now, load, self.near_by and cut > self._least_cut * now)
+        self.local_load.restore(self.constraint, x, now, load, near_by and cut > self._least_cut * now)
         self.operator.apply(x, u)
         self._keep_change(x, u)
 
@@ -149,3 +179,29 @@ def _move(working, along_a, along_b, along_c, a, b, c, x):
             value = old - along_a * a[j, i] - along_b * b[j, i] - along_c * c[j, i]
             x[j, i] = value if working[j, i] else 0.0
             c[j, i] = old
+
+
+@loop
+def gaps_on(working, u, h):
+    """Return the number of points of the set, and the sum of `u - h` over it."""
+    count, total = 0.0, 0.0
+    for j in range(u.shape[0]):
+        row_count, row_total = 0.0, 0.0
+        for i in range(u.shape[1]):
+            weight = 1.0 if working[j, i] else 0.0
+            row_count += weight
+            row_total += weight * (u[j, i] - h[j, i])
+        count += row_count
+        total += row_total
+    return count, total
+
+
+@loop
+def sum_on(working, z):
+    total = 0.0
+    for j in range(z.shape[0]):
+        row = 0.0
+        for i in range(z.shape[1]):
+            row += z[j, i] if working[j, i] else 0.0
+        total += row
+    return total

@@ -174,6 +174,10 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
         "interface.stick needs counterbody.poisson of 0.5, got 0.3",
     ),
     "heat": ({"thermal": {"conductivity": 0.2, "diffusivity": 1e-7, "feedback": "none"}}, "losses in it heat it"),
+    "softens": (
+        {"history": None, "steady": STEADY, "softening": {"table": [[1e-3, 1.0, 1.0], [0.1, 0.5, 0.8]]}},
+        "only the rubber softens",
+    ),
     "yields": ({"counterbody": {**STIFF, "hardness": 1e6}}, "counterbody.hardness is a key of material"),
 }
 

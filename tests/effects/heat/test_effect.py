@@ -277,7 +277,7 @@ def test_without_it_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     places = (
         "effects.heat.effect.HeatMemory",
         "effects.heat.effect.depths_of",
-        "steady_sliding.sliding.find_temperatures",
+        "effects.heat.steady.find_temperatures",
     )
     for place in places:
         monkeypatch.setattr(f"parcontact.{place}", refuse)

@@ -157,3 +157,9 @@ def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[Doubt]:
         hottest, speed = max(beyond)
         facts = {"low": low, "high": high, "count": len(beyond), "points": len(points)}
         yield Doubt("flash temperatures", "material", {**facts, "hottest": hottest, "speed": speed})
+
+
+def doubts_of_points(points: Sequence[Point], job: Job) -> Iterator[Doubt]:
+    """Yield warnings about the temperatures of a friction curve."""
+    yield from describe_hot(points)
+    yield from describe_unmeasured(points, job)

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Main, RunParcontact
-from parcontact.effects.heat.flash import Flash
 from scipy.special import lambertw
 
 from parcontact import job as jobs
 from parcontact import scene
-from parcontact.effects.heat.heating import Feedback
+from parcontact.effects.heat.flash import Flash
+from parcontact.effects.heat.steady import Feedback
 from parcontact.errors import InputError, JobError, RunError
 from parcontact.parallel.slab import Slab
 from parcontact.plotting import curve_charts
@@ -166,7 +166,7 @@ def rise_in_round(friction_of: Callable[[float], float], guesses: list[float]) -
 
     def warmed(rise: float) -> Point:
         guesses.append(rise)
-        return Point((1.0, 0.0), 1e5, 0.0, 1.0, None, 0.1, None, None, 1.0, 1, 0.0, (), Flash(friction_of(rise)))  # type: ignore[arg-type]
+        return Point((1.0, 0.0), 1e5, 0.0, 1.0, None, 0.1, None, None, 1.0, 0.0, (), Flash(friction_of(rise)))  # type: ignore[arg-type]
 
     return warmed
 

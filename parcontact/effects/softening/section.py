@@ -1,0 +1,121 @@
+"""The `softening` section: how the moduli of filled rubber fall with the strain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+from pydantic import AfterValidator, Field, PrivateAttr
+
+from ...errors import InputError
+from ...job.sections.part import Part, Rule, existing_file
+from ...job.sections.quantities import Positive
+from ...job.text.fault import Fault, refuse
+from .strain_table import StrainTable
+from .sweep_file import read_sweep
+
+Row = tuple[Positive, Positive, Positive]
+LEAST_POISSON = 0.45  # physics: Poisson's ratio from which the strain of an incompressible body holds to 10 %
+
+
+def _rising(table: tuple[Any, ...] | None) -> Iterator[Fault]:
+    if table is None or any(row is None or None in row for row in table):
+        return
+    strains = [row[0] for row in table]
+    if len(strains) < 2 or any(b <= a for a, b in pairwise(strains)):
+        yield Fault("must be at least two rows [strain, f, g] with rising strains [-]", ("table",))
+
+
+def _of_a_file(path: Path | None, reference: float | None) -> Iterator[Fault]:
+    if path is None and reference is not None:
+        yield Fault(
+            "is for the path of a strain sweep; factors of a table are given as they are", ("reference_strain",)
+        )
+
+
+class Softening(Part):
+    """Factors of the storage and the loss modulus over the amplitude of the shear strain."""
+
+    label: ClassVar[str] = "softening"
+    table: tuple[Row, ...] | None = Field(
+        default=None, description="a list of rows [strain, f, g], factors of G' and G''"
+    )
+    path: Annotated[Path, AfterValidator(existing_file)] | None = Field(
+        default=None, description="the path of a strain sweep with the columns strain, f, g or strain and moduli"
+    )
+    reference_strain: Positive | None = Field(default=None, description="a positive strain [-] of the sweep")
+
+    one_of = (("table", "path"),)
+    rules = (Rule(("table",), _rising), Rule(("path", "reference_strain"), _of_a_file))
+
+    _made: tuple[StrainTable, str] = PrivateAttr()
+
+    def model_post_init(self, context: Any) -> None:
+        if self.table is not None:
+            self._made = StrainTable(*zip(*self.table, strict=True)), ""
+            return
+        if self.path is None:
+            return  # `one_of` reports it
+        try:
+            self._made = read_sweep(self.path, self.reference_strain)
+        except InputError as error:
+            refuse(Fault(f"cannot be read: {error}", ("path",)))
+
+    @property
+    def made(self) -> StrainTable:
+        """Return the factors over the strain."""
+        return self._made[0]
+
+    @property
+    def fact(self) -> str:
+        """Return a sentence on the strain at which the factors are 1; '' for given factors."""
+        return self._made[1]
+
+
+def only_in_steady_sliding(softening: Softening | None, history: Any, initial: Any) -> Iterator[Fault]:
+    """Refuse histories: `f G' + i g G''` is no Prony series, so that it has no memory in time."""
+    if softening is None:
+        return
+    if history:
+        sentence = (
+            "cannot be used with softening, which is for friction curves (parcontact steady): softened moduli are no"
+        )
+        yield Fault(f"{sentence} Prony series; leave out the history and give steady.pressures", ("history",))
+    if initial.state == "steady":
+        yield Fault("cannot be used with softening, as softened moduli are no Prony series", ("initial",))
+
+
+def on_a_periodic_half_space(softening: Softening | None, grid: Any, body: Any) -> Iterator[Fault]:
+    """Refuse free boxes and layers, for whose waves the strain is not known."""
+    if softening is None:
+        return
+    if not all(grid.cyclic):
+        yield Fault(
+            "must be periodic with softening: strains are those of waves in a periodic box", ("grid", "boundary")
+        )
+    if body is not None:
+        yield Fault("cannot be used with softening: strains are those of a half space", ("body",))
+
+
+def of_rubber(softening: Softening | None, material: Any) -> Iterator[Fault]:
+    """Refuse bodies that dissipate nothing or that are compressible."""
+    if softening is None:
+        return
+    if not material.fitted.branches:
+        yield Fault(
+            "needs a material that relaxes (model zener or dma): strains count where it dissipates", ("softening",)
+        )
+    if material.poisson < LEAST_POISSON:
+        sentence = (
+            f"must be at least {LEAST_POISSON:g} with softening, whose strains are those of an incompressible body"
+        )
+        yield Fault(f"{sentence}, got {material.poisson:g}", ("material", "poisson"))
+
+
+RULES = (
+    Rule(("softening", "history", "initial"), only_in_steady_sliding),
+    Rule(("softening", "grid", "body"), on_a_periodic_half_space),
+    Rule(("softening", "material"), of_rubber),
+)
