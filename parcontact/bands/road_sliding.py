@@ -185,8 +185,6 @@ class RoadSliding:
         Rounds use Aitken's relaxation for temperatures, and a power mean for strains; the first is for cold bands. No
         temperature above the range of the material's shift is tried.
         """
-        from ..effects.heat.steady import describe_beyond, describe_cold_state
-
         cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
         warms = feeds_back(self.job)
         highest = highest_temperature_of(self.job.material) if warms else math.inf
@@ -194,7 +192,7 @@ class RoadSliding:
         enough = ROUND_SHARE * self.job.numerics.asked.both[0]
         rises: Array = np.zeros(self.cut.count)
         last: Array = np.zeros(0)
-        relax, seen = 1.0, list[tuple[float, float]]()
+        relax, friction_cold, seen = 1.0, math.nan, list[tuple[float, float]]()
         for rounds in range(1, MOST_ROUNDS + 1):
             self._set_state(np.minimum(cold + rises, highest))
             rungs = self._cascade.climb([0])
@@ -202,20 +200,26 @@ class RoadSliding:
             seen.append(_sums(results))
             changes = _changes(seen[-2], seen[-1]) if rounds > 1 else (math.inf, math.inf)
             over = self._rises_beyond(rises, results)
+            softened = not self._table or changes[0] <= enough
+            if math.isnan(friction_cold):  # no heat before the strains of cold rubber are found
+                over, friction_cold = (over, seen[-1][0]) if softened else (0.0 * over, math.nan)
             settled = np.abs(over) <= np.maximum(LEAST_ERROR, RELATIVE * rises)
-            if np.all(settled) and (not self._table or changes[0] <= enough):
-                return BandSearch(rounds, seen[0][0], changes)
+            if np.all(settled) and softened:
+                return BandSearch(rounds, friction_cold, changes)
             if not np.all(settled) and np.all(settled | ((rises == most) & (over > 0.0))):
+                from ..effects.heat.steady import describe_beyond
+
                 raise RunError(describe_beyond(*place, most, most + float(over[rises == most].max())))
-            if last.size:
+            if last.any():
                 change = over - last
                 relax = float(np.clip(-relax * float(last @ change) / max(float(change @ change), TINY), 0.1, 1.0))
             rises, last = np.clip(rises + relax * over, 0.0, most), over
             if self._table:
                 self._strains = self._table.mixed(self._strains_of(results), self._strains)
+        at = "" if math.isnan(cold) else f" and {cold:.4g} C"
         raise RunError(
-            f"{describe_cold_state(*place)}: temperatures and strains of bands did not settle in {MOST_ROUNDS} rounds. "
-            "Try feedback: none"
+            f"steady sliding at {place[0]:.4g} m/s under {place[1]:.4g} Pa{at}: temperatures and strains of bands did "
+            f"not settle in {MOST_ROUNDS} rounds. Try feedback: none"
         )
 
     def _place(self) -> tuple[float, float]:

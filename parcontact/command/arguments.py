@@ -146,6 +146,12 @@ def _leak(add: Add) -> None:
     add("--fluid", metavar="FLUID", type=values.fluid, help=text)
     text = "pressures of the fluid at both ends [Pa]; absolute pressures for a gas"
     add("--pressures", metavar="HIGH:LOW", type=values.pressure_drop, help=text)
+    text = (
+        "load of the job: net of the pressure of the fluid (default), or the total, of which the fluid carries a part"
+    )
+    add("--load", choices=("net", "total"), default="net", help=text)
+    text = "pressure [Pa] over which the total load is measured (default: the low one)"
+    add("--ambient", metavar="P", type=values.pressure, help=text)
 
 
 def _report(add: Add) -> None:

@@ -47,6 +47,7 @@ natural = checked(int, lambda value: value >= 0, "a whole number of zero or more
 counts = checked(
     lambda text: tuple(map(int, text.split(","))), lambda values: min(values) > 0, "positive whole numbers"
 )
+pressure = checked(float, lambda value: 0.0 <= value < INFINITE, "a pressure [Pa] of zero or more")
 positive = checked(float, lambda value: 0.0 < value < INFINITE, "a positive number")
 share = checked(float, lambda value: 0.0 <= value <= 1.0, "a number from 0 to 1")
 poisson = checked(float, lambda value: -1.0 < value <= 0.5, "a Poisson ratio above -1 and up to 0.5")

@@ -267,7 +267,13 @@ def leak(options: argparse.Namespace) -> int:
 
     if (options.fluid is None) != (options.pressures is None):
         raise InputError("--fluid and --pressures HIGH:LOW [Pa] go together: give both, or none")
-    drop = PressureDrop(options.fluid, *options.pressures) if options.fluid else None
+    total = options.load == "total"
+    if total and options.fluid is None:
+        raise InputError("--load total needs a fluid: give --fluid and --pressures HIGH:LOW [Pa]")
+    if options.ambient is not None and not total:
+        raise InputError("--ambient goes with --load total only")
+    high, low = options.pressures or (0.0, 0.0)
+    drop = PressureDrop(options.fluid, high, low, total, options.ambient) if options.fluid else None
     for directory in options.directories:
         lines = write_leakage(directory, options.at or "", options.over, world, drop)
         print(*lines, sep="\n", end="\n" if world.rank == 0 else "")

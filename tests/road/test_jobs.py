@@ -355,8 +355,9 @@ def test_a_periodic_map_is_filtered_periodically(tmp_path: Path) -> None:
     x = 2 * np.pi * np.arange(48) / 48
     long = 1e-6 * np.cos(3 * x)[None, :] * np.cos(2 * x)[:, None]
     np.save(tmp_path / "map.npy", long + 1e-7 * np.cos(16 * x + 0.4)[None, :] * np.cos(17 * x)[:, None])
-    surface = {"shape": "topography", "path": str(tmp_path / "map.npy"), "unit": "m", "size": [1e-3, 1e-3]}
-    surface |= {"detrend": "mean", "periodic": "none", "short_wavelength": 1e-4}
+    surface = {"shape": "topography", "path": str(tmp_path / "map.npy"), "unit": "m", "size": [1e-3, 1e-3]} | {
+        **{"detrend": "mean", "periodic": "none", "short_wavelength": 1e-4}
+    }
     rest = {"material": {"model": "elastic", "shear_modulus": 1e6}, "history": [{"pressure": 1e3}]}
     job = jobs.load({"grid": {"points": 48, "size": 1e-3}, "surface": surface, **rest})
     setup = scene.set_up(job, Slab.alone(48, 48))

@@ -44,5 +44,14 @@ LEAK: Table = (
         when="--fluid",
     ),
     Column(*("mass_flow", "kg/s", "the same flow as a mass, empty where no density is known"), when="--fluid"),
+    Column(
+        *(
+            "flow_rate_total",
+            "m³/s",
+            "`flow_rate` if the fluid carries its part of the load; empty where K is not known",
+        ),
+        when="--load total",
+    ),
+    Column(*("mass_flow_total", "kg/s", "the same flow as a mass"), when="--load total"),
 )
 TABLES = {"leak.csv": LEAK}

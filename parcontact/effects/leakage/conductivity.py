@@ -2,6 +2,7 @@
 is too narrow for continuum flow."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -21,10 +22,15 @@ def is_thin(constriction: Any) -> Any:
 
 
 def chart(
-    over: Axis, at: Array, flows: Mapping[str, Array], constrictions: Mapping[str, Array], log_x: bool = False
+    over: Axis,
+    at: Array,
+    flows: Mapping[str, Array],
+    constrictions: Mapping[str, Array],
+    log_x: bool = False,
+    dotted: Mapping[str, Array] = MappingProxyType({}),
 ) -> Chart:
     """Draw conductivities K [m^3], by their names, over an axis, all of shape (n,), with their critical constrictions
-    [m]; K is 0 where contact closes, and NaN where it is not known."""
+    [m]; K is 0 where contact closes, and NaN where it is not known. Others are `dotted`, in the same colours."""
     lines, thin = list[ChartLine](), list[ChartLine]()
     for number, (name, flow) in enumerate(flows.items()):
         known = np.isfinite(flow)
@@ -32,4 +38,9 @@ def chart(
         narrow = known & (flow > 0.0) & is_thin(constrictions[name])
         if narrow.any():
             thin.append(ChartLine(THIN * (not thin), at[narrow], flow[narrow], THIN_LOOK))
+    looks = [style.line(number) | {"linestyle": ":"} for number in range(len(dotted))]
+    lines += [
+        ChartLine(name, at[flow > 0.0], flow[flow > 0.0], look)
+        for (name, flow), look in zip(dotted.items(), looks, strict=True)
+    ]
     return Chart("leakage", over, Axis("conductivity K", "m³"), lines + thin, log_x=log_x, zeros="closed")

@@ -65,22 +65,44 @@ FLUIDS = {  # at 20 C and 1 bar: CRC Handbook of Chemistry and Physics, 97th edi
 
 @dataclass(frozen=True)
 class PressureDrop:
-    """A fluid under a pressure that falls from `high` to `low` [Pa], absolute pressures for a gas."""
+    """A fluid under a pressure that falls from `high` to `low` [Pa], absolute pressures for a gas.
+
+    With `total` it carries its part of the load, which is measured over the pressure `ambient` [Pa] (default: `low`).
+    """
 
     fluid: Fluid
     high: float
     low: float
+    total: bool = False
+    ambient: float | None = None
 
     @property
     def mean_free_path(self) -> float:
         """Mean free path at the mean pressure [m]."""
         return self.fluid.mean_free_path(0.5 * (self.high + self.low))
 
-    def conducting_gap(self, gap: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the gaps [m] whose conductance without slip equals that of `gap` with slip."""
+    @property
+    def outside(self) -> float:
+        """Pressure [Pa] over which the load is measured."""
+        return self.low if self.ambient is None else self.ambient
+
+    @property
+    def pressures(self) -> tuple[float, ...]:
+        """Pressures [Pa] at which the conductivity for the fluid is calculated: the mean one, and both ends if a gas
+        carries a part of the load."""
+        ends = (self.low, self.high) if self.total and self.mean_free_path else ()
+        return (0.5 * (self.low + self.high), *ends)
+
+    def local_loads(self, load: float) -> tuple[float, float]:
+        """Return the loads [Pa] that contact carries at the high and at the low side, if the fluid carries its part."""
+        return load + self.outside - self.high, load + self.outside - self.low
+
+    def conducting_gap(self, gap: NDArray[np.float64], pressure: float) -> NDArray[np.float64]:
+        """Return the gaps [m] that pass as much mass of a fluid without slip at the mean pressure as `gap` does with
+        slip at a pressure [Pa]."""
         if not (path := self.mean_free_path):
             return gap
-        return np.cbrt(gap**2 * (gap + 6.0 * path))
+        return np.cbrt(gap**2 * (pressure / self.pressures[0] * gap + 6.0 * path))
 
     def flow_rate(self, conductivity: float, length: float, width: float) -> float:
         """Return the flow [m^3/s] at the low side through a conductivity [m^3] over a length and a width [m]; NaN for a

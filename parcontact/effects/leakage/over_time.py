@@ -1,6 +1,7 @@
 """Leakage of a run: the flow through its saved gaps, as leak.csv and a picture."""
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
@@ -15,19 +16,23 @@ from ...errors import InputError
 from ...job import reading
 from ...job.resolved import RESOLVED, shown_job
 from ...parallel.mpi import MPI
+from ...parallel.root import on_root
 from ...parallel.slab import Slab
 from ...plotting.plotted_run import Fields, PlottedRun
 from ...printed import per_cent, quantity, stated_error
 from ...storage import files, hdf5, read_back
 from ..contact_law import touching_of
 from . import conductivity
+from . import load_curve as load_curves
 from . import pictures as leakage_charts
 from . import results as leak_stop
 from .columns import LEAK
 from .flow import Flow, Leak, Map, flow_mesh_error, leak, least_section, solve_flow
 from .fluids import PressureDrop
+from .load_curve import LoadCurve
 
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
+UNEQUAL = 0.1  # accuracy: pressure drop over the load, above which the part of the load that a fluid carries matters
 INERTIA = 0.2  # accuracy: viscous flow of a gas over its bound by inertia, above which viscous flow is 10 % too large
 MOST_CELLS = 4e6  # tuning: largest map of which every rank solves one; 2048 x 2048 takes 1.4 GB
 
@@ -38,7 +43,9 @@ class LeakInstant(NamedTuple):
     `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` their ratios to K of the surface that
     just touches, NaN if unknown; `constriction` [m] is the smallest gap on the widest path of the direction that leaks
     more; `error_x` and `error_y` are the relative changes of K on half the mesh (`flow.flow_mesh_error`); `flow_rate`
-    [m^3/s] and `mass_flow` [kg/s] are those of a fluid in this direction (`fluids`), NaN without a fluid.
+    [m^3/s] and `mass_flow` [kg/s] are those of a fluid in this direction (`fluids`), NaN without a fluid, and those of
+    `total` the same if the fluid carries its part of the load. `parts` are, along x and along y, the conductivities for
+    the fluid [m^3] without and with its part; empty unless asked for.
     """
 
     time: float
@@ -57,15 +64,18 @@ class LeakInstant(NamedTuple):
     error_y: float
     flow_rate: float = np.nan
     mass_flow: float = np.nan
+    flow_rate_total: float = np.nan
+    mass_flow_total: float = np.nan
+    parts: tuple[tuple[float, float], ...] = ()
 
 
 class SolvedLeak(NamedTuple):
     """The flow at an instant, without maps, and along x and y its mesh errors, the conductivities [m^3] for a fluid
-    with slip, and the smallest open sections [m^2]."""
+    with slip at `PressureDrop.pressures`, and the smallest open sections [m^2]."""
 
     leak: Leak
     errors: tuple[float, float]
-    of_fluid: tuple[float, float]
+    of_fluid: tuple[tuple[float, ...], tuple[float, ...]]
     sections: tuple[float, float]
 
 
@@ -118,34 +128,59 @@ class Gaps:
     def solve(self, index: int) -> tuple[SolvedLeak, list[Map]]:
         """Return the flow at a saved instant, and its maps for both directions."""
         gap, flows, errors, shown = self.read(index), list[Flow](), list[float](), list[Map]()
-        of_fluid, sections = list[float](), list[float]()
+        of_fluid, sections = list[tuple[float, ...]](), list[float]()
         for axis in ("x", "y"):
             flow = solve_flow(gap, self.size, axis, self._sides(axis))
             shown.append(leakage_charts.flux(gap, flow.pressure, self.size))
             sections.append(least_section(gap, flow, self.size, axis))
             flows.append(replace(flow, pressure=np.empty((0, 0))))
-            of_fluid.append(self._conductivity(gap, flow, axis))
+            of_fluid.append(self._conductivities(gap, flow, axis))
             errors.append(flow_mesh_error(gap, flow, self.size, axis, self._sides(axis)))
-        pairs = ((found[0], found[1]) for found in (errors, of_fluid, sections))
-        return SolvedLeak(Leak(*flows), *pairs), shown
+        slipping = of_fluid[0], of_fluid[1]
+        return SolvedLeak(Leak(*flows), (errors[0], errors[1]), slipping, (sections[0], sections[1])), shown
 
     def _sides(self, axis: str) -> bool:
         """Return whether the sides along a flow are periodic."""
         return self.periodic["yx".index(axis)]
 
-    def _conductivity(self, gap: Map, flow: Flow, axis: str) -> float:
-        """Return the conductivity for the fluid along an axis [m^3], NaN without one."""
+    def _conductivities(self, gap: Map, flow: Flow, axis: str) -> tuple[float, ...]:
+        """Return the conductivities for the fluid along an axis [m^3] at its pressures, NaN without a fluid."""
         if self.drop is None or not self.drop.mean_free_path:
-            return np.nan if self.drop is None else flow.conductivity
-        return solve_flow(self.drop.conducting_gap(gap), self.size, axis, self._sides(axis)).conductivity
+            return (np.nan if self.drop is None else flow.conductivity,)
+        gaps = (self.drop.conducting_gap(gap, pressure) for pressure in self.drop.pressures)
+        return tuple(solve_flow(slipping, self.size, axis, self._sides(axis)).conductivity for slipping in gaps)
 
-    def row(self, index: int, solved: SolvedLeak, bare: Leak | None) -> LeakInstant:
-        found = solved.leak
-        wider = int(found.along_y.constriction > found.along_x.constriction)
-        through = solved.of_fluid[wider], *self.size[:: -1 if wider else 1]
-        flows = (self.drop.flow_rate(*through), self.drop.mass_flow(*through)) if self.drop else ()
+    def refuse_memory(self, at: str) -> None:
+        """Raise InputError if K depends on more than the load, or if only the instant `at` is asked for."""
+        if at:
+            raise InputError("--load total needs all saved loads: leave out --at")
+        body = self.job.material.fitted.remembers
+        if body and len({float(self.fields.times[index]) for index in self.shown if self.load(index) > 0.0}) < 2:
+            body = False  # all loads at one instant
+        if body or any(asked(self.job) for asked in self.job.asked("remembers")):
+            why = "the body relaxes between the saved instants" if body else "contact depends on its history"
+            raise InputError(
+                f"--load total needs K as a function of the load, but {why}: run an elastic body, of the modulus at "
+                "the time in question, without adhesion or stick"
+            )
+
+    def _measured(self, index: int, name: str) -> float:
+        """Return a value of measures.csv at a saved instant, NaN if it has none."""
         rows = np.flatnonzero(self.columns["step"] == self.fields.steps[index])
-        row = {name: float(self.columns[name][rows[-1]]) if rows.size else np.nan for name in LeakInstant._fields[1:3]}
+        return float(self.columns[name][rows[-1]]) if rows.size else np.nan
+
+    def load(self, index: int) -> float:
+        """Return the mean pressure [Pa] at a saved instant."""
+        return self._measured(index, "pressure")
+
+    def row(self, index: int, solved: SolvedLeak, bare: Leak | None, curves: Sequence[LoadCurve] = ()) -> LeakInstant:
+        """Return the row of an instant; `curves`, along x and y, are for a fluid that carries a part of the load."""
+        found, row = solved.leak, {name: self._measured(index, name) for name in LeakInstant._fields[1:3]}
+        totals = [curve.conductivity(self.drop, row["pressure"]) for curve in curves if self.drop]
+        along = list(zip((found.along_x.constriction, found.along_y.constriction), totals or (0.0, 0.0), strict=True))
+        wider = int(along[1] > along[0])  # where contact closes both, the direction that the fluid opens more
+        flows = self._flows(solved.of_fluid[wider][0], wider) if self.drop else (np.nan, np.nan)
+        parts = tuple(zip((through[0] for through in solved.of_fluid), totals, strict=True)) if totals else ()
         return LeakInstant(
             float(self.fields.times[index]),
             row["pressure"],
@@ -161,7 +196,15 @@ class Gaps:
             found.along_y.constriction,
             *solved.errors,
             *flows,
+            *(self._flows(totals[wider], wider) if totals else (np.nan, np.nan)),
+            parts,
         )
+
+    def _flows(self, conductivity: float, axis: int) -> tuple[float, float]:
+        """Return the flows [m^3/s] and [kg/s] through a conductivity [m^3] along x (0) or y (1)."""
+        assert self.drop is not None
+        through = conductivity, *self.size[:: -1 if axis else 1]
+        return self.drop.flow_rate(*through), self.drop.mass_flow(*through)
 
 
 def write_leakage(
@@ -171,30 +214,44 @@ def write_leakage(
     one instant; collective. Each rank takes an instant at a time.
 
     K is drawn `over` pressure or time, "" for an automatic choice; `drop` adds the flow of a fluid. Yields sentences
-    on root. Raises InputError for a directory without gaps.
+    on root. Raises InputError for a directory without gaps, and if the fluid carries a part of the load also for rows
+    that are no function of the load, or too few.
     """
     gaps = Gaps(directory, at, drop)
+    total = drop is not None and drop.total
+    if total:
+        gaps.refuse_memory(at)
     gaps.shown = comm.bcast(gaps.shown)  # a run may save more while ranks read
     leaks, drawn, maps = _solve_all(gaps, comm)
+    curves: Sequence[LoadCurve] = on_root(comm, lambda: _load_curves(gaps, leaks)) if total else ()
     if comm.rank > 0:
         return
     bare, missing = _bare_flow(gaps)
-    rows = [gaps.row(index, leaks[index], bare) for index in gaps.shown]
+    rows = [gaps.row(index, leaks[index], bare, curves) for index in gaps.shown]
     name = f"leak.{gaps.fields.steps[gaps.shown[0]]}" if at else "leak"
     table, picture = (directory / f"{name}.{kind}" for kind in ("csv", "png"))
-    columns = choose_columns(LEAK, when={"--fluid"} if drop else ())
+    columns = choose_columns(LEAK, when={"--fluid"} | ({"--load total"} if total else set()) if drop else ())
     files.replace_file(table, to_csv(names_of(columns), (values_of(columns, row) for row in rows)))
     instant = PlottedRun(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
     flows = leaks[drawn].leak.along_x, leaks[drawn].leak.along_y
     leakage_charts.draw_leakage(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
     yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
     yield from (text for axis in "xy" for text in _describe(rows, axis))
-    chosen = max((k for k, row in enumerate(rows) if row.percolates_x + row.percolates_y), default=len(rows) - 1)
+    chosen = max(range(len(rows)), key=lambda k: _tells(rows[k], k))
     yield from _describe_fluid(gaps, rows[chosen], leaks[gaps.shown[chosen]]) if drop else ()
+    if drop and total:
+        yield from load_curves.describe_cover(curves[0], drop, [row.pressure for row in rows], rows[chosen].pressure)
     yield from _describe_missing(gaps, at)
     if missing:
         yield f"share_x and share_y are left empty, as the undeformed surface cannot be made: {missing}"
     yield f"picture: {picture}"
+
+
+def _tells(row: LeakInstant, number: int) -> tuple[int, ...]:
+    """Return a key, largest for the row whose flow is described: of known flows the last one through an open gap, else
+    the last one through a gap that the fluid opens."""
+    totals = [total for _, total in row.parts]
+    return not any(map(math.isnan, totals)), bool(row.percolates_x + row.percolates_y), any(totals), number
 
 
 def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, SolvedLeak], int, list[Map]]:
@@ -216,6 +273,16 @@ def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, SolvedLeak], 
     parts = comm.gather((mine, maps if drawn == chosen else [])) or []
     leaks = {index: one for part, _ in parts for index, one in part.items()}
     return leaks, chosen[1], next((found for _, found in parts if found), [])
+
+
+def _load_curves(gaps: Gaps, leaks: Mapping[int, SolvedLeak]) -> tuple[LoadCurve, LoadCurve]:
+    """Return K over the load along x and along y; raises InputError if they give the flow of no row."""
+    drop, loads = gaps.drop, [gaps.load(index) for index in gaps.shown]
+    assert drop is not None
+    along_x = load_curves.load_curve(loads, [leaks[index].of_fluid[0] for index in gaps.shown])
+    along_y = load_curves.load_curve(loads, [leaks[index].of_fluid[1] for index in gaps.shown])
+    load_curves.refuse_uncovered(along_x, drop, loads)
+    return along_x, along_y
 
 
 def _bare_flow(gaps: Gaps) -> tuple[Leak | None, str]:
@@ -247,9 +314,15 @@ def _describe_fluid(gaps: Gaps, last: LeakInstant, solved: SolvedLeak) -> Iterat
     drop = gaps.drop
     assert drop is not None
     pressures = f"from {quantity(drop.high, 'Pa')} to {quantity(drop.low, 'Pa')}"
-    sizes = gaps.size, gaps.size[::-1]
-    for axis, through, size, section in zip("xy", solved.of_fluid, sizes, solved.sections, strict=True):
+    sizes, parts = (gaps.size, gaps.size[::-1]), last.parts or [(flows[0], flows[0]) for flows in solved.of_fluid]
+    if not drop.total and drop.high - drop.low > UNEQUAL * last.pressure:
+        yield (
+            f"contact carries all of the load, {quantity(last.pressure, 'Pa')}: right if it is net of the fluid's "
+            "pressure, else the flow is too small, and --load total calculates it"
+        )
+    for axis, (net, through), size, section in zip("xy", parts, sizes, solved.sections, strict=True):
         box = f"a length of {quantity(size[0], 'm')} and a width of {quantity(size[1], 'm')}"
+        yield from [load_curves.describe_part(axis, net, through)] * drop.total
         flows = f"along {axis} {drop.describe_rate(through, *size)}, over {box}"
         yield f"{drop.fluid.name} {pressures} at t = {quantity(last.time, 's')}: {flows}"
         yield from _describe_inertia(drop, axis, drop.mass_flow(through, *size), drop.inertial_bound(section))

@@ -76,9 +76,12 @@ def chart_of(rows: Sequence[Any], over: str) -> charts.Chart:
     kept = np.append(different, True) if over == "pressure" else np.full(len(rows), True)
     at = columns[over][kept]
     flows, narrowest = ({f"along {axis}": columns[f"{name}_{axis}"][kept] for axis in "xy"} for name in KINDS)
+    parts = columns["parts"][kept]  # shape (n, 0), or (n, 2, 2) if the fluid carries a part of the load
+    dotted = {f"{name}, net load": parts[:, k, 0] for k, name in enumerate(flows)} if parts.size else {}
+    flows = {name: parts[:, k, 1] for k, name in enumerate(flows)} if parts.size else flows
     later = at[at > 0.0]
     log_x = over == "time" and later.size > 0 and bool(later.max() > LONG * later.min())
-    return conductivity.chart(charts.Axis(over, UNITS[over]), at, flows, narrowest, log_x)
+    return conductivity.chart(charts.Axis(over, UNITS[over]), at, flows, narrowest, log_x, dotted)
 
 
 def _draw_flow(axes: Axes, size: tuple[float, float], gap: Map, flow: Flow, flux: Map) -> None:

@@ -30,6 +30,17 @@ def headline(run: RunTable) -> Iterator[str]:
         yield from [f"the conductivity of the gap is {' and '.join(flows)}"] * bool(flows)
         yield from [f"contact closes the gap along {' and '.join(closed)}"] * bool(closed)
         yield from stops
+    yield from _with_part(columns)
+
+
+def _with_part(columns: Columns) -> Iterator[str]:
+    """Yield the last known flow of a fluid that carries its part of the load."""
+    pairs = zip(columns.get("flow_rate_total", ()), columns.get("flow_rate", ()), strict=False)
+    known = [(total, net) for total, net in pairs if total == total]
+    if known:
+        total, net = known[-1]
+        more = f", {total / net:.3g} times the flow under a net load" if net else ""
+        yield f"{total:.3g} m³/s leak if the fluid carries its part of the load{more}"
 
 
 def _flow(columns: Columns, row: int, axis: str) -> str:

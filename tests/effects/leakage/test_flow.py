@@ -135,7 +135,7 @@ EVEN = np.full((4, 8), GAP)
 
 
 def rate(drop: PressureDrop) -> float:
-    flow = solve_flow(drop.conducting_gap(EVEN), SIZE)
+    flow = solve_flow(drop.conducting_gap(EVEN, drop.pressures[0]), SIZE)
     return drop.flow_rate(flow.conductivity, *SIZE)
 
 
