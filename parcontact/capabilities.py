@@ -3,6 +3,7 @@
 A folder may have `SECTION`, the section of a job that asks for it, and `EFFECT`, its class in `effect.py`. Other rooms
 find what its further modules offer by `offers`, and so name no capability. `GIVES` and `USES` name what an effect finds
 in a step for others, and what it needs of others: effects that give something follow a step before those that use it.
+With `MATERIAL = True` the section is a material, which may include a file.
 """
 
 from collections.abc import Collection, Mapping

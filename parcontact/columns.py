@@ -153,7 +153,10 @@ MEASURES: Table = (
     Column("dissipated", "J", "turned to heat since the start"),
     Column("seconds", "s", "wall time of the step", lambda row: round(row.seconds, 6)),
     Column(
-        PER_BRANCH, "J", "by branch K of the material (`output.branch_dissipation`)", attrgetter("branch_dissipation")
+        PER_BRANCH,
+        "J",
+        "by branch K of the material (`output.branch_dissipation`), or of both bodies as one (`counterbody`)",
+        attrgetter("branch_dissipation"),
     ),
     _measured("friction_x", "", "tangential over normal force along x; positive where it opposes motion along +x"),
     CORRECTED,
@@ -194,7 +197,12 @@ STEADY: Table = (  # rows are `steady_sliding.point.Point`
         lambda point: round(float(point.operator_calls), 2),
     ),
     Column("seconds", "s", "wall time", lambda point: round(point.seconds, 3)),
-    Column(PER_BRANCH, "W", "power that branch K dissipates", attrgetter("dissipated")),
+    Column(
+        PER_BRANCH,
+        "W",
+        "power that branch K dissipates, of both bodies as one with `counterbody`",
+        attrgetter("dissipated"),
+    ),
     Column(
         *("friction_x", ""), "signed friction along x", lambda point: point.friction * (point.velocity[0] / point.speed)
     ),

@@ -181,10 +181,10 @@ def _on_one_grid(job: Job) -> Job:
 def fit(options: argparse.Namespace) -> int:
     """Fit a material to measured moduli; write a material file and a picture."""
     from .. import mesh
+    from ..job.checks.frequencies import excited_band
     from ..plotting import compound_files as files
     from ..rubber import compound
     from ..rubber.shift import read_shift
-    from ..scene.measured_range import excited_band
 
     target = options.out or options.table.with_suffix(".yaml")
     files.refuse_foreign(target)

@@ -21,7 +21,6 @@ from .sections.part import Instead, Origin, Part, Rule
 from .sections.spectral_bands import BAND_RULES, SomeBands
 from .sections.stages import Initial, Stage, Steady
 from .text.fault import Fault
-from .text.overrides import Included
 from .text.python_data import is_array
 from .text.yamltext import dump
 
@@ -106,6 +105,8 @@ class Job(Part):
     def model_post_init(self, context: Any) -> None:
         if isinstance(context, Origin):
             self._origin = context
+        for change in self.asked("changed_material") if type(self) is not Job else ():
+            self.__dict__["material"] = change(self)  # before it is frozen, and rules see it
 
     @classmethod
     def words(cls) -> tuple[str, ...]:
@@ -134,9 +135,9 @@ class Job(Part):
         return self._origin.path
 
     @property
-    def included(self) -> Included | None:
-        """Return the file of an included material, or None."""
-        return self._origin.included
+    def included(self) -> str:
+        """Return a line for each file of an included material."""
+        return "\n".join(map(str, self._origin.included))
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -146,7 +147,8 @@ class Job(Part):
     @property
     def doubts(self) -> tuple[Doubt, ...]:
         """Return all warnings about the job; they are errors with `numerics.strict`."""
-        of_fit = self.material.doubts if isinstance(self.material, Dma) else ()
+        given = self.material.given
+        of_fit = given.doubts if isinstance(given, Dma) else ()
         of_material = (*of_fit, *meaning.doubt_temperatures(self))
         of_effects = [
             each if isinstance(each, Doubt) else Doubt("said", "", {"text": str(each)}) for each in self._said("doubts")
@@ -165,7 +167,7 @@ class Job(Part):
     @property
     def facts(self) -> tuple[str, ...]:
         """Return sentences on the temperature of the material, and on what the sections of effects mean in this job."""
-        return tuple(filter(None, (describe_temperature(self.material), *self._said("facts"))))
+        return tuple(filter(None, (describe_temperature(self.material.given), *self._said("facts"))))
 
     def _said(self, what: str) -> Iterator[Any]:
         """Yield the `doubts` or `facts` of the effects whose sections are given."""
@@ -244,9 +246,10 @@ def extended_model(sections: tuple[str, ...]) -> type[Job]:
         for name, effect in effects.items()
     }
     made = create_model(SEPARATOR.join(("Job", *sections)), __base__=Job, __module__=__name__, **fields)
-    absent = set(Job.words()) - set(made.model_fields)
     every = ((name, rule) for name, effect in effects.items() for rule in getattr(effect, "rules", ()))
-    own: Iterator[Any] = (_named_rule(name, rule) for name, rule in every if absent.isdisjoint(rule.needs))
+    own: Iterator[Any] = (
+        _named_rule(name, rule) for name, rule in every if made.model_fields.keys() >= set(rule.needs)
+    )
     laws = (limits.refuse_steady(name) for name, effect in effects.items() if getattr(effect, "brings_law", False))
     lifted = [check for effect in effects.values() for check in getattr(effect, "lifts", ())]
     kept = (rule for rule in Job.rules if rule.check not in lifted)

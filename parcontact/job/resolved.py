@@ -20,6 +20,7 @@ SHOWN = (
     "steady",
     "adhesion",
     "interface",
+    "counterbody",
     "bands",
 )  # sections that pictures and texts need; others may differ between versions
 LAST = "checkpoint"  # last section of a job with every default

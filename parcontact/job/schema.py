@@ -27,6 +27,7 @@ from .sections.part import Part, kind_key, literal_words
 from .sections.quantities import AUTO_POINTS, FROM_SURFACE, LARGEST, MOST, along_x, both, bounded, countable, listed
 from .sections.stages import expand_range
 from .text.fault import list_words
+from .text.overrides import materials
 
 Schema = dict[str, Any]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -84,7 +85,8 @@ def json_schema() -> Schema:
     kind = extended_model(tuple(name for name in added_sections.find_effects() if name not in without_schema()))
     found = kind.model_json_schema(schema_generator=SchemaOfKeys)
     properties = found["properties"]
-    properties["material"] = {"anyOf": [_included(found["$defs"]), properties["material"]]}
+    for name in materials():
+        properties[name] = {"anyOf": [_included(found["$defs"]), properties[name]]}
     properties["surface"] = {"anyOf": [properties["surface"]["items"], properties["surface"]]}
     properties["sweep"] = _sweep()
     found["anyOf"] = [{"required": ["history"]}, {"required": ["steady"]}]
@@ -162,7 +164,7 @@ def _collect(place: str, annotation: Any, found: dict[type[Part], SectionSchema]
 
 def _keys(part: type[Part]) -> Iterator[Key]:
     found = part.model_json_schema(schema_generator=SchemaOfKeys)
-    for word, schema in found["properties"].items():
+    for word, schema in found.get("properties", {}).items():
         words = literal_words(part.model_fields[word].annotation)
         text = schema.get("description") or (list_words(words) if words else "a mapping of the keys below")
         units = [unit for unit in re.findall(r"\[([^\]]+)\]", text) if "," not in unit]

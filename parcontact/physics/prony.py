@@ -195,9 +195,9 @@ def creep_spectrum(*material: *Moduli) -> CreepSpectrum:
     """
     series = normal_form(*material)
     spring, terms, times = series
-    zeros = [_zero_above(index, series) for index in range(times.size - (spring == 0))]
-    slopes = np.array([np.sum(terms * times / distances**2) for _, distances in zeros])
-    retardation_times = np.array([zero for zero, _ in zeros])
+    zeros = retardation(series)
+    slopes = np.array([zero.slope for zero in zeros])
+    retardation_times = np.array([zero.time for zero in zeros])
     fluidity = 1 / float(terms @ times) if spring == 0 else 0.0
     return CreepSpectrum(1 / float(spring + terms.sum()), 1 / (retardation_times * slopes), retardation_times, fluidity)
 
@@ -208,9 +208,23 @@ def creep(t: ArrayLike, *material: *Moduli) -> Array:
     return creep_spectrum(*material).compliance(t)
 
 
-def _zero_above(index: int, series: Prony) -> tuple[float, Array]:
-    """Return the zero lambda of f = G_inf + sum_k G_k tau_k/(tau_k - lambda) above tau[index], and all
-    tau_k - lambda."""
+class Zero(NamedTuple):
+    """Zero lambda of f = G_inf + sum_k G_k tau_k/(tau_k - lambda), a retardation time [s], all tau_k - lambda [s], and
+    df/dlambda [Pa/s]."""
+
+    time: float
+    distances: Array
+    slope: float
+
+
+def retardation(series: Prony) -> list[Zero]:
+    """Return the zeros of a series in normal form, one above each relaxation time; without a spring the last is
+    infinite and left out."""
+    return [_zero_above(index, series) for index in range(series.moduli.size - (series.modulus_inf == 0))]
+
+
+def _zero_above(index: int, series: Prony) -> Zero:
+    """Return the zero above tau[index]."""
     from scipy.optimize import brentq
 
     pole, sign, room = _nearer_pole(index, series)
@@ -220,7 +234,9 @@ def _zero_above(index: int, series: Prony) -> tuple[float, Array]:
     least = room * min(1.0, abs(own / rest))
     bracket = np.log(least / 2), np.log(1.5 * room)
     offset = sign * np.exp(brentq(lambda x: sum(_split(pole, sign * np.exp(x), series)), *bracket, xtol=1e-15))
-    return float(times[pole] + offset), times - times[pole] - offset
+    distances = times - times[pole] - offset
+    slope = float(np.sum(series.moduli * times / distances**2))
+    return Zero(float(times[pole] + offset), distances, slope)
 
 
 def _nearer_pole(index: int, series: Prony) -> tuple[int, int, float]:

@@ -10,7 +10,7 @@ NO_SWEEP = 'set={"sweep": None}'
 WORDS = {  # patterns and their replacements, applied in this order
     r"choose one of them \(--case\) or leave it out \(--set sweep=null\)": f"leave it out ({NO_SWEEP})",
     r"change the sweep instead, like --set '.*'": f"leave the sweep out ({NO_SWEEP})",
-    r"--set material=\{include: (.*?)\}": r'set={"material": {"include": "\1"}}',
+    r"--set (\w+)=\{include: (.*?)\}": r'set={"\1": {"include": "\2"}}',
     r"--restart never": 'restart="never"',
     r"--restart PATH": "restart=PATH",
     r"give --out for another directory": "give another output.directory",

@@ -12,9 +12,10 @@ from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..effects.relaxation import relaxation_of
 from ..errors import InputError
 from ..job import Dma, Job, Zener
+from ..job.checks.frequencies import excited_band
 from ..physics.prony import complex_modulus
 from ..plotting import prefixes, style
-from ..scene.measured_range import excited_band, excited_bands
+from ..scene.measured_range import excited_bands
 from .page_parts import ReportSection, ReportTable, draw_panel
 
 DECADES = 1.5  # range of a picture beyond the relaxation times [decades]
@@ -37,7 +38,7 @@ def material_section(job: Job) -> ReportSection:
         *_describe_temperature(job),
     ]
     if job.included:
-        rows.append(("included from", str(job.included)))
+        rows.append(("included from", job.included))
     tables = [ReportTable(("property", "value"), rows)]
     if not series.moduli.size:
         return ReportSection("Material", tables=tables)
@@ -53,8 +54,8 @@ def material_section(job: Job) -> ReportSection:
 
 def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:
     found = job.material.fitted
-    if isinstance(job.material, Dma):
-        yield "fitted to", str(job.material.path)
+    if isinstance(given := job.material.given, Dma):
+        yield "fitted to", str(given.path)
     if not isinstance(found, Zener):
         return
     if found.shift is not None:

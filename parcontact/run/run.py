@@ -181,7 +181,7 @@ class Run:
         title = self.job.title or self.job.path.stem
         self.console.say(f"{title}: {grid.nx} x {grid.ny} points on {ranks}")
         if self.job.included:
-            self.console.say(str(self.job.included))
+            self.console.say(self.job.included)
         if self.job.origin.mesh:
             self.console.say(self.job.origin.mesh)
         for fact in scene.describe_scene(self.march.scene):

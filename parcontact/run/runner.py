@@ -123,8 +123,7 @@ def provenance_of(job: Job, slab: Slab, saved: Contents | None, doubts: tuple[st
     link = Link(job.resolved(), slab.comm.size, saved.step if saved else 0)
     seeds = tuple(shape.seed for shape in job.surface if isinstance(shape, Rough | RoughSpectrum))
     chain = extend_chain(saved.chain if saved else (), link)
-    included = str(job.included) if job.included else ""
-    return Provenance(chain, seeds, included, doubts, references=cite_lines(listing.plain_data(job)))
+    return Provenance(chain, seeds, job.included, doubts, references=cite_lines(listing.plain_data(job)))
 
 
 def _open_files(

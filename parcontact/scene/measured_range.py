@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..doubts import Doubt
 from ..effects.relaxation import time_factor_of
-from ..job import Flat, Grid, Job, Rough, Wave, Zener
+from ..job import Job, Zener
+from ..job.checks.frequencies import excited_band
 from ..rubber.shift import doubt_kelvin
 
 NEAR = 0.5  # accuracy: decades beyond the measured band without a warning
@@ -26,37 +27,6 @@ class ExcitedBand(NamedTuple):
     def reduced(self) -> tuple[float, float]:
         """Frequencies [Hz] with the same moduli at the reference temperature."""
         return self.band[0] * self.factor, self.band[1] * self.factor
-
-
-def excited_band(job: Job) -> tuple[float, float] | None:
-    """Return the range of frequencies [Hz] at which the waves of a job's surface load a point of the body, over all
-    stages and steady velocities; None if the surface does not move."""
-    velocities = [*(stage.velocity for stage in job.history), job.initial.velocity]
-    speeds = [*(math.hypot(*velocity) for velocity in velocities), *(job.steady.velocities if job.steady else ())]
-    moving, waves = (
-        [speed for speed in speeds if speed > 0.0],
-        [number for shape in job.surface for number in wave_numbers(shape, job.grid)],
-    )
-    if not moving or not waves:
-        return None
-    low, high = min(waves), max(waves)
-    return min(moving) * low / (2 * math.pi), max(moving) * high / (2 * math.pi)
-
-
-def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
-    """Return the wavenumbers [rad/m] of a shape, or the lowest and the highest one; none for a flat surface. Round
-    shapes and files may have every wave from the box to two cells."""
-    longest = 2.0 * math.pi / max(grid.size)
-    cells = [cell for cell, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1]
-    if isinstance(shape, Flat):
-        return ()
-    if isinstance(shape, Wave):
-        waves = [2.0 * math.pi * n / length for n, length in zip(shape.waves, grid.size, strict=True)]
-        return (math.hypot(*waves),) if any(waves) else ()
-    if isinstance(shape, Rough):
-        ratio = shape.anisotropy.ratio if shape.anisotropy else 1.0
-        return max(2.0 * math.pi / (ratio * shape.long_wavelength), longest), 2.0 * math.pi / shape.short_wavelength
-    return longest, max(math.pi / min(cells, default=math.inf), longest)
 
 
 def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedBand]:

@@ -67,6 +67,8 @@ def request(
         raise InputError("no pressure: give --pressures [Pa], or a stage with a pressure or force in the job")
     if any(not 0.0 < value < math.inf for value in (*speeds, *loads)):
         raise InputError("velocities [m/s] and pressures [Pa] of steady sliding must be positive")
+    for why in filter(None, (ask(job) for ask in job.asked("why_no_curve"))):
+        raise InputError(why)
     direction = section.unit_direction if section else (1.0, 0.0)
     degrees = tuple(temperatures) or (section.temperatures if section and section.temperatures else ())
     for temperature in degrees:

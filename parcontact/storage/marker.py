@@ -17,7 +17,8 @@ from . import files
 MARKER = ".parcontact"
 FORMAT = 1
 VERBS = {"run": "a run", "steady": "a friction curve", "study": "a study"}
-SCENE = ("grid", "bands", "surface", "material", "body")  # sections in which all jobs of a directory must agree
+# sections in which all jobs of a directory must agree
+SCENE = ("grid", "bands", "surface", "material", "body", "counterbody")
 SHOWN = 4  # most differences of two jobs in a message
 EFFECTS = (
     "thermal",

@@ -138,7 +138,8 @@ def references_of(job: dict[str, Any], features: Collection[str] = ()) -> list[t
         ),
         *(f"interface {key}" for key in job.get("interface") or {}),
     }
-    if material["model"] != "elastic":
+    bodies = [section for section in job.values() if isinstance(section, dict) and "model" in section]
+    if any(body["model"] != "elastic" for body in bodies):
         used |= {"viscoelastic", f"integrator {numerics['integrator']}" if job.get("history") else ""}
     lines = REFERENCES.read_text(encoding="utf-8").splitlines()[1:]
     table = ([cell.strip() for cell in line.split("|")] for line in lines)

@@ -16,9 +16,9 @@ from parcontact.bands.choice import cut_bands, doubts_of_bands, on_one_grid_of_a
 from parcontact.effects.heat.bands import flash_of_bands
 from parcontact.effects.heat.flash import Flash
 from parcontact.effects.heat.steady import describe_hot, describe_unmeasured
+from parcontact.job.checks.frequencies import excited_band
 from parcontact.parallel.slab import Slab
 from parcontact.report import road_section
-from parcontact.scene.measured_range import excited_band
 
 LONG = 4e-3
 MEASURED = {

@@ -28,6 +28,7 @@ JOB: dict[str, Any] = {
 }
 KEYS: dict[str, tuple[dict[str, Any], str]] = {  # folder: what its section is refused with
     "leakage": ({"leakage": {}}, "leakage is not a known key"),
+    "counterbody": ({"counterbody": {"model": "elastic", "shear_modulus": 5e6}}, "counterbody is not a known key"),
     "heat": ({"thermal": {"conductivity": 0.2, "diffusivity": 1e-7}}, "thermal is not a known key"),
     "interface": ({"interface": {"shear_stress": 1e5}}, "interface is not a known key"),
     "stick": ({"interface": {"shear_stress": 1e5, "stick": True}}, "interface.stick is not a key of interface"),

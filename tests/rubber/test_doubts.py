@@ -10,10 +10,11 @@ import pytest
 import parcontact as pc
 from parcontact.errors import InputError
 from parcontact.job import Flat, Job, Rough, Sphere, Wave
+from parcontact.job.checks.frequencies import wave_numbers
 from parcontact.rubber import compound, measured_moduli
 from parcontact.rubber.series import Weigh
 from parcontact.rubber.shift import WLF, Factors, read_shift
-from parcontact.scene.measured_range import doubt_band, wave_numbers
+from parcontact.scene.measured_range import doubt_band
 
 from . import measured
 

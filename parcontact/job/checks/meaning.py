@@ -94,7 +94,7 @@ def doubt_moduli(material: Elastic | Zener) -> Iterator[Doubt]:
 
 def doubt_temperatures(job: Sections) -> Iterator[Doubt]:
     """Yield a warning for each key with a temperature that may be in kelvin."""
-    material, steady = job.material, job.steady
+    material, steady = job.material.given, job.steady
     shift = getattr(material, "shift", None)
     yield from doubt_kelvin("material.temperature", [getattr(material, "temperature", None)])
     yield from doubt_kelvin("material.reference", [getattr(material, "reference", None)])

@@ -32,16 +32,18 @@ def plain_data(value: Any) -> Any:
 
 
 def items(part: Part) -> Iterator[tuple[str, Any]]:
-    """Return the keys of a part that have a value, with their values."""
+    """Return the keys of a part that have a value, with their values; parts as the job gives them."""
     names = (name for name in type(part).model_fields if name not in part.left_out())
-    return ((name, value) for name in names if (value := getattr(part, name)) is not None)
+    found = ((name, value) for name in names if (value := getattr(part, name)) is not None)
+    return ((name, value.given if isinstance(value, Part) else value) for name, value in found)
 
 
 def plain_job(job: Any) -> dict[str, Any]:
     """Return a job as plain data for its fingerprint, with checksums of input files in place of their paths."""
     data: dict[str, Any] = plain_data(job)
     data["numerics"] |= job.numerics.chosen
-    for part, given in zip([*data["surface"], data["material"]], [*job.surface, job.material], strict=True):
+    sections = [(data[name], value) for name, value in items(job) if isinstance(value, Part)]
+    for part, given in (*zip(data["surface"], job.surface, strict=True), *sections):
         for key in ("path", "spectrum"):
             if isinstance(path := getattr(given, key, None), Path):
                 del part[key]

@@ -248,6 +248,10 @@ class Zener(Part):
         """Return the long-term modulus at the temperature of the body [Pa]."""
         return self.modulus_factor * (self.modulus_inf + sum(branch.long_modulus for branch in self.branches))
 
+    def at(self, temperature: float) -> Zener:
+        """Return the body at another temperature [deg C], which its shift must reach."""
+        return self.model_copy(update={"temperature": temperature})
+
 
 class Dma(Part):
     """A material fitted to a table of measured moduli when the job is read, as by `parcontact fit`."""
@@ -289,17 +293,17 @@ class Dma(Part):
         return self._fitted
 
 
-def describe_temperature(material: Elastic | Zener | Dma) -> str:
-    """Return a sentence on the temperature of a material, '' for a material without a shift."""
+def describe_temperature(material: Elastic | Zener | Dma, section: str = "material") -> str:
+    """Return a sentence on the temperature of the material of a section, '' for a material without a shift."""
     body = material.fitted
     if not isinstance(body, Zener) or body.shift is None:
         return ""
     reference = body.shift.made.reference
     if body.temperature is None:
-        return f"material: at {reference:g} C, the reference of its shift; the job gives no material.temperature"
+        return f"{section}: at {reference:g} C, the reference of its shift; the job gives no {section}.temperature"
     factors = f"a_T = {body.time_factor:.4g}"
     factors += f", b_T = {body.modulus_factor:.4g}" if body.shift.vertical else ""
-    return f"material: at {body.temperature:g} C ({factors}, reference {reference:g} C)"
+    return f"{section}: at {body.temperature:g} C ({factors}, reference {reference:g} C)"
 
 
 def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
@@ -309,7 +313,7 @@ def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
         raise InputError("temperatures need a material whose relaxation times depend on it: model zener or dma")
     if faults := list(shifted(body.shift, temperature)):
         raise InputError(f"temperature {faults[0].predicate}")
-    return body.model_copy(update={"temperature": temperature})
+    return body.at(temperature)
 
 
 KINDS = {"elastic": Elastic, "zener": Zener, "dma": Dma}

@@ -31,7 +31,7 @@ from .quantities import from_home
 
 
 class Origin(NamedTuple):
-    """Origin of a job: its absolute path, and the file of an included material; `mesh` describes chosen points.
+    """Origin of a job: its absolute path, and the files of included materials; `mesh` describes chosen points.
     `approaches` are the places of the approaches of the stages, `strict` is the place of `numerics.strict` ('' for jobs
     from Python).
 
@@ -40,7 +40,7 @@ class Origin(NamedTuple):
     """
 
     path: Path = Path("job.yaml")
-    included: Included | None = None
+    included: tuple[Included, ...] = ()
     from_file: bool = True
     numbers_as_texts: bool = False
     names_directory: bool = False
@@ -86,6 +86,11 @@ class Part(BaseModel):
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
         """Return `data` with the defaults that depend on other keys or on the job file."""
         return data
+
+    @property
+    def given(self) -> Part:
+        """Return the part as the job gives it; another one if effects changed it."""
+        return self
 
     def left_out(self) -> tuple[str, ...]:
         """Return the keys that are not written although they have a value."""

@@ -8,14 +8,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ... import capabilities
 from .fault import quote, shorten
 from .places import UNREADABLE, Key, Place, Source
 from .python_data import source_of
 from .sweep_cases import SWEEP, Setting, Sweep, refuse_overrides, take_sweep
 from .yamltext import parse, read_source, read_with_content
 
-MATERIAL: Key = ("material",)
-INCLUDE: Key = ("material", "include")
 OURS = Path(__file__).parents[2] / "materials"  # compounds that come with the program
 
 
@@ -24,16 +23,17 @@ class Included(NamedTuple):
 
     path: Path
     sha256: str
+    section: str = "material"
 
     def __str__(self) -> str:
-        return f"material: included from {self.path} (SHA-256 {self.sha256})"
+        return f"{self.section}: included from {self.path} (SHA-256 {self.sha256})"
 
 
 class Reading(NamedTuple):
-    """The data of a job or a case, the file of its included material, and its sweep (None if it has mistakes)."""
+    """The data of a job or a case, the files of its included materials, and its sweep (None if it has mistakes)."""
 
     source: Source
-    included: Included | None
+    included: tuple[Included, ...]
     sweep: Sweep | None
 
 
@@ -57,16 +57,16 @@ def read_job(path: Path, changes: Changes, case: int = 0, given: Source | None =
     elif sweep:
         refuse_overrides(sweep, overrides, source)
         overrides += sweep.case(min(max(case, 0), len(sweep) - 1))
-    own = _material(source)
-    own = {} if "include" in own else dict(own)
+    owns = {name: dict(_material(source, name)) for name in materials()}
+    first = [key for name in owns for key in ((name,), (name, "include"))]
     for override in overrides:
-        if override.path in (MATERIAL, INCLUDE):
+        if override.path in first:
             _apply(source, override)
-    included = _include(source, path, own)
+    included = [_include(source, path, name, {} if "include" in own else own) for name, own in owns.items()]
     for override in overrides:
-        if override.path not in (MATERIAL, INCLUDE):
+        if override.path not in first:
             _apply(source, override)
-    return Reading(source, included, sweep)
+    return Reading(source, tuple(filter(None, included)), sweep)
 
 
 def _parse(change: str | tuple[str, Any], source: Source) -> Setting | None:
@@ -132,49 +132,54 @@ def _dead_end(node: Any, shown: str, name: str) -> str:
 # -- materials from other files ---------------------------------------------------------------------------------------
 
 
-def _material(source: Source) -> dict[str, Any]:
-    """Return the material of a job, an empty mapping if it has none."""
-    found = source.data.get("material") if isinstance(source.data, dict) else None
+def materials() -> list[str]:
+    """Return the sections that are materials."""
+    return ["material", *(each.SECTION for each in capabilities.folders() if getattr(each, "MATERIAL", False))]
+
+
+def _material(source: Source, section: str) -> dict[str, Any]:
+    """Return the material of a section of a job, an empty mapping if it has none."""
+    found = source.data.get(section) if isinstance(source.data, dict) else None
     return found if isinstance(found, dict) else {}
 
 
-def _include(source: Source, job: Path, own: dict[str, Any]) -> Included | None:
-    """Replace `material: {include: name, ...}` by the keys of the included file, updated by the other keys given.
-
-    `own` are the keys of a material that the job file describes without an include.
+def _include(source: Source, job: Path, section: str, own: dict[str, Any]) -> Included | None:
+    """Replace `material: {include: name, ...}` by the keys of the included file, updated by the other keys given; or
+    another `section` that is a material. `own` are the keys of a material that the job file describes without an
+    include.
     """
-    given = _material(source)
-    name, place = given.get("include"), source.locate(INCLUDE).place
+    given, root = _material(source, section), (section,)
+    name, place = given.get("include"), source.locate((section, "include")).place
     if name is None:
         return None
     del given["include"]
     found = _find(name, job)
     if isinstance(found, str):
-        source.note(place, f"material.include must name a material file, got {quote(name)} ({found})")
-        source.data["material"] = UNREADABLE
+        source.note(place, f"{section}.include must name a material file, got {quote(name)} ({found})")
+        source.data[section] = UNREADABLE
         return None
     content, included = read_with_content(found, _shown(found))
     source.mistakes += included.mistakes
-    start = MATERIAL if isinstance(included.data, dict) and list(included.data) == ["material"] else ()
+    start: Key = ("material",) if isinstance(included.data, dict) and list(included.data) == ["material"] else ()
     material, at = included.data["material"] if start else included.data, included.locate(start).place
     if not isinstance(material, dict):
         if material is not UNREADABLE:
             source.note(at, "must be one mapping with the keys of a material")
-        source.data["material"] = UNREADABLE
+        source.data[section] = UNREADABLE
         return None
     if hidden := [key for key in own if key in material and key in given]:
         sentence = f"has no effect on {', '.join(hidden)}, which the job gives itself"
-        source.note(place, f"{sentence}; use --set material={{include: {name}}} to replace the material")
+        source.note(place, f"{sentence}; use --set {section}={{include: {name}}} to replace the material")
     items = included.places.items()
-    places = {(*MATERIAL, *key[len(start) :]): known for key, known in items if key != start}
+    places = {(*root, *key[len(start) :]): known for key, known in items if key != start}
     for key in given:
-        own_place = source.locate((*MATERIAL, key))
+        own_place = source.locate((*root, key))
         places = {path: known for path, known in places.items() if path[1] != key}
-        places[*MATERIAL, key] = own_place.key_place, own_place.place
-    places |= {path: known for path, known in source.places.items() if path[:1] == MATERIAL and len(path) > 2}
-    source.put(MATERIAL, material | given, source.locate(MATERIAL).key_place, at)
+        places[*root, key] = own_place.key_place, own_place.place
+    places |= {path: known for path, known in source.places.items() if path[:1] == root and len(path) > 2}
+    source.put(root, material | given, source.locate(root).key_place, at)
     source.places |= places
-    return Included(found.absolute(), hashlib.sha256(content).hexdigest())
+    return Included(found.absolute(), hashlib.sha256(content).hexdigest(), section)
 
 
 def _find(name: Any, job: Path) -> Path | str:
