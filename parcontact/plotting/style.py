@@ -52,7 +52,7 @@ RC: dict[Any, Any] = {
     "pdf.fonttype": 42,
 }
 FEW_ENTRIES = 2, 4  # most entries of a legend inside a narrow panel and a wide one
-INSIDE = 0.6  # most width of a legend inside a panel, over that of the panel
+INSIDE = 0.5  # most width of a legend inside a panel, over that of the panel
 NARROW = 3.5  # width below which a panel is narrow [inch]
 ROOM, LETTER = 0.45, 0.075  # width of an entry of a legend without its name, and mean width of a letter [inch]
 MARGIN = 0.2  # least width of a panel that a legend below it leaves free [inch]
