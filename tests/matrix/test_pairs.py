@@ -50,6 +50,7 @@ SECTIONS: dict[str, Data] = {  # name in the table: what it adds to a job
     "thermal": {"thermal": HEAT},
     "feedback": {"thermal": {**HEAT, "feedback": "mean"}},
     "counterbody": {"thermal": {**HEAT, "counterbody": HEAT}, **CURVE},
+    "softening": {"softening": {"table": [[1e-3, 1, 1], [0.1, 0.5, 0.7]]}, **CURVE},
 }
 IN_EVERY_JOB = {"title", "grid", "surface", "material", "numerics", "history", "output", "checkpoint"}
 
