@@ -45,6 +45,7 @@ def steady(options: argparse.Namespace) -> int:
 def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
     from ..bands.road_sliding import make_states
     from ..derived import prediction
+    from ..run import watch
     from ..steady_sliding import curve
 
     asked = [getattr(options, name, ()) for name in OF_A_CURVE]
@@ -52,7 +53,10 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
     if options.restart not in ("auto", "never"):
         raise InputError(f"--restart: auto or never was expected for a friction curve, got {options.restart}")
     sweep_stop_file = getattr(options, "sweep_stop_file", None)
-    code = curve.run_curve(job, slab, wanted, options.quiet, options.restart, shows, sweep_stop_file, make_states)
+    end = watch.limit(getattr(options, "wall", None))
+    limit = None if end is None else end - watch.RESERVE_SECONDS
+    chosen = (options.quiet, options.restart, shows, sweep_stop_file, make_states, limit)
+    code = curve.run_curve(job, slab, wanted, *chosen)
     if code == DONE and prediction.has_spectrum(job):
         on_root(slab.comm, lambda: prediction.write_steady(job, wanted))
     return code
@@ -227,6 +231,8 @@ def surface(options: argparse.Namespace) -> int:
         raise InputError(f"--job writes a job for a measured map; {given} is a job")
     measured_maps.refuse_taken(options.start)
     job = measured_maps.load_map(given, options.set) if alone else _load(options)
+    if job.bands is not None:
+        raise InputError(f"{given} has bands, each with heights on a grid of its own: give it a grid instead (grid)")
     base = set_up(job, Slab.alone(*job.grid.points))
     doubts = [doubt for doubt in job.doubts if doubt.place.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)

@@ -68,6 +68,7 @@ class Job(Part):
         Rule(("history",), limits.loads_press),
         Rule(("grid", "material", "body", "initial", "steady"), limits.steady_bodies_do_not_flow),
         Rule(("initial", "output"), limits.energies_count_from_rest),
+        Rule(("history", "output"), limits.energies_are_of_steps),
         Rule(("grid", "material", "history", "initial", "steady"), limits.loads_are_borne),
         Rule(("material", "steady"), limits.temperatures_are_reached),
         Rule(("grid", "history"), limits.steps_can_be_made),

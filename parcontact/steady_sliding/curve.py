@@ -3,6 +3,7 @@ picture."""
 
 import math
 import os
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -131,12 +132,13 @@ def run_curve(
     shows: Callable[[Doubt], bool] = always,
     sweep_stop_file: StopFile | None = None,
     make: Callable[[Job, Slab], States] = on_one_grid,
+    limit: float | None = None,
 ) -> int:
     """Solve all missing points, and write each at once; collective. Return the exit code.
 
     If a point fails, the others are still solved, and the exit code is 1. `restart` is `auto` or `never`; warnings
     are printed if `shows` returns True. `sweep_stop_file` is shared by all cases of a sweep; it is not removed.
-    `make` makes the steady states.
+    `make` makes the steady states. The last point must be solved by the time `limit` (of `time.monotonic`), if any.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
@@ -161,7 +163,7 @@ def run_curve(
         sliding.keep_in(directory.path)
         try:
             with Signals().noted() as signals:
-                return _Curve(sliding, wanted, table, maps, directory, signals, shows, sweep_stop_file).go()
+                return _Curve(sliding, wanted, table, maps, directory, signals, shows, sweep_stop_file, limit).go()
         finally:
             if table:
                 table.close()
@@ -214,7 +216,9 @@ class _Curve:
     signals: Signals
     shows: Callable[[Doubt], bool]
     sweep_stop_file: StopFile | None
+    limit: float | None
     failures: int = 0
+    longest: float = -math.inf
 
     def __post_init__(self) -> None:
         chosen, self.slab = self.sliding.setup.choices, self.sliding.setup.slab
@@ -228,7 +232,9 @@ class _Curve:
             if self._stopped():
                 self._say(f"stopped with {len(lacking) - count} points to go; run again to go on")
                 return AGAIN
+            began = time.monotonic()
             self._solve(index)
+            self.longest = max(self.longest, time.monotonic() - began)
             if self.table:
                 self.table.pass_on()
         if self.table:
@@ -237,8 +243,10 @@ class _Curve:
         return FAILED if self.failures else DONE
 
     def _stopped(self) -> bool:
-        """Return whether a stop was requested; its own stop file is then removed."""
-        others = self.sweep_stop_file is not None and self.sweep_stop_file.asks
+        """Return whether a stop was requested, or a point that takes twice the longest time so far would come too late;
+        its own stop file is then removed."""
+        late = self.limit is not None and time.monotonic() + 2.0 * self.longest > self.limit
+        others = late or (self.sweep_stop_file is not None and self.sweep_stop_file.asks)
         asked = self.signals.stop or (self.slab.root and (others or os.path.lexists(self.directory.stop_file)))
         if not self.slab.reduce((), [float(asked)])[0]:
             return False

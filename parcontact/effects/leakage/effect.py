@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from ...columns import added_by
-from ...job.sections.part import Part
+from ...job.sections.part import Part, Rule
 from ...job.sections.quantities import Count
+from ...job.text.fault import Fault
 from ...parallel.root import on_root
 from ..effect import Changes, Decision, Effect, Instant
 from .flow import leak
 
 NOTHING = (math.nan, math.nan, math.nan)
+
+
+def _needs_steps(leakage: Leakage | None, history: Any) -> Iterator[Fault]:
+    if leakage is not None and not history:
+        yield Fault("needs a history: the flow of a friction curve is not calculated", ("leakage",))
 
 
 class Leakage(Part):
@@ -39,6 +45,7 @@ class LeakageColumns(Effect[tuple[float, ...]]):
 
     section: ClassVar[type[Part]] = Leakage
     columns: ClassVar[tuple[str, ...]] = added_by("leakage")
+    rules: ClassVar[tuple[Rule, ...]] = (Rule(("leakage", "history"), _needs_steps),)
 
     @staticmethod
     def decide(job: Any) -> Decision:

@@ -216,6 +216,12 @@ def steady_bodies_do_not_flow(
             yield Fault(f"{sentence}; give it modulus_inf > 0, or slide in a stage of the history", (key,))
 
 
+def energies_are_of_steps(history: tuple[Stage, ...], output: Output) -> Iterator[Fault]:
+    """Check that a job with energies has a history."""
+    if output.energy and not history:
+        yield Fault("needs a history: a friction curve has no work and no stored energy", ("output", "energy"))
+
+
 def energies_count_from_rest(initial: Initial, output: Output) -> Iterator[Fault]:
     if initial.state == "steady" and output.energy:
         yield Fault("needs initial: {state: virgin}: energies start from a body at rest", ("output", "energy"))
