@@ -10,7 +10,6 @@ so that a point with pressure penetrates by `h + d - c(p)`. As c rises, the prob
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from ..compiled import loop
 from ..errors import InputError
@@ -42,6 +41,8 @@ class InterfaceLaw:
             raise InputError("an interface law needs two positive pressures or more, which rise")
         if np.any(np.diff(closings) < 0.0):
             raise InputError("an interface law needs closings that do not fall while the pressure rises")
+        from scipy.interpolate import PchipInterpolator  # slow to import, and of use to few
+
         logs = np.log(pressures)
         count = STEPS * (len(logs) - 1) + 1
         fine = np.interp(np.linspace(0, len(logs) - 1, count), np.arange(len(logs)), logs)
