@@ -86,31 +86,27 @@ def small(name: str, place: Path) -> Path:
 
 @pytest.mark.mpi(2)
 @pytest.mark.parametrize("name", JOBS)
-def test_check_plan_run_and_run_again(name: str, place: Path) -> None:
-    """The second run changes no result."""
-    job = small(name, place)
-    if MPI.COMM_WORLD.size == 1:  # several ranks run it; what is checked and planned does not depend on them
+def test_a_job_from_check_to_going_on(name: str, place: Path) -> None:
+    """A second run changes no result; a run that is stopped in the middle goes on to the rows of one that was not."""
+    alone, job = MPI.COMM_WORLD.size == 1, small(name, place)
+    if alone:  # what is checked and planned does not depend on ranks
         done("check", job)
         done("plan", job, "--seconds", "0.01")
-    done("run", job, "--out", "whole", "--quiet")
-    MPI.COMM_WORLD.Barrier()
-    before = tables(place / "whole")
-    MPI.COMM_WORLD.Barrier()
-    assert any(name.endswith(("measures.csv", "steady.csv")) for name in before)
-    done("run", job, "--out", "whole", "--quiet")
-    MPI.COMM_WORLD.Barrier()
-    assert tables(place / "whole") == before
-
-
-@pytest.mark.parametrize("name", JOBS)
-def test_stop_and_go_on(name: str, place: Path) -> None:
-    """A run that is stopped in the middle goes on to the rows of one that was not."""
-    job = small(name, place)
-    if not mesh.load_cases(job)[0].job.history:
+    whole = run(place, job)
+    assert any(name.endswith(("measures.csv", "steady.csv")) for name in whole)
+    assert run(place, job) == whole
+    if mesh.load_cases(job)[0].job.history:
+        run(place, job, "part", "--until", repr(middle(job)))
+        assert run(place, job, "part") == whole
+    elif alone:
         said = do("run", job, "--out", "part", "--until", "1.0")
         assert (said.code, "a friction curve has no time" in said.err) == (2, True)
-        return
-    done("run", job, "--out", "whole", "--quiet")
-    done("run", job, "--out", "part", "--quiet", "--until", repr(middle(job)))
-    done("run", job, "--out", "part", "--quiet")
-    assert tables(place / "part") == tables(place / "whole")
+
+
+def run(place: Path, job: Path, out: str = "whole", *words: str) -> dict[str, list[list[str]]]:
+    """Run a job on all ranks; return its tables."""
+    done("run", job, "--out", out, "--quiet", *words)
+    MPI.COMM_WORLD.Barrier()
+    found = tables(place / out)
+    MPI.COMM_WORLD.Barrier()
+    return found
