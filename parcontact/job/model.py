@@ -167,9 +167,9 @@ class Job(Part):
 
     @property
     def facts(self) -> tuple[str, ...]:
+        """Return sentences on the temperature of the material, and on what the sections of effects mean in this job."""
         material: Any = self.material.given
         return tuple(filter(None, (describe_temperature(material), *self._said("facts"))))
-        return tuple(filter(None, (describe_temperature(self.material.given), *self._said("facts"))))
 
     def _said(self, what: str) -> Iterator[Any]:
         """Yield the `doubts` or `facts` of the effects whose sections are given."""
