@@ -16,7 +16,7 @@ RADIUS, G0, CREEP_TIME = 1.0e-2, 2.75e6, 1.0e-2  # m, Pa, s
 
 
 def sliding(path: Path, text: str, comm: MPI.Intracomm, *overrides: str) -> SteadySliding:
-    file = path / f"steady-{comm.rank}.yaml"
+    file = path / f"steady-{MPI.COMM_WORLD.rank}.yaml"  # several ranks may each be alone
     file.write_text(text)
     job = jobs.load(file, overrides)
     return SteadySliding(scene.set_up(job, Slab(comm, *job.grid.points)))

@@ -134,6 +134,8 @@ def plan(options: argparse.Namespace) -> int:
 
     started = watch.age()
     world = ranks.start_ranks()
+    from itertools import chain
+
     from ..parallel.groups import Groups
     from ..parallel.slab import Slab
     from ..plan.memory import count_side_by_side
@@ -143,13 +145,14 @@ def plan(options: argparse.Namespace) -> int:
     chosen = on_root(world, lambda: cases_of(options)[1])
     doubts = on_root(world, lambda: sentences_of(chosen, lambda job: _doubts(job, [])))
     planner = Planner(options.ranks or sorted({1, world.size, ranks.cores()}), options.seconds, started)
-    if len(chosen) > 1:
-        at_once = on_root(world, lambda: count_side_by_side([case.job for case in chosen], world.size))
-        lines = planner.plan_sweep(chosen, Groups(world, at_once))
-    elif chosen[0].job.bands is not None:
+    if chosen[0].job.bands is not None:
         from ..bands.band_plan import plan_bands
 
-        lines = plan_bands(chosen[0].job, Slab(world, 1, 1))
+        head = [f"first of {len(chosen)} cases:"] * (len(chosen) > 1)
+        lines = chain(head, plan_bands(chosen[0].job, Slab(world, 1, 1)))
+    elif len(chosen) > 1:
+        at_once = on_root(world, lambda: count_side_by_side([case.job for case in chosen], world.size))
+        lines = planner.plan_sweep(chosen, Groups(world, at_once))
     else:
         lines = planner.plan(chosen[0].job, Slab(world, *chosen[0].job.grid.points))
     for line in (*(f"warning: {text}" for text in doubts), *lines):

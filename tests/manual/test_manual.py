@@ -61,7 +61,8 @@ BLOCKS = [
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A directory with the files that examples name."""
     np.save(tmp_path / "road.npy", np.random.default_rng(1).normal(size=(64, 64)))
-    (tmp_path / "strain_sweep.csv").write_text("strain,f,g\n0.001,1,1\n1,0.3,0.5\n")
+    (tmp_path / "measured").mkdir()
+    (tmp_path / "measured" / "strain_sweep.csv").write_text("strain,f,g\n0.001,1,1\n1,0.3,0.5\n")
     (tmp_path / "materials").mkdir()
     shift = {"law": "wlf", "C1": 8.86, "C2": 101.6, "reference": 20.0}
     compound = {"model": "zener", "modulus_inf": 1e6, "shift": shift}

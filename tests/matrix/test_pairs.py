@@ -49,8 +49,9 @@ SECTIONS: dict[str, Data] = {  # name in the table: what it adds to a job
     "sweep": {"sweep": [{"numerics.max_iterations": [400, 500]}]},
     "thermal": {"thermal": HEAT},
     "feedback": {"thermal": {**HEAT, "feedback": "mean"}},
-    "counterbody": {"thermal": {**HEAT, "counterbody": HEAT}, **CURVE},
+    "conductor": {"thermal": {**HEAT, "counterbody": HEAT}, **CURVE},
     "softening": {"softening": {"table": [[1e-3, 1, 1], [0.1, 0.5, 0.7]]}, **CURVE},
+    "counterbody": {"counterbody": {"model": "elastic", "shear_modulus": 5e6}},
 }
 IN_EVERY_JOB = {"title", "grid", "surface", "material", "numerics", "history", "output", "checkpoint"}
 

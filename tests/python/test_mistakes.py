@@ -168,9 +168,10 @@ def test_a_simulation_is_saved_not_pickled(act: Callable[[Any], Any]) -> None:
 @pytest.mark.mpi
 def test_a_saved_state_has_the_sums_of_the_budget(comm: MPI.Intracomm, shared_path: Any) -> None:
     """The budget at the end is that of the whole slide, to the last digit, as without a stop; also of a saved one."""
-    whole = pc.Simulation(BALL, comm=comm)
+    changes = {"surface.waves": [1, 1], "history.0.pressure": 2e4, "history.1.pressure": 2e4}  # spots of several cells
+    whole = pc.Simulation(BALL, changes, comm=comm)
     whole.run()
-    run = pc.Simulation(BALL, comm=comm)
+    run = pc.Simulation(BALL, changes, comm=comm)
     for row in run.steps():
         if row.step == 5:
             break

@@ -136,7 +136,7 @@ CURVE = ("steady", "--velocities", "0.1,1", "--pressures", "1e4")
     ("words", "said", "times"),
     [
         (("run",), "step 1 at t = 0 s (stage 'press'): force_y would not be finite", 1),
-        (CURVE, "its results would not be finite", 2),  # of each point
+        (CURVE, "its results would not be finite", 3),  # of each point, and why points are missing
     ],
 )
 def test_no_run_and_no_point_of_a_curve_is_one(

@@ -163,6 +163,8 @@ def test_displacement_control() -> None:
 TESTED = {
     *(
         "isolated contact",
+        "counterbody",
+        "softening",
         "extrapolated starts",
         "starts from a whole cell earlier",
         "chosen time steps",
