@@ -11,7 +11,7 @@ from .each_case import OF_A_CURVE, cases_of, each_case, job_overrides
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from ..doubts import Doubt
     from ..job import Case, Job
@@ -149,7 +149,7 @@ def plan(options: argparse.Namespace) -> int:
         from ..bands.band_plan import plan_bands
 
         head = [f"first of {len(chosen)} cases:"] * (len(chosen) > 1)
-        lines = chain(head, plan_bands(chosen[0].job, Slab(world, 1, 1)))
+        lines: Iterator[str] = chain(head, plan_bands(chosen[0].job, Slab(world, 1, 1)))
     elif len(chosen) > 1:
         at_once = on_root(world, lambda: count_side_by_side([case.job for case in chosen], world.size))
         lines = planner.plan_sweep(chosen, Groups(world, at_once))
