@@ -13,6 +13,7 @@ import pytest
 import yaml
 from conftest import WORLD, Main
 from csv_rows import rows
+from legible import watch_pictures
 
 from matrix.test_pairs import CURVE, HISTORY, SCENE, SECTIONS, job_of
 from parcontact import __main__
@@ -86,11 +87,12 @@ def made(home: Path, kind: str) -> Path:
 def test_a_verb_of_a_kind(
     kind: str, verb: str, results: dict[str, Path], main: Main, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It ends with 0 and has made its file, or refuses in a sentence."""
+    """It ends with 0 and has made its file and legible pictures, or refuses in a sentence."""
     home = made(results[kind], kind)
     monkeypatch.chdir(home)
     words, promised = (text.format(job="job.yaml", out="out") for text in VERBS[verb])
-    code, shown, said = main(verb, *words.split())
+    with watch_pictures():
+        code, shown, said = main(verb, *words.split())
     assert "Traceback" not in shown + said
     refusal = REFUSED.get(verb, {}).get(kind)
     assert code == (0 if refusal is None else 2), said
