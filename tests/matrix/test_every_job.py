@@ -87,7 +87,8 @@ def small(name: str, place: Path) -> Path:
 @pytest.mark.mpi(2)
 @pytest.mark.parametrize("name", JOBS)
 def test_a_job_from_check_to_going_on(name: str, place: Path) -> None:
-    """A second run changes no result; a run that is stopped in the middle goes on to the rows of one that was not."""
+    """A second run changes no result; on one rank, a run that is stopped in the middle goes on to the rows of one that was
+    not."""
     alone, job = MPI.COMM_WORLD.size == 1, small(name, place)
     if alone:  # what is checked and planned does not depend on ranks
         done("check", job)
@@ -95,10 +96,12 @@ def test_a_job_from_check_to_going_on(name: str, place: Path) -> None:
     whole = run(place, job)
     assert any(name.endswith(("measures.csv", "steady.csv")) for name in whole)
     assert run(place, job) == whole
+    if not alone:
+        return
     if mesh.load_cases(job)[0].job.history:
         run(place, job, "part", "--until", repr(middle(job)))
         assert run(place, job, "part") == whole
-    elif alone:
+    else:
         said = do("run", job, "--out", "part", "--until", "1.0")
         assert (said.code, "a friction curve has no time" in said.err) == (2, True)
 
