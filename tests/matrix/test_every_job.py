@@ -87,8 +87,8 @@ def small(name: str, place: Path) -> Path:
 @pytest.mark.mpi(2)
 @pytest.mark.parametrize("name", JOBS)
 def test_a_job_from_check_to_going_on(name: str, place: Path) -> None:
-    """A second run changes no result; on one rank, a run that is stopped in the middle goes on to the rows of one that was
-    not."""
+    """A second run changes no result. On one rank a run that is stopped in the middle goes on to the rows of one that
+    was not."""
     alone, job = MPI.COMM_WORLD.size == 1, small(name, place)
     if alone:  # what is checked and planned does not depend on ranks
         done("check", job)
