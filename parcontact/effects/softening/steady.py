@@ -89,7 +89,8 @@ def loops(setup: Setup) -> Iterator[StrainLoop]:
 def doubts_of_points(points: Sequence[Point], job: Any) -> Iterator[Doubt]:
     """Yield a warning if strains of a curve are outside of the table."""
     section = job.section("softening")
-    beyond = [point for point in points if section and not section.made.reaches(point.strain_amplitude)]
+    strained = [point for point in points if section and point.strain_amplitude > 0.0]  # NaN without friction
+    beyond = [point for point in strained if not section.made.reaches(point.strain_amplitude)]
     if beyond:
         low, high = section.made.strain[0], section.made.strain[-1]
         worst = max(beyond, key=lambda point: abs(math.log(point.strain_amplitude / math.sqrt(low * high))))

@@ -296,3 +296,4 @@ def test_strains_outside_of_the_table_are_said(tmp_path: Path) -> None:
     (doubt,) = doubts_of_points([solved(job)], job)
     assert "the strain is 0.061 at 1 m/s, beyond the 1e-06 to 0.00964" in str(doubt)
     assert not list(doubts_of_points([solved(wave(0.1, TABLE))], wave(0.1, TABLE)))
+    assert not list(doubts_of_points([replace(solved(job), strain_amplitude=math.nan)], job))  # without friction
