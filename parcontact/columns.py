@@ -247,6 +247,22 @@ BANDS: Table = (
     Column("strain_amplitude", "", "strain that softens the rubber of the band; empty without `softening`"),
 )
 
+CYCLES: Table = (
+    Column("stage", "", "number of the stage, from 0"),
+    Column("cycle", "", "number of the cycle in its stage, from 1"),
+    Column("frequency", "Hz", "of the load or of the velocity"),
+    Column(
+        "loss",
+        "J",
+        "area of the loop of force over displacement without the mean force; in a cycle that repeats "
+        "the last one, the energy dissipated",
+    ),
+    Column("error_loss", "", "estimated relative error of the loss"),
+    Column("friction_amplitude", "", "half the range of friction along the velocity; empty if nothing slides"),
+    Column("approach_amplitude", "m", "half the range of the approach"),
+    Column("phase", "rad", "by which the displacement lags behind the force, of their first harmonics"),
+)
+
 THEORY: Table = (
     Column("time", "s", "instant of the job"),
     Column("distance", "m", "slid"),
@@ -336,6 +352,7 @@ TABLES: Mapping[str, Table] = {
     "steady.csv": STEADY,
     "steady_waves.csv": STEADY_WAVES,
     "bands.csv": BANDS,
+    "cycles.csv": CYCLES,
     "theory.csv": THEORY,
     "steady_theory.csv": STEADY_THEORY,
     "bands_theory.csv": BANDS_THEORY,

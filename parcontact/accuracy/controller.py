@@ -200,7 +200,7 @@ class Controller:
         limits = _bounds(span)
         if dt <= limits.least or dt >= limits.most:
             return min(max(dt, limits.least), limits.most)
-        if span.stage.speed:
+        if span.stage.slides:
             cell = one_cell(span.stage, self.job.grid)
             return min(cell * cells_per_step(dt / cell), limits.most)
         power = math.floor(REST_LEVELS * math.log2(dt / limits.least) + SAME_LEVEL)
@@ -234,12 +234,12 @@ class Controller:
         ends = span.ends
         assert isinstance(ends, ChosenEnds)
         now = ends.made[-1] if ends.made else 0.0
-        stop = next(stop for stop in ends.stops if not reached(now, stop))
-        if span.stage.speed:
+        stop = ends.next_stop(now)
+        if span.stage.slides:
             dt = self._to_a_multiple(span, now, dt)
         elif STRETCH * dt < stop - now < 2.0 * dt:
             dt = 0.5 * (stop - now)
-        if stop - now <= (STRETCH if not span.stage.speed else 1.0 + SAME_LEVEL) * dt:
+        if stop - now <= (STRETCH if not span.stage.slides else 1.0 + SAME_LEVEL) * dt:
             return self._ending(chosen, span, number, stop - now, stop, rejected)
         return self._ending(chosen, span, number, dt, now + dt, rejected)
 
@@ -262,7 +262,7 @@ class Controller:
 
     def _ending(self, chosen: ChosenSteps, span: Span, number: int, dt: float, end: float, rejected: bool) -> Step:
         """Return the step of this length and end [s after the start of the stage]."""
-        (x, y), (along_x, along_y) = span.origin, span.stage.velocity
+        (x, y), (along_x, along_y), moving = span.origin, span.stage.velocity, span.stage.moving(end)
         made = chosen.ends.get(span.index, [])
         last = made[-1] - (made[-2] if len(made) > 1 else 0.0) if made else 0.0
         step = Step(
@@ -270,10 +270,10 @@ class Controller:
             span.index,
             span.start + end,
             dt,
-            (x + along_x * end, y + along_y * end),
-            span.stage.velocity,
+            (x + along_x * moving, y + along_y * moving),
+            span.mean_velocity(end, dt),
             span.stage.control,
-            span.stage.load.at(min(end / span.stage.seconds, 1.0)),
+            span.stage.load.at(end / span.stage.seconds, end),
             dt / last if last > 0.0 else 0.0,
         )
         return step._replace(decide=partial(self.decide, chosen, span, step, end, rejected))

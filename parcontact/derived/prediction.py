@@ -217,6 +217,8 @@ def _refuse_unknown(job: Job) -> None:
     for index, stage in enumerate(job.history):
         if stage.control == "approach":
             raise InputError(f"history.{index}.approach: the theory needs a pressure [Pa] or a force [N]")
+        if stage.speed and not stage.slides:
+            raise InputError(f"history.{index}.velocity: the theory needs a constant velocity [m/s]")
 
 
 def _refuse_free(job: Job) -> None:
@@ -325,5 +327,5 @@ def _leg(job: Job, span: Span) -> SlidingLeg:
     """Return a stage as a leg: the jump of its load, if any, and its steps."""
     fractions = np.array([*([0.0] if span.jumps else []), *(span.ends[index] for index in range(1, span.count + 1))])
     area = job.grid.lx * job.grid.ly if span.stage.control == "force" else 1.0
-    pressures = np.array([span.stage.load.at(min(fraction, 1.0)) for fraction in fractions]) / area
+    pressures = np.array([span.stage.load.at(each, each * span.stage.seconds) for each in fractions]) / area
     return SlidingLeg(span.stage.velocity, span.stage.seconds, fractions * span.stage.seconds, pressures)

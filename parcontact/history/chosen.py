@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, Protocol
 from ..job.checks.cells import one_cell
 from ..job.sections.calculation import Grid, Numerics
 from ..job.sections.geometry import Cylinder, Flat, Rough, Sphere, Wave
+from ..job.sections.oscillation import PARTS_OF_CYCLE
 from ..job.sections.stages import Initial, Stage
 
 SAME_TIME = 1e-9  # accuracy: relative deviation of a duration from a whole number of steps that is ignored
@@ -22,6 +23,7 @@ LEAST_SHARE = 2.0**-20  # tuning: shortest step of a stage over its duration
 MOST_CELLS = 4  # tuning: largest number of cells slid in a step
 WAVE_STEPS = 4  # accuracy: least number of steps in which the shortest wave passes
 RAMP_STEPS = 16  # accuracy: least number of steps while a load changes
+CYCLE_STEPS = 32  # accuracy: least number of steps in a cycle of an oscillation
 
 
 def reached(time: float, until: float) -> bool:
@@ -65,9 +67,16 @@ def most_cells(job: Planned) -> int:
     return int(min(MOST_CELLS, 2 ** max(0, math.floor(math.log2(min(waves) / WAVE_STEPS * (1.0 + SAME_TIME))))))
 
 
+def longest_change(stage: Stage) -> float:
+    """Return the longest step [s] that follows the load, or the phase of an oscillation."""
+    if stage.frequency:
+        return 1.0 / (CYCLE_STEPS * stage.frequency)
+    return stage.seconds if stage.load.constant else stage.seconds / RAMP_STEPS
+
+
 def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:
     """Return the bounds of steps that slide by at most `cells`; at rest the longest is the whole stage."""
-    most = stage.seconds if stage.load.constant else stage.seconds / RAMP_STEPS
+    most = longest_change(stage)
     if not stage.speed:
         return Bounds(min(LEAST_SHARE * stage.seconds, most), most)
     cell = one_cell(stage, grid)
@@ -109,13 +118,23 @@ class StepLadder:
 class ChosenEnds:
     """Ends of the steps of a stage: those that were `made` [s after its start], followed by a ladder.
 
-    The stage ends at the first of `stops` [s]; a later one is the end of a longer run.
+    The stage ends at the first of `stops` [s]; a later one is the end of a longer run. Steps also end with each `part`
+    of a cycle [s], if that is not 0.
     """
 
     made: Sequence[float]
     stops: tuple[float, ...]
     ladder: StepLadder
     limits: Bounds
+    part: float = 0.0
+
+    def next_stop(self, now: float) -> float:
+        """Return the first instant after `now` at which a step has to end [s]."""
+        stop = next(stop for stop in self.stops if not reached(now, stop))
+        if not self.part:
+            return stop
+        part = (math.floor(now / self.part * (1.0 + SAME_TIME)) + 1) * self.part
+        return stop if reached(part, stop) else part
 
     @property
     def count(self) -> int:
@@ -183,7 +202,8 @@ class ChosenSteps:
         left = 0.0 if reached(now, stops[-1]) else stops[-1] - now
         first = min(self.next if made and self.next else limits.least, limits.most)
         longest = min(limits.most, one_cell(stage, grid)) if stage.speed else limits.most
-        return ChosenEnds(made, stops, StepLadder(first, max(first, longest), left), limits)
+        part = 1.0 / (PARTS_OF_CYCLE * stage.frequency) if stage.frequency else 0.0
+        return ChosenEnds(made, stops, StepLadder(first, max(first, longest), left), limits, part)
 
     def numbers(self) -> dict[str, tuple[list[float] | float, str]]:
         """Return all data with units, by their names in checkpoints."""

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 from ..job.checks.limits import estimate_steps, first_step
 from ..job.sections.calculation import Grid
+from ..job.sections.oscillation import PARTS_OF_CYCLE
 from ..job.sections.stages import AUTO, GeometricStep, Stage
-from .chosen import RAMP_STEPS, SAME_TIME, reached
+from .chosen import RAMP_STEPS, SAME_TIME, longest_change, reached
 
 
 @dataclass(frozen=True)
@@ -54,11 +55,23 @@ class GivenEnds:
 
 def divide(stage: Stage, grid: Grid) -> GivenEnds:
     """Return the steps of a stage: none exceeds the requested length, and an instantaneous stage has none. Automatic
-    steps of a body without memory are one cell in sliding, the whole stage at rest, and several on a ramp."""
+    steps of a body without memory are one cell in sliding, the whole stage at rest, and several on a ramp. Cycles of
+    an oscillation consist of equal steps, which also end at both turns."""
     if stage.seconds == 0.0:
         return GivenEnds(0, 1.0, 0.0)
+    if stage.cycles is not None and not isinstance(stage.time_step, GeometricStep):
+        return GivenEnds(stage.cycles * _steps_of_cycle(stage, grid), 1.0, stage.seconds)
     if stage.time_step == AUTO and not stage.load.constant and not stage.speed:
         return GivenEnds(RAMP_STEPS, 1.0, stage.seconds)
     steps = estimate_steps(stage, stage.seconds, first_step(stage, grid))
     growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
     return GivenEnds(max(1, math.ceil(steps * (1.0 - SAME_TIME))), growth, stage.seconds)
+
+
+def _steps_of_cycle(stage: Stage, grid: Grid) -> int:
+    """Return the number of equal steps in a cycle."""
+    longest = first_step(stage, grid)
+    if stage.time_step == AUTO:
+        longest = min(longest, longest_change(stage))
+    part = 1.0 / (PARTS_OF_CYCLE * stage.frequency)
+    return PARTS_OF_CYCLE * max(1, math.ceil(part / longest * (1.0 - SAME_TIME)))

@@ -91,7 +91,7 @@ class Span:
 
     def position(self, index: int) -> tuple[float, float]:
         """Return the position of the surface at this end [m]."""
-        slid = self.ends.elapsed(index)
+        slid = self.stage.moving(self.ends.elapsed(index))
         (x, y), (along_x, along_y) = self.origin, self.stage.velocity
         return x + along_x * slid, y + along_y * slid
 
@@ -107,13 +107,22 @@ class Span:
     def step(self, number: int) -> Step:
         """Return the step of this number of the history."""
         index, stage = self.place(number), self.stage
-        facts = stage.velocity, stage.control
         if index == 0:
-            return Step(number, self.index, self.start, 0.0, self.origin, *facts, stage.load.start, 0.0)
+            facts = self.origin, stage.velocity, stage.control
+            return Step(number, self.index, self.start, 0.0, *facts, stage.load.start, 0.0)
         dt = self.ends.interval(index)
         growth = dt / self.ends.interval(index - 1) if index > 1 else 0.0
-        load = stage.load.at(min(self.ends[index], 1.0))
-        return Step(number, self.index, self.time(index), dt, self.position(index), *facts, load, growth)
+        end = self.ends.elapsed(index)
+        facts = self.position(index), self.mean_velocity(end, dt), stage.control
+        return Step(number, self.index, self.time(index), dt, *facts, stage.load.at(self.ends[index], end), growth)
+
+    def mean_velocity(self, end: float, dt: float) -> tuple[float, float]:
+        """Return the mean velocity [m/s] in a step of length dt that ends at `end` [s after the start of the stage]."""
+        x, y = self.stage.velocity
+        if self.stage.slides or not (x or y):
+            return self.stage.velocity
+        share = (self.stage.moving(end) - self.stage.moving(end - dt)) / dt
+        return x * share, y * share
 
 
 class Timeline:
@@ -243,7 +252,7 @@ class Timeline:
             first = span.before + span.jumps + 1
             if isinstance(span.ends, ChosenEnds):
                 return span.step(first)
-            if span.ends.growth == 1.0 and not span.stage.velocity[1]:
+            if span.ends.growth == 1.0 and span.stage.slides and not span.stage.velocity[1]:
                 cells, moved = span.origin[0] / self.grid.dx, span.position(span.ends.count)[0] - span.origin[0]
                 each = moved / self.grid.dx / span.ends.count
                 off, drift = abs(cells - round(cells)), abs(each - round(each))

@@ -18,6 +18,7 @@ from .sections.geometry import (
 )
 from .sections.height_arrays import HeightArray
 from .sections.materials import Dma, Elastic, PronyBranch, Zener, ZenerBranch
+from .sections.oscillation import Swing
 from .sections.part import Part
 from .sections.quantities import Positive, log_range
 from .sections.stages import AUTO, GeometricStep, Initial, Ramp, Stage, Steady

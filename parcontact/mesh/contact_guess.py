@@ -84,7 +84,7 @@ def _loads(job: Loaded, area: float) -> Iterator[tuple[float, float]]:
     pressures = []
     for stage in job.history:
         if stage.control != "approach":
-            pressures.append(max(stage.load.start, stage.load.end) / (area if stage.control == "force" else 1.0))
+            pressures.append(stage.load.highest / (area if stage.control == "force" else 1.0))
             yield pressures[-1], stage.speed
     if job.initial.pressure is not None:
         yield job.initial.pressure, math.hypot(*job.initial.velocity)

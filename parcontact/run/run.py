@@ -24,7 +24,7 @@ from ..storage.console import always
 from ..storage.directory import Directory
 from ..storage.recorder import Recorder
 from ..storage.stopfile import StopFile
-from ..summary import slide
+from ..summary import cycles, slide
 from ..summary.run_table import RunTable
 from .watch import Watch
 
@@ -198,7 +198,7 @@ class Run:
     def _log_summary(self) -> int:
         """Report the end of the run and its errors, and note the end in its directory; returns the exit code."""
         row, console, errors = self.march.row, self.console, self.march.state.errors
-        slides = any(stage.speed for stage in self.job.history)
+        slides = any(stage.slides for stage in self.job.history)
         self._log_counts()
         if self.slab.root and (slides or self.march.scene.law is not None) and not self.stop:
             with suppress(OSError, InputError):  # an unreadable table does not end a run
@@ -209,6 +209,7 @@ class Run:
                     sentences += said(table)
                 for text in sentences:
                     console.say(text)
+        self._log_cycles()
         for line in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
             console.say(line)
         sample = describe_sample(self.job.grid, self.job.surface, slides)
@@ -236,6 +237,17 @@ class Run:
         how = detached or "done" if finished else f"stopped at t = {row.time:g} s as requested; run again to go on"
         console.say(f"{how}: results in {self.directory.path}")
         return DONE
+
+    def _log_cycles(self) -> None:
+        """Write cycles.csv of a history that oscillates, also of a run that stops early, and describe its cycles."""
+        if not self.slab.root or not any(stage.frequency for stage in self.job.history):
+            return
+        try:
+            rows = tables.read_columns(self.directory.path / "measures.csv")
+            for text in cycles.write_cycles(self.directory.path, self.job, rows):
+                self.console.say(text)
+        except (OSError, InputError) as error:
+            self.console.warn(f"cycles.csv cannot be written: {error}")
 
 
 def chosen_by_accuracy(job: Job) -> set[str]:

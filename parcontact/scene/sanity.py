@@ -123,7 +123,7 @@ def refuse_approaches(setup: Setup) -> None:
     for index, stage in enumerate(setup.job.history):
         if stage.control != "approach":
             continue
-        ends = stage.load.start, stage.load.end
+        ends = stage.load.lowest, stage.load.highest
         text = below_rounding(setup, max(ends, key=abs))
         text = text or (beyond_full_contact(setup, max(ends), setup.heights.mean) if bounded else "")
         if text:

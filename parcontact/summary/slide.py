@@ -279,7 +279,7 @@ def _begun(history: Sequence[Stage], times: Sequence[float]) -> int:
 
 def _slide(history: Sequence[Stage]) -> range:
     """Return the indices of the stages of the slide; none where nothing slides."""
-    last = max((index for index, stage in enumerate(history) if any(stage.velocity) and stage.seconds), default=-1)
+    last = max((index for index, stage in enumerate(history) if stage.slides and stage.seconds), default=-1)
     same = takewhile(lambda index: history[index].velocity == history[last].velocity, range(last, -1, -1))
     return range(min(same, default=0), last + 1)
 

@@ -98,7 +98,7 @@ def test_ramps(tmp_path: Path, control: str) -> None:
     stage = f"{{{control}: {{from: 1, to: 3}}, duration: 2, time_step: 0.5, velocity: [0, -1]}}"
     (stage_read,) = job_of(tmp_path, replaced(SMALL.split("history")[0], history=f"[{stage}]")).history
     assert (stage_read.control, stage_read.load, stage_read.load.constant) == (control, Ramp(1.0, 3.0), False)
-    assert [stage_read.load.at(fraction) for fraction in (0.0, 0.5, 1.0)] == [1.0, 2.0, 3.0]
+    assert [stage_read.load.at(fraction, fraction) for fraction in (0.0, 0.5, 1.0)] == [1.0, 2.0, 3.0]
     assert (stage_read.time_step, stage_read.velocity) == (0.5, (0.0, -1.0))
 
 

@@ -12,17 +12,17 @@ from . import Sections
 
 def excited_band(job: Sections) -> tuple[float, float] | None:
     """Return the range of frequencies [Hz] at which the waves of a job's surface load a point of the body, over all
-    stages and steady velocities; None if the surface does not move."""
+    stages and steady velocities; None if the surface does not move and no load oscillates."""
     velocities = [*(stage.velocity for stage in job.history), job.initial.velocity]
     speeds = [*(math.hypot(*velocity) for velocity in velocities), *(job.steady.velocities if job.steady else ())]
+    turns = [stage.frequency for stage in job.history if stage.frequency]
     moving, waves = (
         [speed for speed in speeds if speed > 0.0],
         [number for shape in job.surface for number in wave_numbers(shape, job.grid)],
     )
-    if not moving or not waves:
-        return None
-    low, high = min(waves), max(waves)
-    return min(moving) * low / (2 * math.pi), max(moving) * high / (2 * math.pi)
+    if moving and waves:
+        turns += [min(moving) * min(waves) / (2 * math.pi), max(moving) * max(waves) / (2 * math.pi)]
+    return (min(turns), max(turns)) if turns else None
 
 
 def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:

@@ -50,11 +50,7 @@ def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, 
     """Yield a warning if the approach of a sphere is too large for the thickness [m]."""
     if len(surface) != 1 or not isinstance(surface[0], Sphere):
         return
-    approaches = [
-        (max(stage.load.start, stage.load.end), index)
-        for index, stage in enumerate(history)
-        if stage.control == "approach"
-    ]
+    approaches = [(stage.load.highest, index) for index, stage in enumerate(history) if stage.control == "approach"]
     deepest, index = max(approaches, default=(0.0, 0))
     if deepest > THICKEST * thickness:
         numbers = {"approach": deepest, "thickness": thickness}

@@ -13,6 +13,7 @@ from ..sections.calculation import Body, Grid, Numerics, Output, Study
 from ..sections.geometry import Flat, OnOneMesh, Rough, RoughSpectrum, Topography
 from ..sections.height_arrays import SAME_CELL, HeightArray
 from ..sections.materials import AnyMaterial, heated
+from ..sections.oscillation import Oscillation
 from ..sections.part import Rule
 from ..sections.stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Stage, Steady
 from ..text.fault import Fault
@@ -163,7 +164,7 @@ def some_history(history: tuple[Any, ...], steady: Steady | None) -> Iterator[Fa
     if not history and steady is None:
         yield Fault("needs at least one stage, unless there is a steady section", ("history",))
     known = steady is None or steady.pressures is not None or None in history
-    if not known and not any(stage.control != "approach" and stage.load.end > 0.0 for stage in history):
+    if not known and not any(stage.control != "approach" and stage.load.highest > 0.0 for stage in history):
         sentence = "is missing; it must be positive pressures [Pa] when no stage of the history has a pressure or force"
         yield Fault(sentence, ("steady", "pressures"))
 
@@ -171,7 +172,7 @@ def some_history(history: tuple[Any, ...], steady: Steady | None) -> Iterator[Fa
 def some_load(history: tuple[Any, ...], initial: Initial) -> Iterator[Fault]:
     if not history or None in history or initial.pressure or any(stage.approach for stage in history):
         return
-    if not any(stage.load.start or stage.load.end for stage in history):
+    if not any(stage.load.lowest or stage.load.highest for stage in history):
         yield Fault("must not be zero in every stage: there would be no contact", ("history", 0, history[0].control))
 
 
@@ -180,11 +181,18 @@ def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
     for index, stage in enumerate(history):
         if stage is None or stage.control == "approach":
             continue
-        least = min(stage.load.start, stage.load.end)
+        least = stage.load.lowest
         if least < 0.0:
-            ends = () if stage.load.constant else ("from" if stage.load.start == least else "to",)
+            ends = _place_of_lowest(stage)
             sentence = f"must be {LOADS[stage.control]}, got {least:g}; pulling needs adhesion"
             yield Fault(sentence, ("history", index, stage.control, *ends))
+
+
+def _place_of_lowest(stage: Stage) -> tuple[str, ...]:
+    """Return the key of the lowest load within the load of a stage."""
+    if isinstance(stage.load, Oscillation):
+        return ("amplitude",)
+    return () if stage.load.constant else ("from" if stage.load.start == stage.load.lowest else "to",)
 
 
 def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> Iterator[Fault]:
@@ -255,7 +263,7 @@ def loads_are_borne(
     for index, stage in enumerate(history):
         if stage is None or stage.control == "approach":
             continue
-        mean = max(stage.load.start, stage.load.end) / (grid.lx * grid.ly if stage.control == "force" else 1.0)
+        mean = stage.load.highest / (grid.lx * grid.ly if stage.control == "force" else 1.0)
         if mean >= hardness:
             sentence = f"leads to a mean pressure of {mean:.4g} Pa; it must be below material.hardness, {hardness:g} Pa"
             yield Fault(sentence, ("history", index, stage.control))

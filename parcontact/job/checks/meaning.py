@@ -120,7 +120,7 @@ def _pressures(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     loads.append(("steady.pressures", max((job.steady.pressures if job.steady else None) or (0.0,)), 0.0))
     least, held = 0.0, 0.0
     for index, stage in enumerate(job.history):
-        ends = [_mean(stage, load, job.grid) for load in (stage.load.start, stage.load.end)]
+        ends = [_mean(stage, load, job.grid) for load in (stage.load.lowest, stage.load.highest)]
         least, held = (least, held + stage.seconds) if min(ends) == least else (min(ends), stage.seconds)
         loads += [(f"history.{index}.{stage.control}", *load) for load in ((max(ends), 0.0), (least, held))]
     found = [(pressure / modulus_after(material, seconds), key, pressure, seconds) for key, pressure, seconds in loads]
@@ -178,7 +178,7 @@ def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     times = [branch.relaxation_time for branch in branches if 0.0 < branch.relaxation_time < math.inf]
     rough = [shape for shape in job.surface if isinstance(shape, Rough)]
     lengths = [length for shape in rough for length in (shape.long_wavelength, shape.short_wavelength)]
-    speeds = [stage.speed for stage in job.history if stage.speed and stage.seconds]
+    speeds = [stage.speed for stage in job.history if stage.slides and stage.seconds]
     speeds += [math.hypot(*job.initial.velocity)] if any(job.initial.velocity) else []
     speeds += job.steady.velocities if job.steady else ()
     if not (times and lengths and speeds) or getattr(material, "temperature", None) is not None:
@@ -204,7 +204,8 @@ def _room(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     modulus, found, elapsed = instant_contact_modulus(material), set(), 0.0
     for index, stage in enumerate(job.history):
         elapsed += stage.seconds
-        x, y = x + stage.velocity[0] * stage.seconds, y + stage.velocity[1] * stage.seconds
+        moving = stage.moving(stage.seconds)
+        x, y = x + stage.velocity[0] * moving, y + stage.velocity[1] * moving
         radius = _hertz(stage, sphere.radius, modulus, grid)
         if radius / sphere.radius > STEEPEST and "steep" not in found:
             found.add("steep")
@@ -229,11 +230,17 @@ def _relaxed_contact_modulus(material: Elastic | Zener, seconds: float) -> float
 
 
 def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
-    """Return the contact radius [m] at the end of a stage by Hertz (1882) for a contact modulus [Pa]."""
+    """Return the contact radius [m] by Hertz (1882) for a contact modulus [Pa], at the end of a stage or at the highest
+    load of an oscillation."""
     if stage.control == "approach":
-        return math.sqrt(max(stage.load.end, 0.0) * radius)
-    force = _mean(stage, stage.load.end, grid) * grid.lx * grid.ly
+        return math.sqrt(max(_final(stage), 0.0) * radius)
+    force = _mean(stage, _final(stage), grid) * grid.lx * grid.ly
     return float((0.75 * max(force, 0.0) * radius / modulus) ** (1 / 3))
+
+
+def _final(stage: Stage) -> float:
+    """Return the load at the end of a stage, or the highest load of an oscillation."""
+    return stage.load.highest if stage.frequency else stage.load.end
 
 
 def neighbours(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
@@ -285,7 +292,7 @@ def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
         (index, first), *more = stages
         speed = math.hypot(*velocity)
         seconds = first.seconds + sum(stage.seconds for _, stage in more)
-        if not speed * seconds or steady == (velocity, first.load.end):
+        if not first.slides or not speed * seconds or steady == (velocity, first.load.end):
             continue
         start = _round_trip(grid, velocity, seconds + near / speed, near) - near
         if speed * seconds > start * (1.0 + SAME) and memory > REMEMBERS * start / speed:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import zlib
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from .calculation import Numerics
 from .height_arrays import HeightArray
+from .oscillation import Oscillation, Swing
 from .part import Part
 from .stages import Ramp
 
@@ -26,6 +28,10 @@ def plain_data(value: Any) -> Any:
     if isinstance(value, Ramp):
         velocity = {"velocity": value.velocity} if value.velocity else {}
         return value.start if value.constant else {"from": value.start, "to": value.end, **velocity}
+    if isinstance(value, Oscillation):
+        return asdict(value)
+    if isinstance(value, Swing):
+        return {"amplitude": list(value), "frequency": value.frequency}
     if isinstance(value, tuple):
         return [plain_data(inner) for inner in value]
     return str(value) if isinstance(value, Path) else value
@@ -79,9 +85,12 @@ def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
 
 
 def _unit_of(value: Any, part: Part, key: str) -> str:
-    """Return the unit of a number, with the velocity of a ramp; '' for words such as auto, and for mappings."""
+    """Return the unit of a number, with the velocity of a ramp or the frequency of an oscillation; '' for words such as
+    auto, and for mappings."""
     if isinstance(value, Ramp) and value.velocity:
         return f"{unit(part, key)} at {text(value.velocity)} m/s"
+    if isinstance(value, Oscillation | Swing):
+        return f"{unit(part, key)} at {text(value.frequency)} Hz"
     return "" if isinstance(value, str | Part) else unit(part, key)
 
 
@@ -99,10 +108,13 @@ def text(value: Any) -> str:
         return f"{value:.6g}"
     if isinstance(value, Ramp):
         return text(value.start) if value.constant else f"{text(value.start)} to {text(value.end)}"
+    if isinstance(value, Oscillation):
+        return f"{text(value.mean)} ± {text(value.amplitude)}"
     if isinstance(value, Part):
         return f"({listed_line(value)})"
     if isinstance(value, tuple):
-        return f"[{', '.join(text(inner) for inner in value)}]"
+        more = "±" * isinstance(value, Swing)
+        return f"{more}[{', '.join(text(inner) for inner in value)}]"
     return str(value)
 
 

@@ -10,18 +10,21 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, PlainValidator, TypeAdapter, ValidationInfo, create_model
 
 from ..text.fault import Fault, quote, refuse
+from .oscillation import FREQUENCY, OR_SWING, Oscillation, Swing, check_cycles
 from .part import Instead, Origin, Part, Rule
-from .quantities import Flag, Positive, Real, Vector, along_x, listed, log_range
+from .quantities import Count, Flag, Positive, Real, Vector, along_x, listed, log_range
 from .temperature import Celsius
 
 Control = Literal["pressure", "force", "approach"]
 CONTROLS: tuple[Control, ...] = ("pressure", "force", "approach")
+LASTS = ("duration", "distance", "cycles")  # keys of which one gives the duration of a stage
 PRESSURE = "a pressure [Pa] of zero or more"
 FORCE = "a force [N] of zero or more"
 VELOCITY = "a velocity [m/s]: a number along x, or [vx, vy]"
 SLIDES = (1.0, 0.0)  # physics: creep of a surface that slides without rolling
 SIGNED = ", with adhesion also below zero"
 APPROACH = "a finite approach [m]"
+UNITS = {PRESSURE: "Pa", FORCE: "N", APPROACH: "m"}
 SECONDS: TypeAdapter[float] = TypeAdapter(Positive)
 
 
@@ -58,19 +61,36 @@ class Ramp:
         """Return the duration by the normal velocity [s]; 0 without one."""
         return abs(self.end - self.start) / self.velocity if self.velocity else 0.0
 
-    def at(self, fraction: float) -> float:
-        """Return the load at a fraction (0 to 1) of the stage; exact at both ends."""
+    @property
+    def lowest(self) -> float:
+        return min(self.start, self.end)
+
+    @property
+    def highest(self) -> float:
+        return max(self.start, self.end)
+
+    def at(self, fraction: float, seconds: float) -> float:
+        """Return the load at a fraction of the stage; exact at both ends, and constant after the stage."""
+        fraction = min(fraction, 1.0)
         return (1 - fraction) * self.start + fraction * self.end
 
 
-def _ramp(number: Any, description: str, **more: Any) -> PlainValidator:
-    """Return a validator that makes a `Ramp` of one number, or of {from, to} and the keys in `more`."""
+Load = Ramp | Oscillation
+
+
+def _load(number: Any, description: str, **more: Any) -> PlainValidator:
+    """Return a validator that makes a `Ramp` of one number, or of {from, to} and the keys in `more`, and an
+    `Oscillation` of {mean, amplitude, frequency}."""
     end: Any = (number, Field(description=description))
     keys = create_model("Ends", __base__=Part, **{"from": end, "to": end}, **more)
+    size: Any = (Positive, Field(description=f"a positive amplitude [{UNITS[description]}]"))
+    turns = create_model("Oscillating", __base__=Part, mean=end, amplitude=size, frequency=FREQUENCY)
 
-    def read(value: Any, info: ValidationInfo) -> Ramp:
-        if isinstance(value, Ramp):
+    def read(value: Any, info: ValidationInfo) -> Ramp | Oscillation:
+        if isinstance(value, Ramp | Oscillation):
             return value
+        if isinstance(value, dict) and value.keys() & turns.model_fields.keys():
+            return Oscillation(*(one for _, one in turns.model_validate(value, context=info.context)))
         if isinstance(value, list | tuple) and len(value) == 2:
             ends = f"{{from: {quote(value[0])}, to: {quote(value[1])}}}"
             refuse(Fault(f"must be {description}, got a list; give {ends} for a ramp, or a stage for each"))
@@ -80,7 +100,7 @@ def _ramp(number: Any, description: str, **more: Any) -> PlainValidator:
             refuse(Fault("needs different ends: a constant approach has no velocity", ("velocity",)))
         return ramp
 
-    return PlainValidator(read, json_schema_input_type=number | keys)
+    return PlainValidator(read, json_schema_input_type=number | keys | turns)
 
 
 NORMAL: Any = (Positive | None, Field(default=None, description="a positive velocity along the normal [m/s]"))
@@ -113,14 +133,15 @@ TimeStep = Annotated[
 def _stepping(
     duration: float | None,
     distance: float | None,
+    cycles: int | None,
     velocity: tuple[float, float],
     time_step: float | GeometricStep | Auto | None,
     cells_per_step: float | None,
-    approach: Ramp | None,
+    approach: Load | None,
     creep: tuple[float, float],
 ) -> Iterator[Fault]:
     """Check that a stage with time steps has a duration, and a stage with a distance or a creep a velocity."""
-    lasts = duration is not None or distance is not None or (approach is not None and approach.velocity is not None)
+    lasts = any(value is not None for value in (duration, distance, cycles)) or bool(approach and approach.seconds)
     if not lasts and (time_step or cells_per_step):
         key = "time_step" if time_step else "cells_per_step"
         yield Fault("needs a duration [s] or a distance [m]: without them a stage is one solve", (key,))
@@ -130,12 +151,14 @@ def _stepping(
             yield Fault("needs a velocity [m/s] that is not zero", (name,))
 
 
-def _lasting_ramp(duration: float | None, distance: float | None, *loads: Ramp | None) -> Iterator[Fault]:
+def _lasting_ramp(
+    duration: float | None, distance: float | None, cycles: int | None, *loads: Load | None
+) -> Iterator[Fault]:
     """Check that each ramp has one duration: from a key of the stage, or from the velocity of the approach."""
-    lasts = {"duration": duration, "distance": distance}
+    lasts = {"duration": duration, "distance": distance, "cycles": cycles}
     given = [key for key, value in lasts.items() if value is not None]
     for name, ramp in zip(CONTROLS, loads, strict=True):
-        if ramp is None:
+        if not isinstance(ramp, Ramp):
             continue
         if ramp.velocity and given:
             sentence = f"already gives the duration, {ramp.seconds:.4g} s; leave out the velocity or {given[0]}"
@@ -153,13 +176,14 @@ class Stage(Part):
     """One stage of the history: a load, a velocity, and a duration; a stage without duration is one solve."""
 
     name: str = Field(default="stage", description="text (put numbers in quotes)")
-    pressure: Annotated[Ramp | None, _ramp(Real, PRESSURE)] = Field(default=None, description=PRESSURE + SIGNED)
-    force: Annotated[Ramp | None, _ramp(Real, FORCE)] = Field(default=None, description=FORCE + SIGNED)
-    approach: Annotated[Ramp | None, _ramp(Real, APPROACH, velocity=NORMAL)] = Field(default=None, description=APPROACH)
-    velocity: Velocity = (0.0, 0.0)
+    pressure: Annotated[Load | None, _load(Real, PRESSURE)] = Field(default=None, description=PRESSURE + SIGNED)
+    force: Annotated[Load | None, _load(Real, FORCE)] = Field(default=None, description=FORCE + SIGNED)
+    approach: Annotated[Load | None, _load(Real, APPROACH, velocity=NORMAL)] = Field(default=None, description=APPROACH)
+    velocity: Annotated[Velocity, OR_SWING] = (0.0, 0.0)
     creep: Creep = SLIDES
     duration: Positive | None = Field(default=None, description="a positive time [s]")
     distance: Positive | None = Field(default=None, description="a positive length [m]")
+    cycles: Count | None = Field(default=None, description="a positive whole number of cycles")
     time_step: TimeStep | None = Field(
         default=None, description="a positive time step [s], {first, growth}, or auto"
     )  # default: auto, if the stage has a duration and no cells_per_step
@@ -169,10 +193,11 @@ class Stage(Part):
 
     foreign = dict.fromkeys(("load", "normal_load"), Instead(WHICH_LOAD, CONTROLS))
     one_of = (CONTROLS,)
-    at_most_one = (("duration", "distance"), ("time_step", "cells_per_step"))
+    at_most_one = (LASTS, ("time_step", "cells_per_step"))
     rules = (
-        Rule(("duration", "distance", "velocity", "time_step", "cells_per_step", "approach", "creep"), _stepping),
-        Rule(("duration", "distance", *CONTROLS), _lasting_ramp),
+        Rule((*LASTS, "velocity", "time_step", "cells_per_step", "approach", "creep"), _stepping),
+        Rule((*LASTS, *CONTROLS), _lasting_ramp),
+        Rule(("cycles", "velocity", *CONTROLS), check_cycles),
     )
 
     @classmethod
@@ -180,7 +205,7 @@ class Stage(Part):
         """Set `time_step: auto` for a stage with a duration that gives no steps."""
         approach, given = data.get("approach"), data.keys() & {"time_step", "cells_per_step"}
         moves = approach.get("velocity") if isinstance(approach, dict) else getattr(approach, "velocity", None)
-        lasts = moves or data.keys() & {"duration", "distance"}
+        lasts = moves or data.keys() & {*LASTS}
         return {**data, "time_step": AUTO} if lasts and not given else data
 
     @property
@@ -199,21 +224,39 @@ class Stage(Part):
         return next(name for name in CONTROLS if getattr(self, name) is not None)
 
     @property
-    def load(self) -> Ramp:
+    def load(self) -> Load:
         """Return the prescribed load, in the unit of its control: Pa, N or m."""
-        ramp: Ramp = getattr(self, self.control)
-        return ramp
+        load: Load = getattr(self, self.control)
+        return load
+
+    @property
+    def frequency(self) -> float:
+        """Return the frequency of the load or of the velocity [Hz]; 0 for a stage that does not oscillate."""
+        found = (each for each in (self.load, self.velocity) if isinstance(each, Oscillation | Swing))
+        return next((each.frequency for each in found), 0.0)
+
+    @property
+    def slides(self) -> bool:
+        """Return True if the surface slides at a constant velocity."""
+        return any(self.velocity) and not isinstance(self.velocity, Swing)
 
     @property
     def speed(self) -> float:
-        """Return the magnitude of the velocity [m/s]."""
+        """Return the magnitude of the velocity [m/s], the largest one if it oscillates."""
         return math.hypot(*self.velocity)
+
+    def moving(self, seconds: float) -> float:
+        """Return the time [s] in which a surface with the constant `velocity` reaches the same position as after
+        `seconds` of the stage."""
+        return self.velocity.moving(seconds) if isinstance(self.velocity, Swing) else seconds
 
     @property
     def seconds(self) -> float:
         """Return the duration of the stage [s]; 0 for an instantaneous stage."""
         if self.distance is not None:
             return self.distance / self.speed
+        if self.cycles is not None:
+            return self.cycles / self.frequency
         return self.duration or self.load.seconds
 
 

@@ -1,0 +1,165 @@
+"""Cycles of stages that oscillate: loss, amplitudes and phase, from the rows of measures.csv; the table cycles.csv.
+
+The force F and the displacement s belong together: the normal force and the approach where a load or an approach
+oscillates, the tangential force and the position of the surface where its velocity does. The loss of a cycle is the
+area of its loop,
+
+    W = int (F - <F>) ds,
+
+with the mean force <F> over the time of the cycle, as creep under the mean force is no part of the loop. A cycle that
+repeats the last one dissipates W. `phase` is the angle [rad] by which s lags behind F, of their first harmonics: 0 for
+an elastic body.
+
+Between two rows F and s are Hermite's cubics with slopes by differences. The error of W by this interpolation is
+estimated by that over pairs of steps; its order is at least three.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..columns import CYCLES, names_of, to_csv, values_of
+from ..job import Job, Stage, Swing
+from ..parallel.slab import Array
+from ..printed import per_cent, quantity
+from ..storage import files
+from .slide import SAME_INSTANT
+
+TABLE = "cycles.csv"
+LEAST_ROWS = 5  # rows of a cycle with an estimate of the error
+PAIRS = 2.0**3 - 1.0  # accuracy: errors of steps twice as long, minus those of steps, over the latter
+NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.legendre.leggauss(4), (1, 0), strict=True))
+Columns = Mapping[str, Sequence[float]]
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A row of cycles.csv: `loss` [J] with its relative error; amplitudes are half the range within the cycle, of
+    friction NaN where nothing slides, of the approach [m]; `phase` [rad]."""
+
+    stage: int
+    cycle: int
+    frequency: float
+    loss: float
+    error_loss: float
+    friction_amplitude: float
+    approach_amplitude: float
+    phase: float
+
+
+def find_cycles(job: Job, columns: Columns) -> list[Cycle]:
+    """Return all whole cycles in the columns of measures.csv."""
+    found, start = list[Cycle](), 0.0
+    table = {name: np.asarray(values, float) for name, values in columns.items()}
+    for index, stage in enumerate(job.history):
+        if stage.frequency:
+            last = math.inf if index == len(job.history) - 1 else start + stage.seconds
+            found += _cycles_of(index, job, table, start, last)
+        start += stage.seconds
+    return found
+
+
+def _cycles_of(index: int, job: Job, table: Mapping[str, Array], start: float, last: float) -> Iterator[Cycle]:
+    stage, time, number = job.history[index], table["time"], 1
+    period = 1.0 / stage.frequency
+    same = SAME_INSTANT * max(period, start)
+    kept = np.append(np.diff(time) > 0.0, True)  # the last of the rows of an instant
+    while (end := start + number * period) <= min(last, time[-1]) + same:
+        rows = np.flatnonzero(kept & (time >= end - period - same) & (time <= end + same))
+        if rows.size >= LEAST_ROWS:
+            yield _measure(index, number, stage, job, {name: values[rows] for name, values in table.items()}, start)
+        number += 1
+
+
+def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str, Array], start: float) -> Cycle:
+    time, area = cycle["time"], job.grid.lx * job.grid.ly
+    along, way = friction_along(stage, cycle), way_along(stage, cycle, start)
+    if way is None:
+        force, place = area * cycle["pressure"], cycle["approach"]
+    else:
+        force, place = along, way
+    loss, rough = (_loop(time[rows], force[rows], place[rows]) for rows in (slice(None), _every_second(time.size)))
+    error = abs(rough - loss) / PAIRS
+    with np.errstate(divide="ignore", invalid="ignore"):
+        friction = along / (area * cycle["pressure"]) if stage.speed else np.full(1, np.nan)
+    return Cycle(
+        index,
+        number,
+        stage.frequency,
+        loss,
+        error / abs(loss) if loss else math.nan,
+        0.5 * float(np.ptp(friction)),
+        0.5 * float(np.ptp(cycle["approach"])),
+        _harmonic_angle(time, force, stage.frequency) - _harmonic_angle(time, place, stage.frequency),
+    )
+
+
+def write_cycles(directory: Path, job: Job, columns: Columns) -> Iterator[str]:
+    """Write cycles.csv, and yield a sentence on the last cycles of each stage that oscillates. Raises OSError."""
+    found = find_cycles(job, columns)
+    files.replace_file(directory / TABLE, to_csv(names_of(CYCLES), (values_of(CYCLES, cycle) for cycle in found)))
+    for index, stage in enumerate(job.history):
+        if own := [cycle for cycle in found if cycle.stage == index]:
+            yield _describe(stage, own, job.numerics.asked.of_steps)
+
+
+def _describe(stage: Stage, cycles: Sequence[Cycle], accuracy: float) -> str:
+    """Return a sentence on the last cycle, and whether its loss agrees with that of the one before."""
+    *_, last = cycles
+    lost = f"{quantity(last.loss, 'J', 4)} ± {per_cent(last.error_loss)}, phase {math.degrees(last.phase):.3g} degrees"
+    said = f"{stage.name}: loss of cycle {last.cycle} {lost}"
+    if len(cycles) == 1:
+        return f"{said}; a second cycle would show whether cycles repeat"
+    change = abs(last.loss - cycles[-2].loss) / abs(last.loss) if last.loss else 0.0
+    if change <= accuracy:
+        return f"{said}; the last two cycles agree: their losses differ by {per_cent(change)}"
+    return f"{said}; the last two cycles differ by {per_cent(change)} of the loss: more cycles would repeat better"
+
+
+def friction_along(stage: Stage, columns: Mapping[str, Array]) -> Array:
+    """Return the tangential force [N] against the motion along the velocity of a stage, or its amplitude."""
+    (x, y), speed = stage.velocity, stage.speed or 1.0
+    return -(columns["force_x"] * x + columns["force_y"] * y) / speed
+
+
+def way_along(stage: Stage, columns: Mapping[str, Array], start: float) -> Array | None:
+    """Return the positions [m] along the velocity of a stage that began at `start` [s]; None if it is constant."""
+    if not isinstance(stage.velocity, Swing):
+        return None
+    return stage.speed * np.array([stage.moving(time - start) for time in columns["time"].tolist()])
+
+
+def _every_second(count: int) -> Array:
+    """Return the indices of every second row, and of the last one."""
+    return np.unique([*range(0, count, 2), count - 1])
+
+
+def _over_time(time: Array, *values: Array) -> tuple[Array, list[tuple[Array, Array]]]:
+    """Return weights [s] of instants, and the values and their rates at the instants."""
+    dt, s = np.diff(time)[:, None], NODES[None, :]
+    found = []
+    for each in values:
+        rate = np.gradient(each, time, edge_order=2)
+        old, new = each[:-1, None], each[1:, None]
+        left, right, change = dt * rate[:-1, None], dt * rate[1:, None], new - old
+        at = old + s * left + s**2 * (3 * change - 2 * left - right) + s**3 * (left + right - 2 * change)
+        slope = left + 2 * s * (3 * change - 2 * left - right) + 3 * s**2 * (left + right - 2 * change)
+        found.append((at, slope / dt))
+    return dt * WEIGHTS[None, :], found
+
+
+def _loop(time: Array, force: Array, place: Array) -> float:
+    """Return the area of a loop."""
+    weights, ((f, _), (_, rate)) = _over_time(time, force, place)
+    mean = float(np.sum(weights * f)) / float(time[-1] - time[0])
+    return float(np.sum(weights * (f - mean) * rate))
+
+
+def _harmonic_angle(time: Array, values: Array, frequency: float) -> float:
+    """Return the phase of the first harmonic over a cycle [rad]."""
+    weights, ((found, _),) = _over_time(time, values)
+    (instants, _) = _over_time(time, time)[1][0]
+    return float(np.angle(np.sum(weights * found * np.exp(-2j * math.pi * frequency * instants))))
