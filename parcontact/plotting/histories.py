@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..job.added_sections import answers
 from ..parallel.slab import Array
 from ..storage import read_back
+from ..summary.cycles import friction_along, way_along
 from . import prefixes, style
 from .charts import Axis, Chart, ChartLine
 from .plotted_run import PlottedRun
@@ -64,7 +65,10 @@ def chart_histories(run: PlottedRun, over: str = "") -> list[Chart]:
 
 
 def _chart_cycles(run: PlottedRun) -> list[Chart]:
-    """Return the panel of friction over displacement of a surface that sticks and is moved to and fro along x."""
+    """Return the loops of oscillations, or friction over displacement of a surface that sticks and is moved to and fro
+    along x."""
+    if any(stage.frequency for stage in run.job.history):
+        return list(_chart_loops(run))
     if not (run.backwards and "stick_area" in run.columns):
         return []
     ways = np.diff(run.columns["distance"], prepend=0.0)
@@ -72,6 +76,35 @@ def _chart_cycles(run: PlottedRun) -> list[Chart]:
         ways[rows] *= np.sign(run.job.history[number].velocity[0])
     line = ChartLine("", np.cumsum(ways), run.columns["friction_x"], style.line(0))
     return [Chart("friction", Axis("displacement along x", "m"), Axis("friction coefficient\nalong x"), [line])]
+
+
+def _chart_loops(run: PlottedRun) -> Iterator[Chart]:
+    """Yield panels of load over approach, and of friction over displacement, with a line for each stage that
+    oscillates."""
+    loads, frictions = list[ChartLine](), list[ChartLine]()
+    load_axis, load = run.load
+    starts = np.cumsum([0.0, *(stage.seconds for stage in run.job.history)]).tolist()
+    for number, rows in run.rows_of_stages.items():
+        stage = run.job.history[number]
+        rows = [*range(max(rows[0] - 1, 0), rows[0]), *rows]
+        columns = {name: values[rows] for name, values in run.columns.items()}
+        lines = frictions if stage.speed and not stage.slides else loads
+        look, name = style.line(len(lines)), stage.name
+        if stage.frequency and lines is loads:
+            loads.append(ChartLine(name, columns["approach"], load[rows], look))
+        elif stage.frequency and (way := way_along(stage, columns, starts[number])) is not None:
+            friction = friction_along(stage, columns) / (run.area * columns["pressure"])
+            frictions.append(ChartLine(name, way, friction, look))
+    if loads:
+        yield Chart("loop", Axis("approach", "m"), load_axis, _named_if_many(loads), bottom=False)
+    if frictions:
+        axes = Axis("displacement along the velocity", "m"), Axis("friction coefficient\nalong the velocity")
+        yield Chart("loop", *axes, _named_if_many(frictions))
+
+
+def _named_if_many(lines: list[ChartLine]) -> list[ChartLine]:
+    """Return lines, without a name if there is one only."""
+    return lines if len(lines) > 1 else [replace(line, name="") for line in lines]
 
 
 def _steps_grow(times: Array) -> bool:
@@ -161,7 +194,7 @@ def describe_solve(run: PlottedRun) -> str:
 def _choose_abscissa(run: PlottedRun, over: str) -> Abscissa:
     """Return the given axis, else distance if the surface slides whenever time passes, else time, else load."""
     if not over:
-        slides = run.slides and all(stage.speed > 0.0 for stage in run.job.history if stage.seconds)
+        slides = run.slides and all(stage.slides for stage in run.job.history if stage.seconds)
         over = ("distance" if slides else "time") if run.lasts else "load"
     if over == "load":
         return Abscissa(*run.load, marked=True)

@@ -22,7 +22,7 @@ from . import charts, curve_charts, histories, maps, movie, prefixes, style, swe
 from .charts import Chart
 from .plotted_run import PlottedRun
 
-PANELS = ("friction", "area", "approach", "gap", "pressure", "load", "energy")
+PANELS = ("friction", "loop", "area", "approach", "gap", "pressure", "load", "loss", "phase", "energy")
 MEASURES = "measures.csv"
 FAILED_CASES = 3  # most failed cases that a picture names
 

@@ -56,7 +56,8 @@ class PlottedRun:
         """Return True if the surface moves along x only and reverses, where the magnitude of friction would have a
         cusp."""
         velocities = [stage.velocity for stage in self.job.history]
-        return any(x < 0.0 for x, _ in velocities) and not any(y for _, y in velocities)
+        turns = any(stage.speed and not stage.slides for stage in self.job.history)
+        return (turns or any(x < 0.0 for x, _ in velocities)) and not any(y for _, y in velocities)
 
     @property
     def curves(self) -> bool:

@@ -25,7 +25,7 @@ from .charts import FRACTION, Axis, Chart, ChartLine
 TABLE = sweep_table.TABLE
 UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N", "size": "m", "distance": "m"}
 UNITS |= {"duration": "s", "work": "J/m²", "range": "m", "shear_modulus": "Pa", "modulus_inf": "Pa"}
-UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m"}
+UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m", "frequency": "Hz", "amplitude": ""}
 MARKERS, DASHES = ("o", "s"), ("--", ":")  # markers of means, dashes of theories, by column of a panel
 THIN = 1.0  # tuning: width of lines of the theory [points]
 GREY, EMPTY = {"color": style.GREY}, np.zeros(0)  # entries of legends that hold for all colours
@@ -36,13 +36,19 @@ FRICTION, AREA = Axis("friction coefficient"), Axis(FRACTION)
 PANELS: Panels = (  # panels: columns by the names of lines
     ("friction", FRICTION, {"highest": "mu_max", "dynamic": "mu_dyn"}),
     ("area", AREA, {"simulation": CORRECTED}),
+    ("loss", Axis("loss per cycle", "J"), {"last cycle": "loss"}),
+    ("phase", Axis("phase", "rad"), {"last cycle": "phase"}),
     ("energy", Axis("dissipated energy", "J"), {"dissipated": "dissipated"}),
 )
 CURVE_PANELS: Panels = (
     ("friction", FRICTION, {"steady sliding": "friction"}),
     ("area", AREA, {"steady sliding": CORRECTED}),
 )
-SHARES = {"friction": "error_friction", CORRECTED: "error_area"}  # columns with the relative error of a column
+SHARES = {
+    "friction": "error_friction",
+    "loss": "error_loss",
+    CORRECTED: "error_area",
+}  # columns with the relative error of a column
 SIZES = {
     name: f"{name}_error" for name in names_of(SWEEP) if f"{name}_error" in names_of(SWEEP)
 }  # columns with the absolute error of a column

@@ -97,6 +97,12 @@ def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str
     )
 
 
+def measure_last(job: Job, columns: Columns) -> dict[str, float]:
+    """Return loss, its error, and phase of the last cycle by their names; none without a whole cycle."""
+    found = find_cycles(job, columns)
+    return {name: getattr(found[-1], name) for name in ("loss", "error_loss", "phase")} if found else {}
+
+
 def write_cycles(directory: Path, job: Job, columns: Columns) -> Iterator[str]:
     """Write cycles.csv, and yield a sentence on the last cycles of each stage that oscillates. Raises OSError."""
     found = find_cycles(job, columns)
