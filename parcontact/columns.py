@@ -322,29 +322,19 @@ SWEEP: Table = tuple(
 )
 
 STUDY: Table = (
-    Column("fingerprint", "", "of the job of the case"),
+    Column("case", "", "its number, from 0"),
     Column("mesh", "", "points along x"),
     Column(
         *("cells_per_step", ""),
         "cells slid in a step; `auto` if the stages choose their steps and the study varies none",
     ),
     Column("integrator", "", "integrator"),
-    Column("mu_max", "", "highest friction"),
-    Column(
-        *("mu_end", ""),
-        "mean friction over the last quarter of the last sliding stage (`mu_dyn` of runs: over the last three quarters "
-        "of the slide)",
-    ),
-    Column("area", "", "mean contact area over the same part"),
-    Column("area_corrected", "", "mean corrected area over the same part"),
-    Column("steps", "", "steps made"),
-    Column("operator_calls", "", "applications of the operator"),
-    Column("transform_work", "", "sum of N log2 N over all transforms of N points"),
-    Column("cpu_seconds", "s", "of all ranks"),
-    Column(*("error_mu_max", ""), "relative to the extrapolated limit; empty where nothing slides, as `error_mu_end`"),
-    Column("error_mu_end", "", "relative to the extrapolated limit"),
-    Column("error_area", "", "relative to the extrapolated limit"),
-    Column("error_area_corrected", "", "relative to the extrapolated limit"),
+    *(one for one in SWEEP_RESULTS if one.name != "mu_max_distance"),
+    Column("seconds", "s", "wall time of all steps"),
+    Column(*("error_mu_max", ""), "relative to the extrapolated limit; empty where nothing slides, as `error_mu_dyn`"),
+    Column("error_mu_dyn", "", "relative to the extrapolated limit"),
+    Column("error_contact_area", "", "relative to the extrapolated limit"),
+    Column("error_contact_area_corrected", "", "relative to the extrapolated limit"),
 )
 
 BANDS_THEORY: Table = (*BANDS[:6], *THEORY[-2:])

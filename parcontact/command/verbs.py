@@ -92,7 +92,7 @@ def _check_study(options: argparse.Namespace, cases: Sequence[Case]) -> None:
     if cases[0].job.study is None:
         return
     from .. import mesh
-    from ..study.ladders import ladders, make_jobs
+    from ..study.ladders import ladders, make_cases
 
     for case in cases:
         number = case.number if case.settings else None
@@ -100,7 +100,7 @@ def _check_study(options: argparse.Namespace, cases: Sequence[Case]) -> None:
         def make(changes: Sequence[str], number: int | None = number) -> Job:
             return mesh.load(options.job, [*job_overrides(options), *changes], number)
 
-        make_jobs(case.job, ladders(case.job), make)
+        make_cases(case.job, ladders(case.job), make)
 
 
 def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
@@ -205,7 +205,7 @@ def fit(options: argparse.Namespace) -> int:
 
 
 def study(options: argparse.Namespace) -> int:
-    """Run a job on finer and finer meshes and steps, for error against cost; continues after a stop."""
+    """Run a job on finer and finer meshes and steps, and draw error over time; continues after a stop."""
     world = ranks.start_ranks()
     from ..parallel.slab import Slab
     from ..study import study as whole_study

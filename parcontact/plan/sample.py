@@ -98,7 +98,7 @@ def sample(job: Job, slab: Slab, seconds: float, starting: float = 0.0) -> Sampl
 
     Raises InputError for files that do not match the job.
     """
-    _warm_up(job, slab)
+    warm_up(job, slab)
     began, worked = time.perf_counter(), time.process_time()
     if job.history:
         building, stages = _march(job, slab, seconds)
@@ -118,7 +118,7 @@ def measure_program(job: Job, slab: Slab) -> int:
 
     Collective.
     """
-    _warm_up(job, slab)
+    warm_up(job, slab)
     return int(slab.reduce((), [float(peak_memory())])[0])
 
 
@@ -135,7 +135,7 @@ def peak_memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * KILO
 
 
-def _warm_up(job: Job, slab: Slab) -> None:
+def warm_up(job: Job, slab: Slab) -> None:
     """Make the first steps, or a steady state, of a tiny scene, so that the trial includes no compilation."""
     small = make_tiny(job)
     if small is None:

@@ -31,7 +31,7 @@ from ..summary import slide, sweep_table, theory_comparison, theory_settings
 from ..summary.run_table import RunTable
 from .page_parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
 
-STUDY_PICTURES = {"convergence.png": "errors over refinement"}
+STUDY_PICTURES = {"convergence.png": "errors over refinement and over time"}
 INTERFACE = ("friction_viscous", "friction_interface")
 SHOWN = (
     *("friction", "contact_area", "approach", "mean_gap", "max_pressure"),
@@ -147,8 +147,7 @@ def describe_study(directory: Path) -> ReportSection:
     read_back.refuse_cut(directory / "study.csv")
     with (directory / "study.csv").open(newline="") as file:
         names, *rows = list(csv.reader(file)) or [[]]
-    kept = [k for k, name in enumerate(names) if name != "fingerprint"]
-    table = _shorten([names[k] for k in kept], [[_parse_number(row[k]) for k in kept] for row in rows])
+    table = _shorten(names, [[*map(_parse_number, row)] for row in rows])
     text = directory / "study.txt"
     sentences = text.read_text(errors="replace").splitlines() if text.is_file() else ["The study is not finished."]
     pictures = [

@@ -11,10 +11,12 @@ import itertools
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
+from pathlib import Path
 
 from ..errors import InputError
-from ..job import AUTO, GeometricStep, Job, Stage
+from ..job import AUTO, Case, GeometricStep, Job, Stage
 from ..job.checks.cells import one_cell
+from ..job.reading import CASES
 
 MakeJob = Callable[[Sequence[str]], Job]  # returns the job changed by overrides
 
@@ -39,6 +41,12 @@ class Settings:
 
     def __str__(self) -> str:
         return f"mesh {self.mesh}, {self.steps}, {self.integrator}"
+
+    @property
+    def directory(self) -> Path:
+        """Return the directory of the case in that of the study. It stays the same if ladders get longer."""
+        cells = AUTO if self.cells_per_step is None else f"{self.cells_per_step:.9g}"
+        return Path(CASES, f"{self.mesh}-{cells}-{self.integrator}")
 
     @property
     def steps(self) -> str:
@@ -99,7 +107,12 @@ def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
     """Return the overrides for a case of the job; all time steps change in the same proportion."""
     ny = 1 if job.grid.ny == 1 else case.mesh * job.grid.ny // job.grid.nx
     words = [f"grid.points=[{case.mesh}, {ny}]", "output.fields=[]", "output.every=1", "output.energy=false"]
-    words += ["output.branch_dissipation=false", f"numerics.integrator={case.integrator}"]
+    words += [
+        "output.branch_dissipation=false",
+        "checkpoint.keep=0",
+        "study=null",
+        f"numerics.integrator={case.integrator}",
+    ]
     words.append(f"numerics.tolerance={job.numerics.tolerance!r}")  # the job's tolerance, also if the accuracy chose it
     words += [f"{key}={value!r}" for key, value in _chosen_values(job)]
     factor = case.time_step / own.time_step
@@ -119,16 +132,20 @@ def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
     return words
 
 
-def make_jobs(job: Job, refined: Ladders, make: MakeJob) -> dict[Settings, Job]:
-    """Return the jobs of all cases of a study. Raises InputError with the mistakes of the first case that has any."""
-    jobs = dict[Settings, Job]()
-    for case in refined.combine():
+def make_cases(job: Job, refined: Ladders, make: MakeJob) -> dict[Settings, Case]:
+    """Return the cases of a study, with output directories of their own. Raises InputError with the mistakes of the
+    first case that has any."""
+    cases = dict[Settings, Case]()
+    for one in refined.combine():
         try:
-            jobs[case] = make(overrides(job, refined.own, case))
+            made = make(overrides(job, refined.own, one))
         except InputError as error:
             said = re.sub(r"(?m)^--set [^:]*: ", "", str(error))
-            raise InputError(f"study, case {case}: {said}") from error
-    return jobs
+            raise InputError(f"study, case {one}: {said}") from error
+        output = made.output.model_copy(update={"directory": job.output.directory / one.directory})
+        values = {"mesh": one.mesh, "cells_per_step": one.cells_per_step or AUTO, "integrator": one.integrator}
+        cases[one] = Case(len(cases), values, made.model_copy(update={"output": output}))
+    return cases
 
 
 def _sliding(job: Job) -> list[Stage]:

@@ -1,116 +1,82 @@
-"""`parcontact study`: runs all cases in turn, with a row of study.csv for each; then limits and pictures."""
+"""`parcontact study`: a sweep over meshes, steps and integrators; then limits, errors over time, and a picture."""
 
-import hashlib
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping
 
-from ..errors import RunError
-from ..job import Job
+from ..columns import STUDY, names_of
+from ..job import Case, Job
 from ..job.sections.listing import plain_job
-from ..parallel.signals import Signals
+from ..parallel.groups import Groups
+from ..parallel.root import on_root
 from ..parallel.slab import Slab
+from ..plan.sample import warm_up
 from ..plotting import study_pictures as study_plots
-from ..storage import files, marker, stopfile
+from ..run import runner, sweep, sweep_warnings
+from ..run.run import Options
+from ..storage import files, marker
 from ..storage.directory import Directory
-from . import outcome, verdict
-from .ladders import Ladders, MakeJob, Settings, describe_choices, ladders, make_jobs
-from .outcome import Outcome, read_outcomes, write_outcomes
+from ..summary import sweep_table
+from . import verdict
+from .ladders import Ladders, MakeJob, Settings, describe_choices, ladders, make_cases
 
-DONE, AGAIN = 0, 3  # exit codes
+ENDS = {sweep.STOPPED_EARLY: "stopped early; run again to go on", sweep.FAILED: "some cases failed: there is no limit"}
+Errors = Mapping[Settings, Mapping[str, float]]
 
 
 def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
-    """Run a study; collective. `make` returns the job changed by overrides; returns the exit code.
+    """Run all cases of a study, one after the other on all ranks; collective. Return the exit code.
 
-    All jobs are read before the first case runs. After a stop the same command continues with the missing cases.
+    `make` returns the job changed by overrides. All jobs are read before the first case runs. After a stop the same
+    command continues. The directory has the results of a sweep, and those of the study once all cases are finished.
     """
     refined = ladders(job)
-    jobs = make_jobs(job, refined, make)
+    cases = make_cases(job, refined, make)
     directory = Directory(job.output.directory, slab, "study")
-    with Signals().noted() as signals, directory.claimed():
+    with directory.claimed():
         plain = plain_job(job) if slab.root else {}
         directory.refuse_foreign(job.path, plain, False)
         directory.make(job.path, job.resolved(), marker.Claim(marker.kept(plain)))
-        study = _Study(refined, jobs, directory, quiet)
-        stop = directory.stop_file
-        ended = study.run(lambda: signals.stop or (slab.root and os.path.lexists(stop)))
-        if not ended:
-            if problem := slab.agree(stopfile.remove(stop) if slab.root else ""):
-                raise RunError(problem)
-            study.say(f"stopped after {len(study.outcomes)} of {len(jobs)} cases; run again to go on")
-            return AGAIN
-        study.conclude(describe_choices(job))
-    return DONE
+        several = list(cases.values())
+        shown = on_root(slab.comm, lambda: sweep_warnings.warn_once(several))
+        warm_up(several[0].job, slab)
+        stop = on_root(slab.comm, lambda: sweep.stop_file(several))
+
+        def act(one: Job, own: Slab, shows: sweep.Shows) -> int:
+            return runner.run_job(one, own, Options(True, sweep_stop_file=stop, shows=shows))
+
+        code = sweep.SweepRun(several, Groups(slab.comm), act, stop, quiet, shown=shown).run(several)
+        lines = [] if code else on_root(slab.comm, lambda: conclude(job, refined, cases, slab.comm.size))
+        if slab.root and not quiet:
+            print(*lines, ENDS.get(code, f"study: {directory.path}"), sep="\n", flush=True)
+    return code
 
 
-class _Study:
-    """The cases of a study and their outcomes so far."""
-
-    def __init__(self, refined: Ladders, jobs: dict[Settings, Job], directory: Directory, quiet: bool) -> None:
-        self.refined, self.jobs, self.slab, self.quiet = refined, jobs, directory.slab, quiet
-        self.path = directory.path / "study.csv"
-        self.prints = {case: _fingerprint(one) for case, one in jobs.items()}
-        known = read_outcomes(self.path, self.prints) if self.slab.root else {}
-        self.outcomes: dict[Settings, Outcome] = self.slab.agree(known)
-
-    def say(self, text: str) -> None:
-        if self.slab.root and not self.quiet:
-            print(text, flush=True)
-
-    def run(self, stopped: Callable[[], bool]) -> bool:
-        """Run the missing cases; return True if all are finished."""
-        self.say(f"{len(self.jobs)} cases" + f", {len(self.outcomes)} of them finished before" * bool(self.outcomes))
-        self.say(f"  {'case':50}{' friction max' * self.refined.slides} {'area':>9} {'CPU [s]':>8}")
-        for case, job in self.jobs.items():
-            if case not in self.outcomes:
-                found = self._one(case, job, stopped)
-                if found is None:
-                    return False
-                self.outcomes[case] = found
-                if self.slab.root:
-                    write_outcomes(self.path, self.prints, self.outcomes)
-            one = self.outcomes[case]
-            friction = f" {one.mu_max:13.6g}" * self.refined.slides
-            self.say(f"  {case!s:50}{friction} {one.area_corrected:9.5f} {one.cpu_seconds:8.2f}")
-        return True
-
-    def _one(self, case: Settings, job: Job, stopped: Callable[[], bool]) -> Outcome | None:
-        slab = self.slab.resized(*job.grid.points)
-        try:
-            return outcome.march_through(job, slab, stopped)
-        except RunError as error:
-            raise RunError(f"{case}: {error}") from error
-
-    def conclude(self, notes: Sequence[str]) -> None:
-        """Write limits, errors, pictures and sentences."""
-        if not self.slab.root:
-            return
-        ordered = {case: self.outcomes[case] for case in self.jobs}
-        reference = verdict.references(self.refined, ordered)
-        errors = {case: verdict.errors(found, reference) for case, found in ordered.items()}
-        write_outcomes(self.path, self.prints, ordered, errors)
-        lines = [*notes, *map(str, verdict.limits(self.refined, ordered))]
-        lines += verdict.sentences(ordered, reference, self.slab.comm.size)
-        files.replace_file(self.path.with_suffix(".txt"), "\n".join(lines) + "\n")
-        doubts = {name: limit.doubt for name, limit in reference.items()}
-        study_plots.plot_study(self.path.parent, self._curves(ordered, errors), doubts)
-        for line in (*lines, f"done: {self.path.parent}"):
-            self.say(line)
-
-    def _curves(
-        self, outcomes: dict[Settings, Outcome], errors: dict[Settings, dict[str, float]]
-    ) -> list[study_plots.StudyCurve]:
-        """Return the errors along each ladder."""
-        return [
-            study_plots.StudyCurve(quantity, integrator, name, sizes, [errors[case][quantity] for case in cases])
-            for integrator in self.refined.integrators
-            for name, (sizes, cases) in verdict.sequences(self.refined, outcomes, integrator).items()
-            for quantity in verdict.NEEDED
-            if quantity in errors[cases[0]]
-        ]
+def conclude(job: Job, refined: Ladders, cases: Mapping[Settings, Case], ranks: int) -> list[str]:
+    """Write limits, errors and a picture of finished cases; return the sentences of study.txt; root only."""
+    place = job.output.directory
+    rows = dict(zip(cases, sweep_table.read_cases(place / sweep_table.TABLE), strict=True))
+    reference = verdict.references(refined, rows)
+    errors = {case: verdict.errors(row, reference) for case, row in rows.items()}
+    named = {case: {f"error_{name}": error for name, error in found.items()} for case, found in errors.items()}
+    table = [{**row, **named[case], **cases[case].settings, "case": cases[case].number} for case, row in rows.items()]
+    sweep_table.save_cases(place / "study.csv", names_of(STUDY), table)
+    lines = [*describe_choices(job), *map(str, verdict.limits(refined, rows))]
+    lines += verdict.sentences(rows, reference, ranks)
+    files.replace_file(place / "study.txt", "\n".join(lines) + "\n")
+    doubts = {name: limit.doubt for name, limit in reference.items()}
+    study_plots.plot_study(place, _curves(refined, rows, errors), doubts)
+    return lines
 
 
-def _fingerprint(job: Job) -> str:
-    """Return a fingerprint of everything that determines the outcome of a case."""
-    lasting = job.model_copy(update={"study": None, "output": None, "checkpoint": None, "title": ""})
-    return hashlib.sha256(lasting.resolved().encode()).hexdigest()[:12]
+def _curves(refined: Ladders, rows: verdict.Outcomes, errors: Errors) -> list[study_plots.StudyCurve]:
+    """Return the errors along each ladder."""
+    return [
+        study_plots.StudyCurve(
+            *(quantity, integrator, name, sizes),
+            [errors[case][quantity] for case in cases],
+            [rows[case]["seconds"] for case in cases],
+        )
+        for integrator in refined.integrators
+        for name, (sizes, cases) in verdict.sequences(refined, rows, integrator).items()
+        for quantity in verdict.NEEDED
+        if quantity in errors[cases[0]]
+    ]

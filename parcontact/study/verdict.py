@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from ..printed import per_cent, with_error
 from .extrapolation import Limit, extrapolate
 from .ladders import Ladders, Settings
-from .outcome import QUANTITIES, Outcome
 
+QUANTITIES = ("mu_max", "mu_dyn", "contact_area", "contact_area_corrected")
 TARGETS = (0.05, 0.03, 0.01, 0.003)
-FRICTION = ("mu_max", "mu_end")
-NEEDED = (*FRICTION, "area_corrected")  # quantities that the sentences assess
+FRICTION = ("mu_max", "mu_dyn")
+NEEDED = (*FRICTION, "contact_area_corrected")  # quantities that the sentences assess
 TOGETHER, TIME, CHOSEN = "mesh and time together", "time alone", "mesh with auto steps"  # ladders
+Outcome = Mapping[str, float]  # a row of sweep.csv
 Outcomes = Mapping[Settings, Outcome]
 
 
@@ -71,7 +72,7 @@ def limits(ladders: Ladders, outcomes: Outcomes) -> list[StudyFinding]:
     for integrator in ladders.integrators:
         for name, (sizes, cases) in sequences(ladders, outcomes, integrator).items():
             for quantity in judged(ladders):
-                values = [float(getattr(outcomes[case], quantity)) for case in cases]
+                values = [outcomes[case][quantity] for case in cases]
                 found.append(StudyFinding(quantity, integrator, name, extrapolate(sizes, values)))
     return found
 
@@ -88,7 +89,7 @@ def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
         each = [replace(ladders, cells=(cells,)) for cells in ladders.cells]
         found = [one for part in each for one in limits(part, outcomes) if one.ladder in (TOGETHER, CHOSEN)]
     dearest = max(outcomes, key=lambda case: case.effort)
-    best = {name: Limit(getattr(outcomes[dearest], name), math.nan, math.nan) for name in judged(ladders)}
+    best = {name: Limit(outcomes[dearest][name], math.nan, math.nan) for name in judged(ladders)}
     for quantity in best:
         choices = [one.limit for one in found if one.quantity == quantity and one.limit.value]
         if choices:
@@ -100,8 +101,7 @@ def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
 def errors(outcome: Outcome, reference: Mapping[str, Limit]) -> dict[str, float]:
     """Return the relative error of each quantity; NaN if the reference is 0, such as friction at rest."""
     return {
-        name: abs(getattr(outcome, name) / limit.value - 1.0) if limit.value else math.nan
-        for name, limit in reference.items()
+        name: abs(outcome[name] / limit.value - 1.0) if limit.value else math.nan for name, limit in reference.items()
     }
 
 
@@ -117,17 +117,17 @@ def worst(error: Mapping[str, float]) -> float:
 
 
 def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) -> list[str]:
-    """Return the cheapest settings that reach each target, with their time, and the error of the reference."""
+    """Return the settings that reach each target in the least time, and the error of the reference."""
     error = {case: worst(proven(errors(outcome, reference), reference)) for case, outcome in outcomes.items()}
     if all(map(math.isnan, error.values())):
         return ["there is no contact, and no error"]
     needed = [name for name in NEEDED if name in reference]
     on = "1 rank" if ranks == 1 else f"{ranks} ranks"
-    lines = [f"the cheapest settings with errors of {', '.join(needed)} within a bound, CPU times on {on}:"]
+    lines = [f"the fastest settings with errors of {', '.join(needed)} within a bound, times of all steps on {on}:"]
     for target in TARGETS:
         enough = [case for case in outcomes if error[case] <= target]
-        case = min(enough, key=lambda case: outcomes[case].transform_work, default=None)
-        found = f"{case}; {outcomes[case].cpu_seconds:.3g} s" if case else "none of these settings is good enough"
+        case = min(enough, key=lambda case: outcomes[case]["seconds"], default=None)
+        found = f"{case}; {outcomes[case]['seconds']:.3g} s" if case else "none of these settings is good enough"
         lines.append(f"for {per_cent(target)}: {found}")
     doubt = worst({name: limit.doubt for name, limit in reference.items() if limit.value})
     known = "is not known" if math.isnan(doubt) else f"is {100 * doubt:.2g} %"

@@ -49,7 +49,6 @@ VERBS: dict[str, tuple[str, str]] = {  # verb: its words, and the file that it p
 }
 BEFORE_A_RESULT = {"run", "steady", "check", "plan", "doctor", "manual", "schema"}
 REFUSED = {  # verb: what it refuses, and a part of the sentence
-    "plot": {"study": "neither a run nor a friction curve"},  # a study draws its own pictures
     "theory": {"adhesion": "excludes adhesion"},
     "study": dict.fromkeys(KINDS.keys() - {"study", "sweep"}, "no ladders") | {"sweep": "2 cases"},
     "leak": dict.fromkeys(("curve", "bands", "sweep", "study"), "no output directory of a run")

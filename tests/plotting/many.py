@@ -256,7 +256,8 @@ def draw_study(path: Path) -> None:
     """Draw the errors of all integrators along all ladders."""
     curves = [
         study_pictures.StudyCurve(
-            name, integrator, ladder, [1.0, 0.5, 0.25, 0.125], np.geomspace(0.1, 1e-4 * (k + 1), 4).tolist()
+            *(name, integrator, ladder, [1.0, 0.5, 0.25, 0.125]),
+            *(np.geomspace(0.1, 1e-4 * (k + 1), 4).tolist(), [0.3 * 8**n for n in range(4)]),
         )
         for name in study_pictures.NAMES
         for k, (integrator, ladder) in enumerate(product(study_pictures.INTEGRATORS, study_pictures.MARKS))

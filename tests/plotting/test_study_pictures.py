@@ -7,13 +7,13 @@ from matplotlib.figure import Figure
 
 from parcontact.plotting import study_pictures
 
-QUANTITIES = ("mu_max", "mu_end", "area_corrected")
+QUANTITIES = ("mu_max", "mu_dyn", "contact_area_corrected")
 
 
 def test_how_errors_fall(tmp_path: Path, drawn: list[Figure]) -> None:
-    """One panel below the other, with one key above them; what is not known of the reference is grey."""
+    """Over refinement and over time, one quantity below the other; what is not known of the reference is grey."""
     curves = [
-        study_pictures.StudyCurve(name, integrator, ladder, [1.0, 0.5, 0.25], [0.1, 0.02, 1e-5])
+        study_pictures.StudyCurve(name, integrator, ladder, [1.0, 0.5, 0.25], [0.1, 0.02, 1e-5], [0.5, 3.0, 20.0])
         for name in QUANTITIES
         for integrator in study_pictures.INTEGRATORS
         for ladder in ("mesh and time together", "mesh alone", "time alone")
@@ -22,7 +22,7 @@ def test_how_errors_fall(tmp_path: Path, drawn: list[Figure]) -> None:
     figure = drawn[0]
     assert not touching(figure)
     assert not outside(figure)
-    assert len(figure.axes) == 3
+    assert len(figure.axes) == 6
     assert len(entries(figure)) == 9
     assert all(len(axes.patches) == 1 for axes in figure.axes)
 

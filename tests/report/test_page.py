@@ -182,7 +182,7 @@ def test_sweep_and_study(tmp_path: Path) -> None:
     head = ("case", "history.0.velocity", "state", "mu_max", "mu_dyn", "contact_area")
     with (tmp_path / "sweep.csv").open("w", newline="") as file:
         csv.writer(file).writerows([head, (0, 0.1, "done", 0.25, 0.2, 0.5), (1, 1.0, "failed", "", "", "")])
-    (tmp_path / "study.csv").write_text("fingerprint,mesh,integrator,mu_max\nabc,64,exponential,0.123456789\n")
+    (tmp_path / "study.csv").write_text("case,mesh,integrator,mu_max\n0,64,exponential,0.123456789\n")
     (tmp_path / "study.txt").write_text("for 1 %: mesh 64\n")
     found = Page(page.write_report([tmp_path]).read_text())
     check(found)
@@ -192,7 +192,7 @@ def test_sweep_and_study(tmp_path: Path) -> None:
     # a phone shows rows of wide tables as names, which may break at marks, and values
     named = re.findall(r'<td data-head="([^"]*)"', found.text.replace("&#8203;", ""))
     units = [name.replace("velocity", "velocity [m/s]") for name in head]
-    assert named == [*units, *units, "mesh", "integrator", "mu_max"]
+    assert named == [*units, *units, "case", "mesh", "integrator", "mu_max"]
 
 
 def test_a_report_of_a_sweep_says_what_differs_between_cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,5 @@
 """Results that were cut off, as a copy that breaks off leaves them: whatever reads them says so, with exit code 2."""
 
-import re
 import shutil
 from pathlib import Path
 
@@ -93,18 +92,3 @@ def test_maps_that_do_not_fit_their_coordinates(whole: Path, main: Main, name: s
     for words in (("plot", "run"), ("plot", "run", "--at", "2"), ("report", "run")):
         code, said, errors = main(*words)
         assert (code, "run/fields.h5 is damaged" in errors) == (2, True), (words, said + errors)
-
-
-@pytest.mark.parametrize("content", [b"\x89PNG\r\n", b"\xff", None])
-def test_a_table_of_a_study_that_is_none(tmp_path: Path, main: Main, content: bytes | None) -> None:
-    """Bytes of another file, or a cell that is no number."""
-    (tmp_path / "job.yaml").write_text(JOBS["run"].replace("32, size", "16, size") + "study: {mesh: [16, 32]}\n")
-    study = ("study", "job.yaml", "--out", "study", "--quiet")
-    assert main(*study)[0] == 0
-    table = tmp_path / "study" / "study.csv"
-    number = re.compile(rb"(?<=,)\d\.\d+")
-    wrong = content if content is not None else number.sub(b"1.5x", table.read_bytes())
-    table.write_bytes(wrong)
-    code, _, errors = main(*study)
-    assert (code, "study.csv cannot be read" in errors) == (2, True), errors
-    assert table.read_bytes() == wrong
