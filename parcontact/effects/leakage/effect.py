@@ -59,6 +59,11 @@ class LeakageColumns(Effect[tuple[float, ...]]):
         return gap == 0.0 if job.section("leakage").total else None
 
     @staticmethod
+    def why_no_theory(job: Any) -> str:
+        total = job.section("leakage").total
+        return "the theory excludes a fluid that carries a part of the load: give leakage: {load: net}" if total else ""
+
+    @staticmethod
     def ended(job: Any, saved: Saved) -> Detached | None:
         return end_in(job, saved) if job.section("leakage").total else None
 
