@@ -300,6 +300,8 @@ def _material(job: Job) -> Prony:
     for forbidden in job.asked("forbids"):
         if BY_THEORY in forbidden:
             raise InputError(forbidden[BY_THEORY])
+    for why in filter(None, (ask(job) for ask in job.asked("why_no_theory"))):
+        raise InputError(why)
     if job.material.hardness is not None:
         raise InputError("the theory excludes counterbodies that yield: leave out material.hardness")
     series, factor = relaxation_of(job.material), 0.5 / (1.0 - job.material.poisson)

@@ -7,9 +7,10 @@
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Generic, Literal, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, NamedTuple, Protocol, TypeVar
 
 from ..history.timeline import Step
 from ..parallel.slab import Array
@@ -92,6 +93,28 @@ class Detached(NamedTuple):
 
     time: float
     load: float
+
+
+NEVER = -1.0  # a time [s] in a checkpoint
+
+
+def entries_of_end(end: Detached | None, job: Any) -> dict[str, Entry]:
+    """Return the entries of a detachment, None before one, in checkpoints of a job."""
+    time, load = end or (NEVER, 0.0)
+    return {"detached at": Entry(time, 1.0, "s"), "detached under": Entry(load), "history": Entry(_mark(job))}
+
+
+def end_in(job: Any, saved: Saved) -> Detached | None:
+    """Return time and load of the detachment from the entries of a law in a checkpoint; None before a detachment, or if
+    the job has another history."""
+    if "detached at" not in saved or saved["detached at"] == NEVER or float(saved["history"]) != _mark(job):
+        return None
+    return Detached(float(saved["detached at"]), float(saved["detached under"]))
+
+
+def _mark(job: Any) -> float:
+    """Return a checksum of the history of a job."""
+    return float(zlib.crc32(repr(job.history).encode()))
 
 
 UNITS_OF_LOADS = {"pressure": " Pa", "force": " N", "approach": " m"}

@@ -119,8 +119,9 @@ class Effect(Protocol[Memory]):
 
     It may have `rules` for the whole job, as sections have them; `lifts`, checks of jobs that do not apply with it;
     and functions of a job `doubts` and `facts`, which give warnings (`doubts.Doubt`, or sentences) and sentences
-    about the section. `changed_material` of a job is in place of its material, and `why_no_curve` returns why it has no
-    friction curve. Methods are collective unless stated. The base class has no memory.
+    about the section. `changed_material` of a job is in place of its material; `why_no_curve` and `why_no_theory`
+    return why it has no friction curve, and no prediction by Persson's theory. Methods are collective unless stated.
+    The base class has no memory.
     """
 
     section: ClassVar[type[Part]]  # section that it adds to a job

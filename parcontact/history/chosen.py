@@ -71,7 +71,7 @@ def longest_change(stage: Stage) -> float:
     """Return the longest step [s] that follows the load, or the phase of an oscillation."""
     if stage.frequency:
         return 1.0 / (CYCLE_STEPS * stage.frequency)
-    return stage.seconds if stage.load.constant else stage.seconds / RAMP_STEPS
+    return stage.seconds if stage.constant else stage.seconds / RAMP_STEPS
 
 
 def bounds(stage: Stage, grid: Grid, cells: int = 1) -> Bounds:

@@ -61,7 +61,7 @@ def divide(stage: Stage, grid: Grid) -> GivenEnds:
         return GivenEnds(0, 1.0, 0.0)
     if stage.cycles is not None and not isinstance(stage.time_step, GeometricStep):
         return GivenEnds(stage.cycles * _steps_of_cycle(stage, grid), 1.0, stage.seconds)
-    if stage.time_step == AUTO and not stage.load.constant and not stage.speed:
+    if stage.time_step == AUTO and not stage.constant and not stage.speed:
         return GivenEnds(RAMP_STEPS, 1.0, stage.seconds)
     steps = estimate_steps(stage, stage.seconds, first_step(stage, grid))
     growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0

@@ -76,7 +76,7 @@ class Span:
     def rests(self) -> bool:
         """True if the surface rests under a constant load, and the length of steps is free."""
         free = self.stage.chooses or isinstance(self.stage.time_step, GeometricStep)
-        return free and not any(self.stage.velocity) and self.stage.load.constant
+        return free and not any(self.stage.velocity) and self.stage.constant
 
     @property
     def extremes(self) -> tuple[float, float]:

@@ -74,6 +74,7 @@ class Job(Part):
         Rule(("grid", "history"), limits.steps_can_be_made),
         Rule(("output",), limits.no_temperature),
         Rule(("output",), limits.no_traction),
+        Rule(("output",), limits.no_fluid_pressure),
         Rule(("history",), limits.no_rolling),
         Rule(("bands", "surface", "steady", "output"), limits.bands_fit),
         Rule(("study", "grid", "surface", "history"), limits.study_fits),
@@ -240,13 +241,15 @@ SEPARATOR = ":"  # separates the sections in the class name of an extended job, 
 
 @cache
 def extended_model(sections: tuple[str, ...]) -> type[Job]:
-    """Return the model of a job extended by sections of effects; rules on the section of another effect apply if the
-    job has it."""
+    """Return the model of a job extended by sections of effects, and by the keys that one adds to stages; rules on the
+    section of another effect apply if the job has it."""
     effects = added_sections.effects_of(sections)
     fields: dict[str, Any] = {
         name: (effect.section | None, Field(default=None, description="a mapping of keys"))
         for name, effect in effects.items()
     }
+    for stage in (effect.stage for effect in effects.values() if hasattr(effect, "stage")):
+        fields["history"] = (tuple[stage, ...], Job.model_fields["history"])  # type: ignore[valid-type]
     made = create_model(SEPARATOR.join(("Job", *sections)), __base__=Job, __module__=__name__, **fields)
     every = ((name, rule) for name, effect in effects.items() for rule in getattr(effect, "rules", ()))
     own: Iterator[Any] = (

@@ -21,6 +21,7 @@ SHOWN = (
     "adhesion",
     "interface",
     "counterbody",
+    "leakage",
     "bands",
 )  # sections that pictures and texts need; others may differ between versions
 LAST = "checkpoint"  # last section of a job with every default

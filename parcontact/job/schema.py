@@ -25,7 +25,7 @@ from .model import Job, extended_model
 from .sections.materials import Dma, Elastic, Zener
 from .sections.part import Part, kind_key, literal_words
 from .sections.quantities import AUTO_POINTS, FROM_SURFACE, LARGEST, MOST, along_x, both, bounded, countable, listed
-from .sections.stages import expand_range
+from .sections.stages import Stage, expand_range
 from .text.fault import list_words
 from .text.overrides import materials
 
@@ -142,6 +142,9 @@ def sections() -> list[SectionSchema]:
         _collect(name, field, found)
     for name, effect in added_sections.effects_of(added_sections.own_sections()).items():
         _collect(name, effect.section, found)
+        if hasattr(effect, "stage"):  # what it adds to stages
+            keys = (key for key in _keys(effect.stage) if key.word not in Stage.model_fields)
+            found[effect.stage] = SectionSchema("history", effect.stage, tuple(keys))
     return list(found.values())
 
 

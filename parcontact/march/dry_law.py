@@ -24,8 +24,10 @@ from .starts import cells_moved, make_start
 
 
 def choose_contact_law(scene: Scene) -> ContactLaw[Any]:
-    """Return the contact law that an effect of the scene provides, or the law of its constraint."""
-    return scene.law or DryLaw(scene)
+    """Return the contact law that an effect of the scene provides, or the law of its constraint. A law that solves by
+    the latter gets it by its method `upon`."""
+    dry, law = DryLaw(scene), scene.law
+    return dry if law is None else law.upon(dry) if hasattr(law, "upon") else law
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,18 @@ class Scenery(Part):
     steady: Steady | None = None
     numerics: Numerics = Numerics()
 
+    @classmethod
+    def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
+        """Leave out the keys that effects add to stages."""
+        stages = data.get("history")
+        return {**data, "history": [_of_any_stage(stage) for stage in stages]} if isinstance(stages, list) else data
+
+
+def _of_any_stage(stage: Any) -> Any:
+    if not isinstance(stage, dict):
+        return stage
+    return {key: value for key, value in stage.items() if key in Stage.model_fields}
+
 
 def fill_grid(source: Source, origin: Origin) -> Origin:
     """Replace all words of the grid in the source of a job by numbers. Return the origin with a sentence on them."""

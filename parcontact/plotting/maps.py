@@ -37,12 +37,15 @@ LOOKS = {
     "gap": Look("m", "Blues_r", "k", " (contact black)"),
     "displacement": Look("m", "viridis"),
     "height": Look("m", "cividis", note=" (up is into the body)"),
+    "fluid_pressure": Look("Pa", "viridis", "k", " (contact black)"),
     "temperature": Look("K", "hot", note=" rise"),
     "traction": Look("Pa", "inferno"),
     "slip": Look("", "viridis", note=": traction over its bound"),
 }
 TRACTIONS = ("traction_x", "traction_y")
 STICK_MAPS = ("traction", "slip")  # drawn from both components and the pressure
+OUTSIDE = ("gap", "fluid_pressure")  # drawn outside of contact
+ROUNDING = 1e-6  # rounding: of a pressure, over the highest
 TENSION = "RdBu_r"  # colours of pressures of both signs
 STRIP = 8  # most points across of a map that is drawn as a line
 BAR = 0.9  # height of a bar of colours over that of its map
@@ -97,22 +100,28 @@ def _panel(fields: Fields, name: str, values: Array, instant: str, window: Windo
         beyond = "max" if np.nanmax(part, initial=-np.inf) > limits[1] else "neither"
         show = _draw_map(axes, name, (fields.x[columns], fields.y[rows]), limits, extend=beyond)
         show(part)
-        axes.set_title(f"{name}{LOOKS[name].note}\n{instant}")
+        axes.set_title(f"{_words(name)}{LOOKS[name].note}\n{instant}")
 
     return draw
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def mask(name: str, values: Array, pressure: Array | None, job: Job) -> Array:
     """Return a map for drawing, NaN at points without a value.
 
     Pressures are drawn where they are positive, with adhesion everywhere; gaps outside of contact, or where they are
-    positive if there are no pressures.
+    positive if there are no pressures; the pressure of a fluid outside of contact.
     """
     if name == "pressure":
         return values if (values < 0.0).any() else np.where(values > 0.0, values, np.nan)
     if name == "gap":
         closed = values <= 0.0 if pressure is None else touching_of(job, pressure, values)
         return np.where(closed, np.nan, np.maximum(values, 0.0))
+    if name == "fluid_pressure" and pressure is not None:  # the rest of the pressure is that of contact
+        return np.where(pressure - values > ROUNDING * np.abs(pressure).max(), np.nan, values)
     return values
 
 
@@ -172,7 +181,7 @@ def _draw_map(
     if low <= high:
         ticks = [low] if low == high else MaxNLocator(TICKS, steps=[1, 2, 5, 10])
         scale = axes.figure.colorbar(mesh, ax=axes, ticks=ticks, shrink=BAR * height, **bar).ax.yaxis
-        prefixes.label(scale, name, look.unit)
+        prefixes.label(scale, _words(name), look.unit)
     return mesh.set_array
 
 
@@ -188,7 +197,7 @@ def _draw_line(
     else:  # there are no values for a scale
         axes.set_yticks([low if high == low else 0.0])
     prefixes.label(axes.xaxis, "x" if lies else "y", "m")
-    prefixes.label(axes.yaxis, name, LOOKS[name].unit)
+    prefixes.label(axes.yaxis, _words(name), LOOKS[name].unit)
     return lambda values: line.set_ydata(np.nan_to_num(values[0] if lies else values[:, 0]))
 
 
@@ -217,7 +226,7 @@ def draw_frames(
         if name in STICK_MAPS:
             size = np.hypot(*(file[part][index] for part in TRACTIONS))
             return stick_maps(size, file["pressure"][index], job)[STICK_MAPS.index(name)]
-        pressure = file["pressure"][index] if name == "gap" and "pressure" in file else None
+        pressure = file["pressure"][index] if name in OUTSIDE and "pressure" in file else None
         return mask(name, file[dataset_of(file, name)][index], pressure, job)
 
     ranges = [find_range(read(index)) for index in labels]
@@ -227,7 +236,7 @@ def draw_frames(
     fill = (_draw_line if min(x.size, y.size) <= STRIP else _draw_map)(axes, name, (x, y), limits)
     for index, label in labels.items():
         fill(read(index))
-        axes.set_title(f"{name}, {label}")
+        axes.set_title(f"{_words(name)}, {label}")
         if figure.get_layout_engine() is not None:  # the layout of the first frame is kept for all
             figure.draw_without_rendering()
             figure.set_layout_engine("none")

@@ -50,6 +50,11 @@ class Row(Mapping[str, float]):
     flow_x: float
     flow_y: float
     constriction: float
+    fluid_pressure: float
+    flow_rate: float
+    mass_flow: float
+    error_x: float
+    rounds: float
     stick_area: float
     slip_loss: float
     flash_temperature: float

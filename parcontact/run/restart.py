@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 from ..errors import InputError
 from ..history.chosen import ChosenSteps, reached
 from ..history.timeline import Step, Timeline
-from ..job import Job, Stage
+from ..job import Job
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..physics.entries import part_of
@@ -148,7 +148,7 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
 def find_changed_step(contents: Contents, job: Job) -> str:
     """Return a message on the first completed step that differs in this job, or ''; later steps may differ."""
     number, until, chosen = contents.step, contents.time, part_of("steps", contents.numbers)
-    history = TypeAdapter(tuple[Stage, ...]).validate_python(contents.job["history"])
+    history = TypeAdapter(type(job).model_fields["history"].annotation).validate_python(contents.job["history"])
     old, new = (
         Timeline.from_job(each, until, ChosenSteps.from_job(each, chosen))
         for each in (job.model_copy(update={"history": history}), job)

@@ -19,8 +19,8 @@ from ..parallel.slab import Array, Slab
 from . import files, hdf5
 from .provenance import Provenance
 
-MAPS = ("pressure", "displacement", "gap", "height", "temperature", "traction_x", "traction_y")
-UNITS = {column.name: column.unit for column in FIELDS if column.name in MAPS}
+COORDINATES = ("t", "y", "x", "step")
+UNITS = {column.name: column.unit for column in FIELDS if column.name not in COORDINATES}  # of maps
 KIND = "parcontact fields"
 XDMF_SECONDS = 10.0  # tuning: least time between updates of fields.xdmf, which grows with every instant [s]
 

@@ -5,7 +5,6 @@ last two gaps, extrapolated in time and moved with the surface by whole cells.
 """
 
 import math
-import zlib
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -23,7 +22,16 @@ from ...physics.units import Units
 from ...solve.certificate import Certificate
 from ...solve.contact import Contact
 from ...solve.problem import Approach, Control, MeanPressure
-from ..contact_protocol import Detached, EdgeMotion, End, PreviousContacts, SolvedContact, nothing_holds
+from ..contact_protocol import (
+    Detached,
+    EdgeMotion,
+    End,
+    PreviousContacts,
+    SolvedContact,
+    end_in,
+    entries_of_end,
+    nothing_holds,
+)
 from . import gap_kernels
 from .adhesive_energies import JUMPS, PUSHED, SURFACES, PathWork
 from .adhesive_solver import AdhesiveSolver
@@ -39,7 +47,6 @@ PART_TOLERANCE = 0.05  # tuning: tolerance of all parts of a step except the las
 OPEN = 10.0  # physics: gap of detached surfaces over the range
 LEAST_LOAD = 1e-9  # accuracy: least load over all tension, and over the strength of a point
 LEAST_TENSION = 1e-2  # physics: least tension over the strength in the area under tension
-NEVER = -1.0  # a time [s] in a checkpoint
 
 
 class PastGap(NamedTuple):
@@ -308,7 +315,6 @@ class AdhesiveLaw:
     def entries(self, memory: AdhesiveMemory, units: Units) -> dict[str, Entry]:
         """Return the gaps, the positions of the surface, and the detachment."""
         now, before = memory.pasts
-        end = memory.end or (NEVER, 0.0)
         found = {
             "gap": Entry(now.gap, units.height, "m"),
             "earlier gap": Entry(before.gap, units.height, "m"),
@@ -317,9 +323,7 @@ class AdhesiveLaw:
             "gap is known": Entry(float(now.known)),
             "earlier gap is known": Entry(float(before.known)),
             "modulus": Entry(memory.modulus, units.modulus, "Pa"),
-            "detached at": Entry(end[0], 1.0, "s"),
-            "detached under": Entry(end[1]),
-            "history": Entry(_mark(self.scene.job)),
+            **entries_of_end(memory.end, self.scene.job),
         }
         if memory.free_correction is None:
             return found
@@ -339,18 +343,9 @@ def end_of(job: Any, saved: Saved) -> Detached | None:
     """Return time and load of the detachment from the entries of the law in a checkpoint; None before a detachment, or
     if the job continues after it or has another history."""
     section = job.section("adhesion")
-    if section is None or section.detached == "open" or "detached at" not in saved or saved["detached at"] == NEVER:
-        return None
-    if float(saved["history"]) != _mark(job):
-        return None
-    return Detached(float(saved["detached at"]), float(saved["detached under"]))
+    return None if section is None or section.detached == "open" else end_in(job, saved)
 
 
 def _place(saved: Array) -> tuple[float, float]:
     x, y = saved.tolist()
     return x, y
-
-
-def _mark(job: Any) -> float:
-    """Return a checksum of the history of a job."""
-    return float(zlib.crc32(repr(job.history).encode()))

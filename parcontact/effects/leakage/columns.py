@@ -10,7 +10,25 @@ MEASURES: Table = (
         "smallest gap on the widest path, in the direction that leaks more (with `leakage`)",
         when="leakage",
     ),
+    *(
+        Column(name, unit, meaning, when="leakage.load")
+        for name, unit, meaning in (
+            ("fluid_pressure", "Pa", "mean over the box of the fluid's pressure over the ambient one (`load: total`)"),
+            ("flow_rate", "m³/s", "flow of the fluid along x at the low pressure, through the box (`load: total`)"),
+            ("mass_flow", "kg/s", "the same flow as a mass, empty where no density is known"),
+            (
+                "error_x",
+                "",
+                "relative change of K along x if only every second point of the gap is used (`load: total`)",
+            ),
+            ("rounds", "", "contacts and flows solved in the step (`load: total`)"),
+        )
+    ),
 )
+FIELDS: Table = (
+    Column("fluid_pressure", "Pa", "of the fluid over the ambient pressure, continued into contact (`load: total`)"),
+)
+FIELDS_NEED = {"fluid_pressure": "leakage: {load: total}"}  # what the map needs
 LAST: Table = (  # columns of a sweep: the last values of a run
     Column("flow_x", "m³", "with `leakage`: last calculated K along x", when="leakage"),
     Column("flow_y", "m³", "the same along y", when="leakage"),

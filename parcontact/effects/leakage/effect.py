@@ -3,33 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import Field
 
 from ...columns import added_by
+from ...job.checks import limits
 from ...job.sections.part import Part, Rule
-from ...job.sections.quantities import Count
-from ...job.text.fault import Fault
+from ...job.sections.stages import Stage
 from ...parallel.root import on_root
+from ...parallel.slab import Array
+from ...physics.entries import Entry, Saved
+from ...physics.units import Units
+from ...solve.constraint import Mask
+from ..contact_protocol import ContactLaw, Detached, end_in
 from ..effect import Changes, Decision, Effect, Instant
 from .flow import leak
+from .section import RULES, Leakage, SealStage, drop_at
 
 NOTHING = (math.nan, math.nan, math.nan)
-
-
-def _needs_steps(leakage: Leakage | None, history: Any) -> Iterator[Fault]:
-    if leakage is not None and not history:
-        yield Fault("needs a history: the flow of a friction curve is not calculated", ("leakage",))
-
-
-class Leakage(Part):
-    """The `leakage` section: the number of steps between two calculations of the flow."""
-
-    label: ClassVar[str] = "leakage"
-    every: Count = Field(default=1, description="a positive whole number of steps")
 
 
 def compile_loops() -> None:
@@ -45,7 +39,10 @@ class LeakageColumns(Effect[tuple[float, ...]]):
 
     section: ClassVar[type[Part]] = Leakage
     columns: ClassVar[tuple[str, ...]] = added_by("leakage")
-    rules: ClassVar[tuple[Rule, ...]] = (Rule(("leakage", "history"), _needs_steps),)
+    stage: ClassVar[type[Stage]] = SealStage
+    rules: ClassVar[tuple[Rule, ...]] = RULES
+    lifts: ClassVar[tuple[Any, ...]] = (limits.no_fluid_pressure,)
+    brings_law: ClassVar[bool] = False  # a rule excludes steady sliding with `load: total`
 
     @staticmethod
     def decide(job: Any) -> Decision:
@@ -53,7 +50,26 @@ class LeakageColumns(Effect[tuple[float, ...]]):
         why = (
             "there is no leakage section" if section is None else f"the flow is calculated every {section.every} steps"
         )
+        if section is not None and section.total:
+            why = f"{section.substance.name} carries a part of the load"
         return Decision("leakage", section is not None, why)
+
+    @staticmethod
+    def touches(job: Any, pressure: Array, gap: Array) -> Mask | None:
+        return gap == 0.0 if job.section("leakage").total else None
+
+    @staticmethod
+    def why_no_theory(job: Any) -> str:
+        total = job.section("leakage").total
+        return "the theory excludes a fluid that carries a part of the load: give leakage: {load: net}" if total else ""
+
+    @staticmethod
+    def ended(job: Any, saved: Saved) -> Detached | None:
+        return end_in(job, saved) if job.section("leakage").total else None
+
+    def __new__(cls, scene: Any) -> Any:
+        """Return the effect of a job: with `load: total` that of a fluid that carries a part of the load."""
+        return super().__new__(Seal if scene.job.section("leakage").total else cls)
 
     def __init__(self, scene: Any) -> None:
         self._scene, self._every = scene, scene.job.section("leakage").every
@@ -78,3 +94,46 @@ class LeakageColumns(Effect[tuple[float, ...]]):
 
     def values(self, memory: tuple[float, ...]) -> Sequence[float]:
         return memory
+
+
+@dataclass(frozen=True)
+class SealColumns:
+    """Memory of a seal: its columns, and the map of the fluid's pressure over the ambient one [Pa]."""
+
+    columns: tuple[float, ...]
+    pressure: Array
+
+
+class Seal(LeakageColumns):
+    """The flow of a fluid that carries a part of the load (`seal_law`)."""
+
+    columns: ClassVar[tuple[str, ...]] = ("flow_x", "constriction", *added_by("leakage.load"))
+    fields: ClassVar[tuple[str, ...]] = ("fluid_pressure",)
+    brings_law: ClassVar[bool] = False
+
+    def __init__(self, scene: Any) -> None:
+        self._scene = scene
+
+    def law(self) -> ContactLaw[Any]:
+        from .seal_law import SealLaw  # what solves is not loaded to check a job
+
+        return SealLaw(self._scene)
+
+    def at_rest(self) -> Any:
+        return SealColumns((math.nan,) * len(self.columns), self._scene.slab.zeros())
+
+    def follow(self, instant: Instant, memory: Any) -> Changes[Any]:
+        from .fluid_pressure import pressure_of
+
+        numbers, step = instant.solved.numbers, instant.step
+        pressure = pressure_of(drop_at(self._scene.job, step.stage, step.time), instant.solved.memory.share)
+        return Changes(SealColumns(tuple(numbers[name] for name in self.columns), pressure))
+
+    def values(self, memory: Any) -> Sequence[float]:
+        return tuple(memory.columns)
+
+    def field(self, memory: Any, name: str) -> Array:
+        return memory.pressure.copy()
+
+    def entries(self, memory: Any, units: Units) -> dict[str, Entry]:
+        return {"fluid pressure": Entry(memory.pressure, 1.0, "Pa")}

@@ -151,7 +151,13 @@ class Gaps:
         return tuple(solve_flow(slipping, self.size, axis, self._sides(axis)).conductivity for slipping in gaps)
 
     def refuse_memory(self, at: str) -> None:
-        """Raise InputError if K depends on more than the load, or if only the instant `at` is asked for."""
+        """Raise InputError if K depends on more than the load, if only the instant `at` is asked for, or if the fluid
+        carries its part of the load already."""
+        if (section := self.job.section("leakage")) is not None and section.total:
+            raise InputError(
+                "--load total is for runs whose contact carries all of the load: the fluid of "
+                f"{self.directory} carries its part already, and measures.csv has flow_x and flow_rate"
+            )
         if at:
             raise InputError("--load total needs all saved loads: leave out --at")
         body = self.job.material.fitted.remembers

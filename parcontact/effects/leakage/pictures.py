@@ -16,25 +16,50 @@ from ...plotting.plotted_run import PlottedRun
 from ...plotting.style import Panel
 from . import conductivity
 from .flow import Flow, Map
+from .section import drop_at
 
 BAR = 0.7  # height of the bar of colours over that of its map
 DECADES = 3  # decades of the flow on the colour scale
 SAME = 1e-6  # rounding: relative difference below which pressures are the same
 FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # columns of a run
-KEYS = ("leakage",)  # names of panels for --panels
+KEYS = ("leakage", "leak")  # names of panels for --panels
 SWEEP_PANELS = (("leakage", charts.Axis("conductivity", "m³"), {label: name for name, label in FLOWS.items()}),)
 KINDS = ("flow", "constriction")  # kinds of columns per direction
 LONG = 100.0  # ratio of times above which their axis is logarithmic
 
 
 def panels(run: PlottedRun, along: Abscissa) -> Iterator[charts.Chart]:
-    """Yield the chart of conductivities of a run over an axis, if the gap is open at any time."""
+    """Yield the chart of conductivities of a run over an axis, if the gap is open at any time, and that of the leak
+    over the pressure of a fluid that carries a part of the load."""
     columns = run.columns
-    if "flow_x" in columns and max(np.nanmax(columns[name], initial=0.0) for name in FLOWS) > 0.0:
+    names = {name: label for name, label in FLOWS.items() if name in columns}
+    if names and max(np.nanmax(columns[name], initial=0.0) for name in names) > 0.0:
         rows = slice(None) if along.rows is None else along.rows
-        flows = {label: columns[name][rows] for name, label in FLOWS.items()}
+        flows = {label: columns[name][rows] for name, label in names.items()}
         narrowest = dict.fromkeys(flows, columns["constriction"][rows])
         yield conductivity.chart(along.axis, along.values, flows, narrowest)
+        if "fluid_pressure" in columns:
+            yield from _leak_over_pressure(run)
+
+
+def _leak_over_pressure(run: PlottedRun) -> Iterator[charts.Chart]:
+    """Yield the chart of the leak over the high pressure of the fluid if it changes, under the last load; dotted is
+    that of a contact which carries all of this load, where the run has a row of it."""
+    columns, times = run.columns, run.columns["time"]
+    load = columns["pressure"][-1]
+    loaded = np.flatnonzero((np.abs(columns["pressure"] - load) <= SAME * abs(load)) & (columns["step"] > 0))
+    stages = [run.timeline.span(int(columns["step"][row])).index for row in loaded]
+    rows = [(drop_at(run.job, stage, float(times[row])), row) for stage, row in zip(stages, loaded, strict=True)]
+    net = next((row for drop, row in rows if drop.high == drop.low == drop.outside), None)
+    rows = [(drop, row) for drop, row in rows if drop.high > drop.low]
+    high, flows = np.array([drop.high for drop, _ in rows]), columns["flow_rate"][[row for _, row in rows]]
+    if high.size < 2 or not np.ptp(high):
+        return
+    lines = [charts.ChartLine("total load", high, flows, style.line(0) | {"marker": "."})]
+    if net is not None:
+        alone = [drop.flow_rate(float(columns["flow_x"][net]), *run.job.grid.size) for drop, _ in rows]
+        lines.append(charts.ChartLine("net load", high, np.array(alone), style.line(0) | {"linestyle": ":"}))
+    yield charts.Chart("leak", charts.Axis("high pressure", "Pa"), charts.Axis("leak", "m³/s"), lines, zeros="closed")
 
 
 def draw_leakage(

@@ -160,6 +160,14 @@ def no_rolling(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
             yield Fault(sentence, ("history", index, "creep"))
 
 
+def no_fluid_pressure(output: Output) -> Iterator[Fault]:
+    """Refuse maps of the pressure of a fluid; the effect that computes them lifts this rule."""
+    if "fluid_pressure" in output.fields:
+        yield Fault(
+            "includes fluid_pressure, which needs a fluid that carries a part of the load", ("output", "fields")
+        )
+
+
 def some_history(history: tuple[Any, ...], steady: Steady | None) -> Iterator[Fault]:
     if not history and steady is None:
         yield Fault("needs at least one stage, unless there is a steady section", ("history",))

@@ -28,7 +28,7 @@ from .quantities import (
 Integrator = Literal["exponential", "exponential-linear", "backward-euler"]
 Kernel = Literal["spectral", "love"]
 Precision = Literal["double", "mixed"]
-FieldName = Literal["pressure", "displacement", "gap", "height", "temperature", "traction"]
+FieldName = Literal["pressure", "displacement", "gap", "height", "temperature", "traction", "fluid_pressure"]
 
 
 def _different(name: str) -> Rule:

@@ -27,7 +27,8 @@ def plain_data(value: Any) -> Any:
         return {key: plain_data(inner) for key, inner in items(value) if key not in chosen}
     if isinstance(value, Ramp):
         velocity = {"velocity": value.velocity} if value.velocity else {}
-        return value.start if value.constant else {"from": value.start, "to": value.end, **velocity}
+        start, end = plain_data(value.start), plain_data(value.end)
+        return start if value.constant else {"from": start, "to": end, **velocity}
     if isinstance(value, Oscillation):
         return asdict(value)
     if isinstance(value, Swing):

@@ -241,6 +241,11 @@ class Stage(Part):
         return any(self.velocity) and not isinstance(self.velocity, Swing)
 
     @property
+    def constant(self) -> bool:
+        """Return True if no load changes within the stage."""
+        return all(getattr(getattr(self, name), "constant", True) for name in type(self).model_fields)
+
+    @property
     def speed(self) -> float:
         """Return the magnitude of the velocity [m/s], the largest one if it oscillates."""
         return math.hypot(*self.velocity)

@@ -1,0 +1,132 @@
+"""Pressure of a fluid in a whole map of gaps, along x, and the rounds in which it settles with the contact.
+
+A small leak eps, SMALL of the mean of g^3, continues the pressure into contact and closed pools, where it is not
+determined otherwise:
+
+    div((g^3 + eps) grad p) = 0;    of a gas div((g^3 + 6 lambda g^2 + eps) grad p^2) = 0.
+
+The unknown of the rounds is the share s of the drive, 1 at the high and 0 at the low end,
+
+    p = p2 + s (p1 - p2)    of a liquid,    p^2 = p2^2 + s (p1^2 - p2^2)    of a gas.
+
+A round presses the contact under the fluid's pressure, and gets another share from its gap. The next share is that of
+Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) from the last DEPTH rounds.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .elimination import Balance
+from .flow import flow_mesh_error, solve_flow
+from .fluids import PressureDrop
+
+Map = NDArray[np.floating]
+SMALL = 1e-9  # accuracy: small leak over the mean of g^3
+DEPTH = 3  # tuning: differences of earlier rounds
+RIDGE = 1e-12  # rounding: of the products of differences
+SETTLED = 1e-4  # accuracy: relative change of the flow in the last round, and rms change of the share
+
+
+def pressure_of(drop: PressureDrop, share: Map) -> Map:
+    """Return the fluid's pressure over the ambient one [Pa] for a share of the drive."""
+    if drop.fluid.molar_mass is None:
+        return drop.low + share * (drop.high - drop.low) - drop.outside
+    return np.sqrt(drop.low**2 + share * (drop.high**2 - drop.low**2)) - drop.outside
+
+
+def linear_share(shape: tuple[int, int]) -> Map:
+    """Return the share in an even gap, a map of `shape` (ny, nx)."""
+    row = 1.0 - (np.arange(shape[1]) + 0.5) / shape[1]
+    return np.broadcast_to(row, shape).copy()
+
+
+def conducting(gap: Map, drop: PressureDrop, share: Map) -> Map:
+    """Return the gaps that pass as much without slip as `gap` [m] does with slip at the local pressure."""
+    if not drop.mean_free_path:
+        return gap
+    local = np.maximum(pressure_of(drop, share) + drop.outside, 0.0)
+    path = drop.mean_free_path * drop.pressures[0] / np.maximum(local, 1e-3 * drop.high)
+    return np.asarray(np.cbrt(gap**2 * (gap + 6.0 * path)))
+
+
+@dataclass(frozen=True)
+class Filled:
+    """The share of the drive in all cells, the flow over that of an even gap with the same mean of g^3, and the part of
+    the flow that passes by the small leak."""
+
+    share: Map
+    flow: float
+
+
+def fill_share(gap: Map, size: tuple[float, float]) -> Filled:
+    """Return the share in a map of conducting gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m]."""
+    cubes = gap.T**3
+    mean = float(cubes.mean())
+    resistances = 1.0 / (cubes / mean + SMALL) if mean > 0.0 else np.ones(cubes.shape)
+    balance, given = Balance(resistances, size[1] / size[0] * gap.shape[1] / gap.shape[0], True), np.zeros(cubes.shape)
+    given[0] = balance.first
+    share = balance.solve(given)
+    return Filled(share.T.copy(), balance.power(share) * size[0] / size[1])
+
+
+class Rounds:
+    """The shares of earlier rounds in a step with a pressure drop of a fluid, on a box of `size` [m]; on root."""
+
+    def __init__(self, drop: PressureDrop, size: tuple[float, float]) -> None:
+        self._drop, self._size, self.count = drop, size, 0
+        self._shares, self._residuals, self._flow = list[Map](), list[Map](), 0.0
+
+    def advance(self, gap: Map, share: Map, most: float) -> tuple[tuple[bool, bool, float], Map]:
+        """Return whether the rounds have settled, whether the fluid lifts the seal off, and the change of the flow, for
+        the gap [m] under the fluid's pressure of a share; and the share of the next round. The mean pressure is
+        at most `most` [Pa]."""
+        self.count += 1
+        drop, last = self._drop, self._flow
+        filled = fill_share(conducting(gap, drop, share), self._size)
+        self._flow = filled.flow
+        mean, wanted = (float(pressure_of(drop, one).mean()) for one in (share, filled.share))
+        change = abs(filled.flow / last - 1.0) if last else math.inf
+        lifted = mean >= (1.0 - SETTLED) * most and wanted >= most
+        moved = math.sqrt(float(np.mean((filled.share - share) ** 2)))
+        settled = drop.high == drop.low or (change < SETTLED and moved < SETTLED)
+        if lifted or settled:
+            return (settled and not lifted, lifted, change), share
+        following = np.clip(self._mixed(share, filled.share), 0.0, 1.0)
+        then = float(pressure_of(drop, following).mean())
+        if then > most:
+            following = (
+                share + max(0.0, (most - mean) / (then - mean)) * (following - share) if mean < most else filled.share
+            )
+        return (False, False, change), following
+
+    def _mixed(self, share: Map, found: Map) -> Map:
+        """Return the share of the next round from that of a round and the one `found` from its gap."""
+        self._shares.append(share)
+        self._residuals.append(found - share)
+        del self._shares[: -DEPTH - 1], self._residuals[: -DEPTH - 1]
+        residual = self._residuals[-1]
+        changes = np.array([(residual - old).ravel() for old in self._residuals[:-1]])
+        if not changes.any():
+            return found
+        moves = np.array([(share - old).ravel() for old in self._shares[:-1]])
+        products = changes @ changes.T
+        products[np.diag_indices_from(products)] += RIDGE * np.trace(products) / len(products)
+        weights = np.linalg.solve(products, changes @ residual.ravel())
+        return share + (residual.ravel() - weights @ (moves + changes)).reshape(share.shape)
+
+
+def seal_flow(gap: Map, drop: PressureDrop, share: Map, size: tuple[float, float]) -> dict[str, float]:
+    """Return the conductivity along x [m^3] that gives the flow of a fluid through a map of gaps [m], its critical
+    constriction [m] and mesh error, and the flow [m^3/s] and [kg/s]."""
+    through = conducting(gap, drop, share).astype(np.float64, copy=False)
+    flow = solve_flow(through, size, "x", True)
+    return {
+        "flow_x": flow.conductivity,
+        "constriction": flow.constriction,
+        "error_x": flow_mesh_error(through, flow, size, "x", True),
+        "flow_rate": drop.flow_rate(flow.conductivity, *size),
+        "mass_flow": drop.mass_flow(flow.conductivity, *size),
+    }
