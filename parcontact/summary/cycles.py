@@ -10,8 +10,13 @@ with the mean force <F> over the time of the cycle, as creep under the mean forc
 repeats the last one dissipates W. `phase` is the angle [rad] by which s lags behind F, of their first harmonics: 0 for
 an elastic body.
 
-Between two rows F and s are Hermite's cubics with slopes by differences. The error of W by this interpolation is
-estimated by that over pairs of steps; its order is at least three.
+Between two rows F and s are Hermite's cubics with slopes by differences. The error of W has up to four parts:
+
+* by this interpolation: that over pairs of steps, of an order of at least three;
+* where something slides, the error of friction, weighted with the force;
+* else by the length of steps: that of a harmonic motion with these steps (`prony.discrete_modulus`), times HARMONICS;
+* by the solver, as for the area (`accuracy.sources`), over the root of the number of steps, and over sin phase, as the
+  loop is the small difference of two paths; and by the mesh, MESH of the error of the area.
 """
 
 import math
@@ -21,10 +26,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ..accuracy.constants import SOLVER_AREA
 from ..columns import CYCLES, names_of, to_csv, values_of
+from ..effects.relaxation import relaxation_of
 from ..job import Job, Stage, Swing
 from ..parallel.slab import Array
-from ..printed import per_cent, quantity
+from ..physics.prony import complex_modulus, discrete_modulus
+from ..printed import per_cent, quantity, stated_error
 from ..storage import files
 from .slide import SAME_INSTANT
 
@@ -32,6 +40,9 @@ TABLE = "cycles.csv"
 LEAST_ROWS = 5  # rows of a cycle with an estimate of the error
 PAIRS = 2.0**3 - 1.0  # accuracy: errors of steps twice as long, minus those of steps, over the latter
 NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.legendre.leggauss(4), (1, 0), strict=True))
+# fitted to spheres in tests/summary/test_cycles.py: errors of steps over those of one harmonic; of solves, which are
+# independent of each other; and of the loss over that of the area (0.25 at most)
+HARMONICS, NOISE, MESH = 2.0, 2.0, 0.3
 Columns = Mapping[str, Sequence[float]]
 
 
@@ -82,7 +93,10 @@ def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str
     else:
         force, place = along, way
     loss, rough = (_loop(time[rows], force[rows], place[rows]) for rows in (slice(None), _every_second(time.size)))
-    error = abs(rough - loss) / PAIRS
+    phase = _harmonic_angle(time, force, stage.frequency) - _harmonic_angle(time, place, stage.frequency)
+    phase = math.remainder(phase, 2.0 * math.pi)
+    error = abs(rough - loss) / PAIRS / abs(loss) if loss else math.nan
+    error += _load_error(job, stage, cycle, phase) if way is None else _friction_error(along, cycle)
     with np.errstate(divide="ignore", invalid="ignore"):
         friction = along / (area * cycle["pressure"]) if stage.speed else np.full(1, np.nan)
     return Cycle(
@@ -90,11 +104,36 @@ def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str
         number,
         stage.frequency,
         loss,
-        error / abs(loss) if loss else math.nan,
+        error,
         0.5 * float(np.ptp(friction)),
         0.5 * float(np.ptp(cycle["approach"])),
-        _harmonic_angle(time, force, stage.frequency) - _harmonic_angle(time, place, stage.frequency),
+        phase,
     )
+
+
+def _friction_error(force: Array, cycle: Mapping[str, Array]) -> float:
+    """Return the mean relative error of friction over a cycle, weighted with the force."""
+    weights, errors = np.abs(force), cycle["error_friction"]
+    known = np.isfinite(errors) & (weights > 0.0)
+    return float(np.average(errors[known], weights=weights[known])) if known.any() else math.nan
+
+
+def _load_error(job: Job, stage: Stage, cycle: Mapping[str, Array], phase: float) -> float:
+    """Return the relative error of the loss by steps, solver and mesh, where nothing moves along the surface."""
+    solver = NOISE * SOLVER_AREA.value * float(np.mean(cycle["residual"])) ** SOLVER_AREA.order
+    solver /= math.sqrt(cycle["time"].size) * abs(math.sin(phase))
+    return _step_error(job, stage, np.diff(cycle["time"])) + solver + MESH * float(np.mean(cycle["error_area"]))
+
+
+def _step_error(job: Job, stage: Stage, dt: Array) -> float:
+    """Return the relative error of the loss of a harmonic load or approach with steps of these lengths [s]."""
+    omega, series = 2.0 * math.pi * stage.frequency, relaxation_of(job.material)
+    if not series.moduli.size:
+        return 0.0
+    true = complex_modulus(np.array([omega]), *series)
+    made = discrete_modulus(omega, dt, *series, integrator=job.numerics.integrator)
+    lost, found = ((g if stage.control == "approach" else -1.0 / g).imag for g in (true, made))
+    return HARMONICS * float(np.average(np.abs(found / lost - 1.0), weights=dt))
 
 
 def measure_last(job: Job, columns: Columns) -> dict[str, float]:
@@ -115,7 +154,9 @@ def write_cycles(directory: Path, job: Job, columns: Columns) -> Iterator[str]:
 def _describe(stage: Stage, cycles: Sequence[Cycle], accuracy: float) -> str:
     """Return a sentence on the last cycle, and whether its loss agrees with that of the one before."""
     *_, last = cycles
-    lost = f"{quantity(last.loss, 'J', 4)} ± {per_cent(last.error_loss)}, phase {math.degrees(last.phase):.3g} degrees"
+    lost = (
+        f"{quantity(last.loss, 'J', 4)} ± {stated_error(last.error_loss)}, phase {math.degrees(last.phase):.3g} degrees"
+    )
     said = f"{stage.name}: loss of cycle {last.cycle} {lost}"
     if len(cycles) == 1:
         return f"{said}; a second cycle would show whether cycles repeat"
