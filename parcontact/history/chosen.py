@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol
 
 from ..job.checks.cells import one_cell
 from ..job.sections.calculation import Grid, Numerics
-from ..job.sections.geometry import Cylinder, Flat, Rough, Sphere, Wave
+from ..job.sections.geometry import Flat, Indenter, Rough, Wave
 from ..job.sections.oscillation import PARTS_OF_CYCLE
 from ..job.sections.stages import Initial, Stage
 
@@ -62,7 +62,7 @@ def most_cells(job: Planned) -> int:
             waves += [n / abs(count) for n, count in zip(grid.points, shape.waves, strict=True) if count]
         elif isinstance(shape, Rough):
             waves.append(shape.short_wavelength / max(cells, default=max(grid.dx, grid.dy)))
-        elif not isinstance(shape, Sphere | Cylinder | Flat):
+        elif not isinstance(shape, Indenter | Flat):
             return 1
     return int(min(MOST_CELLS, 2 ** max(0, math.floor(math.log2(min(waves) / WAVE_STEPS * (1.0 + SAME_TIME))))))
 

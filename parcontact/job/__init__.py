@@ -5,10 +5,14 @@ from .model import Job, describe_job
 from .reading import Case, load, load_cases, select_cases
 from .sections.calculation import Checkpoint, Grid, Numerics, Output, Study
 from .sections.geometry import (
+    Cone,
     Cylinder,
     Flat,
     HeightFile,
+    Indenter,
     OnOneMesh,
+    Punch,
+    Pyramid,
     Rough,
     RoughSpectrum,
     Spectral,

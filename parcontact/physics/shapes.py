@@ -31,6 +31,60 @@ def _circle(r2: Array, radius: float) -> tuple[Array, Array]:
     return -inside / (radius + rest), inverse
 
 
+def _inverse(distance: Array) -> Array:
+    """Return the inverse of a distance, 0 at the centre."""
+    return np.divide(1.0, distance, out=np.zeros_like(distance), where=distance > 0.0)
+
+
+@dataclass(frozen=True)
+class Conical:
+    """A cone with its tip (0) at the centre."""
+
+    steepness: float
+    centre: tuple[float, float]
+
+    def height(self, x: Array, y: Array) -> Array:
+        return -self.steepness * np.hypot(x, y)
+
+    def slope(self, x: Array, y: Array) -> tuple[Array, Array]:
+        factor = -self.steepness * _inverse(np.hypot(x, y))
+        return factor * x, factor * y
+
+
+@dataclass(frozen=True)
+class Pyramidal:
+    """A square pyramid with its tip (0) at the centre and sides along x and y; on its edges the slope is the mean of
+    both faces."""
+
+    steepness: float
+    centre: tuple[float, float]
+
+    def height(self, x: Array, y: Array) -> Array:
+        return -self.steepness * np.maximum(np.abs(x), np.abs(y))
+
+    def slope(self, x: Array, y: Array) -> tuple[Array, Array]:
+        along_x = 0.5 * (1.0 + np.sign(np.abs(x) - np.abs(y)))
+        return -self.steepness * along_x * np.sign(x), -self.steepness * (1.0 - along_x) * np.sign(y)
+
+
+@dataclass(frozen=True)
+class FlatEnded:
+    """A round punch: a flat face (0) of a radius, and around it a parabola with the radius of curvature `edge`."""
+
+    radius: float
+    edge: float
+    centre: tuple[float, float]
+
+    def height(self, x: Array, y: Array) -> Array:
+        beyond = np.maximum(np.hypot(x, y) - self.radius, 0.0)
+        return -(beyond**2) / (2.0 * self.edge)
+
+    def slope(self, x: Array, y: Array) -> tuple[Array, Array]:
+        distance = np.hypot(x, y)
+        factor = -np.maximum(distance - self.radius, 0.0) / self.edge * _inverse(distance)
+        return factor * x, factor * y
+
+
 @dataclass(frozen=True)
 class Round:
     """A sphere, or a cylinder along x or y, with its highest point (0) at the centre; the profile is parabolic or

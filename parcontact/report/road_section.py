@@ -8,7 +8,7 @@ from ..bands.band import Band
 from ..bands.choice import cut_bands, describe_cut
 from ..derived.surface_summary import NOT_SELF_AFFINE
 from ..errors import InputError
-from ..job import Cylinder, Job, Sphere
+from ..job import Indenter, Job
 from ..job.sections import listing
 from ..parallel.fft import FFT
 from ..parallel.slab import Slab
@@ -44,7 +44,7 @@ def road_section(job: Job) -> ReportSection:
     found = statistics.surface_statistics(heights, job.grid.size)
     if not found.rms_height:
         return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
-    waves = any(not isinstance(part, Sphere | Cylinder) for part in job.surface)
+    waves = any(not isinstance(part, Indenter) for part in job.surface)
     tables = [shapes, *([_tabulate(found, "on the grid of the job")] if waves else [])]
     return ReportSection("Surface", sentences, tables, _draw(surface_picture.Sketch(heights, job.grid.size, found)))
 

@@ -19,7 +19,7 @@ from ..parallel.slab import Array, Slab, allocate
 from ..physics import heightfile
 from ..physics.lowest import lowest, shape_of
 from ..physics.roughness import Roughness, shortest_wave
-from ..physics.shapes import Round
+from ..physics.shapes import Conical, FlatEnded, Pyramidal, Round, Shape
 from ..physics.surface import Surface, single_wave
 
 ROUNDING = 1e-8  # accuracy: relative, by which the shortest wavelength of a table is reduced so that it is included
@@ -38,7 +38,7 @@ def make_surface(job: Job, fft: FFT) -> tuple[Surface, Remarks]:
     grid, remarks = job.grid, Remarks([], [])
     spectral = [part for part in job.surface if isinstance(part, jobs.Spectral)]
     waves = reduce(add, (_waves(part, grid, fft, remarks) for part in spectral)) if spectral else None
-    shapes = [_round(part, grid) for part in job.surface if isinstance(part, jobs.Sphere | jobs.Cylinder)]
+    shapes = [_indenter(part, grid) for part in job.surface if isinstance(part, jobs.Indenter)]
     surface = Surface(fft.slab, fft, grid.size, waves, shapes, grid.cyclic)
     surface.level()
     if surface.waves is not None:
@@ -55,11 +55,16 @@ def outline_surface(job: Job, fft: FFT) -> Surface:
     return Surface(fft.slab, fft, job.grid.size, waves)
 
 
-def _round(part: jobs.Sphere | jobs.Cylinder, grid: Grid) -> Round:
+def _indenter(part: jobs.Indenter, grid: Grid) -> Shape:
+    centre = part.center or (grid.lx / 2, grid.ly / 2)
+    if isinstance(part, jobs.Cone | jobs.Pyramid):
+        return (Conical if isinstance(part, jobs.Cone) else Pyramidal)(part.slope, centre)
+    if isinstance(part, jobs.Punch):
+        return FlatEnded(part.radius, part.edge, centre)
     along = (1.0, 1.0)
     if isinstance(part, jobs.Cylinder):
         along = (1.0, 0.0) if part.axis == "y" else (0.0, 1.0)
-    return Round(part.radius, part.center or (grid.lx / 2, grid.ly / 2), along, part.profile == "exact")
+    return Round(part.radius, centre, along, part.profile == "exact")
 
 
 def shortest_measured(job: Job, surface: Surface) -> float | None:

@@ -43,20 +43,13 @@ GRID = {
     "grid: {points: 64, size: 1, zz: 1}": "1:29: grid.zz is not a known key; known keys: points, size, boundary",
 }
 
+SHAPES = "rough | sphere | cylinder | cone | pyramid | punch | wave | file | array | topography | flat"
 SURFACES = {
     "surface: wave": "2:10: surface must be one shape, or a list of shapes, got 'wave'",
     "surface: []": "2:10: surface needs at least one shape, such as shape: flat",
-    "surface: [3]": (
-        "2:11: surface.0 must be a mapping with shape: rough | sphere | cylinder | wave | file | array | topography | "
-        "flat, got 3"
-    ),
-    "surface: {radius: 1}": (
-        "2:10: surface.shape is missing; it must be rough | sphere | cylinder | wave | file | array | topography | flat"
-    ),
-    "surface: [{shape: spher}]": (
-        "2:19: surface.0.shape must be rough | sphere | cylinder | wave | file | array | topography | flat, got "
-        "'spher'; did you mean sphere?"
-    ),
+    "surface: [3]": (f"2:11: surface.0 must be a mapping with shape: {SHAPES}, got 3"),
+    "surface: {radius: 1}": f"2:10: surface.shape is missing; it must be {SHAPES}",
+    "surface: [{shape: spher}]": f"2:19: surface.0.shape must be {SHAPES}, got 'spher'; did you mean sphere?",
     "surface: {shape: sphere}": "2:10: surface.radius is missing; it must be a positive length [m]",
     "surface: {shape: sphere, radius: 1, axis: y}": (
         "2:37: surface.axis is not a key of shape sphere; known keys: shape, radius, profile, center"
@@ -183,7 +176,7 @@ HISTORIES = {
         "4:11: history.0 takes at most one of time_step | cells_per_step, got time_step and cells_per_step"
     ),
     "history: [{pressure: 1, velocity: 1, duration: 1, distance: 1, time_step: 1}]": (
-        "4:11: history.0 takes at most one of duration | distance, got duration and distance"
+        "4:11: history.0 takes at most one of duration | distance | cycles, got duration and distance"
     ),
     "history: [{pressure: 1, time_step: 1}]": (
         "4:36: history.0.time_step needs a duration [s] or a distance [m]: without them a stage is one solve"

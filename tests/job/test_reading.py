@@ -69,7 +69,7 @@ def test_every_mistake_in_order(tmp_path: Path) -> None:
         "job.yaml:15:7: material.branches.1.relaxation_time is missing; it must be a positive time [s]",
         "job.yaml:17:5: history.0 needs exactly one of pressure | force | approach, got pressure and force",
         "job.yaml:18:5: history.1 needs exactly one of pressure | force | approach, got none",
-        "job.yaml:18:5: history.1 takes at most one of duration | distance, got duration and distance",
+        "job.yaml:18:5: history.1 takes at most one of duration | distance | cycles, got duration and distance",
         "job.yaml:18:5: history.1 takes at most one of time_step | cells_per_step, got time_step and cells_per_step",
         "job.yaml:18:12: history.1.name must be text (put numbers in quotes), got 3",
         "job.yaml:18:99: history.1.time_step.first must be a positive time step [s], got 0",

@@ -13,7 +13,7 @@ from typing import Any
 from ...doubts import Doubt
 from ...rubber.shift import doubt_kelvin
 from ..sections.calculation import Grid
-from ..sections.geometry import HeightFile, OnOneMesh, Rough, RoughSpectrum, Sphere, Topography, Wave
+from ..sections.geometry import Cone, HeightFile, OnOneMesh, Pyramid, Rough, RoughSpectrum, Sphere, Topography, Wave
 from ..sections.materials import Elastic, PronyBranch, Zener
 from ..sections.stages import Stage
 from . import Sections, limits
@@ -80,6 +80,8 @@ def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Doubt]:
             square += (q * shape.amplitude) ** 2 / 2
         elif isinstance(shape, Rough):
             square += (shape.rms_slope or 0.0) ** 2
+        elif isinstance(shape, Cone | Pyramid):
+            square += shape.slope**2
     yield from doubt_slope(math.sqrt(square), surface)
 
 

@@ -16,6 +16,7 @@ from .quantities import Flag, Number, Positive, Real, Seed, Whole, both
 Profile = Literal["paraboloid", "exact"]
 Center = Annotated[tuple[Real, Real] | None, Field(description="a position [x, y] [m]")]
 Radius = Annotated[Positive, Field(description="a positive length [m]")]
+Slope = Annotated[Positive, Field(description="a positive slope [-]")]
 Wavelength = Annotated[Positive, Field(description="a positive wavelength [m]")]
 
 MapUnit = Literal["m", "mm", "um", "nm"]
@@ -98,6 +99,31 @@ class Cylinder(Part):
     radius: Radius
     axis: Literal["x", "y"] = "y"
     profile: Profile = "paraboloid"
+    center: Center = None  # default: the middle of the box
+
+
+class Cone(Part):
+    """A circular cone whose surface falls by `slope` from its tip."""
+
+    shape: Literal["cone"] = "cone"
+    slope: Slope
+    center: Center = None  # default: the middle of the box
+
+
+class Pyramid(Part):
+    """A square pyramid with sides along x and y; its faces fall by `slope` from its tip."""
+
+    shape: Literal["pyramid"] = "pyramid"
+    slope: Slope
+    center: Center = None  # default: the middle of the box
+
+
+class Punch(Part):
+    """A round punch with a flat face of `radius`, around which it falls as a parabola with the radius `edge`."""
+
+    shape: Literal["punch"] = "punch"
+    radius: Radius
+    edge: Radius
     center: Center = None  # default: the middle of the box
 
 
@@ -187,11 +213,15 @@ class Flat(Part):
 
 # Shapes given by their waves; the others are closed forms at every point.
 Spectral = Rough | RoughSpectrum | Wave | HeightFile | HeightArray | Topography
+Indenter = Sphere | Cylinder | Cone | Pyramid | Punch
 OnOneMesh = HeightFile | HeightArray  # shapes known at the points of one grid only
 KINDS: dict[str, type[Part]] = {
     "rough": Rough,
     "sphere": Sphere,
     "cylinder": Cylinder,
+    "cone": Cone,
+    "pyramid": Pyramid,
+    "punch": Punch,
     "wave": Wave,
     "file": HeightFile,
     "array": HeightArray,
@@ -208,5 +238,5 @@ def _shape(data: Any, info: ValidationInfo) -> Any:
     return data if isinstance(data, RoughSpectrum) else CHOSEN(data, info)
 
 
-AnyShape = Rough | RoughSpectrum | Sphere | Cylinder | Wave | HeightFile | HeightArray | Topography | Flat
+AnyShape = Rough | RoughSpectrum | Indenter | Wave | HeightFile | HeightArray | Topography | Flat
 Shape = Annotated[AnyShape, PlainValidator(_shape, json_schema_input_type=AnyShape)]
