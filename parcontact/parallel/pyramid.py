@@ -11,11 +11,11 @@ from functools import cached_property
 from itertools import count, pairwise
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from .mpi import MPI
-from .regrid import fetch
-from .rows import RowExchange
+from .rows import RowExchange, numbers_next_to
 from .slab import Slab
 
 Shape = tuple[int, int]  # points of a cell along x and y: 1 or 2
@@ -82,22 +82,23 @@ class PyramidStep:
 
     def complete(self, cells: NDArray[Any]) -> None:
         """Exchange cells if every rank has all of them."""
-        if self.coarse.comm.size < self.fine.comm.size:
-            ends = ending_in(self.fine, self.shape[1])
-            made = Slab(self.fine.comm, self.coarse.nx, self.coarse.ny, self.fine.tally, ends)
-            cells[...] = fetch(made, cells[self.own], [slice(0, made.ny)] * made.comm.size)
+        comm = self.fine.comm
+        if self.coarse.comm.size < comm.size:
+            starts, stops = cells[:1].nbytes * self._ending.T
+            comm.Allgatherv(MPI.IN_PLACE, [cells, (stops - starts, starts), MPI.BYTE])
+            self.fine.tally["bytes sent"] += cells[self.own].nbytes * (comm.size - 1)
 
     def adjacent_points(self, points: NDArray[Any], *offsets: int) -> NDArray[Any]:
         """Return rows next to those of this rank: -1 is the last one above, 0 the first below, 1 the next; shape
         (offsets, nx).
 
-        After the last row follows the first; if the number of rows is odd, with a row of zeros between. It is empty
-        on ranks without points, and for cells of one row.
+        After the last row follows the first; if the number of rows is odd, with a row of zeros between. Ranks without
+        points get zeros. The result is empty for cells of one row.
         """
         if self.shape[1] == 1:
             return points[:0]
         cycle = self.fine.ny + self.fine.ny % 2
-        return self._row_exchange("points", self.fine, self.fine.dealt, cycle, offsets).fetch(points)
+        return self._row_exchange("points", self.fine, self.fine.bounds, cycle, offsets).fetch(points)
 
     def adjacent_cells(self, cells: NDArray[Any], *offsets: int) -> NDArray[Any]:
         """Return the same for rows next to the cells that end in points of this rank."""
@@ -106,21 +107,18 @@ class PyramidStep:
         return self._row_exchange("cells", self.coarse, self._ending, self.coarse.ny, offsets).fetch(cells)
 
     @cached_property
-    def _ending(self) -> list[slice]:
-        """The rows of cells that end in points of each rank."""
-        return list(map(ending_in(self.fine, self.shape[1]), range(self.fine.comm.size)))
+    def _ending(self) -> NDArray[np.int64]:
+        """The rows of cells that end in points of each rank, as in `Slab.bounds`."""
+        parts = map(ending_in(self.fine, self.shape[1]), range(self.fine.comm.size))
+        return np.array([(part.start, part.stop) for part in parts], np.int64)
 
     def _row_exchange(
-        self, what: str, slab: Slab, parts: list[slice], cycle: int, offsets: tuple[int, ...]
+        self, what: str, slab: Slab, bounds: NDArray[np.int64], cycle: int, offsets: tuple[int, ...]
     ) -> "RowExchange":
         """Return the exchange of rows next to the part of each rank with points; it is stored for further calls."""
         key = what, offsets
         if key not in self._kept:
-            wanted = [
-                [((part.start if offset < 0 else part.stop) + offset) % cycle for offset in offsets]
-                if points.start < points.stop
-                else []
-                for part, points in zip(parts, self.fine.dealt, strict=True)
-            ]
-            self._kept[key] = RowExchange(slab, wanted, self.fine.comm.rank)
+            wanted = numbers_next_to(bounds, offsets) % cycle
+            wanted[self.fine.bounds[:, 0] == self.fine.bounds[:, 1]] = -1
+            self._kept[key] = RowExchange.of_numbers(slab, wanted, self.fine.comm.rank)
         return self._kept[key]

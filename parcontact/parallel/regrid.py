@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..compiled import loop
+from .rows import fetch
 from .slab import Array, Slab
 
 COARSEST = 32  # tuning: least points of a coarser grid along a direction
@@ -55,7 +56,7 @@ def highest(fine: Slab, coarse: Slab, field: Array) -> Array:
 def _rows_of_cells(fine: Slab, coarse: Slab, field: Array) -> Array:
     """Return the rows of a map within the rows of cells of this rank."""
     fy, _ = factors(fine, coarse)
-    return fetch(fine, field, [slice(fy * part.start, fy * part.stop) for part in coarse.dealt])
+    return fetch(fine, field, fy * coarse.bounds)
 
 
 @loop
@@ -81,32 +82,5 @@ def _spread(cells: Array, above: int, fy: int, fx: int, out: Array) -> None:
 def prolong(coarse: Slab, fine: Slab, field: Array, out: Array) -> Array:
     """Put the value of each coarse cell into all its fine cells, so that points far from contact get no pressure."""
     fy, fx = factors(fine, coarse)
-    wanted = [slice(part.start // fy, (part.stop + fy - 1) // fy) for part in fine.dealt]
-    _spread(fetch(coarse, field, wanted), fine.rows.start % fy, fy, fx, out)
+    _spread(fetch(coarse, field, (fine.bounds + np.array([0, fy - 1])) // fy), fine.rows.start % fy, fy, fx, out)
     return out
-
-
-def fetch(slab: Slab, field: Array, wanted: list[slice]) -> Array:
-    """Return rows of a map for this rank; `wanted` has the rows for every rank."""
-    comm, mine = slab.comm, wanted[slab.comm.rank]
-    if comm.size == 1:
-        return field[mine]
-    out = np.empty((mine.stop - mine.start, slab.nx), field.dtype)
-    sent = [_overlap(slab.rows, theirs) for theirs in wanted]
-    got = [_overlap(mine, theirs) for theirs in slab.dealt]
-    width = slab.nx * field.itemsize
-    leaving, arriving = _message(sent, slab.rows.start, width), _message(got, mine.start, width)
-    comm.Alltoallv([np.ascontiguousarray(field).view(np.uint8), leaving, "B"], [out.view(np.uint8), arriving, "B"])
-    slab.tally["bytes sent"] += sum(leaving[0]) - leaving[0][comm.rank]
-    return out
-
-
-def _overlap(a: slice, b: slice) -> slice:
-    start = max(a.start, b.start)
-    return slice(start, max(start, min(a.stop, b.stop)))
-
-
-def _message(parts: list[slice], origin: int, width: int) -> tuple[list[int], list[int]]:
-    """Return counts and displacements in bytes."""
-    counts = [(part.stop - part.start) * width for part in parts]
-    return counts, [(part.start - origin) * width if count else 0 for part, count in zip(parts, counts, strict=True)]

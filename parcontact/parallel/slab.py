@@ -62,6 +62,7 @@ class Slab:
         self.rows = self.rows_of(comm.rank)
         self.shape = (self.rows.stop - self.rows.start, nx)
         self.tally = Tally() if tally is None else tally
+        self.exchanges: dict[Any, Any] = {}  # plans of `rows`, kept as long as the slab
 
     @staticmethod
     def alone(nx: int, ny: int, tally: Tally | None = None) -> "Slab":
@@ -82,6 +83,11 @@ class Slab:
     def dealt(self) -> list[slice]:
         """The rows of every rank."""
         return [self.rows_of(rank) for rank in range(self.comm.size)]
+
+    @cached_property
+    def bounds(self) -> NDArray[np.int64]:
+        """The first row of every rank and the one after its last, shape (ranks, 2)."""
+        return np.array([(part.start, part.stop) for part in self.dealt], np.int64)
 
     @property
     def only_counts(self) -> bool:

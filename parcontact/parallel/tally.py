@@ -14,9 +14,9 @@ class Tally(Counter[str]):
     """Named counts of one rank, e.g. `tally["operator"]`; a name never counted reads 0.
 
     Names in use: `fft` (2-D transforms, forward or backward), `fft 2048x2048 float64` (the same by size and
-    precision), `operator` (applications of a pressure -> displacement operator or its inverse), `allreduce`, `bytes
-    sent` (to other ranks in transforms and moves of rows), `map bytes` (held in maps and transform buffers), `map
-    bytes at most` (their maximum), `shift` (sub-cell shifts of a surface).
+    precision), `operator` (applications of a pressure -> displacement operator or its inverse), `allreduce`, `messages`
+    (with rows, to single ranks), `bytes sent` (to other ranks in transforms and moves of rows), `map bytes` (held in
+    maps and transform buffers), `map bytes at most` (their maximum), `shift` (sub-cell shifts of a surface).
 
     If it `only_counts`, arrays take no memory (`Ledger`). Only a ledger uses the `purpose` of arrays.
     """

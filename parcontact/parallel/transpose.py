@@ -1,9 +1,11 @@
 """Exchange between the passes of a distributed transform: rows with all x-wavenumbers become all rows of some.
 
-It is made in legs, each of some rows of every rank, so that messages never take more than a part of a map.
+It is made in legs, each of some rows of every rank, so that messages never take more than a part of a map. A leg is
+sent before the next one is packed: to pack meanwhile takes a second buffer, and gained nothing on two ranks.
 """
 
-from itertools import pairwise
+from collections.abc import Iterator
+from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,11 +49,13 @@ class Leg:
         self._first, height = rows[own].start - slab.rows.start, rows[own].stop - rows[own].start
         counts = [0 if rank == own else height * (part.stop - part.start) for rank, part in enumerate(dealt)]
         starts = [sum(counts[:rank]) for rank in range(slab.comm.size)]
-        self._parcels: list[Waves] = [
-            wire[start : start + count].reshape(height, count // max(height, 1))
-            for start, count in zip(starts, counts, strict=True)
-        ]
-        self._parcels[own] = spectrum[rows[own]]
+        self._parcels: list[tuple[Waves, slice]] = []
+        for ranks in _runs(dealt, own):
+            columns = slice(dealt[ranks[0]].start, dealt[ranks[-1]].stop)
+            shape = len(ranks), height, (columns.stop - columns.start) // len(ranks)
+            first, count = starts[ranks[0]], shape[0] * shape[1] * shape[2]
+            parcel = spectrum[None, rows[own]] if own in ranks else wire[first : first + count].reshape(shape)
+            self._parcels.append((parcel, columns))
         column_counts = [0 if rank == own else mine * (part.stop - part.start) for rank, part in enumerate(rows)]
         column_starts = [mine * part.start for part in rows]
         kind = MPI.C_DOUBLE_COMPLEX if spectrum.dtype == np.complex128 else MPI.C_FLOAT_COMPLEX
@@ -61,9 +65,8 @@ class Leg:
 
     def post(self, rows: slice, waves: Waves) -> None:
         """Copy a block of this rank's rows into the spectrum and the messages."""
-        place = slice(rows.start - self._first, rows.stop - self._first)
-        for parcel, columns in zip(self._parcels, self._dealt, strict=True):
-            parcel[place] = waves[:, columns]
+        for parcel, part in self._parts(rows, waves):
+            parcel[...] = part
 
     def to_columns(self) -> None:
         """Exchange the messages; collective."""
@@ -75,6 +78,21 @@ class Leg:
 
     def collect(self, rows: slice, waves: Waves) -> None:
         """Reverse `post`."""
+        for parcel, part in self._parts(rows, waves):
+            part[...] = parcel
+
+    def _parts(self, rows: slice, waves: Waves) -> Iterator[tuple[Waves, Waves]]:
+        """Yield the places of a block of rows in the messages to each run of ranks, and its waves, shape (ranks, rows,
+        wavenumbers) each."""
         place = slice(rows.start - self._first, rows.stop - self._first)
-        for parcel, columns in zip(self._parcels, self._dealt, strict=True):
-            waves[:, columns] = parcel[place]
+        for parcel, columns in self._parcels:
+            part = waves[:, columns].reshape(len(waves), len(parcel), parcel.shape[2])  # a view
+            yield parcel[:, place], part.transpose(1, 0, 2)
+
+
+def _runs(dealt: list[slice], own: int) -> list[list[int]]:
+    """Return runs of ranks with wavenumbers, the same number each, so that one copy serves all ranks of a run; `own` is
+    alone."""
+    having = [rank for rank, part in enumerate(dealt) if part.stop > part.start]
+    runs = groupby(having, lambda rank: (rank < own, rank > own, dealt[rank].stop - dealt[rank].start))
+    return [list(run) for _, run in runs]

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..parallel.regrid import fetch
+from ..parallel.rows import RowExchange
 from ..parallel.slab import Array, Slab
 from .constraint import CELL, Cells, Constraint
 
@@ -35,9 +35,10 @@ class LocalLoad:
         stacked = [slice(start, stop) for start, stop in pairwise(ends)]
         self._stack = Slab(slab.comm, 2 * width, ends[-1], slab.tally, stacked.__getitem__)
         numbers = np.concatenate([np.arange(part.start, part.stop) for part in touched])
-        self._wanted = [slice(*np.searchsorted(numbers, [part.start, part.stop]).tolist()) for part in touched]
+        wanted = np.searchsorted(numbers, [(part.start, part.stop) for part in touched])
+        self._exchange = RowExchange.of_parts(self._stack, wanted)
         own = np.arange(touched[rank].start, touched[rank].stop)
-        self._starts = np.searchsorted(numbers[self._wanted[rank]], own)
+        self._starts = np.searchsorted(numbers[slice(*wanted[rank].tolist())], own)
         self._cells = Cells(rows, slab.rows.start % rows, columns)
         self._sums = np.zeros(self._stack.shape)
 
@@ -59,7 +60,7 @@ class LocalLoad:
 
     def _complete(self, own: Array) -> Array:
         """Return sums over whole cells, for cells with points on this rank."""
-        parts = fetch(self._stack, own, self._wanted)
+        parts = self._exchange.fetch(own)
         return np.add.reduceat(parts, self._starts, axis=0) if len(parts) else parts
 
 
