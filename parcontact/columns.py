@@ -263,6 +263,12 @@ CYCLES: Table = (
     Column("phase", "rad", "by which the displacement lags behind the force, of their first harmonics"),
 )
 
+BANDS_OVER_TIME: Table = (
+    Column("time", "s", "since the start of the history"),
+    Column("distance", "m", "slid since the start"),
+    *BANDS[1:],
+)
+
 THEORY: Table = (
     Column("time", "s", "instant of the job"),
     Column("distance", "m", "slid"),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..accuracy.budget import ErrorBudget
 from ..accuracy.observation import properties_of
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job
@@ -21,11 +22,12 @@ from ..scene import Setup, choices, set_up
 from ..solve import kernels
 from ..solve.constraint import NonNegative
 from ..solve.interface_law import InterfaceLaw
-from ..solve.nonsymmetric.judge import Judge
+from ..solve.nonsymmetric.judge import Judge, SteadyContact
 from ..solve.nonsymmetric.splitting import Splitting
 from ..solve.problem import MeanPressure
 from ..steady_sliding.losses import branch_powers
 from ..steady_sliding.sliding import judge_state, tolerance_of
+from .band_steps import parts_of_history
 from .choice import Cut
 from .ladder import PressureLadder
 
@@ -63,7 +65,7 @@ class Rung:
     depths: Array
     squares: Array
     strain_weights: Array
-    errors: Array  # friction by solver and by grid, area by solver and by grid
+    errors: Array  # friction by solver, time steps and grid, and the same of area
     residual: float
     penetration: float
     operator_calls: float
@@ -87,12 +89,14 @@ class Band:
             heights = fft.backward(waves, fft.slab.empty())
         slab = Slab.alone(*grid.points)
         surface = (HeightArray(heights=GivenHeights(np.asarray(heights))),)
-        own = job.model_copy(update={"grid": grid, "surface": surface, "bands": None})
+        self.parts = parts_of_history(job, grid, cut.wavelengths(number)[0])
+        history = tuple(stage for stage, _ in self.parts)
+        own = job.model_copy(update={"grid": grid, "surface": surface, "bands": None, "history": history})
         self._wavenumbers = float(cut.edges[0]), float(cut.edges[-1])  # of all bands
         self.warming: Warming | None = None
         self._warmed_for: tuple[Vector, float] | None = None
-        self._set_up(set_up(own, slab))
-        self._heights = self.setup.surface.heights((0.0, 0.0), slab.empty())
+        self._set_up(set_up(own, slab, measured=False))  # the same digits in every run, on any number of ranks
+        self.heights = self.setup.surface.heights((0.0, 0.0), slab.empty())
 
     def _set_up(self, setup: Setup) -> None:
         self.setup = setup
@@ -114,7 +118,7 @@ class Band:
             body, moved = self.setup.half_space, (self.setup.fft, self.setup.in_units(velocity), self.setup.prony)
             self.operator: Convolution = body.sliding_operator(*moved)
             self._inverse = body.sliding_inverse(*moved)
-            self._full = float(np.std(self._inverse.apply(self._heights, self.setup.slab.empty())))
+            self._full = float(np.std(self._inverse.apply(self.heights, self.setup.slab.empty())))
             section = self.setup.job.section("thermal")
             if section is not None and self._warmed_for != (velocity, seconds):
                 from ..effects.heat.bands import warming_of, waves_along_depth
@@ -129,28 +133,30 @@ class Band:
         """Rms pressure [Pa] of its waves in full contact."""
         return self._full * self.setup.units.pressure
 
+    def contact(self, pressure: float, law: InterfaceLaw) -> SteadyContact:
+        """Return the contact in steady sliding under a mean pressure [Pa]; see `solve`."""
+        setup, units = self.setup, self.setup.units
+        judge = Judge(setup.slab, setup.height / units.height)
+        tolerance = tolerance_of(setup.choices.numerics.tolerance)
+        solver = Splitting(judge, self.operator, self._inverse, tolerance, MOST_STEPS)
+        given = MeanPressure(pressure / units.pressure), law.in_units(units.pressure, units.height)
+        contact = solver.solve(self.heights, *given, setup.slab.zeros())
+        if contact.failure:
+            raise RunError(f"a band of {max(setup.grid.size):.3g} m under {pressure:.3g} Pa {contact.failure}")
+        return contact
+
     def solve(self, pressure: float, law: InterfaceLaw, below: PressureLadder | None) -> Rung:
         """Return the steady state under a mean pressure [Pa] with the closing of all finer bands [m over Pa], and its
         distribution over `below`, the ladder of the next finer band. Raises RunError if it is not found."""
-        setup, velocity, units = self.setup, self._velocity, self.setup.units
-        mean = pressure / units.pressure
-        judge, tolerance = (
-            Judge(setup.slab, setup.height / units.height),
-            tolerance_of(setup.choices.numerics.tolerance),
-        )
-        solver = Splitting(judge, self.operator, self._inverse, tolerance, MOST_STEPS)
-        given = MeanPressure(mean), law.in_units(units.pressure, units.height)
-        contact = solver.solve(self._heights, *given, setup.slab.zeros())
-        if contact.failure:
-            raise RunError(f"a band of {max(setup.grid.size):.3g} m under {pressure:.3g} Pa {contact.failure}")
-        seen = contact.u, self._heights, contact.d, NonNegative().touches(contact.p)
+        setup, velocity, contact = self.setup, self._velocity, self.contact(pressure, law)
+        units = setup.units
+        seen = contact.u, self.heights, contact.d, NonNegative().touches(contact.p)
         measures = self.probe.measure(contact.p, 1.0, *seen, (0.0, 0.0), velocity)
-        lost = self.operator.loss(contact.p, setup.size, _unit(velocity)) / kernels.sum_of(contact.p)
+        lost = self.operator.loss(contact.p, setup.size, direction_of(velocity)) / kernels.sum_of(contact.p)
         by_energy = lost * units.height / units.length
         friction, budget = judge_state(setup, self._known, contact.certificate, by_energy, velocity, measures)
         weights, above = (np.zeros(0), 0.0) if below is None else below.weights_of_rungs(contact.p * units.pressure)
-        area, along = setup.grid.lx * setup.grid.ly, _unit(velocity)
-        parts = [(part.solver, part.mesh) if part else (0.0, 0.0) for part in (budget.friction, budget.area)]
+        area, along = setup.grid.lx * setup.grid.ly, direction_of(velocity)
         return Rung(
             pressure,
             friction,
@@ -164,7 +170,7 @@ class Band:
             branch_powers(setup, contact, velocity).sum(axis=1) / area,
             *self._heat_of(contact.p),
             *self._strains_of(contact.u),
-            np.array(parts).ravel(),
+            rung_errors(budget),
             contact.certificate.worst,
             contact.certificate.penetration,
             float(contact.steps),
@@ -190,6 +196,12 @@ class Band:
         depths = depths_between(*self._wavenumbers) / setup.units.length
         found = strains_of(setup, u, self._velocity, depths, all_waves, 1)
         return found.squares, found.weights[0]
+
+
+def rung_errors(budget: ErrorBudget | None) -> Array:
+    """Return the errors of a rung from the budget of its contact."""
+    both = (budget.friction, budget.area) if budget else (None, None)
+    return np.array([(p.solver + p.folded, p.time, p.mesh) if p else (0.0, 0.0, 0.0) for p in both]).ravel()
 
 
 def _make_waves(cut: Cut, number: int, seed: int, fft: FFT, side: float) -> Spectrum:
@@ -225,6 +237,7 @@ def _seed(job: Job, number: int, sample: int) -> int:
     return int(np.random.SeedSequence([seed, number, sample]).generate_state(1, np.uint64)[0])
 
 
-def _unit(velocity: Vector) -> Vector:
+def direction_of(velocity: Vector) -> Vector:
+    """Return the direction of a velocity."""
     speed = math.hypot(*velocity)
     return velocity[0] / speed, velocity[1] / speed

@@ -9,10 +9,15 @@ from ..solve.interface_law import HARD
 from ..steady_sliding.curve import request
 from .cascade import Cascade, Task
 from .choice import FEWEST, cut_bands, describe_cut
+from .road_history import RoadHistory
 
 
 def plan_bands(job: Job, slab: Slab) -> Iterator[str]:
-    """Yield lines on the bands of a job and the time of its points; collective, all ranks must take every line."""
+    """Yield lines on the bands of a job and the time of its points or marches; collective, all ranks must take every
+    line."""
+    if job.history:
+        yield from _plan_history(job, slab)
+        return
     wanted, cut = request(job), cut_bands(job)
     yield from describe_cut(cut, job)
     cascade = Cascade(job, cut, slab)
@@ -29,3 +34,20 @@ def plan_bands(job: Job, slab: Slab) -> Iterator[str]:
     points = len(wanted.points)
     yield f"parcontact steady: {points} steady states of {of_point} contacts or more, {each * 1e3:.3g} ms each"
     yield f"on {slab.comm.size} rank{'s' * (slab.comm.size > 1)}: {points * of_point * each:.3g} s or more in all"
+
+
+def _plan_history(job: Job, slab: Slab) -> Iterator[str]:
+    """Yield lines on the marches of a history, from the march of a middle rung of the finest band."""
+    road = RoadHistory(job, slab)
+    yield from road.notes()
+    tasks, steps = road.tasks(), road.steps()
+    began = time.perf_counter()
+    road.try_march()
+    each = slab.agree((time.perf_counter() - began) / steps[-1])
+    for of_band in tasks:
+        number = of_band[0].band
+        long, short = road.cut.wavelengths(number)
+        yield f"band from {long:.3g} to {short:.3g} m: {len(of_band)} marches of {steps[number]} steps"
+    rounds = sum(-(-len(of_band) // slab.comm.size) * steps[of_band[0].band] for of_band in tasks)
+    ranks = f"{slab.comm.size} rank{'s' * (slab.comm.size > 1)}"
+    yield f"parcontact: {sum(map(len, tasks))} marches, {each * 1e3:.3g} ms a step; on {ranks}: {rounds * each:.3g} s"

@@ -13,7 +13,7 @@ it, and the weights w_j of `ladder`. Contacts of one pass are independent: ranks
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from .choice import Cut
 from .contact_store import ContactStore
 from .ladder import PressureLadder
 
+T = TypeVar("T")
 TINY = 1e-300  # rounding: least power, to avoid division by 0
 NEGLIGIBLE = 1e-12  # accuracy: least share of the load of a rung that is solved without laws
 
@@ -46,7 +47,7 @@ class BandResult:
     Its weights and load [Pa]; friction of its waves over the whole load [-], by energy and by slopes; area at its
     shortest wave, counted and corrected; share of the load above its ladder; power [W/m^2] per branch; S_j and g of
     its heat (`effects.heat.bands`), averaged over the load; squares of strains at all depths and their weights
-    (`Rung`), averaged over the power; absolute errors of friction and of area by solver and grid.
+    (`Rung`), averaged over the power; absolute errors of friction and of area by solver, time steps and grid.
     """
 
     weights: Array
@@ -100,7 +101,7 @@ class Cascade:
         """Time for which the rubber has slid [s]: over the distance of `thermal`, or over the box of the
         coarsest band."""
         section = self.job.section("thermal")
-        return ((section and section.distance) or self.cut.box) / math.hypot(*self.velocity)
+        return ((section and section.distance) or self.cut.box) / (math.hypot(*self.velocity) or math.inf)
 
     def set_temperatures(self, temperatures: Sequence[float]) -> None:
         """Set the temperatures [deg C] of the bands; NaN for the temperature of the material."""
@@ -133,13 +134,15 @@ class Cascade:
                 own = [next(solved) for _ in rungs]
                 found[number, sample] = [replace(rung, approach=rung.approach + touching[sample]) for rung in own]
                 if number:
-                    laws[sample], touching[sample] = self.closing_of(number, found[number, sample])
+                    laws[sample], touching[sample] = self.closing_of(
+                        number, [rung.approach for rung in found[number, sample]]
+                    )
         return found
 
-    def closing_of(self, number: int, rungs: Sequence[Rung]) -> tuple[InterfaceLaw, float]:
-        """Return the closing of a band and all finer ones, and their approach [m] where c is 0, without the residual of
-        the solver."""
-        closings = np.maximum.accumulate([rung.approach for rung in rungs])
+    def closing_of(self, number: int, approaches: Sequence[float] | Array) -> tuple[InterfaceLaw, float]:
+        """Return the closing of a band and all finer ones by the approaches [m] of its rungs, and the approach where c
+        is 0, without the residual of the solver."""
+        closings = np.maximum.accumulate(approaches)
         law = InterfaceLaw.of_table(self.ladders[number].rungs, closings)
         return law, float(closings[0] - law.closings[1])
 
@@ -175,7 +178,7 @@ class Cascade:
             np.sum([w * rung.depths for w, rung in zip(loads / loads.sum(), rungs, strict=True)], axis=0),
             _mean_over(loads * energy, [rung.squares for rung in rungs]),
             _mean_over(loads * energy, [rung.strain_weights for rung in rungs]),
-            np.array([*((loads * energy) @ errors[:, :2] / self.pressure), *(areas @ errors[:, 2:])]),
+            np.array([*((loads * energy) @ errors[:, :3] / self.pressure), *(areas @ errors[:, 3:])]),
         )
 
     def hard(self, sample: int) -> Results:
@@ -198,16 +201,16 @@ class Cascade:
         laws = [(task.law.pressures.tobytes(), task.law.closings.tobytes()) for task in tasks]
         here = self.velocity, self.pressure, self._temperatures, self._strains and self._strains[1]
         states = [(here, task[:3], law) for task, law in zip(tasks, laws, strict=True)]
-        return self.store.find(states, lambda lacking: self._share([tasks[number] for number in lacking]))
+        return self.store.find(states, lambda lacking: self.share([tasks[number] for number in lacking], self._solve))
 
-    def _share(self, tasks: Sequence[Task]) -> list[Rung]:
-        """Solve the contacts of the tasks, each on one rank."""
+    def share(self, tasks: Sequence[T], solve: Callable[[T], Rung]) -> list[Rung]:
+        """Solve tasks, each on one rank. Raises RunError on all ranks if one fails."""
         rank, size = self.slab.comm.rank, self.slab.comm.size
         own: list[Rung | None] = []
         problem = ""
         for task in tasks[rank::size]:
             try:
-                own.append(self._solve(task))
+                own.append(solve(task))
             except (RunError, InputError) as error:
                 problem = str(error)
                 own.append(None)

@@ -21,7 +21,7 @@ from ..scene import Setup, choices
 from ..solve.certificate import Certificate
 from ..steady_sliding.curve import States, on_one_grid
 from ..steady_sliding.point import Point
-from .band import Rung, Vector
+from .band import Rung, Vector, direction_of
 from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, cut_bands, describe_cut, doubts_of_bands
 from .steep_waves import STRAIN
@@ -91,6 +91,7 @@ class RoadSliding:
 
     def __init__(self, job: Job, slab: Slab) -> None:
         self.job, self.slab, self.cut = job, slab, cut_bands(job)
+        self.table = None if job.history else RoadSliding.table  # of a history it has the history
         self._cascade = Cascade(job, self.cut, slab)
         self.setup: Setup = replace(self._cascade.band(0, 0).setup, slab=slab)
         self.temperature, self._own_temperature = math.nan, temperature_of(job.material)
@@ -151,13 +152,17 @@ class RoadSliding:
 
     def rows(self, velocity: Vector) -> list[list[float]]:
         """Return the lines of bands.csv for the last state."""
-        point, cut, rows = self._point, self.cut, []
-        assert point is not None
+        assert self._point is not None
+        return self._rows(self._point, [self._point.speed])
+
+    def _rows(self, point: Point, instant: Sequence[float]) -> list[list[float]]:
+        """Return the lines of bands.csv for a state; `instant` has its first columns."""
+        cut, rows = self.cut, []
         for number, result in enumerate(self._results):
             last = number + 1 == cut.count
             friction = result.friction + (point.measures.friction_interface if last else 0.0)
             slope_to = cut.rms_slope(number, 0)
-            place = point.speed, point.measures.pressure, point.temperature, float(number)
+            place = *instant, point.measures.pressure, point.temperature, float(number)
             rise = self._rises[number] if self._rises else math.nan
             found = friction, result.contact_area, cut.rms_slope(number), rise, result.load_lost
             strains = slope_to, STRAIN * slope_to, self._strains_of(self._results)[number] if self._table else math.nan
@@ -308,7 +313,7 @@ class RoadSliding:
         box, rubbed = self.setup.grid.lx * self.setup.grid.ly, self._rub(results)
         slopes = sum(result.friction_slopes for result in results) + rubbed / pressure
         friction = outcome.friction + rubbed / pressure
-        direction = (velocity[0] / math.hypot(*velocity), velocity[1] / math.hypot(*velocity))
+        direction = direction_of(velocity) if any(velocity) else (1.0, 0.0)
         pressed = [rung for rung, weight in zip(outcome.rungs[-1], finest.weights, strict=True) if weight > 0.0]
         measures = Measures(
             pressure=finest.load,
@@ -340,15 +345,20 @@ class RoadSliding:
         the area that coarser bands leave, so that relative errors of areas by their grids add up."""
         area = outcome.results[-1].contact_area_corrected
         lost = sum(result.load_lost for result in outcome.results)
-        of_bands = np.sum([result.errors for result in outcome.results], axis=0)[:2]
-        grids = [result.errors[3] / (result.contact_area_corrected or 1.0) for result in outcome.results]
-        of_area = outcome.results[-1].errors[2], sum(grids) * area
+        of_bands = np.sum([result.errors for result in outcome.results], axis=0)[:3]
+        shares = [result.errors[4:] / (result.contact_area_corrected or 1.0) for result in outcome.results]
+        of_area = outcome.results[-1].errors[3], *(np.sum(shares, axis=0) * area)
         method, scatter = outcome.method, [SURE * error for error in outcome.scatter]
         parts = [
             ErrorParts(
-                solver / whole, 0.0, 0.0, mesh / whole, method=method[k] / whole + lost, scatter=scatter[k] / whole
+                solver / whole,
+                steps / whole,
+                0.0,
+                mesh / whole,
+                method=method[k] / whole + lost,
+                scatter=scatter[k] / whole,
             )
-            for k, (whole, (solver, mesh)) in enumerate(((friction or 1.0, of_bands), (area or 1.0, of_area)))
+            for k, (whole, (solver, steps, mesh)) in enumerate(((friction or 1.0, of_bands), (area or 1.0, of_area)))
         ]
         own = self._interface_share(outcome, friction)
         with_interface = parts[0]._replace(method=parts[0].method + own * parts[1].method)

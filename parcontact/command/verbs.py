@@ -33,8 +33,14 @@ def _run(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int
     if not job.history:
         return _curve(options, job, slab, shows)
     sweep_stop_file = getattr(options, "sweep_stop_file", None)
-    chosen = (options.quiet, options.restart, options.until, options.wall)
-    return runner.run_job(job, slab, Options(*chosen, sweep_stop_file=sweep_stop_file, shows=shows))
+    chosen = Options(
+        options.quiet, options.restart, options.until, options.wall, sweep_stop_file=sweep_stop_file, shows=shows
+    )
+    if job.bands is not None:
+        from ..run.road_run import run_history
+
+        return run_history(job, slab, chosen)
+    return runner.run_job(job, slab, chosen)
 
 
 def steady(options: argparse.Namespace) -> int:
@@ -73,7 +79,7 @@ def check(options: argparse.Namespace) -> int:
     job = chosen[0].job
     _check_study(options, chosen)
     print(jobs.describe_job(job))
-    steps = describe_steps(job)
+    steps = "" if job.bands is not None else describe_steps(job)
     steps = steps and f"chosen time steps: {steps}"
     notes: list[list[str]] = []
     doubts = sentences_of(chosen, lambda one: _doubts(one, notes))

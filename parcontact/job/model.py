@@ -256,10 +256,15 @@ def extended_model(sections: tuple[str, ...]) -> type[Job]:
         _named_rule(name, rule) for name, rule in every if made.model_fields.keys() >= set(rule.needs)
     )
     laws = (limits.refuse_steady(name) for name, effect in effects.items() if getattr(effect, "brings_law", False))
+    single = (limits.refuse_bands_over_time(name) for name, effect in effects.items() if not _in_bands(effect))
     lifted = [check for effect in effects.values() for check in getattr(effect, "lifts", ())]
     kept = (rule for rule in Job.rules if rule.check not in lifted)
-    made.rules = (*kept, *laws, *own)
+    made.rules = (*kept, *laws, *single, *own)
     return made
+
+
+def _in_bands(effect: Any) -> bool:
+    return bool(getattr(effect, "in_bands_over_time", False))
 
 
 def _named_rule(section: str, rule: Rule) -> Rule:

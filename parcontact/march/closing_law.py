@@ -10,6 +10,8 @@ effect provides this law (`effects.effect.Effect.law`); it is solved by splittin
 Energies of the run do not include the work on the finer roughness.
 """
 
+from collections.abc import Callable
+
 from ..effects.contact_protocol import PreviousContacts, SolvedContact
 from ..errors import InputError
 from ..history.timeline import Step
@@ -25,16 +27,18 @@ from ..solve.problem import Control, MeanPressure
 from .dry_law import DryLaw
 from .starts import make_start
 
+SOFTER = 4.0  # tuning: most modulus of the last step over that of this one, for a start from its pressures
 MOST_STEPS = 20000  # tuning: limit on the steps of the splitting for one contact
 
 
 class ClosingLaw(DryLaw):
-    """Law of a scene with the closing c [m] as a function of the pressure [Pa]. It has no memory of its own.
+    """Law of a scene with the closing c [m] as a function of the pressure [Pa], at the end of each step. It has no
+    memory of its own.
 
     Raises InputError for a body that moves in the mean, and for a hardness.
     """
 
-    def __init__(self, scene: Scene, law: InterfaceLaw) -> None:
+    def __init__(self, scene: Scene, law: Callable[[Step], InterfaceLaw]) -> None:
         super().__init__(scene)
         body, setup = scene.setup.half_space, scene.setup
         if body.moves_in_the_mean or scene.job.material.hardness is not None:
@@ -59,11 +63,11 @@ class ClosingLaw(DryLaw):
         if isinstance(control, MeanPressure) and control.value == 0.0:
             return super().solve(trial, step, control, memory, past, before, tolerance)
         scene, p = self.scene, past.spare
-        if past.last.alpha > 0.0:  # a contact is known
+        if 0.0 < past.last.alpha <= SOFTER * trial.alpha:  # a contact is known, of about as many points
             make_start(scene, past.pressures, step, trial.alpha, p)
         else:
             p.fill(0.0)
-        law = self._law.in_units(trial.alpha * scene.units.pressure, scene.units.height)
+        law = self._law(step).in_units(trial.alpha * scene.units.pressure, scene.units.height)
         found = self._splitting.solve(trial.effective, control, law, p, tolerance)
         contact = Contact(p, found.u, found.d, found.certificate, found.steps, found.failure)
         return SolvedContact(contact, None, NonNegative().touches(p))

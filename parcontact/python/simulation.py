@@ -51,6 +51,11 @@ class Simulation:
         self.job = read_job_here(job, set, self.comm)
         if not self.job.history:
             raise InputError("the job has no history to run; parcontact.steady solves its steady states")
+        if self.job.bands is not None:
+            raise InputError(
+                "a job in bands has no steps in memory, as its rows exist when the coarsest band is done: run it by "
+                "`parcontact job.yaml`, and read its results by parcontact.open"
+            )
         self._slab = Slab(self.comm, *self.job.grid.points)
         self._saved: Contents | None = None
         self._march_made: March | None = None

@@ -194,10 +194,10 @@ class Scene:
         return contact_law.constraint_of(self.job, alpha * self.units.pressure, most)
 
 
-def set_up(job: Job, slab: Slab, until: float = 0.0) -> Setup:
+def set_up(job: Job, slab: Slab, until: float = 0.0, measured: bool = True) -> Setup:
     """Return the setup of a job for a march to the end of its history or, if later, to `until` [s]; collective. Raises
-    InputError for files that do not fit."""
-    chosen, fft = choices(job, until), FFT(slab)
+    InputError for files that do not fit. Transforms are `measured` (`parallel.fft.FFT`)."""
+    chosen, fft = choices(job, until), FFT(slab, measured=measured)
     surface, remarks = make_surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
     shortest = shortest_measured(job, surface)

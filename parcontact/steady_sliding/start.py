@@ -1,13 +1,14 @@
 """Start of a march from steady sliding: contact, displacement and branches of a surface that has always slid."""
 
 from dataclasses import replace
+from typing import Any
 
 from ..accuracy.controller import tolerance_before
 from ..job import Job
 from ..march.loop import March
 from ..march.state import first_state, pressed_state
 from ..parallel.slab import Slab
-from ..scene import Setup, build_on, sanity, set_up
+from ..scene import Scene, Setup, build_on, sanity, set_up
 from ..solve.nonsymmetric.judge import SteadyContact
 from ..storage.checkpoint import Contents
 from .losses import branch_maps
@@ -29,6 +30,18 @@ def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = Non
     if saved is not None:
         march.restore(saved)
     return march
+
+
+def begin(scene: Scene, contact: SteadyContact | None = None, **of_row: Any) -> March:
+    """Return a march on a scene from rest, or from a `contact` in steady sliding at the velocity of its job's `initial`
+    section, with the values `of_row` in the row of time 0; collective."""
+    if contact is None:
+        return March(scene)
+    body, workspace = scene.material.at_rest(), scene.solver.workspace
+    maps = branch_maps(scene.setup, contact, scene.job.initial.velocity, workspace.other_displacement)
+    scene.material.start_from(body, contact.u, maps)
+    state = first_state(scene, body)
+    return March(scene, pressed_state(scene, state, replace(state.row, **of_row), contact.p, contact.d))
 
 
 def _from_steady_sliding(setup: Setup) -> March:

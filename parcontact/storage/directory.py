@@ -24,7 +24,7 @@ from .marker import SCENE, VERBS, Claim
 
 MAX_SECONDS_TO_RELEASE = 3.0  # tuning: longest wait for the lock of a killed run [s]
 RESULTS = {
-    "run": ("measures.csv", "cycles.csv", "fields.h5", "fields.xdmf", "run.log"),
+    "run": ("measures.csv", "cycles.csv", "bands.csv", "fields.h5", "fields.xdmf", "run.log"),
     "steady": (
         "steady.csv",
         "steady_waves.csv",

@@ -185,7 +185,20 @@ def test_a_cut_off_leaves_steep_waves_out() -> None:
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"history": [{"pressure": 1e5}]}, "history cannot be used with bands"),
+        ({"history": [{"pressure": {"from": 1e4, "to": 1e5}, "duration": 1.0}]}, "must be the same pressure"),
+        ({"history": [{"pressure": 1e5}, {"pressure": 2e5}]}, "must be the same pressure"),
+        ({"history": [{"force": 1.0}]}, "boxes of their own: give a pressure"),
+        ({"history": [{"pressure": 1e5, "velocity": [0, 1], "distance": 1e-3}]}, "must be along x"),
+        ({"history": [{"pressure": 1e5, "duration": 1.0, "time_step": 0.1}]}, "give cells_per_step"),
+        ({"history": [{"pressure": 1e5}], "output": {"energy": True}}, "the work on finer bands is in no band"),
+        (
+            {"history": [{"pressure": 1e5}], "thermal": {"conductivity": 0.2, "diffusivity": 1e-7}},
+            "thermal cannot be used with bands and a history",
+        ),
+        (
+            {"history": [{"pressure": 1e5}], "interface": {"shear_stress": 1e5, "stick": True}, "steady": None},
+            "interface.stick cannot be used with bands and a history",
+        ),
         ({"grid": {"points": 64, "size": 1e-2}}, "takes at most one of grid | bands, got grid and bands"),
         ({"adhesion": {"work": 0.05, "range": 1e-7}}, "adhesion cannot be used with bands"),
         ({"surface": {"shape": "sphere", "radius": 1e-2}}, "must be rough in a job with bands"),

@@ -44,7 +44,7 @@ def finer(job: jobs.Job, velocity: float, pressure: float) -> tuple[Cascade, Any
     cascade = Cascade(job, cut_bands(job), Slab.alone(1, 1))
     cascade.press((velocity, 0.0), pressure)
     rungs = cascade.climb([0])
-    return cascade, rungs, cascade.closing_of(1, rungs[1, 0])[0]
+    return cascade, rungs, cascade.closing_of(1, [rung.approach for rung in rungs[1, 0]])[0]
 
 
 def march_with(
@@ -53,7 +53,7 @@ def march_with(
     data = {"surface": heights, "grid": {"points": len(heights), "size": 4 * LONG}, **job}
     march, rows = begun(jobs.load(data), comm), list[StepRow]()
     if law is not None:
-        march.scene.law = ClosingLaw(march.scene, law)
+        march.scene.law = ClosingLaw(march.scene, lambda step: law)
     run_steps(march, [lambda state: rows.append(state.row)])
     return march, rows
 

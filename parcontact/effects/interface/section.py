@@ -80,6 +80,12 @@ def _rolls(interface: Any, history: Any, surface: Any) -> Iterator[Fault]:
             yield Fault("needs cells_per_step or a time_step: chosen steps do not follow the error of rolling", place)
 
 
+def _in_bands(interface: Any, bands: Any, history: Any) -> Iterator[Fault]:
+    if interface is not None and interface.stick and bands is not None and history:
+        sentence = "cannot be used with bands and a history: tractions of all bands would have to be solved together"
+        yield Fault(sentence, ("interface", "stick"))
+
+
 def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
     if interface is not None and interface.stick and adhesion is not None:
         yield Fault("cannot be used with adhesion: leave one of them out", ("interface", "stick"))
@@ -128,10 +134,12 @@ class InterfaceEffect(Effect[Memory]):
     """An effect of the section."""
 
     section: ClassVar[type[Part]] = Interface
+    in_bands_over_time: ClassVar[bool] = True
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("interface", "material"), _incompressible),
         Rule(("interface", "grid", "body", "initial", "steady"), _sticks),
         Rule(("interface", "history", "surface"), _rolls),
+        Rule(("interface", "bands", "history"), _in_bands),
         Rule(("interface", "adhesion"), _no_adhesion),
         Rule(("interface", "output"), _has_tractions),
     )

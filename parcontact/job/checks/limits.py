@@ -289,6 +289,16 @@ def refuse_steady(section: str) -> Rule:
     return Rule((section, "initial", "steady"), check)
 
 
+def refuse_bands_over_time(section: str) -> Rule:
+    """Return the rule that excludes bands with a history for a section whose effect is not marched in bands."""
+
+    def check(given: Any, bands: Any, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
+        if given is not None and bands is not None and history:
+            yield Fault("cannot be used with bands and a history; with bands leave out one of the two", (section,))
+
+    return Rule((section, "bands", "history"), check)
+
+
 def steps_can_be_made(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
     """Check that the history has at most MOST_STEPS steps."""
     total = 0.0

@@ -54,8 +54,36 @@ def _without(name: str, why: str) -> Rule:
     return Rule(("bands", name), check)
 
 
+def _over_time(bands: Any, history: Any, initial: Any, output: Any) -> Iterator[Fault]:
+    """Check that bands can be marched through a history: under one pressure, along x, with steps of their own."""
+    if bands is None or not history or None in history:
+        return
+    load = "must be the same pressure in all stages of a job in bands, whose bands are marched at fixed pressures"
+    for index, stage in enumerate(history):
+        place = ("history", index)
+        if stage.control != "pressure":
+            yield Fault(
+                "cannot be used with bands, which have boxes of their own: give a pressure", (*place, stage.control)
+            )
+        elif not stage.load.constant or stage.load.start != (history[0].pressure or stage.load).start:
+            yield Fault(load, (*place, "pressure"))
+        elif not stage.load.start > 0.0:
+            yield Fault("must be positive in a job in bands", (*place, "pressure"))
+        if stage.velocity[1]:
+            yield Fault("must be along x in a job in bands, whose surfaces are isotropic", (*place, "velocity"))
+        if stage.seconds and stage.time_step not in (None, AUTO):
+            text = "cannot be used with bands: each has steps of its own cells; give cells_per_step for the longest"
+            yield Fault(text, (*place, "time_step"))
+    if initial.state == "steady" and initial.pressure != history[0].load.start:
+        yield Fault("must be the pressure of the history in a job in bands", ("initial", "pressure"))
+    if initial.state == "steady" and (initial.velocity[1] or not initial.velocity[0]):
+        yield Fault("must be along x, and not zero, in a job in bands", ("initial", "velocity"))
+    if output.energy:
+        yield Fault("cannot be used with bands: the work on finer bands is in no band", ("output", "energy"))
+
+
 BAND_RULES = (
-    _without("history", "a job in bands is steady sliding (steady); a history needs a grid"),
+    Rule(("bands", "history", "initial", "output"), _over_time),
     _without("body", "a layer changes the coarsest waves only; give it a grid"),
     _without("study", "a study refines one grid"),
 )

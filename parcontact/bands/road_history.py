@@ -1,0 +1,232 @@
+"""History of a surface in bands: friction and area over time, from rest and after changes of velocity.
+
+Every band is marched through the whole history at every rung of its ladder, from the finest band to the coarsest, with
+the closing of all finer bands at each instant as the law of its interface (`road_march`). Then the load is distributed
+over the bands at each instant as in steady sliding (`cascade`, `road_sliding`), with errors of the same kind: half of
+the rungs are marched on hard walls, too, for the error of the method.
+
+The nominal pressure is constant, so that rungs keep their pressures.
+"""
+
+import copy
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from ..job import Job
+from ..parallel.slab import Array, Slab
+from ..solve.interface_law import InterfaceLaw
+from ..steady_sliding.point import Point
+from ..storage.step_row import StepRow
+from .band import Rung
+from .band_steps import BEFORE, BandClock, Place, rest_step
+from .cascade import Cascade
+from .choice import FEWEST
+from .ladder import NODES, PressureLadder
+from .road_march import BandMarch, instant_of
+from .road_sliding import RoadSliding, _sums
+
+T = TypeVar("T")
+INSTANTS = 50  # accuracy: instants of a stage with a row, equally spaced in the logarithm of slip or time
+EARLIEST = 0.5  # accuracy: cells of the finest band below which the mesh decides
+
+
+class RungTask(NamedTuple):
+    """One march: band, surface, rung, and whether finer bands are absent."""
+
+    band: int
+    sample: int
+    rung: int
+    hard: bool
+
+
+class Instant(NamedTuple):
+    """An instant with a row: its place, time since the start [s], distance slid [m], and velocity along x [m/s]."""
+
+    place: Place
+    time: float
+    distance: float
+    velocity: float
+
+
+class ClosingOverTime:
+    """Closing of a band and all finer ones over time, from the approaches of its rungs, shape (rungs, places)."""
+
+    def __init__(
+        self, cascade: Cascade, number: int, clock: BandClock, approaches: Array, finer: "ClosingOverTime | None"
+    ) -> None:
+        self._cascade, self._number, self._clock = cascade, number, clock
+        self._approaches, self._finer = approaches, finer
+        self._known = dict[Place, tuple[InterfaceLaw, float]]()
+
+    def find(self, place: Place) -> tuple[InterfaceLaw, float]:
+        """Return the law at a place, and the approach [m] where it is 0."""
+        if place not in self._known:
+            before, after, share = self._clock.between(place)
+            found = (1.0 - share) * self._approaches[:, before] + share * self._approaches[:, after]
+            touching = self._finer.find(place)[1] if self._finer else 0.0
+            self._known[place] = self._cascade.closing_of(self._number, found + touching)
+        return self._known[place]
+
+    def law(self, place: Place) -> InterfaceLaw:
+        return self.find(place)[0]
+
+
+Closings = dict[int, ClosingOverTime | None]
+After = Callable[[RungTask, int, int], None]
+
+
+class RoadHistory(RoadSliding):
+    """History of a job in bands on the ranks of `slab`; the constructor and the methods are collective."""
+
+    def __init__(self, job: Job, slab: Slab) -> None:
+        super().__init__(job, slab)
+        self.pressure = job.history[0].load.end
+        fastest = max((abs(speed) for speed in self._speeds()), default=0.0)
+        self._cascade.press((fastest, 0.0), self.pressure)
+        self._hard = copy.copy(self._cascade)
+        self._hard.ladders = [PressureLadder(np.array(halved(ladder.rungs))) for ladder in self._cascade.ladders]
+        bands = [self._cascade.band(number, 0) for number in range(self.cut.count)]
+        self._clocks = [BandClock(band.setup.job, band.parts) for band in bands]
+        self.samples = range(self.cut.samples or FEWEST)
+        self._tracks = dict[tuple[int, int], list[Rung]]()
+        self._on_walls = list[list[Rung]]()
+        self._closings: Closings = {}
+        self._marches = dict[tuple[int, int], BandMarch]()
+        self._cell = bands[-1].setup.grid.dx
+
+    def _speeds(self) -> list[float]:
+        initial = [self.job.initial.velocity[0]] if self.job.initial.state == "steady" else []
+        return [*initial, *(stage.velocity[0] for stage in self.job.history)]
+
+    def tasks(self) -> list[list[RungTask]]:
+        """Return all marches of each band, from the finest to the coarsest, those on hard walls last."""
+        found = list[list[RungTask]]()
+        for number in reversed(range(self.cut.count)):
+            count, half = (len(each.ladders[number].rungs) for each in (self._cascade, self._hard))
+            own = [RungTask(number, sample, rung, False) for sample in self.samples for rung in range(count)]
+            walls = range(half) if number + 1 < self.cut.count else ()
+            found.append([*own, *(RungTask(number, 0, rung, True) for rung in walls)])
+        return found
+
+    def steps(self) -> list[int]:
+        """Return the numbers of steps of a march of each band."""
+        return [len(clock.places) for clock in self._clocks]
+
+    def try_march(self) -> None:
+        """March the middle rung of the finest band, to measure the time; on this rank alone."""
+        last = self.cut.count - 1
+        middle = len(self._hard.ladders[last].rungs) // 2
+        self._march_alone(dict.fromkeys(self.samples), RungTask(last, 0, middle, True))
+
+    def march(self, after: After) -> None:
+        """March all bands; `after`, collective, is called after each round with its last march and the numbers of its
+        marches and of those that were known, and may raise an error to stop.
+
+        Marches in the store of contacts (`keep_in`) are not made again.
+        """
+        laws: Closings = dict.fromkeys(self.samples)
+        walls = list[list[Rung]]()
+        for tasks in self.tasks():
+            number = tasks[0].band
+            tracks = iter(self._march(tasks, laws, after))
+            for sample in self.samples:
+                rungs = self._cascade.ladders[number].rungs
+                own = self._tracks[number, sample] = [next(tracks) for _ in rungs]
+                approaches = np.array([track.approach for track in own])
+                of_band = self._cascade, number, self._clocks[number]
+                laws[sample] = ClosingOverTime(*of_band, approaches, laws[sample]) if number else None
+            finest = number + 1 == self.cut.count
+            walls.append(halved(self._tracks[number, 0]) if finest else list(tracks))
+            if number == 1:
+                self._closings = dict(laws)
+        self._on_walls = walls[::-1]
+
+    def _march(self, tasks: Sequence[RungTask], laws: Closings, after: After) -> list[Rung]:
+        """Make marches in rounds, one on each rank."""
+        found, size = list[Rung](), self.slab.comm.size
+        solve = partial(self._march_alone, laws)
+        for first in range(0, len(tasks), size):
+            now = tasks[first : first + size]
+            states = [("history", tuple(task)) for task in now]
+
+            self._lacking = 0
+
+            def share(lacking: Sequence[int], now: Sequence[RungTask] = now) -> list[Rung]:
+                self._lacking = len(lacking)
+                return self._cascade.share([now[number] for number in lacking], solve)
+
+            found += self._cascade.store.find(states, share)
+            after(now[-1], len(now), len(now) - self._lacking)
+        self._marches.clear()
+        return found
+
+    def _march_alone(self, laws: Closings, task: RungTask) -> Rung:
+        """Make one march, on this rank alone."""
+        key = task.band, task.sample
+        if key not in self._marches:
+            self._marches[key] = BandMarch(self._cascade.band(*key))
+        cascade = self._hard if task.hard else self._cascade
+        below = cascade.ladders[task.band + 1] if task.band + 1 < self.cut.count else None
+        finer, clock = None if task.hard else laws[task.sample], self._clocks[task.band]
+        pressure = float(cascade.ladders[task.band].rungs[task.rung])
+        return self._marches[key].march(pressure, finer.law if finer else None, clock.place, below)
+
+    # -- rows ---------------------------------------------------------------------------------------------------------
+
+    def instants(self) -> Iterator[Instant]:
+        """Yield the instants of all rows."""
+        start = slid = 0.0
+        for number, stage in enumerate(self.job.history):
+            velocity = stage.velocity[0]
+            if number == 0 and self.job.initial.state == "steady":
+                yield Instant(Place(0, BEFORE), 0.0, 0.0, self.job.initial.velocity[0])
+            elif number == 0 or stage.seconds == 0.0:
+                yield Instant(Place(number, 0.0), start, slid, velocity)
+            if stage.seconds:
+                first = EARLIEST * self._cell / abs(velocity) if velocity else rest_step(self.job, stage)
+                for elapsed in np.geomspace(min(first, stage.seconds), stage.seconds, INSTANTS).tolist():
+                    yield Instant(Place(number, elapsed), start + elapsed, slid + abs(velocity) * elapsed, velocity)
+            start, slid = start + stage.seconds, slid + stage.seconds * abs(velocity)
+
+    def records(self) -> Iterator[tuple[StepRow, list[list[float]]]]:
+        """Yield the row of measures.csv and those of bands.csv of each instant, after `march`."""
+        way = 1.0
+        for step, instant in enumerate(self.instants()):
+            way = math.copysign(1.0, instant.velocity) if instant.velocity else way
+            point = self._point_at(instant, way)
+            measures = replace(point.measures, friction=abs(point.measures.friction))
+            row = StepRow(
+                *(step, instant.time, instant.distance, measures),
+                certificate=point.certificate,
+                operator_calls=round(point.operator_calls),
+                seconds=point.seconds,
+                errors=point.errors,
+                added=(measures.friction - measures.friction_interface, measures.friction_interface),
+            )
+            yield row, self._rows(point, [instant.time, instant.distance])
+
+    def _point_at(self, instant: Instant, way: float) -> Point:
+        """Return the state at an instant, with friction along `way` times x."""
+        began, place = time.perf_counter(), instant.place
+        at = [clock.between(place) for clock in self._clocks]
+        rungs = {key: [instant_of(track, *at[key[0]], way) for track in tracks] for key, tracks in self._tracks.items()}
+        for sample, closing in self._closings.items():
+            touching = closing.find(place)[1] if closing else 0.0
+            rungs[0, sample] = [replace(rung, approach=rung.approach + touching) for rung in rungs[0, sample]]
+        walls = [[instant_of(track, *at[k], way) for track in tracks] for k, tracks in enumerate(self._on_walls)]
+        self._cascade.velocity = instant.velocity, 0.0
+        hard = _sums(self._hard.fall(lambda band, _: walls[band]))
+        outcome = self._outcome(rungs, self.samples, hard)
+        self._results = outcome.results
+        return self._to_point(outcome, (way, 0.0), self.pressure, time.perf_counter() - began)
+
+
+def halved(rungs: Sequence[T]) -> Sequence[T]:
+    """Return every second item, the last one included, or all of them if these are few."""
+    return rungs[::-2][::-1] if len(rungs) >= 2 * NODES else rungs

@@ -1,0 +1,84 @@
+"""March of one band over a history, under the pressure of one rung, with the closing of all finer bands."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+
+import numpy as np
+
+from ..history.timeline import Step
+from ..march.closing_law import ClosingLaw
+from ..march.loop import March, run_steps
+from ..scene import build_on
+from ..solve.interface_law import HARD, InterfaceLaw
+from ..steady_sliding.start import begin
+from .band import Band, Rung, rung_errors
+from .band_steps import BEFORE, Place
+from .ladder import PressureLadder
+
+LawAt = Callable[[Place], InterfaceLaw]
+NONE = np.zeros(1)  # of what only steady states have
+
+
+class BandMarch:
+    """Marches of one band. A march gives a `Rung` whose numbers have one more axis in front, over the places of
+    `clock`: the track of this rung. Its friction is along +x, by slopes."""
+
+    def __init__(self, band: Band) -> None:
+        self.band = band
+        self.scene = build_on(band.setup)
+        self.scene.probe = band.probe
+
+    def march(
+        self, pressure: float, law: LawAt | None, place: Callable[[Step], Place], below: PressureLadder | None
+    ) -> Rung:
+        """Return the track under a mean pressure [Pa], with the distribution of pressure over `below`, the ladder of
+        the next finer band. Without a law finer bands are absent. Raises RunError for a step that fails."""
+        scene, rows = self.scene, list[Rung]()
+        scene.law = ClosingLaw(scene, lambda step: law(place(step))) if law is not None else None
+        march = self._begin(pressure, law)
+        if march.row.operator_calls:
+            rows.append(self._measure(march, pressure, below))
+        steps = (step._replace(load=pressure) for step in march.steps())
+        run_steps(march, [lambda march: rows.append(self._measure(march, pressure, below))], steps)
+        return track_of(rows)
+
+    def _begin(self, pressure: float, law: LawAt | None) -> March:
+        scene, band, initial = self.scene, self.band, self.band.setup.job.initial
+        if initial.state == "virgin":
+            return begin(scene)
+        contact = band.contact(pressure, law(Place(0, BEFORE)) if law is not None else HARD)
+        seen = contact.p, 1.0, contact.u, band.heights, contact.d, contact.p > 0.0
+        measures = scene.probe.measure(*seen, (0.0, 0.0), initial.velocity)
+        facts = {"certificate": contact.certificate, "operator_calls": contact.steps}
+        return begin(scene, contact, measures=measures, **facts)
+
+    def _measure(self, march: March, pressure: float, below: PressureLadder | None) -> Rung:
+        row, last, units, grid = march.row, march.state.contact.last, self.scene.units, self.scene.choices.grid
+        m, weights, lost = row.measures, np.zeros(0), 0.0
+        if below is not None:
+            weights, lost = below.weights_of_rungs(last.pressure * (last.alpha * units.pressure))
+        friction = -m.force_x / (pressure * grid.lx * grid.ly)
+        return Rung(
+            *(pressure, friction, friction, m.contact_area, m.contact_area_corrected, m.approach, m.max_pressure),
+            *(weights, lost, NONE, NONE, NONE, NONE, NONE, rung_errors(row.errors)),
+            *(row.certificate.worst, row.certificate.penetration, float(row.operator_calls)),
+        )
+
+
+def track_of(rows: Sequence[Rung]) -> Rung:
+    """Return rungs at successive places as one track."""
+    return Rung(**{name: np.array([getattr(row, name) for row in rows]) for name in NAMES})
+
+
+def instant_of(track: Rung, before: int, after: int, share: float, sign: float = 1.0) -> Rung:
+    """Return the rung between two places of a track; friction is along `sign` times x."""
+
+    def between(name: str) -> np.ndarray:
+        values = getattr(track, name)
+        return (1.0 - share) * values[before] + share * values[after]
+
+    found = Rung(**{name: between(name) for name in NAMES})
+    return replace(found, friction=sign * found.friction, friction_slopes=sign * found.friction_slopes)
+
+
+NAMES = tuple(each.name for each in fields(Rung))
