@@ -10,7 +10,7 @@ from ..march.closing_law import ClosingLaw
 from ..march.loop import March, run_steps
 from ..scene import build_on
 from ..solve.interface_law import HARD, InterfaceLaw
-from ..steady_sliding.start import begin
+from ..steady_sliding.start import start_march
 from .band import Band, Rung, rung_errors
 from .band_steps import BEFORE, Place
 from .ladder import PressureLadder
@@ -45,12 +45,12 @@ class BandMarch:
     def _begin(self, pressure: float, law: LawAt | None) -> March:
         scene, band, initial = self.scene, self.band, self.band.setup.job.initial
         if initial.state == "virgin":
-            return begin(scene)
+            return start_march(scene)
         contact = band.contact(pressure, law(Place(0, BEFORE)) if law is not None else HARD)
         seen = contact.p, 1.0, contact.u, band.heights, contact.d, contact.p > 0.0
         measures = scene.probe.measure(*seen, (0.0, 0.0), initial.velocity)
         facts = {"certificate": contact.certificate, "operator_calls": contact.steps}
-        return begin(scene, contact, measures=measures, **facts)
+        return start_march(scene, contact, measures=measures, **facts)
 
     def _measure(self, march: March, pressure: float, below: PressureLadder | None) -> Rung:
         row, last, units, grid = march.row, march.state.contact.last, self.scene.units, self.scene.choices.grid

@@ -32,7 +32,7 @@ def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = Non
     return march
 
 
-def begin(scene: Scene, contact: SteadyContact | None = None, **of_row: Any) -> March:
+def start_march(scene: Scene, contact: SteadyContact | None = None, **of_row: Any) -> March:
     """Return a march on a scene from rest, or from a `contact` in steady sliding at the velocity of its job's `initial`
     section, with the values `of_row` in the row of time 0; collective."""
     if contact is None:

@@ -61,6 +61,9 @@ def _over_time(bands: Any, history: Any, initial: Any, output: Any) -> Iterator[
     load = "must be the same pressure in all stages of a job in bands, whose bands are marched at fixed pressures"
     for index, stage in enumerate(history):
         place = ("history", index)
+        if stage.frequency:
+            yield Fault("cannot oscillate in a job in bands, which are marched through slides and rests", place)
+            continue
         if stage.control != "pressure":
             yield Fault(
                 "cannot be used with bands, which have boxes of their own: give a pressure", (*place, stage.control)
