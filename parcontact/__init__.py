@@ -18,7 +18,7 @@ from .errors import InputError, JobError, RunError
 if TYPE_CHECKING:
     from .effects.leakage.flow import Flow, Leak, leak
     from .python.curves import Curve, steady
-    from .python.results import open
+    from .python.opened import open
     from .python.row import Row
     from .python.simulation import Simulation
     from .python.surface_and_material import Material, material, surface
@@ -32,7 +32,7 @@ _ROOMS = {
     "Row": "python.row",
     "steady": "python.curves",
     "Curve": "python.curves",
-    "open": "python.results",
+    "open": "python.opened",
     "surface": "python.surface_and_material",
     "material": "python.surface_and_material",
     "Material": "python.surface_and_material",

@@ -23,9 +23,8 @@ from matplotlib.ticker import NullFormatter
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.job import Job, load, load_cases
 from parcontact.physics.prony import complex_modulus
-from parcontact.plotting import style
+from parcontact.results import slide, style, sweep_table, theory_settings
 from parcontact.storage import tables
-from parcontact.summary import slide, sweep_table, theory_settings
 from parcontact.theory import hertz
 
 JOBS = Path(__file__).resolve().parents[1] / "jobs" / "paper"

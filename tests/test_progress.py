@@ -12,8 +12,8 @@ from drawing import ELASTIC, LOADS, MAPS, SLIDE, WAVE, ZENER, ran
 
 from parcontact import progress
 from parcontact.__main__ import main
-from parcontact.plotting.plotted_run import PlottedRun
-from parcontact.report import result_sections
+from parcontact.results import result_sections
+from parcontact.results.plotted_run import PlottedRun
 from parcontact.storage.console import Console
 from parcontact.storage.step_row import StepRow
 

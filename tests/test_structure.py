@@ -24,15 +24,14 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"theory", "solve"},
     {"effects"},
     {"storage"},
-    {"summary"},
-    {"plotting"},
     {"scene"},
     {"mesh"},
     {"march"},
     {"steady_sliding"},
     {"bands"},
-    {"run", "plan", "derived"},
-    {"doctor", "study", "report"},
+    {"results"},
+    {"run", "plan"},
+    {"doctor", "study"},
     {"manual"},
     {"python"},
     {"__init__"},  # the front door, which names what the room python has
@@ -40,12 +39,12 @@ FLOORS = [  # from the ground up; a room imports only from the floors below its 
     {"__main__"},
 ]
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
-KNOW_MPI = {"python", "parallel", "storage", "summary", "derived", "command"}
+KNOW_MPI = {"python", "parallel", "storage", "results", "command"}
 
 
 OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of another room
     **dict.fromkeys((f"effects.leakage.{name}" for name in ("elimination", "flow", "fluids", "paths")), "physics"),
-    "effects.leakage.conductivity": "plotting",
+    "effects.leakage.conductivity": "results",
     **dict.fromkeys((f"effects.heat.{name}" for name in ("flash", "heat", "heat_memory", "heat_unbounded")), "physics"),
     **dict.fromkeys((f"effects.stick.{name}" for name in ("discs", "solver")), "solve"),
     "effects.stick.shear_operator": "physics",
@@ -54,14 +53,14 @@ OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of anothe
         (f"effects.adhesion.{name}" for name in ("adhesive_solver", "free_inverse", "gap_iterate")), "solve"
     ),
     **dict.fromkeys((f"effects.adhesion.{name}" for name in ("gap_kernels", "gap_solver", "law")), "solve"),
-    "effects.adhesion.pull_off": "summary",
-    "effects.leakage.over_time": "derived",
+    "effects.adhesion.pull_off": "results",
+    "effects.leakage.over_time": "results",
     "effects.softening.strain": "scene",
 }
 
 
 FILES = {  # modules that any capability may have, and the rooms that ask them
-    **{"columns": "column", "sentences": "column", "results": "summary", "pictures": "plotting"},
+    **{"columns": "column", "sentences": "column", "results": "results", "pictures": "results"},
     **{"steady": "steady_sliding", "bands": "bands"},
 }
 
@@ -119,7 +118,7 @@ def test_only_some_rooms_know_mpi(module: str) -> None:
     assert not [name for name in imports_that_run(module) if room(name) == "mpi4py" or name.startswith("parallel.mpi")]
 
 
-COMPARE = {"doctor", "plotting", "derived", "report", "command"}  # rooms that set theory next to results
+COMPARE = {"doctor", "results", "command"}  # rooms that set theory next to results
 
 
 def test_theory_stands_alone() -> None:

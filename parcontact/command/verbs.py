@@ -50,7 +50,7 @@ def steady(options: argparse.Namespace) -> int:
 
 def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
     from ..bands.road_sliding import make_states
-    from ..derived import prediction
+    from ..results import prediction
     from ..run import watch
     from ..steady_sliding import curve
 
@@ -62,10 +62,7 @@ def _curve(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> i
     end = watch.limit(getattr(options, "wall", None))
     limit = None if end is None else end - watch.RESERVE_SECONDS
     chosen = (options.quiet, options.restart, shows, sweep_stop_file, make_states, limit)
-    code = curve.run_curve(job, slab, wanted, *chosen)
-    if code == DONE and prediction.has_spectrum(job):
-        on_root(slab.comm, lambda: prediction.write_steady(job, wanted))
-    return code
+    return curve.run_curve(job, slab, wanted, *chosen, lambda: prediction.draw_curve(job, wanted))
 
 
 @ranks.root_alone
@@ -173,7 +170,7 @@ def theory(options: argparse.Namespace) -> int:
 
 
 def _predict(options: argparse.Namespace, job: Job, slab: Slab, shows: Shows) -> int:
-    from ..derived import prediction
+    from ..results import prediction
 
     lines = on_root(slab.comm, lambda: prediction.foretell(job, options.gamma, options.waves))
     if slab.root and not options.quiet:
@@ -195,7 +192,7 @@ def fit(options: argparse.Namespace) -> int:
     """Fit a material to measured moduli; write a material file and a picture."""
     from .. import mesh
     from ..job.checks.frequencies import excited_band
-    from ..plotting import compound_files as files
+    from ..results import compound_files as files
     from ..rubber import compound
     from ..rubber.shift import read_shift
 
@@ -228,8 +225,8 @@ def surface(options: argparse.Namespace) -> int:
     """Describe and draw the surface of a job, or a measured map."""
     from pathlib import Path
 
-    from ..derived.surface_summary import describe_surface
     from ..parallel.slab import Slab
+    from ..results.surface_summary import describe_surface
     from ..scene import sanity, set_up
     from . import measured_maps
 
@@ -255,7 +252,7 @@ def surface(options: argparse.Namespace) -> int:
 @ranks.root_alone
 def info(options: argparse.Namespace) -> int:
     """Describe checkpoints, field files and output directories, and check them for damage."""
-    from ..summary import info as about
+    from ..results import info as about
 
     text, sound = about.describe_all(options.file)
     print(text)
@@ -265,7 +262,7 @@ def info(options: argparse.Namespace) -> int:
 @ranks.root_alone
 def plot(options: argparse.Namespace) -> int:
     """Draw runs and friction curves, compare several, or make a movie."""
-    from ..plotting import plots
+    from ..results import plots
 
     names = ("format", "panels", "over", "log", "compare", "movie", "at", "out")
     wanted = plots.PlotOptions(**{name: getattr(options, name) for name in names})
@@ -298,7 +295,7 @@ def leak(options: argparse.Namespace) -> int:
 @ranks.root_alone
 def report(options: argparse.Namespace) -> int:
     """Write one HTML file with job, results, data and versions."""
-    from ..report import page
+    from ..results import page
 
     print(f"report: {page.write_report(options.directories, options.out)}")
     return DONE
@@ -363,7 +360,7 @@ def schema(options: argparse.Namespace) -> int:
 @ranks.root_alone
 def cite(options: argparse.Namespace) -> int:
     """List the publications to cite for a run."""
-    from ..summary import citations
+    from ..results import citations
 
     print(citations.describe_citations(options.directory))
     return DONE

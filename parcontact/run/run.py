@@ -17,6 +17,8 @@ from ..march import loop
 from ..march.failure import StepError
 from ..march.loop import March
 from ..physics.body import states_errors
+from ..results import cycles, slide
+from ..results.run_table import RunTable
 from ..scene import sanity
 from ..storage import tables
 from ..storage.checkpoint import Contents, Facts
@@ -24,8 +26,6 @@ from ..storage.console import always
 from ..storage.directory import Directory
 from ..storage.recorder import Recorder
 from ..storage.stopfile import StopFile
-from ..summary import cycles, slide
-from ..summary.run_table import RunTable
 from .watch import Watch
 
 DONE, STOPPED_EARLY = 0, 3  # exit codes: success; stopped early with a good checkpoint, run again

@@ -18,13 +18,13 @@ from ..parallel.groups import Groups
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..printed import per_cent
+from ..results import sweep_table
 from ..storage import files, marker, stopfile
 from ..storage.directory import refuse_files, refuse_other_jobs
 from ..storage.stopfile import StopFile
-from ..summary import sweep_table
 from . import watch
 from .run import DONE, STOPPED_EARLY
-from .sweep_warnings import SweepWarnings, name_cases
+from .sweep_warnings import SweepWarnings
 
 FAILED, REFUSED = 1, 2
 ELSEWHERE = -1  # in place of an exit code: another program runs the case
@@ -95,7 +95,7 @@ class SweepRun:
             if not self.quiet:
                 print_line(f"largest estimated error of {what}: {per_cent(found[worst], 3)}, in case {worst}")
             if beyond := [number for number, error in found.items() if exceeds(error, asked[number][k])]:
-                more = f"the estimated error of {what} exceeds numerics.accuracy in {name_cases(beyond)}"
+                more = f"the estimated error of {what} exceeds numerics.accuracy in {sweep_table.name_cases(beyond)}"
                 print_line(f"warning: {more}; the log of each case says how to reduce it", sys.stderr)
 
     def _take(self, own: Sequence[Case], signals: Signals) -> list[int]:

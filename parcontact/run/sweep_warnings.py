@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from ..doubts import Doubt
 from ..job import Case, Job
+from ..results.sweep_table import name_cases
 
 # first warning of each subject, and the numbers of its cases
 Kinds = dict[tuple[str, ...], tuple[Doubt, list[int]]]
@@ -71,12 +72,3 @@ def warn_once(cases: Sequence[Case]) -> list[Doubt]:
     for text in sentences_of(cases, lambda job: job.doubts):
         print(f"warning: {text}", file=sys.stderr, flush=True)
     return [doubt for case in cases for doubt in case.job.doubts]
-
-
-def name_cases(numbers: Sequence[int]) -> str:
-    """Return ascending numbers as text: `cases 0, 2-5`."""
-    starts = [number for number in numbers if number - 1 not in numbers]
-    ends = [number for number in numbers if number + 1 not in numbers]
-    pairs = zip(starts, ends, strict=True)
-    listed = ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in pairs)
-    return f"case{'s' * (len(numbers) > 1)} {listed}"

@@ -29,7 +29,7 @@ from ..storage.steady_maps import SteadyMaps
 from ..storage.stopfile import StopFile
 from .point import Point
 from .sliding import SteadySliding
-from .table import WAVES, CurveTable
+from .table import WAVES, CurveTable, Draw
 
 DONE, FAILED, AGAIN = 0, 1, 3  # exit codes: all points solved; some have failed; stopped early, run again
 SAME = (*marker.SCENE, *marker.EFFECTS, *(f"numerics.{key}" for key in ("kernel", "precision", "slope", "tolerance")))
@@ -133,12 +133,14 @@ def run_curve(
     sweep_stop_file: StopFile | None = None,
     make: Callable[[Job, Slab], States] = on_one_grid,
     limit: float | None = None,
+    draw: Draw | None = None,
 ) -> int:
     """Solve all missing points, and write each at once; collective. Return the exit code.
 
     If a point fails, the others are still solved, and the exit code is 1. `restart` is `auto` or `never`; warnings
     are printed if `shows` returns True. `sweep_stop_file` is shared by all cases of a sweep; it is not removed.
-    `make` makes the steady states. The last point must be solved by the time `limit` (of `time.monotonic`), if any.
+    `make` makes the steady states; `draw` draws the finished curve, on root. The last point must be solved by the time
+    `limit` (of `time.monotonic`), if any.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
@@ -163,7 +165,7 @@ def run_curve(
         sliding.keep_in(directory.path)
         try:
             with Signals().noted() as signals:
-                return _Curve(sliding, wanted, table, maps, directory, signals, shows, sweep_stop_file, limit).go()
+                return _Curve(sliding, wanted, table, maps, directory, signals, shows, sweep_stop_file, limit).go(draw)
         finally:
             if table:
                 table.close()
@@ -224,7 +226,7 @@ class _Curve:
         chosen, self.slab = self.sliding.setup.choices, self.sliding.setup.slab
         self.watch = sanity.ContactWatch(chosen.numerics.strict, chosen.timeline, more=more_points(chosen.grid))
 
-    def go(self) -> int:
+    def go(self, draw: Draw | None) -> int:
         """Solve missing points; collective. Return the exit code."""
         bare = self.maps.lacking() if self.maps and self.slab.root else []
         lacking = self.slab.agree(self.table.lacking(self.wanted.points, bare) if self.table else [])
@@ -237,8 +239,8 @@ class _Curve:
             self.longest = max(self.longest, time.monotonic() - began)
             if self.table:
                 self.table.pass_on()
+        on_root(self.slab.comm, lambda: self.table.conclude(self.failures, draw) if self.table else None)
         if self.table:
-            self.table.conclude(self.failures)
             self.directory.note(finished=(self.table.count, 0.0))
         return FAILED if self.failures else DONE
 

@@ -26,6 +26,9 @@ WAVES = ("steady_waves.csv", names_of(STEADY_WAVES))  # an additional table
 HEAD = "velocity [m/s]    load [Pa] corr.area  error  friction  error  calls  residual"  # corr.area: corrected area
 
 
+Draw = Callable[[], Path]  # draws the picture of a curve and returns its path
+
+
 class EarlierPoint(NamedTuple):
     """A point solved by an earlier run, and its relative errors of friction and of the corrected area."""
 
@@ -145,8 +148,8 @@ class CurveTable:
         self._lost = lost_points.without([*lost_points.without(self._lost, [at]), LostPoint(at, why)], self.known)
         lost_points.write(self.path.parent, self._lost)
 
-    def conclude(self, failures: int) -> None:
-        """Sort a curve that was solved in parts, draw it, and report failures; raises OSError."""
+    def conclude(self, failures: int, draw: Draw | None) -> None:
+        """Sort a curve that was solved in parts, `draw` it, and report failures; raises OSError."""
         self._bar.close()
         self._file.sync()
         if self.known:
@@ -159,12 +162,10 @@ class CurveTable:
             self.say(text)
         solved = [Wanted(point.speed, point.measures.pressure, point.temperature) for point in self._points]
         lost_points.write(self.path.parent, lost_points.without(self._lost, solved))
-        from ..plotting import plots  # matplotlib is slow to import, and for pictures only
-
-        picture = plots.draw_steady(self.path)
+        picture = f" and {draw()}" if draw else ""
         there = lost_points.name_lost(self.path.parent) or "all points"
         failed = f"parcontact: {failures} of the points could not be solved; {self.path} has {there}"
-        self.say(failed if failures else f"done: {self.path} and {picture}")
+        self.say(failed if failures else f"done: {self.path}{picture}")
 
     def _earlier(self) -> list[EarlierPoint]:
         """Return the points of earlier runs."""

@@ -9,12 +9,12 @@ from ..parallel.groups import Groups
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..plan.sample import warm_up
-from ..plotting import study_pictures as study_plots
+from ..results import study_pictures as study_plots
+from ..results import sweep_table
 from ..run import runner, sweep, sweep_warnings
 from ..run.run import Options
 from ..storage import files, marker
 from ..storage.directory import Directory
-from ..summary import sweep_table
 from . import verdict
 from .ladders import Ladders, MakeJob, Settings, describe_choices, ladders, make_cases
 

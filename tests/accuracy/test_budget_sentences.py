@@ -9,7 +9,7 @@ import pytest
 
 from parcontact.accuracy.budget import ErrorBudget, ErrorParts, ErrorSums, advice
 from parcontact.job import Job
-from parcontact.report import log
+from parcontact.results import log
 from parcontact.steady_sliding.table import EarlierPoint, describe_missed
 from parcontact.storage.curve_points import Wanted
 from parcontact.storage.step_row import StepRow

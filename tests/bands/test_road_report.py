@@ -18,7 +18,7 @@ from parcontact.effects.heat.flash import Flash
 from parcontact.effects.heat.steady import describe_hot, describe_unmeasured
 from parcontact.job.checks.frequencies import excited_band
 from parcontact.parallel.slab import Slab
-from parcontact.report import road_section
+from parcontact.results import road_section
 
 LONG = 4e-3
 MEASURED = {

@@ -14,15 +14,14 @@ from numpy.testing import assert_allclose
 
 from parcontact import __version__
 from parcontact.__main__ import main
-from parcontact.derived import prediction
 from parcontact.errors import InputError
 from parcontact.job import Job
 from parcontact.job import load as load_job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
+from parcontact.results import info, prediction, theory_settings
+from parcontact.results.theory_settings import TheorySettings
 from parcontact.steady_sliding.curve import request
-from parcontact.summary import info, theory_settings
-from parcontact.summary.theory_settings import TheorySettings
 from parcontact.theory import full_contact
 
 ROUGH: dict[str, Any] = {

@@ -11,8 +11,8 @@ import yaml
 from conftest import WORLD, Main
 
 from parcontact import capabilities
-from parcontact.plotting import histories
-from parcontact.plotting.plotted_run import PlottedRun
+from parcontact.results import histories
+from parcontact.results.plotted_run import PlottedRun
 
 from .tread_wear import forget, install, shown
 
@@ -31,7 +31,7 @@ ANSWERS = """
 
     @staticmethod
     def panels(run, along):
-        from parcontact.plotting.charts import Axis, Chart
+        from parcontact.results.charts import Axis, Chart
 
         yield Chart("wear", along.axis, Axis("wear", "m"), along.series({"": run.columns["wear_depth"]}))
 

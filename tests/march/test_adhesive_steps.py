@@ -11,7 +11,7 @@ from restarting import ELASTIC, ROUGH, ZENER, Bench, cut, rows, same
 
 from parcontact import Simulation
 from parcontact.effects.leakage.flow import leak
-from parcontact.summary import info
+from parcontact.results import info
 
 STICK = {"work": 0.05, "range": 1e-6}
 PULL = {"name": "pull", "approach": {"from": 1e-6, "to": -2e-6}, "duration": 4e-4, "time_step": 1e-4}

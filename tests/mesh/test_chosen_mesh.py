@@ -18,10 +18,10 @@ from parcontact.mesh import load, load_cases
 from parcontact.mesh.contact_guess import UNKNOWN, guesses, slope_of
 from parcontact.parallel.root import on_root
 from parcontact.parallel.slab import Slab
+from parcontact.results import info
 from parcontact.run import runner
 from parcontact.run.run import Options, chosen_by_accuracy
 from parcontact.steady_sliding import curve
-from parcontact.summary import info
 
 ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 5e-4, short_wavelength: 6.25e-5, rms_slope: 0.1, seed: 1}"
 AUTO = f"""\

@@ -13,8 +13,7 @@ from drawing import SPHERE, STRIP, WAVE, ZENER, asked, ran
 
 from parcontact import job
 from parcontact.__main__ import main
-from parcontact.plotting import plots, study_pictures
-from parcontact.report import chapters, result_sections
+from parcontact.results import chapters, plots, result_sections, study_pictures
 from parcontact.rubber import compound
 
 BANDS, VELOCITIES, TEMPERATURES, PRESSURES = 12, np.logspace(-3, 1, 9), (0.0, 20.0, 40.0), (1e5, 4e5)
@@ -275,7 +274,7 @@ def draw_compound(path: Path) -> None:
             lines.append(f"{f:.8g},{3 * g.real:.8g},{3 * g.imag:.8g},{t:.4g}")
     (path / "rubber.csv").write_text("\n".join(lines) + "\n")
     found = compound.fitted(path / "rubber.csv", 0.5, 20.0, "wlf", 0.01)
-    from parcontact.plotting import compound_files
+    from parcontact.results import compound_files
 
     compound_files.draw_compound(found, path / "compound.png", (1.0, 1e6))
 

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from parcontact.plotting import band_charts, charts
+from parcontact.results import band_charts, charts
 
 HEAD = "velocity,pressure,temperature,band,long_wavelength,short_wavelength,friction,contact_area,flash_temperature"
 

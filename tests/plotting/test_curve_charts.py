@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from parcontact import job
-from parcontact.plotting import curve_charts, plots
+from parcontact.results import curve_charts, plots
 
 HEAD = (
     "velocity,pressure,friction,contact_area,contact_area_corrected,error_friction,error_area,temperature,shift_factor"

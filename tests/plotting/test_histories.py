@@ -9,9 +9,8 @@ from drawing import ELASTIC, FRACTION, KINDS, PEAK, SLIDE, SPHERE, WAVE, ZENER, 
 from matplotlib.figure import Figure
 
 from parcontact.errors import InputError
-from parcontact.plotting import plots
+from parcontact.results import plots, theory_settings
 from parcontact.storage import tables
-from parcontact.summary import theory_settings
 
 
 @pytest.mark.parametrize("kind", KINDS)

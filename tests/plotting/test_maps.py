@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from parcontact.job import Job
-from parcontact.plotting import maps, plots
-from parcontact.plotting.plotted_run import Fields, PlottedRun, label_frames
-from parcontact.report import result_sections
+from parcontact.results import maps, plots, result_sections
+from parcontact.results.plotted_run import Fields, PlottedRun, label_frames
 
 ALL = "output: {fields: [pressure, displacement, gap, height]}\n"
 CREEP = "history: [{pressure: 1.0e3, duration: 2.0e-3, time_step: 2.0e-3}]\n"

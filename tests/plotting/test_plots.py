@@ -26,7 +26,7 @@ from drawing import (
 )
 from matplotlib.figure import Figure
 
-from parcontact.plotting import charts, style
+from parcontact.results import charts, style
 from parcontact.storage import tables
 
 BACK = SLIDE.replace("}]", "}, {name: back, pressure: 1.0e3, velocity: -0.1, distance: 1.0e-3, cells_per_step: 1}]")

@@ -5,7 +5,7 @@ from pathlib import Path
 from drawing import entries, outside, touching
 from matplotlib.figure import Figure
 
-from parcontact.plotting import study_pictures
+from parcontact.results import study_pictures
 
 QUANTITIES = ("mu_max", "mu_dyn", "contact_area_corrected")
 

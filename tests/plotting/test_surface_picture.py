@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from parcontact.physics import surface_statistics as statistics
-from parcontact.plotting import surface_picture
+from parcontact.results import surface_picture
 
 
 def test_a_map_has_the_proportions_of_its_box() -> None:

@@ -10,9 +10,9 @@ from drawing import entries
 from legible import assert_legible
 from matplotlib.figure import Figure
 
-from parcontact.plotting import sweep_charts
-from parcontact.plotting.charts import Chart, ChartLine
-from parcontact.plotting.plots import PlotOptions, plot
+from parcontact.results import sweep_charts
+from parcontact.results.charts import Chart, ChartLine
+from parcontact.results.plots import PlotOptions, plot
 
 SIZES = (1e-3, 2e-3, 3e-3)
 RESULTS = ("mu_max", "mu_dyn", "contact_area_corrected")

@@ -17,7 +17,7 @@ from PIL import Image
 from parcontact import __main__, job
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
-from parcontact.report import log, origin, page
+from parcontact.results import log, origin, page
 from parcontact.steady_sliding import curve
 
 pytestmark = pytest.mark.rendered

@@ -16,11 +16,11 @@ from scipy.special import gamma
 from parcontact import job as jobs
 from parcontact import scene
 from parcontact.accuracy.observation import properties_of
-from parcontact.derived import prediction
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics import surface_statistics as statistics
+from parcontact.results import prediction
 from parcontact.road import map_files, spectrum, treatment
 from parcontact.road.map_files import UNITS
 from parcontact.scene import rigid_surface, sanity

@@ -13,7 +13,7 @@ from scipy.special import gamma
 
 from parcontact import job as jobs
 from parcontact.errors import InputError
-from parcontact.plotting import compound_files as pictures
+from parcontact.results import compound_files as pictures
 from parcontact.rubber import compound
 from parcontact.rubber.series import PronySeries, Weigh
 from parcontact.rubber.shift import WLF, Arrhenius, Factors, read_shift

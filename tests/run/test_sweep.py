@@ -26,10 +26,10 @@ from parcontact.parallel.groups import Groups
 from parcontact.parallel.signals import Signals
 from parcontact.parallel.slab import Slab
 from parcontact.plan import memory
+from parcontact.results import info, slide, sweep_table
 from parcontact.run import sweep, watch
 from parcontact.storage import directory, files, tables
 from parcontact.storage.stopfile import StopFile
-from parcontact.summary import info, slide, sweep_table
 
 LEAVING = """
 grid: {points: 32, size: 1.0e-3, boundary: free}

@@ -128,9 +128,9 @@ def test_a_layer_costs_no_iterations(base: str, poisson: float) -> None:
 
 def test_theory_of_a_layer_in_full_contact(tmp_path: Any) -> None:
     """Persson's theory is exact in full contact: friction of all waves over S."""
-    from parcontact.derived import prediction
     from parcontact.parallel.slab import Slab
     from parcontact.python.given_jobs import of_parts
+    from parcontact.results import prediction
 
     job = of_parts(**sliding_wave({"thickness": 1e-4}))
     *_, row = prediction.predict(job, Slab.alone(32, 4), 0.45, "lattice")

@@ -20,7 +20,7 @@ from parcontact.effects import contact_law
 from parcontact.effects.leakage.over_time import Gaps
 from parcontact.job import Job
 from parcontact.parallel.slab import Array, Slab
-from parcontact.plotting import maps
+from parcontact.results import maps
 from parcontact.solve.constraint import Cells, Mask, NonNegative, Set
 
 FLUID, LOAD = 4e4, 6e4  # pressure of the fluid, and the load that it does not bear [Pa]

@@ -9,11 +9,10 @@ import pytest
 from marched_jobs import JOBS, load_script, marched
 from numpy.typing import NDArray
 
-from parcontact.derived import prediction
 from parcontact.job import Job, load, load_cases
 from parcontact.parallel.slab import Slab
-from parcontact.summary import slide
-from parcontact.summary.slide import Slide
+from parcontact.results import prediction, slide
+from parcontact.results.slide import Slide
 from parcontact.theory import hertz
 
 SMALL = ["grid.points=128", "surface.0.short_wavelength=1.25e-4"]  # 16 cells per shortest wave, as in the paper

@@ -16,11 +16,10 @@ from matplotlib.figure import Figure
 
 from parcontact import __main__
 from parcontact.mesh import load_cases
-from parcontact.report import page
+from parcontact.results import page, sweep_table
 from parcontact.solve.nonsymmetric.steady import SteadySolver
 from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.storage.tables import read_columns
-from parcontact.summary import sweep_table
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="in this process, on one rank")
 

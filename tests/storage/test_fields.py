@@ -10,11 +10,11 @@ from mpi4py import MPI
 
 from parcontact.errors import InputError, RunError
 from parcontact.parallel.slab import Array, Slab
+from parcontact.results import info
 from parcontact.storage import fields, hdf5
 from parcontact.storage.fields import FieldsFile
 from parcontact.storage.hdf5 import Slice
 from parcontact.storage.provenance import Link, Provenance, extend_chain, read_chain
-from parcontact.summary import info
 
 pytestmark = pytest.mark.mpi
 

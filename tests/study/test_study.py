@@ -24,12 +24,12 @@ from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load
 from parcontact.mesh import load as load_job
 from parcontact.parallel.slab import Slab
+from parcontact.results import sweep_table
 from parcontact.run import runner
 from parcontact.run.run import Options
 from parcontact.study import study, verdict
 from parcontact.study.extrapolation import Limit, extrapolate
 from parcontact.study.ladders import Ladders, Settings, describe_choices, ladders, make_cases, overrides
-from parcontact.summary import sweep_table
 
 WAVE = """
 grid: {points: [32, 1], size: [2.5e-4, 2.5e-4]}

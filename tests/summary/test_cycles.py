@@ -17,8 +17,8 @@ from scipy.special import jv
 
 from parcontact.history.timeline import Timeline
 from parcontact.job import Job
+from parcontact.results.cycles import Cycle, find_cycles, write_cycles
 from parcontact.storage.step_row import StepRow
-from parcontact.summary.cycles import Cycle, find_cycles, write_cycles
 
 MODULUS, BRANCH, TIME = 1e6, 2e6, 1e-2  # long-term, of the branch [Pa], relaxation time [s]
 RUBBER = {"model": "zener", "modulus_inf": MODULUS, "branches": [{"modulus": BRANCH, "relaxation_time": TIME}]}

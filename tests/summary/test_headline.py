@@ -16,9 +16,8 @@ from parcontact import job
 from parcontact.effects.adhesion.pull_off import Columns, PullOff, describe_pull_off, find
 from parcontact.errors import InputError
 from parcontact.job import Stage
-from parcontact.report import page
+from parcontact.results import citations, headline, info, page, theory_comparison
 from parcontact.storage.provenance import cite_lines
-from parcontact.summary import citations, headline, info, theory_comparison
 
 ROW = ("time", "distance", "pressure", "friction", "contact_area", "contact_area_corrected", "approach", "max_pressure")
 

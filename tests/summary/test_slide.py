@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from parcontact.job import Job, Stage
-from parcontact.summary.slide import absolute_errors, describe_slide, mean_errors, mean_over_end, measure_slide, ripple
+from parcontact.results.slide import absolute_errors, describe_slide, mean_errors, mean_over_end, measure_slide, ripple
 
 REST = {"pressure": 1.0, "duration": 1.0, "time_step": 0.5}
 CLIMB = {"pressure": 1.0, "velocity": 2.0, "duration": 0.5, "time_step": 0.1}

@@ -9,10 +9,10 @@ from sweeping import JOB, table
 
 from parcontact.__main__ import main
 from parcontact.job import Case, load_cases
-from parcontact.plotting import sweep_charts as pictures
+from parcontact.results import sweep_charts as pictures
+from parcontact.results import sweep_table
 from parcontact.run import sweep
 from parcontact.storage import tables
-from parcontact.summary import sweep_table
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from ...job import Job
 from ...printed import quantity
-from ...summary.run_table import RunTable
+from ...results.run_table import RunTable
 from . import pull_off
 
 SWEPT = (("pull_off", "the pull-off force", "N", "pull_off_error"),)  # results of a sweep for its headline

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...parallel.slab import Array
-from ...plotting import style
-from ...plotting.charts import Axis, Chart, ChartLine
+from ...results import style
+from ...results.charts import Axis, Chart, ChartLine
 
 CONTINUUM = 1e-8  # physics: gap of about thirty molecules of water, the least for continuum flow [m]
 THIN = "constriction\nunder 10 nm"

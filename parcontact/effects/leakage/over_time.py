@@ -18,8 +18,8 @@ from ...job.resolved import RESOLVED, shown_job
 from ...parallel.mpi import MPI
 from ...parallel.root import on_root
 from ...parallel.slab import Slab
-from ...plotting.plotted_run import Fields, PlottedRun
 from ...printed import per_cent, quantity, stated_error
+from ...results.plotted_run import Fields, PlottedRun
 from ...storage import files, hdf5, read_back
 from ..contact_law import touching_of
 from . import conductivity

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 
 from ...columns import UNITS
-from ...plotting import charts, prefixes, style
-from ...plotting.histories import Abscissa
-from ...plotting.plotted_run import PlottedRun
-from ...plotting.style import Panel
+from ...results import charts, prefixes, style
+from ...results.histories import Abscissa
+from ...results.plotted_run import PlottedRun
+from ...results.style import Panel
 from . import conductivity
 from .flow import Flow, Map
 from .section import drop_at

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ...printed import quantity, span, with_error
+from ...results.run_table import RunTable
 from ...storage import read_back
-from ...summary.run_table import RunTable
 
 TABLE = "leak.csv"
 DATA = (TABLE,)  # tables of a run that a report keeps

@@ -12,7 +12,6 @@ from conftest import WORLD
 from marched_jobs import column, marched
 
 from parcontact import scene
-from parcontact.derived import prediction
 from parcontact.effects.counterbody.effect import CounterbodyThatDeforms, frequencies
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import InputError, JobError
@@ -21,6 +20,7 @@ from parcontact.job.schema import json_schema
 from parcontact.job.sections.listing import plain_data, plain_job
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
+from parcontact.results import prediction
 from parcontact.steady_sliding.curve import request
 from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.storage.provenance import references_of

@@ -14,7 +14,7 @@ from parcontact.effects.heat.flash import Flash
 from parcontact.effects.heat.steady import Feedback
 from parcontact.errors import InputError, JobError, RunError
 from parcontact.parallel.slab import Slab
-from parcontact.plotting import curve_charts
+from parcontact.results import curve_charts
 from parcontact.rubber.shift import WLF, Factors, highest_temperature
 from parcontact.steady_sliding.curve import request
 from parcontact.steady_sliding.point import Point

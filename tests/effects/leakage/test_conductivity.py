@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from parcontact.effects.leakage import conductivity
 from parcontact.effects.leakage import pictures as leakage_charts
 from parcontact.effects.leakage.over_time import LeakInstant
-from parcontact.plotting import charts
+from parcontact.results import charts
 
 
 def drawn(chart: charts.Chart) -> dict[str, np.ndarray]:

@@ -16,7 +16,7 @@ import parcontact as pc
 from parcontact import __main__
 from parcontact.effects.leakage import over_time as leak
 from parcontact.effects.leakage.flow import flow_mesh_error, solve_flow
-from parcontact.report import result_sections
+from parcontact.results import result_sections
 
 POINTS = 64
 PRESS = {"pressure": {"from": 1e4, "to": 8e4}, "duration": 1.0, "time_step": 0.25}

@@ -9,8 +9,7 @@ import yaml
 from parcontact import __main__
 from parcontact.effects.leakage import results as leak_stop
 from parcontact.printed import span
-from parcontact.report import page
-from parcontact.summary import headline
+from parcontact.results import headline, page
 
 LENGTH, MODULUS, CLOSING = 2.5e-4, 1.0e6, 1.0e5  # of the wave [m], G [Pa], pressure of full contact [Pa]
 AMPLITUDE = CLOSING * LENGTH / (math.pi * 4 * MODULUS)  # Westergaard (1939): p* = pi E* A/lambda, E* = 4 G

@@ -17,7 +17,7 @@ from parcontact import __main__
 from parcontact.effects.leakage import load_curve
 from parcontact.effects.leakage.fluids import FLUIDS, PressureDrop
 from parcontact.errors import InputError
-from parcontact.summary import headline
+from parcontact.results import headline
 
 LENGTH, MODULUS, CLOSING = 2.5e-4, 1.0e6, 1.0e5  # of the wave [m], G [Pa], pressure of full contact p* [Pa]
 AMPLITUDE = CLOSING * LENGTH / (math.pi * 4 * MODULUS)  # Westergaard (1939): p* = pi E* A/lambda, E* = 4 G

@@ -14,8 +14,8 @@ from ..errors import InputError
 from ..job import Dma, Job, Zener
 from ..job.checks.frequencies import excited_band
 from ..physics.prony import complex_modulus
-from ..plotting import prefixes, style
 from ..scene.measured_range import excited_bands
+from . import prefixes, style
 from .page_parts import ReportSection, ReportTable, draw_panel
 
 DECADES = 1.5  # range of a picture beyond the relaxation times [decades]

@@ -9,9 +9,9 @@ from ..job import Job
 from ..job.sections.listing import plain_data
 from ..storage import hdf5, provenance
 from ..storage.read_back import read_results
-from ..summary.slide import ERRORS
 from . import log
 from .page_parts import ReportSection, ReportTable
+from .slide import ERRORS
 
 FRICTION = ERRORS[0]
 

@@ -16,9 +16,9 @@ from ..parallel.slab import Array
 from ..storage import marker, read_back
 from ..storage.fields import UNITS
 from ..storage.hdf5 import MEND
-from ..summary.run_table import RunTable, find_telling_row
 from . import prefixes
 from .charts import FRACTION, Axis
+from .run_table import RunTable, find_telling_row
 
 MEASURED = (
     *("step", "time", "distance", "pressure", "friction", "friction_x", "contact_area", "contact_area_corrected"),

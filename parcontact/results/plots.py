@@ -17,8 +17,7 @@ from ..errors import InputError
 from ..job.added_sections import answers
 from ..job.reading import CASES
 from ..storage import hdf5, lost_points
-from ..summary import sweep_table, theory_settings
-from . import charts, curve_charts, histories, maps, movie, prefixes, style, sweep_charts
+from . import charts, curve_charts, histories, maps, movie, prefixes, style, sweep_charts, sweep_table, theory_settings
 from .charts import Chart
 from .plotted_run import PlottedRun
 

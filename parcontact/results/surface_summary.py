@@ -9,11 +9,11 @@ from ..errors import InputError
 from ..job import Job, Topography
 from ..parallel.slab import Array
 from ..physics import surface_statistics as statistics
-from ..plotting import style, surface_picture
 from ..printed import per_cent, quantity, with_error
 from ..road import map_files, treatment
 from ..road.prepared_map import prepare
 from ..storage import hdf5
+from . import style, surface_picture
 
 NOT_SELF_AFFINE = "no self-affine range was found"
 

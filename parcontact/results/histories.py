@@ -11,9 +11,9 @@ from ..errors import InputError
 from ..job.added_sections import answers
 from ..parallel.slab import Array
 from ..storage import read_back
-from ..summary.cycles import friction_along, way_along
 from . import prefixes, style
 from .charts import Axis, Chart, ChartLine
+from .cycles import friction_along, way_along
 from .plotted_run import PlottedRun
 
 EARLY = 0.05  # half of the rows within this share of the time make a linear axis useless

@@ -10,9 +10,7 @@ from ..errors import InputError
 from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..job.sections import listing
-from ..plotting import plots
-from ..summary import headline, sweep_table
-from . import log, material, origin, result_sections, road_section
+from . import headline, log, material, origin, plots, result_sections, road_section, sweep_table
 from .page_parts import Chapter, ReportSection, ReportTable, draw_chart, embed_file
 
 KINDS = {  # kinds of results, by their table

@@ -16,11 +16,10 @@ from ..columns import SWEEP, names_of
 from ..job.added_sections import answers
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
-from ..summary import sweep_table
-from ..summary.slide import CORRECTED
-from ..summary.sweep_table import SAMPLES
-from . import prefixes, style
+from . import prefixes, style, sweep_table
 from .charts import FRACTION, Axis, Chart, ChartLine
+from .slide import CORRECTED
+from .sweep_table import SAMPLES
 
 TABLE = sweep_table.TABLE
 UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N", "size": "m", "distance": "m"}

@@ -26,11 +26,11 @@ from ..physics.roughness import EDGE, Roughness
 from ..steady_sliding.curve import Request, request
 from ..storage import files, hdf5, tables
 from ..storage.curve_points import Wanted
-from ..summary import theory_comparison, theory_settings
-from ..summary.theory_settings import TheorySettings
 from ..theory import full_contact, persson, persson_rings
 from ..theory.persson_history import Memory, SlidingLeg, follow
 from ..theory.persson_rings import Rings
+from . import theory_comparison, theory_settings
+from .theory_settings import TheorySettings
 
 ONE_ROUGH = (
     "surface: the theory takes the power spectrum of one isotropic rough surface, and this job has none, or other "
@@ -148,17 +148,25 @@ def predict_bands(job: Job, wanted: Request) -> Iterator[BandInstant]:
 
 
 def write_steady(job: Job, wanted: Request) -> SteadyInstant:
-    """Write steady_theory.csv for a curve, and draw both if the curve exists. Return the point of the
-    highest friction."""
+    """Write steady_theory.csv for a curve. Return the point of the highest friction."""
     rows = list(predict_steady(job, wanted))
     if job.bands is not None:
         _write(job.output.directory / BANDS_FILE, BANDS_THEORY, predict_bands(job, wanted))
     _write(job.output.directory / STEADY_FILE, STEADY_THEORY, rows)
-    if (curve := job.output.directory / "steady.csv").is_file():
-        from ..plotting import plots  # matplotlib is slow to import, and for pictures only
-
-        plots.draw_steady(curve)
     return max(rows, key=lambda row: row.friction)
+
+
+def draw_curve(job: Job, wanted: Request) -> Path:
+    """Draw the curve of a job, with the theory if it needs no heights. Return the path of the picture."""
+    if has_spectrum(job):
+        write_steady(job, wanted)
+    return _draw(job)
+
+
+def _draw(job: Job) -> Path:
+    from . import plots  # matplotlib is slow to import, and for pictures only
+
+    return plots.draw_steady(job.output.directory / "steady.csv")
 
 
 def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
@@ -180,6 +188,8 @@ def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
     if not has_spectrum(job):
         raise InputError(f"{ONE_ROUGH.partition(';')[0]}" if job.bands is None else OF_SPECTRA)
     highest = write_steady(job, request(job))
+    if (job.output.directory / "steady.csv").is_file():
+        _draw(job)
     place = Wanted(highest.velocity, highest.pressure, highest.temperature)
     return [
         f"Persson's theory, {settings.sentence}: {job.output.directory / STEADY_FILE}",

@@ -56,7 +56,7 @@ def _refuse_links(directory: Path) -> None:
 def render(directories: Sequence[Path]) -> str:
     each = [describe_directory(directory) for directory in progress.with_bar(directories, "chapters", "chapter")]
     chapters = [*compare_directories(directories), *each]
-    loader = PackageLoader("parcontact", "report")
+    loader = PackageLoader("parcontact", "results")
     shown = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     shown.filters |= {"breakable": breakable, "whole_numbers": whole_numbers}
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")

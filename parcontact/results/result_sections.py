@@ -16,20 +16,23 @@ from .. import capabilities, progress
 from ..columns import STEADY, SWEEP, UNITS
 from ..job import Job
 from ..job.added_sections import answers
-from ..plotting import charts, curve_charts, histories, maps, prefixes, style, sweep_charts
-from ..plotting.plotted_run import (
-    Fields,
-    PlottedRun,
-    choose_evenly,
-    find_curve_job,
-    find_free_area,
-    label_frames,
-    to_load,
-)
 from ..storage import hdf5, lost_points, marker, read_back
-from ..summary import slide, sweep_table, theory_comparison, theory_settings
-from ..summary.run_table import RunTable
+from . import (
+    charts,
+    curve_charts,
+    histories,
+    maps,
+    prefixes,
+    slide,
+    style,
+    sweep_charts,
+    sweep_table,
+    theory_comparison,
+    theory_settings,
+)
 from .page_parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
+from .plotted_run import Fields, PlottedRun, choose_evenly, find_curve_job, find_free_area, label_frames, to_load
+from .run_table import RunTable
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement and over time"}
 INTERFACE = ("friction_viscous", "friction_interface")

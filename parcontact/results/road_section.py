@@ -6,17 +6,17 @@ import numpy as np
 
 from ..bands.band import Band
 from ..bands.choice import cut_bands, describe_cut
-from ..derived.surface_summary import NOT_SELF_AFFINE
 from ..errors import InputError
 from ..job import Indenter, Job
 from ..job.sections import listing
 from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics import surface_statistics as statistics
-from ..plotting import prefixes, surface_picture
 from ..printed import with_error
 from ..scene import rigid_surface
+from . import prefixes, surface_picture
 from .page_parts import Picture, ReportSection, ReportTable, draw_panel
+from .surface_summary import NOT_SELF_AFFINE
 
 MOST_POINTS = 2**22  # most points of a surface that is computed for a report
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from ..plotting import charts, style
+from . import charts, style
 
 SIZE = (4.2, 2.9)  # size of a chart, half the width of a laptop's screen [inch]
 RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes, independent of fonts

@@ -1,1 +1,0 @@
-"""A report in one HTML file: job, results, costs and provenance."""

@@ -1,0 +1,1 @@
+"""Results of output directories: tables, sentences, pictures and reports."""
