@@ -80,6 +80,7 @@ def check(options: argparse.Namespace) -> int:
     steps = steps and f"chosen time steps: {steps}"
     notes: list[list[str]] = []
     doubts = sentences_of(chosen, lambda one: _doubts(one, notes))
+    notes[0] += _describe_waves(job)
     for text in filter(None, (job.included, job.origin.mesh, steps, *job.facts, "\n".join(notes[0]))):
         print(f"\n{text}")
     for warning in doubts:
@@ -131,6 +132,15 @@ def _doubts(job: Job, notes: list[list[str]]) -> list[Doubt]:
     return sanity.find_doubts(setup, degrees)
 
 
+def _describe_waves(job: Job) -> list[str]:
+    """Return sentences of effects on the waves of a surface on one grid."""
+    if job.bands is not None or not job.asked("describe_waves"):
+        return []
+    from ..scene import sanity
+
+    return sanity.describe_waves(job)
+
+
 def plan(options: argparse.Namespace) -> int:
     """Estimate the steps, time, memory and disk of a job; writes nothing."""
     from ..run import watch
@@ -158,7 +168,8 @@ def plan(options: argparse.Namespace) -> int:
         lines = planner.plan_sweep(chosen, Groups(world, at_once))
     else:
         lines = planner.plan(chosen[0].job, Slab(world, *chosen[0].job.grid.points))
-    for line in (*(f"warning: {text}" for text in doubts), *lines):
+    said = on_root(world, lambda: _describe_waves(chosen[0].job))
+    for line in (*(f"warning: {text}" for text in doubts), *said, *lines):
         if world.rank == 0:
             print(line, flush=True)
     return DONE

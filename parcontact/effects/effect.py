@@ -119,9 +119,10 @@ class Effect(Protocol[Memory]):
 
     It may have `rules` for the whole job, as sections have them; `lifts`, checks of jobs that do not apply with it;
     and functions of a job `doubts` and `facts`, which give warnings (`doubts.Doubt`, or sentences) and sentences
-    about the section. `changed_material` of a job is in place of its material; `why_no_curve` and `why_no_theory`
-    return why it has no friction curve, and no prediction by Persson's theory. Methods are collective unless stated.
-    The base class has no memory.
+    about the section. `describe_waves` of a job gives sentences on the waves of its surface on one grid, from bins of
+    wavenumbers [rad/m] and their mean square slopes. `changed_material` of a job is in place of its material;
+    `why_no_curve` and `why_no_theory` return why it has no friction curve, and no prediction by Persson's theory.
+    Methods are collective unless stated. The base class has no memory.
     """
 
     section: ClassVar[type[Part]]  # section that it adds to a job

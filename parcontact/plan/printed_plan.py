@@ -15,7 +15,7 @@ DAY, YEAR = 86400.0, 365.25 * 86400.0  # [s]
 LARGE = 1e10  # least size that is printed in GB [bytes]
 OF_STEADY_STATES = (
     *("viscoelasticity", "isolated contact", "layer", "surface spectrum", "preconditioner in single precision"),
-    *("interface", "thermal", "counterbody"),
+    *("interface", "thermal", "counterbody", "softening"),
 )
 ON_TILES = "more on rank 0 (tiles), at most"
 TO_ASK_FOR = "to ask a batch system for"

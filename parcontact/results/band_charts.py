@@ -1,5 +1,5 @@
-"""Pictures of a friction curve in bands: friction of each band over velocity, area over magnification, temperature by
-band.
+"""Pictures of a friction curve in bands: friction of each band over velocity, area over magnification, and what
+capabilities have by band (`BAND_PANELS` of their pictures: keys and axes of columns).
 
 Persson's theory for the same spectrum is drawn if `bands_theory.csv` exists.
 """
@@ -11,15 +11,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..job.added_sections import answers
 from ..parallel.slab import Array
 from . import prefixes, style
-from .charts import Axis, Chart, ChartLine
+from .charts import FRACTION, Axis, Chart, ChartLine
 from .plotted_run import count_different, read_table
 
 TABLE, THEORY = "bands.csv", "bands_theory.csv"
 NEEDED = ("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength")
 SHOWN = 4  # number of velocities that are drawn as lines
 THIN = 1.0  # tuning: width of the lines of the theory [points]
+AREA = Axis(FRACTION)
 THEORY_LOOK = {"color": style.GREY, "linestyle": ":", "linewidth": THIN}
 ENTRY = ChartLine("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
 
@@ -28,16 +30,17 @@ def chart_bands(directory: Path) -> list[Chart]:
     """Return panels of a table of bands, for its first pressure and temperature."""
     if not (directory / TABLE).is_file():
         return []
-    whole = read_table(directory / TABLE, (*NEEDED, "friction", "contact_area", "flash_temperature"))
+    whole = read_table(directory / TABLE, (*NEEDED, "friction", "contact_area"))
     columns = _choose(whole)
     if not columns["velocity"].size:
         return []
     theory = None
     if (directory / THEORY).is_file():
         theory = _choose(read_table(directory / THEORY, ("velocity", "pressure", "temperature", "band")))
-    found = [_friction(columns, theory), _over_bands(columns, theory, "contact_area")]
-    if np.isfinite(columns["flash_temperature"]).any():
-        found.append(_over_bands(columns, None, "flash_temperature"))
+    found = [_friction(columns, theory), _over_bands("bands area", columns, theory, "contact_area")]
+    for name, (key, axis) in (pair for panels in answers("pictures", "BAND_PANELS") for pair in panels.items()):
+        if name in columns and np.isfinite(columns[name]).any():
+            found.append(_over_bands(key, columns, None, name, axis))
     if at := _describe_first(whole):
         found = [replace(chart, y=replace(chart.y, name=f"{chart.y.name}\nat {at}")) for chart in found]
     return found
@@ -78,9 +81,11 @@ def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Cha
     return Chart("bands", Axis("sliding velocity", "m/s"), y, series, log_x=True, edges=edges)
 
 
-def _over_bands(columns: dict[str, Array], theory: dict[str, Array] | None, name: str) -> Chart:
-    """Return a chart of area over magnification, or of temperature over wavelength, for some velocities."""
-    area, longest = name == "contact_area", float(columns["long_wavelength"].max())
+def _over_bands(
+    key: str, columns: dict[str, Array], theory: dict[str, Array] | None, name: str, y: Axis = AREA
+) -> Chart:
+    """Return a chart of the area over magnification, or of another column over wavelength, for some velocities."""
+    area, longest = y is AREA, float(columns["long_wavelength"].max())
     x = Axis("magnification") if area else Axis("shortest wave of the band", "m")
     series = []
     for number, speed in enumerate(_some(np.unique(columns["velocity"]))):
@@ -91,8 +96,7 @@ def _over_bands(columns: dict[str, Array], theory: dict[str, Array] | None, name
             label = prefixes.quantity(speed, "m/s") if table is columns else ""
             series.append(ChartLine(label, longest / short if area else short, table[name][rows], look))
     series += [] if theory is None else [ENTRY]
-    y = Axis("contact area /\nnominal area") if area else Axis("temperature rise", "K")
-    return Chart("bands area" if area else "bands heat", x, y, series, log_x=True)
+    return Chart(key, x, y, series, log_x=True)
 
 
 def _tables(

@@ -4,10 +4,14 @@ Several temperatures are separate lines; friction over a_T v shows them on one m
 """
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
+from ..errors import InputError
+from ..job import load
+from ..job.added_sections import answers
 from ..job.resolved import STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from . import band_charts, prefixes, style
@@ -59,6 +63,9 @@ def chart_steady(directory: Path, over: str = "") -> list[Chart]:
             one = along == "reduced" and "load" not in lines  # over a_T v the theory is one line
             series += _make_thin(theory, along, name, {} if one else lines, "theory")
         found.append(Chart(key, axes[along], axes[name], series, log_x=True))
+    with suppress(InputError):  # files of the job no longer exist
+        job = load(directory / STEADY_RESOLVED)
+        found += [chart for panels_of in answers("pictures", "curve_panels") for chart in panels_of(job, columns)]
     return found + (band_charts.chart_bands(directory) if x == "velocity" else [])
 
 

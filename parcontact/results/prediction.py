@@ -88,7 +88,9 @@ class SteadyInstant(NamedTuple):
 
 
 def has_spectrum(job: Job) -> bool:
-    """Return whether the theory does not need the heights of a job: in bands, or with one rough surface."""
+    """Return whether the theory is for a job and does not need its heights: in bands, or with one rough surface."""
+    if _why_forbidden(job):
+        return False
     if job.bands is not None:
         return not isinstance(job.surface[0], jobs.Topography)
     return job.grid.boundary == "periodic" and _only_rough(job) is not None
@@ -185,6 +187,8 @@ def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
     if settings != TheorySettings(persson.GAMMA, "continuum"):
         raise InputError("--gamma and --waves are for histories, and this job has a friction curve alone")
     _refuse_free(job)
+    if why := _why_forbidden(job):
+        raise InputError(why)
     if not has_spectrum(job):
         raise InputError(f"{ONE_ROUGH.partition(';')[0]}" if job.bands is None else OF_SPECTRA)
     highest = write_steady(job, request(job))
@@ -305,12 +309,15 @@ def _longest_slide(timeline: Timeline) -> float:
 # -- the history ------------------------------------------------------------------------------------------------------
 
 
+def _why_forbidden(job: Job) -> str:
+    """Return why an effect of a job forbids the theory; '' if none does."""
+    forbidden = [found[BY_THEORY] for found in job.asked("forbids") if BY_THEORY in found]
+    return next(filter(None, (*forbidden, *(ask(job) for ask in job.asked("why_no_theory")))), "")
+
+
 def _material(job: Job) -> Prony:
     """Return the incompressible body with the stiffness of the job's half space, to which nu contributes a factor."""
-    for forbidden in job.asked("forbids"):
-        if BY_THEORY in forbidden:
-            raise InputError(forbidden[BY_THEORY])
-    for why in filter(None, (ask(job) for ask in job.asked("why_no_theory"))):
+    if why := _why_forbidden(job):
         raise InputError(why)
     if job.material.hardness is not None:
         raise InputError("the theory excludes counterbodies that yield: leave out material.hardness")

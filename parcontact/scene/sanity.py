@@ -20,15 +20,18 @@ from ..job.checks.cells import more_points
 from ..job.checks.limits import MOST_STEPS
 from ..parallel import rows
 from ..parallel.slab import Array, Slab
+from ..physics.convolution import wavenumbers
 from ..physics.measures import Measures
 from ..printed import rounded_up
 from .measured_range import doubt_band
-from .scene import Setup
+from .scene import Setup, set_up
 
 SEAM = 2.0  # accuracy: least jump across the edge, over the largest increment inside, for a warning
 FEW_CELLS = 0.15  # accuracy: least excess of the counted area, as a share of it, for a warning
 FEW_POINTS = 2**22  # tuning: largest number of points whose heights are computed for a check; this takes seconds
 STRICT = "an error with numerics.strict"
+BINS = 12  # accuracy: bins of wavenumbers in an octave
+LEAST = 1e-6  # accuracy: share of the mean square slope below which a bin has no waves
 RESOLVED = 1e-6  # accuracy: largest rounding of heights over an approach
 FULL_CONTACT_ROUNDING = 1e-14  # rounding: relative rounding of a sum of lengths
 
@@ -45,6 +48,24 @@ def refuse_impossible(job: Job, timeline: Timeline) -> None:
 def is_quickly_made(job: Job) -> bool:
     """Return whether the heights of a job decide about warnings, and are few enough to be computed for these."""
     return job.depends_on_heights and job.grid.nx * job.grid.ny <= FEW_POINTS
+
+
+def describe_waves(job: Job) -> list[str]:
+    """Return sentences of effects on the waves of a surface on one grid, which is made for it on one rank; none for a
+    flat surface, or for one of too many points."""
+    if job.grid.nx * job.grid.ny > FEW_POINTS:
+        return []
+    setup = set_up(job, Slab.alone(*job.grid.points))
+    q = np.hypot(*wavenumbers(setup.fft, setup.size)).ravel() / setup.units.length
+    heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
+    slopes = (setup.fft.multiplicity * np.abs(setup.fft.forward(heights) / setup.slab.points) ** 2).ravel() * q**2
+    bins = np.rint(BINS * np.log2(np.maximum(q / q[q > 0.0].min(), 1.0))).astype(np.int64)
+    sums, weighted = (np.bincount(bins, weights) for weights in (slopes, slopes * q))
+    kept = sums > LEAST * sums.sum()
+    if not kept.any():
+        return []
+    middle = weighted[kept] / sums[kept]
+    return [text for describe in job.asked("describe_waves") for text in describe(job, middle, sums[kept])]
 
 
 def find_doubts(setup: Setup, temperatures: Sequence[float] = ()) -> list[Doubt]:

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...parallel.slab import Array
 
+ROUNDING = 1e-9  # rounding: relative, of a wavenumber at the end of an octave
 MIXED = 0.7  # tuning: exponent of the new strain in that of the next round
 
 
@@ -59,10 +60,9 @@ class Softened:
     longest: float
     strains: tuple[float, ...]
 
-    def octave(self, q: Array) -> np.ndarray:
+    def octave(self, q: Array) -> NDArray[np.int64]:
         """Return the number of the octave of each wavenumber [1/length]."""
-        ratio = np.maximum(q * self.longest / (2.0 * np.pi), 1.0)
-        return np.minimum(np.floor(np.log2(ratio * (1.0 + 1e-9))).astype(np.int64), len(self.strains) - 1)
+        return np.minimum(octave_of(q, self.longest), len(self.strains) - 1)
 
     def same_factors(self, other: "Softened") -> bool:
         """Return True if the octaves have the factors of other strains."""
@@ -74,3 +74,21 @@ class Softened:
         f, g = self.table.factors(np.array(self.strains))
         octave = self.octave(q)
         return f[octave], g[octave]
+
+
+def octave_of(q: Array, longest: float) -> NDArray[np.int64]:
+    """Return the number of the octave of each wavenumber [1/length], from the wavelength `longest` on."""
+    ratio = np.maximum(q * longest / (2.0 * np.pi), 1.0)
+    return np.floor(np.log2(ratio * (1.0 + ROUNDING))).astype(np.int64)
+
+
+def strains_in_full_contact(q: Array, slopes: Array, group: NDArray[np.int64], count: int) -> Array:
+    """Return the strain [-] of each group of waves in full contact, from the mean square slopes of waves with the
+    wavenumbers q, shape (n,), and the number of their group, below `count`; NaN for a group without waves.
+
+    With r = k_j/q it is `gamma_q^2 = sum_j 12 (k_j A_j)^2 r^2/(1 + r)^5`; `(k A)^2` is twice the mean square slope.
+    """
+    ratio = q / q[:, None]
+    squares = (24.0 * slopes * ratio**2 / (1.0 + ratio) ** 5).sum(axis=1)
+    sums, whole = (np.bincount(group, weights, count) for weights in (slopes * squares, slopes))
+    return np.sqrt(np.divide(sums, whole, out=np.full(count, np.nan), where=whole > 0.0))

@@ -1,0 +1,31 @@
+"""Panels of softening: strain by band, and the moduli over strain with the strains of a friction curve."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ...parallel.slab import Array
+from ...plotting import style
+from ...plotting.charts import Axis, Chart, ChartLine
+
+BAND_PANELS = {"strain_amplitude": ("bands strain", Axis("strain amplitude"))}
+POINTS = 200  # number of points of a line
+NAMES = ("G' storage", "G'' loss")
+
+
+def curve_panels(job: Any, columns: Mapping[str, Array]) -> Iterator[Chart]:
+    """Yield the chart of the factors of both moduli over strain, with marks at the strains in columns of a friction
+    curve, for jobs with softening."""
+    section = job.section("softening")
+    if section is None:
+        return
+    table, found = section.made, columns["strain_amplitude"]
+    marked = np.sort(found[np.isfinite(found)])
+    strain = np.geomspace(min(table.strain[0], *marked), max(table.strain[-1], *marked), POINTS)
+    series = []
+    for number, (name, line, marks) in enumerate(zip(NAMES, table.factors(strain), table.factors(marked), strict=True)):
+        look = style.line(number)
+        series.append(ChartLine(name, strain, line, look))
+        series.append(ChartLine("", marked, marks, look | {"marker": "o", "linestyle": "none"}))
+    yield Chart("steady softening", Axis("strain amplitude"), Axis("modulus /\nunsoftened"), series, log_x=True)
