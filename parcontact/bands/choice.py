@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..job import Grid, Job
 from ..job.added_sections import answers
 from ..job.checks.cells import fast_length
+from ..job.checks.size import doubt_memory
 from ..job.sections.spectral_bands import AUTO, LEAST_CELLS, Bands
 from ..parallel.slab import Array
 from ..physics.roughness import EDGE
@@ -105,6 +106,8 @@ def cut_bands(job: Job) -> Cut:
             f"bands.points: a band from {spectrum.longest:.3g} to {spectrum.longest / ratio:.3g} m with {waves} of its "
             f"longest waves needs {math.ceil(least)} points or more along a side, got {side}"
         )
+    for doubt in doubt_memory(Grid(points=points, size=(1.0, 1.0))):
+        raise InputError(f"bands.count: {count} of {decades / count:.2g} decades: {doubt.body}, or more bands")
     edges = spectrum.cut(count)
     if measured:
         edges = np.concatenate([[2.0 * np.pi / max(measured.grid.size)], edges])

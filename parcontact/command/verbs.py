@@ -250,6 +250,7 @@ def surface(options: argparse.Namespace) -> int:
     job = measured_maps.load_map(given, options.set) if alone else _load(options)
     if job.bands is not None:
         raise InputError(f"{given} has bands, each with heights on a grid of its own: give it a grid instead (grid)")
+    sanity.refuse_memory(job)
     base = set_up(job, Slab.alone(*job.grid.points))
     doubts = [doubt for doubt in job.doubts if doubt.place.startswith("surface")] + sanity.check_heights(base)
     base.surface.rescale(1.0)

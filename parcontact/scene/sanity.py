@@ -40,9 +40,16 @@ def refuse_impossible(job: Job, timeline: Timeline) -> None:
     """Raise InputError for a run with too many points for the memory, or with too many instants."""
     count = timeline.count
     endless = f"the history would have {count:.3g} steps; it has at most {MOST_STEPS:.0e}" if count > MOST_STEPS else ""
-    for text in (*map(str, size.doubt_memory(job.grid)), size.beyond_file(count, job.output), endless):
+    refuse_memory(job)
+    for text in (size.beyond_file(count, job.output), endless):
         if text:
             raise InputError(text)
+
+
+def refuse_memory(job: Job) -> None:
+    """Raise InputError for a grid that cannot fit into the memory of the machines."""
+    for doubt in size.doubt_memory(job.grid):
+        raise InputError(str(doubt))
 
 
 def is_quickly_made(job: Job) -> bool:

@@ -305,6 +305,7 @@ def test_weights_of_a_ladder() -> None:
     [
         ({"waves": 1, "points": 64}, "bands.waves must be a whole number of at least 2"),
         ({"points": 1}, "needs 128 points or more along a side, got 1$"),
+        ({"points": 10**7}, "points need at least .* GB of memory on all ranks together"),
         ({"points": [64, 1]}, "needs 128 points or more along a side, got 64$"),
     ],
 )

@@ -135,6 +135,10 @@ def test_the_verb_surface(road: Path, main: "Main", run_parcontact: "RunParconta
     code, _, err = main("surface", road / "job.yaml", "--out", road / "road.doc")
     assert code == 2
     assert err.startswith("parcontact: --out must end in .png, .pdf, .svg")
+    (road / "large.yaml").write_text(JOB.format(points=10**7, size=LENGTH, more=""))
+    code, _, err = main("surface", road / "large.yaml")
+    assert code == 2
+    assert "10000000 x 10000000 points need at least" in err
 
 
 # -- what is taken out of a map, and what is doubted ------------------------------------------------------------------
