@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from types import SimpleNamespace
 from typing import Any
 
-from pydantic import Field, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from ..accuracy.shares import FRICTION, STEADY
 from ..errors import InputError
-from ..job import Job
+from ..job import Job, added_sections
 from ..job.checks import cells
 from ..job.model import prepared
 from ..job.sections.calculation import Accuracy, Grid, Numerics
@@ -72,7 +73,7 @@ def _choose_points(source: Source, origin: Origin) -> Origin:
     known = prepared({name: source.data[name] for name in Scenery.model_fields if source.data.get(name) is not None})
     points: Any = UNREADABLE
     try:
-        scenery = Scenery.model_validate(known, context=origin)
+        scenery = _with_changed_material(Scenery.model_validate(known, context=origin), source.data, origin)
         box = Grid.model_validate({**grid, "points": 1}, context=origin)
         points, said = _choose(scenery, box, source.data, origin)
         origin = origin._replace(mesh=said)
@@ -82,6 +83,17 @@ def _choose_points(source: Source, origin: Origin) -> Origin:
         pass
     grid["points"] = points
     return origin
+
+
+def _with_changed_material(scenery: Scenery, data: dict[str, Any], origin: Origin) -> Scenery:
+    """Return the sections with the material that effects of a job put in place of its own."""
+    added = [name for name, value in data.items() if name not in Job.model_fields and value is not None]
+    for section, effect in added_sections.effects_of(added).items():
+        if change := getattr(effect, "changed_material", None):
+            own = TypeAdapter(effect.section).validate_python(data[section], context=origin)
+            material = change(SimpleNamespace(**dict(scenery), **{section: own}))
+            scenery = scenery.model_copy(update={"material": material})
+    return scenery
 
 
 def points_for(job: Job, accuracy: float) -> tuple[int, int]:

@@ -1,5 +1,5 @@
 """Panel of heat: temperature by band."""
 
-from ...plotting.charts import Axis
+from ...results.charts import Axis
 
 BAND_PANELS = {"flash_temperature": ("bands heat", Axis("temperature rise", "K"))}

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from ...parallel.slab import Array
-from ...plotting import style
-from ...plotting.charts import Axis, Chart, ChartLine
+from ...results import style
+from ...results.charts import Axis, Chart, ChartLine
 
 BAND_PANELS = {"strain_amplitude": ("bands strain", Axis("strain amplitude"))}
 POINTS = 200  # number of points of a line

@@ -11,7 +11,7 @@ import yaml
 from conftest import WORLD
 from marched_jobs import column, marched
 
-from parcontact import scene
+from parcontact import mesh, scene
 from parcontact.effects.counterbody.effect import CounterbodyThatDeforms, frequencies
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import InputError, JobError
@@ -298,3 +298,22 @@ def test_ranks_get_the_pair() -> None:
 def test_a_relaxing_counterbody_has_its_references() -> None:
     pressed = job(material=STIFF, counterbody=OTHER, history=LOAD)
     assert references_of(plain_data(pressed)) == references_of(plain_data(job(counterbody=None, history=LOAD)))
+
+
+def test_points_follow_from_the_pair() -> None:
+    """As for the one material with the modulus of the pair, 1/(1/1 + 1/0.2) MPa."""
+    rough = {
+        "shape": "rough",
+        "hurst": 0.9,
+        "long_wavelength": 1.25e-4,
+        "short_wavelength": 3.125e-5,
+        "rms_slope": 0.02,
+    }
+    scene_of = {"grid": {"points": "auto", "size": 5e-4}, "surface": rough, "numerics": {"accuracy": 0.02}}
+    bodies = [{"model": "elastic", "shear_modulus": modulus} for modulus in (1e6, 2e5, 1e6 / 6.0)]
+    given = {"history": [{"pressure": 5e3}], **scene_of}
+    both, one, hard = (
+        mesh.load(data_of(material=body, counterbody=other, **given)).grid.points
+        for body, other in ((bodies[0], bodies[1]), (bodies[2], None), (bodies[0], None))
+    )
+    assert both == one != hard

@@ -19,14 +19,13 @@ from numpy.typing import NDArray
 from parcontact import job as jobs
 from parcontact import scene
 from parcontact.bands.road_sliding import RoadSliding
-from parcontact.derived import prediction
 from parcontact.effects.softening.steady import doubts_of_points
 from parcontact.effects.softening.strain import strains_at_octaves
 from parcontact.effects.softening.strain_table import Softened, StrainTable
 from parcontact.errors import InputError, JobError
 from parcontact.parallel.slab import Slab
 from parcontact.physics.convolution import wavenumbers
-from parcontact.plotting import curve_charts
+from parcontact.results import curve_charts, prediction
 from parcontact.scene import sanity
 from parcontact.steady_sliding.point import Point
 from parcontact.steady_sliding.sliding import SteadySliding
