@@ -11,6 +11,7 @@ PAIRS = (("G_stor", "G_loss"), ("E_stor", "E_loss"), ("*_stor", "*_loss"))
 HELD = {"f": "frequency", "omega": "frequency", "T": "temperature"}  # of which a sweep has one
 NAMES = {"strain", *FACTORS, "omega", "T", *(name for pair in PAIRS for name in pair)}
 PLAIN = {"strain", *FACTORS}  # columns that need no unit
+HIGHEST = 10.0  # physics: strain [-] that no rubber reaches in shear
 UNITS = {"": 1.0, "%": 0.01}
 EXAMPLE = "strain,f,g or strain[%],G'[MPa],G''[MPa]"
 
@@ -32,6 +33,10 @@ def read_sweep(path: Path, reference: float | None) -> tuple[StrainTable, str]:
     strain = tuple(unit * value for value in strain)
     if not strain[0] > 0.0 or len(set(strain)) < len(strain) or min(*storage, *loss) <= 0.0:
         raise InputError(f"{path}: strains must be positive and different, moduli or factors positive")
+    if strain[-1] > HIGHEST and not table.units.get("strain"):
+        raise InputError(
+            f"{path}: strains without a unit reach {strain[-1]:g}; write strain[%] if they are in per cent"
+        )
     found = StrainTable(strain, storage, loss)
     if pair == FACTORS:
         return found, ""

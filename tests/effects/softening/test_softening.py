@@ -339,6 +339,7 @@ def test_files_of_strain_sweeps(tmp_path: Path, name: str) -> None:
         ("strain,f,g\n0.1,1,1\n0.1,1,1\n", "positive and different"),
         ("strain,G'[MPa],G''[MPa],T[C]\n0.01,1,1,20\n0.1,1,1,40\n", "has one temperature, got 2, 20 to 40"),
         ("strain,G'[MPa],G''[MPa],f[Hz]\n0.01,1,1,1\n0.1,1,1,10\n", "has one frequency, got 2, 1 to 10 Hz"),
+        ("strain,f,g\n0.1,1,1\n100,0.3,1\n", r"strains without a unit reach 100; write strain\[%\]"),
         ("strain[mm],f,g\n0.01,1,1\n0.1,1,1\n", "the unit of strain must be one of"),
     ],
 )
