@@ -7,6 +7,7 @@ from the nearest tried case in proportion to their work, which is steps (or stea
 import math
 import re
 import resource
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -17,7 +18,6 @@ from ..history.timeline import Timeline
 from ..job import Case, Job
 from ..parallel.groups import Groups
 from ..parallel.slab import Slab
-from ..run import watch
 from ..steady_sliding.curve import request
 from . import printed_plan
 from .trial import Trial, try_job, warm_up
@@ -28,8 +28,8 @@ KILO = 1024  # unit of resident memory in `getrusage` [bytes]
 
 @dataclass
 class Planner:
-    """Plans jobs for the numbers of `ranks`, within about `seconds` [s] since the program began, of which the first
-    half may be used up before a trial; `started` [s] is the time that the program took to start.
+    """Plans jobs for the numbers of `ranks`, within about `seconds` [s] of the processor since the program began,
+    of which the first half may be used up before a trial; `started` [s] is the time that the program took to start.
 
     Trials are appended to `found`, and `overhead` is the time of an operator call on a few points [s].
     """
@@ -77,7 +77,7 @@ class Planner:
 
     def _left(self, slab: Slab, trials: int) -> float:
         """Return the time of the next of some trials [s]; collective."""
-        return slab.agree(max(self.seconds - watch.age(), self.seconds / 2.0) / trials)
+        return slab.agree(max(self.seconds - time.process_time(), self.seconds / 2.0) / trials)
 
     def _describe(self, job: Job, slab: Slab, trials: int) -> Iterator[str]:
         """Yield lines on the costs of the steps of a job, or of its steady states; collective."""

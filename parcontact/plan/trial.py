@@ -44,7 +44,8 @@ class OutOfTimeError(Exception):
 
 
 class TimedSlab(Slab):
-    """A slab whose sums over ranks raise OutOfTimeError once, on all ranks, after the instant `end` of `perf_counter`.
+    """A slab whose sums over ranks raise OutOfTimeError once, on all ranks, after one of them has reached the instant
+    `end` of its `process_time`.
 
     It remembers the time of the processor and the counts before the first solve.
     """
@@ -55,7 +56,7 @@ class TimedSlab(Slab):
     def reduce(self, sums: Sequence[float], maxima: Sequence[float]) -> list[float]:
         if self.begun is None and self.tally["operator"]:
             self.begun = time.process_time(), self.tally.copy()
-        *found, late = super().reduce(sums, [*maxima, float(time.perf_counter() > self.end)])
+        *found, late = super().reduce(sums, [*maxima, float(time.process_time() > self.end)])
         if late:
             self.end = math.inf
             raise OutOfTimeError
@@ -169,7 +170,7 @@ def try_job(job: Job, slab: Slab, seconds: float) -> Trial | None:
 def _attempt(job: Job, slab: TimedSlab, seconds: float) -> Trial | None:
     """Try a job on its grid; None if too few steps are reached to stand for the others; collective."""
     wisdom.recall(choices(job).transforms, slab, None)
-    slab.end = time.perf_counter() + seconds
+    slab.end = time.process_time() + seconds
     try:
         building, stages = _march(job, slab, seconds) if job.history else _slide_steadily(job, slab)
     except OutOfTimeError:
@@ -275,12 +276,12 @@ def _spread(count: int) -> list[int]:
 
 def _try(march: March, seconds: float) -> list[StageCost]:
     """Return the costs of all stages; root's clock decides for all ranks."""
-    slab, began, timeline = march.scene.slab, time.perf_counter(), march.timeline()
+    slab, began, timeline = march.scene.slab, time.process_time(), march.timeline()
     stages = [StageCost(span.jumps + span.count) for span in timeline.spans]
     with suppress(OutOfTimeError):
         for step in march.steps(timeline):
             stage, span = stages[step.stage], timeline.spans[step.stage]
-            took = slab.agree(time.perf_counter() - began)
+            took = slab.agree(time.process_time() - began)
             if took > seconds * (step.stage + 1) / (len(stages) + 1) and stage.tried >= FEWEST:
                 if step.stage + 1 == len(stages):
                     break
