@@ -136,7 +136,7 @@ MADE_BY = {  # which modules make objects of a kind
     "ContactSolver": {"scene.scene"},
     "HalfSpace": {"scene.scene"},
     "SteadySolver": {"steady_sliding.sliding"},
-    "SteadySliding": {"steady_sliding.start", "steady_sliding.curve", "plan.sample", "plan.memory"},
+    "SteadySliding": {"steady_sliding.start", "steady_sliding.curve", "plan.trial", "plan.memory"},
     "March": {"steady_sliding.start"},
 }
 

@@ -69,9 +69,11 @@ def _steady(add: Add) -> None:
 
 
 def _plan(add: Add) -> None:
-    text = "numbers of ranks for which memory is estimated, N,N,... (default: 1, the ranks started, and all cores)"
+    text = "numbers of ranks of the estimates, N,N,... (default: 1, the ranks started, and all cores)"
     add("--ranks", metavar="N,...", type=values.counts, default=(), help=text)
-    add("--seconds", metavar="T", type=values.seconds, default=10.0, help="time for trial steps [s] (default: 10)")
+    add(
+        "--seconds", metavar="T", type=values.seconds, default=10.0, help="CPU time of the whole plan [s] (default: 10)"
+    )
 
 
 def _theory(add: Add) -> None:

@@ -24,6 +24,7 @@ from ..scene import Scene, build_on, choices, outline, solver_on_tiles
 from ..scene.rigid_surface import highest_waves
 from ..solve.dilute_contact import BLOCKS, LARGEST_SHARE, LEAST, SHARE
 from ..solve.fallback.cold_start import WORTHWHILE
+from ..steady_sliding.curve import request
 from ..steady_sliding.sliding import SteadySliding
 
 FREE_SHARE = 0.7  # tuning: share of the free memory that jobs may take
@@ -65,9 +66,16 @@ def steady_start(job: Job, ranks: int = 1, rank: int | None = None) -> int:
     for a run without it. The table of the wake of a free box may briefly take more."""
     if not choices(job).steady_start.on:
         return 0
+    return steady_bytes(job, ranks, rank)
+
+
+def steady_bytes(job: Job, ranks: int = 1, rank: int | None = None) -> int:
+    """Return the largest memory of a rank in maps [bytes] during the initial steady state, or those of a curve."""
     slab = _slab(job, ranks, rank)
-    sliding = SteadySliding(outline(job, slab), tolerance_before(job, 0, choices(job).viscoelasticity.on))
-    held = sliding.hold(job.initial.velocity)
+    first = choices(job).steady_start.on
+    most = tolerance_before(job, 0, choices(job).viscoelasticity.on) if first else math.inf
+    sliding, wanted = SteadySliding(outline(job, slab), most), None if first else request(job)
+    held = sliding.hold(wanted.velocity(wanted.velocities[0]) if wanted else job.initial.velocity)
     bytes_held = slab.tally["map bytes"]
     del held
     return bytes_held
@@ -77,6 +85,8 @@ def most_bytes(job: Job, ranks: int) -> int:
     """Return the largest memory of rank 0 in maps [bytes]: in steps with a first solve on coarser grids and saved
     fields, or in the steady state from which a run starts."""
     (nx, ny), one_map = job.grid.points, 8 * job.grid.nx * job.grid.ny / ranks
+    if not job.history:
+        return steady_bytes(job, ranks)
     steps = total_bytes(job, ranks) + len(job.output.fields) * one_map + NESTED * one_map * (nx * ny >= WORTHWHILE)
     return int(max(steps, steady_start(job, ranks))) + on_tiles(job)
 

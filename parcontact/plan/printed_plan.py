@@ -1,14 +1,12 @@
 """The text of a plan."""
 
-import os
 import time
 from collections.abc import Iterator, Sequence
 
 from ..job import Job
-from ..printed import per_cent
 from ..scene import choices
 from . import memory
-from .costs import Costs
+from .trial import Trial
 
 SUMS_PER_STEP = 1  # sums over ranks per step outside of the march, to decide whether to stop
 DAY, YEAR = 86400.0, 365.25 * 86400.0  # [s]
@@ -19,7 +17,7 @@ OF_STEADY_STATES = (
 )
 ON_TILES = "more on rank 0 (tiles), at most"
 TO_ASK_FOR = "to ask a batch system for"
-STEADY_START = "steady start, before"
+STEADY_START, STEADY_STATES = "steady start, before", "steady states"
 
 
 def effects(job: Job) -> Iterator[str]:
@@ -33,7 +31,10 @@ def effects(job: Job) -> Iterator[str]:
 
 def maps(job: Job, ranks: Sequence[int], program: int) -> Iterator[str]:
     """Yield a table of the memory of a rank by purpose; `program` is its memory without maps [bytes]."""
-    columns = [memory.holdings(job, count) for count in ranks]
+    if job.history:
+        columns = [memory.holdings(job, count) for count in ranks]
+    else:
+        columns = [{STEADY_STATES: memory.steady_bytes(job, count)} for count in ranks]
     before = [STEADY_START] * choices(job).steady_start.on
     tiles = memory.on_tiles(job)
     width = max(map(len, (*columns[0], *before, *[ON_TILES] * bool(tiles), TO_ASK_FOR)))
@@ -51,50 +52,45 @@ def maps(job: Job, ranks: Sequence[int], program: int) -> Iterator[str]:
     yield f"  {'program without maps':{width}}" + f"{program / size:13.4g}" * len(ranks)
     asked = ((program + memory.most_bytes(job, count)) / size for count in ranks)
     yield f"  {TO_ASK_FOR:{width}}" + "".join(f"{number:13.4g}" for number in asked)
-    yield f"a checkpoint has {_bytes(memory.saved(job))}"
+    if job.history:
+        yield f"a checkpoint has {_bytes(memory.saved(job))}"
 
 
-def steps(costs: Costs) -> Iterator[str]:
+def steps(trial: Trial) -> Iterator[str]:
     """Yield lines on the number of steps, or steady states, and on the work of each."""
-    job, sample = costs.job, costs.sample
-    word = "step" if job.history else "state"
+    job, word = trial.job, "step" if trial.job.history else "state"
+    whole = trial.tried >= trial.steps
     if job.steady and not job.history:
-        yield f"parcontact steady: {sample.steps} steady states, {len(job.steady.velocities)} velocities"
+        yield f"parcontact steady: {trial.steps} steady states, {len(job.steady.velocities)} velocities"
     else:
-        names = (f"{stage.name} {seen.steps}" for stage, seen in zip(job.history, sample.stages, strict=True))
-        most = "at most " if choices(job).short_rest.on and sample.tried < sample.steps else ""
-        if choices(job).chosen_steps.on and sample.tried < sample.steps:
-            most = "about "
-        yield f"{most}{sample.steps} steps: {', '.join(names)}"
-    calls, transforms, sums = (sample.total(name) / sample.steps for name in ("operator", "fft", "allreduce"))
+        names = (f"{stage.name} {seen.steps}" for stage, seen in zip(job.history, trial.stages, strict=True))
+        most = "" if whole else "about " if choices(job).chosen_steps.on else "at most " * choices(job).short_rest.on
+        yield f"{most}{trial.steps} steps: {', '.join(names)}"
+    calls, transforms, sums = (trial.total(name) / trial.steps for name in ("operator", "fft", "allreduce"))
     sums += SUMS_PER_STEP
     yield f"per {word}: {calls:.3g} operator calls, {transforms:.3g} transforms and {sums:.3g} sums over all ranks"
-    if costs.instants:
-        yield f"fields are saved {costs.instants} times, {_bytes(costs.instant_bytes)} each"
-    tried = sample.job.grid.points
-    grid = "" if tried == job.grid.points else f" ({tried[0]} x {tried[1]} points instead)"
-    where = f"on {ranks_text(sample.ranks)}{grid}"
-    rest = "" if sample.tried >= sample.steps else "; the others are assumed to cost the same"
-    yield f"tried: {sample.tried} {word}s {where} in {sample.took:.3g} s{rest}"
+    if job.history and choices(job).fields.on:
+        size = len(job.output.maps) * job.grid.nx * job.grid.ny * 8
+        yield f"fields are saved {-(-trial.steps // job.output.every)} times, {_bytes(size)} each"
+    nx, ny = trial.points
+    grid = "" if (nx, ny) == job.grid.points else f" ({nx} x {ny} points instead)"
+    rest = "" if whole else "; the others are assumed to cost the same"
+    yield f"tried: {trial.tried} {word}s on {ranks_text(trial.ranks)}{grid}{rest}"
 
 
-def times(costs: Costs) -> Iterator[str]:
-    """Yield lines on time and memory on the ranks of the trial, with a warning if other programs disturbed it."""
-    sample = costs.sample
-    if sample.disturbed:
-        load = f"load {os.getloadavg()[0]:.2g} on {len(os.sched_getaffinity(0))} cores"
-        yield (
-            f"warning: other programs use this machine ({load}), and each rank of the trial had only "
-            f"{per_cent(sample.share)} of a core; the times below are too long"
-        )
-    word = "step" if costs.job.history else "state"
-    parts = (("to start", sample.starting), ("to set up the scene", costs.building), ("to write files", costs.writing))
-    shares = ", ".join(f"{seconds:.2g} s {what}" for what, seconds in parts)
-    yield (
-        f"time on {ranks_text(sample.ranks)}: {costs.step:.3g} s per {word}, "
-        f"{duration_text(costs.whole)} in all, including {shares}"
-    )
-    yield f"memory of a rank: at most {_bytes(costs.held)} in maps, {_bytes(costs.resident)} resident"
+def times(trial: Trial, ranks: Sequence[int], started: float, overhead: float) -> Iterator[str]:
+    """Yield a table of times; on other numbers of ranks than those of the trial each has its share of the work."""
+    word = "a step" if trial.job.history else "a state"
+    rows = {
+        f"{word} [s]": [f"{trial.step(count, overhead):.3g}" for count in ranks],
+        "in all": [duration_text(started + trial.case(count, overhead)) for count in ranks],
+    }
+    width = max(map(len, rows))
+    yield f"{'time':{width + 2}}" + "".join(f" {ranks_text(count):>12}" for count in ranks)
+    for name, cells in rows.items():
+        yield f"  {name:{width}}" + "".join(f" {cell:>12}" for cell in cells)
+    if {*ranks} != {trial.ranks}:
+        yield f"tried on {ranks_text(trial.ranks)}; others share the work, without the time of messages between nodes"
 
 
 def unit_of(most: float) -> tuple[str, float]:

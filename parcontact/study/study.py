@@ -8,7 +8,7 @@ from ..job.sections.listing import plain_job
 from ..parallel.groups import Groups
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
-from ..plan.sample import warm_up
+from ..plan.trial import warm_up
 from ..results import study_pictures as study_plots
 from ..results import sweep_table
 from ..run import runner, sweep, sweep_warnings

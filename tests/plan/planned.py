@@ -3,7 +3,7 @@
 from typing import Any
 
 from parcontact.job import Job
-from parcontact.plan.sample import StageCost
+from parcontact.plan.trial import StageCost
 
 Json = dict[str, Any]
 ROUGH: Json = {

@@ -10,9 +10,10 @@ from mpi4py import MPI
 
 from parcontact import scene
 from parcontact.history.timeline import Timeline
+from parcontact.job import Job
 from parcontact.parallel.slab import Slab
-from parcontact.plan.sample import FEWEST, Sample, StageCost, sample
-from parcontact.plan.trial_grids import make_tiny
+from parcontact.plan import trial
+from parcontact.plan.trial import FEWEST, StageCost, Trial, try_job
 from parcontact.scene import choices
 from parcontact.steady_sliding.sliding import SteadySliding
 
@@ -21,7 +22,7 @@ from .planned import CELLS, JOBS, TWO, Json, alike, job
 
 def test_stages_not_tried_are_like_the_others() -> None:
     stages = (alike(4, {"fft": 10.0}), StageCost(6))
-    seen = Sample(job(), 1, 0.0, 0.0, 0.0, 0, stages)
+    seen = Trial(job(), 1, (48, 40), 0.0, stages)
     assert seen.total("fft") == 100.0
     assert seen.total("never counted") == 0.0
 
@@ -34,7 +35,8 @@ def test_a_short_job_is_tried_whole(comm: MPI.Intracomm, name: str) -> None:
     before = begun(planned, comm=comm).scene.slab.tally
     march, rows = marched(planned, comm=comm)
     spent = march.scene.slab.tally.since(before)
-    seen = sample(planned, Slab(comm, *planned.grid.points), 1e6)
+    seen = try_job(planned, Slab(comm, *planned.grid.points), 1e6)
+    assert seen is not None
     assert seen.steps == seen.tried == len(rows) - 1
     assert seen.total("operator") == pytest.approx(sum(row.operator_calls for row in rows), rel=1e-14)
     for count in ("fft", "allreduce", "bytes sent"):
@@ -48,7 +50,9 @@ def test_rest_that_is_cut_short_is_known() -> None:
     planned = job(material=material, history=[dwell, CELLS])
     _, rows = marched(planned)
     assert len(rows) < len(Timeline.from_job(planned))
-    assert sample(planned, Slab.alone(*planned.grid.points), 1e6).steps == len(rows) - 1
+    seen = try_job(planned, Slab.alone(*planned.grid.points), 1e6)
+    assert seen is not None
+    assert seen.steps == len(rows) - 1
 
 
 def test_steps_that_stages_choose_are_known() -> None:
@@ -57,20 +61,23 @@ def test_steps_that_stages_choose_are_known() -> None:
     planned = job(material=TWO, history=[dwell, slide])
     _, rows = marched(planned)
     slab = Slab.alone(*planned.grid.points)
-    seen = sample(planned, slab, 1e6)
+    seen = try_job(planned, slab, 1e6)
+    assert seen is not None
     assert seen.steps == seen.tried == len(rows) - 1
     assert seen.total("operator") == sum(row.operator_calls for row in rows)
-    few = sample(planned, slab, 0.0)
-    assert few.tried < len(rows) - 1
-    assert few.steps > 0
+
+
+def ticking(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Replace the clock by one that goes on by 2 ms whenever it is read."""
+    monkeypatch.setattr(time, "process_time", partial(next, itertools.count(0.0, 2e-3)))
 
 
 def test_every_stage_is_tried_in_the_time_given(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of three long ones some steps each, by a clock that goes on by 2 ms when it is read; what is not tried is like
-    what was, and the first steps count once."""
-    monkeypatch.setattr(time, "perf_counter", partial(next, itertools.count(0.0, 2e-3)))
+    """Three long ones get some steps each; what is not tried costs as much as what was, and first steps count once."""
+    ticking(monkeypatch)
     long = [{**CELLS, "distance": 5e-3, "pressure": pressure} for pressure in (1e4, 2e4, 3e4)]
-    seen = sample(job(history=long), Slab.alone(48, 40), 0.1)
+    seen = try_job(job(history=long), Slab.alone(48, 40), 2.0)
+    assert seen is not None
     assert all(stage.tried >= FEWEST for stage in seen.stages[:2])
     assert seen.tried < seen.steps == 3 * (1 + 240)
     stage = StageCost(100)
@@ -79,11 +86,38 @@ def test_every_stage_is_tried_in_the_time_given(monkeypatch: pytest.MonkeyPatch)
     assert stage.total("operator") == 30 + 20 + 98 * 6
 
 
+@pytest.mark.mpi(2)
+def test_a_job_without_time_for_its_steps_is_tried_on_fewer_points(
+    comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The clock ends its first solve on all ranks. Its steps are those of its own grid, and so is the price of its
+    transforms; ranks share what is not the overhead of a call."""
+    ticking(monkeypatch)
+    large = job(grid={"points": 256}, material=TWO, history=[CELLS], numerics={"tolerance": 1e-8})
+    ends, attempt = list[float](), trial._attempt
+
+    def shorter(tried: Job, slab: trial.TimedSlab, seconds: float) -> Trial | None:
+        found = attempt(tried, slab, 0.06 if tried.grid.nx == 256 else 1e6)
+        ends.append(slab.price)
+        return found
+
+    monkeypatch.setattr(trial, "_attempt", shorter)
+    seen = try_job(large, Slab(comm, 256, 256), 1.0)
+    assert seen is not None
+    assert seen.points == (64, 64)
+    assert seen.steps == len(Timeline.from_job(large)) > seen.tried
+    assert min(ends) > 0.0
+    each = seen.total("seconds") / seen.steps
+    assert seen.step(comm.size, 0.0) == pytest.approx(each * seen.share(comm.size))
+    assert seen.step(4 * comm.size, 0.0) == pytest.approx(seen.step(comm.size, 0.0) / 4)
+    assert seen.step(10**12, 1e-9) == pytest.approx(1e-9 * seen.total("operator") / seen.steps, rel=1e-3)
+
+
 @pytest.mark.parametrize("name", JOBS)
 def test_a_tiny_scene_has_all_that_runs(name: str) -> None:
     """The same effects as the job, on 16 points along each side: what is compiled for it is compiled for the job."""
     planned = job(**JOBS[name])
-    small = make_tiny(planned)
+    small = trial._tiny(planned)
     assert small is not None
     assert max(small.grid.points) == 16
     assert choices(small).isolated.on == choices(planned).isolated.on
@@ -104,8 +138,8 @@ def test_steady_states_are_tried_as_they_are_solved(comm: MPI.Intracomm) -> None
         for speed in CURVE["velocities"]:
             sliding.solve((speed, 0.0), pressure)
     spent = slab.tally.since(before)
-    seen = sample(planned, Slab(comm, *planned.grid.points), 1e6)
+    seen = try_job(planned, Slab(comm, *planned.grid.points), 1e6)
+    assert seen is not None
     assert seen.steps == seen.tried == 8
     for count in ("fft", "allreduce", "operator"):
         assert seen.total(count) == spent[count]
-    assert seen.held == slab.agree(slab.tally["map bytes at most"])
