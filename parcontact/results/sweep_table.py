@@ -20,7 +20,7 @@ from ..job import Case, Steady
 from ..job.added_sections import answers
 from ..job.reading import CASES
 from ..storage import curve_points, files, lost_points, marker, read_back, tables
-from . import cycles, slide
+from . import slide
 from .run_table import RunTable
 
 TABLE = "sweep.csv"
@@ -168,7 +168,10 @@ def _results(case: Case) -> dict[str, Any]:
         if not prefix:
             run = RunTable(directory, case.job, columns, bool(marker.detached(directory)))
             row |= dict(pair for swept in answers("results", "swept") for pair in swept(run))
-            row |= cycles.measure_last(case.job, columns)
+            if any(stage.frequency for stage in case.job.history):
+                from . import cycles
+
+                row |= cycles.measure_last(case.job, columns)
             asked = [name for key, names in SECTIONS.items() if _asks_for(case, key) for name in names]
             row |= {name: _last(columns[name]) for name in asked if name in columns}
             row["seconds"] = math.fsum(columns["seconds"])
