@@ -146,6 +146,12 @@ def write_cycles(directory: Path, job: Job, columns: Columns) -> Iterator[str]:
     """Write cycles.csv, and yield a sentence on the last cycles of each stage that oscillates. Raises OSError."""
     found = find_cycles(job, columns)
     files.replace_file(directory / TABLE, to_csv(names_of(CYCLES), (values_of(CYCLES, cycle) for cycle in found)))
+    yield from describe_cycles(job, columns)
+
+
+def describe_cycles(job: Job, columns: Columns) -> Iterator[str]:
+    """Yield a sentence on the last cycles of each stage that oscillates."""
+    found = find_cycles(job, columns)
     for index, stage in enumerate(job.history):
         if own := [cycle for cycle in found if cycle.stage == index]:
             yield _describe(stage, own, job.numerics.asked.of_steps)
