@@ -96,7 +96,9 @@ def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str
     phase = _harmonic_angle(time, force, stage.frequency) - _harmonic_angle(time, place, stage.frequency)
     phase = math.remainder(phase, 2.0 * math.pi)
     error = abs(rough - loss) / PAIRS / abs(loss) if loss else math.nan
-    error += _load_error(job, stage, cycle, phase) if way is None else _friction_error(along, cycle)
+    error += (
+        _load_error(job, stage, cycle, phase) if way is None else _mean_error(cycle["error_friction"], np.abs(along))
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
         friction = along / (area * cycle["pressure"]) if stage.speed else np.full(1, np.nan)
     return Cycle(
@@ -111,9 +113,8 @@ def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str
     )
 
 
-def _friction_error(force: Array, cycle: Mapping[str, Array]) -> float:
-    """Return the mean relative error of friction over a cycle, weighted with the force."""
-    weights, errors = np.abs(force), cycle["error_friction"]
+def _mean_error(errors: Array, weights: Array) -> float:
+    """Return the weighted mean of relative errors over the rows of a cycle in which they are known; NaN without any."""
     known = np.isfinite(errors) & (weights > 0.0)
     return float(np.average(errors[known], weights=weights[known])) if known.any() else math.nan
 
@@ -122,7 +123,8 @@ def _load_error(job: Job, stage: Stage, cycle: Mapping[str, Array], phase: float
     """Return the relative error of the loss by steps, solver and mesh, where nothing moves along the surface."""
     solver = NOISE * SOLVER_AREA.value * float(np.mean(cycle["residual"])) ** SOLVER_AREA.order
     solver /= math.sqrt(cycle["time"].size) * abs(math.sin(phase))
-    return _step_error(job, stage, np.diff(cycle["time"])) + solver + MESH * float(np.mean(cycle["error_area"]))
+    mesh = MESH * _mean_error(cycle["error_area"], np.abs(cycle["pressure"]))
+    return _step_error(job, stage, np.diff(cycle["time"])) + solver + mesh
 
 
 def _step_error(job: Job, stage: Stage, dt: Array) -> float:
