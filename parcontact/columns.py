@@ -163,6 +163,17 @@ MEASURES: Table = (
     ERROR_FRICTION,
     ERROR_AREA,
     Column(
+        *("error_gap", ""),
+        "estimated relative error of `mean_gap`: the error of the area, relative to the open share; empty in full "
+        "contact, and where `error_area` is",
+    ),
+    Column(
+        *("error_energy", "J"),
+        "estimated error of `work`, `dissipated` and `slip_loss` (`output.energy`): of what each step dissipates, "
+        "summed, and of what is stored; with `adhesion` also by how much the work of the load along its path "
+        "and the energies differ. Empty from the first step on whose error is not known",
+    ),
+    Column(
         *("cut_off", ""),
         "1 where the contact reaches the edge of a free box and is cut off there, so that the row is wrong, else 0",
         lambda row: int(row.measures.at_edge),

@@ -34,7 +34,7 @@ FREE_LOST = Fit("the same in free boxes, with sampled coefficients", 6.0, 1.0, C
 FLASH = Fit(
     "flash temperature: times the error of friction", 3.0, 1.0, COVERAGE, "6.3, 1.1 to 150, in 96 % of 127 scenes"
 )
-ENERGY = Fit("dissipated energy with adhesion: times the error of area", 0.4, 1.0, COVERAGE, "20, in 95 % of 44 scenes")
+ENERGY = Fit("energies: times the error of area", 0.4, 1.0, COVERAGE, "20, in 95 % of 44 scenes with adhesion")
 PULL_OFF = Fit(
     "pull-off: times the median error of the area", 0.15, 1.0, COVERAGE, "5.5, 1.1 to 58, in 97 % of 58 scenes"
 )

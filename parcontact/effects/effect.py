@@ -225,6 +225,10 @@ class Effect(Protocol[Memory]):
         """Return the work of the load since the start [J]; None if it is that on the body."""
         return None
 
+    def error_energy(self, memory: Memory) -> float | None:
+        """Return the error of the energies since the start [J]; None if it is that of a body under pressure."""
+        return None
+
     def further_energies(self, memory: Memory) -> "tuple[EnergyMemory, float] | None":
         """Return energies of the body, in the unit of the scene, to be added to those under pressure, and further
         losses of work [J]; None without such energies."""

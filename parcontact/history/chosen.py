@@ -225,5 +225,7 @@ def describe_steps(job: Planned) -> str:
         return f"{names}, one cell of sliding per step and one step at rest, as an elastic body has no error of time"
     cells = most_cells(job)
     slides = any(stage.chooses and stage.speed for stage in job.history)
+    turns = any(stage.chooses and stage.frequency for stage in job.history)
     limits = f", at most {cells} cell{'s' * (cells > 1)} of sliding" * slides
+    limits += f", at least {CYCLE_STEPS} in a cycle" * turns
     return f"{names}, by their estimated error, for numerics.accuracy {job.numerics.asked.of_steps:g}{limits}"

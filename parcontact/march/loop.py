@@ -1,6 +1,7 @@
 """A march: a scene, its state, and the loop over the steps of a timeline with the tasks of a caller."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ..accuracy.budget import ErrorSums
@@ -18,7 +19,6 @@ from .dry_law import choose_contact_law
 from .failure import DetachedError
 from .state import State, entries, first_state, restored, save_state
 from .step import make_step
-from .step_errors import ErrorMemory
 
 FIELDS_OF_EFFECTS = {name: key for fields in offers("columns", "FIELDS_NEED") for name, key in fields.items()}
 
@@ -79,7 +79,7 @@ class March:
 
     @staticmethod
     def _with_sums(state: State, sums: ErrorSums) -> State:
-        return state.after(errors=ErrorMemory(state.friction, sums))
+        return state.after(errors=replace(state.memories["errors"], sums=sums))
 
     def restore(self, contents: Contents) -> None:
         """Restore the state of a checkpoint; collective. Raises InputError for a checkpoint that does not fit."""

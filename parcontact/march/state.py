@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accuracy.budget import ErrorSums
+from ..accuracy.constants import ENERGY
 from ..accuracy.controller import StepTolerance, TolerancePart
 from ..effects.contact_protocol import PreviousContacts, PreviousPressure
 from ..effects.effect import Memories, effect_values
@@ -115,7 +116,7 @@ def parts_of(scene: Scene) -> dict[str, RunPart[Any]]:
         "contact": _ContactPart(scene),
         "law": choose_contact_law(scene),
         "material": scene.material,
-        "errors": BudgetPart(remembers(scene.material)),
+        "errors": BudgetPart(remembers(scene.material), scene.energy is not None),
     }
     if scene.energy is not None:
         found["energy"] = scene.energy
@@ -233,7 +234,9 @@ def completed(scene: Scene, state: State) -> State:
     """Return the state with energies [J] and the columns of effects in its row."""
     work, stored, lost, split = energies_of(scene, state.energy, state.memories)
     added = effect_values(scene.effects, state.memories)
-    row = replace(state.row, work=work, stored=stored, dissipated=lost, branch_dissipation=split, added=added)
+    error = math.nan if state.row.step else error_of_energies(scene, 0.0, 0.0, state.memories)
+    energies = {"work": work, "stored": stored, "dissipated": lost, "error_energy": error, "branch_dissipation": split}
+    row = replace(state.row, **energies, added=added)
     return state.after(row=row)
 
 
@@ -254,6 +257,16 @@ def energies_of(
             dissipated = dissipated + energy.dissipated
     lost = tuple(float(value) * unit for value in dissipated)
     return work, stored, math.fsum(lost), lost
+
+
+def error_of_energies(scene: Scene, summed: float, of_stored: float, of_effects: Memories) -> float:
+    """Return the error of the energies [J] since the start, NaN without energies or if unknown: the `summed` one, and
+    a share of the stored energy times the error of the area, `of_stored`; or the error that an effect computes."""
+    if scene.energy is None:
+        return math.nan
+    found = (effect.error_energy(of_effects[name]) for name, effect in scene.effects.items())
+    error = next((error for error in found if error is not None), summed + ENERGY.value * of_stored)
+    return error if math.isfinite(error) else math.nan
 
 
 # -- checkpoints ------------------------------------------------------------------------------------------------------

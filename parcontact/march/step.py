@@ -16,7 +16,7 @@ from ..effects.contact_protocol import EdgeMotion, PreviousContacts, PreviousPre
 from ..effects.effect import Changes, Instant, Sheared, effect_values
 from ..history.chosen import MadeStep
 from ..history.timeline import Step
-from ..physics.body import Trial, surface_of
+from ..physics.body import Trial, states_errors, surface_of
 from ..physics.energy import EnergyMemory, Pressed
 from ..scene import Scene
 from ..solve.problem import Approach, Control, MeanPressure
@@ -25,8 +25,8 @@ from . import failure
 from .dry_law import choose_contact_law
 from .failure import DetachedError, StepError
 from .starts import cells_moved
-from .state import State, energies_of
-from .step_errors import ErrorMemory, SolvedStep, StepErrors, estimate_errors
+from .state import State, energies_of, error_of_energies
+from .step_errors import ErrorMemory, SolvedStep, StepErrors, add_energy_error, estimate_errors
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,12 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
     step, last = solved.step, state.contact.last
     followed = {name: each.memory for name, each in changes.items()}
     measures = solved.measures if sheared is None else sheared.measures
-    states_errors = all(each.states_errors for each in changes.values()) and not measures.at_edge
+    stated = all(each.states_errors for each in changes.values()) and not measures.at_edge and errors.resolved
+    errors = replace(errors, budget=_budget_of(made, sheared))
+    work, stored, lost, split = energies_of(scene, energy, followed)
+    known = errors if stated and states_errors(scene.material) else None
+    of_energy = add_energy_error(state.memories["errors"].energy, known, sheared, lost - state.row.dissipated)
+    error_energy = error_of_energies(scene, of_energy, errors.of_area * stored, followed)
     remarks = (solved.of_law.remark, *(each.remark for each in changes.values()), _describe_passed(step))
     row = StepRow(
         step.number,
@@ -65,10 +70,14 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         contact.iterations,
         contact.certificate,
         scene.slab.tally["operator"] - calls,
-        *energies_of(scene, energy, followed),
+        work,
+        stored,
+        lost,
+        error_energy,
+        split,
         seconds=time.perf_counter() - began,
         remark="; ".join(f"{failure.describe_place(scene, step)}: {remark}" for remark in remarks if remark),
-        errors=_budget_of(made, sheared) if states_errors and errors.resolved else None,
+        errors=errors.budget if stated else None,
         added=effect_values(scene.effects, followed),
     )
     pressure = PreviousPressure(contact.p, solved.trial.alpha, step.position)
@@ -78,7 +87,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         contact=PreviousContacts((pressure, *pasts[:-1]), pasts[-1].pressure, contact.d),
         law=solved.of_law.memory,
         material=solved.body,
-        errors=ErrorMemory(errors.friction, state.errors),
+        errors=ErrorMemory(errors.friction, state.errors, of_energy),
         energy=energy,
         tolerance=scene.controller.learn(state.tolerance, contact.certificate.worst, errors.lasting),
         **followed,

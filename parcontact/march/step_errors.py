@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from ..accuracy.budget import ErrorBudget, ErrorSums, estimate
+from ..accuracy.constants import ENERGY
 from ..accuracy.embedded import EmbeddedPair, IntegratorDifference
 from ..accuracy.observation import RunProperties, StepObservation, properties_of
 from ..accuracy.time_error import error_of_rise, time_error
 from ..effects.contact_protocol import SolvedContact
+from ..effects.effect import Sheared
 from ..history.timeline import Step
 from ..physics.body import BodyMemory, Trial, remembers, states_errors
 from ..physics.entries import Entry, Saved
@@ -76,28 +78,42 @@ class SolvedStep:
 
 @dataclass(frozen=True)
 class ErrorMemory:
-    """Memory of errors: the friction of the body in the last step, infinite after a jump, and the sums of
-    the budget."""
+    """Memory of errors: the friction of the body in the last step, infinite after a jump, the sums of the budget, and
+    the summed error of the energies that were dissipated and lost in slip [J], infinite if unknown."""
 
     friction: float = math.inf
     sums: ErrorSums = field(default_factory=ErrorSums)
+    energy: float = 0.0
 
 
 @dataclass(frozen=True)
 class BudgetPart:
-    """The errors of a run; `relaxes` is True for a viscoelastic body. Its entries are optional."""
+    """The errors of a run; `relaxes` is True for a viscoelastic body, `energies` if there are energies. Its entries are
+    optional."""
 
     relaxes: bool
+    energies: bool = False
 
     def at_rest(self) -> ErrorMemory:
         return ErrorMemory()
 
     def entries(self, memory: ErrorMemory, units: Units) -> dict[str, Entry]:
         friction = {"friction": Entry(memory.friction, optional=True)} if self.relaxes else {}
-        return friction | memory.sums.entries()
+        energy = {"energy": Entry(memory.energy, 1.0, "J", optional=True)} if self.energies else {}
+        return friction | energy | memory.sums.entries()
 
     def restored(self, memory: ErrorMemory, saved: Saved) -> ErrorMemory:
-        return ErrorMemory(float(saved.get("friction", math.inf)), ErrorSums.restored(saved))
+        friction, energy = float(saved.get("friction", math.inf)), float(saved.get("energy", math.inf))
+        return ErrorMemory(friction, ErrorSums.restored(saved), energy)
+
+
+def add_energy_error(summed: float, errors: StepErrors | None, sheared: Sheared | None, dissipated: float) -> float:
+    """Return the summed error of energies after a step in which the body has `dissipated` an energy [J], infinite
+    without `errors`: relative errors by the step and by the area, and of friction in what slip loses."""
+    if errors is None:
+        return math.inf
+    slip = 0.0 if sheared is None or not sheared.lost else sheared.lost * min(errors.of_friction, 1.0)
+    return summed + abs(dissipated) * (errors.step + ENERGY.value * errors.of_area) + slip
 
 
 def estimate_errors(scene: Scene, friction: float, solved: SolvedStep) -> StepErrors:

@@ -39,12 +39,13 @@ class Row(Mapping[str, float]):
     contact_area_corrected: float
     error_friction: float
     error_area: float
+    error_gap: float
+    error_energy: float
     cut_off: int
     tensile_area: float
     adhesive_force: float
     surface_energy: float
     snap_loss: float
-    error_energy: float
     friction_viscous: float
     friction_interface: float
     flow_x: float

@@ -22,7 +22,7 @@ KINDS = {  # kinds of results, by their table
 JOBS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
 MORE_TABLES = (
     *(name for names in offers("results", "DATA") for name in names),
-    *("theory.csv", "steady_waves.csv", "steady_theory.csv", "bands.csv", "bands_theory.csv"),
+    *("cycles.csv", "theory.csv", "steady_waves.csv", "steady_theory.csv", "bands.csv", "bands_theory.csv"),
     *("sweep_mean.csv", "sweep_curves.csv", "sweep_curves_mean.csv"),
 )
 ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys that are shown in other sections

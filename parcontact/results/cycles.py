@@ -43,6 +43,7 @@ NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.lege
 # fitted to spheres in tests/summary/test_cycles.py: errors of steps over those of one harmonic; of solves, which are
 # independent of each other; and of the loss over that of the area (0.25 at most)
 HARMONICS, NOISE, MESH = 2.0, 2.0, 0.3
+NO_PHASE = 1e-100  # rounding: sine of the phase of a body that loses nothing
 Columns = Mapping[str, Sequence[float]]
 
 
@@ -96,7 +97,10 @@ def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str
     phase = _harmonic_angle(time, force, stage.frequency) - _harmonic_angle(time, place, stage.frequency)
     phase = math.remainder(phase, 2.0 * math.pi)
     error = abs(rough - loss) / PAIRS / abs(loss) if loss else math.nan
-    error += _load_error(job, stage, cycle, phase) if way is None else _friction_error(along, cycle)
+    if way is None:
+        error += _load_error(job, stage, cycle, phase)
+    else:
+        error += _mean_error(cycle["error_friction"], np.abs(along))
     with np.errstate(divide="ignore", invalid="ignore"):
         friction = along / (area * cycle["pressure"]) if stage.speed else np.full(1, np.nan)
     return Cycle(
@@ -111,9 +115,8 @@ def _measure(index: int, number: int, stage: Stage, job: Job, cycle: Mapping[str
     )
 
 
-def _friction_error(force: Array, cycle: Mapping[str, Array]) -> float:
-    """Return the mean relative error of friction over a cycle, weighted with the force."""
-    weights, errors = np.abs(force), cycle["error_friction"]
+def _mean_error(errors: Array, weights: Array) -> float:
+    """Return the weighted mean of relative errors over the rows of a cycle in which they are known; NaN without any."""
     known = np.isfinite(errors) & (weights > 0.0)
     return float(np.average(errors[known], weights=weights[known])) if known.any() else math.nan
 
@@ -121,8 +124,9 @@ def _friction_error(force: Array, cycle: Mapping[str, Array]) -> float:
 def _load_error(job: Job, stage: Stage, cycle: Mapping[str, Array], phase: float) -> float:
     """Return the relative error of the loss by steps, solver and mesh, where nothing moves along the surface."""
     solver = NOISE * SOLVER_AREA.value * float(np.mean(cycle["residual"])) ** SOLVER_AREA.order
-    solver /= math.sqrt(cycle["time"].size) * abs(math.sin(phase))
-    return _step_error(job, stage, np.diff(cycle["time"])) + solver + MESH * float(np.mean(cycle["error_area"]))
+    solver /= math.sqrt(cycle["time"].size) * max(abs(math.sin(phase)), NO_PHASE)
+    mesh = MESH * _mean_error(cycle["error_area"], np.abs(cycle["pressure"]))
+    return _step_error(job, stage, np.diff(cycle["time"])) + solver + mesh
 
 
 def _step_error(job: Job, stage: Stage, dt: Array) -> float:
@@ -146,6 +150,15 @@ def write_cycles(directory: Path, job: Job, columns: Columns) -> Iterator[str]:
     """Write cycles.csv, and yield a sentence on the last cycles of each stage that oscillates. Raises OSError."""
     found = find_cycles(job, columns)
     files.replace_file(directory / TABLE, to_csv(names_of(CYCLES), (values_of(CYCLES, cycle) for cycle in found)))
+    yield from _describe_stages(job, found)
+
+
+def describe_cycles(job: Job, columns: Columns) -> Iterator[str]:
+    """Yield a sentence on the last cycles of each stage that oscillates."""
+    yield from _describe_stages(job, find_cycles(job, columns))
+
+
+def _describe_stages(job: Job, found: Sequence[Cycle]) -> Iterator[str]:
     for index, stage in enumerate(job.history):
         if own := [cycle for cycle in found if cycle.stage == index]:
             yield _describe(stage, own, job.numerics.asked.of_steps)
@@ -153,17 +166,15 @@ def write_cycles(directory: Path, job: Job, columns: Columns) -> Iterator[str]:
 
 def _describe(stage: Stage, cycles: Sequence[Cycle], accuracy: float) -> str:
     """Return a sentence on the last cycle, and whether its loss agrees with that of the one before."""
-    *_, last = cycles
-    lost = (
-        f"{quantity(last.loss, 'J', 4)} ± {stated_error(last.error_loss)}, phase {math.degrees(last.phase):.3g} degrees"
-    )
+    last, lag = cycles[-1], math.degrees(cycles[-1].phase)
+    lost = f"{quantity(last.loss, 'J', 4)} ± {stated_error(last.error_loss)}, phase {lag:.3g} degrees"
     said = f"{stage.name}: loss of cycle {last.cycle} {lost}"
     if len(cycles) == 1:
         return f"{said}; a second cycle would show whether cycles repeat"
     change = abs(last.loss - cycles[-2].loss) / abs(last.loss) if last.loss else 0.0
     if change <= accuracy:
         return f"{said}; the last two cycles agree: their losses differ by {per_cent(change)}"
-    return f"{said}; the last two cycles differ by {per_cent(change)} of the loss: more cycles would repeat better"
+    return f"{said}; the last two cycles differ by {per_cent(change)} of the loss: give more cycles"
 
 
 def friction_along(stage: Stage, columns: Mapping[str, Array]) -> Array:

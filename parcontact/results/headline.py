@@ -9,13 +9,14 @@ from typing import Any
 from ..job import Job
 from ..job.added_sections import answers
 from ..job.resolved import RESOLVED, shown_job
-from ..printed import quantity, with_error
+from ..printed import quantity, stated_error, with_error
 from ..storage import marker, read_back
-from . import slide, sweep_table
+from . import cycles, slide, sweep_table
 from .run_table import RunTable, find_telling_row
 
 SWEPT = (  # results of a sweep, after those of capabilities: column, words, unit, column of the error
     ("mu_dyn", "the mean friction", "", "mu_dyn_error"),
+    ("loss", "the loss of the last cycle", "J", "error_loss"),
     ("friction", "friction", "", slide.ERRORS[0]),
     (slide.CORRECTED, "the contact area over the nominal area", "", slide.ERRORS[1]),
 )
@@ -41,6 +42,8 @@ def _run(directory: Path) -> str:
     run, parts = RunTable(directory, job, columns, detached), [*_friction(job, columns)]
     for headline in answers("results", "headline"):
         parts += headline(run)
+    if last := cycles.measure_last(job, columns):
+        parts.append(f"the last cycle loses {quantity(last['loss'], 'J')} ± {stated_error(last['error_loss'])}")
     return _to_sentence([*parts, _area(job, run)])
 
 
@@ -116,7 +119,7 @@ def _study(directory: Path) -> str:
 
 def _with_unit(row: Mapping[str, Any], name: str, unit: str, error: str) -> str:
     value, within = row[name], row.get(error, math.nan)
-    within = abs(value) * within if error in slide.ERRORS else within
+    within = abs(value) * within if error in (*slide.ERRORS, "error_loss") else within
     if not unit:
         return with_error(value, within)
     return quantity(value, unit, 4) + (f" ± {quantity(within, unit, 2)}" if within > 0.0 else "")

@@ -23,7 +23,7 @@ from ..storage import checkpoint, curve_points, fields, hdf5, lost_points, marke
 from ..storage.console import meshes_of, warnings_of
 from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
-from . import slide, sweep_table, theory_comparison, theory_settings
+from . import cycles, slide, sweep_table, theory_comparison, theory_settings
 from .run_table import RunTable
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
@@ -171,6 +171,7 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.3g} s"
     if job is not None:
         yield from (f"  {text}" for text in slide.describe_slide(job.history, job.initial, job.grid.dx, columns))
+        yield from (f"  {text}" for text in cycles.describe_cycles(job, columns))
     run = RunTable(table.parent, job, columns, bool(detachment))
     yield from (f"  {text}" for sentences in answers("results", "sentences") for text in sentences(run))
 

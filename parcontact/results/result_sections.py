@@ -20,6 +20,7 @@ from ..storage import hdf5, lost_points, marker, read_back
 from . import (
     charts,
     curve_charts,
+    cycles,
     histories,
     maps,
     prefixes,
@@ -66,6 +67,7 @@ def describe_run(directory: Path) -> ReportSection:
     table = RunTable(directory, run.job, columns, bool(marker.detached(directory)))
     sentences = [
         *slide.describe_slide(run.job.history, run.job.initial, run.job.grid.dx, columns),
+        *cycles.describe_cycles(run.job, columns),
         *(text for sentences in answers("results", "sentences") for text in sentences(table)),
         *theory_comparison.describe_theory(directory, run.job.history, run.job.grid.dx),
         theory_settings.describe_settings(directory),

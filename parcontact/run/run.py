@@ -1,5 +1,6 @@
 """A run: a march through a timeline with records, checkpoints and early stops."""
 
+import math
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -17,6 +18,7 @@ from ..march import loop
 from ..march.failure import StepError
 from ..march.loop import March
 from ..physics.body import states_errors
+from ..printed import quantity
 from ..results import cycles, slide
 from ..results.run_table import RunTable
 from ..scene import sanity
@@ -25,6 +27,7 @@ from ..storage.checkpoint import Contents, Facts
 from ..storage.console import always
 from ..storage.directory import Directory
 from ..storage.recorder import Recorder
+from ..storage.step_row import StepRow
 from ..storage.stopfile import StopFile
 from .watch import Watch
 
@@ -210,6 +213,8 @@ class Run:
                 for text in sentences:
                     console.say(text)
         self._log_cycles()
+        if self.march.scene.energy is not None:
+            console.say(_describe_energies(row))
         for line in errors.lines(self.job.numerics.asked.both, chosen_by_accuracy(self.job)):
             console.say(line)
         sample = describe_sample(self.job.grid, self.job.surface, slides)
@@ -248,6 +253,12 @@ class Run:
                 self.console.say(text)
         except (OSError, InputError) as error:
             self.console.warn(f"cycles.csv cannot be written: {error}")
+
+
+def _describe_energies(row: StepRow) -> str:
+    """Return a sentence on the energies since the start, with their error."""
+    within = f"each ± {quantity(row.error_energy, 'J', 2)}" if math.isfinite(row.error_energy) else "errors unknown"
+    return f"work {quantity(row.work, 'J', 4)}, dissipated {quantity(row.dissipated, 'J', 4)}, {within}"
 
 
 def chosen_by_accuracy(job: Job) -> set[str]:

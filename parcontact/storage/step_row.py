@@ -36,6 +36,7 @@ class StepRow:
     work: float = math.nan
     stored: float = math.nan
     dissipated: float = math.nan
+    error_energy: float = math.nan
     branch_dissipation: tuple[float, ...] = ()
     seconds: float = 0.0
     remark: str = ""
@@ -51,6 +52,12 @@ class StepRow:
     def error_area(self) -> float:
         """Return the estimated relative error of the contact area, NaN if unknown."""
         return self.errors.area.total if self.errors else math.nan
+
+    @property
+    def error_gap(self) -> float:
+        """Return the estimated relative error of the mean gap: of the open share; NaN in full contact or if unknown."""
+        area = self.measures.contact_area_corrected
+        return self.error_area * area / (1.0 - area) if area < 1.0 else math.nan
 
 
 def columns(branches: int, added: Sequence[str] = ()) -> list[str]:

@@ -20,13 +20,6 @@ MEASURES: Table = (
         "energy lost in snaps since the start (with `adhesion` and `output.energy`)",
         when="adhesion",
     ),
-    Column(
-        *("error_energy", "J"),
-        "estimated error of `work` and `dissipated`: by how much the work of the load along its path and the energies "
-        "differ, summed over steps without snaps, and 0.4 of the error of the area in what each step dissipates (with "
-        "`adhesion` and `output.energy`)",
-        when="adhesion",
-    ),
 )
 RESULTS: Table = (  # results of a sweep
     Column(

@@ -102,7 +102,7 @@ class AdhesionMemory:
     energies: AdhesiveEnergies = NO_ENERGIES
     snaps: int = 0
     front_warning_given: bool = False
-    columns: tuple[float, ...] = (0.0, 0.0, math.nan, math.nan, math.nan)
+    columns: tuple[float, ...] = (0.0, 0.0, math.nan, math.nan)
 
 
 def _no_strip(adhesion: Any, grid: Any) -> Iterator[Fault]:
@@ -115,8 +115,8 @@ def _no_bands(adhesion: Any, bands: Any) -> Iterator[Fault]:
 
 
 class AdhesionColumns(Effect[AdhesionMemory]):
-    """Columns: share of the area under tension, force of all tension [N], energy of the surfaces [J], energy lost in
-    snaps [J], and error of energies [J]."""
+    """Columns: share of the area under tension, force of all tension [N], energy of the surfaces [J], and energy
+    lost in snaps [J]."""
 
     section: ClassVar[type[Part]] = Adhesion
     columns: ClassVar[tuple[str, ...]] = added_by("adhesion")
@@ -206,11 +206,11 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         """Return the energies after a step. Errors are not stated across a snap. The first step in which edges of
         contact of a viscoelastic body move too far gives a warning."""
         solved, energies = instant.solved, memory.energies
-        columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan, math.nan
+        columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan
         if self._scene.energy is not None:
             if solved.end != "open":
                 energies = adhesive_energies.advance_energies(energies, instant, self._area)
-            columns = (*columns[:2], energies.surfaces, energies.lost, energies.error)
+            columns = (*columns[:2], energies.surfaces, energies.lost)
         far = instant.front > SNAP_FRONT and not instant.untouched
         chosen = instant.step.decide is not None
         snapped = solved.snapped or (chosen and far)
@@ -233,6 +233,9 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     def work(self, memory: AdhesionMemory) -> float:
         return memory.energies.work
+
+    def error_energy(self, memory: AdhesionMemory) -> float:
+        return memory.energies.error
 
     def entries(self, memory: AdhesionMemory, units: Units) -> dict[str, Entry]:
         """Return the energies, and the number of steps in which the contact snapped."""
