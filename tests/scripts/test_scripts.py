@@ -52,6 +52,7 @@ SMALL = {
     "paper_figures": Small(["7", "--to", "pictures"], r"(?m)^picture: pictures/fig07.png"),
     "random_adhesion": Small(["--scenes", "3"], r"(?m)^3 made: 0 with faults; .*[1-9]\d+ steps"),
     "random_scenes": Small(["--scenes", "2", "--steps", "10"], r"2 made: 0 with faults; .*[1-9]\d+ steps"),
+    "solver_errors": Small(["--from", "1", "--marches", "1"], r"(?m)^friction +0.01 +[0-9]+ "),
     "random_steady": Small(["--bodies", "3"], r"(?m)^3 made: 0 with faults; 3 solved"),
 }
 
