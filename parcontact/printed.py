@@ -4,6 +4,7 @@ Texts contain ± and µ; `streams` replaces them on terminals that cannot show t
 """
 
 import math
+from collections.abc import Sequence
 
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 TIMES = {"years": 365.25 * 86400.0, "days": 86400.0, "h": 3600.0, "min": 60.0}  # [s]
@@ -104,3 +105,12 @@ def with_error(value: float, error: float) -> str:
 def _exponent(value: float) -> int:
     """Return the power of ten of the first digit, after rounding to two digits."""
     return int(f"{value:.1e}".partition("e")[2])
+
+
+def name_cases(numbers: Sequence[int]) -> str:
+    """Return ascending numbers as text: `cases 0, 2-5`."""
+    starts = [number for number in numbers if number - 1 not in numbers]
+    ends = [number for number in numbers if number + 1 not in numbers]
+    pairs = zip(starts, ends, strict=True)
+    listed = ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in pairs)
+    return f"case{'s' * (len(numbers) > 1)} {listed}"

@@ -1,11 +1,14 @@
 """Checks of the machine: ranks, libraries, speed, and files that a run writes and reads."""
 
+import math
 import os
 import shutil
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING
 
 import h5py
@@ -15,7 +18,6 @@ from .. import capabilities, private
 from ..job import Job, load
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
-from ..plan.costs import measure_write_rate
 from ..run import runner
 from ..run.run import Options
 from ..storage import header
@@ -29,6 +31,7 @@ PER_POINT = 1.2e-8  # time of an operator call per point on a machine of 2022 [s
 POINTS = 512  # tuning: points along each side of the contact that is timed
 SLOW = 4.0  # tuning: time of an operator call above which a warning is given, over the usual time
 SLOW_DISK = 50e6  # tuning: writing rate below which a warning is given [bytes/s]
+TRIED_BYTES = 32 << 20  # tuning: size of the file that is written to measure the rate [bytes]
 SAME = 1e-6  # accuracy: limit on the difference of pressures, over the largest pressure
 STEPS = 4  # tuning: steps of the run whose files are read back
 
@@ -48,7 +51,7 @@ def describe_machine(comm: "MPI.Intracomm", where: Path) -> Iterator[str]:
     yield f"{POINTS} x {POINTS} points: {1e3 * seconds:.3g} ms per operator call"
     if seconds > SLOW * usual:
         yield f"warning: this is slow, {1e3 * usual:.2g} ms is usual; do other programs run, or too many threads?"
-    rate = comm.bcast(measure_write_rate(where))
+    rate = comm.bcast(_measure_write_rate(where))
     yield f"files: {rate / 1e6:.3g} MB/s in {where}"
     if rate < SLOW_DISK:
         yield f"warning: this is slow, {SLOW_DISK / 1e6:g} MB/s is usual; save fewer fields, or write to another disk"
@@ -106,3 +109,17 @@ def find_broken_files(comm: "MPI.Intracomm", where: Path) -> str:
         comm.Barrier()
         if comm.rank == 0:
             shutil.rmtree(place, ignore_errors=True)
+
+
+def _measure_write_rate(directory: Path) -> float:
+    """Return the writing rate [bytes/s] in the directory or its nearest existing parent, by a temporary file; NaN if
+    that cannot be measured."""
+    place = next(path for path in (directory.absolute(), *directory.absolute().parents) if path.is_dir())
+    with suppress(OSError), TemporaryFile(dir=place) as file:
+        data = os.urandom(TRIED_BYTES)
+        began = time.perf_counter()
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+        return TRIED_BYTES / (time.perf_counter() - began)
+    return math.nan

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..job.reading import CASES
+from ..printed import name_cases
 from ..storage.console import WARNING, log_lines
 from ..storage.curve_points import LOG
-from .sweep_table import name_cases
 
 LOGS = ("run.log", LOG)
 COUNTS = "counts on root: "

@@ -137,15 +137,6 @@ def describe_failed(directory: Path, most: int) -> list[str]:
     return found + [f"and {len(failed) - most} more"] * (len(failed) > most)
 
 
-def name_cases(numbers: Sequence[int]) -> str:
-    """Return ascending numbers as text: `cases 0, 2-5`."""
-    starts = [number for number in numbers if number - 1 not in numbers]
-    ends = [number for number in numbers if number + 1 not in numbers]
-    pairs = zip(starts, ends, strict=True)
-    listed = ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in pairs)
-    return f"case{'s' * (len(numbers) > 1)} {listed}"
-
-
 def _row(case: Case) -> dict[str, Any]:
     head = {"case": case.number, **case.settings}
     try:

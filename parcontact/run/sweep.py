@@ -17,7 +17,7 @@ from ..job.sections.listing import plain_job
 from ..parallel.groups import Groups
 from ..parallel.signals import Signals
 from ..parallel.slab import Slab
-from ..printed import per_cent
+from ..printed import name_cases, per_cent
 from ..results import sweep_table
 from ..storage import files, marker, stopfile
 from ..storage.directory import refuse_files, refuse_other_jobs
@@ -95,7 +95,7 @@ class SweepRun:
             if not self.quiet:
                 print_line(f"largest estimated error of {what}: {per_cent(found[worst], 3)}, in case {worst}")
             if beyond := [number for number, error in found.items() if exceeds(error, asked[number][k])]:
-                more = f"the estimated error of {what} exceeds numerics.accuracy in {sweep_table.name_cases(beyond)}"
+                more = f"the estimated error of {what} exceeds numerics.accuracy in {name_cases(beyond)}"
                 print_line(f"warning: {more}; the log of each case says how to reduce it", sys.stderr)
 
     def _take(self, own: Sequence[Case], signals: Signals) -> list[int]:

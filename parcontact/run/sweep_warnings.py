@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from ..doubts import Doubt
 from ..job import Case, Job
-from ..results.sweep_table import name_cases
+from ..printed import name_cases
 
 # first warning of each subject, and the numbers of its cases
 Kinds = dict[tuple[str, ...], tuple[Doubt, list[int]]]
