@@ -30,14 +30,13 @@ def run(job: dict[str, Any], tolerance: float) -> dict[str, NDArray[np.float64]]
     """Return values and estimates of friction and area in all steps that slide."""
     history = [{**stage, "cells_per_step": 1} for stage in job["history"]]
     rows, _ = marched(begun({**job, "history": history, "numerics": {"tolerance": tolerance, "branch_error": 0.0}}))
-    kept = [row for row in rows if row.errors and row.errors.friction]
-    return {
-        "step": np.array([row.step for row in kept], float),
-        "friction": np.array([row.measures.friction for row in kept]),
-        "area": np.array([row.measures.contact_area_corrected for row in kept]),
-        "friction estimate": np.array([row.errors.friction.solver for row in kept]),
-        "area estimate": np.array([row.errors.area.solver for row in kept]),
-    }
+    kept = [
+        (row.step, row.measures.friction, row.measures.contact_area_corrected, friction.solver, errors.area.solver)
+        for row in rows
+        if (errors := row.errors) and (friction := errors.friction)
+    ]
+    names = "step", "friction", "area", "friction estimate", "area estimate"
+    return dict(zip(names, np.array(kept, float).T, strict=True))
 
 
 def compare(seed: int, found: Table, number: int) -> Iterator[str]:

@@ -12,13 +12,13 @@ from ..plan.trial import warm_up
 from ..results import study_pictures as study_plots
 from ..results import sweep_table
 from ..run import runner, sweep, sweep_warnings
-from ..run.run import Options
+from ..run.run import STOPPED_EARLY, Options
 from ..storage import files, marker
 from ..storage.directory import Directory
 from . import verdict
 from .ladders import Ladders, MakeJob, Settings, describe_choices, ladders, make_cases
 
-ENDS = {sweep.STOPPED_EARLY: "stopped early; run again to go on", sweep.FAILED: "some cases failed: there is no limit"}
+ENDS = {STOPPED_EARLY: "stopped early; run again to go on", sweep.FAILED: "some cases failed: there is no limit"}
 Errors = Mapping[Settings, Mapping[str, float]]
 
 
