@@ -57,7 +57,7 @@ def add_up_back(cells, neighbours, above, wide, tall, points):
 def interpolate_cells(cells, neighbours, above, wide, tall, known, points):
     """Add to each point `1 - known` times the interpolation between cells."""
     pairs, columns = points.shape[1] // 2, cells.shape[1]
-    line = np.empty(columns + 2, cells.dtype)
+    line = np.empty(columns + 2, np.float32)
     own, others = (np.float32(0.75), np.float32(0.25)) if tall == 2 else (np.float32(1.0), np.float32(0.0))
     for j in range(points.shape[0]):
         near = (j + above) // tall
@@ -83,7 +83,8 @@ def interpolate_cells(cells, neighbours, above, wide, tall, known, points):
 def gather_cells(known, known_neighbours, points, neighbours, above, wide, tall, cells):
     """Add up `1 - known` times the values of points in cells, by the weights of the interpolation."""
     count, columns = points.shape[1], cells.shape[1]
-    line = np.zeros(wide * columns + 2, cells.dtype)
+    line = np.empty(wide * columns + 2, np.float32)
+    line[wide * columns] = 0.0  # beyond an odd number of points
     for j in range(cells.shape[0]):
         first = tall * j - above
         a, w_a = row_of(points, neighbours, first), row_of(known, known_neighbours, first)
