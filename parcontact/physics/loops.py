@@ -88,7 +88,9 @@ def sum_measures(p, u, h, mask, above, cyclic):
     first. The largest pressure is kept for each column, so that the loop is vectorized.
     """
     load, count, gaps, sides = 0.0, 0.0, 0.0, 0.0
-    largest = np.zeros(p.shape[1], p.dtype)
+    largest, most = np.empty(p.shape[1]), 0.0
+    for i in range(largest.size):
+        largest[i] = 0.0
     for j in range(p.shape[0]):
         before = mask[j - 1] if j > 0 else above
         row_load, row_count, row_gaps, across, along = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -106,7 +108,9 @@ def sum_measures(p, u, h, mask, above, cyclic):
         count += row_count
         gaps += row_gaps
         sides += across + along
-    return load, count, gaps, sides, largest.max()
+    for i in range(largest.size):
+        most = max(most, largest[i])
+    return load, count, gaps, sides, most
 
 
 @loop
@@ -151,7 +155,7 @@ def embedded(branches, decay, increment, gain, before, past, p, u, heights, offs
     count, ny, nx = branches.shape
     load, bent, size, slope, height, square, turned = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     back = (-1 - offset) % nx
-    e = np.empty(nx, p.dtype)
+    e = np.empty(nx)
     for j in range(first, ny, stride):
         end = 0
         while end < nx:
@@ -218,7 +222,7 @@ def travel(p, p_old, factor, factor_old, shift, lower, upper, out):
     """
     ny, nx = p.shape
     start = shift % nx
-    moved = np.empty(nx, p.dtype)
+    moved = np.empty(nx)
     for j in range(ny):
         copy_shifted(p_old[j], start, moved)
         for i in range(nx):
@@ -252,7 +256,9 @@ def tangential(p, h, rows, phase_x, phase_y, along_x, along_y, weight):
 def displace(h, rows, along_x, along_y, out):
     """Put the spectrum of moved heights into `out`: `along_x along_y h` with the phases of the shift on the `rows` and
     first columns of h, 0 elsewhere."""
-    out[:] = 0.0
+    for j in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            out[j, i] = 0.0
     for k in range(h.shape[0]):
         j = rows[k]
         for i in range(h.shape[1]):

@@ -98,7 +98,9 @@ def _mark_working_set(p, u, h, d, highest, working):
     """Mark the working set. Return the sum of p |g| except where points yield with g <= 0; the number of points of the
     set and their sum of g; the number of points that yield with g <= 0; and the largest -g of points below H."""
     wrong, count, gaps, held = 0.0, 0.0, 0.0, 0.0
-    lowest = np.full(p.shape[1], np.inf)
+    lowest, deepest = np.empty(p.shape[1]), -np.inf
+    for i in range(lowest.size):
+        lowest[i] = np.inf
     for j in range(p.shape[0]):
         row_wrong, row_count, row_gaps, row_held = 0.0, 0.0, 0.0, 0.0
         for i in range(p.shape[1]):
@@ -117,7 +119,9 @@ def _mark_working_set(p, u, h, d, highest, working):
         count += row_count
         gaps += row_gaps
         held += row_held
-    return wrong, count, gaps, held, -lowest.min()
+    for i in range(lowest.size):
+        deepest = max(deepest, -lowest[i])
+    return wrong, count, gaps, held, deepest
 
 
 @loop

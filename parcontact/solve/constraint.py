@@ -116,7 +116,9 @@ def mark_working_set(p, u, h, d, working):
     The lowest gap is kept for each column: a single running minimum would not be vectorized.
     """
     wrong, count, gaps = 0.0, 0.0, 0.0
-    lowest = np.full(p.shape[1], np.inf)
+    lowest, deepest = np.empty(p.shape[1]), -np.inf
+    for i in range(lowest.size):
+        lowest[i] = np.inf
     for j in range(p.shape[0]):
         row_wrong, row_count, row_gaps = 0.0, 0.0, 0.0
         for i in range(p.shape[1]):
@@ -131,7 +133,9 @@ def mark_working_set(p, u, h, d, working):
         wrong += row_wrong
         count += row_count
         gaps += row_gaps
-    return wrong, count, gaps, -lowest.min()
+    for i in range(lowest.size):
+        deepest = max(deepest, -lowest[i])
+    return wrong, count, gaps, deepest
 
 
 @loop
@@ -139,8 +143,12 @@ def advance(p_old, t, step, p, cells, sums):
     """Put `max(p_old - step t, 0)` into p; put the sums of p over cells into the first half of `sums`, and those of
     what was added into the second. Rows of a cell are added up first, so that the loop is vectorized."""
     columns = sums.shape[1] // 2
-    load, cut = np.zeros(p.shape[1]), np.zeros(p.shape[1])
-    sums[:] = 0.0
+    load, cut = np.empty(p.shape[1]), np.empty(p.shape[1])
+    for j in range(sums.shape[0]):
+        for i in range(sums.shape[1]):
+            sums[j, i] = 0.0
+    for i in range(p.shape[1]):
+        load[i] = cut[i] = 0.0
     for j in range(p.shape[0]):
         for i in range(p.shape[1]):
             value = p_old[j, i] - step * t[j, i]
@@ -153,8 +161,7 @@ def advance(p_old, t, step, p, cells, sums):
             for i in range(p.shape[1]):
                 row[i // cells.columns] += load[i]
                 row[columns + i // cells.columns] += cut[i]
-            load[:] = 0.0
-            cut[:] = 0.0
+                load[i] = cut[i] = 0.0
 
 
 @loop

@@ -41,7 +41,9 @@ def pressure_residual(g, q, sigma, mean, working, c):
     elsewhere, into c. Return the size of the set, the sum of c, the sum of sigma over all points, and the largest
     -g."""
     count, total, attracted = 0.0, 0.0, 0.0
-    lowest = np.full(g.shape[1], np.inf)
+    lowest, deepest = np.empty(g.shape[1]), -np.inf
+    for i in range(lowest.size):
+        lowest[i] = np.inf
     for j in range(g.shape[0]):
         row_count, row_total, row_attracted = 0.0, 0.0, 0.0
         for i in range(g.shape[1]):
@@ -56,7 +58,9 @@ def pressure_residual(g, q, sigma, mean, working, c):
         count += row_count
         total += row_total
         attracted += row_attracted
-    return count, total, attracted, -lowest.min()
+    for i in range(lowest.size):
+        deepest = max(deepest, -lowest[i])
+    return count, total, attracted, deepest
 
 
 @loop
@@ -144,7 +148,9 @@ def curvature(law, g, q, mean, sigma, way, image):
     """Return sums over a way w of `-c w`, of `w K w` (K w is `image`), of `w^2 (-d sigma/dg)` and of w; and the largest
     -w/g."""
     slope, stiff, soft, total = 0.0, 0.0, 0.0, 0.0
-    fastest = np.zeros(g.shape[1])
+    fastest, most = np.empty(g.shape[1]), 0.0
+    for i in range(fastest.size):
+        fastest[i] = 0.0
     for j in range(g.shape[0]):
         row_slope, row_stiff, row_soft, row_total = 0.0, 0.0, 0.0, 0.0
         for i in range(g.shape[1]):
@@ -158,7 +164,9 @@ def curvature(law, g, q, mean, sigma, way, image):
         stiff += row_stiff
         soft += row_soft
         total += row_total
-    return slope, stiff, soft, total, fastest.max()
+    for i in range(fastest.size):
+        most = max(most, fastest[i])
+    return slope, stiff, soft, total, most
 
 
 @loop

@@ -1,4 +1,5 @@
-"""Loops between points and cells of `wide` by `tall` points, each 1 or 2.
+"""Loops between points and cells of `wide` by `tall` points, each 2, or None for 1: a loop is compiled without the
+branches that a shape does not need.
 
 They take sums over cells, interpolate between cells, and apply the transposes of both. Interpolation takes 3/4 of
 the own cell of a point and 1/4 of the nearest other one.
@@ -21,12 +22,16 @@ def row_of(own, neighbours, j):
 @loop
 def add_up(points, neighbours, above, wide, tall, cells):
     """Put the sums over cells into `cells`."""
-    second = np.float32(tall - 1)
+    height = 1 if tall is None else 2
+    second = np.float32(height - 1)
     pairs = points.shape[1] // 2
     for j in range(cells.shape[0]):
-        a, b = row_of(points, neighbours, tall * j - above), row_of(points, neighbours, tall * j - above + tall - 1)
+        a, b = (
+            row_of(points, neighbours, height * j - above),
+            row_of(points, neighbours, height * j - above + height - 1),
+        )
         out = cells[j]
-        if wide == 1:
+        if wide is None:
             for i in range(out.size):
                 out[i] = a[i] + second * b[i]
             continue
@@ -39,10 +44,10 @@ def add_up(points, neighbours, above, wide, tall, cells):
 @loop
 def add_up_back(cells, neighbours, above, wide, tall, points):
     """Add the value of each cell to its points."""
-    pairs = points.shape[1] // 2
+    pairs, height = points.shape[1] // 2, 1 if tall is None else 2
     for j in range(points.shape[0]):
-        cell, out = row_of(cells, neighbours, (j + above) // tall), points[j]
-        if wide == 1:
+        cell, out = row_of(cells, neighbours, (j + above) // height), points[j]
+        if wide is None:
             for i in range(out.size):
                 out[i] += cell[i]
             continue
@@ -57,16 +62,20 @@ def add_up_back(cells, neighbours, above, wide, tall, points):
 def interpolate_cells(cells, neighbours, above, wide, tall, known, points):
     """Add to each point `1 - known` times the interpolation between cells."""
     pairs, columns = points.shape[1] // 2, cells.shape[1]
-    line = np.empty(columns + 2, cells.dtype)
-    own, others = (np.float32(0.75), np.float32(0.25)) if tall == 2 else (np.float32(1.0), np.float32(0.0))
+    line = np.empty(columns + 2, np.float32)
     for j in range(points.shape[0]):
-        near = (j + above) // tall
-        other = near if tall == 1 else near + 1 if (j + above) % 2 else near - 1
-        a, b = row_of(cells, neighbours, near), row_of(cells, neighbours, other)
-        for i in range(columns):
-            line[i + 1] = own * a[i] + others * b[i]
+        if tall is None:
+            a = cells[j + above]
+            for i in range(columns):
+                line[i + 1] = a[i]
+        else:
+            near = (j + above) // 2
+            a = row_of(cells, neighbours, near)
+            b = row_of(cells, neighbours, near + 1 if (j + above) % 2 else near - 1)
+            for i in range(columns):
+                line[i + 1] = np.float32(0.75) * a[i] + np.float32(0.25) * b[i]
         out, weight = points[j], known[j]
-        if wide == 1:
+        if wide is None:
             for i in range(columns):
                 out[i] += (1.0 - weight[i]) * line[i + 1]
             continue
@@ -83,11 +92,13 @@ def interpolate_cells(cells, neighbours, above, wide, tall, known, points):
 def gather_cells(known, known_neighbours, points, neighbours, above, wide, tall, cells):
     """Add up `1 - known` times the values of points in cells, by the weights of the interpolation."""
     count, columns = points.shape[1], cells.shape[1]
-    line = np.zeros(wide * columns + 2, cells.dtype)
+    width, height = columns if wide is None else 2 * columns, 1 if tall is None else 2
+    line = np.empty(width + 2, np.float32)
+    line[width] = 0.0  # beyond an odd number of points
     for j in range(cells.shape[0]):
-        first = tall * j - above
+        first = height * j - above
         a, w_a = row_of(points, neighbours, first), row_of(known, known_neighbours, first)
-        if tall == 1:
+        if tall is None:
             for i in range(count):
                 line[i + 1] = (1.0 - w_a[i]) * a[i]
         else:
@@ -99,7 +110,7 @@ def gather_cells(known, known_neighbours, points, neighbours, above, wide, tall,
                 inner = (1.0 - w_a[i]) * a[i] + (1.0 - w_b[i]) * b[i]
                 line[i + 1] = 0.25 * outer + 0.75 * inner
         out = cells[j]
-        if wide == 1:
+        if wide is None:
             for i in range(columns):
                 out[i] = line[i + 1]
             continue

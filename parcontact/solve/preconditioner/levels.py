@@ -5,6 +5,7 @@ square cells are not smooth over long ones. A positive number of pairs joins alo
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from numpy.typing import NDArray
@@ -26,30 +27,36 @@ class CellLevel:
 
     step: pyramid.PyramidStep
 
+    @cached_property
+    def _sides(self) -> tuple[int | None, int | None]:
+        """The shape of a cell as `cell_loops` takes it."""
+        wide, tall = self.step.shape
+        return wide if wide > 1 else None, tall if tall > 1 else None
+
     @property
     def coarse(self) -> Slab:
         return self.step.coarse
 
     def add_up(self, points: Map, cells: Map) -> None:
         step = self.step
-        loops.add_up(points, step.adjacent_points(points, 0, -1), step.above, *step.shape, cells[step.own])
+        loops.add_up(points, step.adjacent_points(points, 0, -1), step.above, *self._sides, cells[step.own])
         step.complete(cells)
 
     def add_up_back(self, cells: Map, points: Map) -> None:
         step = self.step
-        loops.add_up_back(cells[step.own], step.adjacent_cells(cells, 0, -1), step.above, *step.shape, points)
+        loops.add_up_back(cells[step.own], step.adjacent_cells(cells, 0, -1), step.above, *self._sides, points)
 
     def interpolate(self, cells: Map, known: Map, points: Map) -> None:
         step = self.step
         loops.interpolate_cells(
-            cells[step.own], step.adjacent_cells(cells, 0, -1), step.above, *step.shape, known, points
+            cells[step.own], step.adjacent_cells(cells, 0, -1), step.above, *self._sides, known, points
         )
 
     def interpolate_back(self, known: Map, points: Map, cells: Map) -> None:
         step = self.step
         around = [step.adjacent_points(field, 0, 1, -2, -1) for field in (known, points)]
         own = cells[step.own]
-        loops.gather_cells(known, around[0], points, around[1], step.above, *step.shape, own)
+        loops.gather_cells(known, around[0], points, around[1], step.above, *self._sides, own)
         step.complete(cells)
 
 
