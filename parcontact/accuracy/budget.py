@@ -94,14 +94,13 @@ def estimate_steady(run: RunProperties, observed: StepObservation) -> ErrorBudge
 def _estimate(sources: Sequence[ErrorSource], run: RunProperties, observed: StepObservation) -> ErrorBudget:
     """Return the errors of the sources. The error of friction is relative to the sum of body and interface; the
     interface has the relative error of the area."""
-    body = abs(observed.friction - observed.interface)
-    pairs = {source.name: source.error(run, replace(observed, friction=body)) for source in sources}
+    pairs = {source.name: source.error(run, observed) for source in sources}
     missing = dict.fromkeys(("solver", "time", "folded", "mesh"), 0.0)
     area = ErrorParts(**missing | {name: pair.area for name, pair in pairs.items()})
     resolved = resolves(run, observed)
     if observed.friction <= 0.0:
         return ErrorBudget(None, area, resolved)
-    shares = body / observed.friction, observed.interface / observed.friction
+    shares = observed.body / observed.friction, observed.interface / observed.friction
     friction = {name: shares[0] * pair.friction + shares[1] * pair.area for name, pair in pairs.items()}
     return ErrorBudget(ErrorParts(**missing | friction), area, resolved)
 

@@ -26,12 +26,13 @@ transform. Halves, thirds and quarters start from the pressure one whole cell ea
 
 import math
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 from ..history.chosen import Bounds, ChosenEnds, ChosenSteps, MadeStep, reached
 from ..history.timeline import Span, Step, Timeline
 from ..job import Job
 from ..job.checks.cells import one_cell
+from ..job.sections.calculation import Accuracy
 from ..physics.body import Body, remembers
 from ..physics.entries import Entry, Saved
 from ..physics.units import Units
@@ -93,9 +94,14 @@ class Controller:
     def relaxes(self) -> bool:
         return remembers(self.body)
 
+    @cached_property
+    def asked(self) -> Accuracy:
+        """The accuracies that the job asks for."""
+        return self.job.numerics.asked
+
     # -- tolerance ----------------------------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def follows(self) -> bool:
         """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen the tolerance of the
         job, and stages have steps."""
@@ -125,9 +131,9 @@ class Controller:
         """Return the memory after a step with this budget, whose solve has reached `certificate`."""
         if not self.follows or budget is None or certificate <= 0.0:
             return memory
-        asked = self.job.numerics.asked
-        of_area = _room(budget.area, AREA.solver, asked.area)
-        room = min(of_area, _room(budget.friction, FRICTION.solver, asked.friction) if budget.friction else math.inf)
+        room = _room(budget.area, AREA.solver, self.asked.area)
+        if budget.friction is not None:
+            room = min(room, _room(budget.friction, FRICTION.solver, self.asked.friction))
         ratio = certificate * room / self.job.numerics.tolerance
         now = min(max(math.log2(ratio) if ratio > 0.0 else 0.0, 0.0), math.log2(MOST))
         return StepTolerance(memory.mean + NEWEST * (now - memory.mean))
@@ -158,12 +164,11 @@ class Controller:
         the body before it relaxes. With energies this also applies to points that close; the square root of the
         accuracy is then allowed.
         """
-        numerics = self.job.numerics
-        order = order_of_time_error(numerics.integrator, step.growth > 0.0)
-        ratio = error / (FRICTION.time * TIME_MEDIAN * numerics.asked.of_steps)
+        order = order_of_time_error(self.job.numerics.integrator, step.growth > 0.0)
+        ratio = error / (FRICTION.time * TIME_MEDIAN * self.asked.of_steps)
         jump = min(SNAP_SHARE * _bounds(span).most, RELAXING * self.body.shortest_time)
         if step.dt > jump:
-            allowed = math.sqrt(numerics.asked.of_steps) if self.relaxes and self.energies else 1.0
+            allowed = math.sqrt(self.asked.of_steps) if self.relaxes and self.energies else 1.0
             at_once = (step.dt / jump) ** order if begins and self.relaxes else 0.0
             ratio = max(ratio, (front / allowed) ** order, at_once)
         wanted = SAFETY * ratio ** (-1.0 / order) if ratio > 0.0 else MOST_GROWTH
@@ -178,7 +183,7 @@ class Controller:
     def limit(self, made: MadeStep, dt: float, turned: float) -> MadeStep:
         """Return the record of a step of length dt in which the mean traction has changed by the share `turned` of its
         bound, with a next step in which it changes by the root of the accuracy at most, if it changes as fast."""
-        most = math.sqrt(self.job.numerics.asked.of_steps)
+        most = math.sqrt(self.asked.of_steps)
         if turned * made.next <= most * dt:
             return made
         return made._replace(next=self._level(self.timeline.spans[made.stage], most / turned * dt))

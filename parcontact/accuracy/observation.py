@@ -12,6 +12,7 @@ have the same position on the grid and count as one.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from ..job import Cylinder, Flat, Job, Rough, Wave
@@ -48,10 +49,15 @@ class RunProperties:
     folded: float = 0.0
     exponential: bool = True
 
-    @property
+    @cached_property
     def mean_cell(self) -> float:
         """Mean of the sides of a cell, the unit of the radii of spots."""
         return 0.5 * (self.cell[0] + self.cell[1])
+
+    @cached_property
+    def excess(self) -> float:
+        """Excess cells of the contact area per side of a cell on its edge."""
+        return excess_of(*self.cell, self.edges_follow_grid)
 
 
 @dataclass(frozen=True)
@@ -90,7 +96,12 @@ class StepObservation:
     own_error: float | None = None
     uneven: float = 1.0
 
-    @property
+    @cached_property
+    def body(self) -> float:
+        """Magnitude of the friction of the body."""
+        return abs(self.friction - self.interface)
+
+    @cached_property
     def correction(self) -> float:
         """The counted minus the corrected area, over the latter."""
         return (self.area - self.corrected) / self.corrected if self.corrected > 0.0 else 0.0
@@ -130,8 +141,7 @@ def _ridges(shapes: Sequence[Any]) -> bool:
 def radius_of(run: RunProperties, observed: StepObservation) -> float:
     """Return the radius of round spots of contact, or of smaller gaps between them, in cells of mean sides; half the
     width of straight ones; infinite without edges."""
-    excess = excess_of(*run.cell, run.edges_follow_grid)
-    sides = (observed.area - observed.corrected + observed.spared) * run.points / excess
+    sides = (observed.area - observed.corrected + observed.spared) * run.points / run.excess
     if sides <= 0.0:
         return math.inf
     radius = ROUND * min(observed.area, 1.0 - observed.area) * run.points / sides

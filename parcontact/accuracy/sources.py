@@ -86,7 +86,7 @@ class ErrorSource:
 
 def solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
     """Return the errors by the solve of a step."""
-    certificate, ratio = observed.complementarity, observed.slope / observed.friction if observed.friction else 0.0
+    certificate, ratio = observed.complementarity, observed.slope / observed.body if observed.body else 0.0
     friction = SOLVER.value * certificate * math.sqrt(max(1.0, ratio)) * mean_over_spots(run, observed)
     noise = NOISE.value * max(certificate, ROUNDING) * ratio / math.sqrt(count_spots(run, observed))
     return ErrorPair(max(friction, noise), _solver_of_area(observed))
@@ -118,7 +118,7 @@ def folded_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 
 def mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
     """Return the errors by the mesh in a step of a march."""
-    friction = VIEWS.value * observed.friction_mismatch / observed.friction if observed.friction else 0.0
+    friction = VIEWS.value * observed.friction_mismatch / observed.body if observed.body else 0.0
     return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(AREA if any(observed.way) else STILL, run, observed))
 
 

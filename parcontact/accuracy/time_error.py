@@ -91,7 +91,7 @@ def _error_by_pair(observed: StepObservation) -> float:
 def error_of_rise(run: RunProperties, observed: StepObservation) -> float:
     """Return the error of a change of friction since the step before, as after rest: it is delayed by <L> of a step.
     After a jump the change is the slope times the sine of the loss angle, times `uneven`."""
-    if run.prony is None or not run.exponential or not observed.slid or observed.friction <= 0.0:
+    if run.prony is None or not run.exponential or not observed.slid or observed.body <= 0.0:
         return 0.0
     x = max(_share_passed(run, observed), observed.angle)
     if x == 0.0:
@@ -101,7 +101,7 @@ def error_of_rise(run: RunProperties, observed: StepObservation) -> float:
         modulus = complex_modulus(np.array(x / observed.seconds), *run.prony)
         change = observed.uneven * observed.slope * float(modulus.imag / abs(modulus))
     late = _late(run.prony, x, observed.seconds) * (CURVED_RISE.value if observed.curved else 1.0)
-    return late * abs(change) / observed.friction
+    return late * abs(change) / observed.body
 
 
 def share_of_area(run: RunProperties, observed: StepObservation) -> float:

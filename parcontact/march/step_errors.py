@@ -1,15 +1,15 @@
 """Error budget of a step, from the step and from properties of the run."""
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ..accuracy.budget import ErrorBudget, ErrorSums, estimate
 from ..accuracy.constants import ENERGY
-from ..accuracy.embedded import EmbeddedPair, IntegratorDifference
-from ..accuracy.observation import RunProperties, StepObservation, properties_of
+from ..accuracy.embedded import IntegratorDifference
+from ..accuracy.observation import RunProperties, StepObservation
 from ..accuracy.time_error import error_of_rise, time_error
 from ..effects.contact_protocol import SolvedContact
 from ..effects.effect import Sheared
@@ -119,28 +119,26 @@ def add_energy_error(summed: float, errors: StepErrors | None, sheared: Sheared 
 def estimate_errors(scene: Scene, friction: float, solved: SolvedStep) -> StepErrors:
     """Return the errors of a step; `friction` is the friction of the body in the step before, infinite if unknown or
     after a jump. Collective."""
-    step, measures = solved.step, solved.measures
-    branches = scene.material.branched
-    prony = None if branches is None else branches.prony
-    run = properties_of(scene.job, scene.setup.shortest, scene.folded.bound, prony)
     if not states_errors(scene.material):
         return StepErrors(None, 0.0, math.inf, None)
+    run, measures = scene.properties, solved.measures
     body = measures.friction - measures.friction_interface
-    observed = replace(_observe(scene, run, solved), change=body - friction)
-    time, last = time_error(run, observed), math.inf if step.jump else body
+    observed = _observe(scene, run, solved, body - friction)
+    time, last = time_error(run, observed), math.inf if solved.step.jump else body
     if not solved.touches:
         return StepErrors(None, time, last, None)
-    budget, rise = estimate(run, observed), error_of_rise(run, replace(observed, friction=abs(body)))
-    more = max(0.0, rise - time) * abs(body) / measures.friction if budget.friction else 0.0
+    budget, rise = estimate(run, observed), error_of_rise(run, observed)
+    more = max(0.0, rise - time) * observed.body / measures.friction if budget.friction else 0.0
     return StepErrors(budget, time, last, budget.take_from_time(more))
 
 
-def _observe(scene: Scene, run: RunProperties, solved: SolvedStep) -> StepObservation:
-    """Return the observation of a step; collective."""
+def _observe(scene: Scene, run: RunProperties, solved: SolvedStep, change: float) -> StepObservation:
+    """Return the observation of a step with this change of the friction of the body; collective."""
     step, measures, certificate = solved.step, solved.measures, solved.contact.certificate
     pair, mismatch, grid = _compare_integrators(scene, solved), _compare_views(scene, solved), scene.choices.grid
     curved = scene.choices.numerics.integrator == "exponential" and step.growth > 0.0
-    of_steps: dict[str, Any] = {"difference": pair.difference, "order": pair.order, "seconds": step.dt}
+    of_steps: dict[str, Any] = {"difference": pair.difference, "order": pair.order}
+    of_steps |= {"seconds": step.dt, "change": change}
     if remembers(scene.material) and scene.material.branched is None:
         of_steps["own_error"] = scene.material.time_error(solved.body, solved.trial, step.dt)  # type: ignore[attr-defined]
     if not solved.touches:
@@ -173,10 +171,9 @@ def _cells_slid(run: RunProperties, step: Step, cell: tuple[float, float]) -> fl
 def _compare_integrators(scene: Scene, solved: SolvedStep) -> IntegratorDifference:
     """Return the differences that the embedded pair of integrators gives for a step; collective."""
     step, trial, contact, measures = solved.step, solved.trial, solved.contact, solved.measures
-    branches = scene.material.branched
-    if branches is None:
+    pair = scene.integrators
+    if pair is None:
         return NO_DIFFERENCE
-    pair = EmbeddedPair(scene.slab, branches, scene.choices.grid.dx / scene.units.length)
     if not solved.touches:
         return pair.compare_without_load(step.dt, trial, solved.body, step.growth) if step.decide else NO_DIFFERENCE
     load = measures.pressure * scene.slab.points / (trial.alpha * scene.units.pressure)

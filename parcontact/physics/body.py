@@ -173,6 +173,7 @@ class ZenerBody:
         none = np.zeros(len(self.kept))
         self._still = Advance(np.ones(len(self.kept)), none, none)
         self._coefficients: _Coefficients | None = None
+        self.time_factor = 1.0
 
     @property
     def branched(self) -> "ZenerBody":
@@ -180,7 +181,7 @@ class ZenerBody:
 
     def set_time_factor(self, factor: float) -> None:
         """Multiply the original relaxation times by `factor` in all further steps."""
-        self.prony = self.prony._replace(relaxation_times=self._cold * factor)
+        self.prony, self.time_factor = self.prony._replace(relaxation_times=self._cold * factor), factor
         self._coefficients = None
 
     def elapsed(self, dt: float) -> Array:

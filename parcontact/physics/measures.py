@@ -1,7 +1,7 @@
 """Measures of one instant of a contact. This module imports no other, so that tables are read quickly."""
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 LONG_CELLS = 0.1  # fitted: power of the ratio of sides in `excess_of`
 SIDE = (math.pi - 1.0 + math.log(2.0)) / 24.0  # physics: cells in excess per side of a cell on the edge of contact
@@ -45,7 +45,7 @@ class Measures:
 
     @property
     def finite(self) -> bool:
-        return all(map(math.isfinite, astuple(self)))
+        return all(map(math.isfinite, vars(self).values()))
 
     @property
     def friction_x(self) -> float:

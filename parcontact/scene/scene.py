@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..accuracy.controller import Controller
+from ..accuracy.embedded import EmbeddedPair
+from ..accuracy.observation import RunProperties, properties_of
 from ..effects import contact_law
 from ..effects.contact_protocol import ContactLaw
 from ..effects.effect import TOLERANCES, Effect, Memories
@@ -149,6 +151,8 @@ class Scene:
         for body in (self.material.branched, *of_energy, *self.further_bodies):
             if body is not None:
                 body.set_time_factor(factor)
+        if self.material.branched is not None:
+            self.properties = replace(self.properties, prony=self.material.branched.prony)
         if shears := self.choices.shears:
             self.probe = replace(self.probe, shears=[shear.shifted(factor) for shear in shears])
 
@@ -173,6 +177,19 @@ class Scene:
         choices = self.choices
         energies, exact = self.energy is not None, bool(choices.forbidden(TOLERANCES))
         return Controller(self.job, choices.timeline, self.material, energies, exact)
+
+    @cached_property
+    def properties(self) -> RunProperties:
+        """Properties of the run for its error budget, with the relaxation of the body in this step."""
+        branches = self.material.branched
+        prony = None if branches is None else branches.prony
+        return properties_of(self.job, self.setup.shortest, self.folded.bound, prony)
+
+    @cached_property
+    def integrators(self) -> EmbeddedPair | None:
+        """Comparison of the integrators of a body with branches, None for another body."""
+        branches = self.material.branched
+        return None if branches is None else EmbeddedPair(self.slab, branches, self.choices.grid.dx / self.units.length)
 
     @cached_property
     def in_double(self) -> tuple[ContactSolver, Operators]:
