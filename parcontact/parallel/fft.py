@@ -215,7 +215,7 @@ class FFT:
         tally = self.slab.tally
         tally["fft"] += 1
         tally[self._name] += 1
-        tally["bytes sent"] += sum(leg.sent for leg, _ in self._legs if leg)
+        tally["bytes sent"] += self._sent
 
     # -- blocks and transforms ----------------------------------------------------------------------------------------
 
@@ -256,6 +256,7 @@ class FFT:
                 for part, (_, theirs) in zip(slab.dealt, everyone, strict=True)
             ]
             self._legs.append((Leg(slab, dealt, rows, self.spectrum, self._wire) if ranks > 1 else None, blocks))
+        self._sent = sum(leg.sent for leg, _ in self._legs if leg)
 
     def _make_transforms(self) -> None:
         heights = {rows.stop - rows.start for _, blocks in self._legs for rows in blocks}

@@ -69,7 +69,7 @@ class PyramidStep:
     shape: Shape
     _kept: dict[tuple[str, tuple[int, ...]], "RowExchange"] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def above(self) -> int:
         """Number of rows of points of the first own cell on another rank: 0 or 1."""
         return self.fine.rows.start % self.shape[1]

@@ -14,6 +14,7 @@ have neighbours that have yielded. The smaller excess of the two holds for both.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
@@ -48,7 +49,7 @@ class Probe:
     shears: Sequence[Shear] = ()
     hardness: float | None = None
 
-    @property
+    @cached_property
     def _excess(self) -> float:
         """Excess cells per side on the edge of contact."""
         (lx, ly), slab = self.surface.size, self.slab

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Certificate:
     length: float = math.nan
     members: float = 0.0
 
-    @property
+    @cached_property
     def worst(self) -> float:
         total = self.complementarity + self.penetration + self.load
         return total if math.isnan(total) else max(self.complementarity, self.penetration, self.load)

@@ -92,8 +92,8 @@ class NonNegative:
 
     def advance(self, p_old: Array, t: Array, step: float, p: Array, cells: Cells, sums: Array) -> tuple[float, float]:
         advance(p_old, t, step, p, cells, sums)
-        loads, cuts = np.split(sums, 2, axis=1)
-        return float(loads.sum()), float(cuts.sum())
+        columns = sums.shape[1] // 2
+        return float(sums[:, :columns].sum()), float(sums[:, columns:].sum())
 
     def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, cells: Cells) -> None:
         scale_cells(p, cells, total / load * kept)

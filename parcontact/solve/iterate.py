@@ -1,7 +1,7 @@
 """Sums over an iterate of the contact solver, and its errors."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,8 +78,8 @@ class Iterate:
             d = self.d + self.free_gaps / self.free_load
         else:
             d = self.d + (self.gaps / self.load if self.load > 0.0 else 0.0)
-        rest = self.free_gaps - (d - self.d) * self.free_load
-        return replace(self, d=d, gaps=self.gaps - (d - self.d) * self.load, free_gaps=rest)
+        gaps, rest = self.gaps - (d - self.d) * self.load, self.free_gaps - (d - self.d) * self.free_load
+        return Iterate(d, self.load, gaps, self.energy, self.squares, self.free_load, rest, self.between)
 
     def length(self, height: float) -> float:
         """Return the length that gaps are compared with (`Certificate`), between LEAST_HEIGHT and 1 times `height`."""

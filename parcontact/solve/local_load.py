@@ -51,7 +51,7 @@ class LocalLoad:
     def restore(self, constraint: Constraint, p: Array, load: float, total: float, near_by: bool) -> None:
         """Scale p from the sum `load`, as `advance` returned it, to the sum `total`; collective. If `near_by`, each
         cell first loses what was added in it, at most MOST_GIVEN_BACK of its load."""
-        loads = np.split(self._sums, 2, axis=1)[0]
+        loads, _ = _halves(self._sums)
         shares = np.zeros_like(loads)
         if near_by:
             shares = _shares(self._complete(self._sums))
@@ -70,9 +70,15 @@ def _rows_of_cells(part: slice, rows: int) -> slice:
     return slice(start, max(-(-part.stop // rows), start) if part.stop > part.start else start)
 
 
+def _halves(sums: Array) -> tuple[Array, Array]:
+    """Return the sums over cells of the load and of the added pressure."""
+    columns = sums.shape[1] // 2
+    return sums[:, :columns], sums[:, columns:]
+
+
 def _shares(sums: Array) -> Array:
     """Return the share of its load that each cell loses, from its load and the added pressure."""
-    loads, cuts = np.split(sums, 2, axis=1)
+    loads, cuts = _halves(sums)
     return np.clip(
         np.divide(cuts, loads, out=np.zeros_like(loads), where=loads > 0.0), -MOST_GIVEN_BACK, MOST_GIVEN_BACK
     )

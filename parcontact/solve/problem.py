@@ -1,6 +1,7 @@
 """Contact problem, the input of solvers."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 from ..parallel.slab import Array
@@ -51,7 +52,7 @@ class Problem:
     constraint: Constraint
     control: Control
 
-    @property
+    @cached_property
     def mean(self) -> float | None:
         """The prescribed mean pressure; None with a given approach."""
         return self.control.value if isinstance(self.control, MeanPressure) else None

@@ -37,26 +37,34 @@ class CellLevel:
     def coarse(self) -> Slab:
         return self.step.coarse
 
+    @cached_property
+    def _alone(self) -> bool:
+        """True if this rank has all rows, and no row of zeros is between the last and the first: `loops.row_of` then
+        finds the rows next to a map in the map itself."""
+        return self.step.fine.comm.size == 1 and self.step.fine.ny % 2 == 0
+
     def add_up(self, points: Map, cells: Map) -> None:
         step = self.step
-        loops.add_up(points, step.adjacent_points(points, 0, -1), step.above, *self._sides, cells[step.own])
+        around = points if self._alone else step.adjacent_points(points, 0, -1)
+        loops.add_up(points, around, step.above, *self._sides, cells[step.own])
         step.complete(cells)
 
     def add_up_back(self, cells: Map, points: Map) -> None:
         step = self.step
-        loops.add_up_back(cells[step.own], step.adjacent_cells(cells, 0, -1), step.above, *self._sides, points)
+        around = cells if self._alone else step.adjacent_cells(cells, 0, -1)
+        loops.add_up_back(cells[step.own], around, step.above, *self._sides, points)
 
     def interpolate(self, cells: Map, known: Map, points: Map) -> None:
         step = self.step
-        loops.interpolate_cells(
-            cells[step.own], step.adjacent_cells(cells, 0, -1), step.above, *self._sides, known, points
-        )
+        around = cells if self._alone else step.adjacent_cells(cells, 0, -1)
+        loops.interpolate_cells(cells[step.own], around, step.above, *self._sides, known, points)
 
     def interpolate_back(self, known: Map, points: Map, cells: Map) -> None:
-        step = self.step
-        around = [step.adjacent_points(field, 0, 1, -2, -1) for field in (known, points)]
+        step, next_known, next_points = self.step, known, points
+        if not self._alone:
+            next_known, next_points = (step.adjacent_points(field, 0, 1, -2, -1) for field in (known, points))
         own = cells[step.own]
-        loops.gather_cells(known, around[0], points, around[1], step.above, *self._sides, own)
+        loops.gather_cells(known, next_known, points, next_points, step.above, *self._sides, own)
         step.complete(cells)
 
 
