@@ -1,6 +1,8 @@
 """Steps that fail: tried again to the same digits on any restart, or given up with a good checkpoint and advice."""
 
+import cProfile
 import itertools
+import pstats
 import re
 import time
 from dataclasses import replace
@@ -412,3 +414,26 @@ def test_steps_that_fail_are_shortened_as_far_as_a_snap_needs(monkeypatch: pytes
         march.advance(next(steps))
     snap = min(SNAP_SHARE * 1e-2 / RAMP_STEPS, RELAXING * march.scene.material.shortest_time)
     assert tried[-1] <= snap < min(tried[:-1])
+
+
+# -- cost -------------------------------------------------------------------------------------------------------------
+
+MOST_CALLS = 850  # calls of functions in a step; some 750 are made, and were 1550 with all made anew in each step
+
+
+def test_calls_of_functions_in_a_step() -> None:
+    """Steps of small grids, as those of bands and studies, are Python: what does not change is not made again."""
+    slide = {"pressure": 1e5, "velocity": 0.3, "distance": 30 * 1e-3 / 64, "cells_per_step": 1}
+    branches = [{"modulus": 9e6, "relaxation_time": 1e-4}, {"modulus": 4e6, "relaxation_time": 1e-2}]
+    material = {"model": "zener", "modulus_inf": 1e6, "branches": branches}
+    rough = {"hurst": 0.8, "long_wavelength": 2.5e-4, "short_wavelength": 1.25e-4, "rms_slope": 0.1, "seed": 1}
+    march = begun({"grid": GRID, "surface": {"shape": "rough", **rough}, "material": material, "history": [slide]})
+    steps = march.steps()
+    for step in islice(steps, 10):
+        march.advance(step)
+    profile = cProfile.Profile()
+    profile.enable()
+    count = sum(march.advance(step).iterations <= 2 for step in steps)
+    profile.disable()
+    assert count == 21  # the jump and 30 steps: all are like those that the bound is about
+    assert pstats.Stats(profile).total_calls / count < MOST_CALLS  # type: ignore[attr-defined]
