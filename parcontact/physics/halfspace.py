@@ -242,7 +242,18 @@ class HalfSpace:
         """Return G*(-q v) of each wave, times `factors`; at a Nyquist wavenumber, which has two signs, the mean of
         both. The result broadcasts to the rows of a spectrum: without factors all rows are equal if the surface slides
         along x."""
-        found = self._linear_modulus(fft, velocity, prony, rows if velocity[1] else slice(0, 1))
+        return self._moduli(fft, velocity, prony)(rows)
+
+    def _moduli(self, fft: FFT, velocity: Vector, prony: Prony) -> Callable[[slice], Spectrum]:
+        """Return a function that gives `sliding_modulus` of rows. Under a surface that slides along x the modulus
+        without factors is the same in all rows, and made once."""
+        if velocity[1]:
+            return lambda rows: self._with_factors(fft, self._linear_modulus(fft, velocity, prony, rows), rows)
+        of_a_row = self._linear_modulus(fft, velocity, prony, slice(0, 1))
+        return lambda rows: self._with_factors(fft, of_a_row, rows)
+
+    def _with_factors(self, fft: FFT, found: Spectrum, rows: slice) -> Spectrum:
+        """Return the modulus of a linear body on rows times the `factors`."""
         if self.factors is None:
             return found
         storage, loss = self.factors(np.hypot(*wavenumbers(fft, self.size, rows)))
@@ -262,18 +273,20 @@ class HalfSpace:
         free. Raises InputError for a free body that flows, as its wake never ends."""
         if self.free:
             return self._along_wake(fft, velocity, _creep(prony), fft.dtype)
+        moduli = self._moduli(fft, velocity, prony)
 
         def part(rows: slice) -> Spectrum:
-            symbol, modulus = self.symbol(fft, rows), self.sliding_modulus(fft, velocity, prony, rows)
+            symbol, modulus = self.symbol(fft, rows), moduli(rows)
             return np.divide(symbol, modulus, out=np.zeros(symbol.shape, np.complex128), where=symbol != 0.0)
 
         return Convolution(fft, part, fft.complex, even=not velocity[1])
 
     def sliding_inverse(self, fft: FFT, velocity: Vector, prony: Prony) -> Convolution:
         """Return the operator from displacement to pressure, as `inverse`."""
+        moduli = self._moduli(fft, velocity, prony)
 
         def part(rows: slice) -> Spectrum:
-            return np.asarray(self.inverse_symbol(fft, rows) * self.sliding_modulus(fft, velocity, prony, rows))
+            return np.asarray(self.inverse_symbol(fft, rows) * moduli(rows))
 
         return Convolution(fft, part, fft.complex, even=not velocity[1])
 
