@@ -235,8 +235,8 @@ def completed(scene: Scene, state: State) -> State:
     work, stored, lost, split = energies_of(scene, state.energy, state.memories)
     added = effect_values(scene.effects, state.memories)
     error = math.nan if state.row.step else error_of_energies(scene, 0.0, 0.0, state.memories)
-    energies = {"work": work, "stored": stored, "dissipated": lost, "error_energy": error, "branch_dissipation": split}
-    row = replace(state.row, **energies, added=added)
+    row = replace(state.row, work=work, stored=stored, dissipated=lost, error_energy=error)
+    row = replace(row, branch_dissipation=split, added=added)
     return state.after(row=row)
 
 

@@ -345,7 +345,7 @@ def test_energies_of_a_contact_that_comes_about_follow_the_accuracy(accuracy: fl
         "output": {"energy": True},
     }
     _, rows = marched(ball)
-    wanted, error = 27.8e-12, rows[-1].added[-1]
+    wanted, error = 27.8e-12, rows[-1].error_energy
     assert abs(rows[-1].dissipated - wanted) < within * wanted
     assert abs(rows[-1].dissipated - wanted) < error < wanted / 7.0
     begins = next(number for number, row in enumerate(rows) if row.measures.contact_area > 0.0)

@@ -165,7 +165,7 @@ def test_restart_within_a_cycle(comm: MPI.Intracomm, tmp_path: Path) -> None:
 
 def test_what_is_said_of_the_last_two_cycles(tmp_path: Path) -> None:
     """After a jump of the load the first cycle differs from the second."""
-    said = []
+    said = list[str]()
     for cycles in (1, 2):
         job = Job.model_validate({**ball(12), "history": [force(FREQUENCY, cycles)]})
         said += write_cycles(tmp_path, job, table(marched(job)[1]))

@@ -66,7 +66,7 @@ class Swing(tuple[float, float]):
         return made
 
     def __getnewargs__(self) -> tuple[tuple[float, float], float]:
-        return tuple(self), self.frequency
+        return (self[0], self[1]), self.frequency
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Swing) and tuple(self) == tuple(other) and self.frequency == other.frequency
