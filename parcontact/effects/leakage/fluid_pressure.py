@@ -10,7 +10,8 @@ The unknown of the rounds is the share s of the drive, 1 at the high and 0 at th
     p = p2 + s (p1 - p2)    of a liquid,    p^2 = p2^2 + s (p1^2 - p2^2)    of a gas.
 
 A round presses the contact under the fluid's pressure, and gets another share from its gap. The next share is that of
-Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) from the last DEPTH rounds.
+Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) from the last DEPTH rounds. Near percolation, pools open and
+close again: after ANDERSON rounds each cell makes a part of its change, half as large whenever it turns back.
 """
 
 import math
@@ -26,6 +27,8 @@ from .fluids import PressureDrop
 Map = NDArray[np.floating]
 SMALL = 1e-9  # accuracy: small leak over the mean of g^3
 DEPTH = 3  # tuning: differences of earlier rounds
+ANDERSON = 9  # tuning: rounds of Anderson's method
+SHORTER, LONGER, LEAST = 0.5, 1.1, 0.01  # tuning: factors of the part of its change that a cell makes, and the least
 RIDGE = 1e-12  # rounding: of the products of differences
 SETTLED = 1e-4  # accuracy: relative change of the flow in the last round, and rms change of the share
 
@@ -78,6 +81,7 @@ class Rounds:
     def __init__(self, drop: PressureDrop, size: tuple[float, float]) -> None:
         self._drop, self._size, self.count = drop, size, 0
         self._shares, self._residuals, self._flow = list[Map](), list[Map](), 0.0
+        self._parts: Map | None = None
 
     def advance(self, gap: Map, share: Map, most: float) -> tuple[tuple[bool, bool, float], Map]:
         """Return whether the rounds have settled, whether the fluid lifts the seal off, and the change of the flow, for
@@ -94,13 +98,22 @@ class Rounds:
         settled = drop.high == drop.low or (change < SETTLED and moved < SETTLED)
         if lifted or settled:
             return (settled and not lifted, lifted, change), share
-        following = np.clip(self._mixed(share, filled.share), 0.0, 1.0)
+        mixed = (self._mixed if self.count <= ANDERSON else self._damped)(share, filled.share)
+        following = np.clip(mixed, 0.0, 1.0)
         then = float(pressure_of(drop, following).mean())
         if then > most:
             following = (
                 share + max(0.0, (most - mean) / (then - mean)) * (following - share) if mean < most else filled.share
             )
         return (False, False, change), following
+
+    def _damped(self, share: Map, found: Map) -> Map:
+        """Return the share of the next round, in which each cell makes a part of its change."""
+        residual, last = found - share, self._residuals[-1]
+        parts = np.ones(share.shape) if self._parts is None else self._parts
+        self._parts = np.where(last * residual < 0.0, SHORTER * parts, LONGER * parts).clip(LEAST, 1.0)
+        self._residuals[-1] = residual
+        return share + self._parts * residual
 
     def _mixed(self, share: Map, found: Map) -> Map:
         """Return the share of the next round from that of a round and the one `found` from its gap."""
