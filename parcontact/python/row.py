@@ -55,6 +55,8 @@ class Row(Mapping[str, float]):
     flow_rate: float
     mass_flow: float
     error_x: float
+    error_leak: float
+    error_rounds: float
     rounds: float
     stick_area: float
     slip_loss: float

@@ -25,8 +25,9 @@ def headline(run: RunTable) -> Iterator[str]:
     known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
     if known:
         row = known[-1]
-        closed = [axis for axis in "xy" if not columns[f"flow_{axis}"][row]]
-        flows = [_flow(columns, row, axis) for axis in "xy" if axis not in closed]
+        axes = [axis for axis in "xy" if f"flow_{axis}" in columns]
+        closed = [axis for axis in axes if not columns[f"flow_{axis}"][row]]
+        flows = [_flow(columns, row, axis) for axis in axes if axis not in closed]
         yield from [f"the conductivity of the gap is {' and '.join(flows)}"] * bool(flows)
         yield from [f"contact closes the gap along {' and '.join(closed)}"] * bool(closed)
         yield from stops

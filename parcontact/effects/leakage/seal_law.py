@@ -108,8 +108,8 @@ class SealLaw:
             solved = self._dry.solve(trial, step, control, None, past, before, tolerance)
             self._put_gap(trial.effective, solved.contact, gap)
             self._fluid.fill(0.0)
-            return replace(solved, memory=now, numbers=self._numbers(drop, share, gap, 1))
-        rounds, known, iterations = Rounds(drop, self._size), memory.modulus, 0
+            return replace(solved, memory=now, numbers=self._numbers(drop, share, gap, None))
+        rounds, known, iterations, left = Rounds(drop, self._size), memory.modulus, 0, MOST_ROUNDS
         while True:
             load = self._press(trial, drop, share, control)
             pasts = PreviousContacts((PreviousPressure(self._start, known),), past.spare, past.approach)
@@ -118,7 +118,8 @@ class SealLaw:
             contact, known, iterations = solved.contact, trial.alpha, iterations + solved.contact.iterations
             self._put_gap(self._heights, contact, gap)
             verdict = self._advance(rounds, share, gap, self._most(trial, control))
-            if contact.failure or verdict.settled or verdict.lifted or rounds.count == MOST_ROUNDS:
+            left -= 1
+            if contact.failure or verdict.settled or verdict.lifted or not left:
                 break
             self._start[...] = contact.p
         contact.p[...] += self._fluid
@@ -127,7 +128,7 @@ class SealLaw:
         failure = contact.failure or ("" if verdict.settled or verdict.lifted else late)
         contact = replace(contact, iterations=iterations, failure=failure)
         end: End = "detached" if verdict.lifted else "equilibrium"
-        numbers = self._numbers(drop, share, gap, rounds.count)
+        numbers = self._numbers(drop, share, gap, rounds)
         return replace(solved, contact=contact, memory=now, touching=gap == 0.0, numbers=numbers, end=end)
 
     def _begin(self, memory: SealMemory, past: PreviousContacts, step: Step) -> None:
@@ -189,20 +190,18 @@ class SealLaw:
             return _Verdict(*verdict)
 
         verdict = on_root(self.slab.comm, act)
-        rounds.count += not self.slab.root
         if not (verdict.settled or verdict.lifted):
             share[...] = self.slab.from_root(found[0] if found else None)
         return verdict
 
-    def _numbers(self, drop: PressureDrop, share: Array, gap: Array, rounds: int) -> dict[str, float]:
+    def _numbers(self, drop: PressureDrop, share: Array, gap: Array, rounds: Rounds | None) -> dict[str, float]:
         """Return the columns of the flow; collective."""
         whole, shares = self.slab.to_root(gap), self.slab.to_root(share)
 
         def act() -> dict[str, float]:
             assert whole is not None
             assert shares is not None
-            mean = float(pressure_of(drop, shares).mean())
-            return seal_flow(whole, drop, shares, self._size) | {"fluid_pressure": mean, "rounds": float(rounds)}
+            return seal_flow(whole, drop, shares, self._size, rounds)
 
         return on_root(self.slab.comm, act)
 
