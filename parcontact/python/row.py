@@ -51,6 +51,8 @@ class Row(Mapping[str, float]):
     flow_x: float
     flow_y: float
     constriction: float
+    high_pressure: float
+    low_pressure: float
     fluid_pressure: float
     flow_rate: float
     mass_flow: float

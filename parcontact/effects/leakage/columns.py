@@ -13,6 +13,8 @@ MEASURES: Table = (
     *(
         Column(name, unit, meaning, when="leakage.load")
         for name, unit, meaning in (
+            ("high_pressure", "Pa", "of the fluid, at the low end of x (`load: total`)"),
+            ("low_pressure", "Pa", "of the fluid, at the high end of x"),
             ("fluid_pressure", "Pa", "mean over the box of the fluid's pressure over the ambient one (`load: total`)"),
             ("flow_rate", "m³/s", "flow of the fluid along x at the low pressure, through the box (`load: total`)"),
             ("mass_flow", "kg/s", "the same flow as a mass, empty where no density is known"),

@@ -11,7 +11,8 @@ The unknown of the rounds is the share s of the drive, 1 at the high and 0 at th
 
 A round presses the contact under the fluid's pressure, and gets another share from its gap. The next share is that of
 Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) from the last DEPTH rounds. Near percolation, pools open and
-close again: after ANDERSON rounds each cell makes a part of its change, half as large whenever it turns back.
+close again: after ANDERSON rounds each cell makes a part of its change, half as large whenever it turns
+back. Rounds that have not settled after EACH go on with a small leak GROWTH times as large.
 """
 
 import math
@@ -29,6 +30,7 @@ SMALL = 1e-9  # accuracy: small leak over the mean of g^3
 DEPTH = 3  # tuning: differences of earlier rounds
 ANDERSON = 9  # tuning: rounds of Anderson's method
 SHORTER, LONGER, LEAST = 0.5, 1.1, 0.01  # tuning: factors of the part of its change that a cell makes, and the least
+EACH, GROWTH = 20, 100.0  # tuning: rounds with one small leak, and its growth after these
 MOST_REST = 5.0  # tuning: largest sum of further changes over the next one
 RIDGE = 1e-12  # rounding: of the products of differences
 SETTLED = 1e-4  # accuracy: estimated relative error of the flow by the rounds, and rms error of the share
@@ -64,11 +66,11 @@ class Filled:
     conductivity: float
 
 
-def fill_share(gap: Map, size: tuple[float, float]) -> Filled:
+def fill_share(gap: Map, size: tuple[float, float], small: float = SMALL) -> Filled:
     """Return the share in a map of conducting gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m]."""
     cubes = gap.T**3
     mean = float(cubes.mean())
-    resistances = 1.0 / (cubes / mean + SMALL) if mean > 0.0 else np.ones(cubes.shape)
+    resistances = 1.0 / (cubes / mean + small) if mean > 0.0 else np.ones(cubes.shape)
     balance, given = Balance(resistances, size[1] / size[0] * gap.shape[1] / gap.shape[0], True), np.zeros(cubes.shape)
     given[0] = balance.first
     share = balance.solve(given)
@@ -82,16 +84,18 @@ class Rounds:
         self._drop, self._size, self.count = drop, size, 0
         self._shares, self._residuals = list[Map](), list[Map]()
         self.conductivity, self.error = 0.0, math.inf
-        self._parts: Map | None = None
+        self._parts, self._small = np.ones(()), SMALL
         self._last: tuple[Map, Map] | None = None
 
     def advance(self, gap: Map, share: Map, most: float) -> tuple[tuple[bool, bool, float], Map]:
         """Return whether the rounds have settled, whether the fluid lifts the seal off, and the change of the flow, for
         the gap [m] under the fluid's pressure of a share; and the share of the next round. The mean pressure is
         at most `most` [Pa]."""
+        if self.count and self.count % EACH == 0:
+            self._restart()
         self.count += 1
         drop, last = self._drop, self.conductivity
-        filled = fill_share(conducting(gap, drop, share), self._size)
+        filled = fill_share(conducting(gap, drop, share), self._size, self._small)
         change = abs(filled.conductivity / last - 1.0) if last else math.inf
         self.conductivity = filled.conductivity
         mean, wanted = (float(pressure_of(drop, one).mean()) for one in (share, filled.share))
@@ -102,7 +106,8 @@ class Rounds:
         self.error = rest * change
         if lifted or settled:
             return (settled and not lifted, lifted, self.error), share
-        mixed = self._mixed(share, filled.share) if self.count <= ANDERSON else self._damped(share, filled.share, rest)
+        by_cells = (self.count - 1) % EACH >= ANDERSON
+        mixed = self._damped(share, filled.share, rest) if by_cells else self._mixed(share, filled.share)
         following = np.clip(mixed, 0.0, 1.0)
         then = float(pressure_of(drop, following).mean())
         if then > most:
@@ -110,6 +115,13 @@ class Rounds:
                 share + max(0.0, (most - mean) / (then - mean)) * (following - share) if mean < most else filled.share
             )
         return (False, False, self.error), following
+
+    def _restart(self) -> None:
+        """Forget the rounds so far, and go on with a larger leak."""
+        self._small *= GROWTH
+        self._shares.clear()
+        self._residuals.clear()
+        self._parts, self._last = np.ones(()), None
 
     def _rest(self, share: Map, found: Map) -> float:
         """Return the sum of all further changes over the next one, by those of the last two rounds (A. C. Aitken)."""
@@ -124,8 +136,8 @@ class Rounds:
     def _damped(self, share: Map, found: Map, rest: float) -> Map:
         """Return the share of the next round, in which each cell makes a part of its change."""
         residual, last = found - share, self._residuals[-1]
-        parts = np.ones(share.shape) if self._parts is None else self._parts
-        self._parts = np.where(last * residual < 0.0, SHORTER * parts, LONGER * parts).clip(LEAST, 1.0)
+        self._parts = np.where(last * residual < 0.0, SHORTER, LONGER) * self._parts
+        self._parts = np.clip(self._parts, LEAST, 1.0)
         self._residuals[-1] = residual
         return share + rest * self._parts * residual
 
@@ -149,12 +161,12 @@ def seal_flow(
     gap: Map, drop: PressureDrop, share: Map, size: tuple[float, float], rounds: Rounds | None
 ) -> dict[str, float]:
     """Return the columns of a seal with the gap [m] after rounds, None if the fluid has no pressure, and the bound of
-    its mass flow by inertia [kg/s]. A gap through which less flows than by the small leak is closed."""
+    its mass flow by inertia [kg/s]. A gap through which less flows than by SMALL is closed."""
     filled = 0.0 if rounds is None else rounds.conductivity
     through = conducting(gap, drop, share).astype(np.float64, copy=False)
     flow = solve_flow(through, size, "x", True)
     leaks = max(filled - flow.conductivity, 0.0)
-    closed = not flow.percolates or leaks > flow.conductivity
+    closed = flow.conductivity <= SMALL * float(np.mean(through**3))
     return {
         "flow_x": 0.0 if closed else flow.conductivity,
         "constriction": 0.0 if closed else flow.constriction,
@@ -164,6 +176,8 @@ def seal_flow(
         "error_leak": math.nan if closed else leaks / flow.conductivity,
         "error_rounds": 0.0 if rounds is None or drop.high == drop.low else rounds.error,
         "rounds": 1.0 if rounds is None else float(rounds.count),
+        "high_pressure": drop.high,
+        "low_pressure": drop.low,
         "fluid_pressure": float(pressure_of(drop, share).mean()),
         "bound": drop.inertial_bound(least_section(gap.astype(np.float64, copy=False), flow, size, "x")),
     }

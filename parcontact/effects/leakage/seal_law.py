@@ -45,6 +45,7 @@ from .section import drop_at
 
 MOST_ROUNDS = 100  # tuning: limit on the rounds of a step
 LEAST_LOAD = 1e-3  # accuracy: least load of the contact over the load, below which the seal lifts off
+SHARP = 1e-4  # accuracy: largest tolerance of a contact with a fluid; K is then within 0.1 %
 OPEN = 1e-30  # rounding: least open gap [m], as contact has the gap 0
 
 
@@ -97,7 +98,7 @@ class SealLaw:
         tolerance: float | None,
     ) -> SolvedContact[SealMemory]:
         """Solve a step; see `effects.contact_protocol.ContactLaw.solve`. With a pressure of the fluid, solves have the
-        tolerance of the job."""
+        tolerance of the job, at most SHARP."""
         assert self._dry is not None
         drop, (share, gap) = drop_at(self.scene.job, step.stage, step.time), memory.spare
         flows = memory.flows or drop.high > drop.low
@@ -109,12 +110,13 @@ class SealLaw:
             self._put_gap(trial.effective, solved.contact, gap)
             self._fluid.fill(0.0)
             return replace(solved, memory=now, numbers=self._numbers(drop, share, gap, None))
+        sharp = min(self.scene.choices.numerics.tolerance, SHARP)
         rounds, known, iterations, left = Rounds(drop, self._size), memory.modulus, 0, MOST_ROUNDS
         while True:
             load = self._press(trial, drop, share, control)
             pasts = PreviousContacts((PreviousPressure(self._start, known),), past.spare, past.approach)
             pressed = replace(trial, effective=self._heights)
-            solved = self._dry.solve(pressed, step, load, None, pasts, before, None)
+            solved = self._dry.solve(pressed, step, load, None, pasts, before, sharp)
             contact, known, iterations = solved.contact, trial.alpha, iterations + solved.contact.iterations
             self._put_gap(self._heights, contact, gap)
             verdict = self._advance(rounds, share, gap, self._most(trial, control))
