@@ -213,5 +213,5 @@ RULES = (
     Rule(("leakage", "output"), _has_map),
     Rule(("leakage", "material", "numerics"), _refused),
     Rule(("leakage", "initial", "steady"), _no_steady),
-    *map(_excludes, ("adhesion", "interface", "thermal", "bands")),
+    *map(_excludes, ("adhesion", "interface", "thermal")),
 )
