@@ -51,10 +51,14 @@ class Row(Mapping[str, float]):
     flow_x: float
     flow_y: float
     constriction: float
+    high_pressure: float
+    low_pressure: float
     fluid_pressure: float
     flow_rate: float
     mass_flow: float
     error_x: float
+    error_leak: float
+    error_rounds: float
     rounds: float
     stick_area: float
     slip_loss: float

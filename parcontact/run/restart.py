@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ from pydantic import TypeAdapter
 from ..errors import InputError
 from ..history.chosen import ChosenSteps, reached
 from ..history.timeline import Step, Timeline
-from ..job import Job
+from ..job import Job, Stage
+from ..job.sections import listing
 from ..parallel.root import on_root
 from ..parallel.slab import Slab
 from ..physics.entries import part_of
@@ -148,16 +150,26 @@ def _attempt(path: Path, plain: Mapping[str, Any]) -> Contents | str:
 def find_changed_step(contents: Contents, job: Job) -> str:
     """Return a message on the first completed step that differs in this job, or ''; later steps may differ."""
     number, until, chosen = contents.step, contents.time, part_of("steps", contents.numbers)
-    history = TypeAdapter(type(job).model_fields["history"].annotation).validate_python(contents.job["history"])
+    kind: Any = type(job).model_fields["history"].annotation
+    history = TypeAdapter(kind).validate_python(contents.job["history"])
     old, new = (
         Timeline.from_job(each, until, ChosenSteps.from_job(each, chosen))
         for each in (job.model_copy(update={"history": history}), job)
     )
     count = min(number, len(old), len(new))
     for step in range(old.shared(new) + 1, count + 1):
-        if difference := next(_step_differences(old[step], new[step]), ""):
+        stages = [each.history[each[step].stage] for each in (old, new)]
+        if difference := next(chain(_step_differences(old[step], new[step]), _added_differences(*stages)), ""):
             return f"step {step} of the {number} completed ones {difference}"
     return f"{number} steps were completed, but the job has {count} up to t = {until:g} s" if count < number else ""
+
+
+def _added_differences(old: Stage, new: Stage) -> Iterator[str]:
+    """Yield the differences of keys that effects add to stages."""
+    for key in type(new).model_fields.keys() - Stage.model_fields.keys():
+        was, now = (listing.text(getattr(stage, key) or "none") for stage in (old, new))
+        if was != now:
+            yield f"had {key} {was}, but has {now}"
 
 
 def _step_differences(old: Step, new: Step) -> Iterator[str]:

@@ -26,12 +26,14 @@ EFFECTS = (
     "adhesion.work",
     "adhesion.range",
     "adhesion.law",
+    *(f"leakage.{key}" for key in ("load", "pressures", "ambient", "fluid")),
 )  # keys that change completed steps
 SECTIONS = (
     *SCENE,
     "thermal",
     "interface",
     "adhesion",
+    "leakage",
     "initial",
     "numerics",
     "steady",

@@ -13,14 +13,14 @@ MEASURES: Table = (
     *(
         Column(name, unit, meaning, when="leakage.load")
         for name, unit, meaning in (
+            ("high_pressure", "Pa", "of the fluid, at the low end of x (`load: total`)"),
+            ("low_pressure", "Pa", "of the fluid, at the high end of x"),
             ("fluid_pressure", "Pa", "mean over the box of the fluid's pressure over the ambient one (`load: total`)"),
             ("flow_rate", "m³/s", "flow of the fluid along x at the low pressure, through the box (`load: total`)"),
             ("mass_flow", "kg/s", "the same flow as a mass, empty where no density is known"),
-            (
-                "error_x",
-                "",
-                "relative change of K along x if only every second point of the gap is used (`load: total`)",
-            ),
+            ("error_x", "", "relative change of K along x if only every second point of the gap counts"),
+            ("error_leak", "", "relative part of K by the small leak through contact; empty where it closes the gap"),
+            ("error_rounds", "", "estimated relative error of K by the last round of the step"),
             ("rounds", "", "contacts and flows solved in the step (`load: total`)"),
         )
     ),

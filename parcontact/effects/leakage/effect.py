@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -98,10 +98,12 @@ class LeakageColumns(Effect[tuple[float, ...]]):
 
 @dataclass(frozen=True)
 class SealColumns:
-    """Memory of a seal: its columns, and the map of the fluid's pressure over the ambient one [Pa]."""
+    """Memory of a seal: its columns, the map of the fluid's pressure over the ambient one [Pa], and whether a warning
+    about inertia was given."""
 
     columns: tuple[float, ...]
     pressure: Array
+    warned: bool = False
 
 
 class Seal(LeakageColumns):
@@ -126,8 +128,13 @@ class Seal(LeakageColumns):
         from .fluid_pressure import pressure_of
 
         numbers, step = instant.solved.numbers, instant.step
-        pressure = pressure_of(drop_at(self._scene.job, step.stage, step.time), instant.solved.memory.share)
-        return Changes(SealColumns(tuple(numbers[name] for name in self.columns), pressure))
+        drop = drop_at(self._scene.job, step.stage, step.time)
+        pressure = pressure_of(drop, instant.solved.memory.share)
+        warning = drop.describe_inertia("x", numbers["mass_flow"], numbers["bound"])
+        columns = tuple(numbers[name] for name in self.columns)
+        said = f"{warning}; flow_rate and mass_flow are viscous; further steps are not checked"
+        remark = said if warning and not memory.warned else ""
+        return Changes(SealColumns(columns, pressure, memory.warned or bool(warning)), remark)
 
     def values(self, memory: Any) -> Sequence[float]:
         return tuple(memory.columns)
@@ -136,4 +143,7 @@ class Seal(LeakageColumns):
         return memory.pressure.copy()
 
     def entries(self, memory: Any, units: Units) -> dict[str, Entry]:
-        return {"fluid pressure": Entry(memory.pressure, 1.0, "Pa")}
+        return {"fluid pressure": Entry(memory.pressure, 1.0, "Pa"), "warned": Entry(float(memory.warned))}
+
+    def restored(self, memory: Any, saved: Saved) -> Any:
+        return replace(memory, warned=bool(saved["warned"]))

@@ -10,7 +10,9 @@ The unknown of the rounds is the share s of the drive, 1 at the high and 0 at th
     p = p2 + s (p1 - p2)    of a liquid,    p^2 = p2^2 + s (p1^2 - p2^2)    of a gas.
 
 A round presses the contact under the fluid's pressure, and gets another share from its gap. The next share is that of
-Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) from the last DEPTH rounds.
+Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) from the last DEPTH rounds. Near percolation, pools open and
+close again: after ANDERSON rounds each cell makes a part of its change, half as large whenever it turns
+back. Rounds that have not settled after EACH go on with a small leak GROWTH times as large.
 """
 
 import math
@@ -20,14 +22,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .elimination import Balance
-from .flow import flow_mesh_error, solve_flow
+from .flow import flow_mesh_error, least_section, solve_flow
 from .fluids import PressureDrop
 
 Map = NDArray[np.floating]
 SMALL = 1e-9  # accuracy: small leak over the mean of g^3
 DEPTH = 3  # tuning: differences of earlier rounds
+ANDERSON = 9  # tuning: rounds of Anderson's method
+SHORTER, LONGER, LEAST = 0.5, 1.1, 0.01  # tuning: factors of the part of its change that a cell makes, and the least
+EACH, GROWTH = 20, 100.0  # tuning: rounds with one small leak, and its growth after these
+MOST_REST = 5.0  # tuning: largest sum of further changes over the next one
 RIDGE = 1e-12  # rounding: of the products of differences
-SETTLED = 1e-4  # accuracy: relative change of the flow in the last round, and rms change of the share
+SETTLED = 1e-4  # accuracy: estimated relative error of the flow by the rounds, and rms error of the share
 
 
 def pressure_of(drop: PressureDrop, share: Map) -> Map:
@@ -54,22 +60,21 @@ def conducting(gap: Map, drop: PressureDrop, share: Map) -> Map:
 
 @dataclass(frozen=True)
 class Filled:
-    """The share of the drive in all cells, the flow over that of an even gap with the same mean of g^3, and the part of
-    the flow that passes by the small leak."""
+    """The share of the drive in all cells, and the conductivity with the small leak [m^3]."""
 
     share: Map
-    flow: float
+    conductivity: float
 
 
-def fill_share(gap: Map, size: tuple[float, float]) -> Filled:
+def fill_share(gap: Map, size: tuple[float, float], small: float = SMALL) -> Filled:
     """Return the share in a map of conducting gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m]."""
     cubes = gap.T**3
     mean = float(cubes.mean())
-    resistances = 1.0 / (cubes / mean + SMALL) if mean > 0.0 else np.ones(cubes.shape)
+    resistances = 1.0 / (cubes / mean + small) if mean > 0.0 else np.ones(cubes.shape)
     balance, given = Balance(resistances, size[1] / size[0] * gap.shape[1] / gap.shape[0], True), np.zeros(cubes.shape)
     given[0] = balance.first
     share = balance.solve(given)
-    return Filled(share.T.copy(), balance.power(share) * size[0] / size[1])
+    return Filled(share.T.copy(), mean * balance.power(share) * size[0] / size[1])
 
 
 class Rounds:
@@ -77,30 +82,64 @@ class Rounds:
 
     def __init__(self, drop: PressureDrop, size: tuple[float, float]) -> None:
         self._drop, self._size, self.count = drop, size, 0
-        self._shares, self._residuals, self._flow = list[Map](), list[Map](), 0.0
+        self._shares, self._residuals = list[Map](), list[Map]()
+        self.conductivity, self.error = 0.0, math.inf
+        self._parts, self._small = np.ones(()), SMALL
+        self._last: tuple[Map, Map] | None = None
 
     def advance(self, gap: Map, share: Map, most: float) -> tuple[tuple[bool, bool, float], Map]:
         """Return whether the rounds have settled, whether the fluid lifts the seal off, and the change of the flow, for
         the gap [m] under the fluid's pressure of a share; and the share of the next round. The mean pressure is
         at most `most` [Pa]."""
+        if self.count and self.count % EACH == 0:
+            self._restart()
         self.count += 1
-        drop, last = self._drop, self._flow
-        filled = fill_share(conducting(gap, drop, share), self._size)
-        self._flow = filled.flow
+        drop, last = self._drop, self.conductivity
+        filled = fill_share(conducting(gap, drop, share), self._size, self._small)
+        change = abs(filled.conductivity / last - 1.0) if last else math.inf
+        self.conductivity = filled.conductivity
         mean, wanted = (float(pressure_of(drop, one).mean()) for one in (share, filled.share))
-        change = abs(filled.flow / last - 1.0) if last else math.inf
         lifted = mean >= (1.0 - SETTLED) * most and wanted >= most
-        moved = math.sqrt(float(np.mean((filled.share - share) ** 2)))
-        settled = drop.high == drop.low or (change < SETTLED and moved < SETTLED)
+        rest = self._rest(share, filled.share)
+        moved = rest * math.sqrt(float(np.mean((filled.share - share) ** 2)))
+        settled = drop.high == drop.low or (rest * change < SETTLED and moved < SETTLED)
+        self.error = rest * change
         if lifted or settled:
-            return (settled and not lifted, lifted, change), share
-        following = np.clip(self._mixed(share, filled.share), 0.0, 1.0)
+            return (settled and not lifted, lifted, self.error), share
+        by_cells = (self.count - 1) % EACH >= ANDERSON
+        mixed = self._damped(share, filled.share, rest) if by_cells else self._mixed(share, filled.share)
+        following = np.clip(mixed, 0.0, 1.0)
         then = float(pressure_of(drop, following).mean())
         if then > most:
             following = (
                 share + max(0.0, (most - mean) / (then - mean)) * (following - share) if mean < most else filled.share
             )
-        return (False, False, change), following
+        return (False, False, self.error), following
+
+    def _restart(self) -> None:
+        """Forget the rounds so far, and go on with a larger leak."""
+        self._small *= GROWTH
+        self._shares.clear()
+        self._residuals.clear()
+        self._parts, self._last = np.ones(()), None
+
+    def _rest(self, share: Map, found: Map) -> float:
+        """Return the sum of all further changes over the next one, by those of the last two rounds (A. C. Aitken)."""
+        residual, last = found - share, self._last
+        self._last = share, residual
+        if last is None:
+            return 1.0
+        change = residual - last[1]
+        square = float(np.vdot(change, change))
+        return min(max(1.0, -float(np.vdot(share - last[0], change)) / square), MOST_REST) if square else 1.0
+
+    def _damped(self, share: Map, found: Map, rest: float) -> Map:
+        """Return the share of the next round, in which each cell makes a part of its change."""
+        residual, last = found - share, self._residuals[-1]
+        self._parts = np.where(last * residual < 0.0, SHORTER, LONGER) * self._parts
+        self._parts = np.clip(self._parts, LEAST, 1.0)
+        self._residuals[-1] = residual
+        return share + rest * self._parts * residual
 
     def _mixed(self, share: Map, found: Map) -> Map:
         """Return the share of the next round from that of a round and the one `found` from its gap."""
@@ -118,15 +157,27 @@ class Rounds:
         return share + (residual.ravel() - weights @ (moves + changes)).reshape(share.shape)
 
 
-def seal_flow(gap: Map, drop: PressureDrop, share: Map, size: tuple[float, float]) -> dict[str, float]:
-    """Return the conductivity along x [m^3] that gives the flow of a fluid through a map of gaps [m], its critical
-    constriction [m] and mesh error, and the flow [m^3/s] and [kg/s]."""
+def seal_flow(
+    gap: Map, drop: PressureDrop, share: Map, size: tuple[float, float], rounds: Rounds | None
+) -> dict[str, float]:
+    """Return the columns of a seal with the gap [m] after rounds, None if the fluid has no pressure, and the bound of
+    its mass flow by inertia [kg/s]. A gap through which less flows than by SMALL is closed."""
+    filled = 0.0 if rounds is None else rounds.conductivity
     through = conducting(gap, drop, share).astype(np.float64, copy=False)
     flow = solve_flow(through, size, "x", True)
+    leaks = max(filled - flow.conductivity, 0.0)
+    closed = flow.conductivity <= SMALL * float(np.mean(through**3))
     return {
-        "flow_x": flow.conductivity,
-        "constriction": flow.constriction,
-        "error_x": flow_mesh_error(through, flow, size, "x", True),
-        "flow_rate": drop.flow_rate(flow.conductivity, *size),
-        "mass_flow": drop.mass_flow(flow.conductivity, *size),
+        "flow_x": 0.0 if closed else flow.conductivity,
+        "constriction": 0.0 if closed else flow.constriction,
+        "flow_rate": drop.flow_rate(0.0 if closed else flow.conductivity, *size),
+        "mass_flow": drop.mass_flow(0.0 if closed else flow.conductivity, *size),
+        "error_x": math.nan if closed else flow_mesh_error(through, flow, size, "x", True),
+        "error_leak": math.nan if closed else leaks / flow.conductivity,
+        "error_rounds": 0.0 if rounds is None or drop.high == drop.low else rounds.error,
+        "rounds": 1.0 if rounds is None else float(rounds.count),
+        "high_pressure": drop.high,
+        "low_pressure": drop.low,
+        "fluid_pressure": float(pressure_of(drop, share).mean()),
+        "bound": drop.inertial_bound(least_section(gap.astype(np.float64, copy=False), flow, size, "x")),
     }

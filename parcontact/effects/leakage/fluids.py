@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 GAS_CONSTANT = 8.31446261815324  # physics: [J/(mol K)]
 BAR = 1.0e5  # [Pa]
+INERTIA = 0.2  # accuracy: viscous flow of a gas over its bound by inertia, above which viscous flow is 10 % too large
 ROOM = 293.15  # physics: temperature of the table [K]
 
 
@@ -49,6 +50,12 @@ class Fluid:
         if self.molar_mass is None:
             return 0.0
         return self.viscosity / pressure * math.sqrt(math.pi * GAS_CONSTANT * ROOM / (2.0 * self.molar_mass))
+
+    @property
+    def choking_ratio(self) -> float:
+        """Ratio of the low to the high pressure below which the flow of a gas is choked."""
+        kappa = self.heat_ratio
+        return float((2.0 / (kappa + 1.0)) ** (kappa / (kappa - 1.0)))
 
     def density_at(self, pressure: float) -> float:
         """Return the density [kg/m^3] at a pressure [Pa]; NaN if unknown."""
@@ -122,10 +129,22 @@ class PressureDrop:
         """Return the largest flow [kg/s] of a gas through an open section [m^2]; inf for a liquid."""
         if self.fluid.molar_mass is None:
             return math.inf
-        kappa = self.fluid.heat_ratio
-        ratio = max(self.low / self.high, (2.0 / (kappa + 1.0)) ** (kappa / (kappa - 1.0)))
+        kappa, ratio = self.fluid.heat_ratio, max(self.low / self.high, self.fluid.choking_ratio)
         square = 2.0 * kappa / (kappa - 1.0) * (ratio ** (2.0 / kappa) - ratio ** ((kappa + 1.0) / kappa))
         return section * self.high * math.sqrt(square * self.fluid.molar_mass / (GAS_CONSTANT * ROOM))
+
+    def describe_inertia(self, axis: str, viscous: float, bound: float) -> str:
+        """Return a warning if the viscous flow of a gas [kg/s] along an axis is close to its bound by inertia [kg/s],
+        or above; '' otherwise."""
+        if not viscous > INERTIA * bound:
+            return ""
+        both = 1.0 / (1.0 / viscous + 1.0 / bound)
+        choked = ", choked," * (viscous > bound and self.low <= self.fluid.choking_ratio * self.high)
+        return (
+            f"along {axis} inertia limits the flow of {self.fluid.name}: at most {1e6 * bound:.3g} mg/s{choked} pass "
+            f"the smallest open section, and viscous flow alone would be {1e6 * viscous:.3g} mg/s; expect some "
+            f"{1e6 * both:.3g} mg/s, 1/(1/viscous + 1/bound), within 14 %"
+        )
 
     def describe_rate(self, conductivity: float, length: float, width: float) -> str:
         """Return a text on the flow through a conductivity [m^3] over a length and a width [m]: in ml/h at the low

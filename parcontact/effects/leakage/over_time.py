@@ -33,7 +33,6 @@ from .load_curve import LoadCurve
 
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
 UNEQUAL = 0.1  # accuracy: pressure drop over the load, above which the part of the load that a fluid carries matters
-INERTIA = 0.2  # accuracy: viscous flow of a gas over its bound by inertia, above which viscous flow is 10 % too large
 MOST_CELLS = 4e6  # tuning: largest map of which every rank solves one; 2048 x 2048 takes 1.4 GB
 
 
@@ -331,24 +330,14 @@ def _describe_fluid(gaps: Gaps, last: LeakInstant, solved: SolvedLeak) -> Iterat
         yield from [load_curves.describe_part(axis, net, through)] * drop.total
         flows = f"along {axis} {drop.describe_rate(through, *size)}, over {box}"
         yield f"{drop.fluid.name} {pressures} at t = {quantity(last.time, 's')}: {flows}"
-        yield from _describe_inertia(drop, axis, drop.mass_flow(through, *size), drop.inertial_bound(section))
+        warning = drop.describe_inertia(axis, drop.mass_flow(through, *size), drop.inertial_bound(section))
+        yield from [f"warning: {warning}; leak.csv holds the viscous flow"] * bool(warning)
         narrow, path = getattr(last, f"constriction_{axis}"), drop.mean_free_path
         if 0.0 < narrow < path:
             yield (
                 f"along {axis} the constriction, {quantity(narrow, 'm')}, is below the mean free path of "
                 f"{drop.fluid.name}, {quantity(path, 'm')}: the flow is stated for a gas that slips, and is larger"
             )
-
-
-def _describe_inertia(drop: PressureDrop, axis: str, viscous: float, bound: float) -> Iterator[str]:
-    """Yield a warning if the viscous flow of a gas [kg/s] is close to its bound by inertia [kg/s], or above."""
-    if viscous > INERTIA * bound:
-        both = 1.0 / (1.0 / viscous + 1.0 / bound)
-        yield (
-            f"warning: along {axis} inertia limits the flow of {drop.fluid.name}: at most {1e6 * bound:.3g} mg/s pass "
-            f"the smallest open section, and viscous flow alone would be {1e6 * viscous:.3g} mg/s; expect some "
-            f"{1e6 * both:.3g} mg/s, 1/(1/viscous + 1/bound), within 14 %; leak.csv holds the viscous flow"
-        )
 
 
 def _describe_missing(gaps: Gaps, at: str) -> Iterator[str]:

@@ -16,7 +16,6 @@ from ...results.plotted_run import PlottedRun
 from ...results.style import Panel
 from . import conductivity
 from .flow import Flow, Map
-from .section import drop_at
 
 BAR = 0.7  # height of the bar of colours over that of its map
 DECADES = 3  # decades of the flow on the colour scale
@@ -45,21 +44,25 @@ def panels(run: PlottedRun, along: Abscissa) -> Iterator[charts.Chart]:
 def _leak_over_pressure(run: PlottedRun) -> Iterator[charts.Chart]:
     """Yield the chart of the leak over the high pressure of the fluid if it changes, under the last load; dotted is
     that of a contact which carries all of this load, where the run has a row of it."""
-    columns, times = run.columns, run.columns["time"]
+    section, columns = run.job.section("leakage"), run.columns
     load = columns["pressure"][-1]
-    loaded = np.flatnonzero((np.abs(columns["pressure"] - load) <= SAME * abs(load)) & (columns["step"] > 0))
-    stages = [run.timeline.span(int(columns["step"][row])).index for row in loaded]
-    rows = [(drop_at(run.job, stage, float(times[row])), row) for stage, row in zip(stages, loaded, strict=True)]
-    net = next((row for drop, row in rows if drop.high == drop.low == drop.outside), None)
-    rows = [(drop, row) for drop, row in rows if drop.high > drop.low]
-    high, flows = np.array([drop.high for drop, _ in rows]), columns["flow_rate"][[row for _, row in rows]]
-    if high.size < 2 or not np.ptp(high):
+    loaded = (np.abs(columns["pressure"] - load) <= SAME * abs(load)) & (columns["rounds"] > 0)
+    high, low = (columns[f"{end}_pressure"] for end in ("high", "low"))
+    flowing = loaded & (high > low)
+    if flowing.sum() < 2 or not np.ptp(high[flowing]):
         return
-    lines = [charts.ChartLine("total load", high, flows, style.line(0) | {"marker": "."})]
-    if net is not None:
-        alone = [drop.flow_rate(float(columns["flow_x"][net]), *run.job.grid.size) for drop, _ in rows]
-        lines.append(charts.ChartLine("net load", high, np.array(alone), style.line(0) | {"linestyle": ":"}))
-    yield charts.Chart("leak", charts.Axis("high pressure", "Pa"), charts.Axis("leak", "m³/s"), lines, zeros="closed")
+    lines = [
+        charts.ChartLine("total load", high[flowing], columns["flow_rate"][flowing], style.line(0) | {"marker": "."})
+    ]
+    net = np.flatnonzero(loaded & (columns["fluid_pressure"] == 0.0) & (high == low))
+    if net.size:
+        drops = (
+            section.drop((float(one), float(other))) for one, other in zip(high[flowing], low[flowing], strict=True)
+        )
+        alone = [drop.flow_rate(float(columns["flow_x"][net[0]]), *run.job.grid.size) for drop in drops]
+        lines.append(charts.ChartLine("net load", high[flowing], np.array(alone), style.line(0) | {"linestyle": ":"}))
+    axes = charts.Axis("high pressure", "Pa"), charts.Axis("leak", "m³/s")
+    yield charts.Chart("leak", *axes, lines, zeros="closed")
 
 
 def draw_leakage(

@@ -5,9 +5,10 @@ Conductivities K are read from `leak.csv`, which is made from saved gaps, else f
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 
-from ...printed import quantity, span, with_error
+from ...printed import quantity, span, stated_error, with_error
 from ...results.run_table import RunTable
 from ...storage import read_back
 
@@ -25,8 +26,9 @@ def headline(run: RunTable) -> Iterator[str]:
     known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
     if known:
         row = known[-1]
-        closed = [axis for axis in "xy" if not columns[f"flow_{axis}"][row]]
-        flows = [_flow(columns, row, axis) for axis in "xy" if axis not in closed]
+        axes = [axis for axis in "xy" if f"flow_{axis}" in columns]
+        closed = [axis for axis in axes if not columns[f"flow_{axis}"][row]]
+        flows = [_flow(columns, row, axis) for axis in axes if axis not in closed]
         yield from [f"the conductivity of the gap is {' and '.join(flows)}"] * bool(flows)
         yield from [f"contact closes the gap along {' and '.join(closed)}"] * bool(closed)
         yield from stops
@@ -55,8 +57,41 @@ def _error(columns: Columns, axis: str, row: int) -> float:
 
 
 def sentences(run: RunTable) -> list[str]:
-    """Return sentences on the loads at which leakage stops."""
-    return describe_leak_stop(run.directory)
+    """Return sentences on the loads at which leakage stops, or on the seal if the fluid carries a part of the load."""
+    return list(said_at_end(run)) or describe_leak_stop(run.directory)
+
+
+def said_at_end(run: RunTable) -> Iterator[str]:
+    """Yield sentences on the pressures at which a fluid that carries a part of the load opens the seal, closes it, and
+    lifts it off, and on the last leak and its errors."""
+    columns = run.columns
+    if "high_pressure" not in columns:
+        return
+    known = [row for row, flow in enumerate(columns["flow_x"]) if flow == flow]
+    for before, now in pairwise(known):
+        opened = [columns["flow_x"][row] > 0.0 for row in (before, now)]
+        if opened[0] != opened[1] and columns["high_pressure"][before] != columns["high_pressure"][now]:
+            first, second = sorted(columns["high_pressure"][row] for row in (before, now))
+            ends = span(first, second, "Pa")
+            load = quantity(columns["pressure"][now], "Pa")
+            yield f"the seal {'opens' if opened[1] else 'closes'} between {ends} of the fluid, under {load}"
+    if run.detached and known:
+        high, load = (quantity(columns[name][known[-1]], "Pa") for name in ("high_pressure", "pressure"))
+        yield f"the fluid lifts the seal off: up to {high} it has an equilibrium under {load}, in the next step none"
+    leaking = [row for row in known if columns["flow_rate"][row] > 0.0]
+    if leaking:
+        yield _describe_leak(columns, leaking[-1])
+    elif known:
+        yield "contact closes the seal in all steps"
+
+
+def _describe_leak(columns: Columns, row: int) -> str:
+    """Return a sentence on the leak in a row, and on its errors."""
+    errors = {"mesh": "error_x", "rounds": "error_rounds", "small leak": "error_leak"}
+    said = ", ".join(f"{name} {stated_error(columns[key][row])}" for name, key in errors.items())
+    pressures = span(columns["low_pressure"][row], columns["high_pressure"][row], "Pa")
+    leak = f"{columns['flow_rate'][row]:.3g} m³/s leak through the box between {pressures}"
+    return f"{leak}, at t = {quantity(columns['time'][row], 's')} (errors: {said})"
 
 
 def _describe_table(path: Path, claims: object) -> Iterator[str]:

@@ -45,6 +45,7 @@ from .section import drop_at
 
 MOST_ROUNDS = 100  # tuning: limit on the rounds of a step
 LEAST_LOAD = 1e-3  # accuracy: least load of the contact over the load, below which the seal lifts off
+SHARP = 1e-4  # accuracy: largest tolerance of a contact with a fluid; K is then within 0.1 %
 OPEN = 1e-30  # rounding: least open gap [m], as contact has the gap 0
 
 
@@ -97,7 +98,7 @@ class SealLaw:
         tolerance: float | None,
     ) -> SolvedContact[SealMemory]:
         """Solve a step; see `effects.contact_protocol.ContactLaw.solve`. With a pressure of the fluid, solves have the
-        tolerance of the job."""
+        tolerance of the job, at most SHARP."""
         assert self._dry is not None
         drop, (share, gap) = drop_at(self.scene.job, step.stage, step.time), memory.spare
         flows = memory.flows or drop.high > drop.low
@@ -108,17 +109,19 @@ class SealLaw:
             solved = self._dry.solve(trial, step, control, None, past, before, tolerance)
             self._put_gap(trial.effective, solved.contact, gap)
             self._fluid.fill(0.0)
-            return replace(solved, memory=now, numbers=self._numbers(drop, share, gap, 1))
-        rounds, known, iterations = Rounds(drop, self._size), memory.modulus, 0
+            return replace(solved, memory=now, numbers=self._numbers(drop, share, gap, None))
+        sharp = min(self.scene.choices.numerics.tolerance, SHARP)
+        rounds, known, iterations, left = Rounds(drop, self._size), memory.modulus, 0, MOST_ROUNDS
         while True:
             load = self._press(trial, drop, share, control)
             pasts = PreviousContacts((PreviousPressure(self._start, known),), past.spare, past.approach)
             pressed = replace(trial, effective=self._heights)
-            solved = self._dry.solve(pressed, step, load, None, pasts, before, None)
+            solved = self._dry.solve(pressed, step, load, None, pasts, before, sharp)
             contact, known, iterations = solved.contact, trial.alpha, iterations + solved.contact.iterations
             self._put_gap(self._heights, contact, gap)
             verdict = self._advance(rounds, share, gap, self._most(trial, control))
-            if contact.failure or verdict.settled or verdict.lifted or rounds.count == MOST_ROUNDS:
+            left -= 1
+            if contact.failure or verdict.settled or verdict.lifted or not left:
                 break
             self._start[...] = contact.p
         contact.p[...] += self._fluid
@@ -127,7 +130,7 @@ class SealLaw:
         failure = contact.failure or ("" if verdict.settled or verdict.lifted else late)
         contact = replace(contact, iterations=iterations, failure=failure)
         end: End = "detached" if verdict.lifted else "equilibrium"
-        numbers = self._numbers(drop, share, gap, rounds.count)
+        numbers = self._numbers(drop, share, gap, rounds)
         return replace(solved, contact=contact, memory=now, touching=gap == 0.0, numbers=numbers, end=end)
 
     def _begin(self, memory: SealMemory, past: PreviousContacts, step: Step) -> None:
@@ -189,20 +192,18 @@ class SealLaw:
             return _Verdict(*verdict)
 
         verdict = on_root(self.slab.comm, act)
-        rounds.count += not self.slab.root
         if not (verdict.settled or verdict.lifted):
             share[...] = self.slab.from_root(found[0] if found else None)
         return verdict
 
-    def _numbers(self, drop: PressureDrop, share: Array, gap: Array, rounds: int) -> dict[str, float]:
+    def _numbers(self, drop: PressureDrop, share: Array, gap: Array, rounds: Rounds | None) -> dict[str, float]:
         """Return the columns of the flow; collective."""
         whole, shares = self.slab.to_root(gap), self.slab.to_root(share)
 
         def act() -> dict[str, float]:
             assert whole is not None
             assert shares is not None
-            mean = float(pressure_of(drop, shares).mean())
-            return seal_flow(whole, drop, shares, self._size) | {"fluid_pressure": mean, "rounds": float(rounds)}
+            return seal_flow(whole, drop, shares, self._size, rounds)
 
         return on_root(self.slab.comm, act)
 

@@ -109,6 +109,9 @@ class Leakage(Part):
         Rule(("load", "every", "pressures"), _whole),
     )
 
+    def left_out(self) -> tuple[str, ...]:
+        return () if self.total else ("load",)  # so that a job without a fluid is written as it is given
+
     @property
     def total(self) -> bool:
         """True if the fluid carries its part of the load."""
@@ -210,5 +213,5 @@ RULES = (
     Rule(("leakage", "output"), _has_map),
     Rule(("leakage", "material", "numerics"), _refused),
     Rule(("leakage", "initial", "steady"), _no_steady),
-    *map(_excludes, ("adhesion", "interface", "thermal", "bands")),
+    *map(_excludes, ("adhesion", "interface", "thermal")),
 )
