@@ -14,14 +14,17 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from ..job import Job
 from ..parallel.slab import Array, Slab
+from ..physics.measures import Measures
 from ..solve.interface_law import InterfaceLaw
 from ..steady_sliding.point import Point
+from ..storage.directory import MARCHES
 from ..storage.step_row import StepRow
 from .band import Rung
 from .band_steps import BEFORE, BandClock, Place, rest_step
@@ -103,6 +106,10 @@ class RoadHistory(RoadSliding):
     def _speeds(self) -> list[float]:
         initial = [self.job.initial.velocity[0]] if self.job.initial.state == "steady" else []
         return [*initial, *(stage.velocity[0] for stage in self.job.history)]
+
+    def keep_in(self, directory: Path) -> None:
+        """Store marches in a file of this directory until `forget` is called; raises RunError."""
+        self._cascade.store.keep_in(directory, self.job, MARCHES)
 
     def tasks(self) -> list[list[RungTask]]:
         """Return all marches of each band, from the finest to the coarsest, those on hard walls last."""
@@ -196,8 +203,10 @@ class RoadHistory(RoadSliding):
 
     def records(self) -> Iterator[tuple[StepRow, list[list[float]]]]:
         """Yield the row of measures.csv and those of bands.csv of each instant, after `march`."""
-        way = 1.0
-        for step, instant in enumerate(self.instants()):
+        way, virgin = 1.0, self.job.initial.state == "virgin"
+        if virgin:
+            yield StepRow(measures=Measures(approach=math.nan, mean_gap=math.nan)), []
+        for step, instant in enumerate(self.instants(), int(virgin)):
             way = math.copysign(1.0, instant.velocity) if instant.velocity else way
             point = self._point_at(instant, way)
             measures = replace(point.measures, friction=abs(point.measures.friction))

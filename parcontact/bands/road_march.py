@@ -1,5 +1,6 @@
 """March of one band over a history, under the pressure of one rung, with the closing of all finer bands."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 
@@ -46,6 +47,7 @@ class BandMarch:
         scene, band, initial = self.scene, self.band, self.band.setup.job.initial
         if initial.state == "virgin":
             return start_march(scene)
+        band.slide(initial.velocity, math.inf)
         contact = band.contact(pressure, law(Place(0, BEFORE)) if law is not None else HARD)
         seen = contact.p, 1.0, contact.u, band.heights, contact.d, contact.p > 0.0
         measures = scene.probe.measure(*seen, (0.0, 0.0), initial.velocity)
