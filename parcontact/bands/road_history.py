@@ -125,6 +125,10 @@ class RoadHistory(RoadSliding):
         """Return the numbers of steps of a march of each band."""
         return [len(clock.places) for clock in self._clocks]
 
+    def track(self, band: int, sample: int) -> list[Rung]:
+        """Return the tracks of all rungs of a band."""
+        return self._tracks[band, sample]
+
     def try_march(self) -> None:
         """March the middle rung of the finest band, to measure the time; on this rank alone."""
         last = self.cut.count - 1

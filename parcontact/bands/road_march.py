@@ -37,7 +37,7 @@ class BandMarch:
         scene, rows = self.scene, list[Rung]()
         scene.law = ClosingLaw(scene, lambda step: law(place(step))) if law is not None else None
         march = self._begin(pressure, law)
-        if march.row.operator_calls:
+        if self.band.setup.job.initial.state == "steady":
             rows.append(self._measure(march, pressure, below))
         steps = (step._replace(load=pressure) for step in march.steps())
         run_steps(march, [lambda march: rows.append(self._measure(march, pressure, below))], steps)
