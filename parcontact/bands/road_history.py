@@ -19,6 +19,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from ..effects.relaxation import relaxation_of
 from ..job import Job
 from ..parallel.slab import Array, Slab
 from ..physics.measures import Measures
@@ -27,7 +28,7 @@ from ..steady_sliding.point import Point
 from ..storage.directory import MARCHES
 from ..storage.step_row import StepRow
 from .band import Rung
-from .band_steps import BEFORE, BandClock, Place, rest_step
+from .band_steps import BEFORE, SETTLED, BandClock, Place, rest_step
 from .cascade import Cascade
 from .choice import FEWEST
 from .ladder import NODES, PressureLadder
@@ -106,6 +107,17 @@ class RoadHistory(RoadSliding):
     def _speeds(self) -> list[float]:
         initial = [self.job.initial.velocity[0]] if self.job.initial.state == "steady" else []
         return [*initial, *(stage.velocity[0] for stage in self.job.history)]
+
+    def notes(self) -> list[str]:
+        """Return sentences on the chosen bands, and on branches that are not relaxed at the end of a slide."""
+        longest, slowest = self.cut.wavelengths(0)[0], max(relaxation_of(self.job.material)[2], default=0.0)
+        cut_short = [stage.speed for stage in self.job.history if stage.seconds * stage.speed > SETTLED * longest]
+        left = SETTLED * longest / min(cut_short, default=math.inf)
+        said = (
+            f"slides are marched for {SETTLED:g} of the longest waves and are steady then: branches slower than "
+            f"{left:.3g} s keep the imprint of what was before"
+        )
+        return [*super().notes(), *([said] if 0.0 < left < slowest else [])]
 
     def keep_in(self, directory: Path) -> None:
         """Store marches in a file of this directory until `forget` is called; raises RunError."""
