@@ -112,7 +112,7 @@ class RoadHistory(RoadSliding):
         """Return sentences on the chosen bands, and on branches that are not relaxed at the end of a slide."""
         longest, slowest = self.cut.wavelengths(0)[0], max(relaxation_of(self.job.material)[2], default=0.0)
         cut_short = [stage.speed for stage in self.job.history if stage.seconds * stage.speed > SETTLED * longest]
-        left = SETTLED * longest / min(cut_short, default=math.inf)
+        left = SETTLED * longest / max(cut_short, default=math.inf)
         said = (
             f"slides are marched for {SETTLED:g} of the longest waves and are steady then: branches slower than "
             f"{left:.3g} s keep the imprint of what was before"
