@@ -14,9 +14,9 @@ from parcontact.__main__ import main
 from parcontact.bands.band import Band
 from parcontact.bands.road_history import RoadHistory, RungTask
 from parcontact.bands.road_sliding import RoadSliding
-from parcontact.derived import prediction
 from parcontact.job.text.yamltext import dump
 from parcontact.parallel.slab import Array, Slab
+from parcontact.results import prediction
 from parcontact.run.road_run import ended
 from parcontact.storage import tables
 from parcontact.storage.step_row import StepRow
