@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact.__main__ import main
+from parcontact.bands import ladder
 from parcontact.bands.band import Band
 from parcontact.bands.road_history import RoadHistory, RungTask
 from parcontact.bands.road_sliding import RoadSliding
@@ -33,6 +34,12 @@ JOB: dict[str, Any] = {
     **{"bands": {"count": 2, "points": 20, "samples": 1}},
     "history": [{"pressure": 1e5, "duration": 0.01}, SLIDE],
 }
+
+
+@pytest.fixture
+def few_rungs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Coarse ladders, for what does not depend on them."""
+    monkeypatch.setattr(ladder, "RUNGS", 5)
 
 
 def history(comm: MPI.Intracomm = MPI.COMM_SELF, **changes: Any) -> RoadHistory:
@@ -111,6 +118,7 @@ def test_a_slide_comes_to_the_steady_bands() -> None:
 STEADY = {"velocities": [1.0], "pressures": [1e5]}
 
 
+@pytest.mark.usefixtures("few_rungs")
 def test_rests_bracket_and_stops_age() -> None:
     """The longer a rest, the higher the peak, also of a rest between two slides."""
     peaks = []
@@ -130,6 +138,7 @@ class StoppedError(Exception):
     pass
 
 
+@pytest.mark.usefixtures("few_rungs")
 def test_a_stop_after_any_march(tmp_path: Path) -> None:
     """A run goes on with the next march to the same rows."""
     rows = rows_of(history())
@@ -158,6 +167,7 @@ def place(path: Path) -> Path:
     return path
 
 
+@pytest.mark.usefixtures("few_rungs")
 @pytest.mark.mpi(2, 3)
 def test_ranks_agree() -> None:
     """Each march is made on one rank, so that all digits agree."""
@@ -165,6 +175,7 @@ def test_ranks_agree() -> None:
     assert [row.measures for row in together[1:]] == [row.measures for row in alone[1:]]
 
 
+@pytest.mark.usefixtures("few_rungs")
 def test_files_and_a_shorter_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Frictions of bands add up to that of measures.csv; a second run does nothing; `--until` ends the history."""
     monkeypatch.chdir(tmp_path)
