@@ -92,6 +92,10 @@ def reduced(data: Json) -> Json:
     if found.get("bands"):
         found["bands"] = {"samples": 1}
         found["surface"] = [part for part in _list(found["surface"]) if part["shape"] != "topography"]  # 128 x 128
+        if found.get("history"):
+            found["bands"]["count"] = 1 if found.get("sweep") else 2
+            found["surface"] = [{**part, "short_wavelength": part["long_wavelength"] / 4} for part in found["surface"]]
+            found["numerics"]["tolerance"] = 0.02
         if "thermal" in found:
             found["thermal"] = {**found["thermal"], "feedback": "none"}
     return found

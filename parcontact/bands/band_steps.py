@@ -45,7 +45,7 @@ def _parts(job: Job, stage: Stage, cell: float, longest: float) -> Iterator[Stag
     elif not stage.speed:
         yield _timed(stage, stage.seconds, rest_step(job, stage), GROWTH_OF_REST)
     else:
-        most, first = (stage.cells_per_step or LONGEST) * cell, FIRST * cell
+        most, first = LONGEST * cell, FIRST * cell
         way = min(stage.seconds * stage.speed, SETTLED * longest)
         growing = min(way, (most - first) / (1.0 - 1.0 / GROWTH))  # steps from `first` to `most`
         yield _timed(stage, growing / stage.speed, first / stage.speed, GROWTH)

@@ -1,7 +1,8 @@
 """Contacts of the point that is being solved, also in a file, so that a killed run continues within this point.
 
 All input of a contact has a digest. A line of the file is a digest and a rung, whose numbers are read back exactly,
-so that repeated passes of `cascade` find the same states without a solve. An incomplete line is ignored.
+so that repeated passes of `cascade` find the same states without a solve. An incomplete line is ignored. Marches of
+`road_history` are stored in the same way.
 """
 
 import hashlib
@@ -32,9 +33,9 @@ class ContactStore:
         self._slab, self._job, self._path = slab, "", Path()
         self._known: dict[str, Rung] = {}
 
-    def keep_in(self, directory: Path, job: Job) -> None:
+    def keep_in(self, directory: Path, job: Job, name: str = NAME) -> None:
         """Store contacts in a file of this directory, and read those in it. Raises RunError if it cannot be written."""
-        self._path = directory / NAME
+        self._path = directory / name
         self._on_root(lambda: self._read(job))
 
     def find(self, states: Sequence[Any], solve: Callable[[Sequence[int]], Sequence[Rung]]) -> list[Rung]:

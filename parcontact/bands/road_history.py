@@ -14,17 +14,21 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from ..effects.relaxation import relaxation_of
 from ..job import Job
 from ..parallel.slab import Array, Slab
+from ..physics.measures import Measures
 from ..solve.interface_law import InterfaceLaw
 from ..steady_sliding.point import Point
+from ..storage.directory import MARCHES
 from ..storage.step_row import StepRow
 from .band import Rung
-from .band_steps import BEFORE, BandClock, Place, rest_step
+from .band_steps import BEFORE, SETTLED, BandClock, Place, rest_step
 from .cascade import Cascade
 from .choice import FEWEST
 from .ladder import NODES, PressureLadder
@@ -104,6 +108,21 @@ class RoadHistory(RoadSliding):
         initial = [self.job.initial.velocity[0]] if self.job.initial.state == "steady" else []
         return [*initial, *(stage.velocity[0] for stage in self.job.history)]
 
+    def notes(self) -> list[str]:
+        """Return sentences on the chosen bands, and on branches that are not relaxed at the end of a slide."""
+        longest, slowest = self.cut.wavelengths(0)[0], max(relaxation_of(self.job.material)[2], default=0.0)
+        cut_short = [stage.speed for stage in self.job.history if stage.seconds * stage.speed > SETTLED * longest]
+        left = SETTLED * longest / max(cut_short, default=math.inf)
+        said = (
+            f"slides are marched for {SETTLED:g} of the longest waves and are steady then: branches slower than "
+            f"{left:.3g} s keep the imprint of what was before"
+        )
+        return [*super().notes(), *([said] if 0.0 < left < slowest else [])]
+
+    def keep_in(self, directory: Path) -> None:
+        """Store marches in a file of this directory until `forget` is called; raises RunError."""
+        self._cascade.store.keep_in(directory, self.job, MARCHES)
+
     def tasks(self) -> list[list[RungTask]]:
         """Return all marches of each band, from the finest to the coarsest, those on hard walls last."""
         found = list[list[RungTask]]()
@@ -117,6 +136,10 @@ class RoadHistory(RoadSliding):
     def steps(self) -> list[int]:
         """Return the numbers of steps of a march of each band."""
         return [len(clock.places) for clock in self._clocks]
+
+    def track(self, band: int, sample: int) -> list[Rung]:
+        """Return the tracks of all rungs of a band."""
+        return self._tracks[band, sample]
 
     def try_march(self) -> None:
         """March the middle rung of the finest band, to measure the time; on this rank alone."""
@@ -196,8 +219,10 @@ class RoadHistory(RoadSliding):
 
     def records(self) -> Iterator[tuple[StepRow, list[list[float]]]]:
         """Yield the row of measures.csv and those of bands.csv of each instant, after `march`."""
-        way = 1.0
-        for step, instant in enumerate(self.instants()):
+        way, virgin = 1.0, self.job.initial.state == "virgin"
+        if virgin:
+            yield StepRow(measures=Measures(approach=math.nan, mean_gap=math.nan)), []
+        for step, instant in enumerate(self.instants(), int(virgin)):
             way = math.copysign(1.0, instant.velocity) if instant.velocity else way
             point = self._point_at(instant, way)
             measures = replace(point.measures, friction=abs(point.measures.friction))

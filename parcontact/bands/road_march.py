@@ -1,5 +1,6 @@
 """March of one band over a history, under the pressure of one rung, with the closing of all finer bands."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 
@@ -36,7 +37,7 @@ class BandMarch:
         scene, rows = self.scene, list[Rung]()
         scene.law = ClosingLaw(scene, lambda step: law(place(step))) if law is not None else None
         march = self._begin(pressure, law)
-        if march.row.operator_calls:
+        if self.band.setup.job.initial.state == "steady":
             rows.append(self._measure(march, pressure, below))
         steps = (step._replace(load=pressure) for step in march.steps())
         run_steps(march, [lambda march: rows.append(self._measure(march, pressure, below))], steps)
@@ -46,6 +47,7 @@ class BandMarch:
         scene, band, initial = self.scene, self.band, self.band.setup.job.initial
         if initial.state == "virgin":
             return start_march(scene)
+        band.slide(initial.velocity, math.inf)
         contact = band.contact(pressure, law(Place(0, BEFORE)) if law is not None else HARD)
         seen = contact.p, 1.0, contact.u, band.heights, contact.d, contact.p > 0.0
         measures = scene.probe.measure(*seen, (0.0, 0.0), initial.velocity)

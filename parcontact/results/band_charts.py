@@ -1,7 +1,9 @@
 """Pictures of a friction curve in bands: friction of each band over velocity, area over magnification, and what
-capabilities have by band (`BAND_PANELS` of their pictures: keys and axes of columns).
+capabilities have by band (`BAND_PANELS` of their pictures: keys and axes of columns); and of a history in bands over
+the slip of each slide.
 
-Persson's theory for the same spectrum is drawn if `bands_theory.csv` exists.
+Persson's theory for the same spectrum is drawn if `bands_theory.csv` exists, or `theory.csv` for a history. Its slides
+end at the friction of steady sliding, if `steady.csv` exists.
 """
 
 from collections.abc import Iterator, Sequence
@@ -9,13 +11,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..job.added_sections import answers
 from ..parallel.slab import Array
 from . import prefixes, style
 from .charts import FRACTION, Axis, Chart, ChartLine
-from .plotted_run import count_different, read_table
+from .plotted_run import PlottedRun, count_different, read_table
 
 TABLE, THEORY = "bands.csv", "bands_theory.csv"
 NEEDED = ("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength")
@@ -23,12 +24,16 @@ SHOWN = 4  # number of velocities that are drawn as lines
 THIN = 1.0  # tuning: width of the lines of the theory [points]
 AREA = Axis(FRACTION)
 THEORY_LOOK = {"color": style.GREY, "linestyle": ":", "linewidth": THIN}
+OVER_TIME, STEADY = "theory.csv", "steady.csv"
+STEADY_LOOK = {"color": style.GREY, "linestyle": "-", "linewidth": THIN}
+STEADY_ENTRY = ChartLine("steady sliding", np.zeros(0), np.zeros(0), STEADY_LOOK)
+SAME = 1e-9  # rounding: of distances
 ENTRY = ChartLine("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
 
 
 def chart_bands(directory: Path) -> list[Chart]:
-    """Return panels of a table of bands, for its first pressure and temperature."""
-    if not (directory / TABLE).is_file():
+    """Return panels of a table of bands of a curve, for its first pressure and temperature."""
+    if "velocity" not in _columns_of(directory):
         return []
     whole = read_table(directory / TABLE, (*NEEDED, "friction", "contact_area"))
     columns = _choose(whole)
@@ -44,6 +49,75 @@ def chart_bands(directory: Path) -> list[Chart]:
     if at := _describe_first(whole):
         found = [replace(chart, y=replace(chart.y, name=f"{chart.y.name}\nat {at}")) for chart in found]
     return found
+
+
+def _columns_of(directory: Path) -> dict[str, Array]:
+    return read_table(directory / TABLE, ()) if (directory / TABLE).is_file() else {}
+
+
+def chart_slips(run: PlottedRun) -> list[Chart]:
+    """Return panels of a history in bands over the slip since the start of each slide: friction and area, and friction
+    by band in the last slide; none without a slide."""
+    slides = [number for number, stage in enumerate(run.job.history) if stage.slides and stage.seconds]
+    if not slides or "distance" not in _columns_of(run.directory):
+        return []
+    x, starts = Axis("slip of the stage", "m"), _starts(run)
+    friction, area = list[ChartLine](), list[ChartLine]()
+    for count, number in enumerate(slides):
+        rows, look, name = run.rows_of_stages[number], style.line(count), run.job.history[number].name
+        rows = [row for row in rows if run.columns["distance"][row] > starts[number]]
+        slip = run.columns["distance"][rows] - starts[number]
+        name = name if len(slides) > 1 else ""
+        friction.append(ChartLine(name, slip, run.columns["friction"][rows], look))
+        area.append(ChartLine(name, slip, run.columns["contact_area_corrected"][rows], look))
+        others = [*_theory_of(run, starts[number], slip), *_steady_of(run, number, slip)]
+        friction += [line for line, _ in others]
+        area += [line for _, line in others]
+    there = ((OVER_TIME, ENTRY), (STEADY, STEADY_ENTRY))
+    entries = [entry for name, entry in there if (run.directory / name).is_file()]
+    stages = _columns_of(run.directory)
+    start, end = starts[slides[-1]], starts[slides[-1]] + _way(run, slides[-1])
+    kept = (stages["distance"] > start) & (stages["distance"] <= end * (1.0 + SAME))
+    own = {name: values[kept] for name, values in stages.items()}
+    own["slip"] = own["distance"] - start
+    return [
+        Chart("bands slip", x, Axis("friction coefficient"), [*friction, *entries], log_x=True),
+        Chart("bands slip area", x, Axis(FRACTION), [*area, *entries], log_x=True),
+        _stacked(own, "slip", x),
+    ]
+
+
+def _way(run: PlottedRun, number: int) -> float:
+    stage = run.job.history[number]
+    return stage.seconds * stage.speed
+
+
+def _starts(run: PlottedRun) -> Array:
+    """Return the distance slid before each stage [m]."""
+    return np.cumsum([0.0, *(_way(run, number) for number in range(len(run.job.history)))])
+
+
+def _theory_of(run: PlottedRun, start: float, slip: Array) -> Iterator[tuple[ChartLine, ChartLine]]:
+    """Yield friction and area of the theory over the slip of a stage."""
+    if not (run.directory / OVER_TIME).is_file():
+        return
+    theory = read_table(run.directory / OVER_TIME, ("distance", "friction", "contact_area"))
+    there = theory["distance"] - start
+    rows = (there >= slip[0]) & (there <= slip[-1])
+    of = lambda name: ChartLine("", there[rows], theory[name][rows], THEORY_LOOK)  # noqa: E731
+    yield of("friction"), of("contact_area")
+
+
+def _steady_of(run: PlottedRun, number: int, slip: Array) -> Iterator[tuple[ChartLine, ChartLine]]:
+    """Yield lines at friction and area of steady sliding at the velocity of a stage, over the last decade."""
+    if not (run.directory / STEADY).is_file():
+        return
+    stage, names = run.job.history[number], ("velocity", "pressure", "friction", "contact_area_corrected")
+    curve = read_table(run.directory / STEADY, names)
+    same = np.isclose(curve["velocity"], stage.speed) & np.isclose(curve["pressure"], stage.load.start)
+    for row in np.flatnonzero(same)[:1]:
+        ends = np.array([max(slip[0], slip[-1] / 10.0), slip[-1]])
+        yield tuple(ChartLine("", ends, np.full(2, curve[name][row]), STEADY_LOOK) for name in names[2:])  # type: ignore[misc]
 
 
 def _describe_first(columns: dict[str, Array]) -> str:
@@ -65,20 +139,25 @@ def _choose(columns: dict[str, Array]) -> dict[str, Array]:
 
 
 def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Chart:
-    """Return a chart of the friction of each band over velocity, stacked from the coarsest, with the theory's sum as a
-    line."""
+    """Return a chart of the friction of each band over velocity, with the theory's sum as a line."""
+    found = _stacked(columns, "velocity", Axis("sliding velocity", "m/s"))
+    if theory is None:
+        return found
+    speeds = np.unique(theory["velocity"])
+    sums = np.array([theory["friction"][theory["velocity"] == speed].sum() for speed in speeds])
+    return replace(found, series=[*found.series, ENTRY, ChartLine("", speeds, sums, THEORY_LOOK)])
+
+
+def _stacked(columns: dict[str, Array], over: str, x: Axis) -> Chart:
+    """Return a chart of the friction of each band over a column, stacked from the coarsest."""
     series, bands, edges = list[ChartLine](), np.unique(columns["band"]), list[float]()
     for band, color in zip(bands, style.sequence(bands.size), strict=True):
-        rows = _sorted(columns, columns["band"] == band)
+        rows = np.flatnonzero(columns["band"] == band)
+        rows = rows[np.argsort(columns[over][rows], kind="stable")]
         long, short = (float(columns[f"{end}_wavelength"][rows[0]]) for end in ("long", "short"))
         edges += [short] if edges else [long, short]
-        series.append(ChartLine("", columns["velocity"][rows], columns["friction"][rows], {"color": color}, stack=0))
-    if theory is not None:
-        speeds = np.unique(theory["velocity"])
-        sums = np.array([theory["friction"][theory["velocity"] == speed].sum() for speed in speeds])
-        series += [ENTRY, ChartLine("", speeds, sums, THEORY_LOOK)]
-    y = Axis("friction by band,\nlongest waves below")
-    return Chart("bands", Axis("sliding velocity", "m/s"), y, series, log_x=True, edges=edges)
+        series.append(ChartLine("", columns[over][rows], columns["friction"][rows], {"color": color}, stack=0))
+    return Chart("bands", x, Axis("friction by band,\nlongest waves below"), series, log_x=True, edges=edges)
 
 
 def _over_bands(
@@ -110,8 +189,3 @@ def _tables(
 def _some(speeds: Array) -> Sequence[float]:
     places = np.unique(np.linspace(0, speeds.size - 1, min(SHOWN, speeds.size)).round().astype(int))
     return [float(speed) for speed in speeds[places]]
-
-
-def _sorted(columns: dict[str, Array], chosen: NDArray[np.bool_]) -> NDArray[np.intp]:
-    rows = np.flatnonzero(chosen)
-    return rows[np.argsort(columns["velocity"][rows], kind="stable")]

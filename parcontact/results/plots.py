@@ -17,7 +17,19 @@ from ..errors import InputError
 from ..job.added_sections import answers
 from ..job.reading import CASES
 from ..storage import hdf5, lost_points
-from . import charts, curve_charts, histories, maps, movie, prefixes, style, sweep_charts, sweep_table, theory_settings
+from . import (
+    band_charts,
+    charts,
+    curve_charts,
+    histories,
+    maps,
+    movie,
+    prefixes,
+    style,
+    sweep_charts,
+    sweep_table,
+    theory_settings,
+)
 from .charts import Chart
 from .plotted_run import PlottedRun
 
@@ -116,6 +128,8 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
         found = run.job.title or directory.absolute().name
         titles.append(found if run.curves else f"{found}\n{histories.describe_solve(run)}")
         groups.append(options.to_panels(options.choose(histories.chart_histories(run, options.over))))
+        if not options.panels:
+            groups.append(options.to_panels(band_charts.chart_slips(run)))
     elif options.at:
         raise InputError(f"--at {options.at}: {directory} has no run, and therefore no maps")
     if has_curve and options.wants("steady"):

@@ -107,6 +107,8 @@ def _list_main_bands(directory: Path) -> list[ReportTable]:
     if not (directory / "bands.csv").is_file():
         return []
     columns = read_back.read_results(directory / "bands.csv")
+    if "velocity" not in columns:  # of a history
+        return []
     names = [name for name in PLACE if any(value == value for value in columns[name])]
     points: dict[tuple[str, ...], list[int]] = {}
     for row in range(len(columns["velocity"])):

@@ -212,6 +212,8 @@ def state(case: Case) -> str:
         return DAMAGED
     if not case.job.history:
         return "begun" if _points_lack(case.job.steady, columns) else "done"
+    if case.job.bands is not None:  # its rows are written at the end
+        return "done"
     steps = [int(step) for step in columns["step"]]
     timeline = Timeline.from_job(case.job).follow(dict(zip(steps, columns["time"], strict=True)))
     return "done" if steps and (steps[-1] >= len(timeline) or marker.detached(directory)) else "begun"

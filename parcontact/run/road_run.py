@@ -37,7 +37,7 @@ from .run import DONE, STOPPED_EARLY, Options
 from .watch import Watch
 
 MEASURES = "measures.csv"
-RENEWED = "a run in bands goes on by itself, from bands.part in its output directory"
+RENEWED = "a run in bands goes on by itself, from checkpoint/marches.json in its output directory"
 
 
 class _StopError(Exception):

@@ -23,8 +23,9 @@ from . import checkpoint, curve_points, files, hdf5, lost_points, marker, stopfi
 from .marker import SCENE, VERBS, Claim
 
 MAX_SECONDS_TO_RELEASE = 3.0  # tuning: longest wait for the lock of a killed run [s]
+MARCHES = "checkpoint/marches.json"  # finished marches of bands
 RESULTS = {
-    "run": ("measures.csv", "cycles.csv", "bands.csv", "fields.h5", "fields.xdmf", "run.log"),
+    "run": ("measures.csv", "cycles.csv", "bands.csv", "fields.h5", "fields.xdmf", "run.log", MARCHES),
     "steady": (
         "steady.csv",
         "steady_waves.csv",
@@ -124,7 +125,7 @@ class Directory:
 
         def act() -> None:
             checkpoints = [path for _, path in self.saved()] if self.verb == "run" else []
-            for path in [*(self.path / name for name in RESULTS[self.verb]), *self._unfinished(), *checkpoints]:
+            for path in [*(self.path / name for name in self._names()), *self._unfinished(), *checkpoints]:
                 path.unlink(missing_ok=True)
 
         self._on_root(act)
@@ -168,6 +169,11 @@ class Directory:
         found = [name for name in RESULTS[self.verb][:2] if (self.path / name).exists()]
         return [*found, *(path.name for _, path in self.saved() if self.verb == "run")]
 
+    def _names(self) -> list[str]:
+        """Return the names of this verb's results, without those that another verb has in the directory."""
+        others = {name for verb in self.claims if verb != self.verb for name in RESULTS[verb]}
+        return [name for name in RESULTS[self.verb] if name not in others]
+
     def _unfinished(self) -> list[Path]:
         """Return the unfinished files of a killed run."""
         return [*self.path.glob("*.part"), *self.checkpoints.glob("*.part")]
@@ -182,7 +188,7 @@ class Directory:
         """Rename files with the names of this verb's results if neither the marker nor a checkpoint proves their
         origin."""
         if self.claim is None and not (self.verb == "run" and self._has_checkpoints()):
-            for name in (*RESULTS[self.verb], *COPIES[self.verb], *(["checkpoint"] if self.verb == "run" else [])):
+            for name in (*self._names(), *COPIES[self.verb], *(["checkpoint"] if self.verb == "run" else [])):
                 if not _same(self.path / name, job):
                     files.put_aside(self.path / name)
 

@@ -32,7 +32,7 @@ def read_results(path: Path) -> Columns:
         count = _last_step(columns) if path.name == RUN else len(columns["velocity"])
         if count < end:
             raise InputError(f"{path} is damaged: {what}, and the table lacks rows; {MEND}")
-    if path.name == "bands.csv" and (curve := path.with_name(CURVE)).is_file():
+    if path.name == "bands.csv" and "velocity" in columns and (curve := path.with_name(CURVE)).is_file():
         points = [curve_points.of_table(one) for one in (tables.read_columns(curve), columns)]
         if lacking := curve_points.lacking(*points):
             raise InputError(f"{path} is damaged: it lacks {points[0][lacking[0]]}, which {CURVE} has; {MEND}")

@@ -189,7 +189,7 @@ def test_a_cut_off_leaves_steep_waves_out() -> None:
         ({"history": [{"pressure": 1e5}, {"pressure": 2e5}]}, "must be the same pressure"),
         ({"history": [{"force": 1.0}]}, "boxes of their own: give a pressure"),
         ({"history": [{"pressure": 1e5, "velocity": [0, 1], "distance": 1e-3}]}, "must be along x"),
-        ({"history": [{"pressure": 1e5, "duration": 1.0, "time_step": 0.1}]}, "give cells_per_step"),
+        ({"history": [{"pressure": 1e5, "duration": 1.0, "time_step": 0.1}]}, "follow its own cells"),
         ({"history": [{"pressure": 1e5}], "output": {"energy": True}}, "the work on finer bands is in no band"),
         (
             {"history": [{"pressure": 1e5}], "thermal": {"conductivity": 0.2, "diffusivity": 1e-7}},

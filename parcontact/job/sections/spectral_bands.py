@@ -74,9 +74,8 @@ def _over_time(bands: Any, history: Any, initial: Any, output: Any) -> Iterator[
             yield Fault("must be positive in a job in bands", (*place, "pressure"))
         if stage.velocity[1]:
             yield Fault("must be along x in a job in bands, whose surfaces are isotropic", (*place, "velocity"))
-        if stage.seconds and stage.time_step not in (None, AUTO):
-            text = "cannot be used with bands: each has steps of its own cells; give cells_per_step for the longest"
-            yield Fault(text, (*place, "time_step"))
+        for key in (key for key in ("time_step", "cells_per_step") if getattr(stage, key) not in (None, AUTO)):
+            yield Fault("cannot be used with bands, whose steps follow their own cells; leave it out", (*place, key))
     if initial.state == "steady" and initial.pressure != history[0].load.start:
         yield Fault("must be the pressure of the history in a job in bands", ("initial", "pressure"))
     if initial.state == "steady" and (initial.velocity[1] or not initial.velocity[0]):

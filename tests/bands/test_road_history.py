@@ -1,0 +1,192 @@
+"""Histories of surfaces in bands: one band against a run on its grid, full contact against linear theory, steady
+sliding at the end, and stops."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from marched_jobs import column, marched
+from mpi4py import MPI
+
+from parcontact import job as jobs
+from parcontact.__main__ import main
+from parcontact.bands import ladder
+from parcontact.bands.band import Band
+from parcontact.bands.road_history import RoadHistory, RungTask
+from parcontact.bands.road_sliding import RoadSliding
+from parcontact.job.text.yamltext import dump
+from parcontact.parallel.slab import Array, Slab
+from parcontact.results import prediction
+from parcontact.run.road_run import ended
+from parcontact.storage import tables
+from parcontact.storage.step_row import StepRow
+
+LONG = 4e-3
+ROUGH = {
+    **{"shape": "rough", "hurst": 0.8, "long_wavelength": LONG, "short_wavelength": LONG / 4, "rms_slope": 0.2},
+    **{"seed": 3, "amplitudes": "fixed"},
+}
+ZENER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 3e6, "relaxation_time": 1e-3}]}
+SLIDE = {"pressure": 1e5, "velocity": 1.0, "distance": 1.5 * LONG}
+JOB: dict[str, Any] = {
+    **{"surface": ROUGH, "material": ZENER, "numerics": {"tolerance": 2e-3}},
+    **{"bands": {"count": 2, "points": 20, "samples": 1}},
+    "history": [{"pressure": 1e5, "duration": 0.01}, SLIDE],
+}
+
+
+@pytest.fixture
+def few_rungs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Coarse ladders, for what does not depend on them."""
+    monkeypatch.setattr(ladder, "RUNGS", 5)
+
+
+def history(comm: MPI.Intracomm = MPI.COMM_SELF, **changes: Any) -> RoadHistory:
+    return RoadHistory(jobs.load({**JOB, **changes}), Slab(comm, 1, 1))
+
+
+def rows_of(road: RoadHistory) -> list[StepRow]:
+    road.march(lambda *of_round: None)
+    return [row for row, _ in road.records()]
+
+
+def test_one_band_is_a_run_on_its_grid() -> None:
+    """With the same heights and steps: to the tolerance of solves, 1e-5, over the share in contact. A band
+    leaves out the force across the sliding, which is 0 on average."""
+    changes = {"bands": {"count": 1, "points": 32, "samples": 1}, "numerics": {"tolerance": 1e-5}}
+    road = history(**changes)
+    rows = rows_of(road)
+    heights, grid = on_a_grid(road, 0)
+    stages = [
+        {"pressure": 1e5, "velocity": part.speed, "duration": part.seconds, "time_step": dict(part.time_step)}
+        for part, _ in Band(road.job, road.cut, 0, 0).parts
+    ]
+    _, direct = marched({**JOB, **changes, "surface": heights, "grid": grid, "bands": None, "history": stages})
+    slid, found = column(direct, "distance"), column(rows, "distance")
+    for name in ("friction_x", "contact_area", "contact_area_corrected", "max_pressure"):
+        expected = np.interp(found, slid, column(direct, name))
+        assert column(rows, name)[found > 0.0] == pytest.approx(expected[found > 0.0], rel=1e-3)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_full_contact_is_linear_theory_over_time(count: int) -> None:
+    """Friction of the waves of each band, which add up: to 3 %, by steps of half a cell."""
+    rest, slide = ({**stage, "pressure": 3e6} for stage in JOB["history"])
+    of_bands = {"count": count, "points": 40 if count == 1 else 24, "samples": 1}
+    road = history(surface={**ROUGH, "rms_slope": 0.01}, history=[rest, slide], bands=of_bands)
+    rows = rows_of(road)
+    found = column(rows, "distance")
+    there, expected = found > LONG / 50, np.zeros(len(rows))
+    for number in range(count):
+        heights, grid = on_a_grid(road, number)
+        steps = [{**rest, "time_step": 1e-3}, {**slide, "cells_per_step": 0.1}]
+        whole = jobs.load({**JOB, "surface": heights, "history": steps, "bands": None, "grid": grid})
+        theory = list(prediction.predict(whole, Slab.alone(*whole.grid.points), 1.0, "lattice"))
+        expected += np.interp(found, [row.distance for row in theory], [row.friction for row in theory])
+    assert column(rows, "friction")[there] == pytest.approx(expected[there], rel=0.03)
+    assert column(rows, "contact_area")[there] == pytest.approx(1.0, abs=1e-4)
+
+
+def on_a_grid(road: RoadHistory, number: int) -> tuple[Array, dict[str, Any]]:
+    """The heights [m] of a band, and its grid."""
+    setup = Band(road.job, road.cut, number, 0).setup
+    heights = np.asarray(setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height)
+    return heights, {"points": setup.grid.nx, "size": setup.grid.lx}
+
+
+def test_a_slide_comes_to_the_steady_bands() -> None:
+    """Friction and area within the sum of both stated errors, and of 5 %; the solves take few operator calls."""
+    road = history(bands={"count": 2, "points": 24, "samples": 2})
+    last = rows_of(road)[-1]
+    job = jobs.load({**JOB, "bands": {"count": 2, "points": 24, "samples": 2}, "history": [], "steady": STEADY})
+    point = RoadSliding(job, Slab.alone(1, 1)).solve((1.0, 0.0), 1e5)
+    pairs = (
+        (last.measures.friction, point.friction, last.error_friction + point.error_friction),
+        (
+            last.measures.contact_area_corrected,
+            point.measures.contact_area_corrected,
+            last.error_area + point.error_area,
+        ),
+    )
+    for found, expected, stated in pairs:
+        assert found == pytest.approx(expected, rel=min(stated, 0.05))
+    calls = road.track(0, 0)[0].operator_calls
+    assert calls.mean() <= 15.0
+
+
+STEADY = {"velocities": [1.0], "pressures": [1e5]}
+
+
+@pytest.mark.usefixtures("few_rungs")
+def test_rests_bracket_and_stops_age() -> None:
+    """The longer a rest, the higher the peak, also of a rest between two slides."""
+    peaks = []
+    for seconds in (None, 3e-4, 0.03):
+        rest = {"pressure": 1e5, **({"duration": seconds} if seconds else {})}
+        peaks.append(column(rows_of(history(history=[rest, SLIDE])), "friction").max())
+    assert peaks[0] < peaks[1] < peaks[2]
+    start = {"state": "steady", "velocity": 1.0, "pressure": 1e5}
+    stop = {"pressure": 1e5, "duration": 0.03}
+    rows = rows_of(history(initial=start, history=[{**SLIDE, "distance": LONG / 8}, stop, SLIDE]))
+    after = [row.measures.friction for row in rows if row.distance > LONG / 8]
+    assert max(after) == pytest.approx(peaks[2], rel=0.1)  # at another place of the surface
+    assert rows[0].measures.friction == pytest.approx(rows[-1].measures.friction, rel=0.08)
+
+
+class StoppedError(Exception):
+    pass
+
+
+@pytest.mark.usefixtures("few_rungs")
+def test_a_stop_after_any_march(tmp_path: Path) -> None:
+    """A run goes on with the next march to the same rows."""
+    rows = rows_of(history())
+    count = sum(map(len, history().tasks()))
+    made = []
+    for number in range(count + 1):
+        road = history()
+        road.keep_in(place(tmp_path))
+
+        def after(task: RungTask, done: int, known: int, number: int = number) -> None:
+            made.extend([task] * (done - known))
+            if len(made) > number:
+                raise StoppedError
+
+        try:
+            road.march(after)
+        except StoppedError:
+            continue
+    assert len(made) == len(set(made)) == count
+    for row, other in zip(rows, (row for row, _ in road.records()), strict=True):
+        assert other.measures == row.measures or row.step == 0
+
+
+def place(path: Path) -> Path:
+    (path / "checkpoint").mkdir(exist_ok=True)
+    return path
+
+
+@pytest.mark.usefixtures("few_rungs")
+@pytest.mark.mpi(2, 3)
+def test_ranks_agree() -> None:
+    """Each march is made on one rank, so that all digits agree."""
+    alone, together = rows_of(history()), rows_of(history(MPI.COMM_WORLD))
+    assert [row.measures for row in together[1:]] == [row.measures for row in alone[1:]]
+
+
+@pytest.mark.usefixtures("few_rungs")
+def test_files_and_a_shorter_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Frictions of bands add up to that of measures.csv; a second run does nothing; `--until` ends the history."""
+    monkeypatch.chdir(tmp_path)
+    Path("job.yaml").write_text(dump({**JOB, "history": [{"pressure": 1e5}, SLIDE]}))
+    assert main(["job.yaml", "--quiet"]) == 0
+    table, bands = (tables.read_columns(Path("out/job") / name) for name in ("measures.csv", "bands.csv"))
+    friction = np.reshape(bands["friction"], (-1, 2)).sum(axis=1)
+    assert np.abs(friction) == pytest.approx(np.array(table["friction"])[1:], abs=1e-12)
+    assert np.reshape(bands["time"], (-1, 2))[:, 0] == pytest.approx(np.array(table["time"])[1:])
+    before = Path("out/job/measures.csv").stat().st_mtime_ns
+    assert main(["job.yaml", "--quiet"]) == 0
+    assert Path("out/job/measures.csv").stat().st_mtime_ns == before
+    job = ended(jobs.load("job.yaml"), 1e-3)
+    assert [stage.seconds for stage in job.history] == [0.0, 1e-3]
