@@ -14,7 +14,8 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 import parcontact as pc
-from parcontact.effects.leakage.fluids import FLUIDS
+from parcontact.effects.leakage.fluids import FLUIDS, PressureDrop
+from parcontact.effects.leakage.load_curve import load_curve
 
 from .test_total_load import AMPLITUDE, CLOSING, LENGTH, MODULUS, exact, gap
 
@@ -44,7 +45,7 @@ def solved(job: Json, **more: Any) -> pc.Simulation:
 
 def test_the_ambient_pressure_changes_no_digit() -> None:
     """A fluid at the ambient pressure: all as under a net load, also the number of calls of the operator."""
-    net, wet = (dict(solved(ROUGH, **leakage).row) for leakage in ({"leakage": {}}, total(2e5, 2e5)))
+    net, wet = dict(solved(ROUGH, leakage={}).row), dict(solved(ROUGH, **total(2e5, 2e5)).row)
     names = net.keys() & wet.keys() - {"seconds"}
     assert {name: net[name] for name in names} == {name: wet[name] for name in names}
 
@@ -129,6 +130,17 @@ def test_a_rough_seal_as_a_dense_program_solves_it(seed: int) -> None:
     assert row.error_rounds <= 1e-4
 
 
+def test_the_flow_under_local_loads_is_an_estimate() -> None:
+    """The integral of K over the local load, as `leak --load total` has it, of a seal of four waves; four seeds of 64 x
+    64 points at half of the load were within -1 and 12 %, at 0.6 within 16 %."""
+    high, load = 1.5e5, 3e5
+    job: Json = {**ROUGH, "history": [{"pressure": float(one)} for one in np.linspace(load - high, load, 6)]}
+    found = [(row.pressure, [row.flow_x]) for row in pc.Simulation({**job, "leakage": {}}, comm=WORLD).steps()][1:]
+    curve = load_curve(*zip(*found, strict=True))
+    estimate = curve.conductivity(PressureDrop(FLUIDS["water"], high, 0.0, total=True), load)
+    assert estimate == pytest.approx(solved(ROUGH, **total(high, 0.0)).row.flow_x, rel=0.16)
+
+
 def test_a_viscoelastic_body_between_its_limits() -> None:
     """At once it is an elastic body of the modulus at once, in the end of the modulus of rest; work is stored and
     dissipated energy, and the pressures of contact and fluid carry the load."""
@@ -209,7 +221,7 @@ def test_gas_that_is_choked_is_said(main: Main, tmp_path: Path) -> None:
     assert "mg/s, choked, pass the smallest open section" in said
 
 
-REFUSED = {
+REFUSED: Json = {
     "leakage.every must be 1 with load: total": {"leakage": {"load": "total", "pressures": [1.0, 0.0], "every": 2}},
     "leakage.pressures is missing": {"leakage": {"load": "total"}},
     "leakage.fluid needs load: total": {"leakage": {"fluid": "water"}},
