@@ -119,10 +119,11 @@ class Effect(Protocol[Memory]):
 
     It may have `rules` for the whole job, as sections have them; `lifts`, checks of jobs that do not apply with it; a
     `stage`, the class of the stages of a history with keys that it adds; and functions of a job `doubts` and `facts`,
-    which give warnings (`doubts.Doubt`, or sentences) and sentences about the section. `describe_waves` of a job gives sentences on the waves of its surface on one grid, from bins of
-    wavenumbers [rad/m] and their mean square slopes. `changed_material` of a job is in place of its material;
-    `why_no_curve` and `why_no_theory` return why it has no friction curve, and no prediction by Persson's theory.
-    Methods are collective unless stated. The base class has no memory.
+    which give warnings (`doubts.Doubt`, or sentences) and sentences about the section. `describe_waves` of a job gives
+    sentences on the waves of its surface on one grid, from bins of wavenumbers [rad/m] and their mean square slopes.
+    `changed_material` of a job is in place of its material; `why_no_curve` and `why_no_theory` return why it has no
+    friction curve, and no prediction by Persson's theory. Methods are collective unless stated. The base class has no
+    memory.
     """
 
     section: ClassVar[type[Part]]  # section that it adds to a job
