@@ -23,7 +23,7 @@ from matplotlib.ticker import NullFormatter
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.job import Job, load, load_cases
 from parcontact.physics.prony import complex_modulus
-from parcontact.results import slide, style, sweep_table, theory_settings
+from parcontact.results import results, slide, style, theory_settings
 from parcontact.storage import tables
 from parcontact.theory import hertz
 
@@ -94,7 +94,7 @@ def means(rows: Sequence[dict[str, Any]], key: str, name: str) -> tuple[np.ndarr
 
 def rows_of(directory: Path) -> list[dict[str, Any]]:
     """Return the rows of the table of a sweep; contact areas of simulations are corrected at edges."""
-    rows = sweep_table.read_cases(require_file(directory / "sweep.csv"))
+    rows = results.read_cases(require_file(directory / "sweep.csv"))
     for row in rows:
         case = directory / "cases" / f"{int(row['case']):03d}"
         if row["state"] == "done":

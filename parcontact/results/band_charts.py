@@ -16,7 +16,8 @@ from ..job.added_sections import answers
 from ..parallel.slab import Array
 from . import prefixes, style
 from .charts import FRACTION, Axis, Chart, ChartLine
-from .plotted_run import PlottedRun, count_different, read_table
+from .plotted_run import PlottedRun, count_different
+from .results import Results
 
 TABLE, THEORY = "bands.csv", "bands_theory.csv"
 NEEDED = ("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength")
@@ -33,15 +34,16 @@ ENTRY = ChartLine("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
 
 def chart_bands(directory: Path) -> list[Chart]:
     """Return panels of a table of bands of a curve, for its first pressure and temperature."""
-    if "velocity" not in _columns_of(directory):
+    curve = Results(directory, "curve")
+    if "velocity" not in curve.read(TABLE):
         return []
-    whole = read_table(directory / TABLE, (*NEEDED, "friction", "contact_area"))
+    whole = curve.read(TABLE).arrays((*NEEDED, "friction", "contact_area"))
     columns = _choose(whole)
     if not columns["velocity"].size:
         return []
     theory = None
-    if (directory / THEORY).is_file():
-        theory = _choose(read_table(directory / THEORY, ("velocity", "pressure", "temperature", "band")))
+    if curve.has(THEORY):
+        theory = _choose(curve.read(THEORY).arrays(("velocity", "pressure", "temperature", "band")))
     found = [_friction(columns, theory), _over_bands("bands area", columns, theory, "contact_area")]
     for name, (key, axis) in (pair for panels in answers("pictures", "BAND_PANELS") for pair in panels.items()):
         if name in columns and np.isfinite(columns[name]).any():
@@ -51,15 +53,11 @@ def chart_bands(directory: Path) -> list[Chart]:
     return found
 
 
-def _columns_of(directory: Path) -> dict[str, Array]:
-    return read_table(directory / TABLE, ()) if (directory / TABLE).is_file() else {}
-
-
 def chart_slips(run: PlottedRun) -> list[Chart]:
     """Return panels of a history in bands over the slip since the start of each slide: friction and area, and friction
     by band in the last slide; none without a slide."""
     slides = [number for number, stage in enumerate(run.job.history) if stage.slides and stage.seconds]
-    if not slides or "distance" not in _columns_of(run.directory):
+    if not slides or "distance" not in run.read(TABLE):
         return []
     x, starts = Axis("slip of the stage", "m"), _starts(run)
     friction, area = list[ChartLine](), list[ChartLine]()
@@ -74,8 +72,8 @@ def chart_slips(run: PlottedRun) -> list[Chart]:
         friction += [line for line, _ in others]
         area += [line for _, line in others]
     there = ((OVER_TIME, ENTRY), (STEADY, STEADY_ENTRY))
-    entries = [entry for name, entry in there if (run.directory / name).is_file()]
-    stages = _columns_of(run.directory)
+    entries = [entry for name, entry in there if run.has(name)]
+    stages = run.read(TABLE).arrays()
     start, end = starts[slides[-1]], starts[slides[-1]] + _way(run, slides[-1])
     kept = (stages["distance"] > start) & (stages["distance"] <= end * (1.0 + SAME))
     own = {name: values[kept] for name, values in stages.items()}
@@ -99,9 +97,9 @@ def _starts(run: PlottedRun) -> Array:
 
 def _theory_of(run: PlottedRun, start: float, slip: Array) -> Iterator[tuple[ChartLine, ChartLine]]:
     """Yield friction and area of the theory over the slip of a stage."""
-    if not (run.directory / OVER_TIME).is_file():
+    if not run.has(OVER_TIME):
         return
-    theory = read_table(run.directory / OVER_TIME, ("distance", "friction", "contact_area"))
+    theory = run.read(OVER_TIME).arrays(("distance", "friction", "contact_area"))
     there = theory["distance"] - start
     rows = (there >= slip[0]) & (there <= slip[-1])
     of = lambda name: ChartLine("", there[rows], theory[name][rows], THEORY_LOOK)  # noqa: E731
@@ -110,10 +108,10 @@ def _theory_of(run: PlottedRun, start: float, slip: Array) -> Iterator[tuple[Cha
 
 def _steady_of(run: PlottedRun, number: int, slip: Array) -> Iterator[tuple[ChartLine, ChartLine]]:
     """Yield lines at friction and area of steady sliding at the velocity of a stage, over the last decade."""
-    if not (run.directory / STEADY).is_file():
+    if not run.has(STEADY):
         return
     stage, names = run.job.history[number], ("velocity", "pressure", "friction", "contact_area_corrected")
-    curve = read_table(run.directory / STEADY, names)
+    curve = run.read(STEADY).arrays(names)
     same = np.isclose(curve["velocity"], stage.speed) & np.isclose(curve["pressure"], stage.load.start)
     for row in np.flatnonzero(same)[:1]:
         ends = np.array([max(slip[0], slip[-1] / 10.0), slip[-1]])

@@ -10,8 +10,9 @@ from ..errors import InputError
 from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..job.sections import listing
-from . import headline, log, material, origin, plots, result_sections, road_section, sweep_table
+from . import headline, log, material, origin, plots, result_sections, road_section
 from .page_parts import Chapter, ReportSection, ReportTable, draw_chart, embed_file
+from .results import Results, swept_keys
 
 KINDS = {  # kinds of results, by their table
     "measures.csv": ("run", result_sections.describe_run),
@@ -55,7 +56,7 @@ def describe_directory(directory: Path) -> Chapter:
             warnings = log.warnings_of_cases(directory) or warnings
         sections += of_job
         if there[0] in ("measures.csv", "steady.csv"):
-            sections += origin.costs(directory / there[0], found, job)
+            sections += origin.costs(Results(directory, "run" if there[0] == "measures.csv" else "curve"), found, job)
         cited = origin.list_citations(job)
         sections.append(ReportSection("Warnings", found.warnings or warnings or ["There was no warning."]))
     data = [embed_file(directory / name) for name in (*KINDS, *MORE_TABLES) if (directory / name).is_file()]
@@ -95,9 +96,8 @@ def _places(job: Job) -> list[str]:
 
 def _describe_swept(directory: Path) -> str:
     """Return a sentence on the swept keys and their values."""
-    rows = sweep_table.read_cases(directory / "sweep.csv")
-    names = list(rows[0]) if rows else ["case", "state"]
-    swept = {name: dict.fromkeys(str(row[name]) for row in rows) for name in names[1 : names.index("state")]}
+    rows = Results(directory, "sweep").cases
+    swept = {name: dict.fromkeys(str(row[name]) for row in rows) for name in swept_keys(rows)}
     values = "; ".join(f"{name} ({', '.join(found)})" for name, found in swept.items())
     return f"The sweep has {len(rows)} cases, with {values}."
 

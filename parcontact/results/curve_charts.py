@@ -12,13 +12,14 @@ import numpy as np
 from ..errors import InputError
 from ..job import load
 from ..job.added_sections import answers
-from ..job.resolved import STEADY_RESOLVED, shown_job
+from ..job.resolved import STEADY_RESOLVED
 from ..parallel.slab import Array
 from . import band_charts, prefixes, style
 from .charts import Axis, Chart, ChartLine
-from .plotted_run import count_different, find_free_area, read_table, round_digits, to_contact_area, to_load
+from .plotted_run import count_different, round_digits, to_contact_area, to_load
+from .results import Results
 
-TABLE, THEORY = "steady.csv", "steady_theory.csv"
+THEORY = "steady_theory.csv"
 NEEDED = ("velocity", "pressure", "friction", "contact_area")
 COLD = "friction_cold"  # friction without feedback from heat
 EMPTY = np.zeros(0)
@@ -27,7 +28,8 @@ THIN = {"theory": ":", "without feedback": "--"}  # dashes of thin lines, drawn 
 
 def chart_steady(directory: Path, over: str = "") -> list[Chart]:
     """Return panels of a table of steady states; none without states, or if `over` is not possible."""
-    columns, area = read_table(directory / TABLE, NEEDED), find_free_area(directory)
+    curve = Results(directory, "curve")
+    columns, area = curve.table.arrays(NEEDED), curve.free_area
     if over in ("time", "distance") or not columns["velocity"].size:
         return []
     axes = {
@@ -51,8 +53,8 @@ def chart_steady(directory: Path, over: str = "") -> list[Chart]:
     if "flash_temperature" in columns:
         panels.append(("steady flash", x, "flash_temperature"))
     theory = {}
-    if x == "velocity" and COLD not in columns and (directory / THEORY).is_file():  # the theory has no feedback
-        theory = read_table(directory / THEORY, (*NEEDED, "shift_factor"))
+    if x == "velocity" and COLD not in columns and curve.has(THEORY):  # the theory has no feedback
+        theory = curve.read(THEORY).arrays((*NEEDED, "shift_factor"))
         _add_derived(theory, area)
     found = []
     for key, along, name in panels:
@@ -71,9 +73,9 @@ def chart_steady(directory: Path, over: str = "") -> list[Chart]:
 
 def steady_title(directory: Path) -> str:
     """Return the title of the job, with the pressure or force if it is the same at all points."""
-    job = shown_job(directory / STEADY_RESOLVED) if (directory / STEADY_RESOLVED).is_file() else None
-    axis, loads = to_load(read_table(directory / TABLE, ("pressure",))["pressure"], find_free_area(directory))
-    name = (job.title if job else "") or "steady sliding"
+    curve = Results(directory, "curve")
+    axis, loads = to_load(curve.table.arrays(("pressure",))["pressure"], curve.free_area)
+    name = (curve.job.title if curve.job else "") or "steady sliding"
     return f"{name}: {prefixes.quantity(loads[0], axis.unit)}" if count_different(loads) == 1 else name
 
 

@@ -8,11 +8,9 @@ from typing import Any
 
 from ..job import Job
 from ..job.added_sections import answers
-from ..job.resolved import RESOLVED, shown_job
 from ..printed import quantity, stated_error, with_error
-from ..storage import marker, read_back
-from . import cycles, slide, sweep_table
-from .run_table import RunTable, find_telling_row
+from . import cycles, slide
+from .results import Results, read_cases
 
 SWEPT = (  # results of a sweep, after those of capabilities: column, words, unit, column of the error
     ("mu_dyn", "the mean friction", "", "mu_dyn_error"),
@@ -32,14 +30,11 @@ def find_headline(directory: Path) -> str:
 
 def _run(directory: Path) -> str:
     """Return friction, results of capabilities and contact area of a run, as far as its job determines them."""
-    if not (directory / RESOLVED).is_file():
+    run = Results(directory, "run")
+    job, columns = run.job, run.table
+    if job is None or not columns["time"]:
         return ""
-    job = shown_job(directory / RESOLVED)
-    columns = read_back.read_results(directory / "measures.csv")
-    if not columns["time"]:
-        return ""
-    detached = bool(marker.detached(directory))
-    run, parts = RunTable(directory, job, columns, detached), [*_friction(job, columns)]
+    parts = [*_friction(job, columns)]
     for headline in answers("results", "headline"):
         parts += headline(run)
     if last := cycles.measure_last(job, columns):
@@ -56,16 +51,15 @@ def _friction(job: Job, columns: Columns) -> Iterator[str]:
     yield f"the mean friction is {mean} and the highest {peak}"
 
 
-def _area(job: Job, run: RunTable) -> str:
-    """Return the mean contact area of the slide; without a slide the area in the row chosen by
-    `run_table.find_telling_row`."""
-    columns = run.columns
+def _area(job: Job, run: Results) -> str:
+    """Return the mean contact area of the slide; without a slide the area in the telling row."""
+    columns = run.table
     if (found := slide.measure_slide(job.history, columns)) is not None:
         if math.isnan(found.contact_area):
             return "the box cuts the contact off in the whole slide"
         error = slide.absolute_errors(job.history, columns, job.grid.dx).get("contact_area", math.nan)
         return f"the mean contact area is {_size(job, found.contact_area_corrected, error)}"
-    row = find_telling_row(run)
+    row = run.telling_row
     area, when = columns[slide.CORRECTED][row], ""
     if len(columns["time"]) > 1:
         time = f"t = {quantity(columns['time'][row], 's', 4)}" if columns["time"][-1] else ""
@@ -90,7 +84,7 @@ def _size(job: Job, share: float, error: float) -> str:
 
 def _curve(directory: Path) -> str:
     """Return a sentence on the highest friction of a friction curve; '' without a point."""
-    columns = read_back.read_results(directory / "steady.csv")
+    columns = Results(directory, "curve").table
     if not columns["velocity"]:
         return ""
     best = max(range(len(columns["friction"])), key=columns["friction"].__getitem__)
@@ -102,7 +96,7 @@ def _curve(directory: Path) -> str:
 
 def _sweep(directory: Path) -> str:
     """Return a sentence on the range of the first of the results that the cases have; '' without any."""
-    rows = sweep_table.read_cases(sweep_table.results(directory))
+    rows = read_cases(Results(directory, "sweep").points)
     for name, words, unit, error in (*(one for some in answers("results", "SWEPT") for one in some), *SWEPT):
         known = sorted((row for row in rows if math.isfinite(row.get(name, math.nan))), key=itemgetter(name))
         if known and known[-1][name]:
@@ -113,8 +107,7 @@ def _sweep(directory: Path) -> str:
 
 def _study(directory: Path) -> str:
     """Return the first sentence of a study, on its accuracy."""
-    read_back.refuse_cut(directory / "study.txt")
-    return (directory / "study.txt").read_text(errors="replace").partition("\n")[0]
+    return next(iter(Results(directory, "study").sentences_of_study), "")
 
 
 def _with_unit(row: Mapping[str, Any], name: str, unit: str, error: str) -> str:

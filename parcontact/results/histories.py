@@ -10,7 +10,6 @@ from ..columns import UNITS
 from ..errors import InputError
 from ..job.added_sections import answers
 from ..parallel.slab import Array
-from ..storage import read_back
 from . import prefixes, style
 from .charts import Axis, Chart, ChartLine
 from .cycles import friction_along, way_along
@@ -116,10 +115,10 @@ def _steps_grow(times: Array) -> bool:
 def _add_theory(chart: Chart, run: PlottedRun) -> Chart:
     """Add the lines of theory.csv to friction and contact area, if it is in the directory of the run."""
     column = {"friction": "friction", "area": "contact_area"}.get(chart.key)
-    table = run.directory / "theory.csv"
+    table = run.path / "theory.csv"
     if column is None or run.backwards or not table.is_file():
         return chart
-    theory = {name: np.array(values) for name, values in read_back.read_results(table).items()}
+    theory = run.read(table.name).arrays()
     over = "distance" if chart.x.unit == "m" else "time"
     (own,) = chart.series
     lines = [replace(own, name="simulation"), ChartLine("theory", theory[over], theory[column], style.line(1))]
@@ -203,7 +202,7 @@ def _choose_abscissa(run: PlottedRun, over: str) -> Abscissa:
     axis, values = Axis("distance slid" if over == "distance" else over, UNITS[over]), run.columns[over]
     if not np.ptp(values):
         constant = f"{over}, which is constant at {values[-1]:g} {axis.unit}"
-        raise InputError(f"{run.directory}: nothing can be drawn over {constant}")
+        raise InputError(f"{run.path}: nothing can be drawn over {constant}")
     if over == "approach":
         return Abscissa(axis, values, loop=True)
     stages = []
@@ -217,6 +216,6 @@ def _choose_velocity(run: PlottedRun) -> Abscissa:
     ends = [(run.job.history[number].speed, rows[-1]) for number, rows in run.rows_of_stages.items()]
     sliding = sorted((speed, row) for speed, row in ends if speed > 0.0)
     if not sliding:
-        raise InputError(f"{run.directory}: nothing can be drawn over velocity, no stage slides")
+        raise InputError(f"{run.path}: nothing can be drawn over velocity, no stage slides")
     speeds, rows = zip(*sliding, strict=True)
     return Abscissa(Axis("sliding velocity", "m/s"), np.array(speeds), np.array(rows), marked=True)

@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -16,15 +15,13 @@ from .. import capabilities
 from ..errors import InputError
 from ..job import Job
 from ..job.added_sections import answers
-from ..job.resolved import RESOLVED, shown_job
 from ..parallel.slab import Slab
 from ..printed import quantity
-from ..storage import checkpoint, curve_points, fields, hdf5, lost_points, marker, read_back
+from ..storage import checkpoint, curve_points, fields, hdf5, marker
 from ..storage.console import meshes_of, warnings_of
-from ..storage.marker import Claim
 from ..storage.provenance import Link, read_budget, read_chain
-from . import cycles, slide, sweep_table, theory_comparison, theory_settings
-from .run_table import RunTable
+from . import cycles, slide, theory_comparison, theory_settings
+from .results import KINDS, Results
 
 LAST_ROW = {"pressure": "Pa", "friction": "", "contact_area": "", "contact_area_corrected": "", "approach": "m"}
 SHOWN = 20  # tuning: most numbers of one name, or failed cases, that are shown
@@ -125,14 +122,15 @@ def describe_files(directory: Path) -> tuple[str, bool]:
         claims = marker.read_claims(directory)
     except (OSError, ValueError) as error:
         return f"{directory}: {hdf5.reason(error)}", False
-    if not claims and not any((directory / name).exists() for name in ("measures.csv", sweep_table.TABLE)):
-        raise InputError(f"{directory} has no results: it has no marker, no measures.csv and no {sweep_table.TABLE}")
-    lines, problems = [f"{directory}: {_title(directory)}"], list[str]()
+    if not claims and not any((directory / name).exists() for name in ("measures.csv", KINDS["sweep"])):
+        raise InputError(f"{directory} has no results: it has no marker, no measures.csv and no {KINDS['sweep']}")
+    results = Results(directory)
+    lines, problems = [f"{directory}: {results.title}"], list[str]()
     logs = ("run.log", curve_points.LOG)
     lines += dict.fromkeys(f"  {text}" for log in logs for text in meshes_of(directory / log))
     for name, part in PARTS.items():
         try:
-            lines += part(directory / name, claims) if (directory / name).exists() else ()
+            lines += part(results) if (directory / name).exists() else ()
         except InputError as error:
             problems.append(f"  {error}")
         except hdf5.FAILURES as error:
@@ -140,31 +138,19 @@ def describe_files(directory: Path) -> tuple[str, bool]:
     return "\n".join([*lines, *problems]), not problems
 
 
-def _title(directory: Path) -> str:
-    """Return the title of the job, from its first copy."""
-    cases = sorted(path.name for path in directory.glob("cases/*"))
-    of_a_case = [f"cases/{cases[0]}/{kind}.resolved.yaml" for kind in ("job", "steady")] if cases else []
-    for name in ("job.resolved.yaml", "steady.resolved.yaml", "study.resolved.yaml", *of_a_case):
-        if (directory / name).is_file():
-            found = re.search(r"^title: (.+)$", (directory / name).read_text(errors="replace"), re.MULTILINE)
-            return (found and found.group(1).strip("'\"")) or "without a title"
-    return "without a job"
-
-
-def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    columns, claim = read_back.read_results(table), claims.get("run")
+def _run(found: Results) -> Iterator[str]:
+    run = Results(found.path, "run")
+    columns, claim = run.table, run.claims.get("run")
     if not columns["step"]:
         yield "  run: no step yet"
         return
     step, time = int(columns["step"][-1]), columns["time"][-1]
     ended = claim is not None and claim.finished is not None and claim.finished[0] == step
     how = "finished" if ended else "not finished"
-    detachment = claim.detached if ended and claim is not None else ""
-    if detachment:
-        yield f"  {detachment}"
+    if ended and run.detached:
+        yield f"  {run.detached}"
     yield f"  run: {how} after step {step}, t = {quantity(time, 's', 4)}, {len(columns['step'])} rows"
-    resolved = table.with_name(RESOLVED)
-    job = shown_job(resolved) if resolved.exists() else None
+    job = run.job
     names = {name: unit for name, unit in LAST_ROW.items() if name in columns and (name != "friction" or _slides(job))}
     last = [f"{name} {quantity(columns[name][-1], unit, 4)}" for name, unit in names.items()]
     yield f"  last row: {', '.join(last)}"
@@ -172,7 +158,6 @@ def _run(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
     if job is not None:
         yield from (f"  {text}" for text in slide.describe_slide(job.history, job.initial, job.grid.dx, columns))
         yield from (f"  {text}" for text in cycles.describe_cycles(job, columns))
-    run = RunTable(table.parent, job, columns, bool(detachment))
     yield from (f"  {text}" for sentences in answers("results", "sentences") for text in sentences(run))
 
 
@@ -181,35 +166,36 @@ def _slides(job: Job | None) -> bool:
     return job is None or bool(job.directions)
 
 
-def _theory(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    count = f"  Persson's theory: {len(read_back.read_results(table)['time'])} rows, "
+def _theory(found: Results) -> Iterator[str]:
+    run = Results(found.path, "run")
+    count = f"  Persson's theory: {len(run.read(theory_settings.TABLE)['time'])} rows, "
     try:
-        settings = theory_settings.read_settings(table.parent)
+        settings = theory_settings.read_settings(run.path)
     except InputError:
         yield count + "of unknown settings"
         raise
     yield count + (settings.sentence if settings else "of unknown settings")
-    if (resolved := table.with_name(RESOLVED)).exists():
-        job = shown_job(resolved)
-        yield from (f"  {text}" for text in theory_comparison.describe_theory(table.parent, job.history, job.grid.dx))
+    if job := run.job:
+        yield from (f"  {text}" for text in theory_comparison.describe_theory(run.path, job.history, job.grid.dx))
 
 
-def _curve(table: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    columns = read_back.read_results(table)
+def _curve(found: Results) -> Iterator[str]:
+    curve = Results(found.path, "curve")
+    columns, claims = curve.table, curve.claims
     if speeds := columns["velocity"]:
         best = int(np.argmax(columns["friction"]))
         place = curve_points.Wanted(speeds[best], columns["pressure"][best])
         yield f"  friction curve: {len(speeds)} points from {min(speeds):.4g} to {max(speeds):.4g} m/s"
         yield f"  largest friction of the curve: {columns['friction'][best]:.4g} at {place}"
-        errors = {name: slide.largest(columns[name]) for name in slide.ERRORS if name in columns}
+        errors = {name: max(known, default=math.nan) for name, known in curve.errors.items()}
         if errors:
             parts = ", ".join(f"{name.removeprefix('error_')} {100 * value:.3g} %" for name, value in errors.items())
             numerics = claims["steady"].job.get("numerics", {}) if "steady" in claims else {}
             asked = f"; requested: {_accuracy_text(numerics['accuracy'])}" if "accuracy" in numerics else ""
             yield f"  largest estimated errors of the curve: {parts}{asked}"
-        yield from (f"  warning: {text}" for text in warnings_of(table.with_name(curve_points.LOG)))
-    if lost := lost_points.name_lost(table.parent):
-        yield f"  the curve has {lost}"
+        yield from (f"  warning: {text}" for text in warnings_of(curve.path / curve_points.LOG))
+    if curve.lost:
+        yield f"  the curve has {curve.lost}"
 
 
 def _accuracy_text(accuracy: Any) -> str:
@@ -218,32 +204,32 @@ def _accuracy_text(accuracy: Any) -> str:
     return ", ".join(f"{name} {100 * value:.3g} %".lstrip() for name, value in parts.items())
 
 
-def _saved_states(directory: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    for path in sorted(directory.glob("step-*.h5")):
+def _saved_states(found: Results) -> Iterator[str]:
+    for path in sorted(found.path.glob("checkpoint/step-*.h5")):
         contents = checkpoint.inspect(path)
         yield f"  checkpoint after step {contents.step}, t = {quantity(contents.time, 's', 4)}"
 
 
-def _saved_maps(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    with hdf5.open_results(path) as file:
+def _saved_maps(found: Results) -> Iterator[str]:
+    with found.open_maps() as file:
         layout = fields.SavedFields(file)
     saved = np.isfinite(layout.times).sum()
     yield f"  fields: {', '.join(layout.names)} at {saved} of {layout.times.size} instants"
 
 
-def _sweep(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
-    rows = sweep_table.read_cases(path)
+def _sweep(found: Results) -> Iterator[str]:
+    rows = found.cases
     states = Counter(str(row["state"]) for row in rows)
     counts = ", ".join(f"{number} {'not begun' if state == '-' else state}" for state, number in states.items())
     yield f"  sweep of {states.total()} cases: {counts}"
-    yield from (f"  {text}" for text in sweep_table.describe_failed(path.parent, SHOWN))
+    yield from (f"  {text}" for text in found.failed_cases(SHOWN))
 
 
-def _study(path: Path, claims: dict[str, Claim]) -> Iterator[str]:
+def _study(found: Results) -> Iterator[str]:
     yield "  study: errors and costs of settings are in study.txt"
 
 
-Describe = Callable[[Path, dict[str, Claim]], Iterator[str]]
+Describe = Callable[[Results], Iterator[str]]
 PARTS: dict[str, Describe] = {  # descriptions of the parts of an output directory, by their file
     "measures.csv": _run,
     theory_settings.TABLE: _theory,
@@ -251,6 +237,6 @@ PARTS: dict[str, Describe] = {  # descriptions of the parts of an output directo
     "checkpoint": _saved_states,
     "fields.h5": _saved_maps,
     **{name: part for parts in capabilities.offers("results", "PARTS") for name, part in parts.items()},
-    sweep_table.TABLE: _sweep,
+    KINDS["sweep"]: _sweep,
     "study.txt": _study,
 }

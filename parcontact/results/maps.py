@@ -16,7 +16,6 @@ from ..effects.contact_law import touching_of
 from ..errors import InputError
 from ..job import Job
 from ..parallel.slab import Array
-from ..storage import hdf5
 from . import lines, prefixes, style
 from .plotted_run import Fields, PlottedRun
 
@@ -62,7 +61,7 @@ def map_panels(run: PlottedRun, at: str = "") -> tuple[list[list[style.Panel]], 
     InputError if nothing is saved at the instant `at`.
     """
     try:
-        with hdf5.open_results(run.directory / "fields.h5") as file:
+        with run.open_maps() as file:
             fields = Fields(file, at, until=run.telling_step)
             narrow = min(fields.x.size, fields.y.size) <= STRIP
             pressures = list(lines.line_panels(run, fields, narrow)) if fields.read("pressure") is not None else []
@@ -73,7 +72,7 @@ def map_panels(run: PlottedRun, at: str = "") -> tuple[list[list[style.Panel]], 
             return ([pressures, *([one] for one in found)], []) if wide else ([pressures], found)
     except (OSError, KeyError):
         if at:
-            message = f"--at {at}: {run.directory} has no maps; save them by output: {{fields: [...]}}"
+            message = f"--at {at}: {run.path} has no maps; save them by output: {{fields: [...]}}"
             raise InputError(message) from None
         return [], []
 

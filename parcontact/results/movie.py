@@ -46,8 +46,8 @@ def _find_ffmpeg() -> str | None:
 def _draw(directory: Path, name: str) -> tuple[list[Image.Image], int]:
     """Return the frames, and their rate [1/s]."""
     path = directory / "fields.h5"
-    with hdf5.open_results(path) as file:
-        run = PlottedRun(directory)
+    run = PlottedRun(directory)
+    with run.open_maps() as file:
         labels = label_frames(run, file)
         there = maps.drawn_maps(file)
         if name not in there or not labels:

@@ -8,18 +8,18 @@ from pathlib import Path
 from ..job import Job
 from ..job.sections.listing import plain_data
 from ..storage import hdf5, provenance
-from ..storage.read_back import read_results
 from . import log
 from .page_parts import ReportSection, ReportTable
+from .results import Results
 from .slide import ERRORS
 
 FRICTION = ERRORS[0]
 
 
-def costs(table: Path, found: log.Log, job: Job) -> Iterator[ReportSection]:
-    """Yield the errors of a run or a curve with this table, then wall time, operator calls and counts."""
-    columns = read_results(table)
-    yield describe_errors(columns, found, job, table.name == "steady.csv")
+def costs(results: Results, found: log.Log, job: Job) -> Iterator[ReportSection]:
+    """Yield the errors of a run or a curve, then wall time, operator calls and counts."""
+    columns = results.table
+    yield describe_errors(columns, found, job, results.kind == "curve")
     calls = [value for value in columns["operator_calls"] if value == value]
     rows = [
         ("steps or points", str(len(columns["seconds"]))),
@@ -52,7 +52,7 @@ def origin_section(directory: Path, found: log.Log) -> ReportSection:
     there += sorted(directory.glob("checkpoint/step-*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
     for path in there:
         try:
-            with hdf5.open_results(path) as file:
+            with Results(directory).open_maps(str(path.relative_to(directory))) as file:
                 rows = [
                     ("said by", str(path.relative_to(directory))),
                     ("program", str(file.attrs["program"])),

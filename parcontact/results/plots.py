@@ -16,25 +16,13 @@ from matplotlib.figure import Figure
 from ..errors import InputError
 from ..job.added_sections import answers
 from ..job.reading import CASES
-from ..storage import hdf5, lost_points
-from . import (
-    band_charts,
-    charts,
-    curve_charts,
-    histories,
-    maps,
-    movie,
-    prefixes,
-    style,
-    sweep_charts,
-    sweep_table,
-    theory_settings,
-)
+from ..storage import hdf5
+from . import band_charts, charts, curve_charts, histories, maps, movie, prefixes, style, sweep_charts, theory_settings
 from .charts import Chart
 from .plotted_run import PlottedRun
+from .results import KINDS, Results, read_cases, swept_keys
 
 PANELS = ("friction", "loop", "area", "approach", "gap", "pressure", "load", "loss", "phase", "energy")
-MEASURES = "measures.csv"
 FAILED_CASES = 3  # most failed cases that a picture names
 
 
@@ -102,7 +90,7 @@ def draw_steady(table: Path) -> Path:
 
 def _name_missing(directory: Path) -> list[str]:
     """Return lines on lost points of a curve and on failed cases of a sweep, which a picture lacks."""
-    found = [lost_points.name_lost(directory), *sweep_table.describe_failed(directory, FAILED_CASES)]
+    found = [Results(directory).lost, *Results(directory).failed_cases(FAILED_CASES)]
     return [text for text in found if text]
 
 
@@ -118,9 +106,7 @@ def _save(figure: Figure, stem: Path, options: PlotOptions = PlotOptions()) -> P
 
 
 def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
-    has_run, has_curve, has_sweep = (
-        (directory / name).is_file() for name in (MEASURES, curve_charts.TABLE, sweep_charts.TABLE)
-    )
+    has_run, has_curve, has_sweep = (kind in Results(directory).kinds for kind in ("run", "curve", "sweep"))
     groups: list[Sequence[style.Panel]] = []
     titles, fields = list[str](), list[style.Panel]()
     if has_run:
@@ -139,12 +125,12 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
         found_maps, fields = maps.map_panels(run, options.at or "")
         groups += found_maps
     if has_sweep:
-        titles.append(sweep_charts.sweep_title(directory) or directory.absolute().name)
+        titles.append(getattr(Results(directory, "sweep").job, "title", "") or directory.absolute().name)
         groups.append(options.to_panels(options.choose(sweep_charts.chart_sweep(directory))))
     if not (has_run or has_curve or has_sweep):
         if not directory.exists():
             raise InputError(f"{directory} is not a directory")
-        lacking = f"it has neither {MEASURES} nor {curve_charts.TABLE}{_suggest(directory)}"
+        lacking = f"it has neither {KINDS['run']} nor {KINDS['curve']}{_suggest(directory)}"
         raise InputError(f"{directory} has neither a run nor a friction curve: {lacking}")
     if options.panels and not any((*groups, fields)):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
@@ -158,7 +144,7 @@ def _suggest(path: Path) -> str:
         return "; give the output directory of a run, such as out/job"
     found = [
         table.parent
-        for name in (MEASURES, curve_charts.TABLE, sweep_charts.TABLE)
+        for name in (KINDS["run"], KINDS["curve"], KINDS["sweep"])
         for table in sorted(path.glob(f"*/{name}"))
     ]
     return f"; did you mean {found[0]}?" if found else ""
@@ -169,7 +155,7 @@ def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figur
     for directory in directories:
         if not _find_charts(directory, options):
             raise InputError(f"{directory} has nothing to compare")
-    lost = zip(_name_directories(directories), map(lost_points.name_lost, directories), strict=True)
+    lost = zip(_name_directories(directories), (Results(one).lost for one in directories), strict=True)
     title = "\n".join(dict.fromkeys(f"{name}: {text}" for name, text in lost if text))
     return style.figure_of(title, options.group(compare_charts(directories, options)))
 
@@ -182,9 +168,9 @@ def compare_charts(directories: Sequence[Path], options: PlotOptions = PlotOptio
 
 def _find_charts(directory: Path, options: PlotOptions) -> list[Chart]:
     found: list[Chart] = []
-    if (directory / MEASURES).is_file():
+    if (directory / KINDS["run"]).is_file():
         found += options.choose(histories.chart_histories(PlottedRun(directory), options.over))
-    if (directory / curve_charts.TABLE).is_file() and options.wants("steady"):
+    if (directory / KINDS["curve"]).is_file() and options.wants("steady"):
         found += curve_charts.chart_steady(directory, options.over)
     return found
 
@@ -203,13 +189,12 @@ def _name_cases(directories: Sequence[Path]) -> list[str]:
     """Return the keys in which cases of one sweep differ, such as `velocity 1 m/s, seed 2`; [] for other
     directories."""
     paths = [directory.absolute() for directory in directories]
-    table = paths[0].parent.parent / sweep_charts.TABLE if paths else Path()
+    table = paths[0].parent.parent / KINDS["sweep"] if paths else Path()
     if {path.parent for path in paths} != {table.parent / CASES} or not table.is_file():
         return []
-    known = {f"{int(row['case']):03d}": row for row in sweep_table.read_cases(table)}
+    known = {f"{int(row['case']):03d}": row for row in read_cases(table)}
     rows = [known[path.name] for path in paths if path.name in known]
-    keys = list(rows[0])[1 : list(rows[0]).index("state")] if rows else []
-    differing = [key for key in keys if len({row[key] for row in rows}) > 1]
+    differing = [key for key in swept_keys(rows) if len({row[key] for row in rows}) > 1]
     names = [", ".join(_name_value(key.split(".")[-1], row[key]) for key in differing) for row in rows]
     return names if len(set(names)) == len(paths) and all(names) else []
 

@@ -1,6 +1,5 @@
 """The results of a run, for pictures."""
 
-from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -11,14 +10,13 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..history.timeline import Timeline
 from ..job import Job
-from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
+from ..job.resolved import RESOLVED, shown_job
 from ..parallel.slab import Array
-from ..storage import marker, read_back
 from ..storage.fields import UNITS
 from ..storage.hdf5 import MEND
 from . import prefixes
 from .charts import FRACTION, Axis
-from .run_table import RunTable, find_telling_row
+from .results import Results
 
 MEASURED = (
     *("step", "time", "distance", "pressure", "friction", "friction_x", "contact_area", "contact_area_corrected"),
@@ -28,19 +26,24 @@ DIGITS = 6  # significant digits of values that count as equal
 NEAREST = 3  # number of nearest steps with maps in a message
 
 
-class PlottedRun:
+class PlottedRun(Results):
     """The job and the rows of a run, without the unloaded rows at the beginning."""
 
     def __init__(self, directory: Path) -> None:
-        self.directory, self.job = directory, shown_job(directory / RESOLVED)
+        super().__init__(directory, "run")
         self.area = self.job.grid.lx * self.job.grid.ly  # of the box [m^2]
         self.free = self.job.grid.boundary == "free"
-        self._all = read_table(directory / "measures.csv", MEASURED)
+        self._all = self.table.arrays(MEASURED)
         if not self._all["step"].size:
             raise InputError(f"{directory} has no step yet")
         first = int(self._all["pressure"][0] == 0.0 and self._all["step"].size > 1)
         self.columns = {name: values[first:] for name, values in self._all.items()}
         self.lasts, self.slides = self._all["time"][-1] > 0.0, self._all["distance"][-1] > 0.0
+
+    @cached_property
+    def job(self) -> Job:
+        """Job of the run."""
+        return shown_job(self.path / RESOLVED)
 
     @property
     def load(self) -> tuple[Axis, Array]:
@@ -74,9 +77,7 @@ class PlottedRun:
     def telling_step(self) -> int:
         """Return the step whose maps show the contact: the last one, or after a detachment the step of the pull-off or
         of the largest load."""
-        columns = {name: values.tolist() for name, values in self._all.items()}
-        row = find_telling_row(RunTable(self.directory, self.job, columns, bool(marker.detached(self.directory))))
-        return int(self._all["step"][row])
+        return int(self._all["step"][self.telling_row])
 
     @property
     def rows_of_stages(self) -> dict[int, list[int]]:
@@ -170,26 +171,6 @@ def label_frames(run: PlottedRun, file: h5py.File) -> dict[int, str]:
     fields = Fields(file)
     saved = ((k, int(fields.steps[k]), float(fields.times[k])) for k in fields.saved)
     return {k: f"{run.instant(step, time)} (step {step})".lstrip() for k, step, time in saved}
-
-
-def read_table(path: Path, names: Sequence[str]) -> dict[str, Array]:
-    """Return columns of a table by name; raises InputError if a needed one is missing."""
-    columns = {name: np.array(values, dtype=float) for name, values in read_back.read_results(path).items()}
-    if missing := [name for name in names if name not in columns]:
-        raise InputError(f"{path} has no column {', '.join(missing)}")
-    return columns
-
-
-def find_curve_job(directory: Path) -> Job | None:
-    """Return the job of the friction curve in a directory, None if no job is stored there."""
-    found = (directory / name for name in (STEADY_RESOLVED, RESOLVED))
-    return next((shown_job(path) for path in found if path.is_file()), None)
-
-
-def find_free_area(directory: Path) -> float:
-    """Return the area [m^2] of the box of a free scene whose friction curve is in a directory; 0 of any other scene."""
-    job = find_curve_job(directory)
-    return job.grid.lx * job.grid.ly if job and job.grid.boundary == "free" else 0.0
 
 
 def round_digits(values: Array) -> Array:

@@ -1,6 +1,5 @@
 """Sections on results of a run, a friction curve, a sweep or a study, with browsers of their maps."""
 
-import csv
 import io
 import math
 from collections.abc import Callable, Sequence
@@ -16,7 +15,7 @@ from .. import capabilities, progress
 from ..columns import STEADY, SWEEP, UNITS
 from ..job import Job
 from ..job.added_sections import answers
-from ..storage import hdf5, lost_points, marker, read_back
+from ..storage import hdf5
 from . import (
     charts,
     curve_charts,
@@ -27,13 +26,12 @@ from . import (
     slide,
     style,
     sweep_charts,
-    sweep_table,
     theory_comparison,
     theory_settings,
 )
 from .page_parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
-from .plotted_run import Fields, PlottedRun, choose_evenly, find_curve_job, find_free_area, label_frames, to_load
-from .run_table import RunTable
+from .plotted_run import Fields, PlottedRun, choose_evenly, label_frames, to_load
+from .results import MAPS, STATES, Results, read_cases
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement and over time"}
 INTERFACE = ("friction_viscous", "friction_interface")
@@ -56,7 +54,8 @@ MAP_SIZE = (4.2, 3.5)  # size of the picture of a map [inch]
 
 def describe_run(directory: Path) -> ReportSection:
     """Return the section on a run: histories, extreme and last values, and maps over time."""
-    run, columns = PlottedRun(directory), read_back.read_results(directory / "measures.csv")
+    run = PlottedRun(directory)
+    columns = run.table
     known = {name: [value for value in columns.get(name, ()) if value == value] for name in SHOWN}
     rows = [
         (_to_words(name), *map(format_cell, (values[-1], min(values), max(values))), UNITS.get(name, ""))
@@ -64,11 +63,10 @@ def describe_run(directory: Path) -> ReportSection:
         if values and (run.job.directions or not name.startswith("friction"))
     ]
     numbers = ReportTable(("measure", "last", "smallest", "largest", "unit"), rows)
-    table = RunTable(directory, run.job, columns, bool(marker.detached(directory)))
     sentences = [
         *slide.describe_slide(run.job.history, run.job.initial, run.job.grid.dx, columns),
         *cycles.describe_cycles(run.job, columns),
-        *(text for sentences in answers("results", "sentences") for text in sentences(table)),
+        *(text for sentences in answers("results", "sentences") for text in sentences(run)),
         *theory_comparison.describe_theory(directory, run.job.history, run.job.grid.dx),
         theory_settings.describe_settings(directory),
     ]
@@ -87,26 +85,23 @@ def _more_pictures(directory: Path) -> list[tuple[str, str]]:
 
 def describe_curve(directory: Path) -> ReportSection:
     """Return the section on a friction curve: its points and their maps."""
-    columns = read_back.read_results(directory / "steady.csv")
+    curve = Results(directory, "curve")
+    columns = curve.table
     names = [name for name in POINTS if name in columns]
-    units_of = {column.name: column.unit for column in STEADY}
-    units_of |= dict.fromkeys(slide.ERRORS, "relative")
+    units_of = columns.units | dict.fromkeys(slide.ERRORS, "relative")
     head = [f"{_to_words(name)} [{units_of[name]}]" if units_of[name] else _to_words(name) for name in names]
     table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
     pictures = [draw_chart(chart) for chart in curve_charts.chart_steady(directory)]
-    states = partial(_label_states, find_free_area(directory))
-    job = find_curve_job(directory)
-    browsers = _browse_file(directory / "steady.h5", states, job) if job else []
-    lost = lost_points.name_lost(directory)
-    sentences = [f"The curve has {lost}."] if lost else []
-    return ReportSection("Friction curve", sentences, [table, *_list_main_bands(directory)], pictures, browsers)
+    states = partial(_label_states, curve.free_area)
+    browsers = _browse_file(curve, STATES, states, curve.job) if curve.job else []
+    sentences = [f"The curve has {curve.lost}."] if curve.lost else []
+    return ReportSection("Friction curve", sentences, [table, *_list_main_bands(curve)], pictures, browsers)
 
 
-def _list_main_bands(directory: Path) -> list[ReportTable]:
+def _list_main_bands(curve: Results) -> list[ReportTable]:
     """Return a table of the band with most friction at each point of a curve in bands."""
-    if not (directory / "bands.csv").is_file():
+    if not (columns := curve.read("bands.csv")):
         return []
-    columns = read_back.read_results(directory / "bands.csv")
     if "velocity" not in columns:  # of a history
         return []
     names = [name for name in PLACE if any(value == value for value in columns[name])]
@@ -127,10 +122,11 @@ def _list_main_bands(directory: Path) -> list[ReportTable]:
 
 
 def describe_sweep(directory: Path) -> ReportSection:
-    rows = sweep_table.read_cases(sweep_table.results(directory))
+    sweep = Results(directory, "sweep")
+    rows = read_cases(sweep.points)
     used = [name for name in (rows[0] if rows else ()) if any(format_cell(row[name]) not in ("", "–") for row in rows)]
     table = _shorten(list(map(_add_unit, used)), [[row[name] for name in used] for row in rows])
-    settings, failed = theory_settings.describe_settings(directory), sweep_table.describe_failed(directory, MOST_ROWS)
+    settings, failed = theory_settings.describe_settings(directory), sweep.failed_cases(MOST_ROWS)
     sentences = list(filter(None, [settings, *failed]))
     return ReportSection(
         "Sweep", sentences, [table], [draw_chart(chart) for chart in sweep_charts.chart_sweep(directory)]
@@ -151,12 +147,10 @@ def _add_unit(name: str) -> str:
 
 def describe_study(directory: Path) -> ReportSection:
     """Return the section on a study: settings, errors and costs."""
-    read_back.refuse_cut(directory / "study.csv")
-    with (directory / "study.csv").open(newline="") as file:
-        names, *rows = list(csv.reader(file)) or [[]]
-    table = _shorten(names, [[*map(_parse_number, row)] for row in rows])
-    text = directory / "study.txt"
-    sentences = text.read_text(errors="replace").splitlines() if text.is_file() else ["The study is not finished."]
+    study = Results(directory, "study")
+    rows = study.study_rows
+    table = _shorten(list(rows[0]) if rows else [], [list(row.values()) for row in rows])
+    sentences = study.sentences_of_study or ["The study is not finished."]
     pictures = [
         (to_uri((directory / name).read_bytes(), "image/png"), caption)
         for name, caption in STUDY_PICTURES.items()
@@ -182,25 +176,18 @@ def format_cell(value: object) -> str:
     return str(value)
 
 
-def _parse_number(text: str) -> object:
-    try:
-        return float(text or "nan")
-    except ValueError:
-        return text
-
-
 def browse_run(run: PlottedRun) -> list[Browser]:
     """Return browsers of all saved maps of a run over time."""
-    return _browse_file(run.directory / "fields.h5", partial(label_frames, run), run.job, run.telling_step)
+    return _browse_file(run, MAPS, partial(label_frames, run), run.job, run.telling_step)
 
 
 def _browse_file(
-    path: Path, label: Callable[[h5py.File], dict[int, str]], job: Job, step: int | None = None
+    results: Results, name: str, label: Callable[[h5py.File], dict[int, str]], job: Job, step: int | None = None
 ) -> list[Browser]:
     """Return browsers of maps, which start after a `step` or with the last map; none without the file. Raises
     InputError for a damaged file."""
     try:
-        with hdf5.open_results(path) as file, style.drawing(RC):
+        with results.open_maps(name) as file, style.drawing(RC):
             labels = choose_evenly(label(file), MOST_MAPS)
             chosen = Fields(file, until=step).chosen if step is not None else max(labels, default=0)
             names = maps.drawn_maps(file) if labels else []

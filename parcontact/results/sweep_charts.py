@@ -14,14 +14,13 @@ import numpy as np
 
 from ..columns import SWEEP, names_of
 from ..job.added_sections import answers
-from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
-from . import prefixes, style, sweep_table
+from . import prefixes, style
 from .charts import FRACTION, Axis, Chart, ChartLine
+from .results import CURVES, PLACES, Results, read_cases, swept_keys
 from .slide import CORRECTED
 from .sweep_table import SAMPLES
 
-TABLE = sweep_table.TABLE
 UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N", "size": "m", "distance": "m"}
 UNITS |= {"duration": "s", "work": "J/m²", "range": "m", "shear_modulus": "Pa", "modulus_inf": "Pa"}
 UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m", "frequency": "Hz", "amplitude": ""}
@@ -64,12 +63,12 @@ def all_panels() -> Panels:
 
 def chart_sweep(directory: Path) -> list[Chart]:
     """Return panels of a sweep; none without results, or without a swept key of numbers."""
-    table = sweep_table.results(directory)
-    rows, panels = sweep_table.read_cases(table), all_panels()
+    table = Results(directory, "sweep").points
+    rows, panels = read_cases(table), all_panels()
     keys = _find_keys(rows)
-    if table.name == sweep_table.CURVES:
+    if table.name == CURVES:
         panels = CURVE_PANELS
-        places = {name: {row[name] for row in rows if row[name] == row[name]} for name in sweep_table.PLACES}
+        places = {name: {row[name] for row in rows if row[name] == row[name]} for name in PLACES}
         keys = [name for name, values in places.items() if len(values) > 1] + keys
     if not keys:
         return []
@@ -85,12 +84,6 @@ def chart_sweep(directory: Path) -> list[Chart]:
     return found
 
 
-def sweep_title(directory: Path) -> str:
-    """Return the title of the job from its cases; '' if there is none."""
-    jobs = sorted(directory.glob(f"cases/*/{RESOLVED}")) + sorted(directory.glob(f"cases/*/{STEADY_RESOLVED}"))
-    return shown_job(jobs[0]).title if jobs else ""
-
-
 def _find_keys(rows: Rows) -> list[str]:
     """Return the keys with several numbers, except those that choose a sample; of keys that change together the
     first."""
@@ -100,9 +93,7 @@ def _find_keys(rows: Rows) -> list[str]:
 
 def _swept(rows: Rows) -> list[str]:
     """Return the keys of a sweep except those that choose a sample, such as seeds."""
-    names = list(rows[0]) if rows else ["case", "state"]
-    keys = names[names.index("case") + 1 : names.index("state")]
-    return [name for name in keys if name.split(".")[-1] not in SAMPLES]
+    return [name for name in swept_keys(rows) if name.split(".")[-1] not in SAMPLES]
 
 
 def _drop_joint_keys(rows: Rows, names: Sequence[str]) -> list[str]:
@@ -119,7 +110,7 @@ def _drop_joint_keys(rows: Rows, names: Sequence[str]) -> list[str]:
 def _split(rows: Rows, key: str) -> dict[tuple[str, ...], Rows]:
     """Return the rows of each line by the values of the other keys, except `key`, the keys that change with it, and
     those that choose a sample."""
-    places = [name for name in sweep_table.PLACES if name in rows[0]]
+    places = [name for name in PLACES if name in rows[0]]
     others = [name for name in _drop_joint_keys(rows, [key, *places, *_swept(rows)]) if name != key]
     lines: dict[tuple[str, ...], list[dict[str, Any]]] = {}
     for row in rows:
@@ -133,7 +124,7 @@ def _named(key: str, value: Any) -> str:
     if not isinstance(value, float):
         return Path(str(value)).stem
     text = prefixes.quantity(value, UNITS.get(word, ""))
-    return text if word in sweep_table.PLACES else f"{word.replace('_', ' ')} {text}"
+    return text if word in PLACES else f"{word.replace('_', ' ')} {text}"
 
 
 def _make_series(rows: Rows, key: str, columns: dict[str, str]) -> list[ChartLine]:

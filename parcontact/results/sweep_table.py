@@ -3,12 +3,10 @@
 sweep_mean.csv and sweep_curves_mean.csv have means over seeds.
 """
 
-import csv
 import fcntl
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from io import StringIO
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
@@ -18,27 +16,18 @@ from ..errors import InputError
 from ..history.timeline import Timeline
 from ..job import Case, Steady
 from ..job.added_sections import answers
-from ..job.reading import CASES
-from ..storage import curve_points, files, lost_points, marker, read_back, tables
+from ..storage import curve_points, files, marker, read_back, tables
 from . import slide
-from .run_table import RunTable
+from .results import CURVE_COLUMNS, CURVE_RESULTS, CURVES, FAILURE, KINDS, PLACES, Results
 
-TABLE = "sweep.csv"
-CURVES = "sweep_curves.csv"
-PLACES = ("velocity", "pressure", "temperature")  # coordinates of a point of a curve
-CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
-CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *slide.ERRORS, "residual")
 RESULTS = names_of(SWEEP_RESULTS)
 SECTIONS = {column.when: added_names(SWEEP, column.when) for column in SWEEP if column.when}
 FRICTION_ERRORS = ("mu_max_error", "mu_dyn_error")
 THEORY = tuple(name for name in names_of(SWEEP) if name.startswith("theory_"))
-NUMBERS = {*names_of(SWEEP), *CURVE_COLUMNS} - {"state"}
-MEND = "run the sweep again, which writes the table again"
 MEANS = "mean", "std", "sem"
 SAMPLES = "seed", "centre"  # last words of keys that choose samples of one surface, over which means are taken
 FIRST = {"measures.csv": ("step", "time"), "steady.csv": ("velocity", "pressure")}  # first columns of tables
 DAMAGED = "damaged"
-FAILURE = ".failure"  # file with the reason why a case failed
 
 
 def write_sweep_tables(directory: Path, cases: Sequence[Case]) -> None:
@@ -52,7 +41,7 @@ def write_sweep_tables(directory: Path, cases: Sequence[Case]) -> None:
         names = names_of(choose_columns(SWEEP, when=there))[1:]
         if not any(case.job.history for case in cases):  # curves have a table of points instead
             names = tuple(name for name in names if any(name in row for row in rows))
-        save_cases(directory / TABLE, ["case", *keys, *names], rows)
+        save_cases(directory / KINDS["sweep"], ["case", *keys, *names], rows)
         if points:
             save_cases(directory / CURVES, ["case", *keys, *CURVE_COLUMNS], points)
         if seeded and any(case.job.history for case in cases):
@@ -66,35 +55,6 @@ def _asks_for(case: Case, section: str) -> bool:
     if section == "cycles":
         return any(stage.frequency for stage in case.job.history)
     return case.job.output.energy if section == "output.energy" else case.job.section(section) is not None
-
-
-def results(directory: Path) -> Path:
-    """Return the path of the table of a sweep: of its cases, or of the points of its friction curves."""
-    curves, table = directory / CURVES, directory / TABLE
-    if not curves.is_file() or (
-        table.is_file() and any(math.isfinite(row.get("residual", math.nan)) for row in read_cases(table))
-    ):
-        return table
-    return curves
-
-
-def read_cases(path: Path) -> list[dict[str, Any]]:
-    """Read the rows of a table, empty cells as NaN; raises InputError for a damaged table."""
-    try:
-        text = path.read_text(encoding="utf-8")
-        names, *lines = list(csv.reader(StringIO(text, newline=""))) or [[]]
-        if names[:1] != ["case"] or "state" not in names or not text.endswith("\n"):
-            raise ValueError("it must begin with the names of columns, case and state first, and end with a whole line")
-        rows = [dict(zip(names, line, strict=True)) for line in lines]
-        begun = [int(one.name) for one in path.parent.glob(f"{CASES}/*") if one.name.isdecimal()]
-        if path.name == TABLE and max(begun, default=-1) > max((int(row["case"]) for row in rows), default=-1):
-            raise ValueError(f"it lacks rows: case {max(begun)} has begun")
-        return [
-            {name: float(cell or "nan") if name in NUMBERS else _number(cell) for name, cell in row.items()}
-            for row in rows
-        ]
-    except (OSError, ValueError, csv.Error) as error:
-        raise InputError(f"{path} cannot be read: {error}; {MEND}") from error
 
 
 def sweep_errors(cases: Sequence[Case]) -> Iterator[dict[int, float]]:
@@ -119,24 +79,6 @@ def fail(case: Case, reason: str) -> None:
             path.unlink(missing_ok=True)
 
 
-def why_failed(directory: Path, number: int) -> str:
-    """Return the lost points of a case, or the first sentence of the reason for its failure; '' if unknown."""
-    case = directory / CASES / f"{number:03d}"
-    with suppress(OSError, InputError):
-        return lost_points.name_lost(case) or (case / FAILURE).read_text(encoding="utf-8").strip().split("; ")[0]
-    return ""
-
-
-def describe_failed(directory: Path, most: int) -> list[str]:
-    """Return sentences on the failed cases of a sweep, at most `most` and one on the number of others; raises
-    InputError for a damaged table."""
-    if not (directory / TABLE).is_file():
-        return []
-    failed = [int(row["case"]) for row in read_cases(directory / TABLE) if row["state"] == "failed"]
-    found = [": ".join(filter(None, (f"case {one} failed", why_failed(directory, one)))) for one in failed[:most]]
-    return found + [f"and {len(failed) - most} more"] * (len(failed) > most)
-
-
 def _row(case: Case) -> dict[str, Any]:
     head = {"case": case.number, **case.settings}
     try:
@@ -157,7 +99,7 @@ def _results(case: Case) -> dict[str, Any]:
             known = ends if found is None else {key: value for key, value in found._asdict().items() if value == value}
             row |= {f"{prefix}{key}": value for key, value in known.items()}
         if not prefix:
-            run = RunTable(directory, case.job, columns, bool(marker.detached(directory)))
+            run = Results(directory, "run", case.job)
             row |= dict(pair for swept in answers("results", "swept") for pair in swept(run))
             if any(stage.frequency for stage in case.job.history):
                 from . import cycles
@@ -255,12 +197,6 @@ def _means(
 
 def save_cases(path: Path, columns: Sequence[str], rows: Sequence[dict[str, Any]]) -> None:
     files.replace_file(path, to_csv(columns, ([row.get(name) for name in columns] for row in rows)))
-
-
-def _number(text: str) -> Any:
-    with suppress(ValueError):
-        return float(text or "nan")
-    return text
 
 
 @contextmanager

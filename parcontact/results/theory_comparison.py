@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from ..job import Stage
 from ..printed import with_error
-from ..storage import read_back
 from . import slide, theory_settings
+from .results import Results
 
 RUN = "measures.csv"
 
@@ -36,7 +36,7 @@ def compare_with_theory(directory: Path, history: Sequence[Stage], cell: float) 
 
 def _results(path: Path, history: Sequence[Stage], cell: float) -> dict[str, tuple[float, float]]:
     """Return results and their errors by name."""
-    columns = read_back.read_results(path) if path.is_file() else {}
+    columns = Results(path.parent).read(path.name)
     if not columns.get("time"):
         return {}
     columns.setdefault(slide.CORRECTED, columns["contact_area"])

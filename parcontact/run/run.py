@@ -20,7 +20,7 @@ from ..march.loop import March
 from ..physics.body import states_errors
 from ..printed import quantity
 from ..results import cycles, slide
-from ..results.run_table import RunTable
+from ..results.results import Results
 from ..scene import sanity
 from ..storage import tables
 from ..storage.checkpoint import Contents, Facts
@@ -205,11 +205,10 @@ class Run:
         self._log_counts()
         if self.slab.root and (slides or self.march.scene.law is not None) and not self.stop:
             with suppress(OSError, InputError):  # an unreadable table does not end a run
-                rows = tables.read_columns(self.directory.path / "measures.csv")
-                table = RunTable(self.directory.path, self.job, rows, bool(self.march.detached))
-                sentences = list(slide.describe_slide(self.job.history, self.job.initial, self.job.grid.dx, rows))
+                run = Results(self.directory.path, "run", self.job, self.march.detached)
+                sentences = list(slide.describe_slide(self.job.history, self.job.initial, self.job.grid.dx, run.table))
                 for said in answers("results", "said_at_end"):
-                    sentences += said(table)
+                    sentences += said(run)
                 for text in sentences:
                     console.say(text)
         self._log_cycles()

@@ -19,6 +19,7 @@ from ..parallel.signals import Signals
 from ..parallel.slab import Slab
 from ..printed import name_cases, per_cent
 from ..results import sweep_table
+from ..results.results import KINDS, Results
 from ..storage import files, marker, stopfile
 from ..storage.directory import refuse_files, refuse_other_jobs
 from ..storage.stopfile import StopFile
@@ -76,7 +77,7 @@ class SweepRun:
             for text in self.doubts.summary([kinds for _, kinds in found]):
                 print_line(f"warning: {text}", sys.stderr)
             if STOPPED_EARLY not in codes and not self.quiet and not refused:
-                print_line(f"results of all cases: {sweep_table.results(_directory(self.cases))}")
+                print_line(f"results of all cases: {Results(_directory(self.cases), 'sweep').points}")
             elif STOPPED_EARLY in codes and self.groups.count > 1 and not self.quiet:
                 print_line("stopped early; run again to go on")
             if self.runs and STOPPED_EARLY not in codes and len(chosen) > 1:
@@ -208,7 +209,7 @@ def refuse_foreign_sweep(cases: Sequence[Case]) -> None:
     for case in cases:
         there = case.job.output.directory
         refuse_other_jobs(there, marker.sound_claims(there), plain_job(case.job))
-    if not claims and not {CASES, sweep_table.TABLE} & set(entries):
+    if not claims and not {CASES, KINDS["sweep"]} & set(entries):
         refuse_files(directory, entries)
 
 

@@ -11,6 +11,7 @@ from ..parallel.slab import Slab
 from ..plan.trial import warm_up
 from ..results import study_pictures as study_plots
 from ..results import sweep_table
+from ..results.results import Results
 from ..run import runner, sweep, sweep_warnings
 from ..run.run import STOPPED_EARLY, Options
 from ..storage import files, marker
@@ -53,7 +54,7 @@ def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
 def conclude(job: Job, refined: Ladders, cases: Mapping[Settings, Case], ranks: int) -> list[str]:
     """Write limits, errors and a picture of finished cases; return the sentences of study.txt; root only."""
     place = job.output.directory
-    rows = dict(zip(cases, sweep_table.read_cases(place / sweep_table.TABLE), strict=True))
+    rows = dict(zip(cases, Results(place, "sweep").cases, strict=True))
     reference = verdict.references(refined, rows)
     errors = {case: verdict.errors(row, reference) for case, row in rows.items()}
     named = {case: {f"error_{name}": error for name, error in found.items()} for case, found in errors.items()}

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
 ANSWERS = """
     @staticmethod
     def sentences(run):
-        yield f"the tread is worn by {run.columns['wear_depth'][-1]:.3g} m"
+        yield f"the tread is worn by {run.table['wear_depth'][-1]:.3g} m"
 
     @staticmethod
     def headline(run):

@@ -24,7 +24,7 @@ from parcontact.history.timeline import Timeline
 from parcontact.job import Job, load
 from parcontact.mesh import load as load_job
 from parcontact.parallel.slab import Slab
-from parcontact.results import sweep_table
+from parcontact.results import results
 from parcontact.run import runner
 from parcontact.run.run import Options
 from parcontact.study import study, verdict
@@ -51,7 +51,7 @@ def outcomes(path: Path) -> verdict.Outcomes:
     assert run_study(path, path.parent / "out", MPI.COMM_SELF) == 0
     job = load(path)
     cases = make_cases(job, ladders(job), lambda changes: load(path, changes))
-    return dict(zip(cases, sweep_table.read_cases(path.parent / "out" / "sweep.csv"), strict=True))
+    return dict(zip(cases, results.read_cases(path.parent / "out" / "sweep.csv"), strict=True))
 
 
 def run_study(path: Path, out: Path, comm: MPI.Intracomm) -> int:

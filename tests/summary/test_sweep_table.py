@@ -9,8 +9,8 @@ from sweeping import JOB, table
 
 from parcontact.__main__ import main
 from parcontact.job import Case, load_cases
+from parcontact.results import results, sweep_table
 from parcontact.results import sweep_charts as pictures
-from parcontact.results import sweep_table
 from parcontact.run import sweep
 from parcontact.storage import tables
 
@@ -193,7 +193,7 @@ def test_pull_offs_of_cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     )
     Path("pulls.yaml").write_text("\n".join(lines))
     assert main(["pulls.yaml", "--quiet"]) == 0
-    came_off, holds = sweep_table.read_cases(Path("out/pulls/sweep.csv"))
+    came_off, holds = results.read_cases(Path("out/pulls/sweep.csv"))
     rows = tables.read_columns(Path("out/pulls/cases/000/measures.csv"))
     assert came_off["state"] == holds["state"] == "done"
     assert came_off["pull_off"] == pytest.approx(-min(rows["pressure"]) * 4e-4**2, rel=1e-15)

@@ -7,7 +7,6 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-import h5py
 import numpy as np
 
 from ... import scene
@@ -20,7 +19,8 @@ from ...parallel.root import on_root
 from ...parallel.slab import Slab
 from ...printed import per_cent, quantity, stated_error
 from ...results.plotted_run import Fields, PlottedRun
-from ...storage import files, hdf5, read_back
+from ...results.results import Results
+from ...storage import files, hdf5
 from ..contact_law import touching_of
 from . import conductivity
 from . import load_curve as load_curves
@@ -88,13 +88,14 @@ class Gaps:
                 "output directory of a run; those of a sweep are in its cases/" if directory.is_dir() else "directory"
             )
             raise InputError(f"{directory} is no {what}")
-        self.directory, self.job = directory, shown_job(directory / RESOLVED)
+        self.directory, self.results = directory, Results(directory, "run", shown_job(directory / RESOLVED))
+        self.job = shown_job(directory / RESOLVED)
         job = self.job
         self.size, self.periodic = job.grid.size, job.grid.cyclic
         self.cells = job.grid.nx * job.grid.ny
-        self.columns = read_back.read_results(directory / "measures.csv")
+        self.columns = self.results.table
         try:
-            with self._open() as file:
+            with self.results.open_maps() as file:
                 if not {"gap", "pressure"} <= set(file):
                     raise InputError(f"{directory / 'fields.h5'}: {NEEDS}")
                 self.fields = Fields(file, at)
@@ -104,12 +105,9 @@ class Gaps:
         if not self.shown:
             raise InputError(f"{directory}: no map is saved yet")
 
-    def _open(self) -> h5py.File:
-        return hdf5.open_results(self.directory / "fields.h5")
-
     def read(self, index: int) -> Map:
         """Return the gap [m] at a saved instant; raises InputError if the maps are incomplete."""
-        with self._open() as file:
+        with self.results.open_maps() as file:
             gap, pressure = file["gap"][index], file["pressure"][index]
         if gap.shape != pressure.shape or not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
             step = int(self.fields.steps[index])

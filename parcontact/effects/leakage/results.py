@@ -6,11 +6,9 @@ Conductivities K are read from `leak.csv`, which is made from saved gaps, else f
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from pathlib import Path
 
 from ...printed import quantity, span, stated_error, with_error
-from ...results.run_table import RunTable
-from ...storage import read_back
+from ...results.results import Results
 
 TABLE = "leak.csv"
 DATA = (TABLE,)  # tables of a run that a report keeps
@@ -18,11 +16,10 @@ PICTURES = {"leak.png": "flow through the gap, and conductivity"}  # pictures of
 Columns = Mapping[str, Sequence[float]]
 
 
-def headline(run: RunTable) -> Iterator[str]:
+def headline(run: Results) -> Iterator[str]:
     """Yield the last conductivities, from `leak.csv` with their errors, else from the run."""
-    table = run.directory / TABLE
-    columns = read_back.read_results(table) if table.is_file() else run.columns
-    stops = [text for text in describe_leak_stop(run.directory) if " between " in text]
+    columns = run.read(TABLE) or run.table
+    stops = [text for text in describe_leak_stop(run) if " between " in text]
     known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
     if known:
         row = known[-1]
@@ -56,15 +53,15 @@ def _error(columns: Columns, axis: str, row: int) -> float:
     return math.nan if errors is None else errors[row]
 
 
-def sentences(run: RunTable) -> list[str]:
+def sentences(run: Results) -> list[str]:
     """Return sentences on the loads at which leakage stops, or on the seal if the fluid carries a part of the load."""
-    return list(said_at_end(run)) or describe_leak_stop(run.directory)
+    return list(said_at_end(run)) or describe_leak_stop(run)
 
 
-def said_at_end(run: RunTable) -> Iterator[str]:
+def said_at_end(run: Results) -> Iterator[str]:
     """Yield sentences on the pressures at which a fluid that carries a part of the load opens the seal, closes it, and
     lifts it off, and on the last leak and its errors."""
-    columns = run.columns
+    columns = run.table
     if "high_pressure" not in columns:
         return
     known = [row for row, flow in enumerate(columns["flow_x"]) if flow == flow]
@@ -94,21 +91,20 @@ def _describe_leak(columns: Columns, row: int) -> str:
     return f"{leak}, at t = {quantity(columns['time'][row], 's')} (errors: {said})"
 
 
-def _describe_table(path: Path, claims: object) -> Iterator[str]:
-    yield f"  leakage: {len(read_back.read_results(path)['time'])} instants in {path.name}"
+def _describe_table(run: Results) -> Iterator[str]:
+    yield f"  leakage: {len(run.read(TABLE)['time'])} instants in {TABLE}"
 
 
 PARTS = {TABLE: _describe_table}  # descriptions of files of a run, by their names
 
 
-def describe_leak_stop(directory: Path) -> list[str]:
+def describe_leak_stop(run: Results) -> list[str]:
     """Return a sentence on leakage for each direction with known conductivity; one sentence if both agree.
 
     A sentence has the pressures of the last instant with a flow and of the first one without, or their times if the
     pressure is constant. Raises InputError for an unreadable table.
     """
-    table = next((path for name in (TABLE, "measures.csv") if (path := directory / name).is_file()), None)
-    columns = read_back.read_results(table) if table else {}
+    columns = run.read(TABLE) or run.table
     found = [(axis, said) for axis in "xy" if (said := describe_axis(columns, axis))]
     if len({said for _, said in found}) == 1:
         found = [(" and ".join(axis for axis, _ in found), found[0][1])]

@@ -1,0 +1,336 @@
+"""Results of an output directory: job, tables with units, maps, errors, cases, and what is unfinished.
+
+Pictures, texts, tables of sweeps and `parcontact.open` read results through this module only.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import cached_property
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from ..columns import MEASURES, PER_BRANCH, SWEEP, TABLES, names_of
+from ..errors import InputError
+from ..job import Job
+from ..job.added_sections import answers
+from ..job.reading import CASES
+from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
+from ..job.text import yamltext
+from ..parallel.slab import Array
+from ..storage import curve_points, fields, hdf5, lost_points, marker, read_back
+from ..storage.marker import Claim
+from ..storage.tables import Columns
+from .slide import ERRORS
+
+if TYPE_CHECKING:
+    import xarray
+
+KINDS = {  # tables of the kinds of results
+    "run": "measures.csv",
+    "curve": "steady.csv",
+    "sweep": "sweep.csv",
+    "study": "study.csv",
+    "leak": "leak.csv",
+}
+JOBS = {"run": RESOLVED, "curve": STEADY_RESOLVED, "study": "study.resolved.yaml"}
+MAPS, STATES = "fields.h5", "steady.h5"  # maps of a run over time, and of the points of a curve
+CURVES = "sweep_curves.csv"  # the points of all friction curves of a sweep
+PLACES = ("velocity", "pressure", "temperature")  # coordinates of a point of a curve
+CURVE_RESULTS = ("friction", "contact_area", "contact_area_corrected")
+CURVE_COLUMNS = ("state", *PLACES, *CURVE_RESULTS, *ERRORS, "residual")
+NUMBERS = {*names_of(SWEEP), *CURVE_COLUMNS} - {"state"}  # columns of numbers in tables of a sweep
+FAILURE = ".failure"  # file with the reason why a case failed
+SAME_LOAD = 1e-9  # rounding: relative difference below which loads are the same
+NO_XARRAY = "parcontact.open needs xarray, which is not installed: pip install xarray (see parcontact manual install)"
+MEND = "run the sweep again, which writes the table again"
+
+Rows = list[dict[str, Any]]
+
+
+class ResultTable(Columns):
+    """Columns of a table by name; a missing column raises InputError."""
+
+    @property
+    def units(self) -> dict[str, str]:
+        """SI units of the columns, '' if dimensionless or not known."""
+        known = {column.name: column.unit for column in TABLES.get(self.path.name, MEASURES)}
+        return {name: known.get(PER_BRANCH if name.startswith("dissipated_") else name, "") for name in self}
+
+    def arrays(self, needed: Sequence[str] = ()) -> dict[str, Array]:
+        """Return the columns as arrays; raises InputError if a needed one is missing."""
+        if missing := [name for name in needed if name not in self]:
+            raise InputError(f"{self.path} has no column {', '.join(missing)}")
+        return {name: np.array(values, dtype=float) for name, values in self.items()}
+
+    def pandas(self) -> Any:
+        """Return the table as a data frame, with the units of its columns in `attrs`; raises ImportError without
+        pandas."""
+        import pandas as pd  # type: ignore[import-untyped]
+
+        frame = pd.DataFrame(dict(self))
+        frame.attrs["units"] = self.units
+        return frame
+
+
+class Results:
+    """Results in a directory of a `kind`: run, curve, sweep, study or leak; by default the first of these that exist.
+
+    A `job` that is given, and how its surfaces `detached`, are taken in place of what is stored. Tables, maps and job
+    are read when they are used, and raise InputError if they are damaged.
+    """
+
+    def __init__(self, path: str | Path, kind: str = "", job: Job | None = None, detached: str = "") -> None:
+        self.path, self._job, self._detached = Path(path), job, detached
+        self.kinds = tuple(each for each, name in KINDS.items() if self.has(name))
+        self.kind = kind or next(iter(self.kinds), "")
+
+    def has(self, name: str) -> bool:
+        """Return True if the directory has a file of this name."""
+        return (self.path / name).is_file()
+
+    def read(self, name: str) -> ResultTable:
+        """Return a table by the name of its file; without the file, an empty one."""
+        found = read_back.read_results(self.path / name) if self.has(name) else {}
+        return ResultTable(self.path / name, found.items())
+
+    @cached_property
+    def table(self) -> ResultTable:
+        """Columns of the results of the kind, with units; of a sweep, its columns of numbers."""
+        if self.kind != "sweep":
+            return self.read(KINDS[self.kind])
+        rows = self.cases
+        numbers = [name for name in (rows[0] if rows else ()) if all(isinstance(row[name], float) for row in rows)]
+        return ResultTable(self.path / KINDS["sweep"], ((name, [row[name] for row in rows]) for name in numbers))
+
+    @cached_property
+    def job(self) -> Job | None:
+        """Job of the results, with flat shapes in place of files; None if none is stored."""
+        if self._job is not None:
+            return self._job
+        wanted = {"curve": (STEADY_RESOLVED, RESOLVED), "sweep": self._jobs_of_cases}.get(self.kind)
+        names = wanted or (JOBS.get(self.kind, RESOLVED),)
+        return next((shown_job(self.path / name) for name in names if self.has(name)), None)
+
+    @property
+    def _jobs_of_cases(self) -> tuple[str, ...]:
+        found = (path for name in (RESOLVED, STEADY_RESOLVED) for path in sorted(self.path.glob(f"{CASES}/*/{name}")))
+        return tuple(str(path.relative_to(self.path)) for path in found)
+
+    @property
+    def job_file(self) -> Path | None:
+        """Path of the resolved job, of a sweep that of its first case; None if there is none."""
+        return next((self.path / name for name in (*JOBS.values(), *self._jobs_of_cases) if self.has(name)), None)
+
+    @property
+    def title(self) -> str:
+        """Title of the job; a text that says so without one."""
+        if (path := self.job_file) is None:
+            return "without a job"
+        found = re.search(r"^title: (.+)$", path.read_text(errors="replace"), re.MULTILINE)
+        return (found and found.group(1).strip("'\"")) or "without a title"
+
+    def plain_job(self) -> dict[str, Any]:
+        """Return the stored job of a run or a curve as plain data; raises InputError without one."""
+        found = next((self.path / name for name in (RESOLVED, STEADY_RESOLVED) if self.has(name)), None)
+        if found is None:
+            raise InputError(f"{self.path} has no run: it has neither {RESOLVED} nor {STEADY_RESOLVED}")
+        return dict(yamltext.read_source(found, str(found)).data)
+
+    @property
+    def free_area(self) -> float:
+        """Area [m^2] of the box of a free scene; 0 of any other scene, and without a job."""
+        job = self.job
+        return job.grid.lx * job.grid.ly if job and job.grid.boundary == "free" else 0.0
+
+    @property
+    def claims(self) -> dict[str, Claim]:
+        """Claims of the verbs that wrote the directory, by verb."""
+        return marker.sound_claims(self.path)
+
+    @cached_property
+    def detached(self) -> str:
+        """How the surfaces of a run detached for good; '' if they did not."""
+        return self._detached or marker.detached(self.path)
+
+    @property
+    def telling_row(self) -> int:
+        """Row that shows the contact of a run: the last one; after a detachment the row that a capability names, else
+        the last row of the largest load."""
+        pressure, area = (np.asarray(self.table[name], float) for name in ("pressure", "contact_area"))
+        if area[-1] > 0.0 and not self.detached:
+            return len(area) - 1
+        named = (row for telling in answers("results", "telling_row") for row in telling(self))
+        return next(named, int(np.flatnonzero(pressure >= (1.0 - SAME_LOAD) * pressure.max())[-1]))
+
+    @property
+    def errors(self) -> dict[str, list[float]]:
+        """Known relative errors of friction and contact area, by column."""
+        return {name: [error for error in self.table[name] if error == error] for name in ERRORS if name in self.table}
+
+    @cached_property
+    def cases(self) -> Rows:
+        """Rows of the cases of a sweep."""
+        return read_cases(self.path / KINDS["sweep"]) if self.has(KINDS["sweep"]) else []
+
+    @property
+    def points(self) -> Path:
+        """Path of the table of a sweep with its results: of its cases, or of the points of its curves."""
+        known = any(math.isfinite(row.get("residual", math.nan)) for row in self.cases)
+        return self.path / (CURVES if self.has(CURVES) and not known else KINDS["sweep"])
+
+    @property
+    def study_rows(self) -> Rows:
+        """Rows of a study, without fingerprints."""
+        path = self.path / KINDS["study"]
+        read_back.refuse_cut(path)
+        with path.open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        return [{name: _number(text) for name, text in row.items() if name != "fingerprint"} for row in rows]
+
+    @property
+    def sentences_of_study(self) -> list[str]:
+        """Sentences of a study; none before it is finished."""
+        if not self.has("study.txt"):
+            return []
+        read_back.refuse_cut(self.path / "study.txt")
+        return (self.path / "study.txt").read_text(errors="replace").splitlines()
+
+    @property
+    def unfinished(self) -> list[str]:
+        """What was asked for and is missing, with reasons: points of a curve, cases of a sweep, steps of a run."""
+        if self.kind == "sweep":
+            return [*self.failed_cases(), *self._cases_to_go()]
+        return list(self._lost_points() if self.kind == "curve" else self._steps_to_go())
+
+    def _cases_to_go(self) -> Iterator[str]:
+        if count := sum(row["state"] in ("-", "begun") for row in self.cases):
+            yield f"{count} of {len(self.cases)} cases are not finished"
+
+    def _lost_points(self) -> Iterator[str]:
+        if lost := lost_points.name_lost(self.path):
+            yield lost
+        section = self.job.steady if self.job else None
+        if section and section.velocities and section.pressures and self.has(KINDS["curve"]):
+            asked = curve_points.requested_points(section.velocities, section.pressures, section.temperatures or ())
+            there = [*curve_points.of_table(self.table), *(one.at for one in lost_points.read(self.path))]
+            if count := len(curve_points.lacking(asked, there)):
+                yield f"{count} of {len(asked)} points are not solved yet"
+
+    def _steps_to_go(self) -> Iterator[str]:
+        claim = self.claims.get("run") if self.kind == "run" else None
+        if self.kind == "run" and (claim is None or claim.finished is None):
+            yield "the run is not finished"
+
+    def failed_cases(self, most: int = 10**9) -> list[str]:
+        """Return sentences on the failed cases of a sweep, at most `most` and one on the number of others."""
+        failed = [int(row["case"]) for row in self.cases if row["state"] == "failed"]
+        found = [": ".join(filter(None, (f"case {one} failed", self._why_failed(one)))) for one in failed[:most]]
+        return found + [f"and {len(failed) - most} more"] * (len(failed) > most)
+
+    def _why_failed(self, number: int) -> str:
+        """Return the lost points of a case, or the first sentence of the reason for its failure; '' if unknown."""
+        case = self.path / CASES / f"{number:03d}"
+        with suppress(OSError, InputError):
+            return lost_points.name_lost(case) or (case / FAILURE).read_text(encoding="utf-8").strip().split("; ")[0]
+        return ""
+
+    @property
+    def lost(self) -> str:
+        """Text on the lost points of a curve; '' if there is none."""
+        return lost_points.name_lost(self.path)
+
+    def open_maps(self, name: str = MAPS) -> h5py.File:
+        """Open a file of maps; raises FileNotFoundError, and InputError if it is damaged."""
+        return hdf5.open_results(self.path / name)
+
+    @property
+    def program(self) -> str:
+        """Version of the program in the saved maps; '' without maps."""
+        for name in (MAPS, STATES):
+            with suppress(*hdf5.FAILURES, InputError), self.open_maps(name) as file:
+                return str(file.attrs["program"])
+        return ""
+
+    @property
+    def maps(self) -> xarray.Dataset:
+        """Saved maps of a run, read when used: `pressure_map`, ..., of shape (t, y, x), with the coordinates `t` [s],
+        `map_step`, `y` and `x` [m]. Raises ImportError without xarray."""
+        try:
+            import xarray
+        except ImportError as error:
+            raise ImportError(NO_XARRAY) from error
+        return xarray.Dataset(*self._maps()) if self.has(MAPS) else xarray.Dataset()
+
+    def _maps(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        from xarray.core.indexing import LazilyIndexedArray
+
+        from .saved_map import SavedMap
+
+        path = self.path / MAPS
+        try:
+            with h5py.File(path, "r") as file:
+                layout = fields.SavedFields(file)
+                saved = np.flatnonzero(~np.isnan(layout.times))
+                places = {name: (name, file[name][...], {"units": "m"}) for name in ("y", "x")}
+                steps = ("t", file["step"][...][saved], {"units": "1"})
+                found = {name: SavedMap(path, name, file[name].shape, file[name].dtype, saved) for name in layout.names}
+        except hdf5.FAILURES as error:
+            raise InputError(f"{path} cannot be read: {hdf5.reason(error)}") from None
+        drawn = {
+            f"{name}_map": (("t", "y", "x"), LazilyIndexedArray(rows), {"units": fields.UNITS[name]})
+            for name, rows in found.items()
+        }
+        return drawn, {"t": ("t", layout.times[saved], {"units": "s"}), "map_step": steps, **places}
+
+    @property
+    def dataset(self) -> xarray.Dataset:
+        """Columns of a run along `step`, with the coordinate `time` [s], and its maps."""
+        maps, known = self.maps, {column.name for column in MEASURES}
+        units = {
+            name: {"units": unit or "1"} if unit or name in known else {} for name, unit in self.table.units.items()
+        }
+        columns = {name: ("step", values, units[name]) for name, values in self.table.items()}
+        steps = "step", np.array(self.table["step"], dtype=int), units["step"]
+        rows = {name: value for name, value in columns.items() if name not in ("step", "time")}
+        return maps.assign_coords(step=steps, time=columns["time"]).assign(rows)
+
+
+def read_cases(path: Path) -> Rows:
+    """Read the rows of a table of a sweep, empty cells as NaN; raises InputError for a damaged table."""
+    try:
+        text = path.read_text(encoding="utf-8")
+        names, *lines = list(csv.reader(StringIO(text, newline=""))) or [[]]
+        if names[:1] != ["case"] or "state" not in names or not text.endswith("\n"):
+            raise ValueError("it must begin with the names of columns, case and state first, and end with a whole line")
+        rows = [dict(zip(names, line, strict=True)) for line in lines]
+        begun = [int(one.name) for one in path.parent.glob(f"{CASES}/*") if one.name.isdecimal()]
+        last = max((int(row["case"]) for row in rows), default=-1)
+        if path.name == KINDS["sweep"] and max(begun, default=-1) > last:
+            raise ValueError(f"it lacks rows: case {max(begun)} has begun")
+        return [
+            {name: float(cell or "nan") if name in NUMBERS else _number(cell) for name, cell in row.items()}
+            for row in rows
+        ]
+    except (OSError, ValueError, csv.Error) as error:
+        raise InputError(f"{path} cannot be read: {error}; {MEND}") from error
+
+
+def _number(text: str) -> Any:
+    with suppress(ValueError):
+        return float(text or "nan")
+    return text
+
+
+def swept_keys(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the swept keys in the rows of a table of a sweep."""
+    names = list(rows[0]) if rows else ["case", "state"]
+    return names[1 : names.index("state")]
