@@ -237,8 +237,8 @@ def draw_frames(
         fill(read(index))
         axes.set_title(f"{_words(name)}, {label}")
         if figure.get_layout_engine() is not None:  # the layout of the first frame is kept for all
-            figure.draw_without_rendering()
-            figure.set_layout_engine("none")
+            style.lay_out(figure)
+            figure.set_layout_engine(None)
         png = io.BytesIO()
         figure.savefig(png, format="png", dpi=dpi)
         yield Image.open(png).convert("RGB")

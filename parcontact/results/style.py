@@ -137,12 +137,20 @@ def figure_of(title: str, groups: Sequence[Sequence[Panel]], maps: Sequence[Pane
 
 
 def set_height(figure: Figure, height: float) -> None:
-    """Set the height [inch] of a figure, and lay it out once: the next layout, when it is saved, starts from there.
+    """Set the height [inch] of a figure, and lay it out for good: Matplotlib would draw it once more to save it.
 
     A single layout keeps margins that labels needed at the height before, and the lowest leave the page.
     """
     figure.set_figheight(height)
-    figure.draw_without_rendering()
+    for _ in range(2):
+        lay_out(figure)
+    figure.set_layout_engine(None)
+
+
+def lay_out(figure: Figure) -> None:
+    """Set the positions of the axes of a figure by its layout engine, without drawing."""
+    if (engine := figure.get_layout_engine()) is not None:
+        engine.execute(figure)
 
 
 def wrap(text: str, most: int) -> str:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 from numpy.typing import NDArray
-from scipy import fft, ndimage
 
 from ..parallel.slab import Array
 
@@ -50,17 +50,17 @@ def fill(heights: Array, known: NDArray[np.bool_]) -> Array:
     about n^2 sweeps for a hole n points wide."""
     if known.all():
         return heights
-    depth, nearest = ndimage.distance_transform_edt(~known, return_indices=True)
+    depth, nearest = scipy.ndimage.distance_transform_edt(~known, return_indices=True)
     found, weights = heights[tuple(nearest)], 0.25 * np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
     for _ in range(min(SWEEPS, 4 * int(np.ceil(depth.max())) ** 2 + 4)):
-        found = np.where(known, heights, ndimage.convolve(found, weights, mode="nearest"))
+        found = np.where(known, heights, scipy.ndimage.convolve(found, weights, mode="nearest"))
     return np.asarray(found)
 
 
 def find_outliers(heights: Array) -> tuple[NDArray[np.bool_], Array]:
     """Return the mask of points that differ from the median of their neighbours by more than OUTLIER median deviations,
     and these medians; beyond the edges slopes are extrapolated."""
-    around = ndimage.median_filter(np.pad(heights, 1, mode="reflect", reflect_type="odd"), 3)[1:-1, 1:-1]
+    around = scipy.ndimage.median_filter(np.pad(heights, 1, mode="reflect", reflect_type="odd"), 3)[1:-1, 1:-1]
     deviation = np.abs(heights - around)
     typical = float(np.median(deviation[deviation > 0.0])) if deviation.any() else np.inf
     return np.asarray(deviation > OUTLIER * typical), around
@@ -86,10 +86,10 @@ def make_periodic(heights: Array) -> Array:
     for edges, rows in ((jumps, heights), (jumps.T, heights.T)):
         edges[0] += rows[0] - rows[-1]
         edges[-1] -= rows[0] - rows[-1]
-    y, x = fft.fftfreq(heights.shape[0])[:, None], fft.rfftfreq(heights.shape[1])
+    y, x = scipy.fft.fftfreq(heights.shape[0])[:, None], scipy.fft.rfftfreq(heights.shape[1])
     symbol = 2.0 * np.cos(2 * np.pi * y) + 2.0 * np.cos(2 * np.pi * x) - 4.0
     symbol[0, 0] = np.inf
-    return np.asarray(heights + fft.irfft2(fft.rfft2(jumps) / symbol, s=heights.shape))
+    return np.asarray(heights + scipy.fft.irfft2(scipy.fft.rfft2(jumps) / symbol, s=heights.shape))
 
 
 def resample(
@@ -104,13 +104,13 @@ def resample(
     if old == shape and most is None:
         return heights
     periodic = heights if joined else make_periodic(heights)
-    spectrum, kept = fft.fft2(periodic), np.zeros(shape, dtype=complex)
+    spectrum, kept = scipy.fft.fft2(periodic), np.zeros(shape, dtype=complex)
     (ky, kx) = (np.arange(-((min(pair) - 1) // 2), (min(pair) - 1) // 2 + 1) for pair in zip(old, shape, strict=True))
     ky = ky[:, None]
     inside = (ky / most[0]) ** 2 + (kx / most[1]) ** 2 <= 1.0 if most else True
     kept[ky, kx] = np.where(inside, spectrum[ky, kx], 0.0)
-    made = fft.ifft2(kept).real * (kept.size / spectrum.size)
+    made = scipy.fft.ifft2(kept).real * (kept.size / spectrum.size)
     if not joined:
         places = np.meshgrid(*(np.arange(new) * n / new for n, new in zip(old, shape, strict=True)), indexing="ij")
-        made += ndimage.map_coordinates(heights - periodic, places, order=3, mode="nearest")
+        made += scipy.ndimage.map_coordinates(heights - periodic, places, order=3, mode="nearest")
     return np.asarray(made)

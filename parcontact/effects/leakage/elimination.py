@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from ...compiled import loop
 
@@ -41,6 +39,9 @@ class Balance:
 
     def _factorize(self) -> Any:
         """Return the factors of the matrix of the black cells; None if there are none."""
+        from scipy import sparse  # slow to import
+        from scipy.sparse.linalg import splu
+
         count = int(self._number.max(initial=DRY)) + 1
         if not count:
             return None

@@ -1,8 +1,8 @@
 """Paths of a fluid through a map of gaps, from the first row to the last."""
 
 import numpy as np
+import scipy  # its parts are imported when they are used
 from numpy.typing import NDArray
-from scipy import ndimage, sparse
 
 from ...compiled import loop
 
@@ -11,11 +11,12 @@ Mask = NDArray[np.bool_]
 
 def connected_from_end_to_end(open_cells: Mask, periodic_sides: bool) -> Mask:
     """Return the cells that are connected by faces to both the first and the last row."""
-    labels, count = ndimage.label(open_cells)
+    labels, count = scipy.ndimage.label(open_cells)
     if periodic_sides and count:
         both = (labels[:, 0] > 0) & (labels[:, -1] > 0)
         pairs = (np.ones(np.count_nonzero(both)), (labels[both, 0], labels[both, -1]))
-        _, groups = sparse.csgraph.connected_components(sparse.coo_matrix(pairs, shape=(count + 1, count + 1)), False)
+        graph = scipy.sparse.coo_matrix(pairs, shape=(count + 1, count + 1))
+        _, groups = scipy.sparse.csgraph.connected_components(graph, False)
         labels = np.where(labels > 0, groups[labels] + 1, 0)
     spanning = np.intersect1d(labels[0], labels[-1])
     return np.isin(labels, spanning[spanning > 0])
