@@ -161,6 +161,13 @@ def _report(add: Add) -> None:
     add("--out", metavar="FILE", type=Path, help="report (default: report.html in the first directory)")
 
 
+def _export(add: Add) -> None:
+    add("directory", metavar="OUT", type=values.results_path, help="output directory of a friction curve or a run")
+    text = "friction.csv with units (csv, the default), or friction.inp with a table *FRICTION (abaqus)"
+    add("--format", choices=("abaqus", "csv"), default="csv", help=text)
+    add("--out", metavar="FILE", type=Path, help="table (default: in the directory)")
+
+
 def _doctor(add: Add) -> None:
     add("--precision", choices=("double", "mixed"), default="double")
 
@@ -186,6 +193,7 @@ VERBS: dict[Callable[[argparse.Namespace], int], tuple[Callable[[Add], None], ..
     verbs.plot: (_plot,),
     **({verbs.leak: (_leak,)} if capabilities.has("leakage") else {}),
     verbs.report: (_report,),
+    verbs.export: (_export,),
     verbs.doctor: (_doctor,),
     verbs.manual: (_manual,),
     verbs.schema: (),

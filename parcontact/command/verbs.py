@@ -315,6 +315,16 @@ def report(options: argparse.Namespace) -> int:
     return DONE
 
 
+@ranks.root_alone
+def export(options: argparse.Namespace) -> int:
+    """Write friction, or leakage over the load, as a table for programs of finite elements."""
+    from ..results import export as exports
+
+    for line in exports.export_results(options.directory, options.format, options.out):
+        print(line)
+    return DONE
+
+
 def doctor(options: argparse.Namespace) -> int:
     """Check this installation: exact solutions, ranks, files and times."""
     world = ranks.start_ranks()

@@ -237,7 +237,7 @@ def draw_frames(
         fill(read(index))
         axes.set_title(f"{_words(name)}, {label}")
         if figure.get_layout_engine() is not None:  # the layout of the first frame is kept for all
-            style.lay_out(figure)
+            style.arrange(figure)
             figure.set_layout_engine(None)
         png = io.BytesIO()
         figure.savefig(png, format="png", dpi=dpi)

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..columns import MEASURES, PER_BRANCH, SWEEP, TABLES, names_of
 from ..errors import InputError
-from ..job import Job
+from ..job import Job, Zener
 from ..job.added_sections import answers
 from ..job.reading import CASES
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
@@ -144,6 +144,14 @@ class Results:
         if found is None:
             raise InputError(f"{self.path} has no run: it has neither {RESOLVED} nor {STEADY_RESOLVED}")
         return dict(yamltext.read_source(found, str(found)).data)
+
+    @property
+    def temperature(self) -> float:
+        """Temperature of the rubber [deg C], by the job or the reference of its shift; NaN without a shift."""
+        body = self.job.material.fitted if self.job else None
+        if not isinstance(body, Zener) or body.shift is None:
+            return math.nan
+        return body.shift.made.reference if body.temperature is None else body.temperature
 
     @property
     def free_area(self) -> float:

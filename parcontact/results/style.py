@@ -143,11 +143,11 @@ def set_height(figure: Figure, height: float) -> None:
     """
     figure.set_figheight(height)
     for _ in range(2):
-        lay_out(figure)
+        arrange(figure)
     figure.set_layout_engine(None)
 
 
-def lay_out(figure: Figure) -> None:
+def arrange(figure: Figure) -> None:
     """Set the positions of the axes of a figure by its layout engine, without drawing."""
     if (engine := figure.get_layout_engine()) is not None:
         engine.execute(figure)

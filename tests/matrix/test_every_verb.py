@@ -44,6 +44,7 @@ VERBS: dict[str, tuple[str, str]] = {  # verb: its words, and the file that it p
     "leak": ("{out}", "{out}/leak.csv"),
     "info": ("{out}", ""),
     "cite": ("{out}", ""),
+    "export": ("{out}", ""),
     "surface": ("{job} --out surface.png", "surface.png"),
     "fit": ("moduli.csv --job {job} --out compound.yaml", "compound.yaml"),
 }
@@ -54,6 +55,7 @@ REFUSED = {  # verb: what it refuses, and a part of the sentence
     "leak": dict.fromkeys(("curve", "bands", "sweep", "study"), "no output directory of a run")
     | dict.fromkeys(("stick", "heat"), "leakage needs the gap"),
     "cite": dict.fromkeys(("sweep", "study"), "has no run"),
+    "export": dict.fromkeys(("history", "sweep", "study", "adhesion", "stick", "heat"), "has no table for csv"),
     "surface": {"bands": "each with heights on a grid of its own", "sweep": "2 cases"},
     "fit": {"sweep": "2 cases"},
 }

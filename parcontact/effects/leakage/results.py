@@ -8,10 +8,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
 from ...printed import quantity, span, stated_error, with_error
+from ...results.export import ExportedTable
 from ...results.results import Results
 
 TABLE = "leak.csv"
 DATA = (TABLE,)  # tables of a run that a report keeps
+EXPORTED = {  # columns for other programs
+    "pressure": "pressure [Pa]",
+    **{f"flow_{axis}": f"conductivity K along {axis} [m^3]" for axis in "xy"},
+    **{f"error_{axis}": f"relative error of K along {axis} [-]" for axis in "xy"},
+}
 PICTURES = {"leak.png": "flow through the gap, and conductivity"}  # pictures of a run that a report shows
 Columns = Mapping[str, Sequence[float]]
 
@@ -89,6 +95,15 @@ def _describe_leak(columns: Columns, row: int) -> str:
     pressures = span(columns["low_pressure"][row], columns["high_pressure"][row], "Pa")
     leak = f"{columns['flow_rate'][row]:.3g} m³/s leak through the box between {pressures}"
     return f"{leak}, at t = {quantity(columns['time'][row], 's')} (errors: {said})"
+
+
+def exported(run: Results) -> list[ExportedTable]:
+    """Return the conductivities over the load for other programs, of equal loads the last; none without leak.csv."""
+    columns = run.read(TABLE)
+    names = [name for name in EXPORTED if name in columns]
+    rows = {columns["pressure"][k]: [columns[name][k] for name in names] for k in range(len(columns.get("time", ())))}
+    head = [EXPORTED[name] for name in names]
+    return [ExportedTable("conductivity", head, [rows[load] for load in sorted(rows)])] if rows else []
 
 
 def _describe_table(run: Results) -> Iterator[str]:

@@ -1,0 +1,71 @@
+"""Tables for other programs, from a made-up curve: order, units, what is left out, and why."""
+
+import csv
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+from parcontact import job
+from parcontact.errors import InputError
+from parcontact.results import export
+
+JOB = """
+grid: {points: 32, size: 1.0e-3}
+surface: {shape: wave, amplitude: 1.0e-6, waves: [1, 0]}
+material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e7, relaxation_time: 1.0e-4}], band: [50, 3000],
+  shift: {law: wlf, C1: 8.86, C2: 101.6, reference: 20}}
+steady: {velocities: [0.1, 1.0, 10], pressures: [1.0e5, 2.0e5], temperatures: [20, 40]}
+"""
+SHARE = 10 ** (-8.86 * 20.0 / (101.6 + 20.0))  # a_T at 40 C
+
+
+@pytest.fixture
+def curve(tmp_path: Path) -> Path:
+    """A curve whose points are not in order; the waves of 1 mm excite the speed over their length."""
+    (tmp_path / "job.yaml").write_text(JOB)
+    (tmp_path / "steady.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
+    points = list(product((10.0, 0.1, 1.0), (2e5, 1.0000000001e5), (40.0, 20.0)))[1:]  # one is not solved
+    rows = [
+        "velocity,pressure,temperature,friction,error_friction",
+        *(f"{v},{p},{t},{v * t},0.1" for v, p, t in points),
+    ]
+    (tmp_path / "steady.csv").write_text("\n".join([*rows, ""]))
+    return tmp_path
+
+
+def test_a_table_for_abaqus(curve: Path) -> None:
+    """The slip rate varies fastest, then the pressure, then the temperature."""
+    said = list(export.export_results(curve, "abaqus"))
+    lines = [line for line in (curve / "friction.inp").read_text().splitlines() if not line.startswith("**")]
+    rows = [tuple(map(float, line.split(", "))) for line in lines[1:]]
+    assert lines[0] == "*FRICTION"
+    assert [row[:0:-1] for row in rows] == sorted(row[:0:-1] for row in rows)
+    assert all(mu == pytest.approx(v * t) for mu, v, _, t in rows)
+    wanted = {(v, p, t) for v, p, t in product((0.1, 1.0, 10.0), (1e5, 2e5), (20.0, 40.0))} - {(10.0, 2e5, 40.0)}
+    reduced = {point: point[0] / 1e-3 * (SHARE if point[2] == 40.0 else 1.0) for point in wanted}
+    assert {row[1:] for row in rows} == {point for point, frequency in reduced.items() if 25.0 < frequency < 6000.0}
+    assert "points outside of the measured range of the rubber: " in said[1]
+    assert "not solved: 1 of 12 points are not solved yet" in said
+
+
+def test_a_table_with_units(curve: Path) -> None:
+    list(export.export_results(curve, "csv", curve / "table.csv"))
+    with (curve / "table.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == list(export.HEAD)
+    assert {row["pressure [Pa]"] for row in rows} == {"100000.0", "200000.0"}
+    with pytest.raises(InputError, match=r"must end in \.inp"):
+        list(export.export_results(curve, "abaqus", curve / "table.csv"))
+
+
+def test_leakage_over_the_load(tmp_path: Path) -> None:
+    """Of equal loads the last row counts."""
+    (tmp_path / "measures.csv").write_text("step\n0\n")
+    (tmp_path / "leak.csv").write_text("time,pressure,flow_x,flow_y\n0,2,5,6\n1,1,7,8\n2,2,3,4\n")
+    assert list(export.export_results(tmp_path, "csv")) == [f"conductivity: 2 rows in {tmp_path}/conductivity.csv"]
+    head, *rows = (tmp_path / "conductivity.csv").read_text().splitlines()
+    assert head == "pressure [Pa],conductivity K along x [m^3],conductivity K along y [m^3]"
+    assert rows == ["1.0,7.0,8.0", "2.0,3.0,4.0"]
+    with pytest.raises(InputError, match="has no table for abaqus"):
+        list(export.export_results(tmp_path, "abaqus"))
