@@ -7,6 +7,7 @@ temperatures are left out, and named. Capabilities export tables of runs.
 import math
 import textwrap
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -53,14 +54,19 @@ def export_results(directory: Path, form: str, out: Path | None = None) -> Itera
     for table in found:
         path = out or directory / f"{table.name}{SUFFIX[form]}"
         text = to_csv(table.head, table.rows) if form == "csv" else _to_abaqus(table)
-        first = text.partition("\n")[0].encode()
+        first = partial(_begins_with, text.partition("\n")[0].encode())
         try:
-            with files.replaced(path, lambda there, first=first: there.read_bytes().startswith(first)) as file:
+            with files.replaced(path, first) as file:
                 file.write(text.encode())
         except OSError as error:
             raise InputError(f"{path} cannot be written: {hdf5.reason(error)}") from error
         yield f"{table.name}: {len(table.rows)} rows in {path}"
         yield from table.sentences
+
+
+def _begins_with(first: bytes, path: Path) -> bool:
+    """Return True if a file begins with a line, as a table of this program does; raises OSError."""
+    return path.read_bytes().startswith(first)
 
 
 def _friction(directory: Path) -> ExportedTable:
