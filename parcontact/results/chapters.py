@@ -11,6 +11,7 @@ from ..job import Job
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..job.sections import listing
 from . import headline, log, material, origin, plots, result_sections, road_section
+from .curve_tables import compared_table
 from .page_parts import Chapter, ReportSection, ReportTable, draw_chart, embed_file
 from .results import Results, swept_keys
 
@@ -35,6 +36,8 @@ def describe_directory(directory: Path) -> Chapter:
     if not there:
         raise InputError(f"{directory} has no results: it has none of {', '.join(KINDS)}")
     sections = [KINDS[name][1](directory) for name in there]
+    if "steady.csv" in there:
+        sections.insert(0, result_sections.describe_friction(directory))
     found, title, cited, places = (
         log.read_logs(directory),
         "",
@@ -74,9 +77,9 @@ def compare_directories(directories: Sequence[Path]) -> Iterator[Chapter]:
     if len(directories) > 1:
         shared = plots.compare_charts(directories, least=2)
         if shared:
-            yield Chapter(
-                "Comparison", Path(), "", [ReportSection("Together", pictures=[draw_chart(one) for one in shared])]
-            )
+            tables = compared_table(directories, plots.name_directories(directories))
+            together = ReportSection("Together", tables=tables, pictures=[draw_chart(one) for one in shared])
+            yield Chapter("Comparison", Path(), "", [together])
 
 
 def _read_job(resolved: Path) -> tuple[Job, Sequence[str]]:

@@ -10,7 +10,7 @@ from ..job import Job
 from ..job.added_sections import answers
 from ..printed import quantity, stated_error, with_error
 from . import cycles, slide
-from .results import Results, read_cases
+from .results import PLACES, Results, describe_end, read_cases, swept_keys
 
 SWEPT = (  # results of a sweep, after those of capabilities: column, words, unit, column of the error
     ("mu_dyn", "the mean friction", "", "mu_dyn_error"),
@@ -19,6 +19,7 @@ SWEPT = (  # results of a sweep, after those of capabilities: column, words, uni
     (slide.CORRECTED, "the contact area over the nominal area", "", slide.ERRORS[1]),
 )
 
+SLIGHT = 1e-6  # rounding: relative difference below which loads count as constant
 Columns = Mapping[str, Sequence[float]]
 
 
@@ -34,12 +35,21 @@ def _run(directory: Path) -> str:
     job, columns = run.job, run.table
     if job is None or not columns["time"]:
         return ""
-    parts = [*_friction(job, columns)]
+    parts = [f"{text}{_describe_conditions(run)}" for text in _friction(job, columns)]
     for headline in answers("results", "headline"):
         parts += headline(run)
     if last := cycles.measure_last(job, columns):
         parts.append(f"the last cycle loses {quantity(last['loss'], 'J')} ± {stated_error(last['error_loss'])}")
     return _to_sentence([*parts, _area(job, run)])
+
+
+def _describe_conditions(run: Results) -> str:
+    """Return the load of a slide, if it is constant, and the temperature of the rubber, if it is known."""
+    pairs = zip(run.table["pressure"], run.table["distance"], strict=True)
+    loads = [pressure for pressure, slid in pairs if slid > 0.0]
+    constant = run.job is not None and max(loads) - min(loads) <= SLIGHT * max(loads)
+    load = f" under {_load(run.job, loads[-1])}" if run.job is not None and constant else ""
+    return load + ("" if math.isnan(run.temperature) else f" at {run.temperature:g} °C")
 
 
 def _friction(job: Job, columns: Columns) -> Iterator[str]:
@@ -84,14 +94,13 @@ def _size(job: Job, share: float, error: float) -> str:
 
 def _curve(directory: Path) -> str:
     """Return a sentence on the highest friction of a friction curve; '' without a point."""
-    columns = Results(directory, "curve").table
-    if not columns["velocity"]:
+    curve = Results(directory, "curve")
+    if not curve.table["velocity"]:
         return ""
-    best = max(range(len(columns["friction"])), key=columns["friction"].__getitem__)
-    friction, speed, pressure = (columns[name][best] for name in ("friction", "velocity", "pressure"))
-    highest = with_error(friction, friction * _error(columns, slide.ERRORS[0], best))
-    place = f"at {quantity(speed, 'm/s')} and {quantity(pressure, 'Pa')}"
-    return _to_sentence([f"the highest friction of the curve is {highest}, {place}"])
+    best = curve.highest()
+    friction = curve.table["friction"][best]
+    highest = with_error(friction, friction * _error(curve.table, slide.ERRORS[0], best))
+    return _to_sentence([f"the highest friction of the curve is {highest}, {curve.describe_place(best)}"])
 
 
 def _sweep(directory: Path) -> str:
@@ -101,7 +110,9 @@ def _sweep(directory: Path) -> str:
         known = sorted((row for row in rows if math.isfinite(row.get(name, math.nan))), key=itemgetter(name))
         if known and known[-1][name]:
             ends = [f"{_with_unit(row, name, unit, error)} (case {row['case']:g})" for row in (known[0], known[-1])]
-            return _to_sentence([f"{words} of the cases is from {ends[0]} to {ends[1]}"])
+            keys = [*swept_keys(rows), *(place for place in PLACES if place in rows[0])]
+            end = describe_end(known[-1], known, keys) if "friction" in words else ""
+            return _to_sentence([f"{words} of the cases is from {ends[0]} to {ends[1]}{end}"])
     return ""
 
 

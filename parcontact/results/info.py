@@ -15,6 +15,7 @@ from .. import capabilities
 from ..errors import InputError
 from ..job import Job
 from ..job.added_sections import answers
+from ..job.reading import CASES
 from ..parallel.slab import Slab
 from ..printed import quantity
 from ..storage import checkpoint, curve_points, fields, hdf5, marker
@@ -183,10 +184,9 @@ def _curve(found: Results) -> Iterator[str]:
     curve = Results(found.path, "curve")
     columns, claims = curve.table, curve.claims
     if speeds := columns["velocity"]:
-        best = int(np.argmax(columns["friction"]))
-        place = curve_points.Wanted(speeds[best], columns["pressure"][best])
+        best = curve.highest()
         yield f"  friction curve: {len(speeds)} points from {min(speeds):.4g} to {max(speeds):.4g} m/s"
-        yield f"  largest friction of the curve: {columns['friction'][best]:.4g} at {place}"
+        yield f"  largest friction of the curve: {columns['friction'][best]:.4g} {curve.describe_place(best)}"
         errors = {name: max(known, default=math.nan) for name, known in curve.errors.items()}
         if errors:
             parts = ", ".join(f"{name.removeprefix('error_')} {100 * value:.3g} %" for name, value in errors.items())
@@ -196,6 +196,7 @@ def _curve(found: Results) -> Iterator[str]:
         yield from (f"  warning: {text}" for text in warnings_of(curve.path / curve_points.LOG))
     if curve.lost:
         yield f"  the curve has {curve.lost}"
+    yield from (f"  {text}" for text in curve.unfinished if text != curve.lost)
 
 
 def _accuracy_text(accuracy: Any) -> str:
@@ -222,7 +223,21 @@ def _sweep(found: Results) -> Iterator[str]:
     states = Counter(str(row["state"]) for row in rows)
     counts = ", ".join(f"{number} {'not begun' if state == '-' else state}" for state, number in states.items())
     yield f"  sweep of {states.total()} cases: {counts}"
+    yield from _describe_running(found)
     yield from (f"  {text}" for text in found.failed_cases(SHOWN))
+
+
+def _describe_running(sweep: Results) -> Iterator[str]:
+    """Yield how far the cases of a sweep are that have begun and are not finished, and the time that is left."""
+    open_cases = [int(row["case"]) for row in sweep.cases if row["state"] in ("-", "begun")]
+    for number in open_cases:
+        case = Results(sweep.path / CASES / f"{number:03d}")
+        if case.progress:
+            yield f"  case {number}: {case.progress}"
+    known = [row["seconds"] for row in sweep.cases if row["state"] == "done" and row.get("seconds", math.nan) > 0.0]
+    if open_cases and known:
+        left = len(open_cases) * sum(known) / len(known)
+        yield f"  {len(open_cases)} cases to go: {quantity(left, 's', 2)}, one after the other, if they take as long"
 
 
 def _study(found: Results) -> Iterator[str]:

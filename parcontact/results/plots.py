@@ -155,7 +155,7 @@ def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figur
     for directory in directories:
         if not _find_charts(directory, options):
             raise InputError(f"{directory} has nothing to compare")
-    lost = zip(_name_directories(directories), (Results(one).lost for one in directories), strict=True)
+    lost = zip(name_directories(directories), (Results(one).lost for one in directories), strict=True)
     title = "\n".join(dict.fromkeys(f"{name}: {text}" for name, text in lost if text))
     return style.figure_of(title, options.group(compare_charts(directories, options)))
 
@@ -163,7 +163,7 @@ def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figur
 def compare_charts(directories: Sequence[Path], options: PlotOptions = PlotOptions(), least: int = 1) -> list[Chart]:
     """Return the charts that at least `least` directories have, with the lines of all."""
     found = [_find_charts(directory, options) for directory in directories]
-    return charts.compare([each for each in zip(_name_directories(directories), found, strict=True) if each[1]], least)
+    return charts.compare([each for each in zip(name_directories(directories), found, strict=True) if each[1]], least)
 
 
 def _find_charts(directory: Path, options: PlotOptions) -> list[Chart]:
@@ -175,7 +175,7 @@ def _find_charts(directory: Path, options: PlotOptions) -> list[Chart]:
     return found
 
 
-def _name_directories(directories: Sequence[Path]) -> list[str]:
+def name_directories(directories: Sequence[Path]) -> list[str]:
     """Return labels of directories: the swept keys of cases of one sweep, else the last parts of paths that differ."""
     if named := _name_cases(directories):
         return named

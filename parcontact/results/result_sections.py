@@ -29,6 +29,7 @@ from . import (
     theory_comparison,
     theory_settings,
 )
+from .curve_tables import friction_tables, scales_table
 from .page_parts import RC, Browser, ReportSection, ReportTable, draw_chart, to_uri
 from .plotted_run import Fields, PlottedRun, choose_evenly, label_frames, to_load
 from .results import MAPS, STATES, Results, read_cases
@@ -94,8 +95,16 @@ def describe_curve(directory: Path) -> ReportSection:
     pictures = [draw_chart(chart) for chart in curve_charts.chart_steady(directory)]
     states = partial(_label_states, curve.free_area)
     browsers = _browse_file(curve, STATES, states, curve.job) if curve.job else []
+    return ReportSection("Friction curve", (), [table, *_list_main_bands(curve)], pictures, browsers)
+
+
+def describe_friction(directory: Path) -> ReportSection:
+    """Return the first section on a friction curve: friction over speed and temperature, what is not solved and why,
+    and the lengths, frequencies and moduli that matter."""
+    curve = Results(directory, "curve")
     sentences = [f"The curve has {curve.lost}."] if curve.lost else []
-    return ReportSection("Friction curve", sentences, [table, *_list_main_bands(curve)], pictures, browsers)
+    sentences += [f"{text[:1].upper()}{text[1:]}." for text in curve.unfinished if text != curve.lost]
+    return ReportSection("Friction", sentences, [*friction_tables(curve), *scales_table(curve)])
 
 
 def _list_main_bands(curve: Results) -> list[ReportTable]:

@@ -26,6 +26,7 @@ from ..job.reading import CASES
 from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
 from ..job.text import yamltext
 from ..parallel.slab import Array
+from ..printed import quantity
 from ..storage import curve_points, fields, hdf5, lost_points, marker, read_back
 from ..storage.marker import Claim
 from ..storage.tables import Columns
@@ -310,6 +311,53 @@ class Results:
         steps = "step", np.array(self.table["step"], dtype=int), units["step"]
         rows = {name: value for name, value in columns.items() if name not in ("step", "time")}
         return maps.assign_coords(step=steps, time=columns["time"]).assign(rows)
+
+    @property
+    def progress(self) -> str:
+        """How far a run or a curve is, as text; '' before its first row."""
+        job = self.job
+        if self.kind == "run" and job is not None and self.table["time"]:
+            whole = sum(stage.seconds for stage in job.history)
+            share = f" of {quantity(whole, 's')}" if whole else ""
+            return f"step {self.table['step'][-1]:g}, t = {quantity(self.table['time'][-1], 's')}{share}"
+        if self.kind == "curve":
+            return "; ".join([f"{len(self.table['velocity'])} points", *self.unfinished])
+        return ""
+
+    def highest(self) -> int:
+        """Return the row of the highest friction of a curve with points."""
+        return max(range(len(self.table["friction"])), key=self.table["friction"].__getitem__)
+
+    def describe_place(self, row: int) -> str:
+        """Return speed, pressure and known temperature of a point of a curve as text, and whether the curve still rises
+        there at the end of its velocities."""
+        columns = self.table
+        places = [
+            {name: columns[name][k] for name in PLACES if name in columns} for k in range(len(columns["velocity"]))
+        ]
+        at = places[row]
+        degrees = at.get("temperature", math.nan)
+        degrees = self.temperature if math.isnan(degrees) else degrees
+        warm = "" if math.isnan(degrees) else f", {degrees:g} °C"
+        same = [one for one in places if all(_close(one[name], at[name]) for name in at if name != "velocity")]
+        end = describe_end(at, same, ["velocity"])
+        return f"at {quantity(at['velocity'], 'm/s')} and {quantity(at['pressure'], 'Pa')}{warm}{end}"
+
+
+def _close(one: float, other: float) -> bool:
+    return math.isclose(one, other, rel_tol=1e-6) or (math.isnan(one) and math.isnan(other))
+
+
+def describe_end(best: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:
+    """Return a text that friction still rises where the row of the highest friction is at the end of at least three
+    values of a key; else ''."""
+    found = dict[str, None]()
+    for key in keys:
+        values = sorted({row[key] for row in rows if isinstance(row[key], float) and row[key] == row[key]})
+        if len(values) > 2 and best[key] in (values[0], values[-1]):
+            end = "highest" if best[key] == values[-1] else "lowest"
+            found[f"the {end} {key.split('.')[-1].replace('_', ' ')}"] = None
+    return f"; it still rises at {' and '.join(found)}" if found else ""
 
 
 def read_cases(path: Path) -> Rows:

@@ -1,4 +1,4 @@
-"""Tables for other programs, from a made-up curve: order, units, what is left out, and why."""
+"""Tables for other programs and for reports, from a made-up curve, and how far a sweep is."""
 
 import csv
 from itertools import product
@@ -8,7 +8,8 @@ import pytest
 
 from parcontact import job
 from parcontact.errors import InputError
-from parcontact.results import export
+from parcontact.results import curve_tables, export, headline, info
+from parcontact.results.results import Results
 
 JOB = """
 grid: {points: 32, size: 1.0e-3}
@@ -69,3 +70,47 @@ def test_leakage_over_the_load(tmp_path: Path) -> None:
     assert rows == ["1.0,7.0,8.0", "2.0,3.0,4.0"]
     with pytest.raises(InputError, match="has no table for abaqus"):
         list(export.export_results(tmp_path, "abaqus"))
+
+
+# -- the first tables of a report ------------------------------------------------------------------------------------
+
+
+def test_friction_over_speed_and_temperature(curve: Path) -> None:
+    """A table for each pressure; a point that is lost is named, one that is to come is a dash."""
+    lost = '[{"velocity": 0.1, "pressure": 3e5, "temperature": 20, "why": "no"}]'
+    (curve / "steady.lost.json").write_text(lost)
+    tables = curve_tables.friction_tables(Results(curve, "curve"))
+    assert [table.caption for table in tables] == [f"friction under {p} kPa" for p in (100, 200, 300)]
+    assert all(list(table.head) == ["velocity", "at 20 °C", "at 40 °C"] for table in tables)
+    assert list(tables[0].rows[0]) == ["100 mm/s", "2.00 ± 0.20", "4.00 ± 0.40"]
+    assert list(tables[1].rows[2]) == ["10 m/s", "200 ± 20", "–"]
+    assert list(tables[2].rows[0]) == ["100 mm/s", "not solved", "–"]
+    scales = {row[0]: row[1] for row in curve_tables.scales_table(Results(curve, "curve"))[0].rows}
+    assert scales["frequencies that the job excites at 40 °C"] == "100 Hz to 10 kHz"
+    assert scales["measured frequencies, at the reference temperature"] == "50 Hz to 3 kHz"
+    (compared,) = curve_tables.compared_table([curve, curve], ["soft", "hard"])
+    assert list(compared.head) == ["velocity", "pressure", "temperature", "soft", "hard"]
+    assert list(compared.rows[0]) == ["100 mm/s", "100 kPa", "20 °C", "2.00 ± 0.20", "2.00 ± 0.20"]
+
+
+def test_a_headline_names_the_conditions_and_that_friction_still_rises(curve: Path) -> None:
+    said = headline.find_headline(curve)
+    assert said.endswith("is 400 ± 40, at 10 m/s and 100 kPa, 40 °C; it still rises at the highest velocity.")
+    assert Results(curve, "curve").unfinished == ["1 of 12 points are not solved yet"]
+
+
+def test_how_far_a_running_sweep_is(curve: Path) -> None:
+    """Case 1 runs; the others take 20 s each."""
+    home = curve / "sweep"
+    (home / "cases" / "001").mkdir(parents=True)
+    text = JOB.partition("steady:")[0] + "history: [{pressure: 1.0e5, duration: 2.0, time_step: 0.1}]\n"
+    (home / "job.yaml").write_text(text)
+    (home / "cases" / "001" / "job.resolved.yaml").write_text(job.load(home / "job.yaml").resolved())
+    (home / "cases" / "001" / "measures.csv").write_text("step,time\n0,0\n1,0.5\n")
+    rows = [f"{k},{k + 1.0},-,," if k % 2 else f"{k},{k + 1.0},done,{k + 1},20" for k in range(5)]
+    (home / "sweep.csv").write_text("\n".join(["case,history.0.velocity,state,mu_dyn,seconds", *rows, ""]))
+    said, sound = info.describe_path(home)
+    assert sound
+    assert "case 1: step 1, t = 500 ms of 2 s" in said
+    assert "2 cases to go: 40 s" in said
+    assert headline.find_headline(home).endswith("to 5 (case 4); it still rises at the highest velocity.")

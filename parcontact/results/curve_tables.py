@@ -1,0 +1,116 @@
+"""Tables of friction curves for reports: friction over speed and temperature under each pressure, of one curve or of
+several side by side, and the lengths, frequencies and moduli that matter."""
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from ..bands.choice import cut_bands, on_one_grid_of_all
+from ..effects.relaxation import relaxation_of
+from ..errors import InputError
+from ..job import Job, load
+from ..physics.prony import complex_modulus
+from ..printed import quantity, with_error
+from ..scene.measured_range import excited_bands
+from ..storage import lost_points
+from .page_parts import ReportTable
+from .results import Results
+
+MOST = 60  # most rows of a table
+DIGITS = 6  # significant digits of speeds, pressures and temperatures that count as equal
+Place = tuple[float, float, float]  # speed [m/s], pressure [Pa], temperature [deg C] (NaN: not known)
+
+
+def friction_tables(curve: Results) -> list[ReportTable]:
+    """Return a table for each pressure, with a row for each speed and a column for each temperature."""
+    cells = {_round(one.at, curve.temperature): "not solved" for one in lost_points.read(curve.path)}
+    cells = _cells(curve) | cells
+    degrees, found = list(dict.fromkeys(place[2] for place in sorted(cells, key=_order))), []
+    for pressure in dict.fromkeys(place[1] for place in sorted(cells, key=_order)):
+        speeds = sorted({place[0] for place in cells if place[1] == pressure})
+        rows = [
+            [quantity(speed, "m/s"), *(cells.get((speed, pressure, each), "–") for each in degrees)] for speed in speeds
+        ]
+        head = ["velocity", *(f"at {each:g} °C" if each > -math.inf else "friction" for each in degrees)]
+        found.append(ReportTable(head, rows[:MOST], f"friction under {quantity(pressure, 'Pa')}"))
+    return found
+
+
+def compared_table(directories: Sequence[Path], names: Sequence[str]) -> list[ReportTable]:
+    """Return a table of the friction of several curves at the points that at least two have; none without any."""
+    each = [_cells(Results(one, "curve")) if Results(one).has("steady.csv") else {} for one in directories]
+    places = sorted({place for cells in each for place in cells}, key=_order)
+    shared = [place for place in places if sum(place in cells for cells in each) > 1]
+    warm = any(place[2] > -math.inf for place in shared)
+    rows = []
+    for speed, pressure, degrees in shared[:MOST]:
+        at = [quantity(speed, "m/s"), quantity(pressure, "Pa"), *([f"{degrees:g} °C"] if warm else [])]
+        rows.append([*at, *(cells.get((speed, pressure, degrees), "–") for cells in each)])
+    head = ["velocity", "pressure", *(["temperature"] if warm else []), *names]
+    more = f", the first {MOST} of {len(shared)} points" if len(shared) > MOST else ""
+    return [ReportTable(head, rows, f"friction side by side{more}")] if rows else []
+
+
+def _cells(curve: Results) -> dict[Place, str]:
+    """Return the friction with its error at each point of a curve."""
+    columns = curve.table
+    count = len(columns["friction"])
+    degrees, errors = (columns.get(name, [math.nan] * count) for name in ("temperature", "error_friction"))
+    found = zip(columns["velocity"], columns["pressure"], degrees, columns["friction"], errors, strict=True)
+    return {_round(place, curve.temperature): with_error(mu, mu * error) for *place, mu, error in found}
+
+
+def _round(place: Sequence[float], given: float) -> Place:
+    """Return a point with values that count as equal as equal numbers; a temperature that is not known is -infinity."""
+    speed, pressure, degrees = (float(f"{value:.{DIGITS}g}") for value in place)
+    degrees = given if math.isnan(degrees) else degrees
+    return speed, pressure, -math.inf if math.isnan(degrees) else degrees
+
+
+def _order(place: Place) -> tuple[float, float, float]:
+    speed, pressure, degrees = place
+    return degrees, pressure, speed
+
+
+def scales_table(curve: Results) -> list[ReportTable]:
+    """Return the lengths, frequencies and moduli that matter for a curve; none if the files of its job no longer
+    exist."""
+    if (path := curve.job_file) is None:
+        return []
+    with suppress(InputError):
+        job = load(path)
+        rows = [*_lengths(job)]
+        whole = on_one_grid_of_all(job, cut_bands(job)) if job.bands is not None else job
+        for one in excited_bands(whole, (job.steady.temperatures if job.steady else None) or ()):
+            body = whole if one.temperature is None else whole.at_temperature(one.temperature)
+            at = "" if one.temperature is None else f" at {one.temperature:g} °C"
+            rows.append((f"frequencies that the job excites{at}", _span(one.band, "Hz")))
+            rows.append((f"shear moduli |G| at these frequencies{at}", _span(_moduli(body, one.band), "Pa")))
+        if (measured := getattr(job.material.fitted, "band", None)) is not None:
+            rows.append(("measured frequencies, at the reference temperature", _span(measured, "Hz")))
+        return [ReportTable(("what matters", "range"), rows, "lengths, frequencies and moduli")]
+    return []
+
+
+def _lengths(job: Job) -> list[tuple[str, str]]:
+    if job.bands is not None:
+        ends = cut_bands(job).spectrum.ends
+        return [("waves of the surface", _span((2 * math.pi / ends[0], 2 * math.pi / ends[1]), "m"))]
+    waves = [(part.long_wavelength, part.short_wavelength) for part in job.surface if hasattr(part, "long_wavelength")]
+    rows = [("waves of the surface", _span(each, "m")) for each in waves if all(each)]
+    return [*rows, ("cell of the grid", quantity(max(job.grid.dx, job.grid.dy), "m"))]
+
+
+def _moduli(job: Job, band: tuple[float, float]) -> tuple[float, float]:
+    """Return the magnitude of the shear modulus [Pa] at both ends of a band of frequencies [Hz]."""
+    series = relaxation_of(job.material)
+    omega = 2 * math.pi * np.array(band)
+    low, high = np.abs(complex_modulus(omega, series.modulus_inf, series.moduli, series.relaxation_times)).tolist()
+    return low, high
+
+
+def _span(ends: Sequence[float], unit: str) -> str:
+    return " to ".join(quantity(end, unit) for end in ends)
