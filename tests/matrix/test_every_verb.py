@@ -37,6 +37,7 @@ MODULI = "frequency [Hz],storage modulus [MPa],loss modulus [MPa]\n" + "".join(
     f"{f},{1.0 + f**2 / (1.0 + f**2)},{0.05 + f / (1.0 + f**2)}\n" for f in (0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0)
 )
 VERBS: dict[str, tuple[str, str]] = {  # verb: its words, and the file that it promises, if it is always the same one
+    "export": ("{out}", ""),  # before leak, whose table it exports
     "report": ("{out}", "{out}/report.html"),
     "plot": ("{out}", ""),
     "theory": ("{job} --out theory", "theory/**/*theory.csv"),
@@ -44,7 +45,6 @@ VERBS: dict[str, tuple[str, str]] = {  # verb: its words, and the file that it p
     "leak": ("{out}", "{out}/leak.csv"),
     "info": ("{out}", ""),
     "cite": ("{out}", ""),
-    "export": ("{out}", ""),
     "surface": ("{job} --out surface.png", "surface.png"),
     "fit": ("moduli.csv --job {job} --out compound.yaml", "compound.yaml"),
 }
