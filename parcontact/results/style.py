@@ -149,7 +149,7 @@ def set_height(figure: Figure, height: float) -> None:
 
 def arrange(figure: Figure) -> None:
     """Set the positions of the axes of a figure by its layout engine, without drawing."""
-    if (engine := figure.get_layout_engine()) is not None:
+    if figure.axes and (engine := figure.get_layout_engine()) is not None:
         engine.execute(figure)
 
 
