@@ -9,7 +9,6 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..columns import to_csv
@@ -21,22 +20,13 @@ from ..scene.measured_range import doubt_band
 from ..storage import curve_points, files, hdf5
 from ..storage.curve_points import Wanted
 from ..storage.provenance import PROGRAM
-from .results import Results
+from .results import ExportedTable, Results
 
 HEAD = ("friction [-]", "slip rate [m/s]", "pressure [Pa]", "temperature [deg C]", "relative error [-]")
 SUFFIX = {"csv": ".csv", "abaqus": ".inp"}
 WIDTH = 76  # letters in a line of a comment
 SHOWN = 4  # tuning: most points of one reason in a sentence
 OUTSIDE = ("frequencies", "temperatures")  # kinds of warnings for which a point is left out
-
-
-class ExportedTable(NamedTuple):
-    """A table with the stem of the name of its file, its columns with units, and sentences on what it lacks."""
-
-    name: str
-    head: Sequence[str]
-    rows: Sequence[Sequence[float]]
-    sentences: Sequence[str] = ()
 
 
 def export_results(directory: Path, form: str, out: Path | None = None) -> Iterator[str]:

@@ -13,7 +13,7 @@ from contextlib import suppress
 from functools import cached_property
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -390,3 +390,12 @@ def swept_keys(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the swept keys in the rows of a table of a sweep."""
     names = list(rows[0]) if rows else ["case", "state"]
     return names[1 : names.index("state")]
+
+
+class ExportedTable(NamedTuple):
+    """A table with the stem of the name of its file, its columns with units, and sentences on what it lacks."""
+
+    name: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[float]]
+    sentences: Sequence[str] = ()

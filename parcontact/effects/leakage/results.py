@@ -8,8 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
 from ...printed import quantity, span, stated_error, with_error
-from ...results.export import ExportedTable
-from ...results.results import Results
+from ...results.results import ExportedTable, Results
 
 TABLE = "leak.csv"
 DATA = (TABLE,)  # tables of a run that a report keeps
