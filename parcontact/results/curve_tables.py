@@ -99,8 +99,8 @@ def _lengths(job: Job) -> list[tuple[str, str]]:
     if job.bands is not None:
         ends = cut_bands(job).spectrum.ends
         return [("waves of the surface", _span((2 * math.pi / ends[0], 2 * math.pi / ends[1]), "m"))]
-    waves = [(part.long_wavelength, part.short_wavelength) for part in job.surface if hasattr(part, "long_wavelength")]
-    rows = [("waves of the surface", _span(each, "m")) for each in waves if all(each)]
+    waves = ([getattr(part, f"{end}_wavelength", None) for end in ("long", "short")] for part in job.surface)
+    rows = [("waves of the surface", _span([end for end in each if end], "m")) for each in waves if all(each)]
     return [*rows, ("cell of the grid", quantity(max(job.grid.dx, job.grid.dy), "m"))]
 
 

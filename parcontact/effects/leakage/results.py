@@ -100,7 +100,8 @@ def exported(run: Results) -> list[ExportedTable]:
     """Return the conductivities over the load for other programs, of equal loads the last; none without leak.csv."""
     columns = run.read(TABLE)
     names = [name for name in EXPORTED if name in columns]
-    rows = {columns["pressure"][k]: [columns[name][k] for name in names] for k in range(len(columns.get("time", ())))}
+    loads = [float(f"{load:.9g}") for load in columns.get("pressure", ())]  # without rounding errors
+    rows = {load: [load, *(columns[name][k] for name in names[1:])] for k, load in enumerate(loads)}
     head = [EXPORTED[name] for name in names]
     return [ExportedTable("conductivity", head, [rows[load] for load in sorted(rows)])] if rows else []
 
