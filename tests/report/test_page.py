@@ -128,7 +128,7 @@ def test_curve_and_run_together(tmp_path: Path) -> None:
     out = ran(tmp_path, WAVE + ZENER + SLIDE)
     found = Page(page.write_report([steady, out], tmp_path / "both.html").read_text())
     check(found)
-    assert found.headings == ["Friction curve", *COMMON, "Results of the run", *COMMON]
+    assert found.headings == ["Friction", "Friction curve", *COMMON, "Results of the run", *COMMON]
     assert "1 m/s, 1 kPa, 40 °C" in found.text
     assert "decades above the measured 1 to 2 Hz: moduli are an extrapolation there" in found.text
     for cell in ("at the worst point", "40 °C", "0.0215", "70.7 Hz to 707 Hz", "1.52 Hz to 15.2 Hz"):
@@ -173,7 +173,10 @@ def test_two_curves_together(tmp_path: Path) -> None:
         paths.append(tmp_path / name)
     found = Page(page.write_report(paths).read_text())
     check(found)
-    assert found.headings == ["Together", *2 * ["Friction curve", "Provenance", "References to cite", "Data"]]
+    assert found.headings == [
+        "Together",
+        *2 * ["Friction", "Friction curve", "Provenance", "References to cite", "Data"],
+    ]
     assert len(found.pictures) == 2 + 2 * 2
 
 
