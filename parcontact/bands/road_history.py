@@ -94,7 +94,9 @@ class RoadHistory(RoadSliding):
         fastest = max((abs(speed) for speed in self._speeds()), default=0.0)
         self._cascade.press((fastest, 0.0), self.pressure)
         self._hard = copy.copy(self._cascade)
-        self._hard.ladders = [PressureLadder(np.array(halved(ladder.rungs))) for ladder in self._cascade.ladders]
+        self._hard.ladders = [
+            PressureLadder(np.array(halved(ladder.rungs.tolist()))) for ladder in self._cascade.ladders
+        ]
         bands = [self._cascade.band(number, 0) for number in range(self.cut.count)]
         self._clocks = [BandClock(band.setup.job, band.parts) for band in bands]
         self.samples = range(self.cut.samples or FEWEST)
@@ -165,7 +167,7 @@ class RoadHistory(RoadSliding):
                 of_band = self._cascade, number, self._clocks[number]
                 laws[sample] = ClosingOverTime(*of_band, approaches, laws[sample]) if number else None
             finest = number + 1 == self.cut.count
-            walls.append(halved(self._tracks[number, 0]) if finest else list(tracks))
+            walls.append(list(halved(self._tracks[number, 0]) if finest else tracks))
             if number == 1:
                 self._closings = dict(laws)
         self._on_walls = walls[::-1]
@@ -175,10 +177,8 @@ class RoadHistory(RoadSliding):
         found, size = list[Rung](), self.slab.comm.size
         solve = partial(self._march_alone, laws)
         for first in range(0, len(tasks), size):
-            now = tasks[first : first + size]
+            now, self._lacking = tasks[first : first + size], 0
             states = [("history", tuple(task)) for task in now]
-
-            self._lacking = 0
 
             def share(lacking: Sequence[int], now: Sequence[RungTask] = now) -> list[Rung]:
                 self._lacking = len(lacking)
