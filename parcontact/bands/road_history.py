@@ -20,6 +20,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from ..effects.relaxation import relaxation_of
+from ..errors import RunError
 from ..job import Job
 from ..parallel.slab import Array, Slab
 from ..physics.measures import Measures
@@ -198,7 +199,11 @@ class RoadHistory(RoadSliding):
         below = cascade.ladders[task.band + 1] if task.band + 1 < self.cut.count else None
         finer, clock = None if task.hard else laws[task.sample], self._clocks[task.band]
         pressure = float(cascade.ladders[task.band].rungs[task.rung])
-        return self._marches[key].march(pressure, finer.law if finer else None, clock.place, below)
+        try:
+            return self._marches[key].march(pressure, finer.law if finer else None, clock.place, below)
+        except RunError as error:
+            long, short = self.cut.wavelengths(task.band)
+            raise RunError(f"band from {long:.3g} to {short:.3g} m under {pressure:.3g} Pa: {error}") from error
 
     # -- rows ---------------------------------------------------------------------------------------------------------
 
@@ -207,13 +212,15 @@ class RoadHistory(RoadSliding):
         start = slid = 0.0
         for number, stage in enumerate(self.job.history):
             velocity = stage.velocity[0]
-            if number == 0 and self.job.initial.state == "steady":
+            steady = number == 0 and self.job.initial.state == "steady"
+            if steady:
                 yield Instant(Place(0, BEFORE), 0.0, 0.0, self.job.initial.velocity[0])
-            elif number == 0 or stage.seconds == 0.0:
+            if stage.seconds == 0.0 or (number == 0 and not steady):
                 yield Instant(Place(number, 0.0), start, slid, velocity)
             if stage.seconds:
                 first = EARLIEST * self._cell / abs(velocity) if velocity else rest_step(self.job, stage)
-                for elapsed in np.geomspace(min(first, stage.seconds), stage.seconds, INSTANTS).tolist():
+                count = INSTANTS if first < stage.seconds else 1
+                for elapsed in np.geomspace(stage.seconds, first, count)[::-1].tolist():
                     yield Instant(Place(number, elapsed), start + elapsed, slid + abs(velocity) * elapsed, velocity)
             start, slid = start + stage.seconds, slid + stage.seconds * abs(velocity)
 
@@ -225,14 +232,16 @@ class RoadHistory(RoadSliding):
         for step, instant in enumerate(self.instants(), int(virgin)):
             way = math.copysign(1.0, instant.velocity) if instant.velocity else way
             point = self._point_at(instant, way)
-            measures = replace(point.measures, friction=abs(point.measures.friction))
+            whole = point.measures.friction  # along the motion; negative after a reversal
+            measures, rubbed = replace(point.measures, friction=abs(whole)), point.measures.friction_interface
+            rubbed = math.copysign(rubbed, whole)
             row = StepRow(
                 *(step, instant.time, instant.distance, measures),
                 certificate=point.certificate,
                 operator_calls=round(point.operator_calls),
                 seconds=point.seconds,
                 errors=point.errors,
-                added=(measures.friction - measures.friction_interface, measures.friction_interface),
+                added=(measures.friction - rubbed, rubbed),
             )
             yield row, self._rows(point, [instant.time, instant.distance])
 
