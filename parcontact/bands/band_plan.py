@@ -41,9 +41,9 @@ def _plan_history(job: Job, slab: Slab) -> Iterator[str]:
     road = RoadHistory(job, slab)
     yield from road.notes()
     tasks, steps = road.tasks(), road.steps()
-    began = time.perf_counter()
+    began = time.process_time()
     road.try_march()
-    each = slab.agree((time.perf_counter() - began) / steps[-1])
+    each = slab.agree((time.process_time() - began) / steps[-1])
     for of_band in tasks:
         number = of_band[0].band
         long, short = road.cut.wavelengths(number)

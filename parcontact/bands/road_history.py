@@ -20,6 +20,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from ..effects.relaxation import relaxation_of
+from ..errors import RunError
 from ..job import Job
 from ..parallel.slab import Array, Slab
 from ..physics.measures import Measures
@@ -94,7 +95,9 @@ class RoadHistory(RoadSliding):
         fastest = max((abs(speed) for speed in self._speeds()), default=0.0)
         self._cascade.press((fastest, 0.0), self.pressure)
         self._hard = copy.copy(self._cascade)
-        self._hard.ladders = [PressureLadder(np.array(halved(ladder.rungs))) for ladder in self._cascade.ladders]
+        self._hard.ladders = [
+            PressureLadder(np.array(halved(ladder.rungs.tolist()))) for ladder in self._cascade.ladders
+        ]
         bands = [self._cascade.band(number, 0) for number in range(self.cut.count)]
         self._clocks = [BandClock(band.setup.job, band.parts) for band in bands]
         self.samples = range(self.cut.samples or FEWEST)
@@ -165,7 +168,7 @@ class RoadHistory(RoadSliding):
                 of_band = self._cascade, number, self._clocks[number]
                 laws[sample] = ClosingOverTime(*of_band, approaches, laws[sample]) if number else None
             finest = number + 1 == self.cut.count
-            walls.append(halved(self._tracks[number, 0]) if finest else list(tracks))
+            walls.append(list(halved(self._tracks[number, 0]) if finest else tracks))
             if number == 1:
                 self._closings = dict(laws)
         self._on_walls = walls[::-1]
@@ -175,10 +178,8 @@ class RoadHistory(RoadSliding):
         found, size = list[Rung](), self.slab.comm.size
         solve = partial(self._march_alone, laws)
         for first in range(0, len(tasks), size):
-            now = tasks[first : first + size]
+            now, self._lacking = tasks[first : first + size], 0
             states = [("history", tuple(task)) for task in now]
-
-            self._lacking = 0
 
             def share(lacking: Sequence[int], now: Sequence[RungTask] = now) -> list[Rung]:
                 self._lacking = len(lacking)
@@ -198,7 +199,11 @@ class RoadHistory(RoadSliding):
         below = cascade.ladders[task.band + 1] if task.band + 1 < self.cut.count else None
         finer, clock = None if task.hard else laws[task.sample], self._clocks[task.band]
         pressure = float(cascade.ladders[task.band].rungs[task.rung])
-        return self._marches[key].march(pressure, finer.law if finer else None, clock.place, below)
+        try:
+            return self._marches[key].march(pressure, finer.law if finer else None, clock.place, below)
+        except RunError as error:
+            long, short = self.cut.wavelengths(task.band)
+            raise RunError(f"band from {long:.3g} to {short:.3g} m under {pressure:.3g} Pa: {error}") from error
 
     # -- rows ---------------------------------------------------------------------------------------------------------
 
@@ -207,13 +212,15 @@ class RoadHistory(RoadSliding):
         start = slid = 0.0
         for number, stage in enumerate(self.job.history):
             velocity = stage.velocity[0]
-            if number == 0 and self.job.initial.state == "steady":
+            steady = number == 0 and self.job.initial.state == "steady"
+            if steady:
                 yield Instant(Place(0, BEFORE), 0.0, 0.0, self.job.initial.velocity[0])
-            elif number == 0 or stage.seconds == 0.0:
+            if stage.seconds == 0.0 or (number == 0 and not steady):
                 yield Instant(Place(number, 0.0), start, slid, velocity)
             if stage.seconds:
                 first = EARLIEST * self._cell / abs(velocity) if velocity else rest_step(self.job, stage)
-                for elapsed in np.geomspace(min(first, stage.seconds), stage.seconds, INSTANTS).tolist():
+                count = INSTANTS if first < stage.seconds else 1
+                for elapsed in np.geomspace(stage.seconds, first, count)[::-1].tolist():
                     yield Instant(Place(number, elapsed), start + elapsed, slid + abs(velocity) * elapsed, velocity)
             start, slid = start + stage.seconds, slid + stage.seconds * abs(velocity)
 
@@ -225,14 +232,16 @@ class RoadHistory(RoadSliding):
         for step, instant in enumerate(self.instants(), int(virgin)):
             way = math.copysign(1.0, instant.velocity) if instant.velocity else way
             point = self._point_at(instant, way)
-            measures = replace(point.measures, friction=abs(point.measures.friction))
+            whole = point.measures.friction  # along the motion; negative after a reversal
+            measures, rubbed = replace(point.measures, friction=abs(whole)), point.measures.friction_interface
+            rubbed = math.copysign(rubbed, whole)
             row = StepRow(
                 *(step, instant.time, instant.distance, measures),
                 certificate=point.certificate,
                 operator_calls=round(point.operator_calls),
                 seconds=point.seconds,
                 errors=point.errors,
-                added=(measures.friction - measures.friction_interface, measures.friction_interface),
+                added=(measures.friction - rubbed, rubbed),
             )
             yield row, self._rows(point, [instant.time, instant.distance])
 

@@ -3,12 +3,14 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 
 from ..history.timeline import Step
 from ..march.closing_law import ClosingLaw
 from ..march.loop import March, run_steps
+from ..parallel.slab import Array
 from ..scene import build_on
 from ..solve.interface_law import HARD, InterfaceLaw
 from ..steady_sliding.start import start_march
@@ -17,7 +19,8 @@ from .band_steps import BEFORE, Place
 from .ladder import PressureLadder
 
 LawAt = Callable[[Place], InterfaceLaw]
-NONE = np.zeros(1)  # of what only steady states have
+NOTHING: Array = np.zeros(0)
+NONE: Array = np.zeros(1)  # of what only steady states have
 
 
 class BandMarch:
@@ -56,30 +59,30 @@ class BandMarch:
 
     def _measure(self, march: March, pressure: float, below: PressureLadder | None) -> Rung:
         row, last, units, grid = march.row, march.state.contact.last, self.scene.units, self.scene.choices.grid
-        m, weights, lost = row.measures, np.zeros(0), 0.0
-        if below is not None:
-            weights, lost = below.weights_of_rungs(last.pressure * (last.alpha * units.pressure))
+        m, pressures = row.measures, last.pressure * (last.alpha * units.pressure)
+        weights, lost = below.weights_of_rungs(pressures) if below is not None else (NOTHING, 0.0)
         friction = -m.force_x / (pressure * grid.lx * grid.ly)
-        return Rung(
+        values: Any = (
             *(pressure, friction, friction, m.contact_area, m.contact_area_corrected, m.approach, m.max_pressure),
             *(weights, lost, NONE, NONE, NONE, NONE, NONE, rung_errors(row.errors)),
             *(row.certificate.worst, row.certificate.penetration, float(row.operator_calls)),
         )
+        return Rung(*values)
 
 
 def track_of(rows: Sequence[Rung]) -> Rung:
     """Return rungs at successive places as one track."""
-    return Rung(**{name: np.array([getattr(row, name) for row in rows]) for name in NAMES})
+    values: dict[str, Any] = {name: np.array([getattr(row, name) for row in rows]) for name in NAMES}
+    return Rung(**values)
 
 
 def instant_of(track: Rung, before: int, after: int, share: float, sign: float = 1.0) -> Rung:
     """Return the rung between two places of a track; friction is along `sign` times x."""
 
-    def between(name: str) -> np.ndarray:
-        values = getattr(track, name)
+    def between(values: Any) -> Any:
         return (1.0 - share) * values[before] + share * values[after]
 
-    found = Rung(**{name: between(name) for name in NAMES})
+    found = Rung(**{name: between(getattr(track, name)) for name in NAMES})
     return replace(found, friction=sign * found.friction, friction_slopes=sign * found.friction_slopes)
 
 

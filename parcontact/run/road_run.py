@@ -5,7 +5,6 @@ Rows of an instant exist when the coarsest band is done. Until then finished mar
 T: the marches of a longer history are others.
 """
 
-import math
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -189,18 +188,18 @@ class _Run:
 def sum_up_errors(rows: Sequence[StepRow]) -> Iterable[str]:
     """Yield sentences on the errors of friction and area of rows that slide: the mean over the rows, and the largest
     with its parts."""
-    slides = [row for before, row in pairwise(rows) if row.distance > before.distance]
-    for name, known, error in (
-        ("friction", [row for row in slides if not math.isnan(row.error_friction)], lambda row: row.error_friction),
-        ("contact area", [row for row in slides or rows if not math.isnan(row.error_area)], lambda row: row.error_area),
+    slides = [row for before, row in pairwise(rows) if row.distance > before.distance] or list(rows)
+    budgets = [(row, row.errors) for row in slides if row.errors is not None]
+    for name, known in (
+        ("friction", [(row, errors.friction) for row, errors in budgets if errors.friction is not None]),
+        ("contact area", [(row, errors.area) for row, errors in budgets]),
     ):
         if not known:
             continue
-        worst = max(known, key=error)
-        budget = worst.errors.friction if name == "friction" else worst.errors.area
-        parts = ", ".join(f"{SHOWN[part]} {100 * value:.2g} %" for part, value in budget._asdict().items() if value)
-        mean = sum(map(error, known)) / len(known)
+        row, worst = max(known, key=lambda one: one[1].total)
+        parts = ", ".join(f"{SHOWN[part]} {100 * value:.2g} %" for part, value in worst._asdict().items() if value)
+        mean = sum(one.total for _, one in known) / len(known)
         yield (
-            f"error of {name}: {100 * mean:.2g} % on average, at most {100 * error(worst):.2g} % "
-            f"(t = {worst.time:.4g} s, slip {worst.distance:.3g} m: {parts})"
+            f"error of {name}: {100 * mean:.2g} % on average, at most {100 * worst.total:.2g} % "
+            f"(t = {row.time:.4g} s, slip {row.distance:.3g} m: {parts})"
         )

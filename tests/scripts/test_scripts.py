@@ -30,6 +30,9 @@ class Small(NamedTuple):
 
 
 SMALL = {
+    "band_history_errors": Small(
+        ["--events", "4", "--points", "48", "--samples", "1"], r"(?m)^4 three branches.*peak 0\.\d+ -> 0\.\d+.*covers"
+    ),
     "band_errors": Small(["--cases", "1", "--points", "64"], r"(?m)^2 bands, friction: .*within 5 % in \d of 1"),
     "bench": Small(
         ["--points", "64", "--rounds", "1", "--json", "bench.json"],
