@@ -6,8 +6,7 @@
     for row in run.steps():
         print(row.time, row.friction, row.contact_area)
 
-Public names are imported when they are first used.
-"""
+Public names are imported when they are first used."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -16,26 +15,23 @@ from .doubts import ParcontactWarning
 from .errors import InputError, JobError, RunError
 
 if TYPE_CHECKING:
+    from .door.python import Curve, Material, material, open, steady, surface
+    from .door.simulation import Row, Simulation
     from .effects.leakage.flow import Flow, Leak, leak
-    from .python.curves import Curve, steady
-    from .python.opened import open
-    from .python.row import Row
-    from .python.simulation import Simulation
-    from .python.surface_and_material import Material, material, surface
 
 __version__ = "0.2.0"
 __all__ = ["Curve", "Flow", "InputError", "JobError", "Leak", "Material", "ParcontactWarning", "Row", "RunError"]
 __all__ += ["Simulation", "leak", "material", "open", "steady", "surface"]
 
 _ROOMS = {
-    "Simulation": "python.simulation",
-    "Row": "python.row",
-    "steady": "python.curves",
-    "Curve": "python.curves",
-    "open": "python.opened",
-    "surface": "python.surface_and_material",
-    "material": "python.surface_and_material",
-    "Material": "python.surface_and_material",
+    "Simulation": "door.simulation",
+    "Row": "door.simulation",
+    "steady": "door.python",
+    "Curve": "door.python",
+    "open": "door.python",
+    "surface": "door.python",
+    "material": "door.python",
+    "Material": "door.python",
     "leak": "effects.leakage.flow",
     "Leak": "effects.leakage.flow",
     "Flow": "effects.leakage.flow",

@@ -14,12 +14,12 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from .command import ranks
-from .command.arguments import parse_arguments, without_restart
-from .command.verbs import BAD_INPUT, DONE, FAILED
+from .door import verbs
+from .door.arguments import parse_arguments, without_restart
+from .door.verbs import BAD_INPUT, DONE, FAILED
 from .errors import InputError, JobError, RunError
-from .parallel.signals import STOP
-from .storage import files
+from .files import files
+from .parallel.root import STOP
 from .streams import describe_loss, tolerant_streams
 
 STAGGER_SECONDS = 0.5  # delay of the other ranks before they print, so that root prints a common error first [s]
@@ -61,7 +61,7 @@ def program() -> int:
 
 def _end_by_signal(number: int, frame: FrameType | None) -> None:
     """Report a signal that arrives outside of a run, and end the process by its default action."""
-    if all(os.environ.get(name, "0") == "0" for name in ranks.RANKS):  # without MPI, which may be starting
+    if all(os.environ.get(name, "0") == "0" for name in verbs.RANKS):  # without MPI, which may be starting
         os.write(2, f"parcontact: ended by {signal.Signals(number).name}, with nothing to save\n".encode())
     signal.signal(number, signal.SIG_DFL)
     signal.raise_signal(number)
@@ -104,7 +104,7 @@ def _refuse_lost_directory() -> None:
 
 def _judge_output() -> int:
     """Return the exit code of a verb that succeeded: BAD_INPUT if its output could not be written."""
-    reason = describe_loss() if ranks.is_root() else ""
+    reason = describe_loss() if verbs.is_root() else ""
     if reason:
         print(f"parcontact: cannot write to standard output: {reason}", file=sys.stderr, flush=True)
     return BAD_INPUT if reason else DONE
@@ -115,7 +115,7 @@ def _leave_code(code: int, words: Sequence[str] = ()) -> int:
 
     If the run can be continued, the words of the command line that does so follow, one per line.
     """
-    if ranks.is_root() and (path := os.environ.get("PARCONTACT_EXIT_FILE")):
+    if verbs.is_root() and (path := os.environ.get("PARCONTACT_EXIT_FILE")):
         more = without_restart(words) if code == AGAIN else []
         with suppress(OSError):
             Path(path).write_text("".join(f"{line}\n" for line in (code, *more)))
@@ -124,7 +124,7 @@ def _leave_code(code: int, words: Sequence[str] = ()) -> int:
 
 def _end_together(text: str, code: int) -> int:
     """Print an error on root and return the exit code; abort all ranks if only some of them have the error."""
-    root, world = ranks.is_root(), ranks.started()
+    root, world = verbs.is_root(), verbs.started()
     if root:
         print(text, file=sys.stderr, flush=True)
     if world is None:
@@ -141,8 +141,8 @@ def _end_together(text: str, code: int) -> int:
 
 def _end_all(error: BaseException) -> NoReturn:
     """Print why this rank cannot continue, and end all ranks."""
-    world = ranks.started()
-    if not ranks.is_root():
+    world = verbs.started()
+    if not verbs.is_root():
         time.sleep(STAGGER_SECONDS)
     several = world is not None and world.size > 1
     code = AGAIN if isinstance(error, KeyboardInterrupt) else FAILED

@@ -1,10 +1,10 @@
 """Capabilities: what a folder of `effects/` adds to the program. A folder that is deleted takes its capability with it.
 
-A folder may have `SECTION`, the section of a job that asks for it, and `EFFECT`, its class in `effect.py`. Other rooms
+A folder may have `SECTION`, the section of a job that asks for it, and `EFFECT`, its class in `effect.py`;
+columns and sentences stand there, too (`stated`). Other rooms
 find what its further modules offer by `offers`, and so name no capability. `GIVES` and `USES` name what an effect finds
 in a step for others, and what it needs of others: effects that give something follow a step before those that use it.
-With `MATERIAL = True` the section is a material, which may include a file.
-"""
+With `MATERIAL = True` the section is a material, which may include a file."""
 
 from collections.abc import Collection, Mapping
 from functools import cache
@@ -50,6 +50,11 @@ def has(name: str) -> bool:
 def _modules(name: str) -> tuple[ModuleType, ...]:
     made = (each for each in folders() if any(one.name == name for one in iter_modules(each.__path__)))
     return tuple(import_module(f"{each.__name__}.{name}") for each in made)
+
+
+def stated(name: str) -> list[Any]:
+    """Return what the folders themselves state under a name: columns and sentences, which are there at once."""
+    return [getattr(each, name) for each in folders() if hasattr(each, name)]
 
 
 def offers(module: str, name: str) -> list[Any]:

@@ -1,8 +1,7 @@
 """Decorators that compile loops over rows and functions of points, by numba.
 
 Sums may be reordered to use vector units; NaN and infinity keep their meaning. Machine code is kept in a private
-directory, so that only the first run waits for the compiler; without such a directory every run compiles.
-"""
+directory, so that only the first run waits for the compiler; without such a directory every run compiles."""
 
 import gc
 import hashlib
@@ -19,7 +18,7 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core import codegen, event
 
-from . import private
+from . import errors
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 OPTIONS: dict[str, Any] = {
@@ -69,7 +68,7 @@ def _cache_of(compiled: Any) -> Any:
 
 def _compiled(compiler: Callable[[bool], Any]) -> Any:
     """Return the function made by `compiler(kept)`; `kept` is True if a private directory can hold its code."""
-    place = private.directory("compiled")
+    place = errors.directory("compiled")
     if place is None:
         return compiler(False)
     config: Any = numba.config
@@ -115,7 +114,7 @@ def say_that_it_compiles() -> None:
     mpi = sys.modules.get("mpi4py.MPI")
     watched = sys.stderr.isatty() or "ipykernel" in sys.modules
     if watched and (mpi is None or mpi.COMM_WORLD.rank == 0):
-        kept = "once on this machine" if private.directory("compiled") else "in each run, as they cannot be kept"
+        kept = "once on this machine" if errors.directory("compiled") else "in each run, as they cannot be kept"
         text = f"compiling loops, some ten seconds, {kept}; `parcontact doctor` compiles them beforehand"
         print(f"parcontact: {text}", file=sys.stderr, flush=True)
 

@@ -1,8 +1,7 @@
 """Warnings as data (kind, place, numbers), and the sentences that users read.
 
 Code that checks a job, a surface or a contact returns `Doubt`s. No code compares or parses the sentences. Those of
-capabilities are in their folders.
-"""
+capabilities are in their folders."""
 
 import math
 import string
@@ -10,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from .capabilities import offers
+from .capabilities import stated
 from .printed import per_cent, quantity, rounded_down, rounded_up
 
 
@@ -272,5 +271,5 @@ SENTENCES = {
         "{where}: spots of contact are only a few cells wide: contact_area is about {excess!p} too large (limit: "
         "{most!p}); use {more}, a smaller grid.size or a larger load"
     ),
-    **{kind: text for texts in offers("sentences", "SENTENCES") for kind, text in texts.items()},
+    **{kind: text for texts in stated("SENTENCES") for kind, text in texts.items()},
 }

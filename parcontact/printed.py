@@ -1,7 +1,6 @@
 """Numbers formatted for readers: prefixes of units, shares in per cent, as many digits as the error allows.
 
-Texts contain ± and µ; `streams` replaces them on terminals that cannot show them.
-"""
+Texts contain ± and µ; `streams` replaces them on terminals that cannot show them."""
 
 import math
 from collections.abc import Sequence

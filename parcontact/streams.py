@@ -1,12 +1,17 @@
-"""Output streams that never fail: printing must not end the program."""
+"""Output that never fails, and bars of progress.
+
+Output streams that never fail: printing must not end the program.
+
+Progress bars with the time left, on terminals only.
+"""
 
 import io
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import Any, TextIO
+from typing import Any, TextIO, TypeVar
 
 PLAIN = str.maketrans({"±": "+-", "µ": "u", "²": "^2", "³": "^3", "°": "deg ", "−": "-", "–": "-", "×": "x"})
 CONTROLS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
@@ -86,3 +91,44 @@ def describe_loss() -> str:
     """Return why printed text could not be written; '' if it was written, or if the reader closed the pipe."""
     sys.stdout.flush()
     return sys.stdout.lost if isinstance(sys.stdout, TolerantStream) else ""
+
+
+T = TypeVar("T")
+
+
+class Bar:
+    """A progress bar below the printed lines, if standard error is a terminal."""
+
+    def __init__(self, total: int, what: str, unit: str = "step", wanted: bool = True) -> None:
+        self._bar = None
+        if wanted and total and sys.stderr.isatty():
+            from tqdm import tqdm  # slow to import
+
+            self._bar = tqdm(total=total, desc=what, unit=unit, leave=False)
+
+    def step(self) -> None:
+        """Advance the bar by one."""
+        if self._bar is not None:
+            self._bar.update()
+
+    def print(self, text: str) -> None:
+        """Print a line above the bar."""
+        if self._bar is not None:
+            self._bar.write(text, file=sys.stdout)
+        else:
+            print(text, flush=True)
+
+    def close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+def with_bar(items: Sequence[T], what: str, unit: str = "step") -> Iterator[T]:
+    """Yield the items, with a bar that counts the finished ones."""
+    bar = Bar(len(items), what, unit)
+    try:
+        for item in items:
+            yield item
+            bar.step()
+    finally:
+        bar.close()

@@ -1,4 +1,6 @@
-"""Read tables of numbers as instruments and laboratories write them, with one list of names for all columns.
+"""Tables of numbers and arrays that users give.
+
+Read tables of numbers as instruments and laboratories write them, with one list of names for all columns.
 
 Numbers are separated by semicolons, tabs, commas or blanks, with decimal points, or with decimal commas between
 semicolons, tabs or blanks. A mark at the end of every row, or at its beginning, is no cell. Words such as No Data,
@@ -7,7 +9,11 @@ semicolons, tabs or blanks. A mark at the end of every row, or at its beginning,
 The names of columns stand in the last line above the numbers that names enough of them, also in a comment: with units
 in brackets, `Frequency (Hz)`, `f[Hz]`, or behind a slash, `E'/MPa`, or in a row of their own below the names. A long
 name and a symbol may stand together: `Storage Modulus E' (MPa)`. Lines of a laboratory may stand above.
+
+Read .npy files that users give, and refuse heights out of range; damaged files raise InputError.
 """
+
+from __future__ import annotations
 
 import codecs
 import csv
@@ -17,10 +23,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
-from .column_names import NAMES, NUMBERS, Column, plain_unit, read_cell
+from .columns import NAMES, NUMBERS, MeasuredColumn, plain_unit, read_cell
 from .errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 LARGEST_TEXT = 50_000_000  # largest file of a table with names [bytes]
 TO_DECODE = 1_000_000  # tuning: bytes from which the encoding of a file is found
@@ -227,7 +237,7 @@ def read_named_columns(
     dialect = find_dialect(path, [text for _, text in rows if is_row(text)] or [rows[-1][1]])
     columns, last = _header(path, lines, dialect, example, names, enough, plain)
     rows = [(number, text) for number, text in rows if number > last]
-    columns = [each if each.name in names else Column("", None) for each in columns]
+    columns = [each if each.name in names else MeasuredColumn("", None) for each in columns]
     values = [_numbers(path, number, text, columns, dialect) for number, text in rows]
     given = [column.name for column in columns]
     for name in sorted(names):
@@ -262,7 +272,7 @@ def _header(
     names: Set[str],
     enough: Callable[[set[str]], bool],
     plain: Set[str],
-) -> tuple[list[Column], int]:
+) -> tuple[list[MeasuredColumn], int]:
     """Return the columns and the number of the last line of the header."""
     texts = {at: re.sub(r"^\s*(#|%|//)+", "", text) for at, (_, text) in enumerate(lines) if not is_row(text)}
     heads = _candidates(texts, dialect, enough)
@@ -285,12 +295,14 @@ def _header(
             "and units"
         )
     units = _split_like(texts.get(at + 1, ""), dialect, len(head))
-    return [Column(each.name, plain_unit(unit)) for each, unit in zip(head, units, strict=True)], lines[
+    return [MeasuredColumn(each.name, plain_unit(unit)) for each, unit in zip(head, units, strict=True)], lines[
         at + (at + 1 in texts)
     ][0]
 
 
-def _candidates(texts: dict[int, str], dialect: Dialect, enough: Callable[[set[str]], bool]) -> dict[int, list[Column]]:
+def _candidates(
+    texts: dict[int, str], dialect: Dialect, enough: Callable[[set[str]], bool]
+) -> dict[int, list[MeasuredColumn]]:
     """Return the lines that name enough columns, or else the one that names most, for the message."""
     heads = {at: _most_named(text, dialect) for at, text in texts.items()}
     if found := {at: head for at, head in heads.items() if enough({column.name for column in head})}:
@@ -299,11 +311,11 @@ def _candidates(texts: dict[int, str], dialect: Dialect, enough: Callable[[set[s
     return {most: heads[most]} if most >= 0 and _known(heads[most]) else {}
 
 
-def _known(columns: Sequence[Column]) -> int:
+def _known(columns: Sequence[MeasuredColumn]) -> int:
     return len({column.name for column in columns} & NAMES)
 
 
-def _most_named(text: str, dialect: Dialect) -> list[Column]:
+def _most_named(text: str, dialect: Dialect) -> list[MeasuredColumn]:
     return max(([read_cell(cell) for cell in cells] for cells in _splits(text, dialect)), key=_known)
 
 
@@ -326,14 +338,14 @@ def _split_like(text: str, dialect: Dialect, count: int) -> list[str]:
     return (cells + [""] * count)[:count]
 
 
-def header_of(line: str, count: int) -> list[Column]:
+def header_of(line: str, count: int) -> list[MeasuredColumn]:
     """Return the `count` columns that a line above rows of numbers names; [] if it does not."""
     text = re.sub(r"^\s*(#|%|//)+", "", line)
     named = ([read_cell(cell) for cell in cells] for cells in _splits(text, Dialect(None)) if len(cells) == count)
     return max(named, key=_known, default=[])
 
 
-def _numbers(path: Path, number: int, text: str, columns: Sequence[Column], dialect: Dialect) -> list[float]:
+def _numbers(path: Path, number: int, text: str, columns: Sequence[MeasuredColumn], dialect: Dialect) -> list[float]:
     """Return the numbers of a row; NaN in columns without a name."""
     cells = dialect.cells(text)
     while len(cells) > len(columns) and not cells[-1]:
@@ -354,3 +366,43 @@ def _finite(path: Path, number: int, cell: str, name: str, dialect: Dialect) -> 
     if not math.isfinite(value):
         raise InputError(f"{path}:{number}: {name} must be a finite number, got {cell!r}")
     return value
+
+
+HEADER_BYTES = 1_000_000  # largest header of an .npy file [bytes]
+TEXTS = (".txt", ".xyz", ".csv", ".dat", ".asc")
+OWN_FORMATS = (".npy", *TEXTS)  # formats of maps; SurfaceTopography reads others
+LOWEST, HIGHEST = 1e-70, 1e70  # rounding: range of the largest height [m] whose fourth power does not overflow
+
+
+def open_numbers(path: Path) -> NDArray[Any]:
+    """Return the array of an .npy file, mapped into memory. Raises InputError, and errors of numpy."""
+    import numpy as np  # slow import, not needed to read text
+
+    with path.open("rb") as file:
+        start = file.read(12)
+    if not start:
+        raise InputError(f"{path} cannot be read: it is empty")
+    if start[6:7] in (b"\2", b"\3") and int.from_bytes(start[8:12], "little") > HEADER_BYTES:  # numpy would read it all
+        raise InputError(f"{path} cannot be read: its header has more than {HEADER_BYTES / 1e6:g} MB")
+    try:
+        values = np.lib.format.open_memmap(path, mode="r")
+    except ValueError as error:
+        if "mmap length" not in str(error):
+            raise
+        raise InputError(f"{path} cannot be read: it ends before the last of its values") from error
+    refuse_no_numbers(path, values.dtype)
+    if not values.size:
+        raise InputError(f"{path} holds an array of shape {values.shape}, without values")
+    return values
+
+
+def refuse_extreme(what: Path | str, largest: float) -> None:
+    """Raise InputError for a map whose largest height or gap [m] would overflow or underflow in calculations."""
+    if largest and not LOWEST <= largest <= HIGHEST:
+        raise InputError(f"{what}: its largest value is {largest:.3g} m; {LOWEST:g} to {HIGHEST:g} m were expected")
+
+
+def refuse_no_numbers(path: Path, kind: np.dtype[Any]) -> None:
+    """Raise InputError unless the values of a file are real numbers."""
+    if kind.kind not in "iuf":
+        raise InputError(f"{path} holds values of type {kind}; real numbers were expected")

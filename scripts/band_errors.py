@@ -19,12 +19,12 @@ from campaign import numbers, parser
 from numpy.typing import NDArray
 
 from parcontact import job as jobs
-from parcontact.accuracy.budget import ErrorParts
 from parcontact.bands.band import Band
 from parcontact.bands.choice import cut_bands
 from parcontact.bands.road_sliding import SURE, RoadSliding
+from parcontact.march.budget import ErrorParts
+from parcontact.march.point import Point
 from parcontact.parallel.slab import Slab
-from parcontact.steady_sliding.point import Point
 
 COMPOUNDS: dict[str, dict[str, Any]] = {
     "tyre": {"include": "synthetic_tyre"},

@@ -33,7 +33,7 @@ from typing import Any
 import campaign
 
 import parcontact as pc
-from parcontact.mesh import load
+from parcontact.march.mesh import load
 
 ACCURACIES = (0.05, 0.01, 0.003)
 SIZE, DOZEN = 1e-3, 12

@@ -39,20 +39,17 @@ import runs
 from coverage_scenes import FINER, Json, Sketch, sketch
 from matplotlib.figure import Figure
 
-import parcontact.march.step_errors as of_march
-import parcontact.steady_sliding.sliding as of_steady
-from parcontact import scene
-from parcontact.accuracy.budget import UNKNOWN, ErrorBudget, estimate, estimate_steady, weight_of
-from parcontact.accuracy.observation import RunProperties, StepObservation
-from parcontact.effects.adhesion import pull_off
+from parcontact.effects.adhesion import results
 from parcontact.errors import InputError, RunError
-from parcontact.history.timeline import Timeline
 from parcontact.job import Job
+from parcontact.job.history import Timeline
+from parcontact.march import curve, scene, state, steady
+from parcontact.march.budget import UNKNOWN, ErrorBudget, estimate, estimate_steady, weight_of
 from parcontact.march.loop import March
+from parcontact.march.steady import SteadySliding
+from parcontact.march.time_error import RunProperties, StepObservation
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import Prony
-from parcontact.steady_sliding import curve
-from parcontact.steady_sliding.sliding import SteadySliding
 
 SHARPER = 10.0  # accuracy of a scene over the accuracy of its reference
 SAME_TIME = 1e-9
@@ -83,7 +80,7 @@ def record_observations() -> None:
 
         return judge
 
-    of_march.estimate, of_steady.estimate_steady = noting(estimate), noting(estimate_steady)
+    state.estimate, steady.estimate_steady = noting(estimate), noting(estimate_steady)
 
 
 def run(plain: Json) -> Json:
@@ -286,7 +283,7 @@ def _pull_off(series: Json) -> tuple[float, float] | None:
     columns = {name: [row[name] for row in series["rows"]] for name in names}
     columns["contact_area"] = [row["counted"] for row in series["rows"]]
     columns["error_area"] = [row["stated"][1] if row["stated"] else math.nan for row in series["rows"]]
-    pulls = pull_off.find(columns)
+    pulls = results.find(columns)
     if not pulls:
         return None
     pull = pulls[-1]

@@ -47,13 +47,12 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from robustness import any_job
 
-from parcontact import ParcontactWarning, Simulation, __main__, mesh
-from parcontact import job as jobs
+from parcontact import ParcontactWarning, Simulation, __main__, job
 from parcontact.bands.choice import cut_bands
 from parcontact.effects.adhesion.section import chosen_range
 from parcontact.errors import InputError, RunError
-from parcontact.job.checks import limits
-from parcontact.job.text import yamltext
+from parcontact.job import limits, yaml_text
+from parcontact.march import mesh
 
 CPU_SECONDS = 3.0  # limit on the CPU time to refuse a job
 HANG_SECONDS = 120.0  # limit on the CPU time of a job
@@ -148,7 +147,7 @@ def drive(path: Path, here: Path) -> Iterator[str]:
                 yield from row_faults(f"{row['velocity']:g} m/s", row, math.inf)
 
 
-def later_faults(path: Path, here: Path, job: jobs.Job) -> Iterator[str]:
+def later_faults(path: Path, here: Path, job: job.Job) -> Iterator[str]:
     """Yield faults of further verbs on a finished job, each with the probability in LATER_SHARES, drawn from its
     text."""
     out, dice = here / "results", Random(path.read_bytes())
@@ -207,7 +206,7 @@ def save_faults(path: Path, here: Path, name: str) -> Iterator[str]:
         yield f"save to {name!a} leaves {sorted(one.name for one in place.rglob('*'))}"
 
 
-def is_large(job: jobs.Job) -> bool:
+def is_large(job: job.Job) -> bool:
     """Return True if a job is too large for a campaign of thousands."""
     if job.bands is not None:
         cut = cut_bands(job)
@@ -253,7 +252,7 @@ def rows_of(table: Path) -> Iterator[dict[str, float]]:
             yield {name: float(text) for name, text in row.items() if text not in ("", None)}
 
 
-def history_faults(directory: Path, job: jobs.Job) -> Iterator[str]:
+def history_faults(directory: Path, job: job.Job) -> Iterator[str]:
     """Yield faults of a table of measures and of maps of pressure."""
     stick, hardness = job.section("adhesion"), job.material.hardness
     most = math.inf if hardness is None else hardness * (1.0 + SLACK)
@@ -278,7 +277,7 @@ def history_faults(directory: Path, job: jobs.Job) -> Iterator[str]:
                     yield f"pressures from {np.min(pressure):g} to {np.max(pressure):g} Pa, not {least:g} to {most:g}"
 
 
-def load_faults(row: dict[str, float], job: jobs.Job) -> Iterator[str]:
+def load_faults(row: dict[str, float], job: job.Job) -> Iterator[str]:
     """Yield faults of the load of a step. If its time is in several stages, the load may be the load of any of them."""
     if not row["step"]:
         return
@@ -312,7 +311,7 @@ def row_faults(where: str, row: dict[str, float], most: float) -> Iterator[str]:
         yield f"{where}: friction {row['friction']:g}"
 
 
-def traction_faults(row: dict[str, float], job: jobs.Job, lost: float) -> Iterator[str]:
+def traction_faults(row: dict[str, float], job: job.Job, lost: float) -> Iterator[str]:
     """Yield faults of the tractions of a step, before which slip had `lost` an energy [J]. Energies of backward Euler
     balance for short steps only, and those of contacts that are not solved need not."""
     where, coefficient = f"step {row['step']:g}", job.section("interface").coefficient or math.inf
@@ -377,11 +376,11 @@ def _write(directory: Path, text: str) -> Path:
 
 
 def as_drawn(draw: Draw, dice: Random, directory: Path) -> Path:
-    return _write(directory, yamltext.dump(draw(dice, directory)))
+    return _write(directory, yaml_text.dump(draw(dice, directory)))
 
 
 def changed_text(draw: Draw, dice: Random, directory: Path) -> Path:
-    text = yamltext.dump(draw(dice, directory))
+    text = yaml_text.dump(draw(dice, directory))
     for _ in range(dice.choice([1, 1, 2, 4])):
         place, size = dice.randrange(len(text) + 1), dice.randint(0, 20)
         character = chr(dice.choice([dice.randrange(32, 127), dice.randrange(0xD7FF)]))
@@ -422,7 +421,7 @@ def changed_values(draw: Draw, dice: Random, directory: Path) -> Path:
             node[str(last) + dice.choice(["x", "\ud800"])] = node.pop(last)
         else:
             node[last] = dice.choice(EXTREME)
-    return _write(directory, dice.choice([yamltext.dump, yaml.safe_dump])(data))
+    return _write(directory, dice.choice([yaml_text.dump, yaml.safe_dump])(data))
 
 
 def changed_file(draw: Draw, dice: Random, directory: Path) -> Path:
@@ -432,7 +431,7 @@ def changed_file(draw: Draw, dice: Random, directory: Path) -> Path:
     path = directory / f"damaged.{dice.choice(['npy', 'txt', 'xyz'])}"
     part = {"shape": "topography", "unit": "m", "size": [1e-3, 1e-3]} if path.suffix == ".xyz" else {"shape": "file"}
     grid, surface = {"points": 16, "size": 1e-3}, {**part, "path": path.name}
-    job = _write(directory, yamltext.dump({**draw(dice, directory), "grid": grid, "surface": surface}))
+    job = _write(directory, yaml_text.dump({**draw(dice, directory), "grid": grid, "surface": surface}))
     heights = 1e-6 * np.random.default_rng(dice.getrandbits(32)).standard_normal((16, 16))
     odd = (heights * 1e300, heights * 1e-310, heights[:12], heights[0], heights.astype("S8"), heights * 1j)
     heights = dice.choice([*6 * [heights], *odd])

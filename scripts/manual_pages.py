@@ -20,8 +20,8 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-from parcontact.command.arguments import describe_verbs
-from parcontact.manual import texts
+from parcontact.door.arguments import describe_verbs
+from parcontact.door.manual import texts
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = texts.PAGES.parent / "notebooks"

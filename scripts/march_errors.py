@@ -26,8 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 from runs import begun, marched
 
+from parcontact.files.recorder import StepRow
 from parcontact.results import slide
-from parcontact.storage.step_row import StepRow
 
 Json = dict[str, Any]
 POINTS, SIZE, WAY = 64, 1e-3, 24  # points along each side, its length [m], cells slid

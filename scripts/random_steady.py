@@ -23,10 +23,11 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from steady_scenes import certificate
 
-from parcontact import job, scene
+from parcontact import job
+from parcontact.march import scene
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
-from parcontact.steady_sliding.sliding import SteadySliding
 
 
 def drawn(random: np.random.Generator) -> tuple[dict[str, Any], float, float]:

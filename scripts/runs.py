@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from parcontact.files.recorder import StepRow
     from parcontact.job import Job
     from parcontact.march.loop import March
-    from parcontact.storage.step_row import StepRow
 
 ROOT = Path(__file__).resolve().parents[1]
 Json = dict[str, Any]
@@ -22,12 +22,12 @@ def begun(
     from mpi4py import MPI
 
     from parcontact.job import Job
-    from parcontact.mesh import load
+    from parcontact.march import steady
+    from parcontact.march.mesh import load
     from parcontact.parallel.slab import Slab
-    from parcontact.steady_sliding import start
 
     read = job if isinstance(job, Job) else load(job, sets)
-    return start.first(read, Slab(MPI.COMM_SELF if comm is None else comm, *read.grid.points))
+    return steady.first(read, Slab(MPI.COMM_SELF if comm is None else comm, *read.grid.points))
 
 
 def marched(march: "March", note: Callable[["March"], None] | None = None) -> tuple[list["StepRow"], list[float]]:

@@ -8,7 +8,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 import parcontact as pc
-from parcontact.python.row import Row
+from parcontact.door.simulation import Row
 
 RADIUS, WORK, MODULUS = 1e-3, 0.05, 4e6  # of a sphere [m], of adhesion [J/m^2], E* of the relaxed body [Pa]
 FORCE = 1.5 * np.pi * WORK * RADIUS  # pull-off of a sphere by JKR [N]

@@ -5,9 +5,9 @@ from typing import Any
 
 from marched_jobs import marched
 
-from parcontact import scene
 from parcontact.effects.effect import Decision
 from parcontact.job import Job
+from parcontact.march import choices
 
 Json = dict[str, Any]
 NX, NY = 24, 20
@@ -51,7 +51,7 @@ def extra(on: Job, off: Job) -> dict[str, int]:
 
 
 def row(planned: Job, name: str) -> Decision:
-    return next(effect for effect in scene.choices(planned).decisions if effect.name == name)
+    return next(effect for effect in choices.choices(planned).decisions if effect.name == name)
 
 
 TRANSFORM = f"fft {NX}x{NY} float64"

@@ -10,9 +10,9 @@ from matplotlib.text import Text
 
 from parcontact import job
 from parcontact.__main__ import main
+from parcontact.files import run
+from parcontact.files.run import Options
 from parcontact.parallel.slab import Slab
-from parcontact.run import runner
-from parcontact.run.run import Options
 
 WAVE = """
 grid: {points: 32, size: 2.0e-3}
@@ -55,7 +55,7 @@ def ran(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "job.yaml"
     path.write_text(text)
     loaded = job.load(path, [f"output.directory={tmp_path / 'out'}"])
-    assert runner.run_job(loaded, Slab.alone(*loaded.grid.points), Options(quiet=True)) == 0
+    assert run.run_job(loaded, Slab.alone(*loaded.grid.points), Options(quiet=True)) == 0
     return tmp_path / "out"
 
 

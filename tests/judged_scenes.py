@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from parcontact import scene
-from parcontact.history.timeline import Timeline
 from parcontact.job import Job
+from parcontact.job.history import Timeline
+from parcontact.march import sanity, scene
 from parcontact.march.loop import March
 from parcontact.parallel.slab import Slab
-from parcontact.scene import sanity
 
 Json = dict[str, Any]
 HERE = Path(__file__).parents[1] / "jobs"

@@ -11,11 +11,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from parcontact.files.recorder import StepRow
 from parcontact.job import Job, load
+from parcontact.march import steady
 from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Slab
-from parcontact.steady_sliding import start
-from parcontact.storage.step_row import StepRow
 
 # the paper's Hertz material as one Maxwell branch next to the long-term spring: modulus 2.75 MPa at once, a tenth of it
 # in the end, relaxation time 1 ms, creep time 10 ms
@@ -45,7 +45,7 @@ def example(name: str, *overrides: str) -> Job:
 def begun(data: dict[str, Any] | Job, comm: MPI.Intracomm = MPI.COMM_SELF) -> March:
     """A march at the start of a job."""
     job = data if isinstance(data, Job) else Job.model_validate(data)
-    return start.first(job, Slab(comm, *job.grid.points))
+    return steady.first(job, Slab(comm, *job.grid.points))
 
 
 def marched(

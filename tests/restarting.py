@@ -11,10 +11,9 @@ from csv_rows import measures as rows
 from mpi4py import MPI
 
 from parcontact import job
+from parcontact.files import run, tables
+from parcontact.files.run import Options
 from parcontact.parallel.slab import Slab
-from parcontact.run import runner
-from parcontact.run.run import Options
-from parcontact.storage import marker
 
 ROUGH = {
     "shape": "rough",
@@ -90,7 +89,7 @@ class Bench:
             path.write_text(yaml.safe_dump(data))
         self.comm.Barrier()
         loaded = job.load(path, [f"output.directory={out}"])
-        return runner.run_job(loaded, Slab(self.comm, *loaded.grid.points), Options(quiet=True, **options))
+        return run.run_job(loaded, Slab(self.comm, *loaded.grid.points), Options(quiet=True, **options))
 
 
 def maps(path: Path) -> dict[str, bytes]:
@@ -122,8 +121,8 @@ def cut(bench: Bench, whole: Path, step: int) -> Path:
             if int(path.stem.removeprefix("step-")) > step:
                 path.unlink()
         if step == 0:  # before its first checkpoint
-            claims = marker.read_claims(copy)
-            marker.write_claims(copy, {"run": replace(claims["run"], saved=False)})
+            claims = tables.read_claims(copy)
+            tables.write_claims(copy, {"run": replace(claims["run"], saved=False)})
     bench.comm.Barrier()
     return copy
 

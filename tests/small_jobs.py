@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import yaml
 from marched_jobs import ROOT
 
-from parcontact import mesh
+from parcontact.door.manual import texts
 from parcontact.errors import InputError
-from parcontact.job.text import yamltext
-from parcontact.manual import texts
+from parcontact.job import yaml_text
+from parcontact.march import mesh
 
 POINTS = (12, 16, 24, 32, 48, 64, 96, 128, 160, 256)  # tried one after the other
 PARTS = {"surface", "material"}  # a block of YAML with these and one of LOADS is a whole job
@@ -56,7 +56,7 @@ def smallest(found: Found, directory: Path) -> Path:
     for path in found.directory.glob("*.yaml"):
         if not (directory / path.name).exists():
             (directory / path.name).symlink_to(path)
-    data, path = reduced(yamltext.parse(found.text, found.name).data), directory / "small.yaml"
+    data, path = reduced(yaml_text.parse(found.text, found.name).data), directory / "small.yaml"
     for points in POINTS if "bands" not in data else (0,):
         if points:
             data["grid"] = {**data["grid"], "points": [points if n > 1 else 1 for n in _pair(data["grid"]["points"])]}

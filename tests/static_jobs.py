@@ -5,18 +5,18 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from parcontact import job, scene
-from parcontact.march.loop import March
-from parcontact.march.loop import run_steps as run_march
+from parcontact import job as jobs
+from parcontact.files.recorder import StepRow
+from parcontact.march import scene
+from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Slab
-from parcontact.storage.step_row import StepRow
 
 Fields = dict[str, NDArray[Any]]
 
 
 def run(path: Path, *overrides: str) -> list[tuple[StepRow, Fields]]:
     """What each step of a job gave: its row and fields. The steps of these jobs are static solves."""
-    loaded = job.load(path, overrides)
+    loaded = jobs.load(path, overrides)
     ready = March(scene.build(loaded, Slab.alone(*loaded.grid.points)))
     steps = []
 
@@ -25,5 +25,5 @@ def run(path: Path, *overrides: str) -> list[tuple[StepRow, Fields]]:
             fields = {name: state.field(name).copy() for name in ("pressure", "displacement", "gap")}
             steps.append((state.row, fields))
 
-    run_march(ready, [note])
+    run_steps(ready, [note])
     return steps

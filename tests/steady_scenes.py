@@ -7,10 +7,10 @@ from mpi4py import MPI
 from rubbers import complex_modulus
 
 from parcontact import job as jobs
-from parcontact import scene
 from parcontact.effects.relaxation import relaxation_of
+from parcontact.march import scene
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
-from parcontact.steady_sliding.sliding import SteadySliding
 
 RADIUS, G0, CREEP_TIME = 1.0e-2, 2.75e6, 1.0e-2  # m, Pa, s
 

@@ -12,8 +12,7 @@ import pytest
 
 import parcontact
 from parcontact.doubts import SENTENCES, Doubt
-from parcontact.job import Job
-from parcontact.job.checks import meaning
+from parcontact.job import Job, meaning
 from parcontact.printed import rounded_down, rounded_up
 
 HOUSE = Path(parcontact.__file__).parent

@@ -10,12 +10,11 @@ from time import sleep
 import pytest
 from drawing import ELASTIC, LOADS, MAPS, SLIDE, WAVE, ZENER, ran
 
-from parcontact import progress
+from parcontact import streams
 from parcontact.__main__ import main
-from parcontact.results import result_sections
-from parcontact.results.plotted_run import PlottedRun
-from parcontact.storage.console import Console
-from parcontact.storage.step_row import StepRow
+from parcontact.files.recorder import Console, StepRow
+from parcontact.results import report_sections
+from parcontact.results.charts import PlottedRun
 
 
 class Terminal(io.StringIO):
@@ -39,7 +38,7 @@ def stated(monkeypatch: pytest.MonkeyPatch, terminal: io.StringIO, *words: str) 
 
 def test_a_bar_stands_before_the_first_step(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
-    items = progress.with_bar([1, 2, 3], "maps", "map")
+    items = streams.with_bar([1, 2, 3], "maps", "map")
     assert next(items) == 1
     assert "maps:   0%" in terminal.getvalue()
     assert "0/3" in terminal.getvalue()
@@ -74,7 +73,7 @@ def test_steady_states(job: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytes
 def test_the_maps_of_a_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = ran(tmp_path, WAVE + ELASTIC + LOADS + MAPS)
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
-    assert [len(images) for _, images, _ in result_sections.browse_run(PlottedRun(out))] == [2, 2]
+    assert [len(images) for _, images, _ in report_sections.browse_run(PlottedRun(out))] == [2, 2]
     assert "maps of pressure:   0%" in terminal.getvalue()
     assert "0/2" in terminal.getvalue()
 

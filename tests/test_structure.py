@@ -14,62 +14,71 @@ HOUSE = Path(parcontact.__file__).parent
 ROOT = Path(__file__).parents[1]
 MODULES = {".".join(path.relative_to(HOUSE).with_suffix("").parts): path for path in sorted(HOUSE.rglob("*.py"))}
 FLOORS = [  # from the ground up; a room imports only from the floors below its own
-    {"capabilities", "column", "column_names", "errors", "printed", "private", "progress", "streams"},
-    {"columns", "compiled", "datafiles", "doubts", "text_tables"},
+    {"capabilities", "column", "errors", "printed", "streams"},
+    {"columns", "compiled", "doubts"},
+    {"text_tables"},
     {"rubber"},
     {"parallel", "job"},
-    {"history", "road"},
+    {"paths"},  # of the surface over time, and measured maps
     {"physics"},
     {"accuracy"},
-    {"theory", "solve"},
+    {"theory", "contact"},
     {"effects"},
-    {"storage"},
-    {"scene"},
-    {"mesh"},
-    {"march"},
-    {"steady_sliding"},
-    {"bands"},
+    {"files"},
     {"results"},
-    {"run", "plan"},
-    {"doctor", "study"},
-    {"manual"},
-    {"python"},
-    {"__init__"},  # the front door, which names what the room python has
-    {"command"},
+    {"march"},
+    {"steady"},
+    {"bands"},
+    {"runs"},
+    {"report"},
+    {"door"},
+    {"__init__"},  # the front door, which names what the room `door` has
+    {"verbs"},
     {"__main__"},
 ]
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
-KNOW_MPI = {"python", "parallel", "storage", "results", "command"}
+KNOW_MPI = {"door", "verbs", "parallel", "files", "results", "report", "runs"}
 
 
-OF_A_CAPABILITY = {  # modules of capabilities that stand on the floor of another room
-    **dict.fromkeys((f"effects.leakage.{name}" for name in ("elimination", "flow", "fluids", "paths")), "physics"),
-    "effects.leakage.conductivity": "results",
-    **dict.fromkeys((f"effects.heat.{name}" for name in ("flash", "heat", "heat_memory", "heat_unbounded")), "physics"),
-    **dict.fromkeys((f"effects.stick.{name}" for name in ("discs", "solver")), "solve"),
-    "effects.stick.shear_operator": "physics",
-    "effects.adhesion.attraction": "physics",
-    **dict.fromkeys(
-        (f"effects.adhesion.{name}" for name in ("adhesive_solver", "free_inverse", "gap_iterate")), "solve"
+def _on(floor: str, *modules: str) -> dict[str, str]:
+    return dict.fromkeys(modules, floor)
+
+
+STANDS_ON = {  # modules that stand on another floor than their room
+    **_on("paths", "job.history", "job.map_files", "job.measured_maps"),
+    **_on("accuracy", "march.constants", "march.embedded", "march.time_error", "march.budget", "march.controller"),
+    **_on("steady", "march.point", "march.steady", "march.curve"),
+    **_on("runs", "files.restart", "files.run", "files.sweep", "files.sweep_warnings"),
+    **_on("runs", "files.road_run"),
+    **_on(
+        "report",
+        "results.page",
+        "results.curve_tables",
+        "results.export",
+        "results.report_sections",
+        "results.prediction",
+        "results.surface_summary",
     ),
-    **dict.fromkeys((f"effects.adhesion.{name}" for name in ("gap_kernels", "gap_solver", "law")), "solve"),
-    "effects.adhesion.pull_off": "results",
-    "effects.leakage.over_time": "results",
-    "effects.softening.strain": "scene",
+    **_on("verbs", "door.arguments", "door.map_jobs", "door.verbs"),
+    **_on("physics", "effects.leakage.flow", "effects.heat.solver"),
+    **_on("contact", "effects.stick.solver", "effects.adhesion.gap_solver", "effects.adhesion.law"),
+    **_on("report", "effects.leakage.over_time"),
 }
 
 
-FILES = {  # modules that any capability may have, and the rooms that ask them
-    **{"columns": "column", "sentences": "column", "results": "results", "pictures": "results"},
-    **{"steady": "steady_sliding", "bands": "bands"},
-}
+FILES = {
+    "__init__": "column",
+    "results": "results",
+    "pictures": "results",
+    "steady": "steady",
+}  # that any capability may have, and who asks them
 
 
 def room(module: str) -> str:
-    """The room on whose floor a module stands: its folder, but for modules of capabilities that other rooms ask."""
+    """The floor on which a module stands: its room, but for modules of the table above."""
     first, *rest = module.split(".")
     file = FILES.get(rest[-1]) if first == "effects" and len(rest) == 2 else None
-    return OF_A_CAPABILITY.get(module) or file or first
+    return STANDS_ON.get(module) or file or first
 
 
 def imports(module: str) -> Iterator[str]:
@@ -118,7 +127,7 @@ def test_only_some_rooms_know_mpi(module: str) -> None:
     assert not [name for name in imports_that_run(module) if room(name) == "mpi4py" or name.startswith("parallel.mpi")]
 
 
-COMPARE = {"doctor", "results", "command"}  # rooms that set theory next to results
+COMPARE = {"door", "results", "report", "verbs"}  # rooms that set theory next to results
 
 
 def test_theory_stands_alone() -> None:
@@ -130,14 +139,14 @@ def test_theory_stands_alone() -> None:
 
 
 MADE_BY = {  # which modules make objects of a kind
-    **{kind: {"scene.scene"} for kind in ("AnyFraction", "AlongX", "ElasticBody", "ElasticEnergy", "ZenerEnergy")},
-    **{kind: {"scene.scene"} for kind in ("ElasticPressure", "AppliedInverse", "Probe", "Setup", "Scene")},
-    "ZenerBody": {"scene.scene", "physics.energy"},  # a second one follows A^-1 u
-    "ContactSolver": {"scene.scene"},
-    "HalfSpace": {"scene.scene"},
-    "SteadySolver": {"steady_sliding.sliding"},
-    "SteadySliding": {"steady_sliding.start", "steady_sliding.curve", "plan.trial", "plan.memory"},
-    "March": {"steady_sliding.start"},
+    **{kind: {"march.scene"} for kind in ("AnyFraction", "AlongX", "ElasticBody", "ElasticEnergy", "ZenerEnergy")},
+    **{kind: {"march.scene"} for kind in ("ElasticPressure", "AppliedInverse", "Probe", "Setup", "Scene")},
+    "ZenerBody": {"march.scene", "physics.energy"},  # a second one follows A^-1 u
+    "ContactSolver": {"march.scene"},
+    "HalfSpace": {"march.scene"},
+    "SteadySolver": {"march.steady"},
+    "SteadySliding": {"march.steady", "march.curve", "door.memory"},
+    "March": {"march.steady"},
 }
 
 
@@ -219,7 +228,7 @@ def test_modules_have_a_name_of_their_own() -> None:
     assert {name: names.count(name) for name in names if names.count(name) > 1} == {}
 
 
-FOR_USERS = {"theory", "command", "python"}  # rooms whose names are those that users write
+FOR_USERS = {"theory", "verbs", "door"}  # rooms whose names are those that users write
 
 
 def test_functions_have_a_name_of_their_own() -> None:

@@ -9,9 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from parcontact.errors import InputError
-from parcontact.job import RoughSpectrum, Topography
-from parcontact.road import map_files, spectrum
-from parcontact.rubber import measured_moduli
+from parcontact.job import RoughSpectrum, Topography, map_files, measured_maps
+from parcontact.rubber import moduli
 from parcontact.rubber.shift import Factors, read_shift
 
 Array = np.ndarray
@@ -20,7 +19,7 @@ ROWS = np.array([[20.0, 0.5, 5.25, 0.5], [20.0, 5.0, 6.125, 0.7], [20.0, 50.0, 7
 
 def read_moduli(path: Path) -> Array:
     """Young's moduli [MPa] over frequency [Hz], at their temperature [deg C], in the rows of the file."""
-    (one,) = measured_moduli.read_moduli(path).sets
+    (one,) = moduli.read_moduli(path).sets
     return np.stack(
         [np.full(one.at.size, one.temperature), one.at / (2 * np.pi), 3e-6 * one.storage, 3e-6 * one.loss], 1
     )
@@ -34,7 +33,7 @@ def read_shift_table(path: Path) -> Array:
 
 def read_spectrum(path: Path) -> Array:
     """q [1/m] and C2D [m^4]."""
-    found, _ = spectrum.read_spectrum(
+    found, _ = measured_maps.read_spectrum(
         RoughSpectrum.model_construct(spectrum=path, normalisation="physical", hurst=None)
     )
     return np.stack([found.q, found.phi / (4 * np.pi**2)], 1)
@@ -112,7 +111,7 @@ def test_refused_headers(tmp_path: Path, case: str) -> None:
     path = tmp_path / "table.txt"
     path.write_text(text + lines("", ROWS[:, 1:], mark))
     with pytest.raises(InputError) as failure:
-        measured_moduli.read_moduli(path)
+        moduli.read_moduli(path)
     assert str(failure.value).startswith(str(path))
     assert sentence in str(failure.value)
 

@@ -1,4 +1,17 @@
-"""One band of the spectrum on its own grid: a surface with its waves, and its steady states under many pressures."""
+"""A band of the spectrum and its ladder of pressures.
+
+One band of the spectrum on its own grid: a surface with its waves, and its steady states under many pressures.
+
+Ladders of pressures, and distributions of pressure as weights of their rungs.
+
+A result f(p) of a band is known at the rungs p_j of a ladder. Between them f(p)/p is the cubic in log p through the
+four nearest rungs, `f(p) = p sum_j psi_j(p) f(p_j)/p_j`; below the first and above the last rung it is constant. A
+distribution P(p) is represented by `W_j = int P(p) p psi_j(p) dp/p_j`. As the psi_j add up to 1,
+
+    int P(p) f(p) dp = sum_j W_j f(p_j),    sum_j W_j p_j = int P(p) p dp:
+
+the load is conserved. Functions linear in p would conserve it, too, but underestimate a concave f.
+"""
 
 from __future__ import annotations
 
@@ -9,30 +22,71 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..accuracy.budget import ErrorBudget
-from ..accuracy.observation import properties_of
+from ..contact import kernels
+from ..contact.constraint import InterfaceLaw, NonNegative
+from ..contact.problem import MeanPressure
+from ..contact.projected import Judge, SteadyContact
+from ..contact.splitting import Splitting
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job
-from ..job.sections.height_arrays import GivenHeights
+from ..job.surfaces import GivenHeights
+from ..march.budget import ErrorBudget
+from ..march.choices import choices
+from ..march.point import branch_powers
+from ..march.scene import Setup, set_up
+from ..march.steady import judge_state, tolerance_of
+from ..march.time_error import properties_of
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution, wavenumbers
 from ..physics.roughness import Roughness
-from ..scene import Setup, choices, set_up
-from ..solve import kernels
-from ..solve.constraint import NonNegative
-from ..solve.interface_law import InterfaceLaw
-from ..solve.nonsymmetric.judge import Judge, SteadyContact
-from ..solve.nonsymmetric.splitting import Splitting
-from ..solve.problem import MeanPressure
-from ..steady_sliding.losses import branch_powers
-from ..steady_sliding.sliding import judge_state, tolerance_of
 from .band_steps import parts_of_history
 from .choice import Cut
-from .ladder import PressureLadder
 
-if TYPE_CHECKING:  # found only for jobs that ask for it
-    from ..effects.heat.bands import Warming
+if TYPE_CHECKING:
+    from ..effects.heat.steady import Warming
+
+RUNGS, LOWEST = 14, 5e-4  # accuracy: number of rungs, and the first one over the last
+NODES = 4  # accuracy: rungs per interpolation
+ROUNDING = 1e-9  # accuracy: rounding of the position of a pressure on the ladder
+ABOVE = 4.0  # accuracy: last rung above the mean, over the rms pressure
+BELOW = 4.5  # accuracy: first rung below the mean, over the rms pressure, near full contact
+
+
+@dataclass(frozen=True)
+class PressureLadder:
+    """Rungs: rising pressures [Pa], shape (n,)."""
+
+    rungs: Array
+
+    @classmethod
+    def over(cls, mean: float, rms: float) -> PressureLadder:
+        """Return the ladder for pressures of this mean and rms deviation in full contact [Pa], equally spaced in the
+        logarithm; one rung without deviation."""
+        if not rms > 0.0:
+            return cls(np.array([mean]))
+        top = mean + ABOVE * rms
+        bottom = max(LOWEST * top, mean - BELOW * rms)
+        count = max(NODES, int(np.ceil(1 + (RUNGS - 1) * np.log(top / bottom) / -np.log(LOWEST) - 1e-9)))
+        return cls(np.geomspace(bottom, top, count))
+
+    def weights_of_rungs(self, pressures: Array) -> tuple[Array, float]:
+        """Return the weights of rungs for a map of pressures [Pa], and the share of the load above the last rung."""
+        p, rungs = pressures[pressures > 0.0], self.rungs
+        count = len(rungs)
+        if count == 1 or not p.size:
+            return np.full(count, float(p.sum()) / rungs[-1] / pressures.size), 0.0
+        steps = np.log(p / rungs[0]) / np.log(rungs[1] / rungs[0])
+        place = np.clip(steps, 0.0, count - 1.0)
+        first = np.clip(np.floor(place).astype(np.intp) - 1, 0, count - NODES)
+        sums = np.zeros(count)
+        for node in range(NODES):
+            others = [other for other in range(NODES) if other != node]
+            psi = np.prod([(place - first - other) / (node - other) for other in others], axis=0)
+            sums += np.bincount(first + node, p * psi, count)
+        beyond = float(p[steps > count - 1 + ROUNDING].sum())
+        return sums / rungs / pressures.size, beyond / float(p.sum())
+
 
 PARTS = 6  # accuracy: parts of a cell of wavenumbers, along each side, for sums of the spectrum
 MOST_STEPS = 20000  # tuning: limit on the steps of the splitting for one contact
@@ -121,7 +175,7 @@ class Band:
             self._full = float(np.std(self._inverse.apply(self.heights, self.setup.slab.empty())))
             section = self.setup.job.section("thermal")
             if section is not None and self._warmed_for != (velocity, seconds):
-                from ..effects.heat.bands import warming_of, waves_along_depth
+                from ..effects.heat.steady import warming_of, waves_along_depth
 
                 waves, _ = waves_along_depth(*self._wavenumbers)
                 self.warming = warming_of(self.setup, section, seconds, velocity, waves)
@@ -180,7 +234,7 @@ class Band:
         """Return S_j and g of the heat for a map of pressure."""
         if self.warming is None:
             return np.zeros(1), np.zeros(1)
-        from ..effects.heat.bands import shares_of_depth, waves_along_depth
+        from ..effects.heat.steady import shares_of_depth, waves_along_depth
 
         waves, _ = waves_along_depth(*self._wavenumbers)
         shares = shares_of_depth(self.setup, pressure, self._velocity, waves)
@@ -190,7 +244,7 @@ class Band:
         """Return the squares of strains at all depths for a displacement, and their weights."""
         if self.setup.factors is None:
             return np.zeros(1), np.zeros(1)
-        from ..effects.softening.strain import depths_between, strains_of  # of use to few
+        from ..effects.softening.steady import depths_between, strains_of
 
         setup, all_waves = self.setup, np.zeros(self.setup.fft.shape, np.int64)
         depths = depths_between(*self._wavenumbers) / setup.units.length

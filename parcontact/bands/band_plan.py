@@ -3,10 +3,10 @@
 import time
 from collections.abc import Iterator
 
+from ..contact.constraint import HARD
 from ..job import Job
+from ..march.curve import request
 from ..parallel.slab import Slab
-from ..solve.interface_law import HARD
-from ..steady_sliding.curve import request
 from .cascade import Cascade, Task
 from .choice import FEWEST, cut_bands, describe_cut
 from .road_history import RoadHistory

@@ -3,8 +3,7 @@
 After a change of velocity the steps of a slide grow from a small part of a cell to half a cell. After SETTLED of its
 longest waves a band slides steadily, and it is not marched until the next stage: fine bands settle within micrometres.
 So the times of a band's own history are shorter than those of the job, and a step is placed by its stage of the job and
-by the time since this stage began.
-"""
+by the time since this stage began."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -12,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects.relaxation import relaxation_of
-from ..history.timeline import Step, Timeline
 from ..job import Grid, Job
-from ..job.sections.stages import GeometricStep, Stage
+from ..job.history import Step, Timeline
+from ..job.stages import GeometricStep, Stage
 
 FIRST, GROWTH, LONGEST = 0.02, 1.35, 0.5  # accuracy: cells of the first step of a slide, growth, cells of the longest
 SETTLED = 1.5  # accuracy: slip of a stage over the longest wave of a band, after which the band is steady

@@ -1,25 +1,189 @@
-"""Choice of the open parameters of a job in bands: numbers of bands, boxes, points and numbers of surfaces."""
+"""Choice of the bands of a job from its spectrum, or from its measured map.
+
+Choice of the open parameters of a job in bands: numbers of bands, boxes, points and numbers of surfaces.
+
+The spectrum of a job's surface as one function, and moments of its waves between two wavenumbers.
+
+An isotropic spectrum Phi(k) has, between two wavenumbers,
+
+    <h^2> = int Phi k dk/(2 pi),    <|grad h|^2> = int Phi k^3 dk/(2 pi);
+
+on a line of points the integrals have one factor k less. Spectra of several rough shapes are added.
+
+Warning where linear theory fails: the surface is too steep.
+
+The coarsest band of a job whose surface starts with a measured map: the map itself, without finer waves.
+
+A road is not Gaussian, so that a spectrum alone does not describe its long waves.
+"""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import job as jobs
 from ..doubts import Doubt
 from ..errors import InputError
-from ..job import Grid, Job
-from ..job.added_sections import answers
-from ..job.checks.cells import fast_length
-from ..job.checks.size import doubt_memory
-from ..job.sections.spectral_bands import AUTO, LEAST_CELLS, Bands
+from ..job import Grid, Job, Topography, map_files, measured_maps
+from ..job.advice import fast_length
+from ..job.calculation import AUTO, LEAST_CELLS, Bands
+from ..job.listing import answers
+from ..job.meaning import doubt_memory
+from ..job.measured_maps import prepare
+from ..march import map_sentences
+from ..march.measured_range import doubt_band
 from ..parallel.slab import Array
-from ..physics.roughness import EDGE
+from ..physics.roughness import EDGE, Roughness
 from ..printed import quantity
-from ..scene.measured_range import doubt_band
-from .measured_band import MapBand, band_of_map
-from .steep_waves import doubt_steep_waves
-from .wave_spectrum import WaveSpectrum, spectrum_of
+
+POINTS = 4000  # accuracy: points of the midpoint rule over ln k; its error is 1e-5 over six decades
+
+
+@dataclass(frozen=True)
+class WaveSpectrum:
+    """Phi [m^4] as a function of wavenumbers [rad/m], from the `longest` to the `shortest` wavelength [m], of a surface
+    or, with `line`, of a profile along the sliding; smooth except at the `kinks` [rad/m]."""
+
+    phi: Callable[[Array], Array]
+    longest: float
+    shortest: float
+    line: bool = False
+    kinks: tuple[float, ...] = ()
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Smallest and largest wavenumber [rad/m]."""
+        return 2.0 * np.pi / self.longest, 2.0 * np.pi / self.shortest
+
+    def moment(self, low: float, high: float, power: int) -> float:
+        """Return `int Phi k^(1 + power) dk/(2 pi)` between two wavenumbers [rad/m]: the mean square height [m^2] for 0,
+        the mean square slope for 2."""
+        step = np.log(high / low) / POINTS
+        k = low * np.exp(step * (np.arange(POINTS) + 0.5))
+        return float(np.sum(self.phi(k) * k ** (power + 2 - self.line)) * step / (2.0 * np.pi))
+
+    def density_of_slopes(self, k: Array, low: float, high: float) -> Array:
+        """Return the mean square slope per area of the plane of wavenumbers over 4 pi^2, or per length over 2 pi on a
+        line, between two wavenumbers; 0 elsewhere."""
+        inside = (k >= low) & (k < high)
+        known = np.where(inside, k, low)
+        return np.where(inside, self.phi(known) * known**2, 0.0)
+
+    def cut(self, count: int) -> Array:
+        """Return the wavenumbers [rad/m] at the ends of `count` bands, equally spaced in the logarithm."""
+        return np.geomspace(*self.ends, count + 1)
+
+    def steep_beyond(self, slope: float) -> float:
+        """Return the wavelength [m] down to which all longer waves together have this rms slope; 0 if all waves have
+        less."""
+        edges = self.cut(POINTS)
+        middle, step = np.sqrt(edges[1:] * edges[:-1]), np.log(edges[1] / edges[0])
+        squares = np.cumsum(self.phi(middle) * middle ** (4 - self.line)) * step / (2.0 * np.pi)
+        place = int(np.searchsorted(squares, slope**2))
+        return float(2.0 * np.pi / middle[place]) if place < POINTS else 0.0
+
+    def without_shorter(self, wavelength: float) -> "WaveSpectrum":
+        """Return the spectrum without waves shorter than this [m]."""
+        return replace(self, shortest=max(wavelength, self.shortest))
+
+
+def spectrum_of(job: Job, line: bool = False) -> WaveSpectrum:
+    """Return the spectrum of the rough shapes of a job. Raises InputError for tables that cannot be read, and for
+    spectra of a surface [m^4] if the job has profiles."""
+    parts = [part for part in job.surface if isinstance(part, jobs.Rough | jobs.RoughSpectrum)]
+    found = [_part(part, line) for part in parts]
+    longest, shortest = max(one.longest for one in found), min(one.shortest for one in found)
+    if not shortest < longest * EDGE:
+        raise InputError("surface: bands need a short_wavelength below long_wavelength")
+    kinks = tuple(sorted({kink for one in found for kink in (*one.kinks, *one.ends)}))
+    return WaveSpectrum(_sum([one.phi for one in found]), longest, shortest, line, kinks)
+
+
+def _sum(parts: Sequence[Callable[[Array], Array]]) -> Callable[[Array], Array]:
+    return lambda k: np.asarray(sum(part(k) for part in parts))
+
+
+def _part(part: jobs.Rough | jobs.RoughSpectrum, line: bool) -> WaveSpectrum:
+    if isinstance(part, jobs.RoughSpectrum):
+        if line:
+            raise InputError("surface: a spectrum in m^4 is of a surface, and bands.points are those of a line")
+        found, (longest, shortest) = measured_maps.read_spectrum(part)
+        ends = 2.0 * np.pi / longest * EDGE, 2.0 * np.pi / shortest / EDGE
+        inside = lambda k: np.where((k >= ends[0]) & (k <= ends[1]), found(k), 0.0)  # noqa: E731
+        return WaveSpectrum(inside, longest, shortest, line, tuple(found.q.tolist()))
+    limits = part.long_wavelength, part.rolloff_wavelength, part.short_wavelength
+    unit = WaveSpectrum(Roughness(part.hurst, *limits).density, limits[0], limits[2], line)
+    if part.rms_slope is not None:
+        factor = part.rms_slope**2 / unit.moment(*unit.ends, 2)
+    elif part.rms_height is not None:
+        factor = part.rms_height**2 / unit.moment(*unit.ends, 0)
+    elif line:
+        raise InputError("surface: psd_constant is of a surface, and bands.points are those of a line; give rms_slope")
+    else:
+        factor = part.psd_constant or 0.0
+    return replace(unit, phi=lambda k: factor * unit.phi(k), kinks=(2.0 * np.pi / limits[1],))
+
+
+STEEP = 0.5  # physics: rms slope, up to which slopes count as small
+USUAL = 1.3  # physics: rms slope at which the literature on rubber friction cuts spectra off (Lorenz et al. 2011)
+ROUNDED = 1.01  # rounding: rms slope over USUAL, up to which a spectrum has been cut off there
+STRAIN = math.exp(-1.0)  # physics: rms strain over rms slope, at the depth 1/q where the strain of a wave is largest
+
+
+def doubt_steep_waves(spectrum: WaveSpectrum) -> Iterator[Doubt]:
+    """Yield a warning if the surface is too steep for linear theory, with the usual cut-off."""
+    slope = math.sqrt(spectrum.moment(*spectrum.ends, 2))
+    if slope <= STEEP:
+        return
+    steep, usual = spectrum.steep_beyond(STEEP), spectrum.steep_beyond(USUAL)
+    numbers = {"slope": slope, "strain": STRAIN * slope, "steep": steep, "most": STEEP}
+    if usual and slope > ROUNDED * USUAL:
+        yield Doubt("steep waves, cut-off", "surface", {**numbers, "usual": usual, "cutoff": USUAL})
+    else:
+        yield Doubt("steep waves", "surface", numbers)
+
+
+FEWEST_WAVES = 4  # accuracy: least number of shortest waves along a map
+RESOLVED = 8  # accuracy: points of a map per wave that it resolves
+
+
+@dataclass(frozen=True)
+class MapBand:
+    """Heights [m] of the map on its `grid`, shape (ny, nx), its rms slope, notes on its preparation, and warnings."""
+
+    grid: Grid
+    heights: Array
+    rms_slope: float
+    notes: tuple[str, ...]
+    doubts: tuple[Doubt, ...]
+
+
+def band_of_map(job: Job, shortest: float, cells: float) -> MapBand | None:
+    """Return the measured map with which a job's surface starts, with waves down to `shortest` [m], of `cells` cells;
+    None without a map. Raises InputError for a map that cannot be read."""
+    part = job.surface[0]
+    if not isinstance(part, Topography):
+        return None
+    whole = map_files.read_map(part)
+    if whole.is_line:
+        raise InputError(f"{part.path} is a line scan; bands take a map, or the spectrum of the scan in a table")
+    size = part.copies * whole.size[0], part.copies * whole.size[1]
+    nx, ny = (fast_length(cells * length / shortest) for length in size)
+    grid = Grid(points=(nx, ny), size=size)
+    smooth = part.model_copy(update={"short_wavelength": max(shortest, part.short_wavelength or 0.0)})
+    found = prepare(smooth, grid, whole)
+    doubts = [*map_sentences.doubt_sizes(found), *map_sentences.doubt_outliers(found)]
+    if shortest > max(size) / FEWEST_WAVES:
+        cells = max(length / n for length, n in zip(whole.size, whole.heights.shape[::-1], strict=True))
+        seam = {"longest": shortest, "side": max(size), "points": RESOLVED, "seam": RESOLVED * cells}
+        doubts.append(Doubt("no waves of the map", "surface", seam))
+    waves = np.fft.fft2(found.heights) / found.heights.size
+    qy, qx = (2.0 * np.pi * np.fft.fftfreq(n, length / n) for n, length in zip((ny, nx), size[::-1], strict=True))
+    slope = math.sqrt(float(np.sum(np.abs(waves) ** 2 * (qx[None, :] ** 2 + qy[:, None] ** 2))))
+    return MapBand(grid, found.heights, slope, tuple(map_sentences.describe_treatment(found)), tuple(doubts))
+
 
 WIDTH = 0.75  # accuracy: width of a band [decades]; the error of friction is 4 % for 0.65 to 1
 WAVES, WAVES_OF_LINE = 4, 16  # accuracy: number of longest waves along a box
@@ -133,7 +297,7 @@ def describe_cut(cut: Cut, job: Job) -> list[str]:
         f"surfaces of each: {many}",
         f"surface: rms height {quantity(cut.rms_height, 'm', 4)}, rms slope {cut.rms_slope(cut.count - 1, 0):.4g}; "
         f"rms slopes of the bands: {', '.join(f'{cut.rms_slope(band):.3g}' for band in range(cut.count))}",
-        *(text for describe in answers("bands", "describe_bands") for text in describe(job, cut)),
+        *(text for describe in answers("steady", "describe_bands") for text in describe(job, cut)),
     ]
 
 

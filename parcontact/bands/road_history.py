@@ -5,8 +5,7 @@ the closing of all finer bands at each instant as the law of its interface (`roa
 over the bands at each instant as in steady sliding (`cascade`, `road_sliding`), with errors of the same kind: half of
 the rungs are marched on hard walls, too, for the error of the method.
 
-The nominal pressure is constant, so that rungs keep their pressures.
-"""
+The nominal pressure is constant, so that rungs keep their pressures."""
 
 import copy
 import math
@@ -19,20 +18,19 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from ..contact.constraint import InterfaceLaw
 from ..effects.relaxation import relaxation_of
 from ..errors import RunError
+from ..files.directory import MARCHES
+from ..files.recorder import StepRow
 from ..job import Job
+from ..march.point import Point
 from ..parallel.slab import Array, Slab
 from ..physics.measures import Measures
-from ..solve.interface_law import InterfaceLaw
-from ..steady_sliding.point import Point
-from ..storage.directory import MARCHES
-from ..storage.step_row import StepRow
-from .band import Rung
+from .band import NODES, PressureLadder, Rung
 from .band_steps import BEFORE, SETTLED, BandClock, Place, rest_step
 from .cascade import Cascade
 from .choice import FEWEST
-from .ladder import NODES, PressureLadder
 from .road_march import BandMarch, instant_of
 from .road_sliding import RoadSliding, _sums
 

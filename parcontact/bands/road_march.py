@@ -7,16 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from ..history.timeline import Step
-from ..march.closing_law import ClosingLaw
+from ..contact.constraint import HARD, InterfaceLaw
+from ..job.history import Step
+from ..march.laws import ClosingLaw
 from ..march.loop import March, run_steps
+from ..march.scene import build_on
+from ..march.steady import start_march
 from ..parallel.slab import Array
-from ..scene import build_on
-from ..solve.interface_law import HARD, InterfaceLaw
-from ..steady_sliding.start import start_march
-from .band import Band, Rung, rung_errors
+from .band import Band, PressureLadder, Rung, rung_errors
 from .band_steps import BEFORE, Place
-from .ladder import PressureLadder
 
 LawAt = Callable[[Place], InterfaceLaw]
 NOTHING: Array = np.zeros(0)

@@ -9,22 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from ..accuracy.budget import ErrorBudget, ErrorParts
 from ..columns import BANDS, names_of
 from ..doubts import Doubt
 from ..effects.relaxation import feeds_back, highest_temperature_of, temperature_of
 from ..errors import InputError, RunError, UnsolvedError
 from ..job import Job
+from ..march.budget import ErrorBudget, ErrorParts
+from ..march.choices import choices
+from ..march.curve import States, on_one_grid
+from ..march.point import Point
+from ..march.scene import Setup
 from ..parallel.slab import Array, Slab
-from ..physics.measures import Measures
-from ..scene import Setup, choices
-from ..solve.certificate import Certificate
-from ..steady_sliding.curve import States, on_one_grid
-from ..steady_sliding.point import Point
+from ..physics.measures import Certificate, Measures
 from .band import Rung, Vector, direction_of
 from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
-from .choice import FEWEST, MOST, SAMPLE_SHARE, cut_bands, describe_cut, doubts_of_bands
-from .steep_waves import STRAIN
+from .choice import FEWEST, MOST, SAMPLE_SHARE, STRAIN, cut_bands, describe_cut, doubts_of_bands
 
 MOST_ROUNDS = 20  # tuning: limit on rounds of the temperatures
 LEAST_ERROR, RELATIVE = 0.1, 0.02  # accuracy: error of the rise of a band [K], and relative
@@ -137,7 +136,7 @@ class RoadSliding:
         self._results = outcome.results
         point = self._to_point(outcome, velocity, pressure, time.perf_counter() - began)
         if self.job.section("thermal") is not None:
-            from ..effects.heat.bands import flash_of_bands
+            from ..effects.heat.steady import flash_of_bands
 
             self._rises = self._rises_of(outcome.results, point.measures.force_interface)
             heats = [result.friction for result in outcome.results]
@@ -173,7 +172,7 @@ class RoadSliding:
 
     def _rises_of(self, results: Results, rubbing: float) -> list[float]:
         """Return the rises [K] of all bands; `rubbing` [N] is the force of the interface on the coarsest box."""
-        from ..effects.heat.bands import rises_of, uniform, waves_along_depth
+        from ..effects.heat.steady import rises_of, uniform, waves_along_depth
 
         cascade, section = self._cascade, self.job.section("thermal")
         speed, box = math.hypot(*cascade.velocity), self.setup.grid.lx * self.setup.grid.ly

@@ -17,8 +17,7 @@ modulus of a wave that does not pass is at least G(T).
                 of n stages begins with any phase of a wave
                 error = (|dM|(w = 0)/G(T) + the largest |dM|/G'' of 1/T <= w <= pi/dt, if the surface slides)
 
-A wave slower than 1/T does not pass within the history. A frozen branch can get a map at any time: it is G u.
-"""
+A wave slower than 1/T does not pass within the history. A frozen branch can get a map at any time: it is G u."""
 
 import math
 from dataclasses import dataclass
@@ -26,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..history.timeline import Timeline
+from ..job.history import Timeline
 from ..parallel.slab import Array
 from ..physics.prony import Integrator, Prony, coefficients, complex_modulus, relaxation
 from ..printed import per_cent

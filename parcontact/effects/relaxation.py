@@ -5,22 +5,22 @@ from typing import Any
 
 import numpy as np
 
-from .. import job as jobs
-from ..job.sections.materials import heated
+from .. import job
+from ..job.materials import heated
 from ..physics.prony import Prony, normal_form, zener_to_prony
 from ..rubber.shift import highest_temperature
 
-Material = jobs.Elastic | jobs.Zener | jobs.Dma
+Material = job.Elastic | job.Zener | job.Dma
 
 
 def relaxation_of(material: Material) -> Prony:
     """Return the relaxation function of a material [Pa, s]; its long-term modulus and no terms if it has no
     branches."""
     body = material.fitted
-    if isinstance(body, jobs.Elastic) or not body.branches:
+    if isinstance(body, job.Elastic) or not body.branches:
         return Prony(body.long_modulus, np.zeros(0), np.zeros(0))
-    zener = [b for b in body.branches if isinstance(b, jobs.ZenerBranch)]
-    plain = [b for b in body.branches if isinstance(b, jobs.PronyBranch)]
+    zener = [b for b in body.branches if isinstance(b, job.ZenerBranch)]
+    plain = [b for b in body.branches if isinstance(b, job.PronyBranch)]
     series, kelvin, viscosity = ([getattr(b, name) for b in zener] for name in ("G0", "G1", "eta1"))
     prony = zener_to_prony(series, kelvin, viscosity, body.modulus_inf)
     moduli, times = [b.modulus for b in plain], [b.relaxation_time for b in plain]
@@ -38,7 +38,7 @@ def temperature_of(material: Material) -> float:
     """Return the temperature of a material [deg C]: the given one, or the reference of its shift; NaN
     without a shift."""
     body = material.fitted
-    if not isinstance(body, jobs.Zener) or body.shift is None:
+    if not isinstance(body, job.Zener) or body.shift is None:
         return math.nan
     return body.shift.reference if body.temperature is None else body.temperature
 
@@ -46,7 +46,7 @@ def temperature_of(material: Material) -> float:
 def highest_temperature_of(material: Material) -> float:
     """Return the temperature [deg C] at which the tables of a material's shift end; inf without tables."""
     body = material.fitted
-    return highest_temperature(body.shift.made) if isinstance(body, jobs.Zener) and body.shift else math.inf
+    return highest_temperature(body.shift.made) if isinstance(body, job.Zener) and body.shift else math.inf
 
 
 def factor_at(material: Material, rise: float) -> float:

@@ -1,13 +1,18 @@
 """A job: the description of a simulation, read from a YAML file or a mapping into frozen sections."""
 
 from ..errors import JobError
+from .calculation import Checkpoint, Grid, Numerics, Output, Study
+from .materials import Dma, Elastic, PronyBranch, Zener, ZenerBranch
 from .model import Job, describe_job
+from .parts import Part
+from .quantities import Positive, log_range
 from .reading import Case, load, load_cases, select_cases
-from .sections.calculation import Checkpoint, Grid, Numerics, Output, Study
-from .sections.geometry import (
+from .stages import AUTO, GeometricStep, Initial, Ramp, Stage, Steady, Swing
+from .surfaces import (
     Cone,
     Cylinder,
     Flat,
+    HeightArray,
     HeightFile,
     Indenter,
     OnOneMesh,
@@ -20,9 +25,3 @@ from .sections.geometry import (
     Topography,
     Wave,
 )
-from .sections.height_arrays import HeightArray
-from .sections.materials import Dma, Elastic, PronyBranch, Zener, ZenerBranch
-from .sections.oscillation import Swing
-from .sections.part import Part
-from .sections.quantities import Positive, log_range
-from .sections.stages import AUTO, GeometricStep, Initial, Ramp, Stage, Steady

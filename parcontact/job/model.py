@@ -11,18 +11,13 @@ from typing import Any
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
 from ..doubts import Doubt
-from . import added_sections
-from .checks import advice, cells, layer_warnings, limits, meaning, size
-from .sections import height_arrays, listing
-from .sections.calculation import Body, Checkpoint, Grid, Numerics, Output, Study
-from .sections.geometry import Shape
-from .sections.materials import Dma, Material, Zener, describe_temperature, heated
-from .sections.part import Instead, Origin, Part, Rule
-from .sections.spectral_bands import BAND_RULES, SomeBands
-from .sections.stages import Initial, Stage, Steady
-from .text.fault import Fault
-from .text.python_data import is_array
-from .text.yamltext import dump
+from . import advice, limits, listing, meaning, surfaces
+from .calculation import BAND_RULES, Body, Checkpoint, Grid, Numerics, Output, SomeBands, Study
+from .materials import Dma, Material, Zener, describe_temperature, heated
+from .parts import Instead, Origin, Part, Rule
+from .stages import Initial, Stage, Steady
+from .surfaces import Shape
+from .yaml_text import Fault, dump, is_array
 
 OF_A_SECTION = {  # keys that are often written at the top of a job by mistake
     **dict.fromkeys(("load", "pressure", "force", "velocity"), Instead("give it to the stages of history")),
@@ -100,7 +95,7 @@ class Job(Part):
         """Validate a job that has sections of effects by the model extended with them."""
         if cls is Job and isinstance(data, dict):
             others = [key for key, value in data.items() if key not in cls.model_fields and value is not None]
-            if added := added_sections.effects_of(others):
+            if added := listing.effects_of(others):
                 return extended_model(tuple(sorted(added))).model_validate(data, context=info.context)
         return handler(data)
 
@@ -113,7 +108,7 @@ class Job(Part):
     @classmethod
     def words(cls) -> tuple[str, ...]:
         """Return the names of all sections, including sections of this package's effects and `sweep`."""
-        return (*dict.fromkeys((*super().words(), *added_sections.own_sections())), "sweep")
+        return (*dict.fromkeys((*super().words(), *listing.own_sections())), "sweep")
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Job) and dict(self) == dict(other)
@@ -161,8 +156,8 @@ class Job(Part):
             *of_material,
             *advice.doubts_of_resolution(self, self.directions, chosen=bool(self._origin.mesh)),
             *meaning.doubts_of_scene(self),
-            *layer_warnings.doubts_of_layer(self),
-            *size.doubts_of_size(self),
+            *meaning.doubts_of_layer(self),
+            *meaning.doubts_of_size(self),
             *of_effects,
         )
 
@@ -174,15 +169,15 @@ class Job(Part):
 
     def _said(self, what: str) -> Iterator[Any]:
         """Yield the `doubts` or `facts` of the effects whose sections are given."""
-        for section, effect in added_sections.effects_of(self._added_sections()).items():
-            with added_sections.naming_effect(section):
+        for section, effect in listing.effects_of(self._added_sections()).items():
+            with listing.naming_effect(section):
                 found = list(getattr(effect, what, lambda job: ())(self))
             yield from found
 
     @property
     def directions(self) -> list[tuple[float, float]]:
         """Return the different sliding directions (unit vectors); opposite directions count once."""
-        return cells.directions_of(self.history, self.initial, self.steady)
+        return advice.directions_of(self.history, self.initial, self.steady)
 
     @property
     def measured(self) -> bool:
@@ -211,7 +206,7 @@ class Job(Part):
 
     def asked(self, name: str) -> list[Any]:
         """Return what the effects whose sections are given have under a name (`effects.effect.Effect`)."""
-        found = added_sections.effects_of(self._added_sections()).values()
+        found = listing.effects_of(self._added_sections()).values()
         return [getattr(effect, name) for effect in found if hasattr(effect, name)]
 
     def _added_sections(self) -> list[str]:
@@ -243,7 +238,7 @@ SEPARATOR = ":"  # separates the sections in the class name of an extended job, 
 def extended_model(sections: tuple[str, ...]) -> type[Job]:
     """Return the model of a job extended by sections of effects, and by the keys that one adds to stages; rules on the
     section of another effect apply if the job has it."""
-    effects = added_sections.effects_of(sections)
+    effects = listing.effects_of(sections)
     fields: dict[str, Any] = {
         name: (effect.section | None, Field(default=None, description="a mapping of keys"))
         for name, effect in effects.items()
@@ -271,11 +266,11 @@ def _named_rule(section: str, rule: Rule) -> Rule:
     """Return a rule that raises RunError with the name of its effect if it fails."""
 
     def check(*values: Any) -> Iterator[Fault]:
-        with added_sections.naming_effect(section):
+        with listing.naming_effect(section):
             found = list(rule.check(*values))
         yield from found
 
-    return rule if added_sections.is_ours(section) else rule._replace(check=check)
+    return rule if listing.is_ours(section) else rule._replace(check=check)
 
 
 def __getattr__(name: str) -> Any:
@@ -290,7 +285,7 @@ def prepared(data: dict[str, Any]) -> dict[str, Any]:
     """Return the data of a job with `surface` as a list of shapes, and with names of all stages."""
     data = dict(data)
     if isinstance(data.get("surface"), dict | list) or is_array(data.get("surface")):
-        data["surface"] = height_arrays.with_shapes(data["surface"])
+        data["surface"] = surfaces.with_shapes(data["surface"])
     if isinstance(data.get("history"), list):
         data["history"] = [_named(stage, index) for index, stage in enumerate(data["history"])]
     return data

@@ -1,4 +1,7 @@
-"""Reading of job files: one job, or the cases of a sweep; mistakes are reported with file, line and column."""
+"""Reading of job files: one job, or the cases of a sweep; mistakes are reported with file, line and column.
+
+Reading of the resolved job in an output directory, as far as pictures and texts need it.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,11 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from ..errors import InputError, JobError
-from .model import Job
-from .sections.part import Origin
-from .text.fault import faults_of, shorten
-from .text.overrides import read_job
-from .text.places import NOWHERE, UNREADABLE, Mistake, Place, Source
-from .text.python_data import source_of
-from .text.sweep_cases import Sweep
+from . import yaml_text
+from .model import NO_GRID, Job
+from .overrides import Sweep, read_job
+from .parts import Origin
+from .yaml_text import NOWHERE, UNREADABLE, Mistake, Place, Source, faults_of, shorten, source_of
 
 MANY_MISTAKES = 40  # tuning: largest number of mistakes that are all shown
 SHOWN_MISTAKES = 20  # tuning: number of mistakes that are shown if there are more
@@ -178,3 +179,42 @@ def _mistakes(source: Source, error: ValidationError) -> Iterator[Mistake]:
         if found.readable:
             name = ".".join(shorten(str(step)) for step in found.path) or "the job"
             yield Mistake(found.key_place if fault.at_key else found.place, f"{name} {fault.predicate}")
+
+
+RESOLVED = "job.resolved.yaml"
+STEADY_RESOLVED = "steady.resolved.yaml"
+SHOWN = (
+    "title",
+    "grid",
+    "surface",
+    "material",
+    "initial",
+    "history",
+    "steady",
+    "adhesion",
+    "interface",
+    "counterbody",
+    "leakage",
+    "bands",
+)  # sections that pictures and texts need; others may differ between versions
+LAST = "checkpoint"  # last section of a job with every default
+FILES = ("file", "topography")  # shapes that come from files
+
+
+def shown_job(path: Path) -> Job:
+    """Return the resolved job with flat shapes in place of files, which may no longer exist."""
+    try:
+        text = path.read_bytes()
+        data = yaml_text.parse(text, str(path)).data
+        if not text.endswith(b"\n") or not isinstance(data, dict) or LAST not in data:
+            raise InputError(f"{path} is incomplete: it lacks the section {LAST}; restore the whole file")
+        data = {name: data[name] for name in SHOWN if name in data}
+        data["surface"] = [
+            {"shape": "flat"} if shape["shape"] in FILES or "spectrum" in shape else shape for shape in data["surface"]
+        ]
+        if data.pop("bands", None) is not None:  # pictures show tables only
+            data["grid"], data["surface"] = NO_GRID, [{"shape": "flat"}]
+        return Job.model_validate(data)
+    except (OSError, KeyError, TypeError, ValidationError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error).partition("\n")[0]
+        raise InputError(f"{path} cannot be read: {reason}") from error

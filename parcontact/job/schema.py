@@ -1,8 +1,7 @@
 """The JSON Schema (draft 2020-12) of job files, for editors, and a table of all keys, from the types of the sections.
 
 The schema has the words, ranges, exclusions and defaults of each key. Rules between sections (resolution, files, loads)
-are checked by `parcontact check` only.
-"""
+are checked by `parcontact check` only."""
 
 from __future__ import annotations
 
@@ -20,14 +19,14 @@ from pydantic_core.core_schema import (
     TypedDictField,
 )
 
-from . import added_sections
+from . import listing
+from .materials import Dma, Elastic, Zener
 from .model import Job, extended_model
-from .sections.materials import Dma, Elastic, Zener
-from .sections.part import Part, kind_key, literal_words
-from .sections.quantities import AUTO_POINTS, FROM_SURFACE, LARGEST, MOST, along_x, both, bounded, countable, listed
-from .sections.stages import Stage, expand_range
-from .text.fault import list_words
-from .text.overrides import materials
+from .overrides import materials
+from .parts import Part, kind_key, literal_words
+from .quantities import AUTO_POINTS, FROM_SURFACE, LARGEST, MOST, along_x, both, bounded, countable, listed
+from .stages import Stage, expand_range
+from .yaml_text import list_words
 
 Schema = dict[str, Any]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -72,7 +71,7 @@ class SchemaOfKeys(GenerateJsonSchema):
 def without_schema() -> dict[str, str]:
     """Return the reasons why sections of effects have no schema, by section."""
     reasons = {}
-    for name, effect in added_sections.find_effects().items():
+    for name, effect in listing.find_effects().items():
         try:
             effect.section.model_json_schema(schema_generator=SchemaOfKeys)
         except (Exception, SystemExit) as error:  # code of other packages may raise anything
@@ -82,7 +81,7 @@ def without_schema() -> dict[str, str]:
 
 def json_schema() -> Schema:
     """Return the schema of a whole job, with the sections of all installed effects that have a schema."""
-    kind = extended_model(tuple(name for name in added_sections.find_effects() if name not in without_schema()))
+    kind = extended_model(tuple(name for name in listing.find_effects() if name not in without_schema()))
     found = kind.model_json_schema(schema_generator=SchemaOfKeys)
     properties = found["properties"]
     for name in materials():
@@ -140,7 +139,7 @@ def sections() -> list[SectionSchema]:
     found: dict[type[Part], SectionSchema] = {Job: SectionSchema("", Job, tuple(_keys(Job)))}
     for name, field in Job.model_fields.items():
         _collect(name, field, found)
-    for name, effect in added_sections.effects_of(added_sections.own_sections()).items():
+    for name, effect in listing.effects_of(listing.own_sections()).items():
         _collect(name, effect.section, found)
         if hasattr(effect, "stage"):  # what it adds to stages
             keys = (key for key in _keys(effect.stage) if key.word not in Stage.model_fields)

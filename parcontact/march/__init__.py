@@ -1,1 +1,1 @@
-"""One step of a history, the loop over steps, rest made in one step, and errors of failed steps."""
+"""From a job to its steps: scene, choices, errors, steps in time, and steady sliding."""

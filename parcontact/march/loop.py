@@ -4,23 +4,22 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..accuracy.budget import ErrorSums
-from ..capabilities import offers
-from ..effects.contact_protocol import Detached, nothing_holds
+from ..capabilities import stated
+from ..effects.effect import Detached, nothing_holds
 from ..errors import InputError
-from ..history.timeline import Step, Timeline
+from ..files.checkpoint import Contents, Facts
+from ..files.recorder import StepRow
+from ..job.history import Step, Timeline
 from ..parallel.slab import Array
 from ..physics.body import remembers
 from ..physics.entries import Entry
-from ..scene import Scene
-from ..storage.checkpoint import Contents, Facts
-from ..storage.step_row import StepRow
-from .dry_law import choose_contact_law
-from .failure import DetachedError
+from .budget import ErrorSums
+from .laws import DetachedError, choose_contact_law
+from .scene import Scene
 from .state import State, entries, first_state, restored, save_state
 from .step import make_step
 
-FIELDS_OF_EFFECTS = {name: key for fields in offers("columns", "FIELDS_NEED") for name, key in fields.items()}
+FIELDS_OF_EFFECTS = {name: key for fields in stated("FIELDS_NEED") for name, key in fields.items()}
 
 
 class March:

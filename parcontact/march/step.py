@@ -3,30 +3,33 @@
 A step begins the body, solves the contact, measures, commits the body, estimates errors, and updates effects. A step
 that is rejected or fails is dropped; nothing has to be undone. No map is copied for this: the new pressure is in the
 spare map of the state, and the new displacement in a map of the solver's workspace, which gets the map of the old
-displacement in exchange. Operations in place come last, when nothing can fail.
-"""
+displacement in exchange. Operations in place come last, when nothing can fail."""
 
 import math
 import time
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..accuracy.budget import ErrorBudget, add_shear
-from ..effects.contact_protocol import EdgeMotion, PreviousContacts, PreviousPressure
-from ..effects.effect import Changes, Instant, Sheared, effect_values
-from ..history.chosen import MadeStep
-from ..history.timeline import Step
+from ..contact.problem import Approach, Control, MeanPressure
+from ..effects.effect import Changes, EdgeMotion, Instant, PreviousContacts, PreviousPressure, Sheared, effect_values
+from ..files.recorder import StepRow
+from ..job.history import MadeStep, Step
 from ..physics.body import Trial, states_errors, surface_of
 from ..physics.energy import EnergyMemory, Pressed
-from ..scene import Scene
-from ..solve.problem import Approach, Control, MeanPressure
-from ..storage.step_row import StepRow
-from . import failure
-from .dry_law import choose_contact_law
-from .failure import DetachedError, StepError
-from .starts import cells_moved
-from .state import State, energies_of, error_of_energies
-from .step_errors import ErrorMemory, SolvedStep, StepErrors, add_energy_error, estimate_errors
+from . import laws
+from .budget import ErrorBudget, add_shear
+from .laws import DetachedError, StepError, cells_moved, choose_contact_law
+from .scene import Scene
+from .state import (
+    ErrorMemory,
+    SolvedStep,
+    State,
+    StepErrors,
+    add_energy_error,
+    energies_of,
+    error_of_energies,
+    estimate_errors,
+)
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ def make_step(scene: Scene, state: State, step: Step) -> State:
         error_energy,
         split,
         seconds=time.perf_counter() - began,
-        remark="; ".join(f"{failure.describe_place(scene, step)}: {remark}" for remark in remarks if remark),
+        remark="; ".join(f"{laws.describe_place(scene, step)}: {remark}" for remark in remarks if remark),
         errors=errors.budget if stated else None,
         added=effect_values(scene.effects, followed),
     )
@@ -127,13 +130,13 @@ def _solve(scene: Scene, state: State, step: Step) -> SolvedStep:
     contact = of_law.contact
     if of_law.end == "detached":
         raise DetachedError(step.time, step.load)
-    if contact.failure and not failure.accepts(scene, contact):
+    if contact.failure and not laws.accepts(scene, contact):
         moved = math.hypot(*cells_moved(scene, step, state.contact.last.position))
-        raise failure.of_solve(scene, step, contact, contact, [], trial.effective, moved)
+        raise laws.of_solve(scene, step, contact, contact, [], trial.effective, moved)
     maps = contact.p, trial.alpha, contact.u, trial.effective, contact.d, of_law.touching
     measures = scene.probe.measure(*maps, step.position, step.velocity, of_law.least_load)
     if not measures.finite:
-        raise failure.not_finite(scene, step, measures)
+        raise laws.not_finite(scene, step, measures)
     memory = body.commit(state.body, trial, contact.u, scene.solver.workspace.pressure)
     return SolvedStep(step, trial, of_law, measures, memory)
 
@@ -142,7 +145,7 @@ def _control(scene: Scene, step: Step, trial: Trial) -> Control:
     """Return the prescribed load of a step in the run's units; collective. Raises StepError."""
     grid = scene.choices.grid
     if step.control == "approach":
-        failure.refuse_beyond_full_contact(scene, step, trial.effective)
+        laws.refuse_beyond_full_contact(scene, step, trial.effective)
         return Approach((step.load + scene.setup.surface.datum) / scene.units.height)
     mean = step.load / (grid.lx * grid.ly) if step.control == "force" else step.load
     return MeanPressure(mean / (trial.alpha * scene.units.pressure))

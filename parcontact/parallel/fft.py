@@ -1,4 +1,6 @@
-"""Distributed two-dimensional real FFT: a local pass along x, a transpose between ranks, a local pass along y.
+"""Distributed transforms, and what is stored and multiplied in them.
+
+Distributed two-dimensional real FFT: a local pass along x, a transpose between ranks, a local pass along y.
 
 A map of this rank's rows `(ny_loc, nx)` becomes a spectrum of this rank's x-wavenumbers `(ny, nkx_loc)`, in which y
 is local. With lengths larger than the map (zero padding) only the rows of the map are transformed along x and sent.
@@ -9,18 +11,127 @@ not aligned) pass through a block, too. The pass along y works on blocks of colu
 transforms a block, multiplies it by the symbol and transforms it back while it is in cache. In addition to its
 blocks a transform holds one map, and on several ranks its messages, which are less than a map. In single precision
 rows of x-wavenumbers begin at cache lines.
+
+Exchange between the passes of a distributed transform: rows with all x-wavenumbers become all rows of some.
+
+It is made in legs, each of some rows of every rank, so that messages never take more than a part of a map. A leg is
+sent before the next one is packed: to pack meanwhile takes a second buffer, and gained nothing on two ranks.
+
+Spectra stored as maps, exactly, so that files of maps can hold them on any number of ranks.
+
+The half spectrum of a map of ny x nx points has `nx // 2 + 1` complex columns, distributed over the ranks by
+columns. Its real parts fill as many columns of a map, imaginary parts the rest. The imaginary parts of the first
+column and, if nx is even, of the last one do not fit: a second map holds those of `per_map` spectra.
+
+Products of a symbol with the cosine series of a map: a convolution of the map continued mirrored at its edges.
+
+The series `C(k, l) = 4 sum h(i, j) cos(pi (i + 1/2) k/nx) cos(pi (j + 1/2) l/ny)` takes a transform of the size of
+the map along each direction (J. Makhoul, IEEE Trans. Acoust. Speech Signal Process. 28 (1980) 27). With the even
+points first, followed by the odd ones backwards, and V the transform of these n points,
+
+    C(k) = exp(-i theta) V(k) + exp(i theta) V(n - k),        theta = pi k/(2 n),
+    V(k) = (exp(i theta)/2) (C(k) - i C(n - k)),              C(n) = 0.
+
+For a row, whose points are real, `C(k) - i C(n - k) = 2 exp(-i theta) V(k)`: the half spectrum has the wave k as its
+real part and n - k as its imaginary part. So messages, blocks and memory are as for the transform.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
+from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from ..compiled import loop
 from .fftw import pyfftw
+from .mpi import MPI
 from .slab import Array, Slab, allocate, deal, dealt_to, reused, without_memory
-from .transpose import Leg, count_legs, legs_of, wire_points
+
+Waves = NDArray[np.complexfloating]
+LEGS = 4  # tuning: largest number of legs of an exchange
+LEG_BYTES = 1 << 19
+
+
+def count_legs(spectrum_bytes: int, ranks: int) -> int:
+    """Return the number of legs for a spectrum of `spectrum_bytes` on all ranks: one per LEG_BYTES of a rank, at most
+    LEGS."""
+    return max(1, min(LEGS, spectrum_bytes // ranks // LEG_BYTES)) if ranks > 1 else 1
+
+
+def legs_of(rows: int, height: int, count: int) -> list[slice]:
+    """Return the rows of one rank in each leg, in blocks of `height` rows."""
+    blocks = -(-rows // max(height, 1))
+    bounds = [min(rows, height * (blocks * leg // count)) for leg in range(count + 1)]
+    return [slice(start, stop) for start, stop in pairwise(bounds)]
+
+
+def wire_points(legs: list[slice], columns: int) -> int:
+    """Return the wavenumbers in the longest leg, with `columns` in each row for other ranks."""
+    return max(leg.stop - leg.start for leg in legs) * columns
+
+
+class Leg:
+    """One leg, between blocks of rows and the `spectrum` with all rows of this rank's x-wavenumbers.
+
+    Parameters: `dealt`, the x-wavenumbers of each rank; `rows` of each rank, counted in the whole map; `wire`, the
+    buffer of messages to other ranks.
+    """
+
+    def __init__(self, slab: Slab, dealt: list[slice], rows: list[slice], spectrum: Waves, wire: Waves) -> None:
+        self._comm, self._dealt = slab.comm, dealt
+        own, mine = slab.comm.rank, spectrum.shape[1]
+        self._first, height = rows[own].start - slab.rows.start, rows[own].stop - rows[own].start
+        counts = [0 if rank == own else height * (part.stop - part.start) for rank, part in enumerate(dealt)]
+        starts = [sum(counts[:rank]) for rank in range(slab.comm.size)]
+        self._parcels: list[tuple[Waves, slice]] = []
+        for ranks in _runs(dealt, own):
+            columns = slice(dealt[ranks[0]].start, dealt[ranks[-1]].stop)
+            shape = len(ranks), height, (columns.stop - columns.start) // len(ranks)
+            first, count = starts[ranks[0]], shape[0] * shape[1] * shape[2]
+            parcel = spectrum[None, rows[own]] if own in ranks else wire[first : first + count].reshape(shape)
+            self._parcels.append((parcel, columns))
+        column_counts = [0 if rank == own else mine * (part.stop - part.start) for rank, part in enumerate(rows)]
+        column_starts = [mine * part.start for part in rows]
+        kind = MPI.C_DOUBLE_COMPLEX if spectrum.dtype == np.complex128 else MPI.C_FLOAT_COMPLEX
+        self._in_rows = [wire, (counts, starts), kind]
+        self._in_columns = [spectrum, (column_counts, column_starts), kind]
+        self.sent = sum(counts) * spectrum.itemsize
+
+    def post(self, rows: slice, waves: Waves) -> None:
+        """Copy a block of this rank's rows into the spectrum and the messages."""
+        for parcel, part in self._parts(rows, waves):
+            parcel[...] = part
+
+    def to_columns(self) -> None:
+        """Exchange the messages; collective."""
+        self._comm.Alltoallv(self._in_rows, self._in_columns)
+
+    def to_rows(self) -> None:
+        """Reverse `to_columns`; collective."""
+        self._comm.Alltoallv(self._in_columns, self._in_rows)
+
+    def collect(self, rows: slice, waves: Waves) -> None:
+        """Reverse `post`."""
+        for parcel, part in self._parts(rows, waves):
+            part[...] = parcel
+
+    def _parts(self, rows: slice, waves: Waves) -> Iterator[tuple[Waves, Waves]]:
+        """Yield the places of a block of rows in the messages to each run of ranks, and its waves, shape (ranks, rows,
+        wavenumbers) each."""
+        place = slice(rows.start - self._first, rows.stop - self._first)
+        for parcel, columns in self._parcels:
+            part = waves[:, columns].reshape(len(waves), len(parcel), parcel.shape[2])  # a view
+            yield parcel[:, place], part.transpose(1, 0, 2)
+
+
+def _runs(dealt: list[slice], own: int) -> list[list[int]]:
+    """Return runs of ranks with wavenumbers, the same number each, so that one copy serves all ranks of a run; `own` is
+    alone."""
+    having = [rank for rank, part in enumerate(dealt) if part.stop > part.start]
+    runs = groupby(having, lambda rank: (rank < own, rank > own, dealt[rank].stop - dealt[rank].start))
+    return [list(run) for _, run in runs]
+
 
 Spectrum = NDArray[np.complexfloating]
 BLOCK_BYTES = 1 << 19  # tuning: largest block of transformed rows or columns, for a second-level cache
@@ -284,3 +395,154 @@ def _multiply(spectrum: NDArray[np.complexfloating], symbol: NDArray[np.inexact]
         factors = symbol[j] if j < symbol.shape[0] else symbol[count - j]
         for i in range(spectrum.shape[1]):
             spectrum[j, i] *= factors[i]
+
+
+def edges(nx: int) -> int:
+    """Return the number of columns of imaginary parts that do not fit into the map of a spectrum."""
+    return 1 + (nx % 2 == 0)
+
+
+def per_map(nx: int) -> int:
+    """Return for how many spectra one map holds these columns."""
+    return max(1, nx // edges(nx))
+
+
+def to_map(fft: FFT, spectrum: Spectrum, out: Array, rest: Array) -> None:
+    """Put this rank's rows of a spectrum, distributed by columns, into `out`, and the columns that do not fit into
+    `rest`, shape (ny_loc, edges); collective."""
+    rows = to_rows(fft, spectrum)
+    count, nx = rows.shape[1], fft.slab.nx
+    out[:, :count] = rows.real
+    out[:, count:] = rows.imag[:, 1 : nx - count + 1]
+    rest[:, 0] = rows.imag[:, 0]
+    if edges(nx) > 1:
+        rest[:, 1] = rows.imag[:, -1]
+
+
+def from_map(fft: FFT, field: Array, rest: Array, out: Spectrum) -> None:
+    """Reverse `to_map`; collective."""
+    nx = fft.slab.nx
+    count = nx // 2 + 1
+    rows = np.empty((len(field), count), fft.complex)
+    rows.real = field[:, :count]
+    rows.imag[:, 1 : nx - count + 1] = field[:, count:]
+    rows.imag[:, 0] = rest[:, 0]
+    if edges(nx) > 1:
+        rows.imag[:, -1] = rest[:, 1]
+    to_columns(fft, rows, out)
+
+
+def to_rows(fft: FFT, spectrum: Spectrum) -> NDArray[np.complexfloating]:
+    """Return all columns of this rank's rows of a spectrum of the size of maps; collective."""
+    slab = fft.slab
+    parts = slab.comm.alltoall([np.ascontiguousarray(spectrum[rows]) for rows in slab.dealt])
+    return np.concatenate(parts, axis=1)
+
+
+def to_columns(fft: FFT, rows: NDArray[np.complexfloating], out: Spectrum) -> None:
+    """Reverse `to_rows`, into the spectrum `out`; collective."""
+    slab = fft.slab
+    columns = slab.comm.allgather(fft.columns)
+    parts = slab.comm.alltoall([np.ascontiguousarray(rows[:, each]) for each in columns])
+    out[...] = np.concatenate(parts, axis=0)
+
+
+CosineWaves = tuple[NDArray[np.int64], NDArray[np.int64]]
+
+
+class Cosines:
+    """Series of maps of the size of a transform `fft`, in its precision and in the memory of its spectrum, plus a
+    narrow block of columns. The constructor and the methods are collective."""
+
+    def __init__(self, fft: FFT) -> None:
+        self.fft, self.slab, self.mx, self.my = fft, fft.slab, fft.mx, fft.my
+        count = fft.shape[1]
+        self.column_blocks = [slice(k, min(k + NARROWEST, count)) for k in range(0, count, NARROWEST)]
+        self._block = allocate((self.my, NARROWEST), fft.complex, self.slab.tally)
+        if self.slab.only_counts:
+            return
+        self._block.fill(0.0)
+        self._forward, self._backward = (fft.plan(self._block, self._block, 0, backward) for backward in (False, True))
+        self._turn_x, self._turn_y = (
+            np.exp(-0.5j * np.pi * np.arange(n) / length).astype(fft.complex)
+            for n, length in ((self.mx // 2 + 1, self.mx), (self.my, self.my))
+        )
+
+    @property
+    def modes(self) -> tuple[CosineWaves, CosineWaves]:
+        """Half waves along x and y of the real parts of a spectrum, and of the imaginary parts."""
+        columns, along_y = self.fft.columns, np.arange(self.my)[:, None]
+        along_x = np.arange(columns.start, columns.stop)[None, :]
+        return (along_x, along_y), (self.mx - along_x, along_y)
+
+    def convolve(self, field: Array, symbols: list[NDArray[np.complexfloating]], out: Array) -> Array:
+        """Put `(nx ny) series^-1(symbol * series(field))` into `out`; collective.
+
+        Each of the `column_blocks` has its part of the symbol: its real part multiplies real parts of the spectrum,
+        its imaginary part multiplies imaginary parts.
+        """
+        self.fft.along_x(field, self._transform_rows)
+        for columns, symbol in zip(self.column_blocks, symbols, strict=True):
+            part = self.fft.spectrum[:, columns]
+            _fold(part.T, self._block.T[: part.shape[1]])
+            self._forward.execute()
+            _weigh(self._block, self._turn_y, symbol)
+            self._backward.execute()
+            _unfold(self._block.T[: part.shape[1]], part.T)
+        return self.fft.back_along_x(out, 1.0, self._transform_waves)
+
+    def _transform_rows(self, source: Array, waves: Spectrum) -> None:
+        block = self.fft.row_block[: len(waves)]
+        _fold(source, block)
+        self.fft.execute_rows(block, waves)
+        _turn(waves, 2.0 * self._turn_x)
+
+    def _transform_waves(self, waves: Spectrum, target: Array) -> None:
+        block = self.fft.row_block[: len(waves)]
+        _turn(waves, 0.5 * self._turn_x.conj())
+        self.fft.execute_waves(waves, block)
+        _unfold(block, target)
+
+
+def _fold(points: NDArray[np.inexact], folded: NDArray[np.inexact]) -> None:
+    """Put the even points of each row first, followed by the odd ones backwards."""
+    half = (points.shape[1] + 1) // 2
+    folded[:, :half] = points[:, ::2]
+    folded[:, half:] = points[:, 1::2][:, ::-1]
+
+
+def _unfold(folded: NDArray[np.inexact], points: NDArray[np.inexact]) -> None:
+    """Undo `_fold`."""
+    half = (points.shape[1] + 1) // 2
+    points[:, ::2] = folded[:, :half]
+    points[:, 1::2] = folded[:, half:][:, ::-1]
+
+
+@loop
+def _turn(waves: NDArray[np.complexfloating], factors: NDArray[np.complexfloating]) -> None:
+    for j in range(waves.shape[0]):
+        for k in range(waves.shape[1]):
+            waves[j, k] *= factors[k]
+
+
+@loop
+def _weigh(
+    block: NDArray[np.complexfloating], turn: NDArray[np.complexfloating], symbol: NDArray[np.complexfloating]
+) -> None:
+    """Convert transforms along y to series, multiply these by the symbol, and convert back; waves l and my - l are
+    coupled."""
+    count, half = block.shape[0], block.dtype.type(0.5)
+    for low in range(count // 2 + 1):
+        high = (count - low) % count
+        for k in range(symbol.shape[1]):
+            v, w = turn[low] * block[low, k], np.conj(turn[low]) * block[high, k]
+            c = v + w
+            a = symbol[low, k].real * c.real + 1j * (symbol[low, k].imag * c.imag)
+            if high == 0:
+                block[low, k] = half * a
+                continue
+            c = 1j * (v - w)  # of my - low
+            b = symbol[high, k].real * c.real + 1j * (symbol[high, k].imag * c.imag)
+            block[low, k] = half * np.conj(turn[low]) * (a - 1j * b)
+            if high != low:
+                block[high, k] = half * np.conj(turn[high]) * (b - 1j * a)

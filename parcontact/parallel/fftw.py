@@ -1,7 +1,6 @@
 """pyfftw without its copies of scipy's interfaces, which are imported on demand; and FFTW's wisdom.
 
-These interfaces import half of scipy, which takes a fifth of a second.
-"""
+These interfaces import half of scipy, which takes a fifth of a second."""
 
 import importlib
 import sys

@@ -1,8 +1,7 @@
 """MPI, initialized by the first import of this module.
 
 A program without a launcher is one rank. It needs neither a daemon of Open MPI nor a network; searching for them
-takes longer than a short run. Settings of the environment take precedence.
-"""
+takes longer than a short run. Settings of the environment take precedence."""
 
 import os
 

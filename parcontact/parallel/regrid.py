@@ -1,12 +1,167 @@
-"""Maps between a grid and a coarser one whose cells consist of whole fine cells; collective."""
+"""Rows of neighbours, and coarser grids.
 
-from collections.abc import Iterator
+Exchange of whole rows of a map between ranks, point to point: each rank sends to those that want its rows.
+
+A `RowExchange` is a plan, found once from the rows of all ranks; it can be kept and used for any map of the slab.
+
+Maps between a grid and a coarser one whose cells consist of whole fine cells; collective.
+
+Grids of larger and larger cells, each of two by two cells of the one before, down to a single cell.
+
+The first `pairs` of them join two cells along x, or along y if `pairs` is negative. Cells at the end of the grid may
+be cut. A cell belongs to the rank that has its last row in the grid before, until there are so few cells that every
+rank has all of them, which needs no further messages.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import count, pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..compiled import loop
-from .rows import fetch
+from .mpi import MPI
 from .slab import Array, Slab
+
+Index = slice | NDArray[np.intp]
+
+
+class Part(NamedTuple):
+    """Rows of a map that go to one rank, or come from it."""
+
+    rank: int
+    rows: Index
+
+
+class RowExchange:
+    """Plan of an exchange in which this rank gets `count` rows of a map; rows that no rank has are zeros.
+
+    `leaving` are rows of this rank for each rank that wants some, `coming` the places of those that it gets; both are
+    in the order of ranks, and include this rank. A map that every rank has is on a slab of one rank.
+    """
+
+    def __init__(self, slab: Slab, count: int, leaving: list[Part], coming: list[Part], whole: bool) -> None:
+        self._slab, self._count, self._make = slab, count, np.empty if whole else np.zeros
+        own = slab.comm.rank
+        self._kept = [
+            (came.rows, left.rows) for left in leaving if left.rank == own for came in coming if came.rank == own
+        ]
+        self._leaving = [part for part in leaving if part.rank != own]
+        self._coming = [part for part in coming if part.rank != own]
+
+    @staticmethod
+    def of_numbers(slab: Slab, wanted: NDArray[np.integer], rank: int) -> "RowExchange":
+        """Return the exchange of a few rows: `wanted` has the row numbers for each rank, shape (ranks, count); this one
+        is `rank`."""
+        own, rows = wanted[rank], slab.rows
+        asked = wanted if slab.comm.size > 1 else wanted[[rank]]
+        here, there = (asked >= rows.start) & (asked < rows.stop), (own >= 0) & (own < slab.ny)
+        owner = np.where(there, np.searchsorted(slab.bounds[:, 1], own, side="right"), -1)
+        leaving = [Part(r, _index(asked[r, here[r]] - rows.start)) for r in np.flatnonzero(here.any(axis=1)).tolist()]
+        coming = [Part(r, _index(np.flatnonzero(owner == r))) for r in sorted({*owner[there].tolist()})]
+        return RowExchange(slab, own.size, leaving, coming, bool(there.all()))
+
+    @staticmethod
+    def of_parts(slab: Slab, wanted: NDArray[np.integer]) -> "RowExchange":
+        """Return the exchange of consecutive rows: `wanted` has the first row for each rank and the one after its
+        last, shape (ranks, 2)."""
+        start, stop = wanted[slab.comm.rank].tolist()
+        leaving = _overlaps(wanted, slab.rows.start, slab.rows.stop)
+        return RowExchange(slab, stop - start, leaving, _overlaps(slab.bounds, start, stop), True)
+
+    @property
+    def partners(self) -> int:
+        """Number of messages that this rank sends and receives."""
+        return len(self._leaving) + len(self._coming)
+
+    def fetch(self, values: NDArray[Any], out: NDArray[Any] | None = None) -> NDArray[Any]:
+        """Return the wanted rows of this rank, in `out` if it is given, contiguous; collective."""
+        if out is None:
+            out = self._make((self._count, values.shape[1]), values.dtype)
+        for places, rows in self._kept:
+            out[places] = values[rows]
+        if self.partners:
+            self._exchange(np.ascontiguousarray(values), out)
+        return out
+
+    def _exchange(self, values: NDArray[Any], out: NDArray[Any]) -> None:
+        comm, tally = self._slab.comm, self._slab.tally
+        coming = [out[rows] for _, rows in self._coming]  # copies of scattered rows, else places in `out`
+        leaving = [values[rows] for _, rows in self._leaving]
+        requests = [comm.Irecv([rows, MPI.BYTE], part.rank) for part, rows in zip(self._coming, coming, strict=True)]
+        requests += [comm.Isend([rows, MPI.BYTE], part.rank) for part, rows in zip(self._leaving, leaving, strict=True)]
+        MPI.Request.Waitall(requests)
+        for part, rows in zip(self._coming, coming, strict=True):
+            if not isinstance(part.rows, slice):
+                out[part.rows] = rows
+        tally["messages"] += len(leaving)
+        tally["bytes sent"] += sum(rows.nbytes for rows in leaving)
+
+
+def _index(numbers: NDArray[np.intp]) -> Index:
+    """Return the index of rows; a slice, which needs no copy, if they are consecutive."""
+    first, count = int(numbers[0]), numbers.size
+    return slice(first, first + count) if (np.diff(numbers) == 1).all() else numbers
+
+
+def _overlaps(parts: NDArray[np.integer], start: int, stop: int) -> list[Part]:
+    """Return the rows in common with the part of each rank, counted from `start`."""
+    low, high = np.maximum(parts[:, 0], start), np.minimum(parts[:, 1], stop)
+    ranks = np.flatnonzero(low < high).tolist()
+    return [Part(rank, slice(int(low[rank]) - start, int(high[rank]) - start)) for rank in ranks]
+
+
+def fetch(slab: Slab, field: Array, wanted: NDArray[np.integer]) -> Array:
+    """Return rows of a map for this rank; `wanted` as for `RowExchange.of_parts`; collective. On one rank it is a view
+    of the map."""
+    if slab.comm.size == 1:
+        return field[slice(*wanted[0].tolist())]
+    return RowExchange.of_parts(slab, wanted).fetch(field)
+
+
+def roll_rows(slab: Slab, field: Array, count: int, out: Array) -> Array:
+    """Put `field(j - count)`, cyclic along y, into `out` for this rank's rows; not in place; collective."""
+    count %= slab.ny
+    for low, high, shift in ((0, count, slab.ny - count), (count, slab.ny, -count)):
+        wanted = np.clip(slab.bounds, low, high)
+        start, stop = (wanted[slab.comm.rank] - slab.rows.start).tolist()
+        RowExchange.of_parts(slab, wanted + shift).fetch(field, out[start:stop])
+    return out
+
+
+def before_first(slab: Slab, field: Array, cyclic: bool) -> Array:
+    """Return the row of a map before this rank's first one, shape (nx,); collective. The row before the first of the
+    map is the last if the map is `cyclic`, otherwise the first itself. Ranks without rows get zeros."""
+    return _adjacent_rows(slab, field, (-1,), cyclic)[0]
+
+
+def around(slab: Slab, field: Array, count: int, cyclic: bool) -> tuple[Array, Array]:
+    """Return the rows of a map before this rank's first one and after its last, shape (count, nx), the nearest first;
+    collective. A map that is not `cyclic` continues with its first and last row. Ranks without rows get zeros."""
+    found = _adjacent_rows(slab, field, (*range(-1, -1 - count, -1), *range(count)), cyclic)
+    return found[:count], found[count:]
+
+
+def _adjacent_rows(slab: Slab, field: Array, offsets: tuple[int, ...], cyclic: bool) -> Array:
+    """Return rows next to those of this rank, by an exchange that the slab keeps."""
+    key = offsets, cyclic
+    if key not in slab.exchanges:
+        numbers = numbers_next_to(slab.bounds, offsets)
+        wanted = numbers % slab.ny if cyclic else numbers.clip(0, slab.ny - 1)
+        wanted[slab.bounds[:, 0] == slab.bounds[:, 1]] = -1
+        slab.exchanges[key] = RowExchange.of_numbers(slab, wanted, slab.comm.rank)
+    return slab.exchanges[key].fetch(field)
+
+
+def numbers_next_to(bounds: NDArray[np.integer], offsets: tuple[int, ...]) -> NDArray[np.integer]:
+    """Return row numbers for each rank, shape (ranks, offsets), counted from its first row if an offset is negative
+    (-1 is the row before it), and from the one after its last row otherwise."""
+    counted = np.array(offsets)
+    return np.where(counted < 0, bounds[:, :1], bounds[:, 1:]) + counted
+
 
 COARSEST = 32  # tuning: least points of a coarser grid along a direction
 
@@ -84,3 +239,109 @@ def prolong(coarse: Slab, fine: Slab, field: Array, out: Array) -> Array:
     fy, fx = factors(fine, coarse)
     _spread(fetch(coarse, field, (fine.bounds + np.array([0, fy - 1])) // fy), fine.rows.start % fy, fy, fx, out)
     return out
+
+
+Shape = tuple[int, int]  # points of a cell along x and y: 1 or 2
+FEW = 8  # tuning: every rank has all cells of a grid with fewer cells than points of a rank over FEW
+
+
+def pyramid_steps(slab: Slab, pairs: int = 0) -> list["PyramidStep"]:
+    """Return all steps from a grid to a single cell, the finest first; the first `pairs` join pairs. A grid that every
+    rank has is on a slab of one rank."""
+    grids, shapes = [slab], []
+    for nx, ny, shape, alone in _larger(slab.nx, slab.ny, slab.comm.size, pairs):
+        shapes.append(shape)
+        comm, rows_of = (MPI.COMM_SELF, None) if alone else (slab.comm, ending_in(grids[-1], shape[1]))
+        grids.append(Slab(comm, nx, ny, slab.tally, rows_of))
+    return [PyramidStep(fine, coarse, shape) for (fine, coarse), shape in zip(pairwise(grids), shapes, strict=True)]
+
+
+def _larger(nx: int, ny: int, ranks: int, pairs: int) -> Iterator[tuple[int, int, Shape, bool]]:
+    """Yield for each larger grid its cells along x and y, the shape of a cell, and whether every rank has all cells."""
+    enough, alone = nx * ny // (FEW * ranks), ranks == 1
+    for pair in count():
+        if nx * ny == 1:
+            return
+        wide, tall = (1 if pair < -pairs else 2), (1 if pair < pairs else 2)
+        nx, ny = -(-nx // wide), -(-ny // tall)
+        alone = alone or (tall == 2 and nx * ny <= enough)
+        yield nx, ny, (wide, tall), alone
+
+
+def ending_in(fine: Slab, tall: int) -> Callable[[int], slice]:
+    """Return a function of the rank that gives the rows of cells, `tall` rows each, that end in its rows of a finer
+    grid."""
+    if tall == 1:
+        return fine.rows_of
+    last = fine.comm.size - 1
+
+    def rows_of(rank: int) -> slice:
+        part = fine.rows_of(rank)
+        return slice(part.start // 2, (part.stop + (rank == last)) // 2)
+
+    return rows_of
+
+
+@dataclass(frozen=True)
+class PyramidStep:
+    """The step from a grid of points to the next one, of cells of a `shape`. Methods are collective among the ranks of
+    the points."""
+
+    fine: Slab
+    coarse: Slab
+    shape: Shape
+    _kept: dict[tuple[str, tuple[int, ...]], "RowExchange"] = field(default_factory=dict)
+
+    @cached_property
+    def above(self) -> int:
+        """Number of rows of points of the first own cell on another rank: 0 or 1."""
+        return self.fine.rows.start % self.shape[1]
+
+    @cached_property
+    def own(self) -> slice:
+        """Slice of the cells that end in points of this rank, in its map of cells."""
+        part = ending_in(self.fine, self.shape[1])(self.fine.comm.rank)
+        return slice(part.start - self.coarse.rows.start, part.stop - self.coarse.rows.start)
+
+    def complete(self, cells: NDArray[Any]) -> None:
+        """Exchange cells if every rank has all of them."""
+        comm = self.fine.comm
+        if self.coarse.comm.size < comm.size:
+            starts, stops = cells[:1].nbytes * self._ending.T
+            comm.Allgatherv(MPI.IN_PLACE, [cells, (stops - starts, starts), MPI.BYTE])
+            self.fine.tally["bytes sent"] += cells[self.own].nbytes * (comm.size - 1)
+
+    def adjacent_points(self, points: NDArray[Any], *offsets: int) -> NDArray[Any]:
+        """Return rows next to those of this rank: -1 is the last one above, 0 the first below, 1 the next; shape
+        (offsets, nx).
+
+        After the last row follows the first; if the number of rows is odd, with a row of zeros between. Ranks without
+        points get zeros. The result is empty for cells of one row.
+        """
+        if self.shape[1] == 1:
+            return points[:0]
+        cycle = self.fine.ny + self.fine.ny % 2
+        return self._row_exchange("points", self.fine, self.fine.bounds, cycle, offsets).fetch(points)
+
+    def adjacent_cells(self, cells: NDArray[Any], *offsets: int) -> NDArray[Any]:
+        """Return the same for rows next to the cells that end in points of this rank."""
+        if self.shape[1] == 1:
+            return cells[:0]
+        return self._row_exchange("cells", self.coarse, self._ending, self.coarse.ny, offsets).fetch(cells)
+
+    @cached_property
+    def _ending(self) -> NDArray[np.int64]:
+        """The rows of cells that end in points of each rank, as in `Slab.bounds`."""
+        parts = map(ending_in(self.fine, self.shape[1]), range(self.fine.comm.size))
+        return np.array([(part.start, part.stop) for part in parts], np.int64)
+
+    def _row_exchange(
+        self, what: str, slab: Slab, bounds: NDArray[np.int64], cycle: int, offsets: tuple[int, ...]
+    ) -> "RowExchange":
+        """Return the exchange of rows next to the part of each rank with points; it is stored for further calls."""
+        key = what, offsets
+        if key not in self._kept:
+            wanted = numbers_next_to(bounds, offsets) % cycle
+            wanted[self.fine.bounds[:, 0] == self.fine.bounds[:, 1]] = -1
+            self._kept[key] = RowExchange.of_numbers(slab, wanted, self.fine.comm.rank)
+        return self._kept[key]

@@ -1,8 +1,7 @@
 """Distribution of the rows of a map over ranks, and sums over all of them.
 
 A map has `ny` rows of `nx` points. Rows are distributed evenly and in order; x is contiguous and local. Numbers of
-ranks that do not divide `ny`, and ranks without rows, are allowed.
-"""
+ranks that do not divide `ny`, and ranks without rows, are allowed."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial

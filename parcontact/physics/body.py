@@ -29,8 +29,7 @@ A body without relaxing branches (`branched` is None) may have a method `time_er
 the relative error of a step by its length.
 
 Two kinds of branches have no map (`effects.folded_branches` selects them and bounds the error): memoryless ones, for
-which `h_k = gain du + back du_before`, and frozen ones, which are springs `h_k = G_k u`.
-"""
+which `h_k = gain du + back du_before`, and frozen ones, which are springs `h_k = G_k u`."""
 
 import math
 from collections.abc import Callable, Collection, Iterable
@@ -40,9 +39,8 @@ import numpy as np
 
 from ..parallel.slab import Array, Slab
 from . import loops
-from .entries import Entry, Saved
+from .entries import Entry, Saved, Units
 from .prony import Advance, Prony, coefficients, elapsed
-from .units import Units
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,7 @@
              C (k/k_r)^(-2 (1 + hurst))    roll-off <= k < short-wavelength end
 
 with `|FFT(h)|^2 = Phi (nx ny)^2 / area`. The random numbers of a wave come from a stream that depends on the seed
-and its x-wavenumber: a seed gives the same waves on every grid and any number of ranks, and no rank holds the whole.
-"""
+and its x-wavenumber: a seed gives the same waves on every grid and any number of ranks, and no rank holds the whole."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from ..errors import InputError
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array
 from .convolution import wavenumbers
-from .lowest import rows_of
+from .loops import rows_of
 
 BEYOND = 0.01  # accuracy: share of the mean square slope in waves that `shortest_wave` ignores
 BIN = 0.01  # accuracy: width of bins in log wavenumber; the error of a shortest wave is half of it

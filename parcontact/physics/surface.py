@@ -1,24 +1,135 @@
-"""Heights of the rigid surface at any position, and the tangential force of a pressure on it.
+"""The rigid surface: shapes, roughness and statistics.
+
+Heights of the rigid surface at any position, and the tangential force of a pressure on it.
 
 Periodic parts given by waves (roughness, single waves, files) are stored as one transform and moved by a phase
 `exp(-i q s)`. This is exact for any fraction of a cell in any direction, except at the Nyquist wavenumber, which is
 taken as a standing wave. Shapes in closed form are evaluated at each position. Every move starts from the original.
+
+Smooth shapes in closed form, evaluated at any position of the surface.
+
+Heights from a file: each rank reads its own rows.
 """
 
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from typing import Any, Protocol, TextIO
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import text_tables
+from ..errors import InputError
 from ..parallel.fft import FFT, Spectrum
 from ..parallel.slab import Array, Slab
 from . import loops
 from .convolution import wavenumbers
-from .lowest import rows_of
-from .shapes import Shape
+from .loops import rows_of
+
+
+class Shape(Protocol):
+    """Heights and slopes at distances (x, y) from the centre of the shape; all lengths have one unit."""
+
+    @property
+    def centre(self) -> tuple[float, float]: ...
+
+    def height(self, x: Array, y: Array) -> Array: ...
+
+    def slope(self, x: Array, y: Array) -> tuple[Array, Array]: ...
+
+
+def _paraboloid(r2: Array, radius: float) -> tuple[Array, Array]:
+    return -r2 / (2.0 * radius), np.full_like(r2, -1.0 / radius)
+
+
+def _circle(r2: Array, radius: float) -> tuple[Array, Array]:
+    """Return height and slope factor of a circle; beyond the radius the height is the height of the equator."""
+    inside = np.minimum(r2, radius**2)
+    rest = np.sqrt(radius**2 - inside)
+    inverse = np.divide(-1.0, rest, out=np.zeros_like(rest), where=rest > 0.0)
+    return -inside / (radius + rest), inverse
+
+
+def _inverse(distance: Array) -> Array:
+    """Return the inverse of a distance, 0 at the centre."""
+    return np.divide(1.0, distance, out=np.zeros_like(distance), where=distance > 0.0)
+
+
+@dataclass(frozen=True)
+class Conical:
+    """A cone with its tip (0) at the centre."""
+
+    steepness: float
+    centre: tuple[float, float]
+
+    def height(self, x: Array, y: Array) -> Array:
+        return -self.steepness * np.hypot(x, y)
+
+    def slope(self, x: Array, y: Array) -> tuple[Array, Array]:
+        factor = -self.steepness * _inverse(np.hypot(x, y))
+        return factor * x, factor * y
+
+
+@dataclass(frozen=True)
+class Pyramidal:
+    """A square pyramid with its tip (0) at the centre and sides along x and y; on its edges the slope is the mean of
+    both faces."""
+
+    steepness: float
+    centre: tuple[float, float]
+
+    def height(self, x: Array, y: Array) -> Array:
+        return -self.steepness * np.maximum(np.abs(x), np.abs(y))
+
+    def slope(self, x: Array, y: Array) -> tuple[Array, Array]:
+        along_x = 0.5 * (1.0 + np.sign(np.abs(x) - np.abs(y)))
+        return -self.steepness * along_x * np.sign(x), -self.steepness * (1.0 - along_x) * np.sign(y)
+
+
+@dataclass(frozen=True)
+class FlatEnded:
+    """A round punch: a flat face (0) of a radius, and around it a parabola with the radius of curvature `edge`."""
+
+    radius: float
+    edge: float
+    centre: tuple[float, float]
+
+    def height(self, x: Array, y: Array) -> Array:
+        beyond = np.maximum(np.hypot(x, y) - self.radius, 0.0)
+        return -(beyond**2) / (2.0 * self.edge)
+
+    def slope(self, x: Array, y: Array) -> tuple[Array, Array]:
+        distance = np.hypot(x, y)
+        factor = -np.maximum(distance - self.radius, 0.0) / self.edge * _inverse(distance)
+        return factor * x, factor * y
+
+
+@dataclass(frozen=True)
+class Round:
+    """A sphere, or a cylinder along x or y, with its highest point (0) at the centre; the profile is parabolic or
+    exact."""
+
+    radius: float
+    centre: tuple[float, float]
+    along: tuple[float, float] = (1.0, 1.0)  # which coordinates the profile depends on
+    exact: bool = False
+
+    def _profile(self, x: Array, y: Array) -> tuple[Array, Array]:
+        r2 = self.along[0] * x**2 + self.along[1] * y**2
+        return (_circle if self.exact else _paraboloid)(r2, self.radius)
+
+    def height(self, x: Array, y: Array) -> Array:
+        return self._profile(x, y)[0]
+
+    def slope(self, x: Array, y: Array) -> tuple[Array, Array]:
+        factor = self._profile(x, y)[1]
+        return self.along[0] * x * factor, self.along[1] * y * factor
+
 
 Indices = NDArray[np.intp]
 
@@ -155,3 +266,88 @@ def single_wave(fft: FFT, amplitude: float, waves: tuple[int, int], phase: float
         if 0 <= column < fft.shape[1]:
             spectrum[row, column] += value
     return spectrum
+
+
+LONGEST_NUMBER = 1000  # tuning: characters in a line of text for each number
+Values = NDArray[Any]  # of any type, as in the file
+
+
+def read_heights(path: Path, dataset: str, slab: Slab, scale: float = 1.0) -> Array:
+    """Return the rows of this rank of a map of shape (ny, nx) in a .npy, .h5 or text file, times `scale`; collective.
+
+    Raises InputError on every rank if a rank cannot read its rows, the shape differs, or a value is not a finite
+    real number.
+    """
+    rows, problem = _attempt(path, dataset, slab)
+    problem = next((text for text in slab.from_all(problem) if text), "")
+    if not problem:
+        wrong, largest = slab.reduce(
+            [float(np.count_nonzero(~np.isfinite(rows)))], [float(np.abs(rows, dtype=np.float64).max(initial=0.0))]
+        )
+        problem = f"{path}: {wrong:.0f} of its {slab.points} heights are not finite numbers" if wrong else ""
+    if problem:
+        raise InputError(problem)
+    text_tables.refuse_extreme(path, largest * abs(scale))
+    heights = rows.astype(np.float64)
+    heights *= scale
+    return heights
+
+
+def _attempt(path: Path, dataset: str, slab: Slab) -> tuple[Values, str]:
+    """Return the rows of this rank, or a sentence on an error."""
+    try:
+        rows = _rows(path, dataset, slab)
+        text_tables.refuse_no_numbers(path, rows.dtype)
+    except InputError as error:
+        return np.empty(0), str(error)
+    except Exception as error:  # numpy evaluates headers; every rank must report any error
+        number = getattr(error, "errno", None)
+        reason = os.strerror(number) if number else str(error).partition("\n")[0]
+        return np.empty(0), f"{path} cannot be read: {reason}"
+    return rows, ""
+
+
+def _rows(path: Path, dataset: str, slab: Slab) -> Values:
+    if path.suffix == ".npy":
+        whole = text_tables.open_numbers(path)
+        _check(path, whole.shape, slab)
+        return whole[slab.rows]
+    if path.suffix == ".h5":
+        with h5py.File(path) as file:
+            found = file.get(dataset)
+            if not isinstance(found, h5py.Dataset):
+                raise InputError(f"{path} has no dataset {dataset!r}; it has {', '.join(file) or 'none'}")
+            _check(path, found.shape, slab)
+            return np.asarray(found[slab.rows])
+    return _text(path, slab)
+
+
+def _text(path: Path, slab: Slab) -> Values:
+    """Read the rows of this rank from a text file with one row per line, see `text_tables`."""
+    mine, count = np.empty(slab.shape), 0
+    with text_tables.open_text(path) as file:
+        head, rows = text_tables.number_rows(path, _short_lines(path, file, slab.nx))
+        if wrong := [line for line in head if text_tables.COMMENT.sub("", line).strip()]:
+            raise InputError(f"{path}: {slab.nx} numbers a line were expected, got {wrong[0].strip()[:60]!r}")
+        for number, row in rows:
+            if len(row) != slab.nx:
+                raise InputError(f"{path}:{number} has {len(row)} numbers, but the grid has nx = {slab.nx}")
+            if slab.rows.start <= count < slab.rows.stop:
+                mine[count - slab.rows.start] = row
+            count += 1
+    _check(path, (count, slab.nx), slab)
+    return mine
+
+
+def _short_lines(path: Path, file: TextIO, count: int) -> Iterator[str]:
+    """Yield the lines of a file. Raises InputError for a line too long for `count` numbers."""
+    longest = LONGEST_NUMBER * (1 + count)
+    for number, line in enumerate(iter(lambda: file.readline(longest), ""), 1):
+        if len(line) == longest:
+            raise InputError(f"{path}:{number} has {longest} characters or more; {count} numbers were expected")
+        yield line
+
+
+def _check(path: Path, shape: tuple[int, ...], slab: Slab) -> None:
+    if shape != (slab.ny, slab.nx):
+        raise InputError(f"{path} has shape {shape}, but the grid has (ny, nx) = {slab.ny, slab.nx}")

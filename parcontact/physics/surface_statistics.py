@@ -4,8 +4,7 @@
     C1(q) along one direction, one-sided: <h^2> = int_0^inf C1 dq.
 
 (B. N. J. Persson et al., J. Phys.: Condens. Matter 17 (2005) R1; P. R. Nayak, J. Lubr. Technol. 93 (1971) 398;
-T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001, whose C2 is 4 pi^2 times ours.)
-"""
+T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001, whose C2 is 4 pi^2 times ours.)"""
 
 import math
 from dataclasses import dataclass

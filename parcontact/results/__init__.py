@@ -1,1 +1,1 @@
-"""Results of output directories: tables, sentences, pictures and reports."""
+"""Results of runs, curves, sweeps and studies: tables, texts, pictures and reports."""

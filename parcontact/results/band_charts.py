@@ -1,32 +1,62 @@
-"""Pictures of a friction curve in bands: friction of each band over velocity, area over magnification, and what
+"""Pictures of curves, bands and sweeps.
+
+Pictures of a friction curve in bands: friction of each band over velocity, area over magnification, and what
 capabilities have by band (`BAND_PANELS` of their pictures: keys and axes of columns); and of a history in bands over
 the slip of each slide.
 
 Persson's theory for the same spectrum is drawn if `bands_theory.csv` exists, or `theory.csv` for a history. Its slides
 end at the friction of steady sliding, if `steady.csv` exists.
+
+Charts of friction curves (steady.csv) over velocity, or over pressure if only that varies.
+
+Several temperatures are separate lines; friction over a_T v shows them on one master curve.
+
+Pictures of the results of a sweep: friction and contact area over the swept key, with theory if available; sweeps of
+friction curves over velocity, or over another quantity that varies within curves.
+
+Points are cases, lines their means over seeds. Each value of another key has its own line: values of the first such key
+have colours, values of further keys dashes.
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ..job.added_sections import answers
+from .. import printed
+from ..columns import SWEEP, names_of
+from ..errors import InputError
+from ..job import load
+from ..job.listing import answers
+from ..job.reading import STEADY_RESOLVED
 from ..parallel.slab import Array
-from . import prefixes, style
-from .charts import FRACTION, Axis, Chart, ChartLine
-from .plotted_run import PlottedRun, count_different
-from .results import Results
+from . import style
+from .charts import (
+    FRACTION,
+    Axis,
+    Chart,
+    ChartLine,
+    PlottedRun,
+    count_different,
+    round_digits,
+    to_contact_area,
+    to_load,
+)
+from .results import CURVES, PLACES, Results, read_cases, swept_keys
+from .slide import CORRECTED
+from .sweep_table import SAMPLES
 
-TABLE, THEORY = "bands.csv", "bands_theory.csv"
-NEEDED = ("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength")
+BANDS, BANDS_THEORY = "bands.csv", "bands_theory.csv"
+NEEDED_OF_BANDS = ("velocity", "pressure", "temperature", "band", "long_wavelength", "short_wavelength")
 SHOWN = 4  # number of velocities that are drawn as lines
-THIN = 1.0  # tuning: width of the lines of the theory [points]
+THIN_LINE = 1.0  # tuning: width of the lines of the theory [points]
 AREA = Axis(FRACTION)
-THEORY_LOOK = {"color": style.GREY, "linestyle": ":", "linewidth": THIN}
+THEORY_LOOK = {"color": style.GREY, "linestyle": ":", "linewidth": THIN_LINE}
 OVER_TIME, STEADY = "theory.csv", "steady.csv"
-STEADY_LOOK = {"color": style.GREY, "linestyle": "-", "linewidth": THIN}
+STEADY_LOOK = {"color": style.GREY, "linestyle": "-", "linewidth": THIN_LINE}
 STEADY_ENTRY = ChartLine("steady sliding", np.zeros(0), np.zeros(0), STEADY_LOOK)
 SAME = 1e-9  # rounding: of distances
 ENTRY = ChartLine("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
@@ -35,15 +65,15 @@ ENTRY = ChartLine("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
 def chart_bands(directory: Path) -> list[Chart]:
     """Return panels of a table of bands of a curve, for its first pressure and temperature."""
     curve = Results(directory, "curve")
-    if "velocity" not in curve.read(TABLE):
+    if "velocity" not in curve.read(BANDS):
         return []
-    whole = curve.read(TABLE).arrays((*NEEDED, "friction", "contact_area"))
+    whole = curve.read(BANDS).arrays((*NEEDED_OF_BANDS, "friction", "contact_area"))
     columns = _choose(whole)
     if not columns["velocity"].size:
         return []
     theory = None
-    if curve.has(THEORY):
-        theory = _choose(curve.read(THEORY).arrays(("velocity", "pressure", "temperature", "band")))
+    if curve.has(BANDS_THEORY):
+        theory = _choose(curve.read(BANDS_THEORY).arrays(("velocity", "pressure", "temperature", "band")))
     found = [_friction(columns, theory), _over_bands("bands area", columns, theory, "contact_area")]
     for name, (key, axis) in (pair for panels in answers("pictures", "BAND_PANELS") for pair in panels.items()):
         if name in columns and np.isfinite(columns[name]).any():
@@ -57,7 +87,7 @@ def chart_slips(run: PlottedRun) -> list[Chart]:
     """Return panels of a history in bands over the slip since the start of each slide: friction and area, and friction
     by band in the last slide; none without a slide."""
     slides = [number for number, stage in enumerate(run.job.history) if stage.slides and stage.seconds]
-    if not slides or "distance" not in run.read(TABLE):
+    if not slides or "distance" not in run.read(BANDS):
         return []
     x, starts = Axis("slip of the stage", "m"), _starts(run)
     friction, area = list[ChartLine](), list[ChartLine]()
@@ -73,7 +103,7 @@ def chart_slips(run: PlottedRun) -> list[Chart]:
         area += [line for _, line in others]
     there = ((OVER_TIME, ENTRY), (STEADY, STEADY_ENTRY))
     entries = [entry for name, entry in there if run.has(name)]
-    stages = run.read(TABLE).arrays()
+    stages = run.read(BANDS).arrays()
     start, end = starts[slides[-1]], starts[slides[-1]] + _way(run, slides[-1])
     kept = (stages["distance"] > start) & (stages["distance"] <= end * (1.0 + SAME))
     own = {name: values[kept] for name, values in stages.items()}
@@ -122,7 +152,7 @@ def _describe_first(columns: dict[str, Array]) -> str:
     """Return the first pressure and temperature as text, if the table has several."""
     firsts = [(name, columns[name][0], unit) for name, unit in (("pressure", "Pa"), ("temperature", "°C"))]
     several = [one for one in firsts if count_different(columns[one[0]]) > 1]
-    return ", ".join(prefixes.quantity(float(value), unit) for _, value, unit in several)
+    return ", ".join(printed.quantity(float(value), unit) for _, value, unit in several)
 
 
 def _choose(columns: dict[str, Array]) -> dict[str, Array]:
@@ -170,7 +200,7 @@ def _over_bands(
             rows = np.flatnonzero(np.isclose(table["velocity"], speed, rtol=1e-6))
             rows = rows[np.argsort(table["band"][rows])]
             short = table["short_wavelength"][rows]
-            label = prefixes.quantity(speed, "m/s") if table is columns else ""
+            label = printed.quantity(speed, "m/s") if table is columns else ""
             series.append(ChartLine(label, longest / short if area else short, table[name][rows], look))
     series += [] if theory is None else [ENTRY]
     return Chart(key, x, y, series, log_x=True)
@@ -187,3 +217,259 @@ def _tables(
 def _some(speeds: Array) -> Sequence[float]:
     places = np.unique(np.linspace(0, speeds.size - 1, min(SHOWN, speeds.size)).round().astype(int))
     return [float(speed) for speed in speeds[places]]
+
+
+THEORY = "steady_theory.csv"
+NEEDED = ("velocity", "pressure", "friction", "contact_area")
+COLD = "friction_cold"  # friction without feedback from heat
+EMPTY = np.zeros(0)
+THIN = {"theory": ":", "without feedback": "--"}  # dashes of thin lines, drawn in addition to the simulation
+
+
+def chart_steady(directory: Path, over: str = "") -> list[Chart]:
+    """Return panels of a table of steady states; none without states, or if `over` is not possible."""
+    curve = Results(directory, "curve")
+    columns, area = curve.table.arrays(NEEDED), curve.free_area
+    if over in ("time", "distance") or not columns["velocity"].size:
+        return []
+    axes = {
+        "velocity": Axis("sliding velocity", "m/s"),
+        "load": to_load(columns["pressure"], area)[0],
+        "temperature": Axis("temperature", "°C"),
+        "reduced": Axis("shift factor × velocity", "m/s"),
+        "friction": Axis("friction coefficient"),
+        "flash_temperature": Axis("flash temperature", "K"),
+        "area": to_contact_area(columns["contact_area"], area)[0],
+    }
+    _add_derived(columns, area)
+    x, by = "velocity", "load"
+    if over == "load" or (not over and count_different(columns[x]) < 2 <= count_different(columns[by])):
+        x, by = by, x
+    several = [name for name in ("temperature", by) if name in columns and count_different(columns[name]) > 1]
+    lines = {name: axes[name].unit for name in several or [by]}
+    panels = [("steady friction", x, "friction"), ("steady area", x, "area")]
+    if "temperature" in several and x == "velocity":
+        panels.append(("steady master", "reduced", "friction"))
+    if "flash_temperature" in columns:
+        panels.append(("steady flash", x, "flash_temperature"))
+    theory = {}
+    if x == "velocity" and COLD not in columns and curve.has(THEORY):  # the theory has no feedback
+        theory = curve.read(THEORY).arrays((*NEEDED, "shift_factor"))
+        _add_derived(theory, area)
+    found = []
+    for key, along, name in panels:
+        series = list(_make_lines(columns, along, name, lines))
+        if name == "friction" and along == x and COLD in columns:
+            series += _make_thin(columns | {name: columns[COLD]}, along, name, lines, "without feedback")
+        if name in theory:
+            one = along == "reduced" and "load" not in lines  # over a_T v the theory is one line
+            series += _make_thin(theory, along, name, {} if one else lines, "theory")
+        found.append(Chart(key, axes[along], axes[name], series, log_x=True))
+    with suppress(InputError):  # files of the job no longer exist
+        job = load(directory / STEADY_RESOLVED)
+        found += [chart for panels_of in answers("pictures", "curve_panels") for chart in panels_of(job, columns)]
+    return found + (chart_bands(directory) if x == "velocity" else [])
+
+
+def steady_title(directory: Path) -> str:
+    """Return the title of the job, with the pressure or force if it is the same at all points."""
+    curve = Results(directory, "curve")
+    axis, loads = to_load(curve.table.arrays(("pressure",))["pressure"], curve.free_area)
+    name = (curve.job.title if curve.job else "") or "steady sliding"
+    return f"{name}: {printed.quantity(loads[0], axis.unit)}" if count_different(loads) == 1 else name
+
+
+def _add_derived(columns: dict[str, Array], area: float) -> None:
+    """Return the columns of a table with loads, corrected areas, and speeds at the reference temperature."""
+    columns["load"] = to_load(columns["pressure"], area)[1]
+    columns["area"] = to_contact_area(columns.get("contact_area_corrected", columns["contact_area"]), area)[1]
+    if "shift_factor" in columns:
+        columns["reduced"] = columns["shift_factor"] * columns["velocity"]
+
+
+def _make_lines(columns: dict[str, Array], x: str, y: str, by: dict[str, str]) -> Iterator[ChartLine]:
+    """Yield a line for each combination of the columns `by`, given with their units."""
+    error = columns.get(f"error_{y}")
+    places = np.array([round_digits(columns[name]) for name in by]).reshape(len(by), columns[x].size)
+    values, groups = np.unique(places, axis=1, return_inverse=True)
+    for number, place in enumerate(values.T):
+        rows = np.flatnonzero(groups == number)
+        rows = rows[np.argsort(columns[x][rows], kind="stable")]
+        label = ", ".join(printed.quantity(value, unit) for value, unit in zip(place, by.values(), strict=True))
+        look = style.line(number, values.shape[1]) | {"marker": "o"}
+        yield ChartLine(label, columns[x][rows], columns[y][rows], look, None if error is None else error[rows])
+
+
+def _make_thin(columns: dict[str, Array], x: str, y: str, by: dict[str, str], label: str) -> Iterator[ChartLine]:
+    """Yield thin lines, drawn in addition to the simulation, and their entry of the legend."""
+    look = {"color": style.GREY, "linestyle": THIN[label], "linewidth": THIN_LINE}
+    yield ChartLine(label, EMPTY, EMPTY, look)
+    for line in _make_lines(columns, x, y, by):
+        yield ChartLine("", line.x, line.y, look | ({"color": line.look["color"]} if by else {}))
+
+
+UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N", "size": "m", "distance": "m"}
+UNITS |= {"duration": "s", "work": "J/m²", "range": "m", "shear_modulus": "Pa", "modulus_inf": "Pa"}
+UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m", "frequency": "Hz", "amplitude": ""}
+MARKERS, DASHES = ("o", "s"), ("--", ":")  # markers of means, dashes of theories, by column of a panel
+THIN_CASE = 1.0  # tuning: width of lines of the theory [points]
+GREY, NOTHING = {"color": style.GREY}, np.zeros(0)  # entries of legends that hold for all colours
+STYLES = ("-", "--", ":", "-.")  # dashes of lines, by the values of further keys
+WIDE = 10.0  # ratio of the largest to the smallest number above which an axis is logarithmic
+Panels = tuple[tuple[str, Axis, dict[str, str]], ...]
+FRICTION, AREA_OF_CASE = Axis("friction coefficient"), Axis(FRACTION)
+PANELS: Panels = (  # panels: columns by the names of lines
+    ("friction", FRICTION, {"highest": "mu_max", "dynamic": "mu_dyn"}),
+    ("area", AREA_OF_CASE, {"simulation": CORRECTED}),
+    ("loss", Axis("loss per cycle", "J"), {"last cycle": "loss"}),
+    ("phase", Axis("phase", "rad"), {"last cycle": "phase"}),
+    ("energy", Axis("dissipated energy", "J"), {"dissipated": "dissipated"}),
+)
+CURVE_PANELS: Panels = (
+    ("friction", FRICTION, {"steady sliding": "friction"}),
+    ("area", AREA_OF_CASE, {"steady sliding": CORRECTED}),
+)
+SHARES = {
+    "friction": "error_friction",
+    "loss": "error_loss",
+    CORRECTED: "error_area",
+}  # columns with the relative error of a column
+SIZES = {
+    name: f"{name}_error" for name in names_of(SWEEP) if f"{name}_error" in names_of(SWEEP)
+}  # columns with the absolute error of a column
+
+Rows = Sequence[dict[str, Any]]
+
+
+def all_panels() -> Panels:
+    """Return the panels of a sweep, with those of capabilities, in the order of the columns of sweep.csv."""
+    found = (*PANELS, *(panel for panels in answers("pictures", "SWEEP_PANELS") for panel in panels))
+    place = names_of(SWEEP).index
+    return tuple(sorted(found, key=lambda panel: place(next(iter(panel[2].values())))))
+
+
+def chart_sweep(directory: Path) -> list[Chart]:
+    """Return panels of a sweep; none without results, or without a swept key of numbers."""
+    table = Results(directory, "sweep").points
+    rows, panels = read_cases(table), all_panels()
+    keys = _find_keys(rows)
+    if table.name == CURVES:
+        panels = CURVE_PANELS
+        places = {name: {row[name] for row in rows if row[name] == row[name]} for name in PLACES}
+        keys = [name for name, values in places.items() if len(values) > 1] + keys
+    if not keys:
+        return []
+    key = keys[0]
+    word = key.split(".")[-1]
+    x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
+    for panel, y, columns in panels:
+        series = _make_series(rows, key, columns)
+        if any(one.y.any() for one in series):  # after detachment there is neither friction nor area
+            values = np.concatenate([one.x for one in series])
+            wide = bool(values.min() > 0.0 and values.max() >= WIDE * values.min())
+            found.append(Chart(panel, x, y, series, log_x=wide))
+    return found
+
+
+def _find_keys(rows: Rows) -> list[str]:
+    """Return the keys with several numbers, except those that choose a sample; of keys that change together the
+    first."""
+    keys = _drop_joint_keys(rows, _swept(rows))
+    return [name for name in keys if all(isinstance(row[name], float) for row in rows)]
+
+
+def _swept(rows: Rows) -> list[str]:
+    """Return the keys of a sweep except those that choose a sample, such as seeds."""
+    return [name for name in swept_keys(rows) if name.split(".")[-1] not in SAMPLES]
+
+
+def _drop_joint_keys(rows: Rows, names: Sequence[str]) -> list[str]:
+    """Return the names with several values; of names that change together the first."""
+    found: dict[tuple[int, ...], str] = {}
+    for name in names:
+        first: dict[str, int] = {}
+        order = tuple(first.setdefault(repr(row[name]), number) for number, row in enumerate(rows))
+        if any(order):
+            found.setdefault(order, name)
+    return list(found.values())
+
+
+def _split(rows: Rows, key: str) -> dict[tuple[str, ...], Rows]:
+    """Return the rows of each line by the values of the other keys, except `key`, the keys that change with it, and
+    those that choose a sample."""
+    places = [name for name in PLACES if name in rows[0]]
+    others = [name for name in _drop_joint_keys(rows, [key, *places, *_swept(rows)]) if name != key]
+    lines: dict[tuple[str, ...], list[dict[str, Any]]] = {}
+    for row in rows:
+        lines.setdefault(tuple(_named(name, row[name]) for name in others) or ("",), []).append(row)
+    return dict(lines)
+
+
+def _named(key: str, value: Any) -> str:
+    """Return a value with its unit, and the name of its key unless the unit or word is clear."""
+    word = key.split(".")[-1].removesuffix("s")
+    if not isinstance(value, float):
+        return Path(str(value)).stem
+    text = printed.quantity(value, UNITS.get(word, ""))
+    return text if word in PLACES else f"{word.replace('_', ' ')} {text}"
+
+
+def _make_series(rows: Rows, key: str, columns: dict[str, str]) -> list[ChartLine]:
+    """Return entries of the legend, and the lines of all columns: colours for the values of the first further key,
+    dashes for those of the others, marks for the columns. Without further keys, columns have colours."""
+    lines = {(hue, ", ".join(rest)): own for (hue, *rest), own in _split(rows, key).items()}
+    if len({rest for _, rest in lines}) > len(STYLES):
+        lines = {(", ".join(names), ""): own for names, own in lines.items()}
+    hues, rests = (list(dict.fromkeys(names)) for names in zip(*lines, strict=True))
+    colors, found = style.colors(max(len(hues), len(columns))), list[ChartLine]()
+    names = dict[str, dict[str, Any]]()
+    names |= {hue: {"color": colors[k]} for k, hue in enumerate(hues) if len(hues) > 1}
+    names |= {rest: GREY | {"linestyle": STYLES[k]} for k, rest in enumerate(rests) if len(rests) > 1}
+    for (hue, rest), own in lines.items():
+        for k, (name, column) in enumerate(columns.items()):
+            color = colors[hues.index(hue) if len(lines) > 1 else k]
+            look = {"color": color, "linestyle": STYLES[rests.index(rest)]}
+            theory = f"theory, {name}" if len(columns) > 1 else "theory"
+            for one in _make_lines_of_cases((name, theory), own, column, key, look, k):
+                if one.name != name or len(lines) == 1:
+                    names.setdefault(one.name, one.look if len(lines) == 1 else one.look | GREY)
+                elif len(columns) > 1:
+                    names.setdefault(name, GREY | {"marker": MARKERS[k], "linestyle": "none"})
+                found.append(replace(one, name=""))
+    return [*(ChartLine(name, NOTHING, NOTHING, look) for name, look in names.items()), *found]
+
+
+def _make_lines_of_cases(
+    names: tuple[str, str], rows: Rows, column: str, key: str, look: dict[str, Any], number: int
+) -> Iterator[ChartLine]:
+    """Yield the means of a column as a line with points, all cases as small dots, and the theory."""
+    theirs = "contact_area" if column == CORRECTED else column
+    x, y, theory = (_read_column(rows, wanted) for wanted in (key, column, f"theory_{theirs}"))
+    if (there := np.isfinite(y)).any():
+        at, means = _average(x[there], y[there])
+        error = _read_errors(rows, column, y)[there][np.argsort(x[there])] if at.size == there.sum() else None
+        yield ChartLine(names[0], at, means, look | {"marker": MARKERS[number]}, error)
+        if at.size < there.sum():
+            dots = {"marker": ".", "linestyle": "none", "alpha": 0.5, "markersize": 3}
+            yield ChartLine("each case", x[there], y[there], look | dots)
+    if (there := np.isfinite(theory)).any():
+        thin = {"linestyle": DASHES[number], "linewidth": THIN_CASE}
+        yield ChartLine(names[1], *_average(x[there], theory[there]), look | thin)
+
+
+def _average(x: Array, y: Array) -> tuple[Array, Array]:
+    at = np.unique(x)
+    return at, np.array([y[x == value].mean() for value in at])
+
+
+def _read_errors(rows: Rows, column: str, values: Array) -> Array:
+    """Return the relative errors of a column, NaN if unknown."""
+    if column in SHARES:
+        return _read_column(rows, SHARES[column])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(_read_column(rows, SIZES.get(column, "")) / np.abs(values))
+
+
+def _read_column(rows: Rows, name: str) -> Array:
+    values = [row.get(name) for row in rows]
+    return np.array([value if isinstance(value, float) else np.nan for value in values])

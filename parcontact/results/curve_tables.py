@@ -1,23 +1,117 @@
-"""Tables of friction curves for reports: friction over speed and temperature under each pressure, of one curve or of
-several side by side, and the lengths, frequencies and moduli that matter."""
+"""Parts of a report, and the tables of curves at its top.
 
+Parts of a report: texts, tables, pictures, browsers of maps and data, all stored in the page.
+
+Tables of friction curves for reports: friction over speed and temperature under each pressure, of one curve or of
+several side by side, and the lengths, frequencies and moduli that matter.
+"""
+
+import base64
+import io
 import math
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..effects.relaxation import relaxation_of
 from ..errors import InputError
+from ..files import tables
 from ..job import Job, load
+from ..march.measured_range import excited_bands
 from ..physics.prony import complex_modulus
 from ..printed import quantity, with_error
-from ..scene.measured_range import excited_bands
-from ..storage import lost_points
-from .page_parts import ReportTable
+from . import charts, style
 from .results import Results
+
+SIZE = (4.2, 2.9)  # size of a chart, half the width of a laptop's screen [inch]
+RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes, independent of fonts
+
+Picture = tuple[str, str]  # data URI, and caption
+Browser = tuple[str, Sequence[Picture], int]  # name of a map, its pictures, and the index of the first shown
+Download = tuple[str, str, int]  # a file stored in the page: its name, data URI and size [bytes]
+
+
+@dataclass(frozen=True)
+class ReportTable:
+    """A table: names of columns, and rows of texts."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class ReportSection:
+    """A section of a report: heading and contents, shown in the order of the fields; `texts` are shown verbatim."""
+
+    title: str
+    sentences: Sequence[str] = ()
+    tables: Sequence[ReportTable] = ()
+    pictures: Sequence[Picture] = ()
+    browsers: Sequence[Browser] = ()
+    texts: Sequence[tuple[str, str]] = ()
+    downloads: Sequence[Download] = ()
+
+    def __bool__(self) -> bool:
+        """Return True if the section has contents."""
+        return any((self.sentences, self.tables, self.pictures, self.browsers, self.texts, self.downloads))
+
+    def without(self, places: Sequence[str]) -> "ReportSection":
+        """Return the section with the directories `places` removed from paths in its sentences and tables."""
+
+        def shorten(text: str) -> str:
+            for place in places:
+                text = text.replace(place, "")
+            return text
+
+        tables = [replace(one, rows=[[shorten(cell) for cell in row] for row in one.rows]) for one in self.tables]
+        return replace(self, sentences=[shorten(text) for text in self.sentences], tables=tables)
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """A chapter on one output directory; `headline` is a sentence with its results."""
+
+    title: str
+    directory: Path
+    kind: str
+    sections: Sequence[ReportSection]
+    headline: str = ""
+
+
+def draw_chart(chart: charts.Chart) -> Picture:
+    return draw_panel(partial(charts.draw, chart), f"{chart.y.name} over {chart.x.name}".replace("\n", " "))
+
+
+def draw_panel(panel: style.Panel, caption: str) -> Picture:
+    """Return a picture of one panel, as SVG."""
+    file = io.BytesIO()
+    with style.drawing(RC):
+        figure = Figure(figsize=SIZE, layout="constrained")
+        axes = figure.subplots()
+        panel(axes)
+        (extra,) = style.place_legends([[axes]])
+        style.set_height(figure, SIZE[1] + extra)
+        figure.savefig(file, format="svg", dpi=style.DPI, metadata={"Date": None})
+    return to_uri(file.getvalue(), "image/svg+xml"), caption
+
+
+def embed_file(path: Path) -> Download:
+    """Return a table as a download in the page."""
+    data = path.read_bytes()
+    return path.name, to_uri(data, "text/csv"), len(data)
+
+
+def to_uri(data: bytes, kind: str) -> str:
+    """Return data as a data URI."""
+    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
+
 
 MOST = 60  # most rows of a table
 DIGITS = 6  # significant digits of speeds, pressures and temperatures that count as equal
@@ -26,7 +120,7 @@ Place = tuple[float, float, float]  # speed [m/s], pressure [Pa], temperature [d
 
 def friction_tables(curve: Results) -> list[ReportTable]:
     """Return a table for each pressure, with a row for each speed and a column for each temperature."""
-    cells = {_round(one.at, curve.temperature): "not solved" for one in lost_points.read(curve.path)}
+    cells = {_round(one.at, curve.temperature): "not solved" for one in tables.read(curve.path)}
     cells = _cells(curve) | cells
     degrees, found = list(dict.fromkeys(place[2] for place in sorted(cells, key=_order))), []
     for pressure in dict.fromkeys(place[1] for place in sorted(cells, key=_order)):

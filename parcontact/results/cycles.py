@@ -16,8 +16,7 @@ Between two rows F and s are Hermite's cubics with slopes by differences. The er
 * where something slides, the error of friction, weighted with the force;
 * else by the length of steps: that of a harmonic motion with these steps (`prony.discrete_modulus`), times HARMONICS;
 * by the solver, as for the area (`accuracy.sources`), over the root of the number of steps, and over sin phase, as the
-  loop is the small difference of two paths; and by the mesh, MESH of the error of the area.
-"""
+  loop is the small difference of two paths; and by the mesh, MESH of the error of the area."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,14 +25,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..accuracy.constants import SOLVER_AREA
 from ..columns import CYCLES, names_of, to_csv, values_of
 from ..effects.relaxation import relaxation_of
+from ..files import files
 from ..job import Job, Stage, Swing
+from ..march.constants import SOLVER_AREA
 from ..parallel.slab import Array
 from ..physics.prony import complex_modulus, discrete_modulus
 from ..printed import per_cent, quantity, stated_error
-from ..storage import files
 from .slide import SAME_INSTANT
 
 TABLE = "cycles.csv"

@@ -1,8 +1,7 @@
 """Tables for programs of finite elements: friction over slip rate, pressure and temperature, as csv or for Abaqus.
 
 Points of a friction curve at which waves of the surface excite the rubber beyond its measured frequencies or
-temperatures are left out, and named. Capabilities export tables of runs.
-"""
+temperatures are left out, and named. Capabilities export tables of runs."""
 
 import math
 import textwrap
@@ -14,12 +13,12 @@ from ..bands.choice import cut_bands, on_one_grid_of_all
 from ..columns import to_csv
 from ..doubts import Doubt
 from ..errors import InputError
+from ..files import files, hdf5, tables
+from ..files.provenance import PROGRAM
+from ..files.tables import Wanted
 from ..job import Job, load
-from ..job.added_sections import answers
-from ..scene.measured_range import doubt_band
-from ..storage import curve_points, files, hdf5
-from ..storage.curve_points import Wanted
-from ..storage.provenance import PROGRAM
+from ..job.listing import answers
+from ..march.measured_range import doubt_band
 from .results import ExportedTable, Results
 
 HEAD = ("friction [-]", "slip rate [m/s]", "pressure [Pa]", "temperature [deg C]", "relative error [-]")
@@ -63,7 +62,7 @@ def _friction(directory: Path) -> ExportedTable:
     """Return the friction of a curve by temperature, pressure and slip rate, which varies fastest."""
     curve = Results(directory, "curve")
     columns, given = curve.table, curve.temperature
-    points = curve_points.of_table(columns)
+    points = tables.of_table(columns)
     outside = _outside(curve.path, points)
     rows = []
     for k, point in enumerate(points):

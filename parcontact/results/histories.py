@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import printed
 from ..columns import UNITS
 from ..errors import InputError
-from ..job.added_sections import answers
+from ..job.listing import answers
 from ..parallel.slab import Array
-from . import prefixes, style
-from .charts import Axis, Chart, ChartLine
+from . import style
+from .charts import Axis, Chart, ChartLine, PlottedRun
 from .cycles import friction_along, way_along
-from .plotted_run import PlottedRun
 
 EARLY = 0.05  # half of the rows within this share of the time make a linear axis useless
 FEW_ROWS = 8
@@ -182,11 +182,11 @@ def describe_solve(run: PlottedRun) -> str:
     """Return the results of the last solve as text."""
     axis, load = run.load
     fraction = run.columns["contact_area_corrected"][-1]
-    area = prefixes.quantity(fraction * run.area, "m²", 4) if run.free else f"{fraction:.4g} of the nominal"
+    area = printed.quantity(fraction * run.area, "m²", 4) if run.free else f"{fraction:.4g} of the nominal"
     name, column = ("approach", "approach") if run.free else ("mean gap", "mean_gap")
-    length = prefixes.quantity(run.columns[column][-1], "m", 4)
-    highest = prefixes.quantity(run.columns["max_pressure"][-1], "Pa", 4)
-    pressed = f"{axis.name} {prefixes.quantity(load[-1], axis.unit, 4)}"
+    length = printed.quantity(run.columns[column][-1], "m", 4)
+    highest = printed.quantity(run.columns["max_pressure"][-1], "Pa", 4)
+    pressed = f"{axis.name} {printed.quantity(load[-1], axis.unit, 4)}"
     return f"{pressed},  contact area {area},\n{name} {length},  highest pressure {highest}"
 
 

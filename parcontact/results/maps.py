@@ -1,23 +1,158 @@
-"""Maps of saved instants: panels of one instant, and frames of all for movies and reports."""
+"""Pictures of maps: panels, movies and lines.
+
+Maps of saved instants: panels of one instant, and frames of all for movies and reports.
+
+Movies of a map over its saved instants: a GIF, and an MP4 if `ffmpeg` is on the path.
+
+Charts of pressure, and of traction, along a line: of a narrow map, or through the axis of a sphere or cylinder.
+"""
 
 import io
-from collections.abc import Callable, Iterator, Mapping
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
-from ..effects.contact_law import touching_of
+from .. import printed
+from ..effects.effect import touching_of
 from ..errors import InputError
-from ..job import Job
+from ..files import files, hdf5
+from ..job import Cylinder, Elastic, Job, Sphere
 from ..parallel.slab import Array
-from . import lines, prefixes, style
-from .plotted_run import Fields, PlottedRun
+from ..theory import hertz
+from . import style
+from .charts import Fields, PlottedRun, choose_evenly, label_frames
+
+INSTANTS = 5  # most lines in a panel
+MOST_LETTERS = 30  # most letters of the name of a stage in a legend
+RANGE = 1.3  # shown range over the radius of contact
+
+Curve = tuple[str, Array, Array]  # name, positions [m] and pressures [Pa]
+
+
+def line_panels(run: PlottedRun, fields: Fields, narrow: bool) -> Iterator[style.Panel]:
+    """Yield the panel of a narrow map, or of a surface that is a single round shape."""
+    shape = run.job.surface[0]
+    if narrow:
+        yield _make_strip(run, fields)
+    elif len(run.job.surface) == 1 and isinstance(shape, Sphere | Cylinder):
+        yield _make_profile(run, fields, shape)
+
+
+def _choose_instants(run: PlottedRun, fields: Fields) -> tuple[list[tuple[int, str]], str]:
+    """Return some evenly spaced saved instants with their labels, and the load for the title if it is the same at
+    all."""
+    indices = sorted({fields.shown[int(k)] for k in np.linspace(0, len(fields.shown) - 1, INSTANTS)})
+    instants = [(index, int(fields.steps[index]), float(fields.times[index])) for index in indices]
+    loads = {run.pressed(step) for _, step, _ in instants}
+    same_load = run.lasts and len(loads) == 1
+    names = []
+    for index, step, time in instants:
+        stage = style.plain(run.name_stage(step), MOST_LETTERS)
+        when = printed.quantity(time, "s") if same_load else run.instant(step, time)
+        names.append((index, "\n".join(filter(None, (stage, when)))))
+    return names, f", {loads.pop()}" if same_load else ""
+
+
+def _draw_pressures(
+    axes: Axes, curves: Sequence[Curve], along: str, title: str, theory: Sequence[Curve] = (), reach: float = 0.0
+) -> None:
+    """Draw pressures on lines up to `reach` on both sides, if given, with the theory."""
+    shades = np.linspace(0.0, 0.85, len(curves)) if len(curves) > 1 else [0.45]
+    for (name, x, pressure), shade in zip(curves, shades, strict=True):
+        axes.plot(x, pressure, color=colormaps[style.SEQUENCE](shade), label=name)
+    for (name, x, pressure), dashes in zip(theory, ("--", ":"), strict=False):
+        axes.plot(x, pressure, "k" + dashes, lw=1.0, label=name)
+    if reach:
+        axes.set_xlim(-reach, reach)
+    if not any((pressure < 0.0).any() for _, _, pressure in curves):
+        axes.set_ylim(bottom=0.0)
+    axes.set_title(title)
+    axes.locator_params(nbins=5)
+    style.label(axes.xaxis, along, "m")
+    style.label(axes.yaxis, "pressure", "Pa")
+
+
+def _make_strip(run: PlottedRun, fields: Fields) -> style.Panel:
+    """Return a panel of pressures along the long side of a narrow map."""
+    lies = fields.x.size > fields.y.size
+    chosen, load = _choose_instants(run, fields)
+    maps = [(name, fields.file["pressure"][index]) for index, name in chosen]
+    curves = [(name, fields.x, field[0]) if lies else (name, fields.y, field[:, 0]) for name, field in maps]
+    some = "some of the " if len(curves) < len(fields.shown) else "the "
+    title = f"pressure at {some}saved instants{load}" if run.lasts else f"pressure under {some}loads"
+    return partial(_draw_pressures, curves=curves, along="x" if lies else "y", title=title)
+
+
+def traction_panels(run: PlottedRun, fields: Fields) -> Iterator[style.Panel]:
+    """Yield the panel of tractions along the long side of a narrow map at the chosen instant, if they are saved. With a
+    coefficient of friction it has the bounds."""
+    lies = fields.x.size > fields.y.size
+    along, place = ("x", fields.x) if lies else ("y", fields.y)
+    traction, pressure = fields.read(f"traction_{along}"), fields.read("pressure")
+    if traction is None or pressure is None:
+        return
+    t, p = (field[0] if lies else field[:, 0] for field in (traction, pressure))
+    instant = run.instant(int(fields.steps[fields.chosen]), float(fields.times[fields.chosen]))
+    bound = run.job.section("interface").coefficient
+    touched = place[p > 0.0]
+
+    def draw(axes: Axes) -> None:
+        axes.plot(place, t, color=style.BLUE, label="traction")
+        for sign, name in ((1, "bound"), (-1, "")) if bound is not None else ():
+            axes.plot(place, sign * bound * p, "k:", lw=1.0, label=name)
+        if touched.size:
+            margin = 0.15 * np.ptp(touched)
+            axes.set_xlim(touched.min() - margin, touched.max() + margin)
+        axes.set_title(f"traction along {along}, {instant}")
+        axes.locator_params(nbins=5)
+        style.label(axes.xaxis, along, "m")
+        style.label(axes.yaxis, "traction", "Pa")
+
+    yield draw
+
+
+def _make_profile(run: PlottedRun, fields: Fields, shape: Sphere | Cylinder) -> style.Panel:
+    """Return a panel of pressures on a line through the axis, with Hertz's pressure under the last load."""
+    across = isinstance(shape, Cylinder) and shape.axis == "x"
+    centre = shape.center or (run.job.grid.lx / 2, run.job.grid.ly / 2)
+    chosen, load = _choose_instants(run, fields)
+    curves: list[Curve] = []
+    for index, name in chosen:
+        moved = run.moved(int(fields.steps[index]))
+        x, y, field = fields.x - centre[0] - moved[0], fields.y - centre[1] - moved[1], fields.file["pressure"][index]
+        line = field[:, np.argmin(np.abs(x))] if across else field[np.argmin(np.abs(y))]
+        curves.append((name, y if across else x, line))
+    force = float(field.mean() * run.area)
+    reach = RANGE * max(float(np.abs(along[pressure > 0.0]).max(initial=0.0)) for _, along, pressure in curves)
+    theory: list[Curve] = []
+    if isinstance(shape, Sphere) and force > 0.0:
+        r, poisson = np.linspace(-reach, reach, 401), run.job.material.poisson
+        for name, modulus in _find_moduli(run):
+            theory.append((name, r, hertz.pressure(np.abs(r), force, shape.radius, modulus, poisson)))
+    along, title = f"{'y' if across else 'x'} from the axis", f"pressure on a line through the axis{load}"
+    return partial(_draw_pressures, curves=curves, along=along, title=title, theory=theory, reach=reach)
+
+
+def _find_moduli(run: PlottedRun) -> list[tuple[str, float]]:
+    """Return the shear moduli [Pa] of the elastic bodies to compare with."""
+    material = run.job.material.fitted
+    if isinstance(material, Elastic):
+        return [("Hertz", material.shear_modulus)]
+    ends = ("Hertz, G(0)", material.instant_modulus), ("Hertz, G(∞)", material.long_modulus)
+    return [end for end in ends if end[1] > 0.0]
+
 
 Window = tuple[slice, slice]
 
@@ -64,9 +199,9 @@ def map_panels(run: PlottedRun, at: str = "") -> tuple[list[list[style.Panel]], 
         with run.open_maps() as file:
             fields = Fields(file, at, until=run.telling_step)
             narrow = min(fields.x.size, fields.y.size) <= STRIP
-            pressures = list(lines.line_panels(run, fields, narrow)) if fields.read("pressure") is not None else []
+            pressures = list(line_panels(run, fields, narrow)) if fields.read("pressure") is not None else []
             if narrow:
-                return [pressures], list(lines.traction_panels(run, fields))
+                return [pressures], list(traction_panels(run, fields))
             found = list(_panels(run, fields)) if fields.saved else []
             wide = run.job.grid.lx > WIDE * run.job.grid.ly
             return ([pressures, *([one] for one in found)], []) if wide else ([pressures], found)
@@ -176,11 +311,11 @@ def _draw_map(
     mesh = axes.pcolormesh(x, y, empty, cmap=look.colors, norm=norm, rasterized=True)
     for axis, along in ((axes.xaxis, "x"), (axes.yaxis, "y")):
         axis.set_major_locator(MaxNLocator(TICKS - (along == "x"), steps=[1, 2, 5, 10]))
-    height = prefixes.label_map(axes, (x[-1] - x[0], y[-1] - y[0]))
+    height = style.label_map(axes, (x[-1] - x[0], y[-1] - y[0]))
     if low <= high:
         ticks = [low] if low == high else MaxNLocator(TICKS, steps=[1, 2, 5, 10])
         scale = axes.figure.colorbar(mesh, ax=axes, ticks=ticks, shrink=BAR * height, **bar).ax.yaxis
-        prefixes.label(scale, _words(name), look.unit)
+        style.label(scale, _words(name), look.unit)
     return mesh.set_array
 
 
@@ -195,8 +330,8 @@ def _draw_line(
         axes.set_ylim(low, low + 1.05 * (high - low))
     else:  # there are no values for a scale
         axes.set_yticks([low if high == low else 0.0])
-    prefixes.label(axes.xaxis, "x" if lies else "y", "m")
-    prefixes.label(axes.yaxis, _words(name), LOOKS[name].unit)
+    style.label(axes.xaxis, "x" if lies else "y", "m")
+    style.label(axes.yaxis, _words(name), LOOKS[name].unit)
     return lambda values: line.set_ydata(np.nan_to_num(values[0] if lies else values[:, 0]))
 
 
@@ -242,3 +377,68 @@ def draw_frames(
         png = io.BytesIO()
         figure.savefig(png, format="png", dpi=dpi)
         yield Image.open(png).convert("RGB")
+
+
+FRAMES = 200  # most frames of a movie; other instants are left out
+SECONDS = 8.0  # duration of a movie with enough frames [s]
+FASTEST, SLOWEST = 20, 2  # limits on the frames per second
+FFMPEG, KINDS = "ffmpeg", (".gif", ".mp4")
+
+
+def write_movie(directory: Path, name: str, out: Path | None = None) -> list[Path]:
+    """Write a movie of the map `name` over all saved instants, with one range of colours; returns the paths.
+
+    Without `out` they are NAME.gif in the directory, and NAME.mp4 if ffmpeg exists. Raises InputError for another kind
+    of file, an MP4 without ffmpeg, and a map that was not saved.
+    """
+    targets = [out] if out else [directory / f"{name}{kind}" for kind in KINDS if kind == ".gif" or _find_ffmpeg()]
+    if targets[0].suffix not in KINDS:
+        raise InputError(f"--movie writes a GIF or an MP4: --out must end in .gif or .mp4, got {targets[0]}")
+    if targets[0].suffix == ".mp4" and not _find_ffmpeg():
+        raise InputError(f"an MP4 needs the program {FFMPEG} on the path; give an --out that ends in .gif")
+    try:
+        frames, rate = _draw(directory, name)
+    except hdf5.FAILURES as error:
+        raise InputError(f"no movie from {directory / 'fields.h5'}: {hdf5.reason(error)}") from error
+    for target in targets:
+        _write_gif(target, frames, rate) if target.suffix == ".gif" else _write_mp4(target, frames, rate)
+    return targets
+
+
+def _find_ffmpeg() -> str | None:
+    return shutil.which(FFMPEG)
+
+
+def _draw(directory: Path, name: str) -> tuple[list[Image.Image], int]:
+    """Return the frames, and their rate [1/s]."""
+    path = directory / "fields.h5"
+    run = PlottedRun(directory)
+    with run.open_maps() as file:
+        labels = label_frames(run, file)
+        there = drawn_maps(file)
+        if name not in there or not labels:
+            raise InputError(f"{path} has no map of {name}; it has {', '.join(there) or 'none'}")
+        chosen = choose_evenly(labels, FRAMES)
+        rate = int(np.clip(round(len(chosen) / SECONDS), SLOWEST, FASTEST))
+        return list(draw_frames(file, name, chosen, run.job)), rate
+
+
+def _write_gif(target: Path, frames: Sequence[Image.Image], rate: int) -> None:
+    first, *others = frames
+    with files.replaced(target, files.is_marked) as movie:
+        duration, comment = int(1000 / rate), files.MARK.encode()  # duration of a frame [ms]
+        first.save(movie, "GIF", save_all=True, append_images=others, duration=duration, loop=0, comment=comment)
+
+
+def _write_mp4(target: Path, frames: Sequence[Image.Image], rate: int) -> None:
+    """Encode the frames by ffmpeg, with even numbers of points along each side, as players require."""
+    width, height = (2 * (side // 2) for side in frames[0].size)
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(rate), "-i", "-"]
+    look = ["-pix_fmt", "yuv420p", "-metadata", f"comment={files.MARK}", "-movflags", "+faststart", "-f", "mp4"]
+    with files.replaced(target, files.is_marked) as movie:
+        command = [_find_ffmpeg() or FFMPEG, "-v", "error", "-y", *raw, *look, f"file:{Path(movie.name).absolute()}"]
+        pictures = b"".join(frame.crop((0, 0, width, height)).tobytes() for frame in frames)
+        done = subprocess.run(command, input=pictures, capture_output=True, check=False)
+        if done.returncode:
+            why = (done.stderr.decode(errors="replace").strip().splitlines() or ["no message"])[-1]
+            raise InputError(f"{FFMPEG} cannot write {target}: {why}")

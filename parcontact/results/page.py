@@ -1,19 +1,243 @@
-"""The HTML page of a report, which loads no other files."""
+"""`parcontact report`: the page and its chapters.
 
+The HTML page of a report, which loads no other files.
+
+Chapters of a report, one per output directory with a run, a friction curve, a sweep or a study.
+
+Contents of run.log and steady.log: warnings, estimated errors, counts, and the machine.
+
+Sections on errors and costs, program, machine and runs, and references to cite.
+"""
+
+import json
+import math
 import re
 import stat
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from .. import progress
+from .. import job as jobs
+from .. import streams
+from ..capabilities import offers
 from ..errors import InputError
-from ..storage import files, hdf5
-from ..storage.provenance import PROGRAM
-from .chapters import compare_directories, describe_directory
+from ..files import files, hdf5, provenance
+from ..files.provenance import PROGRAM
+from ..files.recorder import WARNING, log_lines
+from ..files.tables import LOG
+from ..job import Job, listing
+from ..job.listing import plain_data
+from ..job.reading import CASES, RESOLVED, STEADY_RESOLVED, shown_job
+from ..printed import name_cases
+from . import info, plots, report_sections
+from .curve_tables import Chapter, ReportSection, ReportTable, compared_table, draw_chart, embed_file
+from .results import Results, swept_keys
+from .slide import ERRORS
+
+LOGS = ("run.log", LOG)
+COUNTS = "counts on root: "
+ESTIMATE = "estimated error of "
+MACHINE = re.compile(r"parcontact |machine: |batch job: |\d+ ranks?, ")  # beginnings of lines about the machine
+
+
+BEYOND = "; more than the "  # in an estimate that exceeds numerics.accuracy
+
+
+@dataclass(frozen=True)
+class Log:
+    """Contents of a log: different warnings in order; sentences on errors and counts of the last run; lines on program
+    and machine."""
+
+    warnings: list[str]
+    estimates: list[str]
+    counts: list[Sequence[str]]
+    machine: list[str]
+
+
+def read_logs(directory: Path) -> Log:
+    """Return the contents of the logs of a directory; empty without a log."""
+    lines = [line for name in LOGS for line in log_lines(directory / name)]
+    warnings = [line.removeprefix(WARNING) for line in lines if line.startswith(WARNING)]
+    counted = [line.removeprefix(COUNTS) for line in lines if line.startswith(COUNTS)]  # allreduce 12, fft 64x64 3
+    counts: list[Sequence[str]] = [part.rsplit(" ", 1) for part in counted[-1].split(", ")] if counted else []
+    machine = [line for line in lines if MACHINE.match(line)]
+    estimates = {line.partition(":")[0]: line for line in lines if line.startswith(ESTIMATE)}
+    return Log(list(dict.fromkeys(warnings)), list(estimates.values()), counts, machine)
+
+
+def warnings_of_cases(directory: Path) -> list[str]:
+    """Return the warnings in the logs of the cases of a sweep, and the errors beyond numerics.accuracy, each once with
+    its cases."""
+    found: dict[str, list[int]] = {}
+    for path in sorted(directory.glob(f"{CASES}/*")):
+        if path.name.isdecimal():
+            logs = read_logs(path)
+            beyond = [line.partition(":")[0] for line in logs.estimates if BEYOND in line]
+            for text in [*logs.warnings, *(f"the {name} exceeds numerics.accuracy" for name in beyond)]:
+                found.setdefault(text, []).append(int(path.name))
+    return [f"{text} ({name_cases(cases)})" for text, cases in found.items()]
+
+
+FRICTION = ERRORS[0]
+
+
+def costs(results: Results, found: Log, job: Job) -> Iterator[ReportSection]:
+    """Yield the errors of a run or a curve, then wall time, operator calls and counts."""
+    columns = results.table
+    yield describe_errors(columns, found, job, results.kind == "curve")
+    calls = [value for value in columns["operator_calls"] if value == value]
+    rows = [
+        ("steps or points", str(len(columns["seconds"]))),
+        ("total wall time", f"{math.fsum(columns['seconds']):.4g} s"),
+        ("operator calls", f"{math.fsum(calls):.6g}"),
+    ]
+    tables = [ReportTable(("cost", "value"), rows)]
+    if found.counts:
+        tables.append(ReportTable(("counted on one rank in the last run", "number"), found.counts))
+    yield ReportSection("Cost", tables=tables)
+
+
+def describe_errors(columns: Mapping[str, Sequence[float]], found: Log, job: Job, of_curve: bool) -> ReportSection:
+    """Return the errors of a friction curve at its worst and best point, or of a run at its end, with the sentences of
+    its log; friction only if something slides. The section is empty for a table without errors."""
+    rows = []
+    for column, name, asked in zip(ERRORS, ("friction", "contact area"), job.numerics.asked.both, strict=True):
+        known = [error for error in columns.get(column, ()) if error == error]
+        if known and (of_curve or job.directions or column != FRICTION):
+            errors = (max(known), min(known)) if of_curve else (known[-1],)
+            rows.append((name, *(f"{100 * error:.3g} %" for error in errors), f"{100 * asked:g} %"))
+    ends = ("at the worst point", "at the best point") if of_curve else ("at the end",)
+    tables = [ReportTable(("estimated error of", *ends, "numerics.accuracy"), rows)] if rows else []
+    return ReportSection("Error budget", [f"{text}." for text in found.estimates] if rows else (), tables)
+
+
+def origin_section(directory: Path, found: Log) -> ReportSection:
+    """Return the provenance by the newest file of a directory that has it."""
+    there = [directory / name for name in ("fields.h5", "steady.h5") if (directory / name).is_file()]
+    there += sorted(directory.glob("checkpoint/step-*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
+    for path in there:
+        try:
+            with Results(directory).open_maps(str(path.relative_to(directory))) as file:
+                rows = [
+                    ("said by", str(path.relative_to(directory))),
+                    ("program", str(file.attrs["program"])),
+                    ("ranks", str(file.attrs["ranks"])),
+                    ("seeds", ", ".join(map(str, file.attrs["seeds"])) or "none"),
+                    *json.loads(file.attrs["libraries"]).items(),
+                ]
+                runs = [
+                    (str(one.runs), one.program, str(one.ranks), one.started, str(one.from_step))
+                    for one in provenance.read_chain(file)
+                ]
+        except (*hdf5.FAILURES, KeyError, ValueError):
+            continue
+        chain = ReportTable(("runs", "program", "ranks", "started", "from step"), runs, "runs that made the results")
+        return ReportSection("Provenance", found.machine, [ReportTable(("of", "value"), rows), chain])
+    return ReportSection("Provenance", found.machine or [f"This report was made by {provenance.PROGRAM}."])
+
+
+def list_citations(job: Job | None) -> ReportSection:
+    """Return the references to cite for the results of a job."""
+    return ReportSection(
+        "References to cite", [provenance.PROGRAM, *(provenance.cite_lines(plain_data(job)) if job else ())]
+    )
+
+
+KINDS = {  # kinds of results, by their table
+    "measures.csv": ("run", report_sections.describe_run),
+    "steady.csv": ("friction curve", report_sections.describe_curve),
+    "sweep.csv": ("sweep", report_sections.describe_sweep),
+    "study.csv": ("study", report_sections.describe_study),
+}
+JOBS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
+MORE_TABLES = (
+    *(name for names in offers("results", "DATA") for name in names),
+    *("cycles.csv", "theory.csv", "steady_waves.csv", "steady_theory.csv", "bands.csv", "bands_theory.csv"),
+    *("sweep_mean.csv", "sweep_curves.csv", "sweep_curves_mean.csv"),
+)
+ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys that are shown in other sections
+
+
+def describe_directory(directory: Path) -> Chapter:
+    """Return the chapter about a directory. Raises InputError if it has no results."""
+    there = [name for name in KINDS if (directory / name).is_file()]
+    if not there:
+        raise InputError(f"{directory} has no results: it has none of {', '.join(KINDS)}")
+    sections = [KINDS[name][1](directory) for name in there]
+    if "steady.csv" in there:
+        sections.insert(0, report_sections.describe_friction(directory))
+    found, title, cited, places = (read_logs(directory), "", list_citations(None), [f"{directory.absolute()}/"])
+    of_cases = (path for name in (RESOLVED, STEADY_RESOLVED) for path in sorted(directory.glob(f"cases/*/{name}")))
+    jobs_there = [*(directory / name for name in JOBS), *of_cases]
+    if resolved := next(
+        (path for path in jobs_there if path.is_file()), None
+    ):  # for a sweep, the job of its first case
+        job, warnings = _read_job(resolved)
+        title, places = job.title, [*_places(job), *places]
+        asked = _describe_job(job, resolved.with_name(JOBS[resolved.name]))
+        of_job = [asked, report_sections.material_section(job), report_sections.road_section(job)]
+        if there == ["sweep.csv"]:
+            of_job[0] = replace(asked, sentences=[_describe_swept(directory)])
+            of_job = [replace(one, title=f"{one.title} of the first case") for one in of_job]
+            warnings = warnings_of_cases(directory) or warnings
+        sections += of_job
+        if there[0] in ("measures.csv", "steady.csv"):
+            sections += costs(Results(directory, "run" if there[0] == "measures.csv" else "curve"), found, job)
+        cited = list_citations(job)
+        sections.append(ReportSection("Warnings", found.warnings or warnings or ["There was no warning."]))
+    data = [embed_file(directory / name) for name in (*KINDS, *MORE_TABLES) if (directory / name).is_file()]
+    text = "The tables, in SI units and with all digits, are stored in this file:"
+    sections += [origin_section(directory, found), cited, ReportSection("Data", [text], downloads=data)]
+    kinds = " and ".join(KINDS[name][0] for name in there)
+    shown = [one.without(sorted(places, key=len, reverse=True)) for one in sections if one]
+    here, there_is = Path.cwd(), directory.absolute()
+    named = there_is.relative_to(here) if there_is.is_relative_to(here) else Path(there_is.name)
+    return Chapter(title or there_is.name, named, kinds, shown, info.find_headline(directory))
+
+
+def compare_directories(directories: Sequence[Path]) -> Iterator[Chapter]:
+    """Yield a chapter that compares several directories in common pictures, with one colour per directory."""
+    if len(directories) > 1:
+        shared = plots.compare_charts(directories, least=2)
+        if shared:
+            tables = compared_table(directories, plots.name_directories(directories))
+            together = ReportSection("Together", tables=tables, pictures=[draw_chart(one) for one in shared])
+            yield Chapter("Comparison", Path(), "", [together])
+
+
+def _read_job(resolved: Path) -> tuple[Job, Sequence[str]]:
+    """Return the job of an output directory and its warnings, which are omitted if its files no longer exist."""
+    try:
+        job = jobs.load(resolved)
+        return job, job.warnings
+    except InputError:
+        return shown_job(resolved), ()
+
+
+def _places(job: Job) -> list[str]:
+    """Return the directories of this machine in a job, to be omitted in the report."""
+    parts = [value for part in (*job.surface, job.material) for _, value in listing.items(part)]
+    return [f"{path.parent}/" for path in (job.path, *parts) if isinstance(path, Path) and path.is_absolute()]
+
+
+def _describe_swept(directory: Path) -> str:
+    """Return a sentence on the swept keys and their values."""
+    rows = Results(directory, "sweep").cases
+    swept = {name: dict.fromkeys(str(row[name]) for row in rows) for name in swept_keys(rows)}
+    values = "; ".join(f"{name} ({', '.join(found)})" for name, found in swept.items())
+    return f"The sweep has {len(rows)} cases, with {values}."
+
+
+def _describe_job(job: Job, given: Path) -> ReportSection:
+    """Return a table of all keys with every default, and the original job file, if it exists."""
+    rows = [row for row in listing.rows(job) if not row[0].startswith(ELSEWHERE)]
+    texts = [("the original job file", given.read_text(errors="replace"))] if given.is_file() else []
+    return ReportSection("Job", tables=[ReportTable(("key", "value", "unit"), rows)], texts=texts)
+
 
 NAME, TEMPLATE = "report.html", "page.html.jinja"
 LONG_WORD = re.compile(r"\S{14,}")  # word that is wider than a column on a phone
@@ -54,7 +278,7 @@ def _refuse_links(directory: Path) -> None:
 
 
 def render(directories: Sequence[Path]) -> str:
-    each = [describe_directory(directory) for directory in progress.with_bar(directories, "chapters", "chapter")]
+    each = [describe_directory(directory) for directory in streams.with_bar(directories, "chapters", "chapter")]
     chapters = [*compare_directories(directories), *each]
     loader = PackageLoader("parcontact", "results")
     shown = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)

@@ -1,8 +1,7 @@
 """Pictures of runs, also unfinished ones, and of friction curves: charts, and maps of one instant.
 
 The job determines the panels: friction if the surface slides, energies if they were requested, curves over the load if
-all stages are single solves, pressures along a line with Hertz's for a sphere.
-"""
+all stages are single solves, pressures along a line with Hertz's for a sphere."""
 
 import os
 from collections.abc import Sequence
@@ -13,13 +12,13 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from .. import printed
 from ..errors import InputError
-from ..job.added_sections import answers
+from ..files import hdf5
+from ..job.listing import answers
 from ..job.reading import CASES
-from ..storage import hdf5
-from . import band_charts, charts, curve_charts, histories, maps, movie, prefixes, style, sweep_charts, theory_settings
-from .charts import Chart
-from .plotted_run import PlottedRun
+from . import band_charts, charts, histories, maps, style, theory_table
+from .charts import Chart, PlottedRun
 from .results import KINDS, Results, read_cases, swept_keys
 
 PANELS = ("friction", "loop", "area", "approach", "gap", "pressure", "load", "loss", "phase", "energy")
@@ -74,7 +73,7 @@ def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> l
         raise InputError("--out names one picture: give one directory, or --compare several in one")
     with style.drawing():
         if options.movie:
-            return [path for one in directories for path in movie.write_movie(one, options.movie, options.out)]
+            return [path for one in directories for path in maps.write_movie(one, options.movie, options.out)]
         if options.compare:
             return [_save(_draw_comparison(directories, options), Path("comparison"), options)]
         return [_save(_draw_directory(directory, options), directory / "picture", options) for directory in directories]
@@ -83,8 +82,8 @@ def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> l
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv into its directory; returns the path of the picture."""
     with style.drawing():
-        panels = PlotOptions().group(curve_charts.chart_steady(table.parent))
-        title = "\n".join([curve_charts.steady_title(table.parent), *_name_missing(table.parent)])
+        panels = PlotOptions().group(band_charts.chart_steady(table.parent))
+        title = "\n".join([band_charts.steady_title(table.parent), *_name_missing(table.parent)])
         return _save(style.figure_of(title, panels), table.with_suffix(""))
 
 
@@ -119,14 +118,14 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
     elif options.at:
         raise InputError(f"--at {options.at}: {directory} has no run, and therefore no maps")
     if has_curve and options.wants("steady"):
-        titles.append(curve_charts.steady_title(directory))
-        groups += options.group(curve_charts.chart_steady(directory, options.over))
+        titles.append(band_charts.steady_title(directory))
+        groups += options.group(band_charts.chart_steady(directory, options.over))
     if has_run and options.wants("maps"):
         found_maps, fields = maps.map_panels(run, options.at or "")
         groups += found_maps
     if has_sweep:
         titles.append(getattr(Results(directory, "sweep").job, "title", "") or directory.absolute().name)
-        groups.append(options.to_panels(options.choose(sweep_charts.chart_sweep(directory))))
+        groups.append(options.to_panels(options.choose(band_charts.chart_sweep(directory))))
     if not (has_run or has_curve or has_sweep):
         if not directory.exists():
             raise InputError(f"{directory} is not a directory")
@@ -134,7 +133,7 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
         raise InputError(f"{directory} has neither a run nor a friction curve: {lacking}")
     if options.panels and not any((*groups, fields)):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
-    lines = *titles[:1], theory_settings.describe_settings(directory), *_name_missing(directory)
+    lines = *titles[:1], theory_table.describe_settings(directory), *_name_missing(directory)
     return style.figure_of("\n".join(filter(None, lines)), groups, fields)
 
 
@@ -171,7 +170,7 @@ def _find_charts(directory: Path, options: PlotOptions) -> list[Chart]:
     if (directory / KINDS["run"]).is_file():
         found += options.choose(histories.chart_histories(PlottedRun(directory), options.over))
     if (directory / KINDS["curve"]).is_file() and options.wants("steady"):
-        found += curve_charts.chart_steady(directory, options.over)
+        found += band_charts.chart_steady(directory, options.over)
     return found
 
 
@@ -201,5 +200,5 @@ def _name_cases(directories: Sequence[Path]) -> list[str]:
 
 def _name_value(key: str, value: Any) -> str:
     """Return a key of a sweep and its value as text, such as `velocity 100 mm/s`."""
-    shown = prefixes.quantity(value, sweep_charts.UNITS.get(key, ""), 4) if isinstance(value, float) else value
+    shown = printed.quantity(value, band_charts.UNITS.get(key, ""), 4) if isinstance(value, float) else value
     return f"{key} {shown}"

@@ -10,27 +10,27 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from .. import job as jobs
-from .. import scene
 from ..bands.choice import cut_bands
 from ..column import Table
 from ..columns import BANDS_THEORY, STEADY_THEORY, THEORY, names_of, to_csv, values_of
 from ..effects.effect import BY_THEORY
 from ..effects.relaxation import relaxation_of, time_factor_of
 from ..errors import InputError
-from ..history.timeline import Span, Timeline
+from ..files import files, hdf5, tables
+from ..files.tables import Wanted
 from ..job import Job
+from ..job.history import Span, Timeline
+from ..march import scene
+from ..march.curve import Request, request
 from ..parallel.slab import Slab
-from ..physics.layer import Layer
+from ..physics.halfspace import Layer
 from ..physics.prony import Prony, complex_modulus
 from ..physics.roughness import EDGE, Roughness
-from ..steady_sliding.curve import Request, request
-from ..storage import files, hdf5, tables
-from ..storage.curve_points import Wanted
 from ..theory import full_contact, persson, persson_rings
 from ..theory.persson_history import Memory, SlidingLeg, follow
 from ..theory.persson_rings import Rings
-from . import theory_comparison, theory_settings
-from .theory_settings import TheorySettings
+from . import theory_table
+from .theory_table import TheorySettings
 
 ONE_ROUGH = (
     "surface: the theory takes the power spectrum of one isotropic rough surface, and this job has none, or other "
@@ -166,7 +166,7 @@ def draw_curve(job: Job, wanted: Request) -> Path:
 
 
 def _draw(job: Job) -> Path:
-    from . import plots  # matplotlib is slow to import, and for pictures only
+    from . import plots
 
     return plots.draw_steady(job.output.directory / "steady.csv")
 
@@ -179,7 +179,7 @@ def foretell(job: Job, gamma: float, waves: WavesOf) -> list[str]:
     if not job.history:
         return _foretell_curve(job, settings)
     path = write_theory(job, predict(job, Slab.alone(*job.grid.points), gamma, waves), settings)
-    compared = theory_comparison.describe_theory(path.parent, job.history, job.grid.dx)
+    compared = theory_table.describe_theory(path.parent, job.history, job.grid.dx)
     return [f"Persson's theory, {settings.sentence}: {path}", *compared]
 
 
@@ -203,18 +203,18 @@ def _foretell_curve(job: Job, settings: TheorySettings) -> list[str]:
 
 def write_theory(job: Job, rows: Iterator[PredictedInstant], settings: TheorySettings) -> Path:
     """Write the rows of a job as theory.csv, with theory.yaml. Return the path of the table."""
-    return _write(job.output.directory / theory_settings.TABLE, THEORY, rows, settings)
+    return _write(job.output.directory / theory_table.TABLE, THEORY, rows, settings)
 
 
 def _write(path: Path, table: Table, rows: Iterable[object], settings: TheorySettings | None = None) -> Path:
     """Write a table and its settings; raises InputError for a path that cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with files.replaced(path, theory_settings.is_own_table if settings else _is_own_curve) as file:
+        with files.replaced(path, theory_table.is_own_table if settings else _is_own_curve) as file:
             lines = (map(float, values_of(table, row)) for row in rows)
             file.write(to_csv(names_of(table), lines).encode())
         if settings:
-            theory_settings.write_settings(path.parent, settings)
+            theory_table.write_settings(path.parent, settings)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {hdf5.reason(error)}") from None
     return path
@@ -289,9 +289,9 @@ def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
 
 def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings:
     """Return a measured spectrum without waves longer than the box or shorter than two cells of the grid."""
-    from ..road import spectrum
+    from ..job import measured_maps
 
-    found, (long, short) = spectrum.read_spectrum(part)
+    found, (long, short) = measured_maps.read_spectrum(part)
     cell = max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
     ends = 2 * np.pi / min(long, max(job.grid.size)), 2 * np.pi / max(short, 2 * cell)
     if ends[0] >= EDGE * ends[1]:

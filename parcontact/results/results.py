@@ -1,7 +1,6 @@
 """Results of an output directory: job, tables with units, maps, errors, cases, and what is unfinished.
 
-Pictures, texts, tables of sweeps and `parcontact.open` read results through this module only.
-"""
+Pictures, texts, tables of sweeps and `parcontact.open` read results through this module only."""
 
 from __future__ import annotations
 
@@ -20,16 +19,13 @@ import numpy as np
 
 from ..columns import MEASURES, PER_BRANCH, SWEEP, TABLES, names_of
 from ..errors import InputError
-from ..job import Job, Zener
-from ..job.added_sections import answers
-from ..job.reading import CASES
-from ..job.resolved import RESOLVED, STEADY_RESOLVED, shown_job
-from ..job.text import yamltext
+from ..files import fields, hdf5, tables
+from ..files.tables import Claim, Columns
+from ..job import Job, Zener, yaml_text
+from ..job.listing import answers
+from ..job.reading import CASES, RESOLVED, STEADY_RESOLVED, shown_job
 from ..parallel.slab import Array
 from ..printed import quantity
-from ..storage import curve_points, fields, hdf5, lost_points, marker, read_back
-from ..storage.marker import Claim
-from ..storage.tables import Columns
 from .slide import ERRORS
 
 if TYPE_CHECKING:
@@ -100,7 +96,7 @@ class Results:
 
     def read(self, name: str) -> ResultTable:
         """Return a table by the name of its file; without the file, an empty one."""
-        found = read_back.read_results(self.path / name) if self.has(name) else {}
+        found = tables.read_results(self.path / name) if self.has(name) else {}
         return ResultTable(self.path / name, found.items())
 
     @cached_property
@@ -144,7 +140,7 @@ class Results:
         found = next((self.path / name for name in (RESOLVED, STEADY_RESOLVED) if self.has(name)), None)
         if found is None:
             raise InputError(f"{self.path} has no run: it has neither {RESOLVED} nor {STEADY_RESOLVED}")
-        return dict(yamltext.read_source(found, str(found)).data)
+        return dict(yaml_text.read_source(found, str(found)).data)
 
     @property
     def temperature(self) -> float:
@@ -163,12 +159,12 @@ class Results:
     @property
     def claims(self) -> dict[str, Claim]:
         """Claims of the verbs that wrote the directory, by verb."""
-        return marker.sound_claims(self.path)
+        return tables.sound_claims(self.path)
 
     @cached_property
     def detached(self) -> str:
         """How the surfaces of a run detached for good; '' if they did not."""
-        return self._detached or marker.detached(self.path)
+        return self._detached or tables.detached(self.path)
 
     @property
     def telling_row(self) -> int:
@@ -200,7 +196,7 @@ class Results:
     def study_rows(self) -> Rows:
         """Rows of a study, without fingerprints."""
         path = self.path / KINDS["study"]
-        read_back.refuse_cut(path)
+        tables.refuse_cut(path)
         with path.open(newline="") as file:
             rows = list(csv.DictReader(file))
         return [{name: _number(text) for name, text in row.items() if name != "fingerprint"} for row in rows]
@@ -210,7 +206,7 @@ class Results:
         """Sentences of a study; none before it is finished."""
         if not self.has("study.txt"):
             return []
-        read_back.refuse_cut(self.path / "study.txt")
+        tables.refuse_cut(self.path / "study.txt")
         return (self.path / "study.txt").read_text(errors="replace").splitlines()
 
     @property
@@ -225,13 +221,13 @@ class Results:
             yield f"{count} of {len(self.cases)} cases are not finished"
 
     def _lost_points(self) -> Iterator[str]:
-        if lost := lost_points.name_lost(self.path):
+        if lost := tables.name_lost(self.path):
             yield lost
         section = self.job.steady if self.job else None
         if section and section.velocities and section.pressures and self.has(KINDS["curve"]):
-            asked = curve_points.requested_points(section.velocities, section.pressures, section.temperatures or ())
-            there = [*curve_points.of_table(self.table), *(one.at for one in lost_points.read(self.path))]
-            if count := len(curve_points.lacking(asked, there)):
+            asked = tables.requested_points(section.velocities, section.pressures, section.temperatures or ())
+            there = [*tables.of_table(self.table), *(one.at for one in tables.read(self.path))]
+            if count := len(tables.lacking_points(asked, there)):
                 yield f"{count} of {len(asked)} points are not solved yet"
 
     def _steps_to_go(self) -> Iterator[str]:
@@ -249,13 +245,13 @@ class Results:
         """Return the lost points of a case, or the first sentence of the reason for its failure; '' if unknown."""
         case = self.path / CASES / f"{number:03d}"
         with suppress(OSError, InputError):
-            return lost_points.name_lost(case) or (case / FAILURE).read_text(encoding="utf-8").strip().split("; ")[0]
+            return tables.name_lost(case) or (case / FAILURE).read_text(encoding="utf-8").strip().split("; ")[0]
         return ""
 
     @property
     def lost(self) -> str:
         """Text on the lost points of a curve; '' if there is none."""
-        return lost_points.name_lost(self.path)
+        return tables.name_lost(self.path)
 
     def open_maps(self, name: str = MAPS) -> h5py.File:
         """Open a file of maps; raises FileNotFoundError, and InputError if it is damaged."""

@@ -1,7 +1,6 @@
 """Maps of a field file that xarray reads piece by piece.
 
-The file is open only during a read, as an open file would block a running run.
-"""
+The file is open only during a read, as an open file would block a running run."""
 
 from pathlib import Path
 from typing import Any

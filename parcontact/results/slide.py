@@ -3,8 +3,7 @@
 The slide of a history is its last part at one non-zero velocity, over all stages with it. As in the paper (Sec. 3.1),
 mu_max is the highest friction of the slide, and mu_dyn the mean over the last three quarters of its distance. Steady
 sliding may need a longer slide (`parcontact steady` solves it directly). Rows in which the box cuts the contact off do
-not count. Without them the slide is not whole, so that no errors are known.
-"""
+not count. Without them the slide is not whole, so that no errors are known."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence

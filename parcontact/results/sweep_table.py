@@ -1,7 +1,6 @@
 """Tables of a sweep: sweep.csv with a row per case, sweep_curves.csv with a row per point of friction curves.
 
-sweep_mean.csv and sweep_curves_mean.csv have means over seeds.
-"""
+sweep_mean.csv and sweep_curves_mean.csv have means over seeds."""
 
 import fcntl
 import math
@@ -13,10 +12,10 @@ from typing import Any
 
 from ..columns import SWEEP, SWEEP_RESULTS, added_names, choose_columns, names_of, to_csv
 from ..errors import InputError
-from ..history.timeline import Timeline
+from ..files import files, tables
 from ..job import Case, Steady
-from ..job.added_sections import answers
-from ..storage import curve_points, files, marker, read_back, tables
+from ..job.history import Timeline
+from ..job.listing import answers
 from . import slide
 from .results import CURVE_COLUMNS, CURVE_RESULTS, CURVES, FAILURE, KINDS, PLACES, Results
 
@@ -125,7 +124,7 @@ def _points(case: Case) -> Iterator[dict[str, Any]]:
     if columns := _columns(case.job.output.directory / "steady.csv"):
         head = {"case": case.number, **case.settings, "state": state(case)}
         numbers = [name for name in CURVE_COLUMNS if name in columns and name not in PLACES]
-        for k, place in enumerate(curve_points.of_table(columns)):
+        for k, place in enumerate(tables.of_table(columns)):
             places = {
                 name: float(f"{value:.9g}") for name, value in zip(PLACES, place, strict=True)
             }  # without rounding errors
@@ -143,7 +142,7 @@ def _columns(path: Path) -> dict[str, list[float]]:
 def state(case: Case) -> str:
     """Return the state of a case: done | failed | begun | damaged | -."""
     directory = case.job.output.directory
-    if case.job.history and read_back.find_lost_rows(directory):
+    if case.job.history and tables.find_lost_rows(directory):
         return DAMAGED
     if (directory / FAILURE).is_file():
         return "failed"
@@ -158,17 +157,17 @@ def state(case: Case) -> str:
         return "done"
     steps = [int(step) for step in columns["step"]]
     timeline = Timeline.from_job(case.job).follow(dict(zip(steps, columns["time"], strict=True)))
-    return "done" if steps and (steps[-1] >= len(timeline) or marker.detached(directory)) else "begun"
+    return "done" if steps and (steps[-1] >= len(timeline) or tables.detached(directory)) else "begun"
 
 
 def _points_lack(section: Steady | None, columns: Mapping[str, Sequence[float]]) -> bool:
     """Return True if a friction curve lacks requested points."""
     asked = (
-        curve_points.requested_points(section.velocities, section.pressures or (), section.temperatures or ())
+        tables.requested_points(section.velocities, section.pressures or (), section.temperatures or ())
         if section
         else ()
     )
-    return bool(curve_points.lacking(asked, curve_points.of_table(columns)))
+    return bool(tables.lacking_points(asked, tables.of_table(columns)))
 
 
 def _means(

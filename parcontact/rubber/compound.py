@@ -12,8 +12,7 @@ from ..printed import per_cent
 from .shift import WLF, Arrhenius, Density, Factors, Shift, doubt_kelvin, log_vertical
 
 if TYPE_CHECKING:
-    from .series import Weigh
-    from .superposition import Superposition, Vertical
+    from .series import Superposition, Vertical, Weigh
 
 TITLE = "# Fitted by parcontact fit to"  # first words of material files of fits
 POOR, HOPELESS = 0.2, 1.0  # accuracy: rms errors of fits above which there is a warning, or an error
@@ -66,7 +65,7 @@ class Compound:
 
     def doubts(self) -> list[str]:
         """Return warnings about a misfit larger than the scatter, and about tables that are not of rubber."""
-        from .sane import odd_moduli  # with numpy, which is slow to import
+        from .moduli import odd_moduli
 
         series, found = self.series, list(self.measured.doubts)
         if series.error > POOR:
@@ -198,10 +197,10 @@ def fitted(
     unless the known shift has one; `reference` [deg C] is by default the middle one of the measured temperatures.
     Raises InputError, also for a table that no fit meets.
     """
-    from . import measured_moduli, series  # scipy is for fits only
-    from .superposition import log_factors, superpose
+    from . import moduli, series
+    from .series import log_factors, superpose
 
-    measured = measured_moduli.read_moduli(path, poisson)
+    measured = moduli.read_moduli(path, poisson)
     if isinstance(law, str):
         measured = measured.without_short_sets()
     temperatures = measured.temperatures

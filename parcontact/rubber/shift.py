@@ -9,8 +9,7 @@ Moduli are b_T times those at the reference:
 
 density     b_T = rho T/(rho_ref T_ref), temperatures in K     (J. D. Ferry, Viscoelastic Properties of Polymers (1980),
             rho = rho_ref (1 - expansion (T - T_ref))           chapter 11: the entropy of a network)
-table       log10 b_T given at some temperatures, likewise
-"""
+table       log10 b_T given at some temperatures, likewise"""
 
 import math
 from bisect import bisect_left
@@ -18,7 +17,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..column_names import TEMPERATURES
+from ..columns import TEMPERATURES
 from ..doubts import Doubt
 from ..errors import InputError
 from ..text_tables import read_named_columns

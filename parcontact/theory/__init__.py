@@ -6,5 +6,4 @@ body is incompressible and given by its shear relaxation function as a Prony ser
     G(t) = modulus_inf + sum_j moduli[j] exp(-t / relaxation_times[j]),
 
 always as three arguments `modulus_inf, moduli, relaxation_times` in a row, so that a `viscoelastic.Prony` can be passed
-as `*material`. A constant Poisson ratio nu instead of 1/2 is the same as all moduli multiplied by 1/(2 (1 - nu)).
-"""
+as `*material`. A constant Poisson ratio nu instead of 1/2 is the same as all moduli multiplied by 1/(2 (1 - nu))."""

@@ -1,4 +1,6 @@
-"""A rigid rough surface in full contact with a viscoelastic half-space on which it slides. The problem is linear, so
+"""Names of types: what the functions of this package take and return.
+
+A rigid rough surface in full contact with a viscoelastic half-space on which it slides. The problem is linear, so
 that the solution is exact.
 
 The surface is a sum of waves with distinct wave vectors, h(x, y) = sum Re[A exp(i (kx x + ky y))], displaced by s(t).
@@ -19,10 +21,14 @@ half-space" with u = h; for the steady state also B. N. J. Persson, J. Chem. Phy
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..physics.prony import Moduli, complex_modulus
-from .arrays import Array, ComplexArray, ComplexValues, Values
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+Values = float | Array
+ComplexValues = complex | Array | ComplexArray
 
 
 class Waves(NamedTuple):

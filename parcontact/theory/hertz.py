@@ -3,12 +3,11 @@
     a^3 = 3 W R / (4 E*),   d = a^2/R,   p(r) = (2 E*/(pi R)) sqrt(a^2 - r^2),   E* = 2 G/(1 - nu)
 
 with contact radius a, force W, radius of the sphere R, approach d, pressure p, shear modulus G and Poisson ratio nu.
-Source: K. L. Johnson, Contact Mechanics (1985), section 4.2. Arguments are in SI units and broadcast.
-"""
+Source: K. L. Johnson, Contact Mechanics (1985), section 4.2. Arguments are in SI units and broadcast."""
 
 import numpy as np
 
-from .arrays import Array, Values
+from .full_contact import Array, Values
 
 
 def contact_modulus(shear_modulus: Values, poisson: Values = 0.5) -> Array:

@@ -10,8 +10,7 @@ While it shrinks, its radius at the time t is that at the earlier time t1(t), gi
 0, and the integral for W ends at t1; contact is lost when t1 = 0.
 
 Source: E. H. Lee, J. R. M. Radok, J. Appl. Mech. 27 (1960) 438; T. C. T. Ting, J. Appl. Mech. 33 (1966) 845. The
-body is incompressible and at rest before t = 0. Arguments are in SI units; only times and distances may be arrays.
-"""
+body is incompressible and at rest before t = 0. Arguments are in SI units; only times and distances may be arrays."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +18,7 @@ from scipy.optimize import brentq
 from scipy.special import hyp1f1
 
 from ..physics.prony import Moduli, normal_form, relaxation_integral
-from .arrays import Array
+from .full_contact import Array
 
 # an approach that rises evenly to `peak_approach` in `rise_time` and falls back as fast
 

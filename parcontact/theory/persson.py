@@ -20,14 +20,13 @@ taken at the present time. A theory with P inside the integral over the past wou
 contact only.
 
 Integrals are sums over waves in `persson_rings.Rings`; `modulus` (M, Pa) has one entry per wave on its last axis, and
-`mean_pressure` (p0, Pa) the shape of the axes before; SI units.
-"""
+`mean_pressure` (p0, Pa) the shape of the axes before; SI units."""
 
 import numpy as np
 from scipy.special import erf
 
 from . import full_contact
-from .arrays import Array, ComplexValues, Values
+from .full_contact import Array, ComplexValues, Values
 from .persson_rings import Rings
 
 GAMMA = 0.45  # physics: the empirical factor of the paper

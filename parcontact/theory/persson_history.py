@@ -12,8 +12,7 @@ b_j. Contact area and friction follow from M and the load at each instant, as in
 
 Assumption: from first contact on the wave in full contact follows the surface, and a load p0(t) that changes or
 vanishes only changes the share in contact. Source: as `persson`; B. N. J. Persson and A. I. Volokitin, Phys. Rev. B
-65 (2002) 134106, for changes of velocity.
-"""
+65 (2002) 134106, for changes of velocity."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -22,7 +21,7 @@ import numpy as np
 
 from ..physics.prony import Prony, normal_form
 from . import full_contact, persson
-from .arrays import Array, ComplexArray
+from .full_contact import Array, ComplexArray
 from .persson_rings import Rings
 
 CHUNK = 1_000_000  # tuning: transfer moduli per chunk, of 16 bytes; about ten arrays of this size are needed

@@ -2,8 +2,7 @@
 
 An isotropic spectrum is integrated by Gauss's rule on panels of x, with k = smallest (largest/smallest)^(x^2): the
 share in contact falls like the root of log(k/smallest) at small areas, which is smooth in x. Partial sums within a
-ring follow from the polynomial through the points of its panel, so that sums and partial sums have the same errors.
-"""
+ring follow from the polynomial through the points of its panel, so that sums and partial sums have the same errors."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -12,8 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array
-from .full_contact import Waves
+from .full_contact import Array, Waves
 
 EQUAL = 1e-9  # accuracy: difference of equal wavenumbers over the largest
 PANEL_POINTS = 10  # accuracy: points of Gauss's rule

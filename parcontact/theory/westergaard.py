@@ -10,12 +10,11 @@ p* = pi E* Delta/lambda, at which contact becomes complete, s = min(p/p*, 1), ps
 
 Source: H. M. Westergaard, J. Appl. Mech. 6 (1939) 49; K. L. Johnson, Contact Mechanics (1985), section 13.2. The gap
 is the integral of its slope outside the contact; the mean gap d follows from the elastic energy U per area, dU = -p dd.
-Arguments are in SI units and broadcast.
-"""
+Arguments are in SI units and broadcast."""
 
 import numpy as np
 
-from .arrays import Array, Values
+from .full_contact import Array, Values
 
 
 def full_contact_pressure(amplitude: Values, wavelength: Values, shear_modulus: Values, poisson: Values = 0.5) -> Array:

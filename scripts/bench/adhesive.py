@@ -7,13 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from parcontact.effects.adhesion.gap_iterate import GapOperators, GapSolution
-from parcontact.effects.adhesion.gap_solver import GapSolver
+from parcontact.contact.problem import Approach
+from parcontact.effects.adhesion.gap_solver import GapOperators, GapSolution, GapSolver
 from parcontact.effects.adhesion.law import EXPONENTIAL, Law
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.problem import Approach
 
 from .peers import ADHESION_COLD, TAMAAS_ADHESIVE, Task, compare_peers
 from .table import Line

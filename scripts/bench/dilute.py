@@ -8,16 +8,14 @@ from functools import partial
 
 import numpy as np
 
+from parcontact.contact import starts
+from parcontact.contact.problem import Operators, Workspace
+from parcontact.contact.solver import ContactSolver
+from parcontact.contact.starts import LARGER_CELLS
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
+from parcontact.physics.convolution import SIDE, TileConvolution, TileOperator, Tiles
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.tile_operator import TileOperator
-from parcontact.physics.tiles import SIDE, TileConvolution, Tiles
-from parcontact.solve.contact import ContactSolver
-from parcontact.solve.dilute_contact import LARGER_CELLS
-from parcontact.solve.fallback import cold_start
-from parcontact.solve.problem import Operators
-from parcontact.solve.workspace import Workspace
 
 from .peers import ASPHER_DILUTE, Task, compare_peers
 from .table import Line, Map, interleave
@@ -62,7 +60,7 @@ class Dilute(Cold):
     def solve(self, solver: Solver) -> Map:
         start, (own, operators) = np.zeros_like(self.heights), solver
         coarse = lambda slab, tolerance: self.solver(tolerance, slab=slab)  # noqa: E731
-        contact = cold_start.prepare_start(own, self.problem(operators), start, coarse, self.on_tiles)
+        contact = starts.prepare_start(own, self.problem(operators), start, coarse, self.on_tiles)
         return np.asarray((self.solve_from(solver, start) if contact is None else contact).p)
 
     def counted(self, solver: Solver, error: float) -> Iterator[Line]:

@@ -18,10 +18,10 @@ import numpy as np
 from runs import Json, begun, marched
 
 import parcontact as pc
-from parcontact import scene
 from parcontact.job import load
+from parcontact.march import scene
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
-from parcontact.steady_sliding.sliding import SteadySliding
 
 from .peers import TAMAAS_SLIDING, Task, compare_peers
 from .table import Line, Map, interleave

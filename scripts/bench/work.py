@@ -8,15 +8,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from runs import Json, begun
 
+from parcontact.contact import starts
+from parcontact.contact.constraint import NonNegative
+from parcontact.contact.problem import MeanPressure, Operators, Problem, Workspace
+from parcontact.contact.solver import Contact, ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.roughness import Roughness
-from parcontact.solve.constraint import NonNegative
-from parcontact.solve.contact import Contact, ContactSolver
-from parcontact.solve.fallback import cold_start
-from parcontact.solve.problem import MeanPressure, Operators, Problem
-from parcontact.solve.workspace import Workspace
 
 from .table import Map
 
@@ -73,7 +72,7 @@ class Cold:
     def start(self, solver: Solver) -> Map:
         """Return the first guess of the pressure, from nested grids."""
         start, (own, operators) = np.zeros_like(self.heights), solver
-        cold_start.prepare_start(own, self.problem(operators), start, lambda slab, tol: self.solver(tol, slab=slab))
+        starts.prepare_start(own, self.problem(operators), start, lambda slab, tol: self.solver(tol, slab=slab))
         return start
 
     def solve_from(self, solver: Solver, start: Map) -> Contact:

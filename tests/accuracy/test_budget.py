@@ -4,9 +4,9 @@ from dataclasses import astuple, replace
 
 import pytest
 
-from parcontact.accuracy.budget import ErrorSums, estimate
-from parcontact.accuracy.observation import RunProperties, StepObservation
-from parcontact.accuracy.shares import AREA, FRICTION, STEADY, Shares
+from parcontact.job.calculation import AREA, FRICTION, STEADY, Shares
+from parcontact.march.budget import ErrorSums, estimate
+from parcontact.march.time_error import RunProperties, StepObservation
 
 KNOWN = RunProperties(10_000, cells_per_wave=8.0, folded=1e-4)
 SEEN = StepObservation(1e-3, 0.02, 0.1, 0.095, slope=0.02, difference=4e-4)

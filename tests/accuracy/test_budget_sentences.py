@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from parcontact.accuracy.budget import ErrorBudget, ErrorParts, ErrorSums, advice
+from parcontact.files.recorder import StepRow
+from parcontact.files.tables import Wanted
 from parcontact.job import Job
-from parcontact.results import log
-from parcontact.steady_sliding.table import EarlierPoint, describe_missed
-from parcontact.storage.curve_points import Wanted
-from parcontact.storage.step_row import StepRow
+from parcontact.march.budget import ErrorBudget, ErrorParts, ErrorSums, advice
+from parcontact.march.curve import EarlierPoint, describe_missed
+from parcontact.results import page
 
 
 def test_an_error_that_is_printed_like_its_limit_is_within_it() -> None:
@@ -70,4 +70,4 @@ def test_friction_of_which_most_may_be_error_is_unknown(mesh: float, stated: flo
     assert (" or more (solver 1 %, mesh" in friction) == bool(further) == (stated >= 1.0)
     assert "or more" not in area
     (tmp_path / "run.log").write_text(f"{friction}\n{area}\n")
-    assert log.read_logs(tmp_path).estimates == [friction, area]
+    assert page.read_logs(tmp_path).estimates == [friction, area]

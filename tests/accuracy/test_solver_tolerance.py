@@ -12,10 +12,10 @@ from mpi4py import MPI
 from sliding import rough, slide
 
 import parcontact as pc
-from parcontact.accuracy.budget import ErrorBudget, ErrorParts
-from parcontact.accuracy.controller import CLOSE, FIRST, MOST, StepTolerance, tolerance_before
-from parcontact.accuracy.shares import AREA, FRICTION, SOLVER_MEDIAN
-from parcontact.history.timeline import Step
+from parcontact.job.calculation import AREA, FRICTION, SOLVER_MEDIAN
+from parcontact.job.history import Step
+from parcontact.march.budget import ErrorBudget, ErrorParts
+from parcontact.march.controller import CLOSE, FIRST, MOST, StepTolerance, tolerance_before
 from parcontact.march.loop import March
 
 CERTIFICATE = 1e-3

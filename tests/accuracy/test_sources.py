@@ -9,9 +9,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import j1, spherical_jn
 
-from parcontact.accuracy.budget import ErrorParts, estimate, estimate_steady
-from parcontact.accuracy.observation import RunProperties, StepObservation, count_spots, radius_of
-from parcontact.accuracy.sources import lost_at_edges, lost_in_short_waves
+from parcontact.march.budget import ErrorParts, estimate, estimate_steady, lost_at_edges, lost_in_short_waves
+from parcontact.march.time_error import RunProperties, StepObservation, count_spots, radius_of
 from parcontact.physics.measures import SIDE
 from parcontact.physics.prony import Prony
 

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from marched_jobs import SLS, begun
 
-from parcontact.accuracy.controller import MOST_GROWTH, REJECTED, SAFETY
-from parcontact.accuracy.shares import FRICTION, TIME_MEDIAN
-from parcontact.history.chosen import MadeStep, most_cells
-from parcontact.history.timeline import Step
 from parcontact.job import Grid, Job
-from parcontact.job.sections.geometry import Flat, HeightFile, Rough, Sphere, Wave
-from parcontact.job.sections.stages import Stage
+from parcontact.job.calculation import FRICTION, TIME_MEDIAN
+from parcontact.job.history import MadeStep, Step, most_cells
+from parcontact.job.stages import Stage
+from parcontact.job.surfaces import Flat, HeightFile, Rough, Sphere, Wave
+from parcontact.march.controller import MOST_GROWTH, REJECTED, SAFETY
 from parcontact.march.loop import March
 
 Json = dict[str, Any]

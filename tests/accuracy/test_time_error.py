@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from parcontact.accuracy.budget import estimate
-from parcontact.accuracy.observation import RunProperties, StepObservation, radius_of
-from parcontact.accuracy.time_error import error_of_rise, time_error
+from parcontact.march.budget import estimate
+from parcontact.march.time_error import RunProperties, StepObservation, error_of_rise, radius_of, time_error
 from parcontact.physics.prony import Prony
 
 KNOWN = RunProperties(10_000, cells_per_wave=8.0)

@@ -11,16 +11,16 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact.__main__ import main
-from parcontact.bands import ladder
+from parcontact.bands import band
 from parcontact.bands.band import Band
 from parcontact.bands.road_history import RoadHistory, RungTask
 from parcontact.bands.road_sliding import RoadSliding
-from parcontact.job.text.yamltext import dump
+from parcontact.files import tables
+from parcontact.files.recorder import StepRow
+from parcontact.files.road_run import ended
+from parcontact.job.yaml_text import dump
 from parcontact.parallel.slab import Array, Slab
 from parcontact.results import prediction
-from parcontact.run.road_run import ended
-from parcontact.storage import tables
-from parcontact.storage.step_row import StepRow
 
 LONG = 4e-3
 ROUGH = {
@@ -39,7 +39,7 @@ JOB: dict[str, Any] = {
 @pytest.fixture
 def few_rungs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Coarse ladders, for what does not depend on them."""
-    monkeypatch.setattr(ladder, "RUNGS", 5)
+    monkeypatch.setattr(band, "RUNGS", 5)
 
 
 def history(comm: MPI.Intracomm = MPI.COMM_SELF, **changes: Any) -> RoadHistory:

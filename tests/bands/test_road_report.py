@@ -13,12 +13,11 @@ from parcontact import job as jobs
 from parcontact.__main__ import main
 from parcontact.bands.band_plan import plan_bands
 from parcontact.bands.choice import cut_bands, doubts_of_bands, on_one_grid_of_all
-from parcontact.effects.heat.bands import flash_of_bands
-from parcontact.effects.heat.flash import Flash
-from parcontact.effects.heat.steady import describe_hot, describe_unmeasured
-from parcontact.job.checks.frequencies import excited_band
+from parcontact.effects.heat.solver import Flash
+from parcontact.effects.heat.steady import describe_hot, describe_unmeasured, flash_of_bands
+from parcontact.job.meaning import excited_band
 from parcontact.parallel.slab import Slab
-from parcontact.results import road_section
+from parcontact.results import report_sections
 
 LONG = 4e-3
 MEASURED = {
@@ -138,7 +137,7 @@ def test_the_report_shows_bands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert "the band with most of the friction" in page
     assert "with all longer waves" in page
     mapped = jobs.load(job_of([road_map(tmp_path / "road.npy", 128, 4 * LONG), table]))
-    section = road_section.road_section(mapped)
+    section = report_sections.road_section(mapped)
     assert len(section.tables[1].rows) == cut_bands(mapped).count
     assert len(section.pictures) == 4
 

@@ -11,17 +11,16 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact.__main__ import main
-from parcontact.bands.band import Band, Rung
-from parcontact.bands.ladder import PressureLadder
+from parcontact.bands.band import Band, PressureLadder, Rung
+from parcontact.bands.choice import spectrum_of
 from parcontact.bands.road_sliding import RoadSliding
-from parcontact.bands.wave_spectrum import spectrum_of
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import JobError, RunError
+from parcontact.files import tables
+from parcontact.march.scene import set_up
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.prony import complex_modulus
-from parcontact.scene import set_up
-from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.storage import tables
 
 LONG, SHORT = 4e-3, 5e-4
 ROUGH = {

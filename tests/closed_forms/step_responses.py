@@ -15,8 +15,16 @@ from parcontact.physics.prony import (
     normal_form,
     relaxation,
 )
-from parcontact.theory.arrays import Array, ComplexArray, ComplexValues, Values
-from parcontact.theory.full_contact import _friction, frequency, pressure_amplitude, traction
+from parcontact.theory.full_contact import (
+    Array,
+    ComplexArray,
+    ComplexValues,
+    Values,
+    _friction,
+    frequency,
+    pressure_amplitude,
+    traction,
+)
 from parcontact.theory.lee_radok import _time_of_equal_radius
 from parcontact.theory.westergaard import _fraction
 

@@ -31,7 +31,7 @@ def imported(environment: dict[str, str], *words: object, cwd: Path) -> tuple[in
 
 
 OF_SCIPY = ("scipy.special", "scipy.fft", "scipy.optimize", "scipy.linalg", "pyfftw.interfaces", "numpy.f2py")
-FURTHER = (*OF_SCIPY, "parcontact.scene", "tqdm")
+FURTHER = (*OF_SCIPY, "parcontact.march.scene", "tqdm")
 LIGHT: list[tuple[list[object], int, set[str]]] = [
     (["--help"], 0, set()),
     (["--version"], 0, set()),
@@ -61,7 +61,7 @@ def test_info_and_a_run(outside_mpi: dict[str, str], tmp_path: Path) -> None:
     assert not found & {*OF_SCIPY, "matplotlib", "xarray"}
     code, found = imported(outside_mpi, "info", "out/checkpoint/step-5.h5", cwd=tmp_path)
     assert code == 0
-    assert not found & {"numba", "scipy", "pyfftw.interfaces", "matplotlib", "xarray", "parcontact.scene"}
+    assert not found & {"numba", "scipy", "pyfftw.interfaces", "matplotlib", "xarray", "parcontact.march.scene"}
 
 
 def test_the_package_alone(outside_mpi: dict[str, str]) -> None:

@@ -15,13 +15,12 @@ from numpy.testing import assert_allclose
 from parcontact import __version__
 from parcontact.__main__ import main
 from parcontact.errors import InputError
-from parcontact.job import Job
-from parcontact.job import load as load_job
+from parcontact.job import Job, load
+from parcontact.march.curve import request
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
-from parcontact.results import info, prediction, theory_settings
-from parcontact.results.theory_settings import TheorySettings
-from parcontact.steady_sliding.curve import request
+from parcontact.results import info, prediction, theory_table
+from parcontact.results.theory_table import TheorySettings
 from parcontact.theory import full_contact
 
 ROUGH: dict[str, Any] = {
@@ -123,19 +122,19 @@ def test_settings_are_read_with_their_table(tmp_path: Path) -> None:
     for one in (ran, other):
         prediction.write_theory(one, iter([]), first)
     paths = [one.output.directory for one in (ran, other)]
-    assert theory_settings.read_settings(paths[0]) == first
-    assert theory_settings.shared(paths) == first
+    assert theory_table.read_settings(paths[0]) == first
+    assert theory_table.shared(paths) == first
     assert (
-        theory_settings.describe_settings(paths[0])
+        theory_table.describe_settings(paths[0])
         == "Persson's theory: gamma 0.5, for the waves of the surface in its box"
     )
     prediction.write_theory(other, iter([]), second)
-    assert theory_settings.shared(paths) is None
+    assert theory_table.shared(paths) is None
     table = (paths[0] / "theory.csv").read_bytes()
     with pytest.raises(ZeroDivisionError):
         prediction.write_theory(ran, (1 / 0 for _ in range(1)), second)  # type: ignore[misc]
     assert (paths[0] / "theory.csv").read_bytes() == table
-    assert theory_settings.read_settings(paths[0]) == first
+    assert theory_table.read_settings(paths[0]) == first
 
 
 def test_damaged_settings_are_stated_by_name(tmp_path: Path) -> None:
@@ -145,7 +144,7 @@ def test_damaged_settings_are_stated_by_name(tmp_path: Path) -> None:
     path = tmp_path / "out" / "theory.yaml"
     path.write_text("gamma: 0.5\n")
     damaged = f"{path} is damaged: it does not say gamma and waves"
-    assert theory_settings.describe_settings(path.parent) == f"theory of unknown settings: {damaged}"
+    assert theory_table.describe_settings(path.parent) == f"theory of unknown settings: {damaged}"
     (path.parent / "measures.csv").write_text("")
     stated, sound = info.describe_path(path.parent)
     assert not sound
@@ -189,7 +188,7 @@ def test_theory_of_a_friction_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert main(["theory", "job.yaml", "--quiet"]) == 0
     path = tmp_path / "out" / "job" / "steady_theory.csv"
     before = path.read_bytes()
-    found = load_job("job.yaml")
+    found = load("job.yaml")
     wanted = [str(row.friction) for row in prediction.predict_steady(found, request(found))]
     assert [row["friction"] for row in rows(path)] == wanted
     assert main(["steady", "job.yaml", "--quiet"]) == 0

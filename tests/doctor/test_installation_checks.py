@@ -10,13 +10,12 @@ from marched_jobs import JOBS
 from mpi4py import MPI
 
 from parcontact import __main__
-from parcontact.doctor import installation_checks, machine
-from parcontact.doctor.bench import Bench, Finding
-from parcontact.doctor.installation_checks import CHECKS, Check, markdown, run_check
+from parcontact.door import doctor
+from parcontact.door.doctor import CHECKS, Bench, Check, Finding, markdown, run_check
+from parcontact.door.manual import texts
 from parcontact.errors import RunError
-from parcontact.manual import texts
-from parcontact.run import runner
-from parcontact.run.run import Options
+from parcontact.files import run as runner
+from parcontact.files.run import Options
 
 
 def test_a_case_that_goes_wrong_is_seen() -> None:
@@ -54,7 +53,7 @@ def test_verb(
 ) -> None:
     check = Check("a case", "an area", lambda bench: bench.expect("area", 0.5, 0.6, allowed))
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(installation_checks, "CHECKS", (check,))
+    monkeypatch.setattr(doctor, "CHECKS", (check,))
     assert __main__.main(["doctor"]) == code
     assert capsys.readouterr().out.splitlines()[-1] == said
     assert list(tmp_path.iterdir()) == []
@@ -70,8 +69,8 @@ def test_table_of_the_manual() -> None:
 @pytest.mark.mpi(2)
 def test_files_that_come_back_as_they_were(comm: MPI.Intracomm, tmp_path: Path) -> None:
     where = Path(comm.bcast(str(tmp_path)))
-    assert machine.find_broken_files(comm, where) == ""
-    lines = list(machine.describe_machine(comm, where))
+    assert doctor.find_broken_files(comm, where) == ""
+    lines = list(doctor.describe_machine(comm, where))
     assert any("MB/s in" in line for line in lines)
 
 
@@ -79,7 +78,7 @@ def test_files_that_do_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     """A run whose result is another one, as after a stop from which it went on wrongly."""
     run = runner.run_job
     monkeypatch.setattr(runner, "run_job", lambda job, slab, options: run(job, slab, Options(until=0.5e-3)))
-    assert "fields.h5" in machine.find_broken_files(MPI.COMM_SELF, tmp_path)
+    assert "fields.h5" in doctor.find_broken_files(MPI.COMM_SELF, tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 

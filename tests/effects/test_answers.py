@@ -12,7 +12,7 @@ from conftest import WORLD, Main
 
 from parcontact import capabilities
 from parcontact.results import histories
-from parcontact.results.plotted_run import PlottedRun
+from parcontact.results.charts import PlottedRun
 
 from .tread_wear import forget, install, shown
 

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from restarting import Bench
 from rubbers import complex_modulus
 
-from parcontact import scene
 from parcontact.effects.folded_branches import (
     FoldedBranches,
     TimeScales,
@@ -25,8 +24,9 @@ from parcontact.effects.folded_branches import (
     time_scales,
 )
 from parcontact.errors import InputError
-from parcontact.history.timeline import Timeline
 from parcontact.job import Job
+from parcontact.job.history import Timeline
+from parcontact.march import scene
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import MovedHeights, ZenerBody
 from parcontact.physics.prony import Prony, normal_form

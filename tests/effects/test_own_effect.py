@@ -15,12 +15,13 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 from restarting import Bench
 
-from parcontact import __main__, job, scene
+from parcontact import __main__, job
+from parcontact.door import memory
 from parcontact.errors import InputError
 from parcontact.job import Job, JobError
+from parcontact.march import choices, scene
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
-from parcontact.plan import memory
-from parcontact.steady_sliding.sliding import SteadySliding
 
 from .tread_wear import forget, install, shown
 
@@ -100,7 +101,7 @@ def test_a_job_reaches_other_ranks(installed: Path, comm: MPI.Intracomm) -> None
     assert own.section("wear").coefficient == COEFFICIENT
     again = Job.model_validate(yaml.safe_load(own.resolved()))
     assert again == own
-    assert list(scene.choices(again).effects) == ["wear"]
+    assert list(choices.choices(again).effects) == ["wear"]
     assert begun(DATA).scene.job.section("wear") is None
 
 
@@ -136,7 +137,7 @@ def test_plan_tells_of_it(
 SHEAR = """
     @staticmethod
     def shear(job):
-        from parcontact.physics.interface_friction import InterfaceFriction
+        from parcontact.physics.motion import InterfaceFriction
 
         return InterfaceFriction(2e4)
 

@@ -12,7 +12,7 @@ import short_job
 import yaml
 from conftest import WORLD, Main
 
-from parcontact.effects.contact_law import touching_of
+from parcontact.effects.effect import touching_of
 from parcontact.job.reading import load
 
 from .tread_wear import forget, install, shown
@@ -143,7 +143,7 @@ def test_a_law_that_fails_is_named(main: Main, changed: Callable[[str, str], Non
         "    def __init__(self, scene):\n"
         "        self.slab, self.rate, self.scene = scene.slab, 1.0, scene\n\n"
         "    def law(self):\n"
-        "        from parcontact.march.dry_law import DryLaw\n"
+        "        from parcontact.march.laws import DryLaw\n"
         "        class Mine(DryLaw):\n"
         "            def solve(self, *given):\n"
         "                return {}['x']\n"

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from counting import NX, NY, PRESS, RUBBER, TRANSFORM, Json, job, row
 
-from parcontact.job.sections.part import Origin
+from parcontact.files import run as runner
+from parcontact.files import tables
+from parcontact.files.run import Options
+from parcontact.job.parts import Origin
 from parcontact.parallel.slab import Slab
-from parcontact.run import runner
-from parcontact.run.run import Options
-from parcontact.storage import tables
 
 
 @pytest.fixture

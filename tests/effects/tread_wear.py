@@ -4,8 +4,8 @@ import re
 import sys
 from pathlib import Path
 
-from parcontact.job import added_sections, model
-from parcontact.manual import texts
+from parcontact.door.manual import texts
+from parcontact.job import listing, model
 
 
 def shown() -> str:
@@ -26,6 +26,6 @@ def install(directory: Path, module: str) -> None:
 
 def forget() -> None:
     """The program forgets the sections that it has found, and looks for them anew."""
-    for found in (added_sections._registered, added_sections._load, added_sections.why_unusable, model.extended_model):
+    for found in (listing._registered, listing._load, listing.why_unusable, model.extended_model):
         found.cache_clear()
     sys.modules.pop("tread_wear", None)

@@ -15,12 +15,10 @@ from marched_jobs import SLS, begun, column, marched
 from mpi4py import MPI
 from restarting import Bench
 
-from parcontact import scene
 from parcontact.errors import InputError, JobError
-from parcontact.history.chosen import ChosenEnds, ChosenSteps, StepLadder
-from parcontact.history.timeline import Timeline
 from parcontact.job import Job
-from parcontact.scene import sanity
+from parcontact.job.history import ChosenEnds, ChosenSteps, StepLadder, Timeline
+from parcontact.march import choices, sanity
 
 POINTS = 32
 CELL = 1e-3 / POINTS
@@ -217,7 +215,7 @@ def test_a_timeline_of_so_many_steps(tmp_path: Path, way: str) -> None:
     assert timeline[timeline.count].time == float(COUNT)
     assert timeline[timeline.count // 2].time == pytest.approx(COUNT / 2, rel=2e-8)
     assert timeline[timeline.count].dt == 1.0
-    assert scene.choices(job).decisions
+    assert choices.choices(job).decisions
     assert time.process_time() - began < 10.0
 
 

@@ -9,10 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from parcontact.history.chosen import reached
-from parcontact.history.given import divide
-from parcontact.history.timeline import Timeline
 from parcontact.job import Grid, Stage
+from parcontact.job.history import Timeline, divide, reached
 
 GRID = Grid(points=(16, 12), size=(1e-3, 7.5e-4))
 SLIDE = {"pressure": 1e4, "velocity": 0.1, "cells_per_step": 1}

@@ -11,24 +11,23 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact.__main__ import main
-from parcontact.job import Job
-from parcontact.job.checks import cells
-from parcontact.job.checks.advice import describe_sample
-from parcontact.job.sections.calculation import Accuracy
-from parcontact.job.sections.height_arrays import GivenHeights
+from parcontact.job import Job, advice
+from parcontact.job.advice import describe_sample
+from parcontact.job.calculation import Accuracy
+from parcontact.job.surfaces import GivenHeights
 
 SIZE = (1e-3, 1e-3)
 WAVE = 6.25e-5
 BOTH = Accuracy(friction=0.01, area=0.01)
 FRICTION = Accuracy(friction=0.003, area=0.1)
-GUESS = cells.Guess(0.05, 0.4, 24.0)
+GUESS = advice.Guess(0.05, 0.4, 24.0)
 
 
 @pytest.mark.parametrize("count", [1, 16, 17, 100, 416, 1000])
 def test_fast_lengths(count: int) -> None:
-    found = cells.fast_length(count)
+    found = advice.fast_length(count)
     assert found >= count
-    assert found % cells.MULTIPLE == 0
+    assert found % advice.MULTIPLE == 0
     assert max(p for p in range(1, found + 1) if found % p == 0 and all(p % q for q in range(2, p))) <= 5
 
 
@@ -37,7 +36,7 @@ def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, fl
     (nx, ny), (x, y) = points, way
     cx, cy = nx * WAVE / SIZE[0], ny * WAVE / SIZE[1]
     sides = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)
-    return cells.friction_error(*sides, GUESS), cells.area_error(*sides, GUESS)
+    return advice.friction_error(*sides, GUESS), advice.area_error(*sides, GUESS)
 
 
 @pytest.mark.parametrize("asked", [BOTH, FRICTION, Accuracy(friction=0.05, area=0.3)])
@@ -45,12 +44,12 @@ def errors(points: tuple[int, int], way: tuple[float, float]) -> tuple[float, fl
 def test_the_mesh_of_fewest_points(asked: Accuracy, angle: float) -> None:
     """It keeps both errors, with no more points than the best of all meshes that transform fast."""
     way = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    found = cells.choose_points(WAVE, SIZE, [way], asked, [GUESS])
-    lengths = [n for n in range(16, 800, 16) if cells.fast_length(n) == n]
+    found = advice.choose_points(WAVE, SIZE, [way], asked, [GUESS])
+    lengths = [n for n in range(16, 800, 16) if advice.fast_length(n) == n]
 
     def keeps(points: tuple[int, int]) -> bool:
         """The grid has the shortest wave, too, and cells that are no longer than tried."""
-        resolved = min(points) * WAVE / SIZE[0] >= cells.LEAST_CELLS and max(points) <= cells.LONGEST * min(points)
+        resolved = min(points) * WAVE / SIZE[0] >= advice.LEAST_CELLS and max(points) <= advice.LONGEST * min(points)
         return resolved and all(a <= b for a, b in zip(errors(points, way), asked.both, strict=True))
 
     least = min(nx * ny for nx in lengths for ny in lengths if keeps((nx, ny)))

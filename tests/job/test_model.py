@@ -6,9 +6,8 @@ from typing import Any
 import pytest
 
 from parcontact.errors import InputError
-from parcontact.job import Elastic, JobError, Ramp, Stage, added_sections, describe_job, load
-from parcontact.job.resolved import shown_job
-from parcontact.job.sections import listing
+from parcontact.job import Elastic, JobError, Ramp, Stage, describe_job, listing, load
+from parcontact.job.reading import shown_job
 
 from .texts import SMALL, job_of, mistakes_of, replaced
 
@@ -187,7 +186,7 @@ def test_a_resolved_job_that_is_none(tmp_path: Path) -> None:
 # -- sections of effects, as a job's own keys -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("section", added_sections.own_sections())
+@pytest.mark.parametrize("section", listing.own_sections())
 def test_an_empty_section_of_an_effect_is_an_absent_one(tmp_path: Path, section: str) -> None:
     assert job_of(tmp_path, SMALL + f"{section}:\n") == job_of(tmp_path, SMALL)
     with pytest.raises(InputError, match=f"zzzzzz is not a known key; known keys: .*\\b{section}\\b"):

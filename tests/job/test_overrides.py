@@ -7,7 +7,7 @@ import pytest
 
 from parcontact.errors import InputError
 from parcontact.job import Case, JobError, load, load_cases, select_cases
-from parcontact.job.sections.spectral_bands import Bands
+from parcontact.job.calculation import Bands
 
 from . import texts
 from .texts import SMALL, with_material

@@ -11,8 +11,7 @@ import yaml
 from marched_jobs import ROOT
 
 from parcontact import __main__
-from parcontact.job import schema
-from parcontact.job.text import yamltext
+from parcontact.job import schema, yaml_text
 
 from . import texts
 from .texts import SMALL
@@ -181,12 +180,12 @@ def validator() -> jsonschema.Draft202012Validator:
 
 
 def right() -> Any:
-    return yamltext.parse(RIGHT, "job").data
+    return yaml_text.parse(RIGHT, "job").data
 
 
 @pytest.mark.parametrize("path", JOBS, ids=lambda path: path.stem)
 def test_every_job_fits(path: Path, validator: jsonschema.Draft202012Validator) -> None:
-    validator.validate(yamltext.read_source(path, str(path)).data)
+    validator.validate(yaml_text.read_source(path, str(path)).data)
 
 
 def test_all_forms_of_values_fit(validator: jsonschema.Draft202012Validator) -> None:

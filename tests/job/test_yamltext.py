@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from parcontact.job import JobError, load
-from parcontact.job.text import yamltext
-from parcontact.job.text.overrides import read_job
+from parcontact.job import JobError, load, yaml_text
+from parcontact.job.overrides import read_job
 
 from .texts import SMALL, mistakes_of, with_material, with_stage, with_surface
 
@@ -171,6 +170,6 @@ def test_a_sweep_of_more_cases_than_a_length_can_be(tmp_path: Path) -> None:
 
 def test_a_key_that_is_indented_more_than_the_one_before() -> None:
     """The column is what is wrong; the brace that is open comes later."""
-    said = "".join(map(str, yamltext.parse("title: x\n grid: {points", "job.yaml").mistakes))
+    said = "".join(map(str, yaml_text.parse("title: x\n grid: {points", "job.yaml").mistakes))
     assert "job.yaml:2:6" in said
     assert "keys of one mapping must begin in the same column" in said

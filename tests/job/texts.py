@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from parcontact.job import JobError
-from parcontact.mesh import load
+from parcontact.march.mesh import load
 
 SMALL = """\
 grid: {points: 64, size: 1e-3}

@@ -8,7 +8,7 @@ import pytest
 from marched_jobs import ROOT
 
 import parcontact
-from parcontact.manual import texts
+from parcontact.door.manual import texts
 
 HOUSE = Path(parcontact.__file__).parent
 ROOMS = {path.stem for path in HOUSE.iterdir() if not path.name.startswith("__")} | {"__main__"}

@@ -22,12 +22,12 @@ from pydantic import TypeAdapter
 
 import parcontact as pc
 from manual.printed import compare_lines
-from parcontact import __main__, mesh
+from parcontact import __main__
 from parcontact.columns import TABLES
-from parcontact.command.arguments import parse_arguments
-from parcontact.job import schema
-from parcontact.job.text import yamltext
-from parcontact.manual import reference, terminal, texts
+from parcontact.door.arguments import parse_arguments
+from parcontact.door.manual import texts
+from parcontact.job import schema, yaml_text
+from parcontact.march import mesh
 
 PAGES = texts.page_names()
 NOTEBOOKS = sorted((texts.PAGES.parent / "notebooks").glob("*.ipynb"))
@@ -105,7 +105,7 @@ def test_the_page_on_python_is_text() -> None:
 
 def test_every_key_has_its_meaning() -> None:
     """A key that was added needs a line in parcontact/manual/keys.yaml: [meaning, example]."""
-    written = {part: set(known) for part, known in reference.meanings().items()}
+    written = {part: set(known) for part, known in texts.meanings().items()}
     assert written == {section.part.__name__: {key.word for key in section.keys} for section in schema.sections()}
 
 
@@ -120,9 +120,9 @@ def test_the_example_of_a_key_is_right(part: Any, word: str, elsewhere: Path) ->
     """As the manual prints it, for the type of the key; a section as a whole is read by the tests of blocks."""
     if word in ("path", "material", "spectrum", "heights") or (part.__name__, word) == ("Job", "surface"):
         return  # files, arrays, and sections that tests of whole jobs read
-    meaning, example = reference.meanings()[part.__name__][word]
+    meaning, example = texts.meanings()[part.__name__][word]
     assert meaning.endswith(".")
-    value = yamltext.parse(f"{word}: {example}", "example").data[word]
+    value = yaml_text.parse(f"{word}: {example}", "example").data[word]
     field = part.model_fields[word]
     annotation: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
     TypeAdapter(annotation).validate_python(value)
@@ -165,10 +165,10 @@ def test_a_block(language: str, name: str, index: int, elsewhere: Path) -> None:
 
 def load_job(text: str, where: Path) -> None:
     """A whole job, or sections of one."""
-    data = yamltext.parse(text, "block").data
+    data = yaml_text.parse(text, "block").data
     without = {key for key, other in (("history", "steady"), ("grid", "bands")) if other in data}
     needed = {key: value for key, value in WHOLE.items() if key not in without}
-    (where / "job.yaml").write_text(yamltext.dump({**needed, **data}))
+    (where / "job.yaml").write_text(yaml_text.dump({**needed, **data}))
     assert mesh.load_cases(where / "job.yaml")
 
 
@@ -304,7 +304,7 @@ def test_it_names_the_pages_of_the_manual() -> None:
 def test_the_first_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """The block is the file, and the run prints what README says."""
     (block,) = blocks_readme("yaml")
-    assert yamltext.parse(block, "README").data == yamltext.parse((JOBS / "slide.yaml").read_text(), "slide").data
+    assert yaml_text.parse(block, "README").data == yaml_text.parse((JOBS / "slide.yaml").read_text(), "slide").data
     monkeypatch.chdir(tmp_path)
     assert __main__.main([str(JOBS / "slide.yaml"), "--quiet"]) == 0
     log = capsys.readouterr().out + (tmp_path / "out" / "slide" / "run.log").read_text()
@@ -388,7 +388,7 @@ TABLES_terminal = re.compile(r"^[|\s:-]+$|[|;]", re.MULTILINE)  # rules and mark
 @pytest.mark.parametrize("name", texts.page_names())
 def test_prose_is_not_wider(name: str) -> None:
     text = texts.plain_page(name, {"verbs": lambda: ""})
-    prose = terminal.CODE.sub("", text)
+    prose = texts.CODE.sub("", text)
     wide = [line for line in prose.splitlines() if len(line) > 80 and not line.startswith(("#", "!["))]
     assert not [line for line in wide if " " in line.strip()]
 
@@ -396,8 +396,8 @@ def test_prose_is_not_wider(name: str) -> None:
 @pytest.mark.parametrize("name", texts.page_names())
 def test_no_word_is_lost(name: str) -> None:
     text = texts.FENCE.sub("", texts.page(name, {"verbs": lambda: ""}))
-    found = terminal.wrapped(text, 80)
-    assert terminal.CODE.findall(found) == terminal.CODE.findall(text)
+    found = texts.wrapped(text, 80)
+    assert texts.CODE.findall(found) == texts.CODE.findall(text)
     assert TABLES_terminal.sub(" ", found).split() == TABLES_terminal.sub(" ", text).split()
 
 
@@ -406,7 +406,7 @@ def test_lists_keys_and_tables() -> None:
     text = (
         "* one two three\n  four five\n\n`key`\n: what it means\n  Example: `key: 1`\n\n| a | b | c |\n|---|---|---|\n"
     )
-    assert terminal.wrapped(f"{text}| row | one | two three |", 16).splitlines() == [
+    assert texts.wrapped(f"{text}| row | one | two three |", 16).splitlines() == [
         "* one two three",
         "  four five",
         "",

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 from marched_jobs import ROOT
 
-from parcontact.manual import texts
+from parcontact.door.manual import texts
 
 MEAN, LONGEST = 14.0, 35  # words: of all pages together, and of any sentence
 README_LONGEST = 25

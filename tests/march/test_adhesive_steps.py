@@ -128,8 +128,8 @@ def test_a_sphere_in_a_large_box_comes_off_under_a_force() -> None:
 def test_no_adhesion_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """A job without the section makes no solver of gaps, no operators for it and no memory of gaps, and calls nothing
     of them; it holds what its plan tells, to the byte, which has no map of theirs."""
+    from parcontact.door import memory
     from parcontact.job import Job
-    from parcontact.plan import memory
 
     def refuse(*given: Any, **named: Any) -> None:
         raise AssertionError("called without an adhesion section")

@@ -8,16 +8,15 @@ from marched_jobs import begun, column
 from mpi4py import MPI
 
 from parcontact import job as jobs
-from parcontact.bands.band import Band
+from parcontact.bands.band import Band, PressureLadder
 from parcontact.bands.cascade import Cascade
 from parcontact.bands.choice import cut_bands
-from parcontact.bands.ladder import PressureLadder
+from parcontact.contact.constraint import HARD, InterfaceLaw
 from parcontact.errors import InputError
-from parcontact.march.closing_law import ClosingLaw
+from parcontact.files.recorder import StepRow
+from parcontact.march.laws import ClosingLaw
 from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Array, Slab
-from parcontact.solve.interface_law import HARD, InterfaceLaw
-from parcontact.storage.step_row import StepRow
 
 LONG = 4e-3
 ROUGH = {

@@ -6,20 +6,20 @@ import pytest
 from marched_jobs import column, marched
 from restarting import ELASTIC, SPHERE
 
-from parcontact.solve.fallback import cold_start
+from parcontact.contact import starts
 
 LOADS = [{"pressure": 1e3}, {"pressure": 2e4}]
 JOB: dict[str, Any] = {"grid": {"points": 24, "size": 1e-3}, "surface": SPHERE, "history": LOADS}
 
 
 def test_only_the_first_contact_starts_cold(monkeypatch: pytest.MonkeyPatch) -> None:
-    prepare, cold = cold_start.prepare_start, list[float]()
+    prepare, cold = starts.prepare_start, list[float]()
 
     def note(solver: Any, problem: Any, *others: Any) -> Any:
         cold.append(problem.mean)
         return prepare(solver, problem, *others)
 
-    monkeypatch.setattr(cold_start, "prepare_start", note)
+    monkeypatch.setattr(starts, "prepare_start", note)
     march, rows = marched({**JOB, "material": ELASTIC})
     unit = march.state.contact.last.alpha * march.scene.units.pressure
     assert [mean * unit for mean in cold] == pytest.approx([rows[1].measures.pressure], rel=1e-12)

@@ -10,9 +10,9 @@ import pytest
 from marched_jobs import begun, marched
 from restarting import ELASTIC, ROUGH, SLIDE, ZENER, Bench, cut, rows, same
 
-from parcontact.history.timeline import Timeline
+from parcontact.files.recorder import StepRow
+from parcontact.job.history import Timeline
 from parcontact.march.loop import March, run_steps
-from parcontact.storage.step_row import StepRow
 
 GRID: dict[str, Any] = {"points": 32, "size": 1e-3}
 DWELL = {"name": "dwell", "pressure": 1e4, "duration": 0.1, "time_step": {"first": 1e-4, "growth": 1.2}}

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from marched_jobs import SLS, begun, marched
 
-import parcontact.march.step_errors
-from parcontact.accuracy.budget import estimate
-from parcontact.history.timeline import Step
+import parcontact.march.state
 from parcontact.job import Job
+from parcontact.job.history import Step
+from parcontact.march.budget import estimate
+from parcontact.march.laws import make_start
 from parcontact.march.loop import March
-from parcontact.march.starts import make_start
 from parcontact.parallel.slab import Array
 
 CELL = 1e-3 / 32
@@ -78,7 +78,7 @@ def stated(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
             made.append((observed.change, observed.uneven))
         return estimate(run, observed)
 
-    monkeypatch.setattr(parcontact.march.step_errors, "estimate", note)
+    monkeypatch.setattr(parcontact.march.state, "estimate", note)
     return made
 
 

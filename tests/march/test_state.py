@@ -10,14 +10,14 @@ import pytest
 from marched_jobs import begun, marched
 
 from parcontact.errors import InputError
-from parcontact.history.timeline import Timeline
-from parcontact.job.sections.listing import plain_data
+from parcontact.files import checkpoint
+from parcontact.files.checkpoint import Facts
+from parcontact.files.provenance import Link, Provenance
+from parcontact.job.history import Timeline
+from parcontact.job.listing import plain_data
 from parcontact.march.loop import March, run_steps
 from parcontact.march.state import parts_of
-from parcontact.physics.units import Units
-from parcontact.storage import checkpoint
-from parcontact.storage.checkpoint import Facts
-from parcontact.storage.provenance import Link, Provenance
+from parcontact.physics.entries import Units
 
 FIELDS = ("pressure", "displacement", "gap", "height")
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 1e-4, "rms_slope": 0.02}

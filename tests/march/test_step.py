@@ -17,19 +17,18 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
-from parcontact.accuracy.controller import RELAXING, SNAP_SHARE, cells_per_step
+from parcontact.contact import starts
+from parcontact.contact.solver import Contact, ContactSolver
 from parcontact.effects.adhesion.adhesive_law import AdhesiveLaw
 from parcontact.effects.adhesion.effect import AdhesionColumns, AdhesionMemory
 from parcontact.effects.effect import Changes, Instant
 from parcontact.errors import InputError, RunError
-from parcontact.history.chosen import RAMP_STEPS, MadeStep
-from parcontact.history.timeline import Step, Timeline
 from parcontact.job import Job
-from parcontact.march.failure import StepError
+from parcontact.job.history import RAMP_STEPS, MadeStep, Step, Timeline
+from parcontact.march.controller import RELAXING, SNAP_SHARE, cells_per_step
+from parcontact.march.laws import StepError
 from parcontact.march.loop import March, run_steps
 from parcontact.physics.body import Trial
-from parcontact.solve.contact import Contact, ContactSolver
-from parcontact.solve.fallback import active_set
 
 GRID: dict[str, Any] = {"points": [64, 64], "size": [1e-3, 1e-3]}
 
@@ -297,7 +296,7 @@ def test_what_a_retry_leaves_unconverged_is_not_accepted(monkeypatch: pytest.Mon
     }
     march = begun(data | {"numerics": {"accept_unconverged": True}})
     monkeypatch.setattr(ContactSolver, "solve", refuse)
-    monkeypatch.setattr(active_set, "solve", lambda *_: made[-1])
+    monkeypatch.setattr(starts, "solve", lambda *_: made[-1])
     with pytest.raises(StepError, match="is refused"):
         run_steps(march, [])
 

@@ -11,10 +11,10 @@ import pytest
 from mpi4py import MPI
 from small_jobs import JOBS, smallest
 
-from parcontact import mesh
 from parcontact.__main__ import main
-from parcontact.command.arguments import NAMES
-from parcontact.history.timeline import Timeline
+from parcontact.door.arguments import NAMES
+from parcontact.job.history import Timeline
+from parcontact.march import mesh
 
 OF_JOBS = {"check", "plan", "run", "steady", "theory", "study", "surface"}
 OF_RESULTS = {"plot", "report", "leak", "info", "cite"}

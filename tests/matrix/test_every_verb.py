@@ -17,7 +17,7 @@ from legible import watch_pictures
 
 from matrix.test_pairs import CURVE, HISTORY, SCENE, SECTIONS, job_of
 from parcontact import __main__
-from parcontact.command.arguments import NAMES
+from parcontact.door.arguments import NAMES
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
 

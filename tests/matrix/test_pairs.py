@@ -8,8 +8,8 @@ import pytest
 import yaml
 from conftest import WORLD, Main
 
+from parcontact.door.manual import texts
 from parcontact.job.model import Job
-from parcontact.manual import texts
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
 

@@ -11,17 +11,16 @@ from job.texts import job_of, mistakes_of, replaced
 from mpi4py import MPI
 
 import parcontact as pc
+from parcontact.files import run
+from parcontact.files.run import Options, chosen_by_accuracy
 from parcontact.job import Job
-from parcontact.job.checks.cells import Guess
-from parcontact.job.sections.geometry import Rough
-from parcontact.mesh import load, load_cases
-from parcontact.mesh.contact_guess import UNKNOWN, guesses, slope_of
+from parcontact.job.advice import Guess
+from parcontact.job.surfaces import Rough
+from parcontact.march import curve
+from parcontact.march.mesh import UNKNOWN, guesses, load, load_cases, slope_of
 from parcontact.parallel.root import on_root
 from parcontact.parallel.slab import Slab
 from parcontact.results import info
-from parcontact.run import runner
-from parcontact.run.run import Options, chosen_by_accuracy
-from parcontact.steady_sliding import curve
 
 ROUGH = "{shape: rough, hurst: 0.8, long_wavelength: 5e-4, short_wavelength: 6.25e-5, rms_slope: 0.1, seed: 1}"
 AUTO = f"""\
@@ -95,7 +94,7 @@ def test_a_run_and_a_curve_say_what_was_chosen(comm: MPI.Intracomm, shared_path:
     comm.barrier()
     job = on_root(comm, lambda: load(path, [f"output.directory={shared_path / 'out'}"]))
     slab = Slab(comm, *job.grid.points)
-    assert runner.run_job(job, slab, Options(quiet=True)) == 0
+    assert run.run_job(job, slab, Options(quiet=True)) == 0
     assert curve.run_curve(job, slab, curve.request(job), quiet=True) == 0
     if comm.rank == 0:
         said, sound = info.describe_path(shared_path / "out")

@@ -17,9 +17,8 @@ from mpi4py import MPI
 from numpy.typing import DTypeLike, NDArray
 
 from parcontact.parallel import fft as transforms
-from parcontact.parallel import regrid, rows, transpose
-from parcontact.parallel.cosines import Cosines
-from parcontact.parallel.fft import FFT, NARROWEST
+from parcontact.parallel import regrid
+from parcontact.parallel.fft import FFT, NARROWEST, Cosines
 from parcontact.parallel.fftw import export_wisdom, import_wisdom
 from parcontact.parallel.slab import Slab
 
@@ -266,7 +265,7 @@ def test_product_with_a_symbol(communicators: list[MPI.Intracomm], nx: int, ny: 
 def test_many_blocks_cosines(comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, nx: int) -> None:
     """In blocks of eight rows, which are sent in four legs."""
     monkeypatch.setattr(transforms, "BLOCK_BYTES", 1)
-    monkeypatch.setattr(transpose, "LEG_BYTES", 1)
+    monkeypatch.setattr(transforms, "LEG_BYTES", 1)
     check_cosines(Slab(comm, nx, 75), np.float64)
 
 
@@ -323,4 +322,4 @@ def test_fetches_what_each_rank_wants(ny: int, seed: int) -> None:
     slab = Slab(MPI.COMM_WORLD, 3, ny)
     wanted = np.sort(np.random.default_rng(seed).integers(0, ny + 1, (slab.comm.size, 2)))
     whole, own = field(slab)
-    np.testing.assert_array_equal(rows.fetch(slab, own, wanted), whole[slice(*wanted[slab.comm.rank])])
+    np.testing.assert_array_equal(regrid.fetch(slab, own, wanted), whole[slice(*wanted[slab.comm.rank])])

@@ -10,8 +10,8 @@ from marched_jobs import begun
 from mpi4py import MPI
 
 from parcontact.march.loop import run_steps
-from parcontact.parallel import rows
-from parcontact.parallel.pyramid import pyramid_steps
+from parcontact.parallel import regrid
+from parcontact.parallel.regrid import pyramid_steps
 from parcontact.parallel.slab import Slab
 
 
@@ -45,8 +45,8 @@ class Pretended:
 def exchanges(slab: Any) -> int:
     """Make each kind of exchange between neighbours, on all grids of cells; return how many."""
     field = np.zeros(slab.shape)
-    rows.around(slab, field, 4, True)
-    rows.before_first(slab, field, True)
+    regrid.around(slab, field, 4, True)
+    regrid.before_first(slab, field, True)
     steps = [step for step in pyramid_steps(slab) if step.coarse.comm.size == slab.comm.size > 1]
     for step in steps:
         step.adjacent_points(np.zeros(step.fine.shape), 0, -1)
@@ -72,10 +72,10 @@ def test_a_thousand_ranks_cost_what_a_few_do() -> None:
     comm: Any = Pretended(1024, 500)
     slab = Slab(comm, 8, 4096)
     field = np.zeros(slab.shape)
-    rows.around(slab, field, 4, True)
+    regrid.around(slab, field, 4, True)
     (kept,) = slab.exchanges.values()
     assert kept.partners == 4
-    rows.around(slab, field, 4, True)
+    regrid.around(slab, field, 4, True)
     assert list(slab.exchanges.values()) == [kept]
     assert len(comm.sent) == len(comm.got) == 4
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
 
-from parcontact.parallel import rows
+from parcontact.parallel import regrid
 from parcontact.parallel.slab import Slab, allocate, deal
 from parcontact.parallel.tally import Tally
 
@@ -103,7 +103,7 @@ def test_rolls_like_numpy(ny: int, count: int, single: bool) -> None:
     whole = np.arange(3.0 * ny).reshape(ny, 3).astype(np.float32 if single else np.float64)
     field, out = slab.empty(whole.dtype), slab.empty(whole.dtype)
     field[...] = whole[slab.rows]
-    np.testing.assert_array_equal(rows.roll_rows(slab, field, count, out), np.roll(whole, count, axis=0)[slab.rows])
+    np.testing.assert_array_equal(regrid.roll_rows(slab, field, count, out), np.roll(whole, count, axis=0)[slab.rows])
     np.testing.assert_array_equal(field, whole[slab.rows])
 
 
@@ -114,18 +114,18 @@ def test_rows_around_those_of_a_rank(ny: int, count: int, cyclic: bool) -> None:
     slab = Slab(MPI.COMM_WORLD, 3, ny)
     whole = np.arange(1.0, 3.0 * ny + 1.0).reshape(ny, 3)
     field = whole[slab.rows].copy()
-    above, below = rows.around(slab, field, count, cyclic)
+    above, below = regrid.around(slab, field, count, cyclic)
     for found, numbers in ((above, slab.rows.start - 1 - np.arange(count)), (below, slab.rows.stop + np.arange(count))):
         expected = whole[numbers % ny if cyclic else np.clip(numbers, 0, ny - 1)]
         np.testing.assert_array_equal(found, expected if slab.shape[0] else np.zeros((count, 3)))
-    np.testing.assert_array_equal(rows.before_first(slab, field, cyclic), above[0])
+    np.testing.assert_array_equal(regrid.before_first(slab, field, cyclic), above[0])
 
 
 def test_counts_what_is_sent() -> None:
     slab = Slab(MPI.COMM_WORLD, 4, 8)
-    rows.roll_rows(slab, slab.zeros(), 8, slab.empty())
+    regrid.roll_rows(slab, slab.zeros(), 8, slab.empty())
     assert slab.tally["bytes sent"] == 0
-    rows.roll_rows(slab, slab.zeros(), 1, slab.empty())
+    regrid.roll_rows(slab, slab.zeros(), 1, slab.empty())
     assert slab.tally["bytes sent"] == (32 if slab.comm.size > 1 else 0)
-    rows.before_first(slab, slab.zeros(), True)
+    regrid.before_first(slab, slab.zeros(), True)
     assert slab.tally["bytes sent"] == (64 if slab.comm.size > 1 else 0)

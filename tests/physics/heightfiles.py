@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
-from parcontact.physics import heightfile
+from parcontact.physics import surface
 
 NX, NY = 7, 5
 
@@ -41,7 +41,7 @@ def made(comm: MPI.Intracomm, path: Path, make: Callable[[Path], object]) -> Pat
 def complaint(comm: MPI.Intracomm, path: Path, dataset: str = "heights") -> str:
     """What reading says, the same on every rank, in one line that names the file."""
     with pytest.raises(InputError) as caught:
-        heightfile.read_heights(path, dataset, Slab(comm, NX, NY))
+        surface.read_heights(path, dataset, Slab(comm, NX, NY))
     said = str(caught.value)
     assert comm.allgather(said) == [said] * comm.size
     assert str(path) in said

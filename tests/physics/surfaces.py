@@ -6,8 +6,7 @@ import numpy as np
 
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.shapes import Round, Shape
-from parcontact.physics.surface import Surface, single_wave
+from parcontact.physics.surface import Round, Shape, Surface, single_wave
 
 from .maps import coordinates
 

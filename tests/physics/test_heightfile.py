@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from parcontact.errors import InputError
 from parcontact.parallel.slab import Slab
-from parcontact.physics import heightfile
+from parcontact.physics import surface
 
 from .heightfiles import KINDS, NX, NY, complaint, made, write
 from .maps import random_map
@@ -30,7 +30,7 @@ def test_rows(
     path = made(comm, shared_path / f"map.{kind}", lambda path: write(path, whole))
     for group in communicators:
         slab = Slab(group, nx, ny)
-        rows = heightfile.read_heights(path, "heights", slab)
+        rows = surface.read_heights(path, "heights", slab)
         assert rows.dtype == np.float64
         assert_array_equal(rows, whole[slab.rows])
 
@@ -39,14 +39,14 @@ def test_columns_first(comm: MPI.Intracomm, shared_path: Path) -> None:
     whole = random_map(NX, NY)
     path = made(comm, shared_path / "map.npy", lambda path: np.save(path, np.asfortranarray(whole)))
     slab = Slab(comm, NX, NY)
-    assert_array_equal(heightfile.read_heights(path, "", slab), whole[slab.rows])
+    assert_array_equal(surface.read_heights(path, "", slab), whole[slab.rows])
 
 
 def test_comments_and_empty_lines(comm: MPI.Intracomm, shared_path: Path) -> None:
     text = "# road\n\n" + "1 2 3 4 5 6 7 # first\n   \n" * NY + "#end"
     path = made(comm, shared_path / "map.txt", lambda path: path.write_text(text))
     slab = Slab(comm, NX, NY)
-    assert_array_equal(heightfile.read_heights(path, "", slab), np.tile(np.arange(1.0, 8.0), (slab.shape[0], 1)))
+    assert_array_equal(surface.read_heights(path, "", slab), np.tile(np.arange(1.0, 8.0), (slab.shape[0], 1)))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -137,7 +137,7 @@ def test_no_real_numbers(comm: MPI.Intracomm, shared_path: Path, kind: str, valu
 def test_only_these_rows_are_held(comm: MPI.Intracomm, shared_path: Path) -> None:
     path = made(comm, shared_path / "map.npy", lambda path: write(path, random_map(NX, NY)))
     slab = Slab(comm, NX, NY)
-    rows = heightfile.read_heights(path, "", slab)
+    rows = surface.read_heights(path, "", slab)
     assert rows.shape == slab.shape
     assert rows.base is None  # not a view into the whole file
 
@@ -171,5 +171,5 @@ def test_heights_times_their_scale(comm: MPI.Intracomm, shared_path: Path) -> No
     """Either may be a number to compute with, and their product not."""
     path = made(comm, shared_path / "map.npy", lambda path: write(path, np.full((NY, NX), 1e-60)))
     with pytest.raises(InputError, match=r"its largest value is 1e-120 m; 1e-70 to 1e\+70 m were expected"):
-        heightfile.read_heights(path, "heights", Slab(comm, NX, NY), 1e-60)
-    assert heightfile.read_heights(path, "heights", Slab(comm, NX, NY), 1e54).max(initial=1e-6) == pytest.approx(1e-6)
+        surface.read_heights(path, "heights", Slab(comm, NX, NY), 1e-60)
+    assert surface.read_heights(path, "heights", Slab(comm, NX, NY), 1e54).max(initial=1e-6) == pytest.approx(1e-6)

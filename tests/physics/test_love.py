@@ -14,14 +14,12 @@ from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.parallel.tally import Tally
-from parcontact.physics import tile_operator as module
-from parcontact.physics import wake
-from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.layer import Base, Layer
+from parcontact.physics import convolution
+from parcontact.physics import love as wake
+from parcontact.physics.convolution import SIDE, Tiles
+from parcontact.physics.halfspace import Base, HalfSpace, Layer
 from parcontact.physics.love import love
-from parcontact.physics.love import love as elastic
 from parcontact.physics.prony import Prony, creep_spectrum
-from parcontact.physics.tiles import SIDE, Tiles
 
 from .maps import gathered, random_map
 
@@ -59,15 +57,15 @@ CELL = (0.1, 0.07)
 def along_the_wake(x: float, y: float, velocity: tuple[float, float]) -> float:
     """`J_g A(x) + sum J_i int exp(-t/l_i)/l_i A(x + v t) dt` with Love's A, by adaptive quadrature in units of l_i."""
 
-    def love(t: float) -> float:
-        return float(elastic(np.array(x + velocity[0] * t), np.array(y + velocity[1] * t), *CELL))
+    def deflection(t: float) -> float:
+        return float(love(np.array(x + velocity[0] * t), np.array(y + velocity[1] * t), *CELL))
 
-    total = CREEP.glass * love(0.0)
+    total = CREEP.glass * deflection(0.0)
     for compliance, time in zip(CREEP.compliances, CREEP.retardation_times, strict=True):
         nearest = -(x * velocity[0] + y * velocity[1]) / float(np.dot(velocity, velocity)) / time
         points = sorted({0.0, *(p for p in (nearest - 0.05, nearest, nearest + 0.05) if 0.0 < p < 40.0), 40.0})
         for start, stop in pairwise(points):
-            part = quad(lambda s, time=time: np.exp(-s) * love(s * time), start, stop, epsabs=1e-12, limit=400)
+            part = quad(lambda s, time=time: np.exp(-s) * deflection(s * time), start, stop, epsabs=1e-12, limit=400)
             total += compliance * part[0]
     return total
 
@@ -291,7 +289,7 @@ def test_displacement_is_that_of_the_whole_box(
 ) -> None:
     """Under a random pressure on scattered tiles, near each other and far apart, on these and at all points; it is
     symmetric, too."""
-    monkeypatch.setattr(module, "NODES", nodes)
+    monkeypatch.setattr(convolution, "NODES", nodes)
     nx, ny = points
     tiles = Tiles(points, np.array([0, 0, 1, 3, (ny - 1) // SIDE]), np.array([0, 1, 4, 2, (nx - 1) // SIDE]))
     marked = stacked(tiles, np.ones((ny, nx)))

@@ -12,12 +12,11 @@ from numpy.testing import assert_allclose
 from parcontact.effects.interface.effect import shares
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics.interface_friction import InterfaceFriction
+from parcontact.physics.energy import Probe
+from parcontact.physics.entries import Units
 from parcontact.physics.measures import SIDE
-from parcontact.physics.probe import Probe
-from parcontact.physics.shapes import Round
-from parcontact.physics.surface import Surface, single_wave
-from parcontact.physics.units import Units
+from parcontact.physics.motion import InterfaceFriction
+from parcontact.physics.surface import Round, Surface, single_wave
 
 pytestmark = pytest.mark.mpi
 

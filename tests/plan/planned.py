@@ -2,8 +2,8 @@
 
 from typing import Any
 
+from parcontact.door.memory import StageCost
 from parcontact.job import Job
-from parcontact.plan.trial import StageCost
 
 Json = dict[str, Any]
 ROUGH: Json = {

@@ -5,12 +5,12 @@ import pytest
 from marched_jobs import marched
 from mpi4py import MPI
 
-from parcontact import scene
+from parcontact.door import memory, plan
+from parcontact.door.memory import try_job
+from parcontact.march import scene
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
-from parcontact.physics.tiles import SIDE, Tiles
-from parcontact.plan import memory, printed_plan
-from parcontact.plan.trial import try_job
-from parcontact.steady_sliding.sliding import SteadySliding
+from parcontact.physics.convolution import SIDE, Tiles
 
 from .planned import JOBS, ROUGH, TWO, Json, job
 
@@ -65,7 +65,7 @@ def test_solvers_on_tiles_hold_what_is_planned(points: tuple[int, int], monkeypa
     made = on_tiles(Tiles(points, np.array([0, 1, 2]), np.array([0, 1, 1])), 2.5e-3)
     assert tally["map bytes"] - before + 2 * 3 * 8 * SIDE**2 == memory.on_tiles(planned)
     del made
-    assert any("tiles" in line for line in printed_plan.maps(planned, [1, 64], 0))
+    assert any("tiles" in line for line in plan.maps(planned, [1, 64], 0))
 
 
 @pytest.mark.parametrize(

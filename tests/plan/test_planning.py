@@ -11,11 +11,11 @@ import yaml
 from mpi4py import MPI
 
 from parcontact import __main__
+from parcontact.door import plan
+from parcontact.door.plan import Planner, case_times, cases_to_try, only_steady_states
 from parcontact.job import load_cases
-from parcontact.job.sections.listing import plain_data
-from parcontact.parallel.groups import Groups
-from parcontact.plan import printed_plan
-from parcontact.plan.planning import Planner, case_times, cases_to_try, only_steady_states
+from parcontact.job.listing import plain_data
+from parcontact.parallel.tally import Groups
 
 from .planned import CELLS, SWEEP, TWO, job
 
@@ -58,7 +58,7 @@ def test_bad_options(words: list[str], capsys: pytest.CaptureFixture[str]) -> No
 )
 def test_times_as_people_tell_them(seconds: float, text: str) -> None:
     """No longer than a column of a table, so that one can be stated from the next."""
-    assert printed_plan.duration_text(seconds) == text
+    assert plan.duration_text(seconds) == text
     assert len(text) < 11
 
 
@@ -115,7 +115,7 @@ def test_small_cases_are_planned_side_by_side(comm: MPI.Intracomm) -> None:
     )
 
 
-PEAK = "import sys; from parcontact.__main__ import main; from parcontact.plan.planning import peak_memory; "
+PEAK = "import sys; from parcontact.__main__ import main; from parcontact.door.plan import peak_memory; "
 PEAK += "code = main(sys.argv[1:]); print('peak', peak_memory()); sys.exit(code)"
 
 

@@ -8,14 +8,14 @@ import pytest
 from marched_jobs import begun, marched
 from mpi4py import MPI
 
-from parcontact import scene
-from parcontact.history.timeline import Timeline
+from parcontact.door import memory
+from parcontact.door.memory import FEWEST, StageCost, Trial, try_job
 from parcontact.job import Job
+from parcontact.job.history import Timeline
+from parcontact.march import scene
+from parcontact.march.choices import choices
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
-from parcontact.plan import trial
-from parcontact.plan.trial import FEWEST, StageCost, Trial, try_job
-from parcontact.scene import choices
-from parcontact.steady_sliding.sliding import SteadySliding
 
 from .planned import CELLS, JOBS, TWO, Json, alike, job
 
@@ -94,14 +94,14 @@ def test_a_job_without_time_for_its_steps_is_tried_on_fewer_points(
     transforms; ranks share what is not the overhead of a call."""
     ticking(monkeypatch)
     large = job(grid={"points": 256}, material=TWO, history=[CELLS], numerics={"tolerance": 1e-8})
-    ends, attempt = list[float](), trial._attempt
+    ends, attempt = list[float](), memory._attempt
 
-    def shorter(tried: Job, slab: trial.TimedSlab, seconds: float) -> Trial | None:
+    def shorter(tried: Job, slab: memory.TimedSlab, seconds: float) -> Trial | None:
         found = attempt(tried, slab, 0.06 if tried.grid.nx == 256 else 1e6)
         ends.append(slab.price)
         return found
 
-    monkeypatch.setattr(trial, "_attempt", shorter)
+    monkeypatch.setattr(memory, "_attempt", shorter)
     seen = try_job(large, Slab(comm, 256, 256), 1.0)
     assert seen is not None
     assert seen.points == (64, 64)
@@ -117,7 +117,7 @@ def test_a_job_without_time_for_its_steps_is_tried_on_fewer_points(
 def test_a_tiny_scene_has_all_that_runs(name: str) -> None:
     """The same effects as the job, on 16 points along each side: what is compiled for it is compiled for the job."""
     planned = job(**JOBS[name])
-    small = trial._tiny(planned)
+    small = memory._tiny(planned)
     assert small is not None
     assert max(small.grid.points) == 16
     assert choices(small).isolated.on == choices(planned).isolated.on

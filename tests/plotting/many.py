@@ -13,7 +13,7 @@ from drawing import SPHERE, STRIP, WAVE, ZENER, asked, ran
 
 from parcontact import job
 from parcontact.__main__ import main
-from parcontact.results import chapters, plots, result_sections, study_pictures
+from parcontact.results import compound_files, page, plots, report_sections
 from parcontact.rubber import compound
 
 BANDS, VELOCITIES, TEMPERATURES, PRESSURES = 12, np.logspace(-3, 1, 9), (0.0, 20.0, 40.0), (1e5, 4e5)
@@ -254,14 +254,14 @@ def draw_sweep_of_numbers(path: Path) -> None:
 def draw_study(path: Path) -> None:
     """Draw the errors of all integrators along all ladders."""
     curves = [
-        study_pictures.StudyCurve(
+        compound_files.StudyCurve(
             *(name, integrator, ladder, [1.0, 0.5, 0.25, 0.125]),
             *(np.geomspace(0.1, 1e-4 * (k + 1), 4).tolist(), [0.3 * 8**n for n in range(4)]),
         )
-        for name in study_pictures.NAMES
-        for k, (integrator, ladder) in enumerate(product(study_pictures.INTEGRATORS, study_pictures.MARKS))
+        for name in compound_files.NAMES
+        for k, (integrator, ladder) in enumerate(product(compound_files.INTEGRATORS, compound_files.MARKS))
     ]
-    study_pictures.plot_study(path, curves, dict.fromkeys(study_pictures.NAMES, 1e-4))
+    compound_files.plot_study(path, curves, dict.fromkeys(compound_files.NAMES, 1e-4))
 
 
 def draw_compound(path: Path) -> None:
@@ -281,12 +281,12 @@ def draw_compound(path: Path) -> None:
 
 def report_curves(path: Path) -> None:
     """Draw the pictures of a report that compares three curves in bands."""
-    assert list(chapters.compare_directories(write_curves(path)))
+    assert list(page.compare_directories(write_curves(path)))
 
 
 def report_run(path: Path) -> None:
     """Draw the pictures of the results of a run."""
-    result_sections.describe_run(path / "run")
+    report_sections.describe_run(path / "run")
 
 
 def report_sweep(path: Path) -> None:

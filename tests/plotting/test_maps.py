@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from parcontact.job import Job
-from parcontact.results import maps, plots, result_sections
-from parcontact.results.plotted_run import Fields, PlottedRun, label_frames
+from parcontact.results import maps, plots, report_sections
+from parcontact.results.charts import Fields, PlottedRun, label_frames
 
 ALL = "output: {fields: [pressure, displacement, gap, height]}\n"
 CREEP = "history: [{pressure: 1.0e3, duration: 2.0e-3, time_step: 2.0e-3}]\n"
@@ -48,7 +48,7 @@ def test_one_look(tmp_path: Path, drawn: list[Figure]) -> None:
     found = {title.split()[0]: axes for title, axes in maps_of(drawn[0]).items()}
     assert set(found) == {"pressure", "gap", "height"}
     run = PlottedRun(out)
-    assert [label for _, label in result_sections.browse_run(run)[0][1]] == ["1 kPa (step 1)", "2 kPa (step 2)"]
+    assert [label for _, label in report_sections.browse_run(run)[0][1]] == ["1 kPa (step 1)", "2 kPa (step 2)"]
     with h5py.File(out / "fields.h5") as file:
         for name, axes in found.items():
             list(maps.draw_frames(file, name, {1: ""}, run.job))
@@ -172,7 +172,7 @@ def test_maps_show_the_contact(tmp_path: Path, drawn: list[Figure], then: str, s
     out = ran(tmp_path, SPHERE + ZENER + HELD % then + "output: {fields: [pressure, gap, height]}\n")
     plots.plot([out])
     assert {title.split("\n")[1] for title in maps_of(drawn[0])} == {stated}
-    for _, images, first in result_sections.browse_run(PlottedRun(out)):
+    for _, images, first in report_sections.browse_run(PlottedRun(out)):
         assert images[first][1].startswith(f"{stated} (step ")
     (lines,) = (axes for axes in drawn[0].axes if axes.get_title().startswith("pressure on a line"))
     legend = lines.get_legend()

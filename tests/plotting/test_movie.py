@@ -9,7 +9,7 @@ import pytest
 from drawing import ELASTIC, KINDS, SPHERE, asked, ran
 from PIL import Image
 
-from parcontact.storage import files
+from parcontact.files import files
 
 LOADS = KINDS["loads"][0]  # two instants
 FAKE = """#!/bin/sh

@@ -26,8 +26,8 @@ from drawing import (
 )
 from matplotlib.figure import Figure
 
+from parcontact.files import tables
 from parcontact.results import charts, style
-from parcontact.storage import tables
 
 BACK = SLIDE.replace("}]", "}, {name: back, pressure: 1.0e3, velocity: -0.1, distance: 1.0e-3, cells_per_step: 1}]")
 CURVE = "velocity,pressure,friction,contact_area\n"

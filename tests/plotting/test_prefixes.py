@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from parcontact.results import prefixes
+from parcontact import printed
+from parcontact.results import style
 
 
 @pytest.mark.parametrize(("largest", "label"), [(3.2e-5, "µm"), (999.9, "m"), (1e3, "km"), (2e-12, "nm"), (0.0, "m")])
 def test_prefixes(largest: float, label: str) -> None:
-    found, size = prefixes.prefixed("m", largest)
+    found, size = printed.prefixed("m", largest)
     assert found == label
     assert not largest or 1.0 <= largest / size < 1e3 or label == "nm"
 
@@ -19,7 +20,7 @@ def test_prefixes(largest: float, label: str) -> None:
 @pytest.mark.parametrize("value", [float("inf"), float("-inf"), float("nan")])
 def test_no_prefix_without_a_size(value: float) -> None:
     """A table that somebody edited may have such cells."""
-    assert prefixes.quantity(value, "m") == f"{value:g} m"
+    assert printed.quantity(value, "m") == f"{value:g} m"
 
 
 @pytest.mark.parametrize(
@@ -43,7 +44,7 @@ def test_no_prefix_without_a_size(value: float) -> None:
     ],
 )
 def test_numbers_with_prefixes(value: float, unit: str, stated: str) -> None:
-    assert prefixes.quantity(value, unit) == stated
+    assert printed.quantity(value, unit) == stated
 
 
 @pytest.mark.parametrize(
@@ -55,7 +56,7 @@ def test_axes_of_long_times(end: float, unit: str, size: float) -> None:
     figure = Figure()
     axes = figure.subplots()
     axes.plot([0.0, end], [0.0, 1.0])
-    prefixes.label(axes.xaxis, "time", "s")
+    style.label(axes.xaxis, "time", "s")
     figure.draw_without_rendering()
     assert axes.get_xlabel() == f"time [{unit}]"
     shown = [float(tick.get_text().replace("−", "-")) for tick in axes.get_xticklabels()]
@@ -69,7 +70,7 @@ def test_marks_of_long_times_do_not_touch(width: float) -> None:
     figure = Figure(figsize=(width, 2.0), layout="constrained")
     axes = figure.subplots()
     axes.set(xscale="log", xlim=(1e-3, 3.2e8))
-    assert prefixes.label_log_times(axes.xaxis, "time")
+    assert style.label_log_times(axes.xaxis, "time")
     figure.draw_without_rendering()
     boxes = [text.get_window_extent() for text in axes.get_xticklabels()]
     assert len(boxes) >= 3

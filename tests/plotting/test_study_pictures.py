@@ -5,7 +5,7 @@ from pathlib import Path
 from drawing import entries, outside, touching
 from matplotlib.figure import Figure
 
-from parcontact.results import study_pictures
+from parcontact.results import compound_files
 
 QUANTITIES = ("mu_max", "mu_dyn", "contact_area_corrected")
 
@@ -13,12 +13,12 @@ QUANTITIES = ("mu_max", "mu_dyn", "contact_area_corrected")
 def test_how_errors_fall(tmp_path: Path, drawn: list[Figure]) -> None:
     """Over refinement and over time, one quantity below the other; what is not known of the reference is grey."""
     curves = [
-        study_pictures.StudyCurve(name, integrator, ladder, [1.0, 0.5, 0.25], [0.1, 0.02, 1e-5], [0.5, 3.0, 20.0])
+        compound_files.StudyCurve(name, integrator, ladder, [1.0, 0.5, 0.25], [0.1, 0.02, 1e-5], [0.5, 3.0, 20.0])
         for name in QUANTITIES
-        for integrator in study_pictures.INTEGRATORS
+        for integrator in compound_files.INTEGRATORS
         for ladder in ("mesh and time together", "mesh alone", "time alone")
     ]
-    study_pictures.plot_study(tmp_path, curves, dict.fromkeys(QUANTITIES, 1e-4))
+    compound_files.plot_study(tmp_path, curves, dict.fromkeys(QUANTITIES, 1e-4))
     figure = drawn[0]
     assert not touching(figure)
     assert not outside(figure)
@@ -28,5 +28,5 @@ def test_how_errors_fall(tmp_path: Path, drawn: list[Figure]) -> None:
 
 
 def test_nothing_is_drawn_where_nothing_is_refined(tmp_path: Path) -> None:
-    assert study_pictures.plot_study(tmp_path, [], {}) is None
+    assert compound_files.plot_study(tmp_path, [], {}) is None
     assert not list(tmp_path.iterdir())

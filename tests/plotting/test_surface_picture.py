@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from parcontact.physics import surface_statistics as statistics
-from parcontact.results import surface_picture
+from parcontact.physics import surface_statistics
+from parcontact.results import surface_summary
 
 
 def test_a_map_has_the_proportions_of_its_box() -> None:
@@ -13,8 +13,8 @@ def test_a_map_has_the_proportions_of_its_box() -> None:
     heights, size = np.random.default_rng(1).standard_normal((20, 60)), (6e-3, 4e-3)
     figure = Figure(figsize=(5.0, 5.0))
     axes = figure.subplots()
-    surface_picture.PANELS["map of the heights"](
-        axes, surface_picture.Sketch(heights, size, statistics.surface_statistics(heights, size))
+    surface_summary.PANELS["map of the heights"](
+        axes, surface_summary.Sketch(heights, size, surface_statistics.surface_statistics(heights, size))
     )
     figure.draw_without_rendering()
     box = axes.get_window_extent()
@@ -25,8 +25,8 @@ def test_a_map_has_the_proportions_of_its_box() -> None:
 def test_a_map_of_few_rows_has_all_panels(shape: tuple[int, int]) -> None:
     """Two rows or columns have no waves of their own: no spectrum is drawn along them."""
     heights, size = np.random.default_rng(1).standard_normal(shape), (6e-3, 4e-3)
-    sketch = surface_picture.Sketch(heights, size, statistics.surface_statistics(heights, size))
-    for panel in surface_picture.PANELS.values():
+    sketch = surface_summary.Sketch(heights, size, surface_statistics.surface_statistics(heights, size))
+    for panel in surface_summary.PANELS.values():
         figure = Figure()
         panel(figure.subplots(), sketch)
         figure.draw_without_rendering()

@@ -14,7 +14,7 @@ import pytest
 from mpi4py import MPI
 
 import parcontact as pc
-from parcontact.steady_sliding.sliding import SteadySliding
+from parcontact.march.steady import SteadySliding
 
 from .test_simulation import JOB
 

@@ -8,7 +8,7 @@ import pytest
 
 from parcontact import job
 from parcontact.errors import InputError
-from parcontact.results import curve_tables, export, headline, info
+from parcontact.results import curve_tables, export, info
 from parcontact.results.results import Results
 
 JOB = """
@@ -94,7 +94,7 @@ def test_friction_over_speed_and_temperature(curve: Path) -> None:
 
 
 def test_a_headline_names_the_conditions_and_that_friction_still_rises(curve: Path) -> None:
-    said = headline.find_headline(curve)
+    said = info.find_headline(curve)
     assert said.endswith("is 400 ± 40, at 10 m/s and 100 kPa, 40 °C; it still rises at the highest velocity.")
     assert Results(curve, "curve").unfinished == ["1 of 12 points are not solved yet"]
 
@@ -113,4 +113,4 @@ def test_how_far_a_running_sweep_is(curve: Path) -> None:
     assert sound
     assert "case 1: step 1, t = 500 ms of 2 s" in said
     assert "2 cases to go: 40 s" in said
-    assert headline.find_headline(home).endswith("to 5 (case 4); it still rises at the highest velocity.")
+    assert info.find_headline(home).endswith("to 5 (case 4); it still rises at the highest velocity.")

@@ -12,11 +12,10 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact import job as jobs
-from parcontact import mesh, scene
 from parcontact.errors import InputError
+from parcontact.job import measured_maps
+from parcontact.march import mesh, sanity, scene
 from parcontact.parallel.slab import Slab
-from parcontact.road import treatment
-from parcontact.scene import sanity
 
 from . import truth
 
@@ -378,5 +377,5 @@ def test_a_periodic_map_is_filtered_periodically(tmp_path: Path) -> None:
     setup = scene.set_up(job, Slab.alone(48, 48))
     heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
     np.testing.assert_allclose(heights - heights.mean(), long, atol=1e-15)
-    assert treatment.is_periodic(long)
-    assert not treatment.is_periodic(long + 1e-6 * x)
+    assert measured_maps.is_periodic(long)
+    assert not measured_maps.is_periodic(long + 1e-6 * x)

@@ -12,9 +12,8 @@ import SurfaceTopography
 from numpy.testing import assert_allclose
 
 from parcontact.errors import InputError
-from parcontact.job import Topography
-from parcontact.job.sections.geometry import MapUnits
-from parcontact.road import map_files
+from parcontact.job import Topography, map_files
+from parcontact.job.surfaces import MapUnits
 
 SIZE = (6e-5, 4e-5)
 HEIGHTS = 1e-6 * np.random.default_rng(5).standard_normal((16, 24))  # (ny, nx) [m]

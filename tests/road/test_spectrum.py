@@ -14,16 +14,15 @@ from mpi4py import MPI
 from scipy.special import gamma
 
 from parcontact import job as jobs
-from parcontact import scene
-from parcontact.accuracy.observation import properties_of
 from parcontact.errors import InputError
+from parcontact.job import map_files, measured_maps
+from parcontact.job.map_files import UNITS
+from parcontact.march import rigid_surface, sanity, scene
+from parcontact.march.time_error import properties_of
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics import surface_statistics as statistics
+from parcontact.physics import surface_statistics
 from parcontact.results import prediction
-from parcontact.road import map_files, spectrum, treatment
-from parcontact.road.map_files import UNITS
-from parcontact.scene import rigid_surface, sanity
 from parcontact.theory import persson_rings
 
 from . import truth
@@ -84,7 +83,7 @@ def test_profiles_become_directions(tmp_path: Path) -> None:
     q = np.geomspace(2e3, 1e6, 60)
     part = load(tmp_path, table("q[1/m],C1D[m^3]", q, c1(q))).surface[0]
     assert isinstance(part, jobs.RoughSpectrum)
-    found, ends = spectrum.read_spectrum(part)
+    found, ends = measured_maps.read_spectrum(part)
     assert found(q) / (4 * np.pi**2) == pytest.approx(c2(q), rel=0.011, abs=0.0)
     assert ends == pytest.approx((2 * np.pi / 2e3, 2 * np.pi / 1e6))
 
@@ -96,7 +95,7 @@ def test_profiles_of_the_surface_are_those_of_the_table(tmp_path: Path) -> None:
     """
     q = np.geomspace(5e3, 4.0e5, 80)
     heights, _, _ = heights_of(load(tmp_path, table("q[1/m] C1D[m^3]", q, c1(q))))
-    own = statistics.surface_statistics(heights, (L, L))
+    own = surface_statistics.surface_statistics(heights, (L, L))
     chosen = (own.qx > 1.5e4) & (own.qx < 1.0e5)
     assert chosen.sum() > 8
     assert own.psd_x[chosen] == pytest.approx(c1(own.qx[chosen]), rel=0.05, abs=0.0)
@@ -108,10 +107,10 @@ def test_spectra_in_the_normalisation_of_surface_topography(tmp_path: Path, kind
     own = {"C1D[m^3]": c1, "C2D[m^4]": c2}[kind](Q)
     plain = load(tmp_path, table(f"q[1/m] {kind}", Q, own)).surface[0]
     assert isinstance(plain, jobs.RoughSpectrum)
-    expected = spectrum.read_spectrum(plain)[0](Q)
+    expected = measured_maps.read_spectrum(plain)[0](Q)
     theirs = load(tmp_path, table(f"q[1/m] {kind}", Q, factor * own), ", normalisation: surface_topography").surface[0]
     assert isinstance(theirs, jobs.RoughSpectrum)
-    assert spectrum.read_spectrum(theirs)[0](Q) == pytest.approx(expected, rel=1e-12, abs=0.0)
+    assert measured_maps.read_spectrum(theirs)[0](Q) == pytest.approx(expected, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("kind", ["C1D[m^3]", "C2D[m^4]"])
@@ -149,7 +148,9 @@ def test_the_spectrum_of_line_scans() -> None:
     part = jobs.Topography.model_construct(path=Path("line.npy"))
     found = []
     for row in heights[::32]:
-        density, ends = spectrum.of_line(part, map_files.Map(row[None] + np.linspace(0.0, 1e-5, 512), (4 * L, 4 * L)))
+        density, ends = measured_maps.of_line(
+            part, map_files.Map(row[None] + np.linspace(0.0, 1e-5, 512), (4 * L, 4 * L))
+        )
         q = np.geomspace(2 * np.pi / ends[0], 2 * np.pi / ends[1], 4001)
         weight = q**2 * density(q) / (2 * np.pi)
         found.append([np.trapezoid(weight, np.log(q)), np.trapezoid(q**2 * weight, np.log(q))])
@@ -163,7 +164,7 @@ def test_line_scans_that_give_no_spectrum(heights: Array) -> None:
     """Flat, short, or a straight line: one sentence."""
     part = jobs.Topography.model_construct(path=Path("line.npy"))
     with pytest.raises(InputError, match=r"line\.npy"):
-        spectrum.of_line(part, map_files.Map(heights[None], (L, L)))
+        measured_maps.of_line(part, map_files.Map(heights[None], (L, L)))
 
 
 @pytest.mark.mpi
@@ -207,7 +208,7 @@ def test_theory_of_a_measured_spectrum(tmp_path: Path) -> None:
     amplitude, kx, ky = rings.waves
     power = np.abs(amplitude) ** 2 / 2
     q = np.geomspace(Q[0], Q[-1], 20001)
-    density = spectrum.read_spectrum(part)[0](q) / (4 * np.pi**2)
+    density = measured_maps.read_spectrum(part)[0](q) / (4 * np.pi**2)
     for weight, own in ((1.0, power), (q**2, power * (kx**2 + ky**2))):
         assert own.sum() == pytest.approx(
             np.trapezoid(2 * np.pi * q**2 * weight * density, np.log(q)), rel=1e-3, abs=0.0
@@ -299,7 +300,7 @@ LENGTH = 1e-3
 def test_a_self_affine_road() -> None:
     """The exponent that it was made with, to 0.05; the square height is the integral of either spectrum."""
     heights = truth.rough(256, LENGTH, LENGTH, LENGTH / 100, 0.1, hurst=0.8)
-    found = statistics.surface_statistics(heights, (LENGTH, LENGTH))
+    found = surface_statistics.surface_statistics(heights, (LENGTH, LENGTH))
     assert found.hurst == pytest.approx(0.8, abs=0.05)
     assert found.rms_slope == pytest.approx(0.1, rel=1e-12)
     one = np.sum(found.psd_y) * 2 * np.pi / LENGTH
@@ -318,8 +319,8 @@ def test_hurst_exponent_of_a_part_of_a_surface(hurst: float, periodic: str) -> N
     falls = np.where((q > 0) & (q < np.pi * n / LENGTH), np.maximum(q, 8 * np.pi / LENGTH) ** (-1 - hurst), 0.0)
     for seed in range(8):
         waves = np.fft.fft2(np.random.default_rng(seed).standard_normal((2 * n, 2 * n))) * falls
-        part = treatment.treat(np.fft.ifft2(waves).real[:n, :n], "tilt", periodic).heights
-        found = statistics.surface_statistics(part, (LENGTH, LENGTH))
+        part = measured_maps.treat(np.fft.ifft2(waves).real[:n, :n], "tilt", periodic).heights
+        found = surface_statistics.surface_statistics(part, (LENGTH, LENGTH))
         fits.append((found.hurst, found.hurst_error))
     values, errors = np.array(fits).T
     error = float(errors.mean())
@@ -331,12 +332,14 @@ def test_hurst_exponent_of_a_part_of_a_surface(hurst: float, periodic: str) -> N
 def test_a_steeper_or_flatter_spectrum_is_not_self_affine(hurst: float) -> None:
     """Exponents of a power law that no self-affine surface has, 0 to 1, are not stated."""
     q = np.geomspace(1.0, 1e2, 24)
-    assert np.isnan(statistics._fit_hurst(q, q ** (-2.0 * (1.0 + hurst)), q)[0])
-    assert statistics._fit_hurst(q, q ** (-2.0 * (1.0 + 0.7)), q) == pytest.approx((0.7, 0.0), rel=1e-9, abs=1e-9)
+    assert np.isnan(surface_statistics._fit_hurst(q, q ** (-2.0 * (1.0 + hurst)), q)[0])
+    assert surface_statistics._fit_hurst(q, q ** (-2.0 * (1.0 + 0.7)), q) == pytest.approx(
+        (0.7, 0.0), rel=1e-9, abs=1e-9
+    )
 
 
 def test_white_noise_has_no_hurst_exponent() -> None:
-    found = statistics.surface_statistics(np.random.default_rng(3).standard_normal((64, 64)), (1.0, 1.0))
+    found = surface_statistics.surface_statistics(np.random.default_rng(3).standard_normal((64, 64)), (1.0, 1.0))
     assert np.isnan(found.hurst)
     assert found.nayak > 1.5  # of an isotropic random surface at least 1.5
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from parcontact.road import treatment
+from parcontact.job import measured_maps
 
 from . import truth
 
@@ -22,7 +22,7 @@ def test_a_trend_is_found_and_taken_off(detrend: str, trend: list[float]) -> Non
     terms = [np.ones_like(X), X, Y, X * X, X * Y, Y * Y]
     heights = np.sum([c * term for c, term in zip(trend, terms, strict=False)], axis=0)
     heights[np.random.default_rng(1).random(X.shape) < 0.1] = np.nan
-    done = treatment.treat(heights, detrend, "none")
+    done = measured_maps.treat(heights, detrend, "none")
     assert np.abs(done.heights).max() < 1e-17
     assert done.missing == np.isnan(heights).sum()
 
@@ -32,7 +32,7 @@ def test_holes_are_filled_smoothly() -> None:
     heights = X**2 - Y**2
     known = np.random.default_rng(2).random(X.shape) >= 0.02
     known[60:66, 40:46] = False
-    filled = treatment.fill(np.where(known, heights, np.nan), known)
+    filled = measured_maps.fill(np.where(known, heights, np.nan), known)
     assert np.array_equal(filled[known], heights[known])
     assert np.abs(filled - heights)[1:-1, 1:-1].max() < 1e-3
     assert np.abs(filled - heights).max() < 0.02  # at the edges of the map half of the neighbours are missing
@@ -41,22 +41,22 @@ def test_holes_are_filled_smoothly() -> None:
 def test_the_periodic_part_keeps_slopes() -> None:
     """No jump across the edges larger than between neighbours inside; the slope inside stays within 1 %."""
     tilted = ROAD + 1e-5 * X
-    made = treatment.make_periodic(tilted)
+    made = measured_maps.make_periodic(tilted)
     inside = np.abs(np.diff(ROAD, axis=1)).max()
     assert np.abs(made[:, 0] - made[:, -1]).max() < inside
     assert np.abs(made[0] - made[-1]).max() < inside
-    whole = truth.rms_slope(np.asarray(treatment.treat(tilted, "tilt", "smooth").heights), LENGTH)
+    whole = truth.rms_slope(np.asarray(measured_maps.treat(tilted, "tilt", "smooth").heights), LENGTH)
     assert whole == pytest.approx(truth.central_slope(ROAD, LENGTH, 4), rel=0.03)
 
 
 def test_a_periodic_map_is_left_alone() -> None:
     """What jumps nowhere has no smooth part, but for one difference across the edge."""
     periodic = truth.rough(128, LENGTH, 5e-4, 1.25e-4, 0.1)
-    assert_allclose(treatment.make_periodic(periodic), periodic, atol=0.03 * np.ptp(periodic))
+    assert_allclose(measured_maps.make_periodic(periodic), periodic, atol=0.03 * np.ptp(periodic))
 
 
 def test_mirrors_keep_everything() -> None:
-    mirrored = treatment.treat(ROAD, "none", "mirror").heights
+    mirrored = measured_maps.treat(ROAD, "none", "mirror").heights
     assert mirrored.shape == (256, 256)
     assert np.array_equal(mirrored[:128, :128], ROAD)
     assert np.array_equal(mirrored[128:, :128], ROAD[::-1])
@@ -74,7 +74,7 @@ def test_resampling_by_fourier_series(shape: tuple[int, int]) -> None:
 
     old = (128, 100)
     kept, lost = [(3, 4), (0, 31), (31, -5)], [(45, 60)]
-    found = treatment.resample(waves(old, *kept, *lost), shape)
+    found = measured_maps.resample(waves(old, *kept, *lost), shape)
     fits = all(abs(n) < size / 2 for n, size in zip(lost[0], shape[::-1], strict=True))
     assert_allclose(found, waves(shape, *kept, *(lost if fits else [])), atol=1e-12)
 
@@ -88,7 +88,7 @@ def test_an_ideal_low_pass(shape: tuple[int, int]) -> None:
         return np.sum([np.cos(a * x + b * y[:, None] + a + 0.3) for a, b in numbers], axis=0)
 
     kept, lost = [(3, 4), (0, 20), (10, 0), (6, -16)], [(0, 21), (11, 0), (9, 12)]
-    found = treatment.resample(waves((128, 128), *kept, *lost), shape, most=(20.0 * (1 + 1e-9), 10.0 * (1 + 1e-9)))
+    found = measured_maps.resample(waves((128, 128), *kept, *lost), shape, most=(20.0 * (1 + 1e-9), 10.0 * (1 + 1e-9)))
     assert_allclose(found, waves(shape, *kept), atol=1e-12)
 
 
@@ -96,14 +96,14 @@ def test_a_low_pass_of_a_map_with_open_edges() -> None:
     """A slope keeps its height, as its harmonic part is not filtered; a short wave on it is gone inside."""
     slope = np.tile(np.linspace(0.0, 1.0, 128, endpoint=False), (128, 1))
     wave = 0.1 * np.cos(2 * np.pi * 32 * np.arange(128) / 128)
-    found = treatment.resample(slope + wave[:, None], (128, 128), joined=False, most=(16.0, 16.0))
+    found = measured_maps.resample(slope + wave[:, None], (128, 128), joined=False, most=(16.0, 16.0))
     assert np.abs(found - slope)[8:-8, 8:-8].max() < 0.02
 
 
 def test_resampling_without_periodic_edges() -> None:
     """A slope stays one up to the edges: to 2 % of its height, where a Fourier series alone would swing by 10 %."""
     slope = np.tile(np.linspace(0.0, 1.0, 100, endpoint=False), (100, 1))
-    found = treatment.resample(slope, (250, 250), joined=False)
+    found = measured_maps.resample(slope, (250, 250), joined=False)
     expected = np.tile(np.minimum(np.linspace(0.0, 1.0, 250, endpoint=False), 0.99), (250, 1))
     assert np.abs(found - expected).max() < 0.02
 
@@ -113,16 +113,16 @@ def test_outliers_are_found() -> None:
     spiked[10, 20] += 50e-6
     spiked[90, 3] -= 50e-6
     spiked[0, 0] += 50e-6
-    assert not treatment.find_outliers(ROAD)[0].any()
-    assert np.argwhere(treatment.find_outliers(spiked)[0]).tolist() == [[0, 0], [10, 20], [90, 3]]
+    assert not measured_maps.find_outliers(ROAD)[0].any()
+    assert np.argwhere(measured_maps.find_outliers(spiked)[0]).tolist() == [[0, 0], [10, 20], [90, 3]]
 
 
 def test_outliers_are_clipped() -> None:
     """They get the median of their neighbours, and the plane is that without them; other points stay."""
     spiked = ROAD.copy()
     spiked[10, 20] += 5e-3
-    done = treatment.treat(spiked, "tilt", "none", clip=True)
-    plain = treatment.treat(ROAD, "tilt", "none").heights
+    done = measured_maps.treat(spiked, "tilt", "none", clip=True)
+    plain = measured_maps.treat(ROAD, "tilt", "none").heights
     rest = np.ones(ROAD.shape, dtype=bool)
     rest[10, 20] = False
     step = np.abs(np.diff(ROAD, axis=0)).max()

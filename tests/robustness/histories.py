@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from parcontact import scene
+from parcontact.files.recorder import StepRow
 from parcontact.job import Job
+from parcontact.march import scene
 from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.body import ZenerBody
-from parcontact.storage.step_row import StepRow
 
 Json = dict[str, Any]
 EPS = float(np.finfo(float).eps)

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from parcontact.doctor.bench import Bench, Watch
-from parcontact.history.timeline import Step
+from parcontact.door.doctor import Bench, Watch
+from parcontact.files.recorder import StepRow
+from parcontact.job.history import Step
 from parcontact.march.loop import March
-from parcontact.storage.step_row import StepRow
 
 LOAD = 1e-13  # how well the mean pressure is met
 BALANCE = {"double": 1e-11, "mixed": 1e-9}  # work = stored + dissipated, over the largest of all times

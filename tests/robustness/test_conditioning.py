@@ -11,12 +11,12 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from parcontact.march.failure import StepError
+from parcontact.contact import kernels
+from parcontact.files.recorder import StepRow
+from parcontact.march.laws import StepError
 from parcontact.march.loop import March
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics import loops
-from parcontact.solve import kernels
-from parcontact.storage.step_row import StepRow
 
 from . import twins
 from .scenes import Sketch

@@ -9,7 +9,7 @@ import pytest
 from conftest import WORLD, Main
 from drawing import ELASTIC, MAPS, WAVE, ZENER
 
-from parcontact.__main__ import main as program
+from parcontact.__main__ import main
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="of files, which root reads alone")
 
@@ -49,9 +49,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("whole")
     for name, text in JOBS.items():
         (place / f"{name}.yaml").write_text(text)
-        assert program([str(place / f"{name}.yaml"), "--quiet", "--out", str(place / name)]) == 0
-    assert program(["leak", str(place / "run")]) == 0
-    assert program(["theory", str(place / "run.yaml"), "--quiet", "--out", str(place / "run")]) == 0
+        assert main([str(place / f"{name}.yaml"), "--quiet", "--out", str(place / name)]) == 0
+    assert main(["leak", str(place / "run")]) == 0
+    assert main(["theory", str(place / "run.yaml"), "--quiet", "--out", str(place / "run")]) == 0
     return place
 
 

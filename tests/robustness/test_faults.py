@@ -20,8 +20,8 @@ from csv_rows import measures
 
 from parcontact import __main__
 from parcontact.errors import RunError
-from parcontact.storage import console, hdf5
-from parcontact.storage.tables import GrowingTable
+from parcontact.files import hdf5, recorder
+from parcontact.files.tables import GrowingTable
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="starts runs of its own")
 
@@ -383,7 +383,7 @@ def test_full_disk_while_maps_are_written(
 def test_log_and_time_left(here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """run.log begins with what one asks for; where there is no terminal, a line tells the time left. The
     first step takes longer than others, so that no time follows from it."""
-    monkeypatch.setattr(console, "LEFT_SECONDS", 0.0)
+    monkeypatch.setattr(recorder, "LEFT_SECONDS", 0.0)
     monkeypatch.setenv("SLURM_JOB_ID", "4711")
     monkeypatch.setattr(sys, "argv", ["/usr/bin/parcontact", "job.yaml", "--out", "out"])
     assert __main__.main(["job.yaml", "--out", "out"]) == DONE

@@ -11,10 +11,9 @@ import wavy_contact
 from closed_forms import step_responses
 from mpi4py import MPI
 
-from parcontact.doctor.bench import Bench
-from parcontact.doctor.installation_checks import CHECKS, Check, run_check
-from parcontact.doctor.small_jobs import (
+from parcontact.door.doctor import (
     CELL,
+    CHECKS,
     CREEP,
     FAST,
     GLASSY,
@@ -26,15 +25,18 @@ from parcontact.doctor.small_jobs import (
     RADIUS,
     RELAXATION,
     WAVELENGTH,
+    Bench,
+    Check,
     Json,
     K,
     crossed,
+    run_check,
     sphere,
     wave,
     zener,
 )
 from parcontact.march.loop import March
-from parcontact.physics import prony as viscoelastic
+from parcontact.physics import prony
 from parcontact.theory import full_contact, hertz, westergaard
 
 from .strict_bench import StrictBench
@@ -96,7 +98,7 @@ def moduli_far_apart(bench: Bench) -> None:
         long = {"duration": 1e3 * ratio * RELAXATION, "time_step": 1e3 * ratio * RELAXATION}
         job = sphere([{"pressure": load, **short}], points=8, size=8e-4, material=zener(*body))
         _, rows = bench.march(job)
-        compliance = viscoelastic.creep([row.time for row in rows[1:]], *body)
+        compliance = prony.creep([row.time for row in rows[1:]], *body)
         point = CELL * 1e-4 * 64 * load
         for row, j in zip(rows[1:], compliance, strict=True):
             bench.expect(f"approach, {ratio:g} : 1", row.measures.approach, point * j, error)
@@ -117,7 +119,7 @@ def odd_branches(bench: Bench) -> None:
         material = {"model": "zener", "modulus_inf": modulus_inf, "branches": branches}
 
         def relaxes(march: March) -> None:
-            exact = STIFF * float(viscoelastic.relaxation(march.row.time, *PRONY))
+            exact = STIFF * float(prony.relaxation(march.row.time, *PRONY))
             bench.expect("amplitude", bench.amplitude(march), exact, 1e-9)
 
         bench.march(wave([stage], material=material), relaxes)
@@ -186,15 +188,13 @@ def many_decades(bench: Bench) -> None:
             bench.expect("friction", rows[-1].measures.friction, friction, 1e-9)
 
 
-def _settling(omega: float, dt: float, steps: int, integrator: viscoelastic.Integrator) -> complex:
+def _settling(omega: float, dt: float, steps: int, integrator: prony.Integrator) -> complex:
     """Transfer modulus after some steps from a jump: each term b + (1 - b) (decay/z)^steps, b its steady value. The
     first quadratic step is linear: b + (m - b) (decay/z)^(steps - 1) with m = decay/z + phi (1 - 1/z)."""
     spring, moduli, times = TYRE
     total = complex(spring)
     for modulus, time in zip(moduli, times, strict=True):
-        share = (
-            complex(viscoelastic.discrete_modulus(omega, dt, 0.0, [modulus], [time], integrator=integrator)) / modulus
-        )
+        share = complex(prony.discrete_modulus(omega, dt, 0.0, [modulus], [time], integrator=integrator)) / modulus
         z = dt / time
         decay, turn = 1.0 / (1.0 + z) if integrator == "backward-euler" else np.exp(-z), np.exp(-1j * omega * dt)
         first = share + (1.0 - share) * decay * turn
@@ -245,7 +245,7 @@ def _across(bench: Bench, waves: tuple[int, int], axis: int) -> None:
     stage = {"velocity": velocity, "duration": 10 * dt, "time_step": dt, "pressure": 2e6}
     _, rows = bench.march(wave([stage], waves, (CELLS, CELLS)))
     moved = (K * waves[0] * velocity[0], K * waves[1] * velocity[1])
-    modulus = viscoelastic.discrete_modulus(sum(moved), dt, *PRONY)
+    modulus = prony.discrete_modulus(sum(moved), dt, *PRONY)
     force = -(HEIGHT**2) * np.hypot(*waves) * K * K * float(np.imag(modulus)) * WAVELENGTH**2
     found = rows[-1].measures.force_x, rows[-1].measures.force_y
     bench.expect("force along", found[axis], force, 1e-9)
@@ -273,7 +273,7 @@ def long_box(bench: Bench) -> None:
     stage = {"velocity": FAST, "duration": 2e-3, "time_step": 5e-4}
     tall = {"points": [3, 16], "size": [1e-4 * WAVELENGTH, WAVELENGTH]}
     march, rows = bench.march(wave([stage], (0, 1), grid=tall))
-    bench.expect("amplitude", bench.amplitude(march), UNIT * K * float(viscoelastic.relaxation(2e-3, *PRONY)), 1e-9)
+    bench.expect("amplitude", bench.amplitude(march), UNIT * K * float(prony.relaxation(2e-3, *PRONY)), 1e-9)
     bench.expect("friction along y", max(row.measures.friction for row in rows), 0.0, 1e-15, scale=1.0)
 
 

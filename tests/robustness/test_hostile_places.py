@@ -18,8 +18,8 @@ from conftest import WORLD, Main
 from matplotlib.figure import Figure
 
 from parcontact.errors import InputError
+from parcontact.files import tables
 from parcontact.results import info
-from parcontact.storage import tables
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
 

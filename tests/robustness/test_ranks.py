@@ -13,9 +13,9 @@ import pytest
 from csv_rows import rows
 from mpi4py import MPI
 
-from parcontact import job, scene
-from parcontact.march.loop import March
-from parcontact.march.loop import run_steps as run_march
+from parcontact import job
+from parcontact.march import scene
+from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Slab
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def solved(path: Path, comm: MPI.Intracomm, *overrides: str) -> March:
     """A march at the end of a job, on the ranks of `comm`."""
     loaded = job.load(path, overrides)
     done = March(scene.build(loaded, Slab(comm, *loaded.grid.points)))
-    run_march(done, [])
+    run_steps(done, [])
     return done
 
 

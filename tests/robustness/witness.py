@@ -10,14 +10,14 @@ from random import Random
 import numpy as np
 from mpi4py import MPI
 
-from parcontact import scene
 from parcontact.errors import RunError
-from parcontact.history import timeline as clock
-from parcontact.history.timeline import Step, Timeline
-from parcontact.march.failure import StepError
+from parcontact.files.recorder import StepRow
+from parcontact.job import history
+from parcontact.job.history import Step, Timeline
+from parcontact.march import scene
+from parcontact.march.laws import StepError
 from parcontact.march.loop import March, run_steps
 from parcontact.parallel.slab import Array, Slab
-from parcontact.storage.step_row import StepRow
 
 from . import scenes, twins
 from .scenes import Sketch
@@ -76,7 +76,7 @@ class Witness:
             self.failure, self.beyond = str(error), isinstance(error, StepError) and error.beyond_precision
         return self
 
-    def _note(self, timeline: clock.Timeline, row: StepRow) -> None:
+    def _note(self, timeline: history.Timeline, row: StepRow) -> None:
         if row.step:
             step = timeline[row.step]
             self.iterations = max(self.iterations, row.iterations)

@@ -10,11 +10,11 @@ import pytest
 import parcontact as pc
 from parcontact.errors import InputError
 from parcontact.job import Flat, Job, Rough, Sphere, Wave
-from parcontact.job.checks.frequencies import wave_numbers
-from parcontact.rubber import compound, measured_moduli
+from parcontact.job.meaning import wave_numbers
+from parcontact.march.measured_range import doubt_band
+from parcontact.rubber import compound, moduli
 from parcontact.rubber.series import Weigh
 from parcontact.rubber.shift import WLF, Factors, read_shift
-from parcontact.scene.measured_range import doubt_band
 
 from . import measured
 
@@ -37,7 +37,7 @@ STORAGE, LOSS = MODULUS.real / 1e6, MODULUS.imag / 1e6  # MPa
 def test_temperatures_near_to_each_other_are_sets_of_their_own(tmp_path: Path, step: float) -> None:
     """Ten in steps of a degree or less, at each of which the same frequencies were measured."""
     temperatures = tuple(step * np.arange(10.0))
-    found = measured_moduli.read_moduli(measured.write_sweeps(tmp_path / "rubber.csv", temperatures=temperatures))
+    found = moduli.read_moduli(measured.write_sweeps(tmp_path / "rubber.csv", temperatures=temperatures))
     assert [each.temperature for each in found.sets] == pytest.approx(temperatures)
     assert all(each.at.size == measured.FREQUENCIES.size for each in found.sets)
 
@@ -45,7 +45,7 @@ def test_temperatures_near_to_each_other_are_sets_of_their_own(tmp_path: Path, s
 def test_temperatures_that_waver_and_touch_are_refused(tmp_path: Path) -> None:
     rows = [FREQUENCY, STORAGE, LOSS, np.linspace(20.0, 25.0, FREQUENCY.size)]
     with pytest.raises(InputError, match="temperatures from 20 to 25 C cannot be separated"):
-        measured_moduli.read_moduli(sweep(tmp_path / "rubber.csv", "f[Hz],G'[MPa],G''[MPa],T[C]", rows))
+        moduli.read_moduli(sweep(tmp_path / "rubber.csv", "f[Hz],G'[MPa],G''[MPa],T[C]", rows))
 
 
 # -- units and orders --------------------------------------------------------------------------------------------------
@@ -67,7 +67,7 @@ ODD: dict[str, tuple[str, list[np.ndarray], str]] = {
 def test_what_no_rubber_is(tmp_path: Path, case: str) -> None:
     head, columns, sentence = ODD[case]
     with pytest.raises(InputError) as failure:
-        measured_moduli.read_moduli(sweep(tmp_path / "rubber.csv", head, columns))
+        moduli.read_moduli(sweep(tmp_path / "rubber.csv", head, columns))
     assert sentence in str(failure.value)
     assert "\n" not in str(failure.value)
 
@@ -83,7 +83,7 @@ def test_what_no_rubber_is(tmp_path: Path, case: str) -> None:
 )
 def test_headers_of_instruments(tmp_path: Path, head: str, columns: list[np.ndarray]) -> None:
     """Words with units in brackets of either kind; a modulus that tan delta stands for. Ten digits are written."""
-    (one,) = measured_moduli.read_moduli(sweep(tmp_path / "rubber.csv", head, columns)).sets
+    (one,) = moduli.read_moduli(sweep(tmp_path / "rubber.csv", head, columns)).sets
     assert one.at == pytest.approx(2 * np.pi * FREQUENCY, rel=1e-9)
     assert one.storage == pytest.approx(1e6 * STORAGE, rel=1e-9)
     assert one.loss == pytest.approx(1e6 * LOSS, rel=1e-9)

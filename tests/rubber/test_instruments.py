@@ -8,7 +8,7 @@ from conftest import Main
 from numpy.testing import assert_allclose
 
 from parcontact.errors import InputError
-from parcontact.rubber import compound, measured_moduli
+from parcontact.rubber import compound, moduli
 from parcontact.rubber.shift import WLF
 
 from . import measured
@@ -61,7 +61,7 @@ def test_shear_moduli(tmp_path: Path, form: str) -> None:
     """All forms mean the same three points; ten digits are written."""
     path, (text, encoding) = tmp_path / "table.csv", SHEAR[form]
     path.write_bytes(text.encode(encoding))
-    found = measured_moduli.read_moduli(path)
+    found = moduli.read_moduli(path)
     (one,) = found.sets
     assert not found.tension
     assert found.doubts == ()
@@ -73,7 +73,7 @@ def test_shear_moduli(tmp_path: Path, form: str) -> None:
 def test_columns_that_are_not_read_may_hold_anything(tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     path.write_text("f[Hz],G'[MPa],Status,G''[MPa]\n0.1,3,ok,1\n1,4,,1\n10,5,end,1\n")
-    (one,) = measured_moduli.read_moduli(path).sets
+    (one,) = moduli.read_moduli(path).sets
     assert_allclose(one.storage, [3e6, 4e6, 5e6], rtol=1e-12)
 
 
@@ -88,20 +88,20 @@ def test_words_of_a_rheometer(tmp_path: Path) -> None:
     ):
         path = tmp_path / "table.csv"
         path.write_text(rows(text, RATES, STORAGE, LOSS))
-        found = measured_moduli.read_moduli(path)
+        found = moduli.read_moduli(path)
         assert found.tension == (not shear)
         assert found.sets[0].storage[0] == pytest.approx(3e5 if shear else 1e5, rel=1e-12)
         assert [("of shear (G) or tension (E)" in doubt, "3 times too stiff" in doubt) for doubt in found.doubts] == (
             [(True, True)] if shear else []
         )
     path.write_text(rows("Time (s),Creep compliance (1/MPa)", RATES, np.array([0.1, 0.15, 0.2])))
-    (doubt,) = measured_moduli.read_moduli(path).doubts
+    (doubt,) = moduli.read_moduli(path).doubts
     assert "of shear (J) or tension (D): it is taken for J" in doubt
 
 
 def test_a_falling_compliance(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="a compliance falls with time"):
-        measured_moduli.read_moduli(write(tmp_path / "table.txt", "t[s] J(t)[1/MPa]", RATES, np.array([3.0, 2.0, 1.0])))
+        moduli.read_moduli(write(tmp_path / "table.txt", "t[s] J(t)[1/MPa]", RATES, np.array([3.0, 2.0, 1.0])))
 
 
 def temperature_sweep(path: Path, law: WLF, step: float = 2.0) -> Path:
@@ -208,7 +208,7 @@ def test_all_forms_mean_the_same(tmp_path: Path, form: str) -> None:
     """One set, of shear, in SI and by rising rate; nu = 1/2 makes G a third of E."""
     path = tmp_path / "rubber.csv"
     path.write_text(SAME[form])
-    found = measured_moduli.read_moduli(path)
+    found = moduli.read_moduli(path)
     (one,) = found.sets
     frequency, storage, loss = np.array(ROWS).T
     assert found.kind == "frequency"
@@ -223,7 +223,7 @@ def test_all_forms_mean_the_same(tmp_path: Path, form: str) -> None:
 def test_relaxation(tmp_path: Path, head: str) -> None:
     path = tmp_path / "rubber.csv"
     path.write_text(f"{head}\n1.0 5 293.15\n0.1 9 293.15\n10 4 293.15\n")
-    found = measured_moduli.read_moduli(path)
+    found = moduli.read_moduli(path)
     (one,) = found.sets
     assert found.kind == "time"
     assert one.temperature == pytest.approx(20.0, abs=1e-12)
@@ -239,7 +239,7 @@ def test_temperatures_are_sets(tmp_path: Path) -> None:
     pairs = [line.rsplit(",", 1) for line in lines]
     mixed = [f"{numbers},{float(temperature) + 0.2 * (n % 3 - 1)}" for n, (numbers, temperature) in enumerate(pairs)]
     path.write_text("\n".join([*head, *mixed[::2], *mixed[1::2]]))
-    found = measured_moduli.read_moduli(path)
+    found = moduli.read_moduli(path)
     assert [round(each.temperature or 0.0) for each in found.sets] == list(measured.TEMPERATURES)
     assert all(each.at.size == measured.FREQUENCIES.size for each in found.sets)
 
@@ -283,7 +283,7 @@ def test_what_will_not_do(tmp_path: Path, case: str) -> None:
     path = tmp_path / "rubber.csv"
     path.write_text(content)
     with pytest.raises(InputError) as failure:
-        measured_moduli.read_moduli(path)
+        moduli.read_moduli(path)
     assert sentence in str(failure.value)
     assert str(failure.value).startswith(str(path))
     assert "\n" not in str(failure.value)
@@ -292,4 +292,4 @@ def test_what_will_not_do(tmp_path: Path, case: str) -> None:
 def test_no_file(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "none.csv"):
         with pytest.raises(InputError, match="is not a file"):
-            measured_moduli.read_moduli(path)
+            moduli.read_moduli(path)

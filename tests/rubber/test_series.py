@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose
 
 from parcontact import job as jobs
 from parcontact.errors import InputError
-from parcontact.job.checks.meaning import modulus_after
-from parcontact.rubber import compound, measured_moduli, series, superposition
+from parcontact.job.meaning import modulus_after
+from parcontact.rubber import compound, series
+from parcontact.rubber import moduli as measured_moduli
 from parcontact.rubber.shift import WLF, Arrhenius, Density, Factors, log_vertical, read_shift
 
 from . import measured
@@ -75,7 +76,7 @@ def test_other_laws(tmp_path: Path) -> None:
     """Free factors where the sets overlap: those of the truth to 0.02 decades of 5; Arrhenius where it holds: energy
     to 1 %."""
     warm = measured.write_sweeps(tmp_path / "warm.csv", temperatures=(0.0, 10.0, 20.0, 35.0, 60.0))
-    free = superposition.superpose(measured_moduli.read_moduli(warm), 20.0, "free", "none").shift
+    free = series.superpose(measured_moduli.read_moduli(warm), 20.0, "free", "none").shift
     assert isinstance(free, Factors)
     expected = [measured.log_factor(t) for t in free.temperatures]
     assert_allclose(free.logs, expected, atol=0.02)
@@ -86,9 +87,7 @@ def test_other_laws(tmp_path: Path) -> None:
         moduli = measured.complex_modulus(omega * 10.0 ** law.log_factor(temperature))
         lines += [f"{w:.10g} {g.real:.10g} {g.imag:.10g} {temperature:g}" for w, g in zip(omega, moduli, strict=True)]
     (tmp_path / "arrhenius.txt").write_text("\n".join(lines))
-    found = superposition.superpose(
-        measured_moduli.read_moduli(tmp_path / "arrhenius.txt"), 20.0, "arrhenius", "none"
-    ).shift
+    found = series.superpose(measured_moduli.read_moduli(tmp_path / "arrhenius.txt"), 20.0, "arrhenius", "none").shift
     assert isinstance(found, Arrhenius)
     assert found.energy == pytest.approx(law.energy, rel=0.01)
 
@@ -116,7 +115,7 @@ def test_sets_that_have_no_shift(
 ) -> None:
     path = measured.write_sweeps(tmp_path / "rubber.csv", temperatures=temperatures)
     with pytest.raises(InputError, match=sentence):
-        superposition.superpose(measured_moduli.read_moduli(path), reference, "wlf", "none")
+        series.superpose(measured_moduli.read_moduli(path), reference, "wlf", "none")
 
 
 def test_free_factors_need_an_overlap(tmp_path: Path) -> None:

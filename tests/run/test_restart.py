@@ -15,11 +15,11 @@ from restarting import ELASTIC, FASTER, PRESS, ROUGH, SCENES, SLIDE, TOUCH, Benc
 
 from parcontact.__main__ import main
 from parcontact.errors import InputError
+from parcontact.files import checkpoint, tables
+from parcontact.files.provenance import read_budget
+from parcontact.files.run import chosen_by_accuracy
 from parcontact.job import Job
 from parcontact.results import info
-from parcontact.run.run import chosen_by_accuracy
-from parcontact.storage import checkpoint, tables
-from parcontact.storage.provenance import read_budget
 
 
 def cut_anywhere(bench: Bench, data: dict[str, Any], everywhere: bool = True) -> None:

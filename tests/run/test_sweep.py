@@ -19,17 +19,16 @@ from mpi4py import MPI
 from sweeping import JOB, table
 
 from parcontact.__main__ import main
+from parcontact.door import memory
 from parcontact.doubts import Doubt
 from parcontact.errors import InputError, RunError
+from parcontact.files import directory, files, run, sweep, tables
+from parcontact.files.tables import StopFile
 from parcontact.job import Case, Job, load_cases
-from parcontact.parallel.groups import Groups
-from parcontact.parallel.signals import Signals
+from parcontact.parallel.root import Signals
 from parcontact.parallel.slab import Slab
-from parcontact.plan import memory
+from parcontact.parallel.tally import Groups
 from parcontact.results import info, slide, sweep_table
-from parcontact.run import sweep, watch
-from parcontact.storage import directory, files, tables
-from parcontact.storage.stopfile import StopFile
 
 LEAVING = """
 grid: {points: 32, size: 1.0e-3, boundary: free}
@@ -183,7 +182,7 @@ def test_no_case_begins_when_the_time_is_used_up(cases: tuple[Case, ...], capsys
         return 0
 
     for seconds, code in ((1.0, 3), (60.0, 0)):
-        limit, alone = watch.limit(watch.age() + seconds, {}), Groups(MPI.COMM_SELF)
+        limit, alone = run.limit_time(run.age() + seconds, {}), Groups(MPI.COMM_SELF)
         assert sweep.SweepRun(cases[:2], alone, act, sweep.stop_file(cases), limit=limit).run(cases[:2]) == code
         assert len(begun) == (0 if code else 2)
     said = capsys.readouterr().out.splitlines()[0]
@@ -423,19 +422,19 @@ def test_a_stop_file_ends_the_case_that_runs(tmp_path: Path, monkeypatch: pytest
     """It saves, and the same command goes on with it."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "job.yaml").write_text(JOB)
-    decide = watch.Watch.decide
+    decide = run.Watch.decide
 
-    def ask(self: watch.Watch, step: int, *others: Any) -> watch.Verdict:
+    def ask(self: run.Watch, step: int, *others: Any) -> run.Verdict:
         if step == 4:
             Path("out/job/stop").touch()
         return decide(self, step, *others)
 
-    monkeypatch.setattr(watch, "LOOK_SECONDS", -1.0)
-    monkeypatch.setattr(watch.Watch, "decide", ask)
+    monkeypatch.setattr(run, "LOOK_SECONDS", -1.0)
+    monkeypatch.setattr(run.Watch, "decide", ask)
     assert main(["job.yaml", "--quiet"]) == 3
     assert [row["state"] for row in table()] == ["begun", *"-----"]
     assert Path("out/job/stop").exists()  # and stops no later program
-    monkeypatch.setattr(watch.Watch, "decide", decide)
+    monkeypatch.setattr(run.Watch, "decide", decide)
     assert main(["job.yaml", "--quiet"]) == 0
     assert "stopped after step 4 of" in Path("out/job/cases/000/run.log").read_text()
     assert {row["state"] for row in table()} == {"done"}

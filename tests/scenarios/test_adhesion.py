@@ -32,8 +32,8 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 import parcontact as pc
-from parcontact.effects.adhesion.pull_off import PullOff, find
-from parcontact.python.row import Row
+from parcontact.door.simulation import Row
+from parcontact.effects.adhesion.results import PullOff, find
 
 ALPHA, AMPLITUDE, WAVELENGTH = 0.3, 5e-6, 1e-3  # of Johnson's wave
 

@@ -6,20 +6,18 @@ import numpy as np
 import pytest
 from counting import ELASTIC, ITERATIONS, NX, NY, PRESS, RUBBER, SLIDE, STAND, Json, job, whole
 
-from parcontact import scene
-from parcontact.accuracy.embedded import EmbeddedPair
-from parcontact.history.timeline import Timeline
+from parcontact.contact.constraint import NonNegative
+from parcontact.contact.problem import MeanPressure, Operators, Problem, Workspace
+from parcontact.contact.solver import ContactSolver
 from parcontact.job import Job
+from parcontact.job.history import Timeline
+from parcontact.march import choices, scene
+from parcontact.march.embedded import EmbeddedPair
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 from parcontact.physics.body import ElasticBody, ZenerBody
-from parcontact.physics.motion import AlongX
-from parcontact.physics.probe import Probe
-from parcontact.physics.slopes import friction_by_energy
-from parcontact.solve.constraint import NonNegative
-from parcontact.solve.contact import ContactSolver
-from parcontact.solve.problem import MeanPressure, Operators, Problem
-from parcontact.solve.workspace import Workspace
+from parcontact.physics.energy import Probe
+from parcontact.physics.motion import AlongX, friction_by_energy
 
 
 def bare(planned: Job) -> Counter[str]:
@@ -88,7 +86,7 @@ def test_elastic_static() -> None:
     assert counts["shift"] == 0
     assert not any(
         effect.on
-        for effect in scene.choices(planned).decisions
+        for effect in choices.choices(planned).decisions
         if effect.name not in ("surface spectrum", "checkpoints")
     )
 

@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from static_jobs import run
 
 import parcontact as pc
+from parcontact.contact import starts
 from parcontact.errors import RunError
-from parcontact.solve import nested
-from parcontact.solve.fallback import cold_start
-from parcontact.storage.step_row import StepRow
+from parcontact.files.recorder import StepRow
 from parcontact.theory import hertz, westergaard
 
 SPHERE = (0.15, 1e-2, 2.75e6)  # force [N], radius [m], shear modulus [Pa] of jobs/hertz.yaml
@@ -247,14 +246,14 @@ def test_only_the_first_solve_of_a_large_job_starts_on_coarser_grids(
     """With the limit lowered: its pressure is the same to the tolerance, at fewer calls; later steps start as ever."""
     words = ("grid.points=64", "surface.short_wavelength=1.25e-4", "history=[{pressure: 5.0e3}, {pressure: 6.0e3}]")
     (small, fields), (small_after, _) = run(bumps, *words)
-    monkeypatch.setattr(cold_start, "WORTHWHILE", 64 * 64)
-    grids, descend = list[int](), nested.descend
+    monkeypatch.setattr(starts, "WORTHWHILE", 64 * 64)
+    grids, descend = list[int](), starts.descend
 
-    def counted(levels: list[nested.Level], *given: Any) -> None:
+    def counted(levels: list[starts.Level], *given: Any) -> None:
         grids.append(len(levels))
         descend(levels, *given)
 
-    monkeypatch.setattr(nested, "descend", counted)
+    monkeypatch.setattr(starts, "descend", counted)
     (large, expected), (large_after, _) = run(bumps, *words)
     assert grids == [2]
     assert_allclose(fields["pressure"], expected["pressure"], rtol=0, atol=1e-7 * expected["pressure"].max())

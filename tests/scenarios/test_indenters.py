@@ -16,11 +16,11 @@ from marched_jobs import marched
 from numpy.testing import assert_allclose
 from physics.maps import coordinates
 
+from parcontact.files.recorder import StepRow
 from parcontact.job import Job
-from parcontact.job.checks.meaning import doubts_of_scene
+from parcontact.job.meaning import doubts_of_scene
 from parcontact.parallel.slab import Slab
-from parcontact.physics.shapes import Conical, FlatEnded, Pyramidal, Shape
-from parcontact.storage.step_row import StepRow
+from parcontact.physics.surface import Conical, FlatEnded, Pyramidal, Shape
 
 SIZE, G = 1e-3, 1e6
 STIFFNESS = 4.0 * G  # E* of an incompressible body [Pa]

@@ -9,11 +9,10 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 import parcontact as pc
-from parcontact.accuracy import budget
-from parcontact.accuracy.observation import radius_of
-from parcontact.march import step_errors
-from parcontact.physics.layer import Layer
-from parcontact.python.row import Row
+from parcontact.door.simulation import Row
+from parcontact.march import budget, state
+from parcontact.march.time_error import radius_of
+from parcontact.physics.halfspace import Layer
 
 
 def last_row(job: dict[str, Any], comm: MPI.Intracomm = MPI.COMM_SELF) -> Row:
@@ -128,8 +127,8 @@ def test_a_layer_costs_no_iterations(base: str, poisson: float) -> None:
 
 def test_theory_of_a_layer_in_full_contact(tmp_path: Any) -> None:
     """Persson's theory is exact in full contact: friction of all waves over S."""
+    from parcontact.door.python import of_parts
     from parcontact.parallel.slab import Slab
-    from parcontact.python.given_jobs import of_parts
     from parcontact.results import prediction
 
     job = of_parts(**sliding_wave({"thickness": 1e-4}))
@@ -280,7 +279,7 @@ def test_steps_are_judged_by_the_whole_edge_of_spots(monkeypatch: pytest.MonkeyP
         seen.append(given)
         return budget.estimate(*given)
 
-    monkeypatch.setattr(step_errors, "estimate", estimate)
+    monkeypatch.setattr(state, "estimate", estimate)
     job = scene(grid=GRID, surface=ROUGH, material={**ZENER, "hardness": 2e5}, history=[PRESS, SLIDE])
     march, _ = marched(job)
     touches, (run, observed) = march.field("pressure") > 0.0, seen[-1]

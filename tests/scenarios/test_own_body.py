@@ -15,11 +15,11 @@ from marched_jobs import column, marched
 import parcontact as pc
 from parcontact.errors import InputError
 from parcontact.job import Job
-from parcontact.job.sections.materials import Elastic
+from parcontact.job.materials import Elastic
+from parcontact.march import scene
 from parcontact.parallel.slab import Slab
 from parcontact.physics.body import BodyMemory, Trial, ZenerBody
 from parcontact.physics.prony import Prony
-from parcontact.scene import scene as making
 
 TIME = 1e-3  # relaxation time [s]
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 5e-4, "short_wavelength": 2.5e-4, "rms_slope": 0.05}
@@ -64,7 +64,7 @@ def job(stage: dict[str, Any]) -> Job:
 def use(monkeypatch: pytest.MonkeyPatch) -> Callable[[type[OwnBody]], None]:
     def replace(kind: type[OwnBody]) -> None:
         monkeypatch.setattr(
-            making, "_body_and_energy", lambda setup, *_: (kind(setup.slab, setup.prony.modulus_inf), None)
+            scene, "_body_and_energy", lambda setup, *_: (kind(setup.slab, setup.prony.modulus_inf), None)
         )
 
     return replace

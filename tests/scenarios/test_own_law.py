@@ -16,12 +16,12 @@ from marched_jobs import column, marched
 from numpy.testing import assert_allclose
 
 import parcontact as pc
-from parcontact.effects import contact_law
+from parcontact.contact.constraint import Cells, Mask, NonNegative, Set
+from parcontact.effects import effect
 from parcontact.effects.leakage.over_time import Gaps
 from parcontact.job import Job
 from parcontact.parallel.slab import Array, Slab
 from parcontact.results import maps
-from parcontact.solve.constraint import Cells, Mask, NonNegative, Set
 
 FLUID, LOAD = 4e4, 6e4  # pressure of the fluid, and the load that it does not bear [Pa]
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "short_wavelength": 1.25e-4, "rms_slope": 0.1}
@@ -79,9 +79,7 @@ class InFluid:
 @pytest.fixture
 def with_fluid(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
     """All that a law of one's own needs."""
-    return lambda: monkeypatch.setattr(
-        contact_law, "constraint_of", lambda job, unit=1.0, most=0.0: InFluid(FLUID / unit)
-    )
+    return lambda: monkeypatch.setattr(effect, "constraint_of", lambda job, unit=1.0, most=0.0: InFluid(FLUID / unit))
 
 
 def job(load: float, points: int = 32, **changes: Any) -> dict[str, Any]:

@@ -18,15 +18,13 @@ from marched_jobs import begun, column, marched
 from numpy.typing import NDArray
 from short_job import JOB
 
-from parcontact import scene
-from parcontact.history.timeline import Timeline
 from parcontact.job import Job
-from parcontact.march.failure import StepError
+from parcontact.job.history import Timeline
+from parcontact.march import sanity, scene
+from parcontact.march.laws import StepError
 from parcontact.parallel.slab import Slab
-from parcontact.physics.measures import Measures
-from parcontact.physics.probe import Probe
-from parcontact.scene import sanity
-from parcontact.solve.certificate import Certificate
+from parcontact.physics.energy import Probe
+from parcontact.physics.measures import Certificate, Measures
 
 ROUGH = {"shape": "rough", "hurst": 0.8, "long_wavelength": 2.5e-4, "rms_slope": 0.02, "seed": 1}
 DECADES = {

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from sliding import CELL, FAST, HEIGHT, MEAN, PRESS, WAVELENGTH, Json, K, rough, slide, wave
 
 import parcontact as pc
+from parcontact.files import tables
+from parcontact.files.recorder import StepRow
 from parcontact.march.loop import March
 from parcontact.physics.prony import Integrator
-from parcontact.storage import tables
-from parcontact.storage.step_row import StepRow
 from parcontact.theory import full_contact
 
 

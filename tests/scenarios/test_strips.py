@@ -11,7 +11,7 @@ from mpi4py import MPI
 import parcontact as pc
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics import strip
+from parcontact.physics import love as strip
 from parcontact.physics.halfspace import HalfSpace
 from parcontact.physics.love import cell_factor, love
 

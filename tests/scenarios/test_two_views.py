@@ -8,9 +8,9 @@ import pytest
 from marched_jobs import marched
 
 import parcontact as pc
-from parcontact.accuracy.budget import ErrorSums
+from parcontact.door.python import Curve
 from parcontact.job import Job
-from parcontact.python.curves import Curve
+from parcontact.march.budget import ErrorSums
 
 Json = dict[str, Any]
 TYRE: Json = {"include": "synthetic_tyre"}

@@ -26,15 +26,15 @@ from counting import (
 )
 from marched_jobs import begun, marched
 
-from parcontact import scene
-from parcontact.history.timeline import Timeline
-from parcontact.solve.constraint import NonNegative
-from parcontact.solve.problem import Approach, Problem
+from parcontact.contact.constraint import NonNegative
+from parcontact.contact.problem import Approach, Problem
+from parcontact.job.history import Timeline
+from parcontact.march import choices
 
 
 def test_every_row_has_a_test() -> None:
     """By name, in ROWS or TESTED."""
-    assert {effect.name for effect in scene.choices(job()).decisions} == {*ROWS, *TESTED}
+    assert {effect.name for effect in choices.choices(job()).decisions} == {*ROWS, *TESTED}
 
 
 FROZEN = {**RUBBER, "branches": [*RUBBER["branches"], {"modulus": 1e5, "relaxation_time": 1e6}]}

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from parcontact import scene
 from parcontact.job import Job
+from parcontact.march import rigid_surface, scene
 from parcontact.parallel.slab import Slab
-from parcontact.physics.lowest import rows_of
+from parcontact.physics.loops import rows_of
 from parcontact.physics.surface import Surface
-from parcontact.scene import rigid_surface
 
 NX, NY = 40, 30
 SIZE = (1e-3, 7.5e-4)

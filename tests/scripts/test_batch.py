@@ -9,7 +9,7 @@ from typing import NamedTuple
 import pytest
 
 from parcontact.__main__ import main
-from parcontact.command.arguments import parse_arguments, without_restart
+from parcontact.door.arguments import parse_arguments, without_restart
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 NOTE = "{{ printf '%s|' {0} \"$@\"; echo; }} >> said"

@@ -7,7 +7,7 @@ import pytest
 from marched_jobs import load_script
 
 from parcontact import job as jobs
-from parcontact import scene
+from parcontact.march import scene
 from parcontact.parallel.slab import Slab
 
 coverage_scenes = load_script("coverage_scenes")

@@ -6,15 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from parcontact.contact.constraint import Constraint, NonNegative
+from parcontact.contact.problem import Approach, MeanPressure, Operator, Operators, Problem, Workspace
+from parcontact.contact.solver import Contact, ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
+from parcontact.physics.measures import Certificate
 from parcontact.physics.roughness import Roughness
-from parcontact.solve.certificate import Certificate
-from parcontact.solve.constraint import Constraint, NonNegative
-from parcontact.solve.contact import Contact, ContactSolver
-from parcontact.solve.problem import Approach, MeanPressure, Operator, Operators, Problem
-from parcontact.solve.workspace import Workspace
 
 Map = NDArray[np.float64]
 TIGHT = 1e-11  # a certificate to this makes pressures agree to 1e-9 of the highest

@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
-from parcontact.solve.bounded import Bounded
-from parcontact.solve.contact import Contact
-from parcontact.solve.fallback import active_set
-from parcontact.solve.problem import Approach, MeanPressure
+from parcontact.contact import starts
+from parcontact.contact.constraint import Bounded
+from parcontact.contact.problem import Approach, MeanPressure
+from parcontact.contact.solver import Contact
 
 from .bodies import BODIES, TIGHT, Bench, Map, rough, solver, white
 
@@ -130,4 +130,4 @@ def test_the_approach_that_comes_of_a_load(mean: float) -> None:
 
 
 def by_sets(body: Bench, h: Map, control: MeanPressure) -> Contact:
-    return active_set.solve(body.solver, body.problem(h, control), np.zeros_like(h))
+    return starts.solve(body.solver, body.problem(h, control), np.zeros_like(h))

@@ -15,15 +15,14 @@ from hypothesis import strategies as st
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
+from parcontact.contact import starts
+from parcontact.contact.constraint import CELL, MOST_GIVEN_BACK, LocalLoad, NonNegative
+from parcontact.contact.problem import Approach, MeanPressure, Operators
+from parcontact.contact.solver import ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
+from parcontact.physics import measures
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve import certificate
-from parcontact.solve.constraint import CELL, NonNegative
-from parcontact.solve.contact import ContactSolver
-from parcontact.solve.fallback import cold_start
-from parcontact.solve.local_load import MOST_GIVEN_BACK, LocalLoad
-from parcontact.solve.problem import Approach, MeanPressure, Operators
 
 from . import polonsky_keer
 from .bodies import BODIES, MODULUS, ROUNDING, TIGHT, Map, keep, rough, solve, solver, white
@@ -136,8 +135,8 @@ def test_periodic_approach_beyond_full_contact_fails() -> None:
 
 
 def test_what_a_contact_reports_is_documented() -> None:
-    for field in dataclasses.fields(certificate.Certificate):
-        assert f"{field.name}: " in str(certificate.Certificate.__doc__)
+    for field in dataclasses.fields(measures.Certificate):
+        assert f"{field.name}: " in str(measures.Certificate.__doc__)
 
 
 # -- what a contact costs: starts, messages and operator calls of an iteration, single precision ----------------------
@@ -184,7 +183,7 @@ def test_calls_in_a_box_with_nothing_around(load: float) -> None:
 
     solving, p = solver(h, tolerance=1e-5, **free), np.zeros_like(h)
     before = solving.slab.tally["operator"]
-    cold_start.prepare_start(solving.solver, solving.problem(h, MeanPressure(load)), p, on)
+    starts.prepare_start(solving.solver, solving.problem(h, MeanPressure(load)), p, on)
     found = keep(solving.solve(h, MeanPressure(load), p))
     assert np.linalg.norm(found.p - exact.p) <= 1e-5 * np.linalg.norm(exact.p)
     assert solving.slab.tally["operator"] - before <= 25

@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from parcontact.contact import starts
+from parcontact.contact.constraint import NonNegative
+from parcontact.contact.problem import Approach, MeanPressure, Operators, Problem, Workspace
+from parcontact.contact.solver import Contact, ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
+from parcontact.physics.convolution import SIDE, Tiles
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.tiles import SIDE, Tiles
-from parcontact.solve import dilute_contact as module
-from parcontact.solve.constraint import NonNegative
-from parcontact.solve.contact import Contact, ContactSolver
-from parcontact.solve.fallback import cold_start
-from parcontact.solve.problem import Approach, MeanPressure, Operators, Problem
-from parcontact.solve.workspace import Workspace
 
 from .bodies import Map
 
@@ -43,7 +41,7 @@ def found(
     tolerance: float = TOLERANCE,
 ) -> tuple[Contact, Array | None, int]:
     """A contact found from nothing, its whole pressure on root, and calls of the operators of the whole grid."""
-    monkeypatch.setattr(module, "BLOCKS", POINTS // 4)
+    monkeypatch.setattr(starts, "BLOCKS", POINTS // 4)
     slab, whole = Slab(comm, POINTS, POINTS), spheres()
     h, height = np.ascontiguousarray(whole[slab.rows]), float(np.ptp(whole))
 
@@ -54,12 +52,12 @@ def found(
 
     def tiles_on(tiles: Tiles, tolerance: float) -> Any:
         work = Workspace(Slab.alone(SIDE, tiles.count * SIDE, slab.tally), tolerance)
-        solver = ContactSolver(work, height, tolerance, 500, module.LARGER_CELLS, BODY.free)
+        solver = ContactSolver(work, height, tolerance, 500, starts.LARGER_CELLS, BODY.free)
         return solver, *BODY.on_tiles(tiles, slab.tally)
 
     solver, operators = solver_on(slab, tolerance)
     problem, p = Problem(*operators, h, NonNegative(), control), slab.zeros()
-    contact = cold_start.prepare_start(solver, problem, p, solver_on, tiles_on if on_tiles else None)
+    contact = starts.prepare_start(solver, problem, p, solver_on, tiles_on if on_tiles else None)
     before = slab.tally["operator"]
     contact = contact or solver.solve(problem, p)
     return contact, slab.to_root(contact.p), slab.tally["operator"] - before
@@ -67,7 +65,7 @@ def found(
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("control", [LIGHT, Approach(0.001)], ids=["load", "approach"])
-@pytest.mark.parametrize(("tolerance", "fewest"), [(TOLERANCE, 0), (0.9 * module.FINEST, 1)], ids=["loose", "tight"])
+@pytest.mark.parametrize(("tolerance", "fewest"), [(TOLERANCE, 0), (0.9 * starts.FINEST, 1)], ids=["loose", "tight"])
 def test_few_calls_of_the_whole_operator(
     comm: MPI.Intracomm,
     control: MeanPressure | Approach,
@@ -92,7 +90,7 @@ def test_tiles_at_an_edge() -> None:
     """A block at the edge has no neighbour beyond it."""
     near, slab = np.zeros((16, 16), np.bool_), Slab.alone(512, 512)
     near[5, 0] = True
-    found = module._tiles_of(near, slab)
+    found = starts._tiles_of(near, slab)
     assert set(zip(found.rows, found.columns, strict=True)) == {(j, i) for j in (4, 5, 6) for i in (0, 1)}
 
 
@@ -104,14 +102,14 @@ def test_maps_of_ranks_without_rows(comm: MPI.Intracomm) -> None:
     slab, tiles = Slab(comm, nx, ny, rows_of=dealt.__getitem__), Tiles((nx, ny), np.array([0, 2]), np.array([1, 0]))
     whole = np.random.default_rng(1).random((ny, nx))
     held = slab.tally["map bytes"]
-    found: Array | None = module._stacked(slab, tiles, whole[slab.rows])
+    found: Array | None = starts._stacked(slab, tiles, whole[slab.rows])
     assert slab.tally["map bytes"] - held == (0 if found is None else found.nbytes)
     stacked = slab.agree(found)
     assert stacked is not None
     assert np.array_equal(stacked[:SIDE, : nx - SIDE], whole[:SIDE, SIDE:])
     assert not stacked[:SIDE, nx - SIDE :].any()
     back = slab.empty()
-    module._unstack(slab, tiles, stacked, back)
+    starts._unstack(slab, tiles, stacked, back)
     outside = np.ones((ny, nx), np.bool_)
     outside[:SIDE, SIDE:] = outside[2 * SIDE :, :SIDE] = False
     assert np.array_equal(back, np.where(outside, 0.0, whole)[slab.rows])
@@ -128,7 +126,7 @@ def test_all_ranks_learn_that_root_failed(comm: MPI.Intracomm) -> None:
     nothing: Any = None
     problem = Problem(nothing, nothing, slab.zeros(), NonNegative(), Approach(1.0))
     with pytest.raises(MemoryError, match="no room for tiles"):
-        module.OnTheseTiles(tiles, on, problem, slab, 1.0).solve(1e-3, slab.zeros())
+        starts.OnTheseTiles(tiles, on, problem, slab, 1.0).solve(1e-3, slab.zeros())
     assert slab.sum(1.0) == [comm.size]
 
 
@@ -159,7 +157,7 @@ def test_points_beyond_the_end_of_the_grid_do_not_touch() -> None:
     heights = np.random.default_rng(1).uniform(-3.0, -1.0, (36, 40))
     nothing: Any = None
     problem = Problem(nothing, nothing, heights, NonNegative(), Approach(1.0))
-    module.OnTheseTiles(grid, on, problem, slab, 2.0).solve(1e-3, slab.zeros())
+    starts.OnTheseTiles(grid, on, problem, slab, 2.0).solve(1e-3, slab.zeros())
     (stacked,) = found
     assert (stacked[:36, :40] == heights).all()
     stacked[:36, :40] = heights.min() - 2.0

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from parcontact.contact.constraint import NonNegative
+from parcontact.contact.solver import Lines, form_iterate
 from parcontact.parallel.slab import Slab
-from parcontact.solve.constraint import NonNegative
-from parcontact.solve.iterate import Lines, form_iterate
 
 ROUNDING = 1e-12  # of sums over some hundred points
 

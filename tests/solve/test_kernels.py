@@ -7,10 +7,10 @@ precision the terms themselves are rounded, 1e-6.
 import numpy as np
 import pytest
 
+from parcontact.contact import constraint, kernels
+from parcontact.contact.constraint import CELL, Cells, NonNegative
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
-from parcontact.solve import constraint, kernels
-from parcontact.solve.constraint import CELL, Cells, NonNegative
 
 from .random_maps import ROUNDING, SHAPES, Maps
 

@@ -5,8 +5,8 @@ import pytest
 from mpi4py import MPI
 from numpy.testing import assert_array_equal
 
+from parcontact.contact.starts import Level, coarser_levels, descend
 from parcontact.parallel.slab import Array, Slab
-from parcontact.solve.nested import Level, coarser_levels, descend
 
 pytestmark = pytest.mark.mpi
 NX, NY = 64, 128

@@ -11,12 +11,12 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact.errors import InputError
-from parcontact.march.loop import run_steps as run_march
+from parcontact.files.tables import read_columns
+from parcontact.march import steady
+from parcontact.march.curve import request
+from parcontact.march.loop import run_steps
 from parcontact.parallel.fftw import pyfftw
 from parcontact.parallel.slab import Slab
-from parcontact.steady_sliding import start as steadystart
-from parcontact.steady_sliding.curve import request
-from parcontact.storage.tables import read_columns
 from parcontact.theory import full_contact
 
 WAVE = """\
@@ -63,9 +63,9 @@ def frictions(shared_path: Path, comm: MPI.Intracomm) -> Callable[..., list[floa
         path = shared_path / f"job-{comm.rank}.yaml"
         path.write_text(text)
         job = jobs.load(path, overrides)
-        marching = steadystart.first(job, Slab(comm, *job.grid.points))
+        marching = steady.first(job, Slab(comm, *job.grid.points))
         found: list[float] = []
-        run_march(marching, [lambda m: found.append(m.row.measures.friction)])
+        run_steps(marching, [lambda m: found.append(m.row.measures.friction)])
         return found
 
     return run

@@ -15,11 +15,11 @@ from conftest import WORLD
 from matplotlib.figure import Figure
 
 from parcontact import __main__
-from parcontact.mesh import load_cases
+from parcontact.contact.splitting import SteadySolver
+from parcontact.files.tables import read_columns
+from parcontact.march.mesh import load_cases
+from parcontact.march.steady import SteadySliding
 from parcontact.results import page, sweep_table
-from parcontact.solve.nonsymmetric.steady import SteadySolver
-from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.storage.tables import read_columns
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="in this process, on one rank")
 

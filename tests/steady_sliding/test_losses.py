@@ -8,8 +8,8 @@ import pytest
 from mpi4py import MPI
 from steady_scenes import CREEP_TIME, certificate, sliding
 
+from parcontact.contact import projected as proximal
 from parcontact.errors import RunError
-from parcontact.solve.nonsymmetric import proximal
 
 from .test_sliding import LINE, cylinder_on
 

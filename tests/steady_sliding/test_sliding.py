@@ -11,17 +11,17 @@ from mpi4py import MPI
 from rubbers import complex_modulus
 from steady_scenes import CREEP_TIME, G0, RADIUS, certificate, sliding
 
-from parcontact import Simulation, scene
+from parcontact import Simulation
+from parcontact.contact import splitting
+from parcontact.contact.projected import Projected
+from parcontact.door import memory, plan
 from parcontact.errors import RunError
 from parcontact.job import Job
+from parcontact.march import scene, steady
+from parcontact.march.point import Point
+from parcontact.march.scene import Setup
+from parcontact.march.steady import SteadySliding, stiffer_lines
 from parcontact.parallel.slab import Slab
-from parcontact.plan import memory, printed_plan
-from parcontact.scene import Setup
-from parcontact.solve.nonsymmetric import steady
-from parcontact.solve.nonsymmetric.projected import Projected
-from parcontact.steady_sliding import start
-from parcontact.steady_sliding.point import Point
-from parcontact.steady_sliding.sliding import SteadySliding, stiffer_lines
 from parcontact.theory import full_contact
 
 FORCE = 0.15  # N
@@ -121,8 +121,8 @@ def test_both_methods_agree(shared_path: Path, comm: MPI.Intracomm, monkeypatch:
     text = "grid: {points: 64, size: 1.0e-3}\nnumerics: {tolerance: 1.0e-4}\n" + WAVY
     frictions = list[float]()
     for light, patience in ((0.0, 0), (1.1, 1000)):
-        monkeypatch.setattr(steady, "LIGHT", light)
-        monkeypatch.setattr(steady, "PATIENCE", patience)
+        monkeypatch.setattr(splitting, "LIGHT", light)
+        monkeypatch.setattr(splitting, "PATIENCE", patience)
         frictions.append(sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5).friction)
     assert frictions[0] != frictions[1]
     assert frictions[0] == pytest.approx(frictions[1], rel=1e-3)
@@ -233,8 +233,8 @@ def test_load_is_taken_back_near_by(shared_path: Path, comm: MPI.Intracomm, monk
         "material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e7, relaxation_time: 1.0e-3}]}\n"
         "history: [{pressure: 1.0}]\n"
     )
-    monkeypatch.setattr(steady, "LIGHT", 1.1)
-    monkeypatch.setattr(steady, "PATIENCE", 1000)  # projected steps alone
+    monkeypatch.setattr(splitting, "LIGHT", 1.1)
+    monkeypatch.setattr(splitting, "PATIENCE", 1000)  # projected steps alone
     near_by = sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5)
     monkeypatch.setattr(Projected, "solve", partialmethod(Projected.solve, near_by=False))
     everywhere = sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5)
@@ -397,10 +397,10 @@ def test_what_is_held_while_it_is_solved(comm: MPI.Intracomm, name: str) -> None
 def test_plan_tells_the_steady_start() -> None:
     """In a row of its own, where there is one."""
     planned = job(*SCENES["along x"])
-    rows = {text[2:26].rstrip(): text[26:].split() for text in printed_plan.maps(planned, [1, 2], 0)}
+    rows = {text[2:26].rstrip(): text[26:].split() for text in plan.maps(planned, [1, 2], 0)}
     assert rows["steady start, before"] == [f"{memory.steady_start(planned, ranks) / 1e6:.4g}" for ranks in (1, 2)]
     virgin = planned.model_copy(update={"initial": type(planned.initial)()})
-    assert not any("steady" in text for text in printed_plan.maps(virgin, [1], 0))
+    assert not any("steady" in text for text in plan.maps(virgin, [1], 0))
     assert memory.steady_start(virgin) == 0
 
 
@@ -427,7 +427,7 @@ def test_at_rest_nothing_is_warm() -> None:
     """A start at rest makes no heat, so that there is no time in which it warmed the rubber."""
     thermal = {"conductivity": 0.2, "diffusivity": 1e-7}
     planned = job({"points": 16, "boundary": "free"}, START_SPHERE, (0.0, 0.0), thermal=thermal)
-    march = start.first(planned, Slab.alone(16, 16))
+    march = steady.first(planned, Slab.alone(16, 16))
     assert march.scene.effects["thermal"].values(march.state.memories["thermal"])[:2] == (0.0, 0.0)
     point = SteadySliding(march.scene.setup).solve((0.0, 0.0), 1e5)
     assert point.flash is not None

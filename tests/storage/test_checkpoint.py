@@ -9,12 +9,12 @@ import pytest
 from mpi4py import MPI
 
 from parcontact.errors import InputError, RunError
+from parcontact.files import checkpoint, hdf5
+from parcontact.files.checkpoint import Contents, Facts
+from parcontact.files.provenance import Link, Provenance
 from parcontact.parallel.slab import Slab
 from parcontact.physics.entries import Entry
 from parcontact.results import info
-from parcontact.storage import checkpoint, hdf5
-from parcontact.storage.checkpoint import Contents, Facts
-from parcontact.storage.provenance import Link, Provenance
 
 NX, NY = 6, 9
 NOON = "2026-01-01T12:00:00+00:00"  # one instant on all ranks

@@ -9,12 +9,12 @@ import pytest
 from mpi4py import MPI
 
 from parcontact.errors import InputError, RunError
+from parcontact.files import fields, hdf5
+from parcontact.files.fields import FieldsFile
+from parcontact.files.hdf5 import Slice
+from parcontact.files.provenance import Link, Provenance, extend_chain, read_chain
 from parcontact.parallel.slab import Array, Slab
 from parcontact.results import info
-from parcontact.storage import fields, hdf5
-from parcontact.storage.fields import FieldsFile
-from parcontact.storage.hdf5 import Slice
-from parcontact.storage.provenance import Link, Provenance, extend_chain, read_chain
 
 pytestmark = pytest.mark.mpi
 

@@ -11,20 +11,16 @@ import pytest
 
 from parcontact.columns import MEASURES, choose_columns
 from parcontact.errors import InputError, InUseError
+from parcontact.files import directory, files, tables, wisdom
+from parcontact.files.checkpoint import TableMark
+from parcontact.files.directory import Directory
+from parcontact.files.provenance import Link, Provenance
+from parcontact.files.recorder import MeasuresFile, Recorder, Recording, StepRow, cut_back_table
+from parcontact.files.tables import Claim, GrowingTable, lacking_points, of_table, read_results, requested_points
 from parcontact.job import load
+from parcontact.march.choices import choices
 from parcontact.parallel.slab import Slab
 from parcontact.physics.measures import Measures
-from parcontact.scene import choices
-from parcontact.storage import directory, files, marker, tables, wisdom
-from parcontact.storage.checkpoint import TableMark
-from parcontact.storage.curve_points import lacking, of_table, requested_points
-from parcontact.storage.directory import Directory
-from parcontact.storage.marker import Claim
-from parcontact.storage.provenance import Link, Provenance
-from parcontact.storage.read_back import read_results
-from parcontact.storage.recorder import Recorder, Recording
-from parcontact.storage.step_row import MeasuresFile, StepRow, cut_back_table
-from parcontact.storage.tables import GrowingTable
 
 
 def test_names_of_unfinished_files_cannot_be_guessed(tmp_path: Path) -> None:
@@ -116,7 +112,7 @@ def test_second_run_is_refused(tmp_path: Path, job: Path, monkeypatch: pytest.Mo
     make(second, job)
     assert second.claim is not None
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-        marker.MARKER,
+        tables.MARKER,
         "checkpoint",
         "job.resolved.yaml",
         "job.yaml",
@@ -143,7 +139,7 @@ def test_other_files_and_other_jobs_are_refused(tmp_path: Path, job: Path) -> No
     keep = r"grid.points was \[8, 8\], is \[9, 9\]; give --set grid.points=\[8,8\] to keep its mesh, or give --out"
     with pytest.raises(InputError, match=keep):
         make(directory_at(out, "study"), job, {**PLAIN, "grid": {"points": [9, 9]}})
-    (out / marker.MARKER).write_text("{")
+    (out / tables.MARKER).write_text("{")
     with pytest.raises(InputError, match="is damaged, so the owner of"):
         make(directory_at(out), job)
 
@@ -170,7 +166,7 @@ def test_differences_of_jobs() -> None:
         "surface": [{"shape": "wave", "seed": 2}],
         "numerics": {"kernel": "love", "x": 2},
     }
-    assert list(marker.differences(then, now, ("grid", "surface", "numerics.kernel", "initial"))) == [
+    assert list(tables.differences(then, now, ("grid", "surface", "numerics.kernel", "initial"))) == [
         "grid.points was [8, 8], is [8, 9]",
         "surface.0.seed was 1, is 2",
     ]
@@ -233,10 +229,12 @@ def test_a_point_that_is_asked_for_again_is_one() -> None:
 def test_what_a_table_lacks() -> None:
     """Speeds and pressures to 1e-6; a temperature that was not asked for is no other one. Speeds are solved first."""
     none, there = math.nan, of_table({"velocity": [0.1, 1.0], "pressure": [1e5, 1e5]})
-    assert lacking(requested_points((1.0, 0.5, 0.1), (1e5,)), there) == [1]
-    assert lacking([(0.1 * (1 + 5e-7), 1e5, none), (0.1 * (1 + 2e-6), 1e5, none), (0.1, 1.1e5, none)], there) == [1, 2]
+    assert lacking_points(requested_points((1.0, 0.5, 0.1), (1e5,)), there) == [1]
+    assert lacking_points(
+        [(0.1 * (1 + 5e-7), 1e5, none), (0.1 * (1 + 2e-6), 1e5, none), (0.1, 1.1e5, none)], there
+    ) == [1, 2]
     heated = of_table({"velocity": [0.1, 1.0], "pressure": [1e5, 1e5], "temperature": [20.0, -5.0]})
-    assert lacking(requested_points((0.1, 1.0), (1e5,), (20.0, -5.0)), heated) == [1, 2]
+    assert lacking_points(requested_points((0.1, 1.0), (1e5,), (20.0, -5.0)), heated) == [1, 2]
 
 
 # -- measures.csv: exact numbers, cut back without repeating or losing a row ------------------------------------------

@@ -18,18 +18,26 @@ from marched_jobs import marched
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
+from parcontact.door import study
+from parcontact.door.study import (
+    Ladders,
+    Limit,
+    Settings,
+    describe_choices,
+    extrapolate,
+    ladders,
+    make_cases,
+    overrides,
+)
 from parcontact.effects.adhesion.section import adhesion_law
 from parcontact.errors import InputError
-from parcontact.history.timeline import Timeline
+from parcontact.files import run as runner
+from parcontact.files.run import Options
 from parcontact.job import Job, load
-from parcontact.mesh import load as load_job
+from parcontact.job.history import Timeline
+from parcontact.march.mesh import load as load_job
 from parcontact.parallel.slab import Slab
 from parcontact.results import results
-from parcontact.run import runner
-from parcontact.run.run import Options
-from parcontact.study import study, verdict
-from parcontact.study.extrapolation import Limit, extrapolate
-from parcontact.study.ladders import Ladders, Settings, describe_choices, ladders, make_cases, overrides
 
 WAVE = """
 grid: {points: [32, 1], size: [2.5e-4, 2.5e-4]}
@@ -46,7 +54,7 @@ LEFT = 2e-5  # share of the transient in the mean: exp(-312/40) 40/938, with a t
 FULL = 11.78e-4 / EXACT  # its maximum after the jump of velocity over that, from the closed form of the transient
 
 
-def outcomes(path: Path) -> verdict.Outcomes:
+def outcomes(path: Path) -> study.Outcomes:
     """Return the rows of a study, which is run if it was not."""
     assert run_study(path, path.parent / "out", MPI.COMM_SELF) == 0
     job = load(path)
@@ -67,7 +75,7 @@ def test_orders_and_limits_of_full_contact(tmp_path: Path) -> None:
     path = tmp_path / "wave.yaml"
     path.write_text(WAVE)
     found = outcomes(path)
-    limits = {(one.quantity, one.integrator, one.ladder): one for one in verdict.limits(ladders(load(path)), found)}
+    limits = {(one.quantity, one.integrator, one.ladder): one for one in study.limits(ladders(load(path)), found)}
     for integrator, order in (("exponential", 3.0), ("backward-euler", 1.0)):
         limit = limits["mu_max", integrator, "mesh and time together"].limit
         print(f"{integrator}: mu_max {limit}")
@@ -77,10 +85,12 @@ def test_orders_and_limits_of_full_contact(tmp_path: Path) -> None:
         assert limit.order == pytest.approx(order, abs=0.1)
         assert abs(limit.value - EXACT) < limit.uncertainty + LEFT * EXACT
         assert limit.value == pytest.approx(EXACT, rel=2e-3)
-    reference = verdict.references(ladders(load(path)), found)
+    reference = study.references(ladders(load(path)), found)
     assert reference["mu_dyn"].value == pytest.approx(EXACT, rel=LEFT)
     alone = [one for one in found if one.integrator == "exponential" and math.isclose(one.time_step, 1 / 128)]
-    errors = [verdict.errors(found[case], reference)["mu_dyn"] for case in sorted(alone, key=lambda case: case.mesh)]
+    errors = [
+        study.estimate_errors(found[case], reference)["mu_dyn"] for case in sorted(alone, key=lambda case: case.mesh)
+    ]
     assert np.ptp(errors) < 0.1 * max(errors)  # full contact is exact on every mesh: refining it alone is wasted
 
 
@@ -122,7 +132,7 @@ def test_refining_one_of_mesh_and_time_is_wasted(tmp_path: Path, integrator: str
     assert fine < 0.5 * coarse  # it was the mesh
 
 
-def make(seconds: float, error: float) -> verdict.Outcome:
+def make(seconds: float, error: float) -> study.Outcome:
     areas = dict.fromkeys(("contact_area", "contact_area_corrected"), 0.5)
     return {"mu_max": 1.0 + error, "mu_dyn": 2.0 * (1.0 + error / 2), **areas, "seconds": seconds}
 
@@ -138,7 +148,7 @@ def test_the_fastest_settings_that_are_accurate_enough_are_named() -> None:
         "contact_area": Limit(0.5, 1.0, 0.0),
         "contact_area_corrected": Limit(0.5, 1.0, 0.0),
     }
-    lines = verdict.sentences(cases, reference, 2)
+    lines = study.sentences(cases, reference, 2)
     assert lines[0].startswith(
         "the fastest settings with errors of mu_max, mu_dyn, contact_area_corrected within a bound"
     )
@@ -155,14 +165,14 @@ def test_a_ladder_without_effect_is_no_proof(tmp_path: Path) -> None:
     path.write_text(WAVE.replace("[exponential, backward-euler]", "[exponential]"))
     refined = ladders(load(path))
     same = dict.fromkeys(refined.combine(), make(1.0, 0.1))
-    assert all("its error is unknown" in str(one) for one in verdict.limits(refined, same))
-    assert verdict.sentences(same, verdict.references(refined, same), 1)[-1].endswith("is not known")
+    assert all("its error is unknown" in str(one) for one in study.limits(refined, same))
+    assert study.sentences(same, study.references(refined, same), 1)[-1].endswith("is not known")
     path.write_text(path.read_text().replace(", cells_per_step: 1}", "}").replace(", cells_per_step: [1]", ""))
     refined = ladders(load(path))
     found = {case: make(1.0, 1.0 / case.mesh**4) for case in refined.combine()}
-    reference = verdict.references(refined, found)
+    reference = study.references(refined, found)
     assert reference["mu_max"].uncertainty == 0.01 * reference["mu_max"].value
-    assert verdict.sentences(found, reference, 1)[-1].endswith("is 1 %")
+    assert study.sentences(found, reference, 1)[-1].endswith("is 1 %")
 
 
 SHORT = (

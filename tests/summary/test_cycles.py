@@ -15,10 +15,10 @@ from mpi4py import MPI
 from restarting import Bench, cut, same
 from scipy.special import jv
 
-from parcontact.history.timeline import Timeline
+from parcontact.files.recorder import StepRow
 from parcontact.job import Job
+from parcontact.job.history import Timeline
 from parcontact.results.cycles import Cycle, find_cycles, write_cycles
-from parcontact.storage.step_row import StepRow
 
 MODULUS, BRANCH, TIME = 1e6, 2e6, 1e-2  # long-term, of the branch [Pa], relaxation time [s]
 RUBBER = {"model": "zener", "modulus_inf": MODULUS, "branches": [{"modulus": BRANCH, "relaxation_time": TIME}]}

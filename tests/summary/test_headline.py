@@ -13,11 +13,11 @@ import yaml
 from drawing import ELASTIC, SLIDE, SPHERE, WAVE, ZENER, ran
 
 from parcontact import job
-from parcontact.effects.adhesion.pull_off import Columns, PullOff, describe_pull_off, find
+from parcontact.effects.adhesion.results import Columns, PullOff, describe_pull_off, find
 from parcontact.errors import InputError
+from parcontact.files.provenance import cite_lines
 from parcontact.job import Stage
-from parcontact.results import citations, headline, info, page, theory_comparison
-from parcontact.storage.provenance import cite_lines
+from parcontact.results import info, page, theory_table
 
 ROW = ("time", "distance", "pressure", "friction", "contact_area", "contact_area_corrected", "approach", "max_pressure")
 
@@ -36,18 +36,18 @@ def replace_rows(out: Path, *rows: Sequence[float]) -> None:
 def test_a_slide(tmp_path: Path) -> None:
     """Friction of 0.2 but for one row; its error is 10 % of it, that of an area of 0.5 is 5 % of this."""
     out = ran(tmp_path, WAVE + ZENER + SLIDE)
-    assert f'<p class="headline">{page.whole_numbers(headline.find_headline(out))}</p>' in page.render([out])
+    assert f'<p class="headline">{page.whole_numbers(info.find_headline(out))}</p>' in page.render([out])
     ways = [k * 5.0e-5 for k in range(21)]
     replace_rows(out, *((way / 0.1, way, 1.0e3, 0.4 if k == 2 else 0.2, 0.5, 0.5, 0, 1) for k, way in enumerate(ways)))
     friction = "The mean friction is 0.200 ± 0.020 and the highest 0.400 ± 0.0"
-    stated = headline.find_headline(out)
+    stated = info.find_headline(out)
     assert stated.startswith(friction)
     assert stated.endswith("; the mean contact area is 50.0 ± 2.5 % of the nominal area.")
 
 
 def test_a_press(tmp_path: Path) -> None:
     """No friction is named where nothing slides. The area is Hertz's, within twice the estimate of its error."""
-    stated = headline.find_headline(ran(tmp_path, SPHERE + ELASTIC + "history: [{force: 0.1}]\n"))
+    stated = info.find_headline(ran(tmp_path, SPHERE + ELASTIC + "history: [{force: 0.1}]\n"))
     found = re.fullmatch(r"The contact area is ([\d.]+) mm² ± ([\d.]+) mm² at 100 mN\.", stated)
     assert found
     radius = (3 * 0.1 * 1.0e-2 / (4 * 4.0e6)) ** (1 / 3)  # E* = 4 G of an incompressible body
@@ -62,26 +62,26 @@ def test_a_pull_off_is_stated_with_the_area_at_it(tmp_path: Path) -> None:
     rows = zip(range(4), loads, areas, strict=True)
     replace_rows(out, *((float(k), 0, load, 0, area, area, -k * 1e-6, 9) for k, load, area in rows))
     force = "The pull-off force is 13.84 µN ± 2 µN"
-    assert headline.find_headline(out) == f"{force}; the contact area is 20.0 ± 1.0 % of the nominal area at t = 1 s."
+    assert info.find_headline(out) == f"{force}; the contact area is 20.0 ± 1.0 % of the nominal area at t = 1 s."
 
 
 def test_leakage_with_its_error(tmp_path: Path) -> None:
     out = ran(tmp_path, WAVE + ELASTIC + "history: [{pressure: 1.0e3}]\n")
     write(out / "leak.csv", ("time", "flow_x", "flow_y", "error_x", "error_y"), (0, 2e-18, 0, 0.1, "nan"))
     flow = "The conductivity of the gap is 2.00e-18 ± 2.0e-19 m³ along x; contact closes the gap along y; "
-    assert headline.find_headline(out).startswith(flow)
+    assert info.find_headline(out).startswith(flow)
 
 
 def test_curves_sweeps_and_studies(tmp_path: Path) -> None:
     write(tmp_path / "steady.csv", ("velocity", "pressure", "friction"), (0.1, 1e5, 0.2), (1.0, 2e5, 0.1))
-    assert headline.find_headline(tmp_path) == "The highest friction of the curve is 0.2, at 100 mm/s and 100 kPa."
+    assert info.find_headline(tmp_path) == "The highest friction of the curve is 0.2, at 100 mm/s and 100 kPa."
     (tmp_path / "steady.csv").unlink()
     head = ("case", "history.0.velocity", "state", "mu_max", "mu_dyn", "mu_dyn_error")
     write(tmp_path / "sweep.csv", head, (0, 0.1, "done", 0.3, 0.2, 0.02), (1, 1.0, "done", 0.2, 0.1, ""))
     (tmp_path / "study.txt").write_text("for 1 %: mesh 64\n")
     swept = "The mean friction of the cases is from 0.1 (case 1) to 0.200 ± 0.020 (case 0)."
-    assert headline.find_headline(tmp_path) == f"{swept} for 1 %: mesh 64"
-    assert not headline.find_headline(tmp_path / "nowhere")
+    assert info.find_headline(tmp_path) == f"{swept} for 1 %: mesh 64"
+    assert not info.find_headline(tmp_path / "nowhere")
 
 
 # -- `parcontact info`: what it says of friction ----------------------------------------------------------------------
@@ -107,18 +107,18 @@ JOB: dict[str, Any] = {
 
 def test_what_to_cite(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="has no run"):
-        citations.describe_citations(tmp_path)
+        info.describe_citations(tmp_path)
     data = {**JOB, "grid": {**JOB["grid"], "boundary": "free"}, "surface": {"shape": "sphere", "radius": 1e-2}}
     (tmp_path / "job.yaml").write_text(yaml.safe_dump({**data, "material": {"model": "elastic", "shear_modulus": 1e6}}))
     (tmp_path / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
-    elastic = citations.describe_citations(tmp_path)
+    elastic = info.describe_citations(tmp_path)
     assert "Love" in elastic
     assert "Bugnicourt" not in elastic
     assert "Persson" not in elastic
     (tmp_path / "theory.csv").touch()
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
     (tmp_path / "job.resolved.yaml").write_text(job.load(tmp_path / "job.yaml").resolved())
-    rubber = citations.describe_citations(tmp_path)
+    rubber = info.describe_citations(tmp_path)
     assert "Love" not in rubber
     assert "Bugnicourt" in rubber
     assert "Persson" in rubber
@@ -142,13 +142,13 @@ def write_table(path: Path, head: str, *rows: str) -> None:
 def test_both_are_measured_alike_and_the_area_is_the_corrected_one(tmp_path: Path) -> None:
     """Constant friction after a peak: the mean over the last three quarters, 1 m to 4 m, is that constant exactly."""
     write_table(tmp_path / "theory.csv", HEAD, "0,0,0,0.5", "1,1,0.2,0.25", "4,4,0.2,0.25")
-    assert list(theory_comparison.describe_theory(tmp_path, [LONG_SLIDE], 1.0)) == [
+    assert list(theory_table.describe_theory(tmp_path, [LONG_SLIDE], 1.0)) == [
         "Persson's theory predicts mu_max 0.2, mu_dyn 0.2, contact area 0.25"
     ]
     write_table(
         tmp_path / "measures.csv", f"{HEAD},contact_area_corrected", "0,0,0,1,1", "1,1,0.4,0.75,0.5", "4,4,0.4,0.75,0.5"
     )
-    assert theory_comparison.compare_with_theory(tmp_path, [LONG_SLIDE], 1.0) == [
+    assert theory_table.compare_with_theory(tmp_path, [LONG_SLIDE], 1.0) == [
         ("mu_max", pytest.approx(0.2), pytest.approx(0.4), math.nan),
         ("mu_dyn", pytest.approx(0.2), pytest.approx(0.4), math.nan),
         ("contact area", pytest.approx(0.25), pytest.approx(0.5), math.nan),
@@ -161,17 +161,17 @@ def test_errors_of_the_run_follow_its_results(tmp_path: Path) -> None:
     head = f"{HEAD},contact_area_corrected,error_friction,error_area"
     rows = "1,1,0.4,0.75,0.5,0.1,0.04", "4,4,0.4,0.75,0.5,0.1,0.04"
     write_table(tmp_path / "measures.csv", head, "0,0,0,1,1,,", *rows)
-    assert list(theory_comparison.describe_theory(tmp_path, [LONG_SLIDE], 1.0)) == [
+    assert list(theory_table.describe_theory(tmp_path, [LONG_SLIDE], 1.0)) == [
         "Persson's theory predicts mu_max 0.2 (run: 0.400 ± 0.040), mu_dyn 0.2 (run: 0.400 ± 0.040), "
         "contact area 0.25 (run: 0.500 ± 0.020)"
     ]
 
 
 def test_nothing_slides_or_nothing_was_predicted(tmp_path: Path) -> None:
-    assert theory_comparison.compare_with_theory(tmp_path, [LONG_SLIDE], 1.0) == []
+    assert theory_table.compare_with_theory(tmp_path, [LONG_SLIDE], 1.0) == []
     rest = Stage.model_validate({"pressure": 1.0, "duration": 1.0})
     write_table(tmp_path / "theory.csv", HEAD, "0,0,0,0", "1,0,0,0.3")
-    assert theory_comparison.compare_with_theory(tmp_path, [rest], 1.0) == [("contact area", 0.3, None, math.nan)]
+    assert theory_table.compare_with_theory(tmp_path, [rest], 1.0) == [("contact area", 0.3, None, math.nan)]
 
 
 # -- pull-offs from made-up rows: of pulls by approach and by load, of several, of a contact that holds ---------------

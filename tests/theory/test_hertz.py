@@ -9,11 +9,11 @@ from closed_forms import flash
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
-from parcontact import scene
 from parcontact.job import Job
+from parcontact.march import scene
+from parcontact.march.point import Point
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
-from parcontact.steady_sliding.point import Point
-from parcontact.steady_sliding.sliding import SteadySliding
 from parcontact.theory import hertz
 
 SPHERE = (0.15, 1e-2, 2.75e6)  # force (N), radius (m), shear modulus (Pa)

@@ -2,7 +2,20 @@
 
 Under one load there are several equilibria, and the history decides which one is reached. A solve starts from the
 last two gaps, extrapolated in time and moved with the surface by whole cells.
+
+Energies of contacts with adhesion: work of the load, energy of the surfaces, and losses in snaps.
+
+In a step in which body and surfaces gain energy, the load does work along its path, by the trapezoidal rule, `F dd -
+F_t ds`. A difference is lost in a snap if the load could not have supplied it on any path between the two states.
+Otherwise it is an error of the rule, and the work is taken from the energies.
+
+Surfaces that detach under a load, or that a load closes again, pass through states without equilibrium. The work of
+the load on this path depends on inertia, which the model does not have. From the last equilibrium on it is taken as
+the least work that the change needs, and 0 if energy is released, which is lost. While surfaces are detached,
+neither work nor losses change.
 """
+
+from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
@@ -10,36 +23,97 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...history.timeline import Step
-from ...parallel import rows
+from ...contact.problem import Approach, Control, MeanPressure
+from ...contact.solver import Contact
+from ...job.history import Step
+from ...march.constants import ENERGY
+from ...parallel import regrid
 from ...parallel.slab import Array
 from ...physics import loops
 from ...physics.body import Trial
-from ...physics.entries import Entry, Saved
-from ...physics.measures import SIDE, Measures
+from ...physics.entries import Entry, Saved, Units
+from ...physics.measures import SIDE, Certificate, Measures
 from ...physics.motion import cells_between
-from ...physics.units import Units
-from ...solve.certificate import Certificate
-from ...solve.contact import Contact
-from ...solve.problem import Approach, Control, MeanPressure
-from ..contact_protocol import (
+from ..effect import (
     Detached,
     EdgeMotion,
     End,
+    Instant,
     PreviousContacts,
     SolvedContact,
     end_in,
     entries_of_end,
     nothing_holds,
 )
-from . import gap_kernels
-from .adhesive_energies import JUMPS, PUSHED, SURFACES, PathWork
-from .adhesive_solver import AdhesiveSolver
-from .attraction import cell_of, modulus_of
-from .gap_iterate import GapOperators
-from .gap_solver import GapSolver
-from .law import DUGDALE, EXPONENTIAL, Law
+from . import law as gap_kernels
+from .gap_solver import AdhesiveSolver, GapOperators, GapSolver
+from .law import DUGDALE, EXPONENTIAL, Law, cell_of, modulus_of
 from .section import adhesion_law
+
+LEAST_SNAP = 1e-4  # accuracy: least loss in a snap over the energies of the step
+FORCE_DOUBT = 0.3  # accuracy: relative error of the tangential force
+SURFACES, PUSHED, JUMPS = "surface_energy", "work_of_load", "leaves_equilibrium"  # names of numbers of the law
+
+
+class AdhesiveEnergies(NamedTuple):
+    """Energies [J] since the start: `work` of the rigid surface, energy of the `surfaces`, 0 at large gaps, energy
+    `lost` in snaps, and `error`, the difference between the work along the path of the load and the energies, summed
+    over all steps without a snap."""
+
+    work: float = 0.0
+    surfaces: float = 0.0
+    lost: float = 0.0
+    error: float = 0.0
+
+
+NO_ENERGIES = AdhesiveEnergies()
+
+
+class PathWork:
+    """Work of the load along its path by the trapezoidal rule, for the modulus 1, in the unit of the scene's energies;
+    0 without energies."""
+
+    def __init__(self, scene: Any, approach: float, pressure: float) -> None:
+        self.scene, self.approach, self.pressure, self.total = scene, approach, pressure, 0.0
+
+    def add(self, contact: Contact) -> None:
+        """Add the work up to a contact; collective."""
+        if (energy := self.scene.energy) is None:
+            return
+        pressure = self.scene.slab.sum(float(contact.p.sum()))[0] / self.scene.slab.points
+        mean, way = 0.5 * (self.pressure + pressure), contact.d - self.approach
+        self.total += energy.unit * self.scene.slab.points * mean * way
+        self.approach, self.pressure = contact.d, pressure
+
+
+def advance_energies(past: AdhesiveEnergies, instant: Instant, area: float) -> AdhesiveEnergies:
+    """Return the energies after a step, in a box of an area [m^2]."""
+    numbers, before, measures = instant.solved.numbers, instant.before, instant.measures
+    surfaces = numbers[SURFACES]
+    gained = instant.gained + surfaces - past.surfaces
+    dragged, doubt = _drag(before, measures, instant.moved)
+    work = numbers[PUSHED] + dragged
+    if numbers[JUMPS]:
+        work = max(work, gained)
+    else:
+        way = measures.approach - before.approach
+        doubt += 0.5 * area * abs((measures.pressure - before.pressure) * way)
+    lost = work - gained
+    snaps = lost > doubt + LEAST_SNAP * (abs(gained) + abs(surfaces))
+    error = past.error + ENERGY.value * instant.error_area * abs(instant.dissipated)
+    if snaps:
+        return AdhesiveEnergies(past.work + work, surfaces, past.lost + lost, error)
+    return AdhesiveEnergies(past.work + gained, surfaces, past.lost, error + abs(lost))
+
+
+def _drag(before: Measures, now: Measures, moved: tuple[float, float]) -> tuple[float, float]:
+    """Return the work of sliding by `moved` without friction of the interface, and its error [J]."""
+    (x, y), slid = moved, math.hypot(*moved)
+    if not slid:
+        return 0.0, 0.0
+    works = [-(one.force_x * x + one.force_y * y) - one.force_interface * slid for one in (before, now)]
+    return 0.5 * sum(works), 0.5 * abs(works[1] - works[0]) + FORCE_DOUBT * abs(works[1])
+
 
 JUMP_STRIDE = 1.0 / 8.0  # accuracy: longest part of a jump that is solved at once
 LEAST_STRIDE = 1.0 / 16.0  # accuracy: shortest part of these, and of a step
@@ -245,10 +319,10 @@ class AdhesiveLaw:
         along_x, along_y = (round(moved) % count for moved, count in zip(cells, self.grid.points, strict=True))
         older = before.gap
         if along_y and growth > 0.0:
-            older = rows.roll_rows(self.slab, before.gap, along_y, out)
+            older = regrid.roll_rows(self.slab, before.gap, along_y, out)
         loops.travel(now.gap, older, 1.0 + growth, growth, along_x, 0.0, np.inf, out)
         if along_y:
-            out[...] = rows.roll_rows(self.slab, out, along_y, self.scene.solver.workspace.pressure)
+            out[...] = regrid.roll_rows(self.slab, out, along_y, self.scene.solver.workspace.pressure)
         if path.closes_gap_first:
             out += self.slab.reduce((), [-float(out.min(initial=np.inf))])[0]
 

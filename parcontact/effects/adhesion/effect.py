@@ -8,24 +8,31 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ...columns import added_by
+from ...contact.constraint import Mask
 from ...doubts import Doubt
-from ...job.checks import limits
-from ...job.sections.geometry import Sphere, Wave
-from ...job.sections.part import Part, Rule
-from ...job.text.fault import Fault
+from ...job import limits
+from ...job.parts import Part, Rule
+from ...job.surfaces import Sphere, Wave
+from ...job.yaml_text import Fault
 from ...parallel.slab import Array
 from ...physics.body import remembers
-from ...physics.entries import Entry, Saved
-from ...physics.units import Units
-from ...solve.constraint import Mask
-from ..contact_protocol import ContactLaw, Detached
-from ..effect import BY_THEORY, EXTRAPOLATION, SINGLE, TOLERANCES, Changes, Decision, Effect, Instant
-from . import adhesive_energies
-from .adhesion_doubts import doubt_range, doubts_of_adhesion
-from .adhesive_energies import NO_ENERGIES, AdhesiveEnergies
-from .attraction import cell_of, modulus_of, smallest_range
-from .law import Law
-from .section import AUTO, Adhesion, adhesion_law, chosen_range
+from ...physics.entries import Entry, Saved, Units
+from ..effect import (
+    BY_THEORY,
+    EXTRAPOLATION,
+    SINGLE,
+    TOLERANCES,
+    Changes,
+    ContactLaw,
+    Decision,
+    Detached,
+    Effect,
+    Instant,
+)
+from . import adhesive_law
+from .adhesive_law import NO_ENERGIES, AdhesiveEnergies
+from .law import Law, cell_of, modulus_of, smallest_range
+from .section import AUTO, Adhesion, adhesion_law, chosen_range, doubt_range, doubts_of_adhesion
 
 MOST_CELLS = 2.0  # physics: largest cell over the process zone of a viscoelastic body
 SAME = 1e-9  # rounding: relative tolerance on a range
@@ -156,7 +163,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     @staticmethod
     def ended(job: Any, saved: Saved) -> Detached | None:
-        from .adhesive_law import end_of  # what solves is not loaded to check a job
+        from .adhesive_law import end_of
 
         return end_of(job, saved)
 
@@ -195,7 +202,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         self._scene, self._area = scene, scene.choices.grid.lx * scene.choices.grid.ly
 
     def law(self) -> ContactLaw[Any]:
-        from .adhesive_law import AdhesiveLaw  # what solves is not loaded to check a job
+        from .adhesive_law import AdhesiveLaw
 
         return AdhesiveLaw(self._scene)
 
@@ -209,7 +216,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan
         if self._scene.energy is not None:
             if solved.end != "open":
-                energies = adhesive_energies.advance_energies(energies, instant, self._area)
+                energies = adhesive_law.advance_energies(energies, instant, self._area)
             columns = (*columns[:2], energies.surfaces, energies.lost)
         far = instant.front > SNAP_FRONT and not instant.untouched
         chosen = instant.step.decide is not None

@@ -1,11 +1,131 @@
-"""Results of adhesion in texts and tables: pull-offs (`pull_off`)."""
+"""Results of adhesion in texts and tables: pull-offs (`pull_off`).
 
-from collections.abc import Iterator
+Pull-offs: the loads at which adhesive contacts detach, from the rows of a run.
+
+The largest tension lies between steps. With loads higher by a and b at the times s before and t after the row of the
+lowest load, the vertex of the parabola through the three points is lower than that row by
+
+    e = (b s/t - a t/s)^2/(4 (s + t) (a/s + b/t)).
+
+The vertex is the load of the pull-off. Its error is the sum of e, of SOLVER times the tolerance of the solves, and of
+PULL_OFF times the median relative error of the contact area up to that row, by the mesh. Spheres were pulled off at
+seven rates with chosen steps, at accuracies from 0.1 to 0.005: all pull-offs differed from those with 1500 equal steps
+by less than this error without the part of the mesh.
+
+The pull-off is the lowest load itself if the pull has no later row, if the contact snaps, or if it still holds. The
+error then has the difference to the load of the row before in place of e.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ...job import Job
+from ...march.constants import PULL_OFF
 from ...printed import quantity
 from ...results.results import Results
-from . import pull_off
+
+SOLVER = 0.25  # accuracy: relative error of the load over the tolerance of the solves
+SNAP = 0.5  # accuracy: change of load in a step, over the largest tension, above which no parabola is used
+LEAST_PULL = 1e-9  # rounding: least mean tension over the highest pressure
+
+Columns = Mapping[str, Sequence[float]]
+Values = NDArray[np.float64]
+
+
+class PullOff(NamedTuple):
+    """A pull-off: the row of its lowest load, the lowest load and its error by steps as mean pressures [Pa], and the
+    first row without contact (one after the last row if the run ended with it, None if the contact holds)."""
+
+    row: int
+    pressure: float
+    between: float
+    lost: int | None
+    mesh: float = math.nan
+
+    def error(self, tolerance: float) -> float:
+        """Return the error of the load [Pa] by steps and mesh, and by the `tolerance` of the solves."""
+        return self.between - (SOLVER * tolerance + self.mesh) * self.pressure
+
+
+def find(columns: Columns, detached: bool = False) -> list[PullOff]:
+    """Return the pull-offs of a run in order, from its columns `time`, `pressure`, `max_pressure`, `approach` and
+    `contact_area`; the run may have ended because its surfaces `detached`.
+
+    A pull begins at the smallest separation, or at the last approach before contact is lost; earlier pulls that the
+    contact survived do not count. It ends when the separation stops growing, as detached surfaces may later attract
+    each other more strongly.
+    """
+    names = "time", "pressure", "approach", "contact_area"
+    time, pressure, approach, area = (np.asarray(columns[name], float) for name in names)
+    touching = np.concatenate([[False], area > 0.0, [False]])
+    changes = np.flatnonzero(touching[1:] != touching[:-1]).tolist()
+    last = len(area) if detached else len(area) - 1  # last row at which a contact may be lost
+    pulls = [_find(time, pressure, approach, last, *ends) for ends in zip(changes[::2], changes[1::2], strict=True)]
+    least = -LEAST_PULL * np.asarray(columns["max_pressure"], float)
+    return [
+        pull._replace(mesh=PULL_OFF.value * _median_to(columns["error_area"], pull.row))
+        for pull in pulls
+        if pull.pressure < least[pull.row]
+    ]
+
+
+def _median_to(values: Sequence[float], row: int) -> float:
+    """Return the median of the values that are known up to a row, NaN without one."""
+    known = [value for value in values[: row + 1] if value == value]
+    return float(np.median(known)) if known else math.nan
+
+
+def _find(time: Values, pressure: Values, approach: Values, last: int, start: int, end: int) -> PullOff:
+    """Return the pull-off of a contact in rows `start` to `end` (excluded), which is lost if `end` is not after
+    `last`."""
+    begin, stop, lost = start + int(np.argmax(approach[start:end])), end, end <= last
+    if lost and (nearer := np.flatnonzero(np.diff(approach[begin:end]) > 0.0)).size:
+        begin += int(nearer[-1]) + 1
+    while stop < len(approach) and approach[stop] < approach[stop - 1] and pressure[stop]:  # 0 after detachment
+        stop += 1
+    row = begin + int(np.argmin(pressure[begin:stop]))
+    held = end if lost else None
+    if lost and start < row < stop - 1 and pressure[row + 1] < (1.0 - SNAP) * pressure[row]:
+        below = _below(np.diff(time[row - 1 : row + 2]), pressure[row - 1 : row + 2])
+        return PullOff(row, float(pressure[row]) - below, below, held)
+    near = pressure[row - 1] if row > start else pressure[row + 1] if row + 1 < stop else pressure[row]
+    return PullOff(row, float(pressure[row]), float(near - pressure[row]), held)
+
+
+def _below(steps: Values, loads: Values) -> float:
+    """Return the depth of the vertex of the parabola through three loads below the second, the lowest one."""
+    (before, after), (left, right) = steps, (loads[0] - loads[1], loads[2] - loads[1])
+    if min(before, after) <= 0.0 or left + right == 0.0:
+        return 0.0
+    falls, rises = left / before, right / after
+    slope = (rises * before - falls * after) / (before + after)
+    return slope**2 * (before + after) / (4.0 * (falls + rises))
+
+
+def describe_pull_off(columns: Columns, area: float, tolerance: float, detached: bool = False) -> Iterator[str]:
+    """Yield a sentence for each pull-off, and for the largest pull of a contact that holds; `area` of the box [m^2],
+    `tolerance` of the solves."""
+    pulls = find(columns, detached)
+    many = sum(pull.lost is not None for pull in pulls) > 1
+    for number, pull in enumerate(pulls, 1):
+        row, pressure, _, lost, _ = pull
+        time, approach = (columns[name][row] for name in ("time", "approach"))
+        load = f"{quantity(-pressure * area, 'N', 4)} ({quantity(-pressure, 'Pa', 4)})"
+        where = f"at t = {quantity(time, 's', 4)}, approach {quantity(approach, 'm', 4)}"
+        error = pull.error(tolerance) * area
+        within = "its error is not known" if math.isnan(error) else f"its error is {quantity(error, 'N', 2)}"
+        if lost is None:
+            yield f"largest pull so far: {load}, {where}; contact holds"
+            continue
+        after = "the next load had no equilibrium"
+        if lost < len(columns["time"]):
+            after = f"contact was lost by t = {quantity(columns['time'][lost], 's', 4)}"
+        yield f"{f'pull-off {number}' if many else 'pull-off'}: {load}, {where}; {within}, and {after}"
+
 
 SWEPT = (("pull_off", "the pull-off force", "N", "pull_off_error"),)  # results of a sweep for its headline
 
@@ -14,7 +134,7 @@ def sentences(run: Results) -> Iterator[str]:
     """Yield a sentence for each pull-off, and for the largest pull of a contact that holds."""
     if run.job is not None:
         tolerance = run.job.numerics.tolerance
-        yield from pull_off.describe_pull_off(run.table, _box(run.job), tolerance, bool(run.detached))
+        yield from describe_pull_off(run.table, _box(run.job), tolerance, bool(run.detached))
 
 
 said_at_end = sentences  # also at the end of a run
@@ -22,7 +142,7 @@ said_at_end = sentences  # also at the end of a run
 
 def headline(run: Results) -> Iterator[str]:
     """Yield the force of the last pull-off and its error, where that is known."""
-    lost = [pull for pull in pull_off.find(run.table, bool(run.detached)) if pull.lost is not None]
+    lost = [pull for pull in find(run.table, bool(run.detached)) if pull.lost is not None]
     if lost and run.job is not None:
         box = _box(run.job)
         force, within = -lost[-1].pressure * box, lost[-1].error(run.job.numerics.tolerance) * box
@@ -35,7 +155,7 @@ def swept(run: Results) -> Iterator[tuple[str, float]]:
     holds."""
     if run.job is None or run.job.section("adhesion") is None:
         return
-    if lost := [each for each in pull_off.find(run.table, bool(run.detached)) if each.lost]:
+    if lost := [each for each in find(run.table, bool(run.detached)) if each.lost]:
         area, pull = _box(run.job), lost[-1]
         yield "pull_off", -pull.pressure * area
         yield "pull_off_error", pull.error(run.job.numerics.tolerance) * area
@@ -44,7 +164,7 @@ def swept(run: Results) -> Iterator[tuple[str, float]]:
 
 def telling_row(run: Results) -> Iterator[int]:
     """Yield the row of the last pull-off."""
-    yield from (pull.row for pull in pull_off.find(run.table, bool(run.detached))[-1:])
+    yield from (pull.row for pull in find(run.table, bool(run.detached))[-1:])
 
 
 def _box(job: Job) -> float:

@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...job.checks.frequencies import excited_band
-from ...job.sections.geometry import Rough
-from ...job.sections.materials import Dma, describe_temperature
-from ...job.sections.part import Part, Rule
-from ...job.text.fault import Fault
+from ...job.materials import Dma, describe_temperature
+from ...job.meaning import excited_band
+from ...job.parts import Part, Rule
+from ...job.surfaces import Rough
+from ...job.yaml_text import Fault
 from ...physics.prony import complex_modulus
 from ..effect import Changes, Decision, Effect, Instant
 from ..relaxation import relaxation_of

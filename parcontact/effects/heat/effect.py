@@ -11,27 +11,23 @@ import numpy as np
 from numpy.typing import DTypeLike
 from pydantic import Field
 
-from ...accuracy.constants import FLASH
 from ...columns import added_by
 from ...errors import InputError, RunError
-from ...history.timeline import Timeline
-from ...job import Grid
-from ...job.added_sections import effects_of
-from ...job.checks import limits
-from ...job.sections.part import Part, Rule
-from ...job.sections.quantities import Positive
-from ...job.text.fault import Fault
-from ...parallel import spectra
+from ...job import Grid, limits
+from ...job.history import Timeline
+from ...job.listing import effects_of
+from ...job.parts import Part, Rule
+from ...job.quantities import Positive
+from ...job.yaml_text import Fault
+from ...march.constants import FLASH
+from ...parallel import fft
 from ...parallel.fft import Spectrum
 from ...parallel.slab import Array
-from ...physics.entries import Entry, Saved
-from ...physics.exponentials import Exponentials, fit_exponentials
-from ...physics.prony import Prony
-from ...physics.units import Units
+from ...physics.entries import Entry, Saved, Units
+from ...physics.prony import Exponentials, Prony, fit_exponentials
 from ..effect import Changes, Decision, Effect, Instant
 from ..relaxation import factor_at, feeds_back, temperature_of
-from .heat import Conductor, Depths, depths_of
-from .heat_memory import Heating, HeatMemory
+from .solver import Conductor, Depths, Heating, HeatMemory, depths_of
 
 LOOSEST, SHARE = 1e-3, 0.1  # accuracy: error of the memory of heat: at most, and as a share of the job's accuracy
 DECAYED = 10.0  # accuracy: duration of the memory of heat over the diffusion time of the longest wave
@@ -187,7 +183,7 @@ class ThermalColumns(Effect[ThermalMemory]):
     def maps(job: Any) -> Sequence[DTypeLike]:
         """Return the types of the map of temperatures, and of those that hold its spectra in a checkpoint."""
         count = 2 + exponentials_of(job).kept
-        return [np.float64] * (count + _rubs(job) + math.ceil(count / spectra.per_map(job.grid.nx)))
+        return [np.float64] * (count + _rubs(job) + math.ceil(count / fft.per_map(job.grid.nx)))
 
     def __init__(self, scene: Any) -> None:
         self._setup, self._slab, self._job = scene.setup, scene.slab, scene.job
@@ -288,12 +284,12 @@ class ThermalColumns(Effect[ThermalMemory]):
             "depths": Entry(np.concatenate([depths.wavenumbers, depths.shares])),
             "grid": Entry(np.array([known.first, known.spacing]), given=True),
         }
-        per = spectra.per_map(self._slab.nx)
-        columns = spectra.edges(self._slab.nx)
+        per = fft.per_map(self._slab.nx)
+        columns = fft.edges(self._slab.nx)
         for number, name, spectrum in self._spectra(memory):
             rest = found.setdefault(f"edges {number // per}", Entry(np.zeros(self._slab.shape), optional=True))
             where, field = columns * (number % per), np.empty(self._slab.shape)
-            spectra.to_map(self._setup.fft, spectrum, field, np.asarray(rest.value)[:, where : where + columns])
+            fft.to_map(self._setup.fft, spectrum, field, np.asarray(rest.value)[:, where : where + columns])
             found[name] = Entry(field, optional=True)
         return found
 
@@ -306,11 +302,11 @@ class ThermalColumns(Effect[ThermalMemory]):
 
     def restored(self, memory: ThermalMemory, saved: Saved) -> ThermalMemory:
         """Return the memory of a checkpoint; collective. Missing waves, of shorter steps than before, start at 0."""
-        per, columns = spectra.per_map(self._slab.nx), spectra.edges(self._slab.nx)
+        per, columns = fft.per_map(self._slab.nx), fft.edges(self._slab.nx)
         for number, name, spectrum in self._spectra(memory):
             if name in saved:
                 rest, where = saved[f"edges {number // per}"], columns * (number % per)
-                spectra.from_map(self._setup.fft, saved[name], rest[:, where : where + columns], spectrum)
+                fft.from_map(self._setup.fft, saved[name], rest[:, where : where + columns], spectrum)
         memory.heat.mean.waves[...] = saved["mean"]
         x, y = saved["force"].tolist()
         return replace(

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from ...columns import added_by
-from ...physics.interface_friction import InterfaceFriction
 from ...physics.measures import Measures
+from ...physics.motion import InterfaceFriction
 from ..effect import Changes, Instant
 from .section import Interface, InterfaceEffect
 
@@ -31,7 +31,7 @@ class InterfaceColumns(InterfaceEffect[tuple[float, float]]):
         """Return the effect of a job: with `stick` that of tractions (`effects.stick.effect`)."""
         if not scene.job.section("interface").stick:
             return super().__new__(cls)
-        from ..stick.effect import StickSlip  # what solves is not loaded to check a job
+        from ..stick.effect import StickSlip
 
         return StickSlip(scene)
 

@@ -8,13 +8,13 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from ... import capabilities
-from ...job.checks import limits
-from ...job.sections.geometry import Rough, RoughSpectrum, Topography
-from ...job.sections.part import Part, Rule
-from ...job.sections.quantities import Flag, Positive
-from ...job.text.fault import Fault
+from ...job import limits
+from ...job.parts import Part, Rule
+from ...job.quantities import Flag, Positive
+from ...job.surfaces import Rough, RoughSpectrum, Topography
+from ...job.yaml_text import Fault
 from ...physics.entries import Memory
-from ...physics.interface_friction import InterfaceFriction
+from ...physics.motion import InterfaceFriction
 from ..effect import Decision, Effect
 from ..relaxation import time_factor_of
 

@@ -10,16 +10,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...columns import added_by
-from ...job.checks import limits
-from ...job.sections.part import Part, Rule
-from ...job.sections.stages import Stage
+from ...contact.constraint import Mask
+from ...job import limits
+from ...job.parts import Part, Rule
+from ...job.stages import Stage
 from ...parallel.root import on_root
 from ...parallel.slab import Array
-from ...physics.entries import Entry, Saved
-from ...physics.units import Units
-from ...solve.constraint import Mask
-from ..contact_protocol import ContactLaw, Detached, end_in
-from ..effect import Changes, Decision, Effect, Instant
+from ...physics.entries import Entry, Saved, Units
+from ..effect import Changes, ContactLaw, Decision, Detached, Effect, Instant, end_in
 from .flow import leak
 from .section import RULES, Leakage, SealStage, drop_at
 
@@ -117,7 +115,7 @@ class Seal(LeakageColumns):
         self._scene = scene
 
     def law(self) -> ContactLaw[Any]:
-        from .seal_law import SealLaw  # what solves is not loaded to check a job
+        from .seal_law import SealLaw
 
         return SealLaw(self._scene)
 

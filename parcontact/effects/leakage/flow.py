@@ -9,21 +9,292 @@ the harmonic mean of their g^3. The pressure is prescribed on two opposite ends 
 periodic or closed. Contact is impermeable. Only cells on a path from end to end are used. Their matrix is factorized
 directly, as g^3 spans many decades and iterations stall. The flow follows from its dissipation, `sum c (p -
 p_neighbour)^2`, which is minimal for the exact pressures, so that their errors enter squared.
+
+Direct solution of the flow between cells: half of the cells are eliminated at once, the rest by sparse factors.
+
+The flows out of each wet cell balance: with the conductances c of its faces, `sum c (p - p_neighbour) = given`.
+White cells of a checkerboard touch black ones only, so that each is eliminated on its own:
+
+    p_white = (given + sum c p_black)/sum c,
+
+which leaves a symmetric matrix of the black cells, with up to eight neighbours each. It is factorized directly.
+
+Paths of a fluid through a map of gaps, from the first row to the last.
+
+Fluids that flow through a gap: liquids, described by their viscosity, and gases, which expand and slip.
+
+A pressure that falls from p1 to p2 over the length L of a gap of conductivity K drives through a width W the flow
+
+    liquid   Q = K/(12 eta) (p1 - p2) W/L,
+    gas      Q = K/(12 eta) (p1^2 - p2^2)/(2 p2) W/L,    at the pressure p2,
+
+for an ideal gas at constant temperature T. Its mean free path is (R the gas constant, M the molar mass; J. C.
+Maxwell, Phil. Trans. R. Soc. 170 (1879) 231)
+
+    lambda = (eta/p) sqrt(pi R T/(2 M)).
+
+At walls that reflect all molecules diffusely it slips, and a gap g conducts like one of `g^3 (1 + 6 lambda/g)`, here
+with lambda at the mean pressure (p1 + p2)/2, which is exact for an even gap. The error is about 10 % for gaps above
+ten mean free paths; in smaller gaps the true flow is larger.
+
+Both flows are viscous. A gas has inertia too: through an open section A no more flows than by the isentropic law of
+A. Barre de Saint-Venant and L. Wantzel, J. Ecole Polytechnique 16 (1839) 85, with the ratio kappa of its heats,
+
+    A p1 sqrt(M/(R T)) sqrt(2 kappa/(kappa - 1) (r^(2/kappa) - r^((kappa + 1)/kappa))),
+
+r being the larger of p2/p1 and (2/(kappa + 1))^(kappa/(kappa - 1)), at which the flow is choked.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from ... import datafiles
+from ... import text_tables
+from ...compiled import loop
 from ...errors import InputError
-from .elimination import Balance
-from .paths import connected_from_end_to_end, critical_constriction
 
-Map = NDArray[np.float64]
+Map = NDArray[np.floating]
+DRY, WHITE = -1, -2  # numbers of cells that are not black
+MOST_NEIGHBOURS = 17  # entries of a row of the matrix, at most, including the diagonal
+PANEL = 1  # tuning: columns per panel of SuperLU
+
+
+class Balance:
+    """Balance of the flows in a map.
+
+    `resistances` are 1/g^3, infinite in dry cells; `aspect` is the side of a cell across the flow over that along
+    it. Flow is along y, from the first to the last row; the other sides are `periodic` or closed. The pressure is
+    prescribed half a cell from these rows: `first` and `last` are the conductances from there, shape (nx,).
+    """
+
+    def __init__(self, resistances: Map, aspect: float, periodic: bool) -> None:
+        self._map = np.ascontiguousarray(resistances), aspect, periodic
+        self.first, self.last = 2.0 * aspect / resistances[0], 2.0 * aspect / resistances[-1]
+        self._number = _number_black_cells(resistances)
+        self._sum = np.zeros_like(self._map[0])
+        _add_faces(*self._map, self.first, self.last, self._sum)
+        self._factors = self._factorize()
+
+    def _factorize(self) -> Any:
+        """Return the factors of the matrix of the black cells; None if there are none."""
+        from scipy import sparse  # slow to import
+        from scipy.sparse.linalg import splu
+
+        count = int(self._number.max(initial=DRY)) + 1
+        if not count:
+            return None
+        starts = np.zeros(count + 1, dtype=np.int32)
+        columns = np.empty(MOST_NEIGHBOURS * count, dtype=np.int32)
+        values = np.empty(columns.size)
+        _eliminate(*self._map, self._number, self._sum, starts, columns, values)
+        matrix = sparse.csc_matrix((values[: starts[-1]], columns[: starts[-1]], starts), shape=(count, count))
+        del columns, values
+        options = {"SymmetricMode": True, "Equil": False}
+        return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=PANEL, options=options)
+
+    def solve(self, given: Map) -> Map:
+        """Return the pressures for the sources `given` in each cell, both of the shape of the map; 0 in dry cells."""
+        black, pressure = self._number >= 0, np.zeros_like(self._sum)
+        if self._factors is not None:
+            total = given.copy()
+            _gather(*self._map, self._number, self._sum, given, True, total)
+            pressure[black] = self._factors.solve(total[black])
+        total = given.copy()
+        _gather(*self._map, self._number, self._sum, pressure, False, total)
+        white = self._number == WHITE
+        pressure[white] = total[white] / self._sum[white]
+        return pressure
+
+    def power(self, pressure: Map) -> float:
+        """Return the dissipation of the flow, sum c (p - p_neighbour)^2, with the pressures 1 and 0 at the ends."""
+        return float(_dissipate(*self._map, self.first, self.last, pressure))
+
+
+def _number_black_cells(resistances: Map) -> NDArray[np.int32]:
+    """Return the numbers of black wet cells, WHITE and DRY elsewhere. If the number of columns is odd, two white cells
+    would touch across periodic sides: the last column then has none."""
+    ny, nx = resistances.shape
+    white = np.add.outer(np.arange(ny), np.arange(nx)) % 2 == 0
+    white[:, -1] &= nx % 2 == 0
+    number = np.where(resistances < np.inf, np.int32(WHITE), np.int32(DRY))
+    black = (resistances < np.inf) & ~white
+    number[black] = np.arange(np.count_nonzero(black), dtype=np.int32)
+    return number
+
+
+@loop
+def _neighbour(resistances, aspect, periodic, row, column, side):
+    """Return row, column and conductance of the face of a neighbour; 0 if there is none."""
+    i, j, width = row, column, resistances.shape[1]
+    if side < 2:
+        i = row - 1 if side == 0 else row + 1
+        if i < 0 or i == resistances.shape[0]:
+            return row, column, 0.0
+    else:
+        j = column - 1 if side == 2 else column + 1
+        if periodic and (j < 0 or j == width):
+            j = width - 1 if j < 0 else 0
+        if j < 0 or j in (width, column):
+            return row, column, 0.0
+    resistance = resistances[row, column] + resistances[i, j]
+    if resistance == np.inf:
+        return row, column, 0.0
+    return i, j, 2.0 / resistance * (aspect if side < 2 else 1.0 / aspect)
+
+
+@loop
+def _add_faces(resistances, aspect, periodic, first, last, out):
+    """Put the sum of the conductances of the faces of each cell, including those of the ends, into `out`."""
+    for row in range(resistances.shape[0]):
+        for column in range(resistances.shape[1]):
+            total = 0.0
+            for side in range(4):
+                total += _neighbour(resistances, aspect, periodic, row, column, side)[2]
+            if row == 0:
+                total += first[column]
+            if row == resistances.shape[0] - 1:
+                total += last[column]
+            out[row, column] = total
+
+
+@loop
+def _eliminate(resistances, aspect, periodic, number, total, starts, columns, values):
+    """Write the matrix of the black cells, row by row."""
+    end = 0
+    for row in range(resistances.shape[0]):
+        for column in range(resistances.shape[1]):
+            own = number[row, column]
+            if own < 0:
+                continue
+            begin = end
+            columns[end], values[end] = own, total[row, column]
+            end += 1
+            for side in range(4):
+                i, j, c = _neighbour(resistances, aspect, periodic, row, column, side)
+                if c == 0.0:
+                    continue
+                if number[i, j] >= 0:
+                    end = _add(number[i, j], -c, begin, end, columns, values)
+                    continue
+                for further in range(4):
+                    k, m, d = _neighbour(resistances, aspect, periodic, i, j, further)
+                    if d > 0.0:
+                        end = _add(number[k, m], -c * d / total[i, j], begin, end, columns, values)
+            starts[own + 1] = end
+
+
+@loop
+def _add(other, value, begin, end, columns, values):
+    """Add a value to an entry of a row that starts at `begin`. Return the end of the row."""
+    for k in range(begin, end):
+        if columns[k] == other:
+            values[k] += value
+            return end
+    columns[end], values[end] = other, value
+    return end + 1
+
+
+@loop
+def _gather(resistances, aspect, periodic, number, total, field, black, out):
+    """Add the flow from white neighbours of a field to black cells, or `c` times that of black neighbours to white
+    cells."""
+    for row in range(resistances.shape[0]):
+        for column in range(resistances.shape[1]):
+            own = number[row, column]
+            if own == DRY or (own >= 0) != black:
+                continue
+            for side in range(4):
+                i, j, c = _neighbour(resistances, aspect, periodic, row, column, side)
+                if c > 0.0 and (number[i, j] < 0) == black:
+                    out[row, column] += c * field[i, j] / (total[i, j] if black else 1.0)
+
+
+@loop
+def _dissipate(resistances, aspect, periodic, first, last, pressure):
+    """Return the sum of the dissipation of all faces, each counted once, and of the ends."""
+    total = 0.0
+    for row in range(resistances.shape[0]):
+        for column in range(resistances.shape[1]):
+            for side in (1, 3):
+                i, j, c = _neighbour(resistances, aspect, periodic, row, column, side)
+                total += c * (pressure[row, column] - pressure[i, j]) ** 2
+    for column in range(resistances.shape[1]):
+        total += first[column] * (1.0 - pressure[0, column]) ** 2 + last[column] * pressure[-1, column] ** 2
+    return total
+
+
+Mask = NDArray[np.bool_]
+
+
+def connected_from_end_to_end(open_cells: Mask, periodic_sides: bool) -> Mask:
+    """Return the cells that are connected by faces to both the first and the last row."""
+    labels, count = scipy.ndimage.label(open_cells)
+    if periodic_sides and count:
+        both = (labels[:, 0] > 0) & (labels[:, -1] > 0)
+        pairs = (np.ones(np.count_nonzero(both)), (labels[both, 0], labels[both, -1]))
+        graph = scipy.sparse.coo_matrix(pairs, shape=(count + 1, count + 1))
+        _, groups = scipy.sparse.csgraph.connected_components(graph, False)
+        labels = np.where(labels > 0, groups[labels] + 1, 0)
+    spanning = np.intersect1d(labels[0], labels[-1])
+    return np.isin(labels, spanning[spanning > 0])
+
+
+def critical_constriction(gap: NDArray[np.float64], periodic_sides: bool) -> tuple[float, tuple[int, int] | None]:
+    """Return the smallest gap on the widest path from end to end, and its row and column; the widest path is that with
+    the largest smallest gap.
+
+    Returns 0 and None if contact closes all paths. Cells are opened in the order of falling gaps until both ends are
+    connected: the last one is the constriction.
+    """
+    open_, (ny, nx) = np.flatnonzero(gap > 0.0), gap.shape
+    cell = int(_open_until_connected(open_[np.argsort(-gap.ravel()[open_])], ny, nx, periodic_sides))
+    if cell < 0:
+        return 0.0, None
+    row, column = divmod(cell, nx)
+    return float(gap[row, column]), (row, column)
+
+
+@loop
+def _open_until_connected(order, ny, nx, periodic):
+    """Open cells in an order until a path leads from the first row to the last. Return the last one, or -1. Open cells
+    that touch form a tree, `parent` leads to its root; both ends are additional cells."""
+    first, last = nx * ny, nx * ny + 1
+    parent = np.full(nx * ny + 2, -1, np.int64)
+    parent[first], parent[last] = first, last
+    for cell in order:
+        parent[cell] = cell
+        row, column = cell // nx, cell % nx
+        for side in range(4):
+            if side == 0:
+                other = cell - nx if row > 0 else first
+            elif side == 1:
+                other = cell + nx if row < ny - 1 else last
+            elif side == 2:
+                other = cell - 1 if column > 0 else (cell + nx - 1 if periodic else cell)
+            else:
+                other = cell + 1 if column < nx - 1 else (cell - nx + 1 if periodic else cell)
+            if parent[other] >= 0:
+                parent[_root(parent, other)] = _root(parent, cell)
+        if _root(parent, first) == _root(parent, last):
+            return cell
+    return -1
+
+
+@loop
+def _root(parent, cell):
+    """Return the root of a tree, and shorten the path to it."""
+    while parent[cell] != cell:
+        parent[cell] = parent[parent[cell]]
+        cell = parent[cell]
+    return cell
+
+
+FloatMap = NDArray[np.float64]
 LEAST_GAP = 1e-3  # accuracy: least open gap over the largest; this changes the flow by about 1e-5
 LEAST_OF_CONSTRICTION = 0.1  # accuracy: least open gap over the critical constriction
 MOST_OF_CONSTRICTION = 1e3  # accuracy: largest gap over the critical constriction; wider cells resist 1e-9 of the whole
@@ -42,14 +313,14 @@ class Flow:
     constriction: float
     position: tuple[int, int] | None
     imbalance: float
-    pressure: Map = field(repr=False)
+    pressure: FloatMap = field(repr=False)
 
     @property
     def percolates(self) -> bool:
         return self.constriction > 0.0
 
 
-def solve_flow(gap: Map, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True) -> Flow:
+def solve_flow(gap: FloatMap, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True) -> Flow:
     """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m] along `axis`."""
     if axis == "x":
         turned = solve_flow(gap.T, size[::-1], "y", periodic_sides)
@@ -68,7 +339,7 @@ def solve_flow(gap: Map, size: tuple[float, float], axis: str = "x", periodic_si
     return Flow(conductivity, constriction, position, abs(leaving / power - 1.0), wet)
 
 
-def _resistances(gap: Map, constriction: float, periodic_sides: bool) -> Map:
+def _resistances(gap: FloatMap, constriction: float, periodic_sides: bool) -> FloatMap:
     """Return 1/g^3 over 1/g^3 of the constriction; infinite in cells that are not used."""
     least = min(LEAST_GAP * float(gap.max()), LEAST_OF_CONSTRICTION * constriction)
     wet = connected_from_end_to_end(gap >= least, periodic_sides)
@@ -77,7 +348,7 @@ def _resistances(gap: Map, constriction: float, periodic_sides: bool) -> Map:
     return found
 
 
-def least_section(gap: Map, flow: Flow, size: tuple[float, float], axis: str = "x") -> float:
+def least_section(gap: FloatMap, flow: Flow, size: tuple[float, float], axis: str = "x") -> float:
     """Return the smallest open section [m^2] across a flow along `axis`, over cells in which fluid flows; 0 if contact
     closes the gap. `gap` [m] has the shape (ny, nx), and `size` is (lx, ly) [m]."""
     across, width = (0, size[1]) if axis == "x" else (1, size[0])
@@ -86,7 +357,7 @@ def least_section(gap: Map, flow: Flow, size: tuple[float, float], axis: str = "
 
 
 def flow_mesh_error(
-    gap: Map, flow: Flow, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True
+    gap: FloatMap, flow: Flow, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True
 ) -> float:
     """Return the relative change of K if only every second point of its gap is used, starting with the first or the
     second, whichever changes it more; NaN if contact closes the gap. The other arguments are as in `solve_flow`."""
@@ -146,7 +417,7 @@ def leak(gap: ArrayLike, size: Sequence[float], periodic: bool | tuple[bool, boo
     if missing := int(np.count_nonzero(~np.isfinite(gaps))):
         raise InputError(f"gap must be finite, {missing} of {gaps.size} points are not: fill or close (0) them")
     gaps, lengths = np.maximum(gaps, 0.0), _lengths(size)
-    datafiles.refuse_extreme("gap", float(gaps.max()))
+    text_tables.refuse_extreme("gap", float(gaps.max()))
     along_x, along_y = periodic if isinstance(periodic, tuple) else (periodic, periodic)
     return Leak(*(solve_flow(gaps, lengths, axis, sides) for axis, sides in (("x", along_y), ("y", along_x))))
 
@@ -159,3 +430,132 @@ def _lengths(size: Sequence[float]) -> tuple[float, float]:
     if not (0.0 < width < math.inf and 0.0 < height < math.inf):
         raise InputError(f"size must be two positive lengths (lx, ly) [m], got {size!r}")
     return width, height
+
+
+GAS_CONSTANT = 8.31446261815324  # physics: [J/(mol K)]
+BAR = 1.0e5  # [Pa]
+INERTIA = 0.2  # accuracy: viscous flow of a gas over its bound by inertia, above which viscous flow is 10 % too large
+ROOM = 293.15  # physics: temperature of the table [K]
+
+
+@dataclass(frozen=True)
+class Fluid:
+    """A fluid at 20 C: its viscosity [Pa s], and the density of a liquid [kg/m^3], NaN if unknown, or the molar mass
+    [kg/mol] and the ratio of heats of a gas."""
+
+    name: str
+    viscosity: float
+    molar_mass: float | None = None
+    density: float = math.nan
+    heat_ratio: float = math.nan
+
+    def mean_free_path(self, pressure: float) -> float:
+        """Return the mean free path [m] of a gas at a pressure [Pa]; 0 for a liquid."""
+        if self.molar_mass is None:
+            return 0.0
+        return self.viscosity / pressure * math.sqrt(math.pi * GAS_CONSTANT * ROOM / (2.0 * self.molar_mass))
+
+    @property
+    def choking_ratio(self) -> float:
+        """Ratio of the low to the high pressure below which the flow of a gas is choked."""
+        kappa = self.heat_ratio
+        return float((2.0 / (kappa + 1.0)) ** (kappa / (kappa - 1.0)))
+
+    def density_at(self, pressure: float) -> float:
+        """Return the density [kg/m^3] at a pressure [Pa]; NaN if unknown."""
+        return self.density if self.molar_mass is None else pressure * self.molar_mass / (GAS_CONSTANT * ROOM)
+
+
+FLUIDS = {  # at 20 C and 1 bar: CRC Handbook of Chemistry and Physics, 97th edition (2016), 6-1 and 6-231
+    "water": Fluid("water", 1.0016e-3, density=998.2),
+    "air": Fluid("air", 1.82e-5, 0.028964, heat_ratio=1.40),
+    "nitrogen": Fluid("nitrogen", 1.76e-5, 0.028014, heat_ratio=1.40),
+    "helium": Fluid("helium", 1.96e-5, 0.0040026, heat_ratio=1.67),
+}
+
+
+@dataclass(frozen=True)
+class PressureDrop:
+    """A fluid under a pressure that falls from `high` to `low` [Pa], absolute pressures for a gas.
+
+    With `total` it carries its part of the load, which is measured over the pressure `ambient` [Pa] (default: `low`).
+    """
+
+    fluid: Fluid
+    high: float
+    low: float
+    total: bool = False
+    ambient: float | None = None
+
+    @property
+    def mean_free_path(self) -> float:
+        """Mean free path at the mean pressure [m]."""
+        return self.fluid.mean_free_path(0.5 * (self.high + self.low))
+
+    @property
+    def outside(self) -> float:
+        """Pressure [Pa] over which the load is measured."""
+        return self.low if self.ambient is None else self.ambient
+
+    @property
+    def pressures(self) -> tuple[float, ...]:
+        """Pressures [Pa] at which the conductivity for the fluid is calculated: the mean one, and both ends if a gas
+        carries a part of the load."""
+        ends = (self.low, self.high) if self.total and self.mean_free_path else ()
+        return (0.5 * (self.low + self.high), *ends)
+
+    def local_loads(self, load: float) -> tuple[float, float]:
+        """Return the loads [Pa] that contact carries at the high and at the low side, if the fluid carries its part."""
+        return load + self.outside - self.high, load + self.outside - self.low
+
+    def conducting_gap(self, gap: NDArray[np.float64], pressure: float) -> NDArray[np.float64]:
+        """Return the gaps [m] that pass as much mass of a fluid without slip at the mean pressure as `gap` does with
+        slip at a pressure [Pa]."""
+        if not (path := self.mean_free_path):
+            return gap
+        return np.cbrt(gap**2 * (pressure / self.pressures[0] * gap + 6.0 * path))
+
+    def flow_rate(self, conductivity: float, length: float, width: float) -> float:
+        """Return the flow [m^3/s] at the low side through a conductivity [m^3] over a length and a width [m]; NaN for a
+        gas that flows into a vacuum."""
+        drive = self.high - self.low
+        if self.fluid.molar_mass is not None:
+            drive = drive * 0.5 * (self.high + self.low) / self.low if self.low else math.nan
+        return conductivity / (12.0 * self.fluid.viscosity) * drive * width / length
+
+    def mass_flow(self, conductivity: float, length: float, width: float) -> float:
+        """Return the flow [kg/s] through a conductivity [m^3] over a length and a width [m]; NaN for an unknown
+        density."""
+        mean = self.fluid.density_at(0.5 * (self.high + self.low))
+        return conductivity / (12.0 * self.fluid.viscosity) * (self.high - self.low) * mean * width / length
+
+    def inertial_bound(self, section: float) -> float:
+        """Return the largest flow [kg/s] of a gas through an open section [m^2]; inf for a liquid."""
+        if self.fluid.molar_mass is None:
+            return math.inf
+        kappa, ratio = self.fluid.heat_ratio, max(self.low / self.high, self.fluid.choking_ratio)
+        square = 2.0 * kappa / (kappa - 1.0) * (ratio ** (2.0 / kappa) - ratio ** ((kappa + 1.0) / kappa))
+        return section * self.high * math.sqrt(square * self.fluid.molar_mass / (GAS_CONSTANT * ROOM))
+
+    def describe_inertia(self, axis: str, viscous: float, bound: float) -> str:
+        """Return a warning if the viscous flow of a gas [kg/s] along an axis is close to its bound by inertia [kg/s],
+        or above; '' otherwise."""
+        if not viscous > INERTIA * bound:
+            return ""
+        both = 1.0 / (1.0 / viscous + 1.0 / bound)
+        choked = ", choked," * (viscous > bound and self.low <= self.fluid.choking_ratio * self.high)
+        return (
+            f"along {axis} inertia limits the flow of {self.fluid.name}: at most {1e6 * bound:.3g} mg/s{choked} pass "
+            f"the smallest open section, and viscous flow alone would be {1e6 * viscous:.3g} mg/s; expect some "
+            f"{1e6 * both:.3g} mg/s, 1/(1/viscous + 1/bound), within 14 %"
+        )
+
+    def describe_rate(self, conductivity: float, length: float, width: float) -> str:
+        """Return a text on the flow through a conductivity [m^3] over a length and a width [m]: in ml/h at the low
+        side, for a gas also at 1 bar, and in mg/s if the density is known."""
+        rate, mass = (flow(conductivity, length, width) for flow in (self.flow_rate, self.mass_flow))
+        said = [] if math.isnan(rate) else [f"{rate:.3g} m³/s ({3.6e9 * rate:.3g} ml/h) at the low side"]
+        said += [] if math.isnan(mass) else [f"{1e6 * mass:.3g} mg/s"]
+        if self.fluid.molar_mass is not None and self.low != BAR:
+            said.append(f"{3.6e9 * mass / self.fluid.density_at(BAR):.3g} ml/h of gas at 1 bar")
+        return ", ".join(said)

@@ -12,8 +12,7 @@ The unknown of the rounds is the share s of the drive, 1 at the high and 0 at th
 A round presses the contact under the fluid's pressure, and gets another share from its gap. The next share is that of
 Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) from the last DEPTH rounds. Near percolation, pools open and
 close again: after ANDERSON rounds each cell makes a part of its change, half as large whenever it turns
-back. Rounds that have not settled after EACH go on with a small leak GROWTH times as large.
-"""
+back. Rounds that have not settled after EACH go on with a small leak GROWTH times as large."""
 
 import math
 from dataclasses import dataclass
@@ -21,9 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .elimination import Balance
-from .flow import flow_mesh_error, least_section, solve_flow
-from .fluids import PressureDrop
+from .flow import Balance, PressureDrop, flow_mesh_error, least_section, solve_flow
 
 Map = NDArray[np.floating]
 SMALL = 1e-9  # accuracy: small leak over the mean of g^3

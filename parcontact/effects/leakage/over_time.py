@@ -1,35 +1,182 @@
-"""Leakage of a run: the flow through its saved gaps, as leak.csv and a picture."""
+"""`parcontact leak`: the flow through the gaps of a run.
+
+Leakage of a run: the flow through its saved gaps, as leak.csv and a picture.
+
+Flow through a seal whose fluid carries a part of the load.
+
+Contact carries the load p0 less the pressure p of the fluid over the ambient one, p_a. In a long seal the contact at a
+place is that under the local load, whose conductivity K is known from loads that a run has saved. The flow per width is
+
+    liquid     1/(12 eta L) int K(p0 + p_a - p) dp,
+    gas        M/(12 eta R T L) int K(p0 + p_a - p) p dp    [kg/(m s)],
+
+from the low to the high pressure, where K of a gas has the slip at p (`fluids`). K p of a gas over the mean pressure
+takes the place of K of a liquid below. Its logarithm is interpolated over the load without new extrema (F. N. Fritsch
+and R. E. Carlson, SIAM J. Numer. Anal. 17 (1980) 238), and its value over p by a parabola, as it is almost linear.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import PchipInterpolator
 
-from ... import scene
 from ...columns import choose_columns, names_of, to_csv, values_of
 from ...errors import InputError
+from ...files import files, hdf5
 from ...job import reading
-from ...job.resolved import RESOLVED, shown_job
+from ...job.reading import RESOLVED, shown_job
+from ...march import scene
 from ...parallel.mpi import MPI
 from ...parallel.root import on_root
 from ...parallel.slab import Slab
-from ...printed import per_cent, quantity, stated_error
-from ...results.plotted_run import Fields, PlottedRun
+from ...printed import per_cent, prefixed, quantity, span, stated_error
+from ...results.charts import Fields, PlottedRun
 from ...results.results import Results
-from ...storage import files, hdf5
-from ..contact_law import touching_of
-from . import conductivity
-from . import load_curve as load_curves
-from . import pictures as leakage_charts
-from . import results as leak_stop
-from .columns import LEAK
-from .flow import Flow, Leak, Map, flow_mesh_error, leak, least_section, solve_flow
-from .fluids import PressureDrop
-from .load_curve import LoadCurve
+from ..effect import touching_of
+from . import LEAK, pictures, results
+from .flow import FloatMap, Flow, Leak, PressureDrop, flow_mesh_error, leak, least_section, solve_flow
+
+Array = NDArray[np.float64]
+LOADS = (
+    6  # accuracy: loads in the range of the integral; three leave errors of 1 to 20 % in a wavy channel, six below 1 %
+)
+POINTS = 2001  # accuracy: of the integral; errors of 1e-6
+SAME = 1e-3  # accuracy: relative difference below which loads count as the same
+RISE = 0.01  # accuracy: relative rise of K over the load above which K depends on more than the load
+NOTABLE = 1.1  # ratio of both flows above which a sentence tells them apart
+
+
+@dataclass(frozen=True)
+class LoadCurve:
+    """Conductivities of a gap over the load: `loads` [Pa] rise, shape (n,), and `flows` [m^3], shape (n, m), are the
+    conductivities at the m pressures of a fluid (`PressureDrop.pressures`), 0 where contact closes the gap."""
+
+    loads: Array
+    flows: Array
+
+    def covers(self, least: float, most: float) -> bool:
+        """Return whether the saved loads include this range [Pa]."""
+        slack = SAME * most
+        return bool(least > 0.0 and self.loads[0] <= least + slack and most <= self.loads[-1] + slack)
+
+    def inside(self, least: float, most: float) -> int:
+        """Return the number of saved loads in a range [Pa]."""
+        return int(np.count_nonzero((self.loads >= least - SAME * most) & (self.loads <= most + SAME * most)))
+
+    def conductivity(self, drop: PressureDrop, load: float) -> float:
+        """Return the conductivity [m^3] that gives the flow of a fluid under a load [Pa] of which it carries its part;
+        NaN if K is not known at all local loads."""
+        least, most = drop.local_loads(load)
+        if not self.covers(least, most):
+            return np.nan
+        share = np.linspace(0.0, 1.0, POINTS)
+        at = self._at(np.clip(most - share * (most - least), self.loads[0], self.loads[-1]))
+        ends = (4.0 * share * (1.0 - share), (1.0 - share) * (1.0 - 2.0 * share), share * (2.0 * share - 1.0))
+        local = sum(part * k for part, k in zip(ends, at.T, strict=True)) if at.shape[1] > 1 else at[:, 0]
+        return float(np.trapezoid(local, share))
+
+    def _at(self, loads: Array) -> Array:
+        """Return the conductivities at local loads; 0 above the last load that leaves the gap open."""
+        opened = int(np.count_nonzero(self.flows[:, 0]))
+        if opened < 2:
+            return np.where(loads[:, None] <= self.loads[0], self.flows[0], 0.0)
+        last = self.loads[opened - 1]
+        logs = PchipInterpolator(self.loads[:opened], np.log(self.flows[:opened]))(np.minimum(loads, last))
+        return np.where(loads[:, None] <= last, np.exp(logs), 0.0)
+
+
+def load_curve(loads: ArrayLike, flows: ArrayLike) -> LoadCurve:
+    """Return the curve through conductivities [m^3], shape (n, m), at saved loads [Pa], of which those above 0 count.
+
+    Raises InputError if K is no function of the load.
+    """
+    given = np.asarray(loads, dtype=float)
+    kept = np.flatnonzero(given > 0.0)
+    order = kept[np.argsort(given[kept], kind="stable")]
+    load, flow = given[order], np.asarray(flows, dtype=float)[order]
+    if not load.size:
+        raise InputError("--load total needs the gap at loads above 0, and none is saved")
+    same, change = np.diff(load) <= SAME * load[1:], np.diff(flow[:, 0])
+    wrong = np.where(same, np.abs(change), change) > RISE * np.maximum(flow[1:, 0], flow[:-1, 0])
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        between = span(float(load[at]), float(load[at + 1]), "Pa")
+        raise InputError(
+            f"--load total needs K as a function of the load, and K does not fall between {between}: save the gap of "
+            "one loading, without unloading"
+        )
+    last = np.append(~same, True)
+    return LoadCurve(load[last], flow[last])
+
+
+def refuse_uncovered(curve: LoadCurve, drop: PressureDrop, loads: Sequence[float]) -> None:
+    """Raise InputError if the saved loads cover the local loads of no row."""
+    if not any(curve.covers(*drop.local_loads(load)) for load in loads):
+        highest = float(curve.loads[-1])
+        least, most = drop.local_loads(highest)
+        if least <= 0.0:
+            raise InputError(
+                f"the fluid's pressure, {quantity(drop.high - drop.outside, 'Pa')} over the ambient one, lifts the "
+                f"seal off: the highest saved load is {quantity(highest, 'Pa')}; save higher loads"
+            )
+        raise InputError(
+            f"--load total under {quantity(highest, 'Pa')} needs K between {span(least, most, 'Pa')}, and the saved "
+            f"loads lie between {span(float(curve.loads[0]), highest, 'Pa')}: {_advice(least, most)}"
+        )
+
+
+def describe_cover(curve: LoadCurve, drop: PressureDrop, loads: Sequence[float], shown: float) -> Iterator[str]:
+    """Yield sentences on rows, under `loads` [Pa], whose local loads are not all saved, and on too few loads for the
+    row under the load `shown`."""
+    ends = [drop.local_loads(load) for load in loads if load > 0.0]
+    empty = [end for end in ends if not curve.covers(*end)]
+    if empty:
+        lifted = sum(least <= 0.0 for least, _ in empty)
+        off = f", under {lifted} of which the fluid lifts the seal off" if lifted else ""
+        needed = span(max(0.0, min(least for least, _ in empty)), max(most for _, most in empty), "Pa")
+        saved = span(float(curve.loads[0]), float(curve.loads[-1]), "Pa")
+        yield (
+            f"flow_rate_total is left empty under {len(empty)} of {len(ends)} loads{off}: it needs K at loads between "
+            f"{needed}, and those saved lie between {saved}"
+        )
+    least, most = drop.local_loads(shown)
+    if (count := curve.inside(least, most)) < LOADS:
+        there = f"K is known at {count} of the local loads between {span(least, most, 'Pa')}"
+        yield f"{there}, and three leave errors of up to 20 %: {_advice(least, most)}"
+
+
+def _advice(least: float, most: float) -> str:
+    """Return the advice to save six loads in a range [Pa]."""
+    unit, size = prefixed("Pa", most)
+    values = [f"{load / size:.4g}" for load in np.linspace(least, most, LOADS)]
+    return f"save the gap under {', '.join(values[:-1])} and {values[-1]} {unit}, as stages of the history"
+
+
+def describe_part(axis: str, net: float, total: float) -> str:
+    """Return a sentence on what the pressure of the fluid does to the flow along an axis, from the conductivities [m^3]
+    if contact carries all of the load, and if the fluid carries its part."""
+    if not total:
+        return f"along {axis} contact closes the gap, also if the fluid carries its part of the load"
+    if not net:
+        return (
+            f"along {axis} contact closes the gap if it carries all of the load, and the pressure of the fluid opens it"
+        )
+    ratio = total / net
+    if 1.0 / NOTABLE <= ratio <= NOTABLE:
+        return f"along {axis} the pressure of the fluid changes the flow by {per_cent(abs(ratio - 1.0))}"
+    does, wrong, factor = ("opens", "small", ratio) if ratio > 1.0 else ("closes", "large", 1.0 / ratio)
+    return (
+        f"along {axis} the pressure of the fluid {does} the gap: flow_rate_total holds if the fluid carries its part "
+        f"of the load, and flow_rate, too {wrong} then by a factor of {factor:.3g}, only if the load of the job is net "
+        "of it"
+    )
+
 
 NEEDS = "leakage needs the gap and where contact is: output: {fields: [pressure, gap]} saves both"
 UNEQUAL = 0.1  # accuracy: pressure drop over the load, above which the part of the load that a fluid carries matters
@@ -105,7 +252,7 @@ class Gaps:
         if not self.shown:
             raise InputError(f"{directory}: no map is saved yet")
 
-    def read(self, index: int) -> Map:
+    def read(self, index: int) -> FloatMap:
         """Return the gap [m] at a saved instant; raises InputError if the maps are incomplete."""
         with self.results.open_maps() as file:
             gap, pressure = file["gap"][index], file["pressure"][index]
@@ -114,7 +261,7 @@ class Gaps:
             raise InputError(f"{self.directory / 'fields.h5'}: the maps after step {step} are incomplete or not finite")
         return np.where(touching_of(self.job, pressure, gap), 0.0, np.maximum(gap, 0.0))
 
-    def bare(self) -> Map:
+    def bare(self) -> FloatMap:
         """Return the gap [m] of the undeformed surface that just touches; raises InputError if its heights no longer
         exist."""
         job = reading.load(self.directory / RESOLVED)
@@ -122,13 +269,13 @@ class Gaps:
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
         return np.asarray(heights.max() - heights, dtype=float)
 
-    def solve(self, index: int) -> tuple[SolvedLeak, list[Map]]:
+    def solve(self, index: int) -> tuple[SolvedLeak, list[FloatMap]]:
         """Return the flow at a saved instant, and its maps for both directions."""
-        gap, flows, errors, shown = self.read(index), list[Flow](), list[float](), list[Map]()
+        gap, flows, errors, shown = self.read(index), list[Flow](), list[float](), list[FloatMap]()
         of_fluid, sections = list[tuple[float, ...]](), list[float]()
         for axis in ("x", "y"):
             flow = solve_flow(gap, self.size, axis, self._sides(axis))
-            shown.append(leakage_charts.flux(gap, flow.pressure, self.size))
+            shown.append(pictures.flux(gap, flow.pressure, self.size))
             sections.append(least_section(gap, flow, self.size, axis))
             flows.append(replace(flow, pressure=np.empty((0, 0))))
             of_fluid.append(self._conductivities(gap, flow, axis))
@@ -140,7 +287,7 @@ class Gaps:
         """Return whether the sides along a flow are periodic."""
         return self.periodic["yx".index(axis)]
 
-    def _conductivities(self, gap: Map, flow: Flow, axis: str) -> tuple[float, ...]:
+    def _conductivities(self, gap: FloatMap, flow: Flow, axis: str) -> tuple[float, ...]:
         """Return the conductivities for the fluid along an axis [m^3] at its pressures, NaN without a fluid."""
         if self.drop is None or not self.drop.mean_free_path:
             return (np.nan if self.drop is None else flow.conductivity,)
@@ -237,13 +384,13 @@ def write_leakage(
     files.replace_file(table, to_csv(names_of(columns), (values_of(columns, row) for row in rows)))
     instant = PlottedRun(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
     flows = leaks[drawn].leak.along_x, leaks[drawn].leak.along_y
-    leakage_charts.draw_leakage(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
+    pictures.draw_leakage(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
     yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
     yield from (text for axis in "xy" for text in _describe(rows, axis))
     chosen = max(range(len(rows)), key=lambda k: _tells(rows[k], k))
     yield from _describe_fluid(gaps, rows[chosen], leaks[gaps.shown[chosen]]) if drop else ()
     if drop and total:
-        yield from load_curves.describe_cover(curves[0], drop, [row.pressure for row in rows], rows[chosen].pressure)
+        yield from describe_cover(curves[0], drop, [row.pressure for row in rows], rows[chosen].pressure)
     yield from _describe_missing(gaps, at)
     if missing:
         yield f"share_x and share_y are left empty, as the undeformed surface cannot be made: {missing}"
@@ -257,10 +404,10 @@ def _tells(row: LeakInstant, number: int) -> tuple[int, ...]:
     return not any(map(math.isnan, totals)), bool(row.percolates_x + row.percolates_y), any(totals), number
 
 
-def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, SolvedLeak], int, list[Map]]:
+def _solve_all(gaps: Gaps, comm: MPI.Intracomm) -> tuple[dict[int, SolvedLeak], int, list[FloatMap]]:
     """Return, on root, the flow at all instants, the instant to draw and its maps: the last one with a flow in both
     directions, or in one; collective."""
-    mine, drawn, maps, problem = dict[int, SolvedLeak](), (-1, -1), list[Map](), ""
+    mine, drawn, maps, problem = dict[int, SolvedLeak](), (-1, -1), list[FloatMap](), ""
     working = max(1, int(comm.size * min(1.0, MOST_CELLS / gaps.cells)))
     try:
         for index in gaps.shown[comm.rank :: working] if comm.rank < working else []:
@@ -282,9 +429,9 @@ def _load_curves(gaps: Gaps, leaks: Mapping[int, SolvedLeak]) -> tuple[LoadCurve
     """Return K over the load along x and along y; raises InputError if they give the flow of no row."""
     drop, loads = gaps.drop, [gaps.load(index) for index in gaps.shown]
     assert drop is not None
-    along_x = load_curves.load_curve(loads, [leaks[index].of_fluid[0] for index in gaps.shown])
-    along_y = load_curves.load_curve(loads, [leaks[index].of_fluid[1] for index in gaps.shown])
-    load_curves.refuse_uncovered(along_x, drop, loads)
+    along_x = load_curve(loads, [leaks[index].of_fluid[0] for index in gaps.shown])
+    along_y = load_curve(loads, [leaks[index].of_fluid[1] for index in gaps.shown])
+    refuse_uncovered(along_x, drop, loads)
     return along_x, along_y
 
 
@@ -306,7 +453,7 @@ def _describe(rows: Sequence[LeakInstant], axis: str) -> Iterator[str]:
         if len(errors) > 1:
             much += f" in the median of the instants, at worst {stated_error(max(errors))}"
         yield f"along {axis} the error of K by the mesh, from every second point of the gap: {much}"
-    thin = [row for row in rows if conductivity.is_thin(getattr(row, f"constriction_{axis}"))]
+    thin = [row for row in rows if pictures.is_thin(getattr(row, f"constriction_{axis}"))]
     if thin:
         where = f"{len(thin)} of {len(rows)} instants, first at t = {quantity(thin[0].time, 's')}"
         yield f"along {axis} the constriction is below 10 nm at {where}: K means little, as no fluid is a continuum"
@@ -325,7 +472,7 @@ def _describe_fluid(gaps: Gaps, last: LeakInstant, solved: SolvedLeak) -> Iterat
         )
     for axis, (net, through), size, section in zip("xy", parts, sizes, solved.sections, strict=True):
         box = f"a length of {quantity(size[0], 'm')} and a width of {quantity(size[1], 'm')}"
-        yield from [load_curves.describe_part(axis, net, through)] * drop.total
+        yield from [describe_part(axis, net, through)] * drop.total
         flows = f"along {axis} {drop.describe_rate(through, *size)}, over {box}"
         yield f"{drop.fluid.name} {pressures} at t = {quantity(last.time, 's')}: {flows}"
         warning = drop.describe_inertia(axis, drop.mass_flow(through, *size), drop.inertial_bound(section))
@@ -351,7 +498,7 @@ def _describe_missing(gaps: Gaps, at: str) -> Iterator[str]:
 def _describe_closure(rows: Sequence[LeakInstant], axis: str) -> str:
     """Return a sentence on where leakage along an axis stops, and at how many instants contact closes the gap."""
     names = (f"flow_{axis}", "pressure", "time")
-    stop = leak_stop.describe_axis({name: [getattr(row, name) for row in rows] for name in names}, axis)
+    stop = results.describe_axis({name: [getattr(row, name) for row in rows] for name in names}, axis)
     closed = [row for row in rows if not getattr(row, f"percolates_{axis}")]
     found = [f"along {axis} leakage {stop}"] if stop else []
     if closed and len(rows) > 1:

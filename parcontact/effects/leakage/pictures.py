@@ -1,8 +1,13 @@
-"""Picture of leakage: the flow through the gap, and conductivity over load or time."""
+"""Picture of leakage: the flow through the gap, and conductivity over load or time.
 
-from collections.abc import Iterator, Sequence
+Chart of the conductivity of a gap over pressure or time, with marks where contact closes, or where the constriction
+is too narrow for continuum flow.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -10,12 +15,47 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 
 from ...columns import UNITS
-from ...results import charts, prefixes, style
+from ...parallel.slab import Array
+from ...results import charts, style
+from ...results.charts import Axis, Chart, ChartLine, PlottedRun
 from ...results.histories import Abscissa
-from ...results.plotted_run import PlottedRun
 from ...results.style import Panel
-from . import conductivity
-from .flow import Flow, Map
+from .flow import FloatMap, Flow
+
+CONTINUUM = 1e-8  # physics: gap of about thirty molecules of water, the least for continuum flow [m]
+THIN = "constriction\nunder 10 nm"
+THIN_LOOK: dict[str, Any] = {"color": style.GREY, "linestyle": "none", "marker": "o", "mfc": "none", "ms": 8}
+
+
+def is_thin(constriction: Any) -> Any:
+    """Return True if a constriction [m] (or each of several) is open but too narrow for continuum flow."""
+    return (constriction > 0.0) & (constriction < CONTINUUM)
+
+
+def chart(
+    over: Axis,
+    at: Array,
+    flows: Mapping[str, Array],
+    constrictions: Mapping[str, Array],
+    log_x: bool = False,
+    dotted: Mapping[str, Array] = MappingProxyType({}),
+) -> Chart:
+    """Draw conductivities K [m^3], by their names, over an axis, all of shape (n,), with their critical constrictions
+    [m]; K is 0 where contact closes, and NaN where it is not known. Others are `dotted`, in the same colours."""
+    lines, thin = list[ChartLine](), list[ChartLine]()
+    for number, (name, flow) in enumerate(flows.items()):
+        known = np.isfinite(flow)
+        lines.append(ChartLine(name, at[known], flow[known], style.line(number) | {"marker": "."}))
+        narrow = known & (flow > 0.0) & is_thin(constrictions[name])
+        if narrow.any():
+            thin.append(ChartLine(THIN * (not thin), at[narrow], flow[narrow], THIN_LOOK))
+    looks = [style.line(number) | {"linestyle": ":"} for number in range(len(dotted))]
+    lines += [
+        ChartLine(name, at[flow > 0.0], flow[flow > 0.0], look)
+        for (name, flow), look in zip(dotted.items(), looks, strict=True)
+    ]
+    return Chart("leakage", over, Axis("conductivity K", "m³"), lines + thin, log_x=log_x, zeros="closed")
+
 
 BAR = 0.7  # height of the bar of colours over that of its map
 DECADES = 3  # decades of the flow on the colour scale
@@ -36,7 +76,7 @@ def panels(run: PlottedRun, along: Abscissa) -> Iterator[charts.Chart]:
         rows = slice(None) if along.rows is None else along.rows
         flows = {label: columns[name][rows] for name, label in names.items()}
         narrowest = dict.fromkeys(flows, columns["constriction"][rows])
-        yield conductivity.chart(along.axis, along.values, flows, narrowest)
+        yield chart(along.axis, along.values, flows, narrowest)
         if "fluid_pressure" in columns:
             yield from _leak_over_pressure(run)
 
@@ -68,16 +108,16 @@ def _leak_over_pressure(run: PlottedRun) -> Iterator[charts.Chart]:
 def draw_leakage(
     path: Path,
     size: tuple[float, float],
-    gap: Map,
+    gap: FloatMap,
     flows: Sequence[Flow],
-    fluxes: Sequence[Map],
+    fluxes: Sequence[FloatMap],
     instant: str,
     rows: Sequence[Any],
     over: str = "",
 ) -> Path:
     """Draw the flow along x and along y on the map of the gap at an instant, and K of all instants."""
 
-    def flow_map(axis: str, flow: Flow, flux: Map) -> Panel:
+    def flow_map(axis: str, flow: Flow, flux: FloatMap) -> Panel:
         def panel(axes: Axes) -> None:
             _draw_flow(axes, size, gap, flow, flux)
             axes.set_title(f"along {axis}" if flow.percolates else f"along {axis}: closed, no path")
@@ -110,10 +150,10 @@ def chart_of(rows: Sequence[Any], over: str) -> charts.Chart:
     flows = {name: parts[:, k, 1] for k, name in enumerate(flows)} if parts.size else flows
     later = at[at > 0.0]
     log_x = over == "time" and later.size > 0 and bool(later.max() > LONG * later.min())
-    return conductivity.chart(charts.Axis(over, UNITS[over]), at, flows, narrowest, log_x, dotted)
+    return chart(charts.Axis(over, UNITS[over]), at, flows, narrowest, log_x, dotted)
 
 
-def _draw_flow(axes: Axes, size: tuple[float, float], gap: Map, flow: Flow, flux: Map) -> None:
+def _draw_flow(axes: Axes, size: tuple[float, float], gap: FloatMap, flow: Flow, flux: FloatMap) -> None:
     """Draw the flow through a gap over its largest value, and circle the constriction."""
     axes.set_facecolor("k")
     look: dict[str, Any] = {"extent": (0.0, size[0], 0.0, size[1]), "origin": "lower", "interpolation": "nearest"}
@@ -121,16 +161,16 @@ def _draw_flow(axes: Axes, size: tuple[float, float], gap: Map, flow: Flow, flux
     if flow.position is not None:
         most = float(np.nanpercentile(flux, 99.9)) or 1.0  # all the flow may be in fewer cells
         drawn = axes.imshow(flux / most, cmap="viridis", norm=LogNorm(10.0**-DECADES, 1.0), **look)
-        shrink = BAR * prefixes.label_map(axes, size)  # after the pictures, which set the aspect
+        shrink = BAR * style.label_map(axes, size)  # after the pictures, which set the aspect
         axes.figure.colorbar(drawn, ax=axes, shrink=shrink, label="flow over its largest")
         row, column = flow.position
         cell = size[0] / gap.shape[1], size[1] / gap.shape[0]
         axes.plot((column + 0.5) * cell[0], (row + 0.5) * cell[1], "o", mfc="none", mec="r", ms=11, mew=1.5)
     axes.grid(False)
-    prefixes.label_map(axes, size)
+    style.label_map(axes, size)
 
 
-def flux(gap: Map, pressure: Map, size: tuple[float, float]) -> Map:
+def flux(gap: FloatMap, pressure: FloatMap, size: tuple[float, float]) -> FloatMap:
     """Return the magnitude of g^3 grad p in open cells over the largest, NaN elsewhere; in single precision."""
     slopes = []
     for axis, length in ((0, size[1]), (1, size[0])):

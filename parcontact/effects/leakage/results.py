@@ -1,7 +1,6 @@
 """Results of leakage in texts: conductivities, and the loads between which contact closes the gap along x and along y.
 
-Conductivities K are read from `leak.csv`, which is made from saved gaps, else from measures.csv.
-"""
+Conductivities K are read from `leak.csv`, which is made from saved gaps, else from measures.csv."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

@@ -6,8 +6,7 @@ With the contact pressure q >= 0 and the pressure p~ of the fluid over the ambie
     g = A (q + p~) - h - d >= 0,    q g = 0,    <q> = p0 - <p~>.
 
 A round solves the contact of the heights `h - A p~` under the load `p0 - <p~>` by the law of the constraint, and the
-flow through its gap. Rounds end when flow and pressure no longer change. The body remembers q + p~.
-"""
+flow through its gap. Rounds end when flow and pressure no longer change. The body remembers q + p~."""
 
 from __future__ import annotations
 
@@ -17,18 +16,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...history.timeline import Step
-from ...parallel import rows
+from ...contact.problem import Control, MeanPressure
+from ...contact.solver import Contact
+from ...job.history import Step
+from ...parallel import regrid
 from ...parallel.root import on_root
 from ...parallel.slab import Array
 from ...physics.body import Trial
-from ...physics.entries import Entry, Saved
+from ...physics.entries import Entry, Saved, Units
 from ...physics.measures import Measures
 from ...physics.motion import cells_between
-from ...physics.units import Units
-from ...solve.contact import Contact
-from ...solve.problem import Control, MeanPressure
-from ..contact_protocol import (
+from ..effect import (
     ContactLaw,
     Detached,
     EdgeMotion,
@@ -39,8 +37,8 @@ from ..contact_protocol import (
     end_in,
     entries_of_end,
 )
+from .flow import PressureDrop
 from .fluid_pressure import Rounds, linear_share, pressure_of, seal_flow
-from .fluids import PressureDrop
 from .section import drop_at
 
 MOST_ROUNDS = 100  # tuning: limit on the rounds of a step
@@ -152,7 +150,7 @@ class SealLaw:
         cells = round(cells_between(last.position, step.position, (grid.dx, grid.dy))[1]) % grid.ny
         if cells:
             for map_ in (share, start):
-                map_[...] = rows.roll_rows(self.slab, map_, cells, self._image)
+                map_[...] = regrid.roll_rows(self.slab, map_, cells, self._image)
 
     def _press(self, trial: Trial, drop: PressureDrop, share: Array, control: Control) -> Control:
         """Put the fluid's pressure and the heights of the contact under it into maps; return its load; collective."""

@@ -8,12 +8,12 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
 
-from ...job.checks import limits
-from ...job.sections.part import Part, Rule
-from ...job.sections.quantities import Count, NonNegative, Positive
-from ...job.sections.stages import Ramp, Stage
-from ...job.text.fault import Fault, quote, refuse
-from .fluids import FLUIDS, Fluid, PressureDrop
+from ...job import limits
+from ...job.parts import Part, Rule
+from ...job.quantities import Count, NonNegative, Positive
+from ...job.stages import Ramp, Stage
+from ...job.yaml_text import Fault, quote, refuse
+from .flow import FLUIDS, Fluid, PressureDrop
 
 PAIR = "two pressures [HIGH, LOW] of zero or more [Pa]"
 ENDS: TypeAdapter[tuple[float, float]] = TypeAdapter(tuple[NonNegative, NonNegative])

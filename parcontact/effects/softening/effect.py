@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...job.sections.part import Part, Rule
+from ...job.parts import Part, Rule
 from ...parallel.slab import Array
 from ...printed import quantity
 from ..effect import BY_THEORY, Decision, Effect

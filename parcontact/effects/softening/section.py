@@ -10,11 +10,10 @@ from typing import Annotated, Any, ClassVar
 from pydantic import AfterValidator, Field, PrivateAttr
 
 from ...errors import InputError
-from ...job.sections.part import Part, Rule, existing_file
-from ...job.sections.quantities import Positive
-from ...job.text.fault import Fault, refuse
-from .strain_table import StrainTable
-from .sweep_file import read_sweep
+from ...job.parts import Part, Rule, existing_file
+from ...job.quantities import Positive
+from ...job.yaml_text import Fault, refuse
+from .strain_table import StrainTable, read_sweep
 
 Row = tuple[Positive, Positive, Positive]
 LEAST_POISSON = 0.45  # physics: Poisson's ratio from which the strain of an incompressible body holds to 10 %

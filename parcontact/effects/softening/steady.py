@@ -1,26 +1,189 @@
-"""The strains of a steady state and its softened moduli, which depend on each other: a fixed point.
+"""Amplitude of the shear strain that softens each wave of a rough contact, in steady sliding.
+
+A wave of the surface displacement with the amplitude A and the wavenumber q strains an incompressible half space at
+the depth z by a tensor e that turns with the constant magnitude
+
+    gamma(z) = sqrt(2 e:e) = 2 q A (q z) exp(-q z).                                                               (1)
+
+The strain is local: it counts where power is dissipated. With the dissipated power d(x, z) of a map of displacements,
+
+    S(z) = <d gamma^2>/<d>/R(z),                                                                                  (2)
+
+where R is the ratio <d gamma^2>/(<d> <gamma^2>) of waves with the same amplitudes and independent phases. In full
+contact S is the sum of gamma^2 over all waves. The strain of a wave is a mean over depth, weighted by its dissipation,
+
+    gamma_q^2 = int 4 q^3 z^2 exp(-2 q z) S(z) dz,                                                                (3)
+
+which for one wave is 3/8 (q A)^2. The strain of an octave, or of a band, is the mean of (3) over its waves, weighted by
+their power. S(z) of bands add up.
+
+The strains of a steady state and its softened moduli, which depend on each other: a fixed point.
 
 A round solves the state with the factors of the last strains, and finds its strains (`strain`). Strains change by a
 power mean, `gamma <- gamma_new^0.7 gamma^0.3`, until friction changes by less than a share of the accuracy.
+
+Strains and factors of bands in full contact, from the spectrum alone.
 """
 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement, pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...doubts import Doubt
 from ...errors import RunError
+from ...march.point import Point, count_octaves, in_rounds
+from ...march.scene import Setup
+from ...parallel.fft import Spectrum
 from ...parallel.slab import Array
-from ...scene import Setup
-from ...steady_sliding.losses import count_octaves
-from ...steady_sliding.point import Point, in_rounds
-from .strain import strains_at_octaves
-from .strain_table import Softened
+from ...physics.convolution import wavenumbers
+from .strain_table import Softened, strains_in_full_contact
 
+SHALLOW, DEEP = 0.2, 4.0  # accuracy: least depth times the largest wavenumber, largest depth times the smallest
+BEYOND = 4.0  # accuracy: ratio by which the depths of the integral (3) go beyond these
+SPACING = 1.5  # accuracy: ratio of two depths of the integral (3); S is found at every second one
+TINY = 1e-300  # rounding: least square of a strain, for logarithms
 Vector = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class StrainsAtDepth:
+    """Strains of a map of displacements: the `squares` S(z) [-] at given depths z, shape (depths,); the `weights` of
+    S(z) in the strain of each octave (3), shape (octaves, depths); and the `power` of each octave, to a common factor.
+    """
+
+    squares: Array
+    weights: Array
+    power: Array
+
+    def of_octaves(self, otherwise: Array) -> Array:
+        """Return the strain [-] of each octave; that of `otherwise` for an octave without power."""
+        found = np.sqrt(self.weights @ self.squares)
+        return np.where(found > 0.0, found, otherwise)
+
+
+def depths_between(low: float, high: float) -> Array:
+    """Return depths for waves between two wavenumbers, in the unit of their inverse."""
+    ends = np.log(SHALLOW / BEYOND / high), np.log(DEEP * BEYOND / low)
+    return np.exp(np.linspace(*ends, 2 + int((ends[1] - ends[0]) / math.log(SPACING))))
+
+
+def ends_of(setup: Setup) -> Vector:
+    """Return the smallest and the largest wavenumber of the grid [1/unit of length]."""
+    cells = setup.slab.nx / setup.size[0], setup.slab.ny / setup.size[1]
+    return 2.0 * math.pi / max(setup.size), math.pi * math.hypot(*cells)
+
+
+def strains_of(
+    setup: Setup, u: Array, velocity: Vector, depths: Array, octave: NDArray[np.int64], count: int
+) -> StrainsAtDepth:
+    """Return the strains at these depths [unit of length] under a surface of this velocity [m/s]; collective.
+
+    The displacement u is in the run's units. `octave` is the number of the octave of each wave, below `count`.
+    """
+    q = np.hypot(*wavenumbers(setup.fft, setup.size))
+    spectrum = setup.fft.forward(u) * (setup.units.height / setup.units.length)
+    power = _power(setup, q, velocity)
+    low, high = ends_of(setup)
+    there = np.flatnonzero((depths >= SHALLOW / high) & (depths <= DEEP / low))[::2]
+    found = np.array([_square_at(setup, spectrum, power, q, float(depths[index])) for index in there])
+    whole = power * np.abs(spectrum) ** 2 * setup.fft.multiplicity
+    return StrainsAtDepth(_continued(depths, there, found), *_weights(setup, whole, q, depths, octave, count))
+
+
+def _continued(depths: Array, there: NDArray[np.int64], found: Array) -> Array:
+    """Return S at all depths: between those where it was `found` log S is a cubic spline in log z, above them S is in
+    proportion to z^2, and below them it is 0."""
+    from scipy.interpolate import CubicSpline  # slow to import, and of use to few
+
+    first, last = depths[there[0]], depths[there[-1]]
+    spline = CubicSpline(np.log(depths[there]), np.log(np.maximum(found, TINY)))
+    inside = np.exp(spline(np.log(np.clip(depths, first, last))))
+    return np.where(depths < first, found[0] * (depths / first) ** 2, np.where(depths > last, 0.0, inside))
+
+
+def _weights(
+    setup: Setup, power: Array, q: Array, depths: Array, octave: NDArray[np.int64], count: int
+) -> tuple[Array, Array]:
+    """Return the weights of S(z) in the strain of each octave, averaged over the `power` of waves, and its power."""
+    step = math.log(depths[1] / depths[0])  # of the trapezoidal rule in ln z
+    sums = [np.bincount(octave.ravel(), power.ravel(), count)]
+    for z in depths:
+        s = q * z
+        sums.append(np.bincount(octave.ravel(), (power * 4.0 * step * s**3 * np.exp(-2.0 * s)).ravel(), count))
+    whole, *each = np.array(setup.slab.sum(*np.concatenate(sums))).reshape(-1, count)
+    weights = np.array(each).T
+    return np.divide(weights, whole[:, None], out=np.zeros_like(weights), where=whole[:, None] > 0.0), whole
+
+
+def _power(setup: Setup, q: Array, velocity: Vector) -> Array:
+    """Return the dissipated power of each wave over the square of its amplitude, to a common factor."""
+    speed = setup.in_units(velocity)
+    omega = np.abs(setup.half_space.frequencies(setup.fft, speed))
+    modulus = setup.half_space.sliding_modulus(setup.fft, speed, setup.prony)
+    return np.asarray(q * omega * np.abs(modulus.imag))
+
+
+def _square_at(setup: Setup, spectrum: Spectrum, power: Array, q: Array, depth: float) -> float:
+    """Return S of (2) at a depth; 0 without dissipation."""
+    waves = spectrum * (depth * np.exp(-q * depth))  # times components of q: strains
+    heavy = waves * np.sqrt(power / np.where(q > 0.0, q, 1.0))
+    strain, density = (_squared(setup, one) for one in (waves, heavy))
+    sums = setup.slab.sum(float((density * strain).sum()), float(density.sum()), float(strain.sum()))
+    if not sums[1] * sums[2] > 0.0:
+        return 0.0
+    return sums[0] / sums[1] / _of_independent_waves(setup, waves, heavy)
+
+
+def _squared(setup: Setup, waves: Spectrum) -> Array:
+    """Return the map of `2 e:e` for waves in proportion to the displacement; (1) with `z exp(-q z)` times it."""
+    fft, out, total = setup.fft, setup.slab.empty(), setup.slab.zeros()
+    for weight, symbol in _components(setup):
+        np.multiply(waves, symbol, out=fft.spectrum)
+        total += weight * fft.backward(fft.spectrum, out) ** 2
+    return total
+
+
+def _components(setup: Setup) -> Iterator[tuple[float, NDArray[Any]]]:
+    """Yield the components of the strain: their weights in `2 e:e`, and symbols."""
+    qx, qy = wavenumbers(setup.fft, setup.size)
+    q = np.hypot(qx, qy)
+    flat = [direction for direction, points in ((qx, setup.slab.nx), (qy, setup.slab.ny)) if points > 1]
+    yield 2.0, q**2
+    for k, one in enumerate(flat):
+        yield 4.0, 1j * one * q
+        for other in flat[k:]:
+            yield (2.0 if other is one else 4.0), one * other + 0.0 * q
+
+
+def _of_independent_waves(setup: Setup, waves: Spectrum, heavy: Spectrum) -> float:
+    """Return R of (2) from fourth moments of waves with independent phases.
+
+    With the vectors E and W of weighted components, whose squares are gamma^2 and d, it is
+    `1 + (2 sum_ij <E_i W_j>^2 - sum_k <E^2>_k <W^2>_k)/(<E^2> <W^2>)`, with the waves k.
+    """
+    counts = setup.fft.multiplicity
+    q = np.hypot(*wavenumbers(setup.fft, setup.size))
+    vectors = [math.sqrt(weight) * symbol for weight, symbol in _components(setup)]
+    both = counts * np.abs(waves) * np.abs(heavy)
+    own, other = (8.0 * q**4 * np.abs(one) ** 2 for one in (waves, heavy))
+    pairs = list(combinations_with_replacement(vectors, 2))
+    products = [float((both * (one * np.conj(two)).real).sum()) for one, two in pairs]
+    whole = float((counts * own).sum()), float((counts * other).sum()), float((2.0 * counts * own * other).sum())
+    first, second, same, *found = setup.slab.sum(*whole, *products)
+    squares = sum((1.0 if one is two else 2.0) * product**2 for (one, two), product in zip(pairs, found, strict=True))
+    return 1.0 + (2.0 * squares - same) / (first * second)
+
+
+def strains_at_octaves(setup: Setup, softened: Softened, u: Array, velocity: Vector) -> StrainsAtDepth:
+    """Return the strains of the octaves of softened rubber on one grid, as `strains_of`; collective."""
+    octave = softened.octave(np.hypot(*wavenumbers(setup.fft, setup.size)))
+    return strains_of(setup, u, velocity, depths_between(*ends_of(setup)), octave, len(softened.strains))
+
 
 SHARE = 0.2  # accuracy: allowed change of friction in a round over the accuracy of the job
 MOST_ROUNDS = 40  # tuning: limit on rounds
@@ -96,3 +259,22 @@ def doubts_of_points(points: Sequence[Point], job: Any) -> Iterator[Doubt]:
         worst = max(beyond, key=lambda point: abs(math.log(point.strain_amplitude / math.sqrt(low * high))))
         facts = {"strain": worst.strain_amplitude, "speed": worst.speed, "low": low, "high": high}
         yield Doubt("strains beyond the sweep", "softening", {**facts, "count": len(beyond), "points": len(points)})
+
+
+BINS = 12  # accuracy: bins of wavenumbers in a band
+
+
+def describe_bands(job: Any, cut: Any) -> Iterator[str]:
+    """Yield a sentence with the strain and the factors f and g of each band of a job (`bands.choice.Cut`)."""
+    section = job.section("softening")
+    if section is None:
+        return
+    edges = np.concatenate(
+        [np.geomspace(cut.edges[k], cut.edges[k + 1], BINS + 1)[int(k > 0) :] for k in range(cut.count)]
+    )
+    q = np.sqrt(edges[1:] * edges[:-1])
+    slopes = np.array([cut.spectrum.moment(float(a), float(b), 2) for a, b in pairwise(edges)])
+    strains = strains_in_full_contact(q, slopes, np.arange(q.size) // BINS, cut.count)
+    f, g = section.made.factors(strains)
+    each = (f"{strain:.2g} (f {a:.2g}, g {b:.2g})" for strain, a, b in zip(strains, f, g, strict=True))
+    yield f"softening: strains of the bands in full contact {', '.join(each)}"

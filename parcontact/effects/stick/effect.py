@@ -35,8 +35,7 @@ With output.energy the work of the tractions on the body is added to the work of
     sum max(0, (t_old + t)/2 (s - s_old)),
 
 so that work = stored + dissipated + slip_loss. At each point slip loses energy. If the motion turns back within a
-step, the trapezoidal rule may give less than 0, and then 0 is closer to the loss.
-"""
+step, the trapezoidal rule may give less than 0, and then 0 is closer to the loss."""
 
 from __future__ import annotations
 
@@ -47,23 +46,20 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...accuracy.constants import ROLLING, STICKING
 from ...columns import added_by
+from ...contact.preconditioner import grids_for
+from ...march.constants import ROLLING, STICKING
 from ...parallel.slab import Array
 from ...physics import loops
 from ...physics.body import BodyMemory, MovedHeights, surface_of
 from ...physics.energy import EnergyMemory, Pressed
-from ...physics.entries import Entry, Saved
-from ...physics.interface_friction import Vector
+from ...physics.entries import Entry, Saved, Units
 from ...physics.measures import Measures
-from ...physics.units import Units
-from ...solve.preconditioner.extension import grids_for
+from ...physics.motion import Vector
 from ..effect import Changes, Instant, Sheared
 from ..interface.section import InterfaceEffect
-from . import discs
-from .shear_operator import ShearOperator, components, stacked
-from .slipping import settle_slips
-from .solver import TangentialSolver, TractionProblem
+from . import solver
+from .solver import ShearOperator, TangentialSolver, TractionProblem, components, settle_slips, stacked
 
 UNIFORM = 1e-12  # rounding: share of the square of a pressure below which its waves are rounding
 LEAST_BOUND = 1e-12  # rounding: bound of tractions, in the run's units, that displacements hardly resolve: taken as 0
@@ -176,7 +172,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         (t, bound), last = memory.spare, memory.last
         self._fill_bound(instant, strength, bound)
         scale = memory.alpha / instant.modulus, instant.step.growth
-        discs.extrapolate_tractions(
+        solver.extrapolate_tractions(
             *components(last.traction), last.bound, *scale, bound, *memory.share, *components(t)
         )
         return memory.spare

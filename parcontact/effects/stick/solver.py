@@ -30,19 +30,349 @@ of the change in step 3, where K measures residuals of all wavelengths. It is 0 
 relative error of tractions where K is close. Over many small steps errors of each would add up, as points slip by
 them. So it must also be below a share of the change of t since the last step, but for a tenth of the tolerance. For
 the related constraint p >= 0 the method is that of `solve.contact`.
+
+Fused loops over tractions that are bounded at each point; each returns partial sums for one reduction.
+
+Operator from tractions along the surface of a half space to the displacements along it.
+
+A wave of tractions t, two components, moves the surface of an elastic half space of shear modulus 1 by
+
+    u^(q) = 1/|q| (I - nu q q^T/q^2) t^(q).
+
+Tractions along q have the compliance of a pressure, `(1 - nu)/|q|`, tractions across q the compliance `1/|q|`. In an
+incompressible half space (nu = 1/2) tractions do not move the surface along its normal, and pressures do not move it
+along itself (K. L. Johnson, Contact Mechanics, 1985, section 3.6).
+
+The mean displacement of a periodic half space is 0. In a free box tractions are constant on each cell, and the
+displacement at a distance (x, y) from the centre of a cell is the integral over it of Cerruti's solution
+
+    u_x = t_x ((1 - nu)/r + nu x^2/r^3)/(2 pi) + t_y nu x y/r^3/(2 pi),
+
+and u_y with x and y exchanged. It follows from the integrals over the cell of 1/r (`love.over_cell`), of `x^2/r^3`,
+with the primitive `y asinh(x/|y|)`, and of `x y/r^3`, with the primitive -r.
+
+Fused loop over the points of a contact that sticks and slips.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from ...parallel.slab import Array, Slab
-from ...solve.preconditioner.extension import ExtendedPreconditioner, Grids
-from ...solve.problem import Operator
-from . import discs
-from .shear_operator import ShearOperator, components, stacked
+from ...compiled import loop
+from ...contact.preconditioner import ExtendedPreconditioner, Grids
+from ...contact.problem import Operator
+from ...parallel.fft import FFT, Spectrum
+from ...parallel.slab import Array, Slab, allocate
+from ...physics.convolution import padded_lengths, tabulate, travelling_wavenumbers, wavenumbers
+from ...physics.love import love
+
+AT_BOUND = 1.0 - 1e-12  # rounding: share of its bound from which a traction is at it
+ACROSS = 0.5  # tuning: least component of a traction across an axis, over the one along it, for moves along the axis
+
+
+@loop
+def shorten_to_bounds(bound, x, y, hit):
+    """Shorten the tractions (x, y) to their bounds, and mark those that `hit` them; a bound of 0 gives no traction."""
+    for j in range(bound.shape[0]):
+        for i in range(bound.shape[1]):
+            size, most = math.hypot(x[j, i], y[j, i]), bound[j, i]
+            hit[j, i] = most > 0.0 and size >= AT_BOUND * most
+            if most <= 0.0:
+                x[j, i], y[j, i] = 0.0, 0.0
+            elif size > most:
+                x[j, i] *= most / size
+                y[j, i] *= most / size
+
+
+@loop
+def extrapolate_tractions(last_x, last_y, last_bound, factor, growth, bound, mean_x, mean_y, x, y):
+    """Make a start in the place of the tractions (x, y) of two steps ago, from the last ones.
+
+    Tractions that slipped stay at their bounds, others are `factor` times what they were, both with `growth` times
+    their last change; new ones have the mean share (mean_x, mean_y) of their bounds.
+    """
+    for j in range(bound.shape[0]):
+        for i in range(bound.shape[1]):
+            if last_bound[j, i] <= 0.0:
+                x[j, i], y[j, i] = mean_x * bound[j, i], mean_y * bound[j, i]
+                continue
+            a, b = last_x[j, i], last_y[j, i]
+            slipped = math.hypot(a, b) >= AT_BOUND * last_bound[j, i]
+            a, b = a + growth * (a - x[j, i]), b + growth * (b - y[j, i])
+            size = math.hypot(a, b)
+            scale = bound[j, i] / size if slipped and size > 0.0 else factor
+            x[j, i], y[j, i] = scale * a, scale * b
+
+
+@loop
+def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
+    """Divide points in contact into those that stick (`free`) and those that slip: their traction was shortened to its
+    bound (`hit`), or `t + kappa w` exceeds it, and the slip `w = e - u` is not against t. `turn` receives |w|/f of
+    points that slip, along t.
+
+    Return sums of |t|, of |P(t + kappa w)| and of `|P(t + kappa w) - t|`, with P(t) the traction shortened to its
+    bound; of the components of the latter; of both components of w over points that stick, and their number.
+    """
+    size, moved, residual, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
+    w_sticks_x, w_sticks_y, count = 0.0, 0.0, 0.0
+    for j in range(bound.shape[0]):
+        sums = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        for i in range(bound.shape[1]):
+            most = bound[j, i]
+            if most <= 0.0:
+                free[j, i] = False
+                continue
+            a, b = x[j, i], y[j, i]
+            w_x, w_y = e_x[j, i] - u_x[j, i], e_y[j, i] - u_y[j, i]
+            here, work = math.hypot(a, b), w_x * a + w_y * b
+            other_x, other_y = a + kappa * w_x, b + kappa * w_y
+            other = math.hypot(other_x, other_y)
+            sticks = work <= 0.0 or not (hit[j, i] or other > most)
+            free[j, i] = sticks
+            turn[j, i] = 0.0 if sticks else work / (here * most)
+            if other > most:
+                other_x, other_y, other = other_x * (most / other), other_y * (most / other), most
+            sums[0] += here
+            sums[1] += other
+            sums[2] += math.hypot(other_x - a, other_y - b)
+            sums[3] += abs(other_x - a)
+            sums[4] += abs(other_y - b)
+            if sticks:
+                sums[5] += w_x
+                sums[6] += w_y
+                sums[7] += 1.0
+        size, moved, residual = size + sums[0], moved + sums[1], residual + sums[2]
+        along_x, along_y = along_x + sums[3], along_y + sums[4]
+        w_sticks_x, w_sticks_y, count = w_sticks_x + sums[5], w_sticks_y + sums[6], count + sums[7]
+    return size, moved, residual, along_x, along_y, w_sticks_x, w_sticks_y, count
+
+
+@loop
+def residual(bound, free, turn, x, y, u_x, u_y, e_x, e_y, short, along_x, moves, r):
+    """Put one component of the residual into r: the slip w of points that stick; of others, the part of w across the
+    traction, times the root of `short/(short + turn)`.
+
+    A point `moves` along this component if it sticks, or if its traction is sufficiently across it; r is 0 elsewhere.
+    """
+    for j in range(bound.shape[0]):
+        for i in range(bound.shape[1]):
+            a, b = x[j, i], y[j, i]
+            turns = abs(b) > ACROSS * abs(a) if along_x else abs(a) > ACROSS * abs(b)
+            moves[j, i] = free[j, i] or (bound[j, i] > 0.0 and turns)
+            r[j, i] = 0.0
+            if moves[j, i]:
+                w_x, w_y = e_x[j, i] - u_x[j, i], e_y[j, i] - u_y[j, i]
+                if not free[j, i]:
+                    across = (a * w_y - b * w_x) / (a * a + b * b) * math.sqrt(short / (short + turn[j, i]))
+                    w_x, w_y = -b * across, a * across
+                r[j, i] = w_x if along_x else w_y
+
+
+@loop
+def complete(
+    bound, free, turn, x, y, u_x, u_y, e_x, e_y, old_x, old_y, old_u_x, old_u_y, short, long, mean_x, mean_y, z_x, z_y
+):
+    """Complete the direction z, of which the preconditioned residual is given. Points that stick add a mean. Points
+    that slip keep the part across the traction, times the root of `short/(short + turn)`, and add the rest of the
+    residual over `long + turn`.
+
+    With the residual r, the last change d of the tractions, and c = A d + turn d, all of them across the traction where
+    points slip, return the sums of r z, r d, z c and d c.
+    """
+    r_z, r_d, z_c, d_c = 0.0, 0.0, 0.0, 0.0
+    for j in range(bound.shape[0]):
+        sums = [0.0, 0.0, 0.0, 0.0]
+        for i in range(bound.shape[1]):
+            if bound[j, i] <= 0.0:
+                z_x[j, i], z_y[j, i] = 0.0, 0.0
+                continue
+            a, b = x[j, i], y[j, i]
+            w_x, w_y = e_x[j, i] - u_x[j, i], e_y[j, i] - u_y[j, i]
+            d_x, d_y = a - old_x[j, i], b - old_y[j, i]
+            c_x, c_y = u_x[j, i] - old_u_x[j, i], u_y[j, i] - old_u_y[j, i]
+            if not free[j, i]:
+                here = math.hypot(a, b)
+                a, b = -b / here, a / here
+                w, d, c = a * w_x + b * w_y, a * d_x + b * d_y, a * c_x + b * c_y + turn[j, i] * (a * d_x + b * d_y)
+                z = a * z_x[j, i] if abs(a) > ACROSS * abs(b) else 0.0
+                z += b * z_y[j, i] if abs(b) > ACROSS * abs(a) else 0.0
+                share = short / (short + turn[j, i])
+                z = z * math.sqrt(share) + w * (1.0 - share) / (long + turn[j, i])
+                z_x[j, i], z_y[j, i] = a * z, b * z
+                w_x, w_y, d_x, d_y, c_x, c_y = a * w, b * w, a * d, b * d, a * c, b * c
+            else:
+                z_x[j, i] += mean_x
+                z_y[j, i] += mean_y
+            sums[0] += w_x * z_x[j, i] + w_y * z_y[j, i]
+            sums[1] += w_x * d_x + w_y * d_y
+            sums[2] += z_x[j, i] * c_x + z_y[j, i] * c_y
+            sums[3] += d_x * c_x + d_y * c_y
+        r_z, r_d, z_c, d_c = r_z + sums[0], r_d + sums[1], z_c + sums[2], d_c + sums[3]
+    return r_z, r_d, z_c, d_c
+
+
+@loop
+def move_tractions(bound, free, x, y, z_x, z_y, step, again, new_x, new_y, hit):
+    """Replace the tractions before (x, y), in (new_x, new_y), by the next ones: `step z` and `again` times the last
+    change further. Those that slip keep their bounds; others are shortened to them. Return the sum of the changes."""
+    change = 0.0
+    for j in range(bound.shape[0]):
+        row_change = 0.0
+        for i in range(bound.shape[1]):
+            most = bound[j, i]
+            if most <= 0.0:
+                new_x[j, i], new_y[j, i], hit[j, i] = 0.0, 0.0, False
+                continue
+            a, b = x[j, i], y[j, i]
+            d_x, d_y = a - new_x[j, i], b - new_y[j, i]
+            if not free[j, i]:
+                d = (a * d_y - b * d_x) / (a * a + b * b)
+                d_x, d_y = -b * d, a * d
+            a, b = a + step * z_x[j, i] + again * d_x, b + step * z_y[j, i] + again * d_y
+            size = math.hypot(a, b)
+            if size > most or not free[j, i]:
+                a, b, size = a * (most / size), b * (most / size), most
+            new_x[j, i], new_y[j, i], hit[j, i] = a, b, size >= AT_BOUND * most
+            row_change += math.hypot(a - x[j, i], b - y[j, i])
+        change += row_change
+    return change
+
+
+@loop
+def change_since(bound, x, y, last_x, last_y, factor):
+    """Sums of the changes of tractions in contact since the last step, whose tractions are multiplied by a factor, and
+    of these."""
+    change, size = 0.0, 0.0
+    for j in range(bound.shape[0]):
+        row_change, row_size = 0.0, 0.0
+        for i in range(bound.shape[1]):
+            a, b = factor * last_x[j, i], factor * last_y[j, i]
+            row_size += math.hypot(a, b)
+            if bound[j, i] > 0.0:
+                row_change += math.hypot(x[j, i] - a, y[j, i] - b)
+        change, size = change + row_change, size + row_size
+    return change, size
+
+
+@loop
+def slope_and_curvature(t, new_t, u, new_u, e):
+    """Sums of d w, of d A d, and of |t w|, for the change d of the tractions in both components, with the slip
+    `w = e - u`."""
+    slope, curvature, size = 0.0, 0.0, 0.0
+    for j in range(t.shape[0]):
+        row_slope, row_curvature, row_size = 0.0, 0.0, 0.0
+        for i in range(t.shape[1]):
+            d, w = new_t[j, i] - t[j, i], e[j, i] - u[j, i]
+            row_slope += d * w
+            row_curvature += d * (new_u[j, i] - u[j, i])
+            row_size += abs(t[j, i] * w)
+        slope, curvature, size = slope + row_slope, curvature + row_curvature, size + row_size
+    return slope, curvature, size
+
+
+@loop
+def shorten_change(t, share, new_t):
+    """Replace the change of a map by a share of it."""
+    for j in range(t.shape[0]):
+        for i in range(t.shape[1]):
+            new_t[j, i] = t[j, i] + share * (new_t[j, i] - t[j, i])
+
+
+Vector = tuple[float, float]
+
+
+def stacked(slab: Slab) -> Slab:
+    """Return the slab of maps with two components: on each rank the rows of the first, then those of the second."""
+    return Slab(slab.comm, slab.nx, 2 * slab.ny, slab.tally, lambda rank: _twice(slab.rows_of(rank)))
+
+
+def _twice(rows: slice) -> slice:
+    return slice(2 * rows.start, 2 * rows.stop)
+
+
+def components(field: Array) -> tuple[Array, Array]:
+    """Return the maps of both components of a stacked map, in its memory."""
+    rows = len(field) // 2
+    return field[:rows], field[rows:]
+
+
+class ShearOperator:
+    """Operator from tractions to displacements on a half space of shear modulus 1, loaded inside a box of `size` [any
+    unit of length]; with `free`, nothing surrounds the box. `short` is the compliance of the shortest waves across
+    their direction. The constructor and `apply` are collective."""
+
+    def __init__(self, fft: FFT, size: Vector, poisson: float, free: bool) -> None:
+        slab = fft.slab
+        self.free, self.short = free, min(size[0] / slab.nx, size[1] / slab.ny) / np.pi
+        self.fft = FFT(slab, padded_lengths(slab.nx, slab.ny), measured=fft.measured) if free else fft
+        self._other = allocate(self.fft.shape, self.fft.complex, slab.tally)
+        self._symbols = [allocate(self.fft.shape, np.float64, slab.tally) for _ in range(3)]
+        if not slab.only_counts:
+            self._fill(size, poisson, free)
+
+    def _fill(self, size: Vector, poisson: float, free: bool) -> None:
+        """Make the symbols of u_x over t_x, u_y over t_y and u_y over t_x."""
+        if free:
+            for symbol, coefficient in zip(self._symbols, _coefficients(poisson), strict=True):
+                symbol[...] = tabulate(self.fft, size, coefficient).real
+            return
+        (qx, qy), (along_x, along_y) = wavenumbers(self.fft, size), travelling_wavenumbers(self.fft, size)
+        q = np.hypot(qx, qy)
+        q[q == 0.0] = np.inf
+        for symbol, product in zip(self._symbols, (qx * qx, qy * qy, along_x * along_y), strict=True):
+            symbol[...] = -poisson * product / q**3
+        for symbol in self._symbols[:2]:
+            symbol += 1.0 / q
+
+    def apply(self, field: Array, out: Array) -> Array:
+        """Put the displacements of stacked tractions into `out`; collective. It counts as two operators."""
+        self.fft.slab.tally["operator"] += 2
+        (t_x, t_y), (u_x, u_y) = components(field), components(out)
+        first: Spectrum = self._other
+        first[...] = self.fft.forward(t_x)
+        second = self.fft.forward(t_y)
+        _mix(first, second, *self._symbols)
+        self.fft.backward(second, u_y)
+        self.fft.backward(first, u_x)
+        return out
+
+
+def _coefficients(poisson: float) -> tuple[Callable[..., Array], ...]:
+    """Return three functions for the displacement at a distance (x, y) from a cell under a unit traction: along x by a
+    traction along x, along y by one along y, and along y by one along x."""
+    along = partial(_along, poisson=poisson)
+    return along, lambda x, y, dx, dy: along(y, x, dy, dx), partial(_across, poisson=poisson)
+
+
+def _along(x: Array, y: Array, dx: float, dy: float, poisson: float) -> Array:
+    """Return the displacement along x of a unit traction along x on a cell."""
+    total = np.zeros(np.broadcast_shapes(x.shape, y.shape))
+    for i, j in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
+        a, b = x + 0.5 * i * dx, y + 0.5 * j * dy
+        ratio = np.divide(a, np.abs(b), out=np.zeros(total.shape), where=b != 0.0)
+        total += i * j * b * np.arcsinh(ratio)
+    return love(x, y, dx, dy, poisson) + poisson / (2.0 * np.pi) * total
+
+
+def _across(x: Array, y: Array, dx: float, dy: float, poisson: float) -> Array:
+    """Return the displacement along y of a unit traction along x on a cell."""
+    corners = ((i, j, np.hypot(x + 0.5 * i * dx, y + 0.5 * j * dy)) for i in (-1, 1) for j in (-1, 1))
+    return np.asarray(sum(-i * j * r for i, j, r in corners) * (poisson / (2.0 * np.pi)))
+
+
+@loop
+def _mix(first, second, along_x, along_y, across):
+    """Replace the spectra of tractions by the spectra of displacements."""
+    for j in range(first.shape[0]):
+        for i in range(first.shape[1]):
+            x, y = first[j, i], second[j, i]
+            first[j, i] = along_x[j, i] * x + across[j, i] * y
+            second[j, i] = across[j, i] * x + along_y[j, i] * y
+
 
 # tuning
 STEP = 0.6  # least step along z; waves along q have half the stiffness that K assumes
@@ -102,7 +432,7 @@ class TangentialSolver:
         """Solve from the tractions t, which are overwritten by the solution; collective. `factor` times `last` are the
         tractions of the step before."""
         bound, aim, kappa, asked = problem
-        discs.shorten_to_bounds(bound, *components(t), self._hit)
+        shorten_to_bounds(bound, *components(t), self._hit)
         if self._is_at_rest(bound, aim, t):
             self._u.fill(0.0)
             return Tractions(self._u, 0.0, 0)
@@ -110,9 +440,9 @@ class TangentialSolver:
         self._operator.apply(t, self._u)
         while True:
             now = *components(t), *components(self._u), *components(aim)
-            found = self.slab.sum(*discs.examine(bound, self._hit, *now, kappa, self._free, self._turn))
+            found = self.slab.sum(*examine(bound, self._hit, *now, kappa, self._free, self._turn))
             change = self._move(bound, now, kappa, found, step, begins=iteration == 0)
-            since = discs.change_since(bound, *now[:2], *components(last), factor)
+            since = change_since(bound, *now[:2], *components(last), factor)
             change, changed, before = self.slab.sum(change, *since)
             size = max(*found[:2], LEAST_LEFT * before)
             certificate = max(found[2], change) / size
@@ -125,7 +455,7 @@ class TangentialSolver:
                 return Tractions(self._u, certificate, iteration, failure)
             if follows:
                 self._other[...] = t + kappa * (aim - self._u)
-                discs.shorten_to_bounds(bound, *components(self._other), self._hit)
+                shorten_to_bounds(bound, *components(self._other), self._hit)
             t, share = self._descend(aim, t)
             if iteration > 0 and not follows and not 1.0 / FAR < share < FAR:
                 step = min(max(share * step, STEP), MOST_GROWTH)
@@ -143,12 +473,12 @@ class TangentialSolver:
             if part <= LEAST_PART * sum(parts):
                 r.fill(0.0)
                 continue
-            discs.residual(*points, *now, self._operator.short, along_x, self._moves, r)
+            residual(*points, *now, self._operator.short, along_x, self._moves, r)
             self._extended.apply(self._preconditioner, self._moves, r)
         last, last_u = components(self._other), components(self._other_u)
-        products = discs.complete(*points, *now, *last, *last_u, self._operator.short, 1.0 / kappa, *mean, *z)
+        products = complete(*points, *now, *last, *last_u, self._operator.short, 1.0 / kappa, *mean, *z)
         again = 0.0 if begins else _step_along_last(step, *self.slab.sum(*products))
-        return discs.move_tractions(bound, self._free, *now[:2], *z, step, again, *last, self._hit)
+        return move_tractions(bound, self._free, *now[:2], *z, step, again, *last, self._hit)
 
     def _mean_step(self, kappa: float, w_x: float, w_y: float, sticking: float) -> tuple[float, float]:
         """Return `k <w>`, from sums of the slip over points that stick; 0 if these fill the box, as nothing resists."""
@@ -163,13 +493,13 @@ class TangentialSolver:
         way to the least J over the way to the next ones: at most 1 where tractions reach their bounds; collective."""
         new, u, new_u = self._other, self._u, self._other_u
         self._operator.apply(new, new_u)
-        sums = discs.slope_and_curvature(t, new, u, new_u, aim)
+        sums = slope_and_curvature(t, new, u, new_u, aim)
         slope, curvature, size, hits = self.slab.sum(*sums, float(self._hit.any()))
         rounded = max(abs(slope), curvature) <= ROUNDING * size
         share = 1.0 if rounded or curvature <= 0.0 or (hits and slope >= curvature) else max(slope / curvature, 0.0)
         if share < 1.0:
-            discs.shorten_change(t, share, new)
-            discs.shorten_change(u, share, new_u)
+            shorten_change(t, share, new)
+            shorten_change(u, share, new_u)
         self._other, self._u, self._other_u = t, new_u, u
         return new, share
 
@@ -200,3 +530,47 @@ def _step_along_last(step: float, r_z: float, r_d: float, z_c: float, d_c: float
     if r_d <= MOST_GROWTH * d_c:
         again = (r_d - step * z_c) / d_c if d_c > 0.0 else 0.0
     return again if step * r_z + again * r_d > LEAST_DESCENT * step * r_z else 0.0
+
+
+@loop
+def settle_slips(bound, stiffness, alpha, t_x, t_y, alpha_old, old_x, old_y, u_x, u_y, target_x, target_y, slipping):
+    """Find the points that stick after a step, and move the targets of all others.
+
+    With `s = target - u` and k the stiffness a point sticks if `|t + k s|` is below its bound. Every other point slips
+    by `s - r`, and its target is `u + r`, where `k r` is what t lacks of `t + k s` shortened to its bound. Exact
+    tractions lack nothing. Otherwise r is not lost: it adds up over steps until a solve corrects t. A point that slips
+    loses `(alpha t + alpha_old t_old)/2 (s - r)`, or 0 if this is negative. Put the powers at the end of the step, in
+    proportion to `t (s - r)`, into the map `slipping`, unless it is empty. Return the sums of losses, of t along x, of
+    t along y and of bounds, the number of points that stick, and the sum of `t (s - r)`.
+    """
+    writes = slipping.size > 0
+    lost, total_x, total_y, most, stuck, power = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(bound.shape[0]):
+        sums = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        for i in range(bound.shape[1]):
+            a, b, limit = t_x[j, i], t_y[j, i], bound[j, i]
+            s_x, s_y = target_x[j, i] - u_x[j, i], target_y[j, i] - u_y[j, i]
+            sums[1] += a
+            sums[2] += b
+            sums[3] += limit
+            if writes:
+                slipping[j, i] = 0.0
+            trial_x, trial_y = a + stiffness * s_x, b + stiffness * s_y
+            size = math.hypot(trial_x, trial_y)
+            if size < limit:
+                sums[4] += 1.0
+                continue
+            r_x, r_y = 0.0, 0.0
+            if limit > 0.0:
+                r_x = (trial_x * (limit / size) - a) / stiffness
+                r_y = (trial_y * (limit / size) - b) / stiffness
+            s_x, s_y = s_x - r_x, s_y - r_y
+            mean_x, mean_y = alpha * a + alpha_old * old_x[j, i], alpha * b + alpha_old * old_y[j, i]
+            sums[0] += max(0.5 * (mean_x * s_x + mean_y * s_y), 0.0)
+            if writes:
+                slipping[j, i] = max(a * s_x + b * s_y, 0.0)
+                sums[5] += slipping[j, i]
+            target_x[j, i], target_y[j, i] = u_x[j, i] + r_x, u_y[j, i] + r_y
+        lost, total_x, total_y = lost + sums[0], total_x + sums[1], total_y + sums[2]
+        most, stuck, power = most + sums[3], stuck + sums[4], power + sums[5]
+    return lost, total_x, total_y, most, stuck, power

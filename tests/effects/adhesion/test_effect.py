@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from parcontact.accuracy.constants import ENERGY
-from parcontact.effects.adhesion.adhesive_energies import (
+from parcontact.effects.adhesion.adhesive_law import (
     FORCE_DOUBT,
     JUMPS,
     PUSHED,
@@ -19,14 +18,16 @@ from parcontact.effects.adhesion.adhesive_energies import (
     advance_energies,
 )
 from parcontact.effects.adhesion.section import adhesion_law
-from parcontact.effects.contact_protocol import SolvedContact
+from parcontact.effects.effect import SolvedContact
 from parcontact.errors import InputError
+from parcontact.files.sweep_warnings import sentences_of
 from parcontact.job import Job
-from parcontact.mesh import load, load_cases
+from parcontact.march import sanity
+from parcontact.march.constants import ENERGY
+from parcontact.march.mesh import load, load_cases
+from parcontact.march.scene import set_up
 from parcontact.parallel.slab import Slab
 from parcontact.physics.measures import Measures
-from parcontact.run.sweep_warnings import sentences_of
-from parcontact.scene import sanity, set_up
 
 E = 4e6  # E* of an incompressible body of 1 MPa [Pa]
 RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 9e6, "relaxation_time": 1.0}]}

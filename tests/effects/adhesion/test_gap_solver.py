@@ -8,17 +8,14 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-from parcontact.effects.adhesion import gap_kernels, law
-from parcontact.effects.adhesion.adhesive_solver import AdhesiveSolver
-from parcontact.effects.adhesion.gap_iterate import GapOperators, GapSolution
-from parcontact.effects.adhesion.gap_solver import GapSolver
+from parcontact.contact.problem import Approach, Control, MeanPressure, Operator, Workspace
+from parcontact.effects.adhesion import law
+from parcontact.effects.adhesion.gap_solver import AdhesiveSolver, GapOperators, GapSolution, GapSolver
 from parcontact.effects.adhesion.law import Law
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.certificate import Certificate
-from parcontact.solve.problem import Approach, Control, MeanPressure, Operator
-from parcontact.solve.workspace import Workspace
+from parcontact.physics.measures import Certificate
 
 NX, NY = 24, 20
 WEAK = Law(0, 0.4, 0.2)
@@ -197,7 +194,7 @@ def test_change_of_energy(one: law.Law, size: float) -> None:
     gap, q, image, way = np.random.default_rng(4).random((4, 5, 7))
     way, new, sigma, sigma_new = -size * way, *(np.empty_like(gap) for _ in range(3))
     sigma[...] = attraction(one, gap)
-    rise, magnitude = gap_kernels.move(one, gap, q, 0.2, sigma, 0.5, way, image, new, sigma_new)
+    rise, magnitude = law.move(one, gap, q, 0.2, sigma, 0.5, way, image, new, sigma_new)
     assert_allclose(new, np.maximum(gap + 0.5 * way, 0.0), atol=1e-15)
     assert_allclose(sigma_new, attraction(one, new), rtol=1e-13, atol=1e-15)
     surface = [law.energy(one, *at) for at in zip(gap.ravel(), sigma.ravel(), strict=True)]

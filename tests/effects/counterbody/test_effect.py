@@ -11,19 +11,19 @@ import yaml
 from conftest import WORLD
 from marched_jobs import column, marched
 
-from parcontact import mesh, scene
 from parcontact.effects.counterbody.effect import CounterbodyThatDeforms, frequencies
 from parcontact.effects.relaxation import relaxation_of
 from parcontact.errors import InputError, JobError
+from parcontact.files.provenance import references_of
 from parcontact.job import Job, load
+from parcontact.job.listing import plain_data, plain_job
 from parcontact.job.schema import json_schema
-from parcontact.job.sections.listing import plain_data, plain_job
+from parcontact.march import choices, mesh, scene
+from parcontact.march.curve import request
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
 from parcontact.physics.prony import complex_modulus
 from parcontact.results import prediction
-from parcontact.steady_sliding.curve import request
-from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.storage.provenance import references_of
 
 BODIES = ("material", "counterbody")
 LENGTH, PRESSURE, AMPLITUDE, TIME = 1e-3, 1e5, 4e-8, 1e-3
@@ -221,7 +221,7 @@ def test_an_absent_one_is_not_called(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(CounterbodyThatDeforms, "changed_material", staticmethod(fail))
     plain = job(counterbody=None, interface={"shear_stress": 1e4})
-    assert "counterbody" not in scene.choices(plain).effects
+    assert "counterbody" not in choices.choices(plain).effects
     assert plain.material is plain.material.given
 
 

@@ -9,17 +9,16 @@ import pytest
 from marched_jobs import marched
 from mpi4py import MPI
 
-from parcontact import scene
 from parcontact.columns import STEADY
+from parcontact.door.simulation import Simulation
 from parcontact.effects.heat.effect import exponentials_of
-from parcontact.effects.heat.heat import Conductor, Depths
-from parcontact.effects.heat.heat_memory import Heating, MeanMemory
+from parcontact.effects.heat.solver import Conductor, Depths, Heating, MeanMemory
 from parcontact.errors import InputError
 from parcontact.job import Job, load
+from parcontact.march import scene
+from parcontact.march.point import Point
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
-from parcontact.python.simulation import Simulation
-from parcontact.steady_sliding.point import Point
-from parcontact.steady_sliding.sliding import SteadySliding
 
 PRESSURE, SPEED, LENGTH = 1e5, 0.2, 1e-3
 RUBBER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 4e6, "relaxation_time": 1e-4}]}

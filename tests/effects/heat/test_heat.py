@@ -8,16 +8,22 @@ from mpi4py import MPI
 from scipy.integrate import quad
 from scipy.special import ive
 
-from parcontact.effects.heat.flash import flash_of
-from parcontact.effects.heat.heat import Conductor, Depths, depths_of, sliding_heat
-from parcontact.effects.heat.heat_memory import Heating, HeatMemory
-from parcontact.effects.heat.heat_unbounded import _reaching, sliding_heat_unbounded
-from parcontact.parallel import spectra
+from parcontact.effects.heat.solver import (
+    Conductor,
+    Depths,
+    Heating,
+    HeatMemory,
+    _reaching,
+    depths_of,
+    flash_of,
+    sliding_heat,
+    sliding_heat_unbounded,
+)
+from parcontact.parallel import fft as spectra
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
-from parcontact.physics.exponentials import fit_exponentials, shares_of_step
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.prony import Prony
+from parcontact.physics.prony import Prony, fit_exponentials, shares_of_step
 from parcontact.physics.roughness import Roughness
 
 RUBBER = Conductor(0.2, 1e-7)

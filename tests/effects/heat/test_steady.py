@@ -9,17 +9,17 @@ from conftest import Main, RunParcontact
 from scipy.special import lambertw
 
 from parcontact import job as jobs
-from parcontact import scene
-from parcontact.effects.heat.flash import Flash
+from parcontact.effects.heat.solver import Flash
 from parcontact.effects.heat.steady import Feedback
 from parcontact.errors import InputError, JobError, RunError
+from parcontact.files.tables import read_columns
+from parcontact.march import scene
+from parcontact.march.curve import request
+from parcontact.march.point import Point
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
-from parcontact.results import curve_charts
+from parcontact.results import band_charts
 from parcontact.rubber.shift import WLF, Factors, highest_temperature
-from parcontact.steady_sliding.curve import request
-from parcontact.steady_sliding.point import Point
-from parcontact.steady_sliding.sliding import SteadySliding
-from parcontact.storage.tables import read_columns
 from parcontact.theory import full_contact
 
 C1, C2, REFERENCE = 17.4, 51.6, 20.0
@@ -109,7 +109,7 @@ def test_table_theory_and_picture(tmp_path: Path, main: Main, run_parcontact: Ru
     assert parts == pytest.approx(found["friction_x"], rel=1e-12)
     share = np.array(found["contact_area_corrected"]) * 1.0e4 / 2.0e5
     assert found["friction_interface"] == pytest.approx(share, rel=1e-6)  # the pressure is met to the tolerance
-    friction, area, master = curve_charts.chart_steady(tmp_path / "out")
+    friction, area, master = band_charts.chart_steady(tmp_path / "out")
     lines = ["-5 °C", "20 °C", "60 °C"]
     for chart in (friction, area):  # "theory" is an entry of the legend without a line
         assert [one.name for one in chart.series] == [*lines, "theory", "", "", ""]

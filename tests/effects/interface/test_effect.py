@@ -6,14 +6,14 @@ from typing import Any
 import pytest
 from marched_jobs import marched
 
-from parcontact import scene
 from parcontact.effects.interface.effect import shares
 from parcontact.errors import InputError
 from parcontact.job import Job, load
+from parcontact.march import scene
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
-from parcontact.physics.interface_friction import InterfaceFriction
 from parcontact.physics.measures import Measures
-from parcontact.steady_sliding.sliding import SteadySliding
+from parcontact.physics.motion import InterfaceFriction
 
 PRESSURE, STRESS, SPEED, LENGTH = 1e5, 2e5, 0.2, 1e-3
 CONSTANT = {"shear_stress": STRESS}

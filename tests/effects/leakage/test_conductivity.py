@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from parcontact.effects.leakage import conductivity
-from parcontact.effects.leakage import pictures as leakage_charts
+from parcontact.effects.leakage import pictures
 from parcontact.effects.leakage.over_time import LeakInstant
 from parcontact.results import charts
 
@@ -24,7 +23,7 @@ def test_closed_instants_and_narrow_constrictions() -> None:
     9 nm."""
     at, flow = np.array([1.0, 2.0, 3.0, 4.0]), np.array([1e-20, 1e-24, 0.0, np.nan])
     narrowest = np.array([1e-6, 9e-9, 0.0, np.nan])
-    chart = conductivity.chart(charts.Axis("time", "s"), at, {"along x": flow}, {"along x": narrowest})
+    chart = pictures.chart(charts.Axis("time", "s"), at, {"along x": flow}, {"along x": narrowest})
     shown = drawn(chart)
     assert shown["closed"].tolist() == [3.0]
     assert shown["constriction under 10 nm"].tolist() == [2.0]
@@ -50,7 +49,7 @@ HOLDS = [row(1.0, 1e5, 4e-20), row(2.0, 1e5 * (1.0 + 1e-12), 3e-20), row(3.0, 2e
     ],
 )
 def test_what_k_is_drawn_over(rows: list[LeakInstant], over: str, name: str, expected: list[float]) -> None:
-    chart = leakage_charts.chart_of(rows, over)
+    chart = pictures.chart_of(rows, over)
     assert chart.x.name == name
     assert chart.series[0].x == pytest.approx(expected, rel=1e-9)
     assert len(chart.series[0].y) == len(expected)
@@ -60,5 +59,5 @@ def test_what_k_is_drawn_over(rows: list[LeakInstant], over: str, name: str, exp
 def test_the_flux_of_gaps_whose_cube_is_0() -> None:
     """Uniform flow through a gap of 1e-120 m: the cube of the gap underflows."""
     pressure = np.tile(np.linspace(1.0, 0.0, 5), (4, 1))
-    inside = leakage_charts.flux(np.full((4, 5), 1e-120), pressure, (1.0, 1.0))[:, 1:-1]
+    inside = pictures.flux(np.full((4, 5), 1e-120), pressure, (1.0, 1.0))[:, 1:-1]
     np.testing.assert_array_equal(inside, np.ones((4, 3)))

@@ -7,14 +7,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from parcontact.effects.leakage.elimination import Balance
-from parcontact.effects.leakage.flow import Map, flow_mesh_error, leak, least_section, solve_flow
-from parcontact.effects.leakage.fluids import FLUIDS, Fluid, PressureDrop
-from parcontact.effects.leakage.paths import critical_constriction
+from parcontact.effects.leakage.flow import (
+    FLUIDS,
+    Balance,
+    FloatMap,
+    Fluid,
+    PressureDrop,
+    critical_constriction,
+    flow_mesh_error,
+    leak,
+    least_section,
+    solve_flow,
+)
 from parcontact.errors import InputError
 
 
-def wave(points: int, depth: float) -> Map:
+def wave(points: int, depth: float) -> FloatMap:
     """Gaps 1 + depth cos(2 pi x), the same along y."""
     x = (np.arange(points) + 0.5) / points
     return np.broadcast_to(1.0 + depth * np.cos(2.0 * np.pi * x), (points, points)).copy()
@@ -48,7 +56,7 @@ def test_error_by_the_mesh() -> None:
     assert np.isnan(flow_mesh_error(0.0 * gap, solve_flow(0.0 * gap, (2.0, 1.0)), (2.0, 1.0)))
 
 
-def checkerboard(points: int, second: float) -> Map:
+def checkerboard(points: int, second: float) -> FloatMap:
     """Conductivities g^3 of 1 and `second`, in 2 x 2 squares whose middles lie on the ends, lines of one pressure."""
     side = ((np.arange(points) + points // 4) * 2 // points) % 2
     return np.cbrt(np.where((side[:, None] + side) % 2 == 0, 1.0, second))
@@ -201,7 +209,7 @@ def test_the_constriction_is_that_of_the_widest_path(periodic: bool) -> None:
 # -- elimination of half of the cells against a dense solution, for odd and even, narrow and wide maps ----------------
 
 
-def dense(cubes: Map, aspect: float, periodic: bool, given: Map) -> Map:
+def dense(cubes: FloatMap, aspect: float, periodic: bool, given: FloatMap) -> FloatMap:
     """The pressures by a full matrix, made face by face."""
     (ny, nx), number = cubes.shape, np.arange(cubes.size).reshape(cubes.shape)
     matrix = np.zeros((cubes.size, cubes.size))

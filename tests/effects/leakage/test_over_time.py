@@ -14,9 +14,9 @@ from mpi4py import MPI
 
 import parcontact as pc
 from parcontact import __main__
-from parcontact.effects.leakage import over_time as leak
+from parcontact.effects.leakage import over_time
 from parcontact.effects.leakage.flow import flow_mesh_error, solve_flow
-from parcontact.results import result_sections
+from parcontact.results import report_sections
 
 POINTS = 64
 PRESS = {"pressure": {"from": 1e4, "to": 8e4}, "duration": 1.0, "time_step": 0.25}
@@ -64,7 +64,7 @@ def test_table_picture_and_columns_of_a_run(comm: MPI.Intracomm, shared_path: Pa
     flows = [float(row["flow_x"]) for row in rows if float(row["pressure"]) > 0.0]
     assert flows == sorted(flows, reverse=True)
     assert all(row["flow_x"] == "" for row in steps[1::2])
-    index, gaps = len(rows) - 2, leak.Gaps(out)
+    index, gaps = len(rows) - 2, over_time.Gaps(out)
     gap = gaps.read(gaps.shown[index])
     along = {"x": pc.leak(gap, gaps.size).along_x, "y": pc.leak(gap, gaps.size).along_y}
     for axis, flow in along.items():
@@ -78,7 +78,7 @@ def test_table_picture_and_columns_of_a_run(comm: MPI.Intracomm, shared_path: Pa
         for name in ("flow_x", "flow_y", "constriction"):
             assert float(row[name]) == pytest.approx(float(of_gap[name]), rel=1e-5)
     assert (out / "leak.png").stat().st_size > 10_000
-    bare = leak.Gaps(out).bare()
+    bare = over_time.Gaps(out).bare()
     touching = pc.leak(bare, (1e-3, 1e-3))
     assert float(rows[-1]["share_x"]) == pytest.approx(float(rows[-1]["flow_x"]) / touching.flow_x)
 
@@ -87,12 +87,12 @@ def test_a_report_has_the_leakage_at_the_end(tmp_path: Path) -> None:
     """The table has the last flow, which is calculated at every second step, and no friction, as nothing slides."""
     out = run(MPI.COMM_SELF, tmp_path, history=[PRESS, {**PRESS, "pressure": {"from": 8e4, "to": 2e4}}])
     last = [row for row in table(out / "measures.csv") if row["flow_x"]][-1]
-    section = result_sections.describe_run(out)
+    section = report_sections.describe_run(out)
     assert "conductivity K over time" in [caption for _, caption in section.pictures]
     shown = {row[0]: row[1] for row in section.tables[0].rows}
     assert "friction" not in shown
     for name in ("flow_x", "flow_y", "constriction"):
-        assert shown[name.replace("_", " ")] == result_sections.format_cell(float(last[name]))
+        assert shown[name.replace("_", " ")] == report_sections.format_cell(float(last[name]))
 
 
 def test_a_contact_on_twice_the_points_is_within_the_error(comm: MPI.Intracomm) -> None:

@@ -7,9 +7,9 @@ import pytest
 import yaml
 
 from parcontact import __main__
-from parcontact.effects.leakage import results as leak_stop
+from parcontact.effects.leakage import results
 from parcontact.printed import span
-from parcontact.results import headline, page
+from parcontact.results import info, page
 from parcontact.results.results import Results
 
 LENGTH, MODULUS, CLOSING = 2.5e-4, 1.0e6, 1.0e5  # of the wave [m], G [Pa], pressure of full contact [Pa]
@@ -37,13 +37,13 @@ def test_waves_close_at_the_pressure_of_full_contact(tmp_path: Path, capsys: pyt
     """Along the grooves at p*, across them from the first contact on; from the run's own table, and from `leak`."""
     out = press(tmp_path, [0.5, 0.95, 1.05, 1.5], leakage={"every": 1})
     across = "leakage along x has already stopped at the first instant, under 50 kPa"
-    assert leak_stop.describe_leak_stop(Results(out, "run")) == [across, ALONG_Y]
+    assert results.describe_leak_stop(Results(out, "run")) == [across, ALONG_Y]
     assert __main__.main(["leak", str(out)]) == 0
-    assert leak_stop.describe_leak_stop(Results(out, "run")) == [across, ALONG_Y]
+    assert results.describe_leak_stop(Results(out, "run")) == [across, ALONG_Y]
     printed = capsys.readouterr().out
     half = "along y leakage stops between 95 and 105 kPa; along y contact closes the gap at 2 of 4 instants, "
     assert f"{half}at the first with 100 % of the area in contact" in printed
-    assert f"; {ALONG_Y}" in headline.find_headline(out)
+    assert f"; {ALONG_Y}" in info.find_headline(out)
     assert f"<p>{page.whole_numbers(ALONG_Y)}</p>" in page.render([out])
     assert __main__.main(["info", str(out)]) == 0
     assert f"  {ALONG_Y}\n" in capsys.readouterr().out
@@ -73,16 +73,16 @@ def test_waves_close_at_the_pressure_of_full_contact(tmp_path: Path, capsys: pyt
 )
 def test_where_leakage_stops(flows: list[float], pressures: list[float], said: str) -> None:
     times = [3600.0 * (1 + row) for row in range(len(flows))]
-    assert leak_stop.describe_axis({"flow_x": flows, "pressure": pressures, "time": times}, "x") == said
+    assert results.describe_axis({"flow_x": flows, "pressure": pressures, "time": times}, "x") == said
 
 
 def test_directions_that_agree_share_a_sentence(tmp_path: Path) -> None:
     text = "time,pressure,flow_x,flow_y\n0,1.05e6,1e-18,2e-18\n1,1.1e6,0,0\n"
     (tmp_path / "leak.csv").write_text(text)
-    assert leak_stop.describe_leak_stop(Results(tmp_path, "run")) == [
+    assert results.describe_leak_stop(Results(tmp_path, "run")) == [
         "leakage along x and y stops between 1.05 and 1.10 MPa"
     ]
-    assert leak_stop.describe_leak_stop(Results(tmp_path / "nowhere", "run")) == []
+    assert results.describe_leak_stop(Results(tmp_path / "nowhere", "run")) == []
 
 
 @pytest.mark.parametrize(

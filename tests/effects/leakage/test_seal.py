@@ -14,8 +14,8 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 import parcontact as pc
-from parcontact.effects.leakage.fluids import FLUIDS, PressureDrop
-from parcontact.effects.leakage.load_curve import load_curve
+from parcontact.effects.leakage.flow import FLUIDS, PressureDrop
+from parcontact.effects.leakage.over_time import load_curve
 
 from .test_total_load import AMPLITUDE, CLOSING, LENGTH, MODULUS, exact, gap
 

@@ -14,10 +14,10 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from parcontact import __main__
-from parcontact.effects.leakage import load_curve
-from parcontact.effects.leakage.fluids import FLUIDS, PressureDrop
+from parcontact.effects.leakage import over_time
+from parcontact.effects.leakage.flow import FLUIDS, PressureDrop
 from parcontact.errors import InputError
-from parcontact.results import headline
+from parcontact.results import info
 
 LENGTH, MODULUS, CLOSING = 2.5e-4, 1.0e6, 1.0e5  # of the wave [m], G [Pa], pressure of full contact p* [Pa]
 AMPLITUDE = CLOSING * LENGTH / (math.pi * 4 * MODULUS)  # Westergaard (1939): p* = pi E* A/lambda, E* = 4 G
@@ -79,7 +79,7 @@ def test_a_channel_with_six_loads(load: float, drop: float, tmp_path: Path, caps
     assert float(factors[0]) == pytest.approx(total / net, rel=0.1)
     assert "K is known" not in printed
     rate = float(row["flow_rate_total"]) / float(row["flow_rate"])
-    assert f"m³/s leak if the fluid carries its part of the load, {rate:.3g} times" in headline.find_headline(out)
+    assert f"m³/s leak if the fluid carries its part of the load, {rate:.3g} times" in info.find_headline(out)
 
 
 def test_a_gas_slips_at_the_local_pressure() -> None:
@@ -94,9 +94,9 @@ def test_a_gas_slips_at_the_local_pressure() -> None:
 
     loads = np.linspace(load - drop, load, 6)
     flows = [[np.mean(gas.conducting_gap(gap(at), p) ** 3) for p in gas.pressures] for at in loads]
-    found = load_curve.load_curve(loads, flows).conductivity(gas, load)
+    found = over_time.load_curve(loads, flows).conductivity(gas, load)
     assert found * gas.pressures[0] == pytest.approx(exact(conductance, load, drop), rel=0.01)  # six loads
-    fixed = load_curve.load_curve(loads, [flows[0]] * 6).conductivity(gas, load)  # K without the load: int K p dp
+    fixed = over_time.load_curve(loads, [flows[0]] * 6).conductivity(gas, load)  # K without the load: int K p dp
     whole = np.mean(gap(loads[0]) ** 2 * (gap(loads[0]) + 6.0 * path / gas.pressures[0]))
     assert fixed == pytest.approx(whole, rel=1e-9)
 
@@ -205,7 +205,7 @@ def test_k_that_rises_is_refused() -> None:
     """Two values at one load, or one that rises with the load."""
     for loads, flows in (([1.0, 2.0, 2.0], [3.0, 2.0, 1.5]), ([1.0, 3.0, 2.0], [3.0, 2.0, 1.5])):
         with pytest.raises(InputError, match="save the gap of one loading, without unloading"):
-            load_curve.load_curve(loads, [[flow] for flow in flows])
+            over_time.load_curve(loads, [[flow] for flow in flows])
 
 
 def test_the_net_flow_says_what_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

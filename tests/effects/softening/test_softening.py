@@ -17,18 +17,16 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from parcontact import job as jobs
-from parcontact import scene
 from parcontact.bands.road_sliding import RoadSliding
-from parcontact.effects.softening.steady import doubts_of_points
-from parcontact.effects.softening.strain import strains_at_octaves
+from parcontact.effects.softening.steady import doubts_of_points, strains_at_octaves
 from parcontact.effects.softening.strain_table import Softened, StrainTable
 from parcontact.errors import InputError, JobError
+from parcontact.march import sanity, scene
+from parcontact.march.point import Point
+from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
 from parcontact.physics.convolution import wavenumbers
-from parcontact.results import curve_charts, prediction
-from parcontact.scene import sanity
-from parcontact.steady_sliding.point import Point
-from parcontact.steady_sliding.sliding import SteadySliding
+from parcontact.results import band_charts, prediction
 from parcontact.theory.persson import GAMMA
 
 Json = dict[str, Any]
@@ -211,7 +209,7 @@ def test_pictures(tmp_path: Path) -> None:
         f"{head}{more}\n1,1e5,,0.1,1,0.06,0,1e-3,1e-4\n1,1e5,,0.1,1,0.08,1,1e-4,1e-5\n"
         "2,1e5,,0.1,1,,0,1e-3,1e-4\n2,1e5,,0.1,1,,1,1e-4,1e-5\n"
     )
-    *_, moduli, _, _, strains = curve_charts.chart_steady(tmp_path)
+    *_, moduli, _, _, strains = band_charts.chart_steady(tmp_path)
     storage, at, loss, _ = moduli.series
     assert_allclose(np.interp(TABLE[100][0], storage.x, storage.y), TABLE[100][1], rtol=0.02)
     assert_allclose(np.interp(TABLE[100][0], loss.x, loss.y), TABLE[100][2], rtol=0.02)
@@ -222,7 +220,7 @@ def test_pictures(tmp_path: Path) -> None:
         [0.06, 0.08],
     )
     (tmp_path / "steady.resolved.yaml").write_text(data.replace("softening:", "hardening:"))  # not of this version
-    assert "steady softening" not in [chart.key for chart in curve_charts.chart_steady(tmp_path)]
+    assert "steady softening" not in [chart.key for chart in band_charts.chart_steady(tmp_path)]
 
 
 def test_the_theory_is_refused() -> None:

@@ -10,11 +10,11 @@ import pytest
 from marched_jobs import marched
 from mpi4py import MPI
 
+from parcontact.door.simulation import Simulation
 from parcontact.doubts import ParcontactWarning
-from parcontact.effects.stick import effect as stick_slip
-from parcontact.effects.stick.shear_operator import ShearOperator
+from parcontact.effects.stick import effect
+from parcontact.effects.stick.solver import ShearOperator
 from parcontact.job import Job
-from parcontact.python.simulation import Simulation
 
 G, RADIUS, FORCE, MU = 1e6, 1e-2, 1e-3, 0.5
 A = (3.0 * FORCE * RADIUS / (16.0 * G)) ** (1.0 / 3.0)  # Hertz, one body that is incompressible
@@ -123,7 +123,7 @@ def test_loops_of_mindlin_and_deresiewicz(monkeypatch: pytest.MonkeyPatch, share
     """The theory assumes slip along the force. With an operator that has no other slip it is met to 0.5 %; with twice
     the cells and steps to 0.25 %. Slip across the force makes the loss smaller, by 0.2 to 1.5 % on both meshes."""
     whole = lost_in_a_cycle(share)
-    monkeypatch.setattr(stick_slip, "ShearOperator", AlongForce)
+    monkeypatch.setattr(effect, "ShearOperator", AlongForce)
     along = lost_in_a_cycle(share)
     assert along == pytest.approx(cycle_loss(share), rel=5e-3, abs=0.0)
     assert 0.985 * along < whole < 0.998 * along

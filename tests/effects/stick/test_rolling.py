@@ -10,8 +10,8 @@ import pytest
 from marched_jobs import column, marched
 
 from parcontact.errors import InputError
+from parcontact.files.recorder import StepRow
 from parcontact.job import load
-from parcontact.storage.step_row import StepRow
 
 G, RADIUS, HALF_WIDTH, MU = 1e6, 1e-2, 1e-4, 0.5
 LOAD = 1e-3  # of a ball [N]

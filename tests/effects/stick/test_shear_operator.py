@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from parcontact.effects.stick.shear_operator import ShearOperator, components, stacked
+from parcontact.effects.stick.solver import ShearOperator, components, stacked
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 

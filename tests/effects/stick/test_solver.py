@@ -8,12 +8,11 @@ import pytest
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from parcontact.effects.stick.shear_operator import ShearOperator, components, stacked
-from parcontact.effects.stick.solver import TangentialSolver, TractionProblem
+from parcontact.contact.preconditioner import ALL, grids_for
+from parcontact.effects.stick.solver import ShearOperator, TangentialSolver, TractionProblem, components, stacked
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.preconditioner.extension import ALL, grids_for
 
 Map = NDArray[np.float64]
 SIZE, POISSON = (1.0, 1.0), 0.5

@@ -8,19 +8,18 @@ import pytest
 from mpi4py import MPI
 from numpy.testing import assert_allclose
 
+from parcontact.contact import starts
+from parcontact.contact.problem import Approach, MeanPressure, Operators, Workspace
+from parcontact.contact.solver import Contact, ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
-from parcontact.solve.contact import Contact, ContactSolver
-from parcontact.solve.fallback import active_set, retry
-from parcontact.solve.problem import Approach, MeanPressure, Operators
-from parcontact.solve.workspace import Workspace
 
 from ..bodies import TIGHT, Bench, Map, keep, rough, solver
 
 
 def found_by_sets(body: Bench, h: Any, control: MeanPressure | Approach, start: float = 0.0) -> Contact:
-    return active_set.solve(body.solver, body.problem(h, control), np.full_like(h, start))
+    return starts.solve(body.solver, body.problem(h, control), np.full_like(h, start))
 
 
 @pytest.mark.parametrize(("boundary", "kernel"), [("periodic", "spectral"), ("periodic", "love"), ("free", "love")])
@@ -47,7 +46,7 @@ def test_on_a_set_the_load_is_kept_and_the_gap_is_closed() -> None:
     h, load = rough(64), MeanPressure(0.5)
     body = solver(h)
     x = np.full_like(h, 0.5)
-    search = active_set._Search(body.solver, body.problem(h, load), x)
+    search = starts._Search(body.solver, body.problem(h, load), x)
     search.working = h > 0.5 * h.max()
     u = np.empty_like(h)
     assert 5 < search.solve_on_set(u, 1e-9) < 50
@@ -57,7 +56,7 @@ def test_on_a_set_the_load_is_kept_and_the_gap_is_closed() -> None:
 
 
 def test_it_says_when_it_has_found_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(active_set, "MAX_SETS", 1)
+    monkeypatch.setattr(starts, "MAX_SETS", 1)
     h = rough(64)
     found = found_by_sets(solver(h), h, MeanPressure(0.1))
     assert found.failure == "found no contact among 1 sets of points"
@@ -86,7 +85,7 @@ def failed_and_again(h: Map, control: MeanPressure | Approach = LOAD, **options:
     body = solver(h, **options)
     first = body.solve(h, control, np.zeros_like(h))
     assert first.failure
-    return body, first, retry.retry_solve(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
+    return body, first, starts.retry_solve(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
 
 
 @pytest.mark.parametrize(("control", "bad"), [(LOAD, np.inf), (Approach(-0.02), np.inf), (Approach(-0.02), np.nan)])
@@ -98,7 +97,7 @@ def test_a_start_that_is_not_finite(control: MeanPressure | Approach, bad: float
     start[3, 4] = bad
     with np.errstate(invalid="ignore"):
         first = body.solve(h, control, start)
-        contact, tried = retry.retry_solve(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
+        contact, tried = starts.retry_solve(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
     expected = good.solve(h, control, np.zeros_like(h))
     assert "not finite" in first.failure
     assert tried == ["a cold start on 3 nested grids"]
@@ -120,7 +119,7 @@ def test_heights_that_are_not_finite_cannot_be_helped() -> None:
     body = solver(h)
     h[0, 0] = np.nan
     with np.errstate(invalid="ignore"):
-        contact, tried = retry.retry_solve(
+        contact, tried = starts.retry_solve(
             body.solver, body.problem(h, LOAD), body.solve(h, LOAD, np.zeros_like(h)), factory(1.0)
         )
     assert "not finite" in contact.failure
@@ -135,7 +134,7 @@ def test_grids_that_cannot_be_halved(shape: tuple[int, int], control: MeanPressu
     body = solver(h, tolerance=1e-9)
     with np.errstate(invalid="ignore"):
         first = body.solve(h, control, np.full_like(h, np.inf))
-        contact, tried = retry.retry_solve(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
+        contact, tried = starts.retry_solve(body.solver, body.problem(h, control), first, factory(np.ptp(h)))
     assert contact.converged
     grids = {37: 1, 1: 2, 6: 3}[shape[0]]
     assert tried == ["a cold start" if grids == 1 else f"a cold start on {grids} nested grids"]
@@ -151,7 +150,7 @@ def test_all_ranks_agree(comm: MPI.Intracomm) -> None:
     body = Bench(solving, *operators)
     with np.errstate(invalid="ignore"):
         first = body.solve(h, LOAD, np.full_like(h, np.inf))
-        contact, _ = retry.retry_solve(body.solver, body.problem(h, LOAD), first, factory(np.ptp(whole)))
+        contact, _ = starts.retry_solve(body.solver, body.problem(h, LOAD), first, factory(np.ptp(whole)))
     alone = solver(whole, tolerance=1e-9).solve(whole, LOAD, np.zeros_like(whole))
     assert contact.converged
     assert_allclose(contact.p, alone.p[slab.rows], atol=1e-7 * alone.p.max())
@@ -164,7 +163,7 @@ def test_an_operator_in_double_precision() -> None:
     body, enough = solver(h), solver(h).solve(h, approach, np.zeros_like(h)).iterations
     first = body.solve(h, approach, np.full_like(h, np.nan))
     double, before = solver(h, max_iterations=enough - 1), body.slab.tally["operator"]
-    contact, tried = retry.retry_solve(
+    contact, tried = starts.retry_solve(
         body.solver, body.problem(h, approach), first, factory(np.ptp(h)), lambda: (double.solver, double.operators)
     )
     assert not np.isfinite(first.certificate.worst)

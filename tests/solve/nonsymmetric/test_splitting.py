@@ -8,18 +8,15 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from parcontact.contact.constraint import HARD, InterfaceLaw
+from parcontact.contact.problem import Approach, MeanPressure
+from parcontact.contact.projected import Judge, Projected
+from parcontact.contact.splitting import RELAXATION, Acceleration, Splitting
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.convolution import Convolution
-from parcontact.physics.halfspace import HalfSpace
-from parcontact.physics.layer import Layer
-from parcontact.solve.interface_law import HARD, InterfaceLaw
-from parcontact.solve.nonsymmetric.acceleration import RELAXATION, Acceleration
-from parcontact.solve.nonsymmetric.judge import Judge
-from parcontact.solve.nonsymmetric.projected import Projected
-from parcontact.solve.nonsymmetric.splitting import Splitting
-from parcontact.solve.problem import Approach, MeanPressure
+from parcontact.physics.halfspace import HalfSpace, Layer
 
 Map = NDArray[np.float64]
 

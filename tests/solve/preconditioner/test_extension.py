@@ -9,10 +9,16 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
+from parcontact.contact.preconditioner import (
+    DECAY,
+    FLOOR,
+    ExtendedPreconditioner,
+    Grids,
+    LongWavePreconditioner,
+    grids_for,
+)
 from parcontact.parallel.slab import Array, Slab
-from parcontact.physics.layer import LongWaves
-from parcontact.solve.preconditioner.extension import FLOOR, ExtendedPreconditioner, Grids, grids_for
-from parcontact.solve.preconditioner.long_waves import DECAY, LongWavePreconditioner
+from parcontact.physics.halfspace import LongWaves
 
 Map = NDArray[np.float64]
 SINGLE = 1e-5  # relative, of sums in single precision: some hundred roundings of 6e-8

@@ -1,0 +1,476 @@
+"""The preconditioner of the contact solver.
+
+Loops between points and cells of `wide` by `tall` points, each 2, or None for 1: a loop is compiled without the
+branches that a shape does not need.
+
+They take sums over cells, interpolate between cells, and apply the transposes of both. Interpolation takes 3/4 of
+the own cell of a point and 1/4 of the nearest other one.
+
+Extension of a residual beyond its set of points, and the transpose of the extension.
+
+A preconditioner K, the inverse of A without a contact set, turns a residual r on a set c into the correction `R K R
+r` (R: restrict to c). This takes r as 0 outside c, whereas the wanted correction moves the surface outside c, too.
+With an extension E of r to all points, `R E' K E R` is symmetric and positive, as K is. It is the inverse of `R A R`
+if e = E r minimizes `<e, K e>`. At any distance from c this e varies over lengths of about the distance. So does the
+mean over cells of all sizes used here. With s the sum of r over a cell, w the number of its points in c, and I the
+linear interpolation between cells of twice the length,
+
+    e = (s + f I e_above)/(w + f),   f = FLOOR times the points of a cell,
+
+from the largest cell, above which e is 0, down to single points, with f = 0. The number of iterations then hardly
+grows with the grid. The grid is taken as periodic, also for free boxes. Maps of cells are in single precision.
+
+Grids of cells for `extension`: each cell joins two by two cells of the next finer grid, or a pair of them.
+
+Pairs come first, until points are about as far from each other along x as along y, as fields that are smooth over
+square cells are not smooth over long ones. A positive number of pairs joins along x, a negative one along y.
+
+Part of a preconditioner for pressure waves that are long compared with the thickness of a layer, within the contact.
+
+Such waves displace a layer by `u = c0 p - c2 laplace p`; a bonded incompressible layer, which flows along its base
+like a viscous film, has c0 = 0. There long waves are far stiffer than the softest wave. A preconditioner K of the
+whole box must limit their stiffness to that of the softest wave, because p vanishes outside contact, and patches of
+contact further from each other than the thickness do not interact. The missing part is the inverse of the equation
+above on the contact,
+
+    c0 z - c2 laplace z + c2 (1 - c)/l^2 z = r,
+
+with c = 1 in contact and 0 outside, where z decays over the length l, twice the thickness. One V-cycle over cells of
+two by two cells approximates it. It starts with cells of half the thickness, as K inverts shorter waves, and makes a
+damped Jacobi step on the way to larger cells and another one on the way back, so that it is symmetric. Maps are in
+single precision.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import loop
+from ..parallel import regrid
+from ..parallel.slab import Array, Slab
+from ..physics.halfspace import LongWaves
+from .problem import Operator
+
+
+@loop
+def row_of(own, neighbours, j):
+    """Return row j, counted from the first of `own`; `neighbours` holds rows below `own` first and rows
+    above it last."""
+    if j < 0:
+        return neighbours[neighbours.shape[0] + j]
+    return own[j] if j < own.shape[0] else neighbours[j - own.shape[0]]
+
+
+@loop
+def add_up(points, neighbours, above, wide, tall, cells):
+    """Put the sums over cells into `cells`."""
+    height = 1 if tall is None else 2
+    second = np.float32(height - 1)
+    pairs = points.shape[1] // 2
+    for j in range(cells.shape[0]):
+        a, b = (
+            row_of(points, neighbours, height * j - above),
+            row_of(points, neighbours, height * j - above + height - 1),
+        )
+        out = cells[j]
+        if wide is None:
+            for i in range(out.size):
+                out[i] = a[i] + second * b[i]
+            continue
+        for i in range(pairs):
+            out[i] = (a[2 * i] + second * b[2 * i]) + (a[2 * i + 1] + second * b[2 * i + 1])
+        for i in range(pairs, out.size):
+            out[i] = a[2 * i] + second * b[2 * i]
+
+
+@loop
+def add_up_back(cells, neighbours, above, wide, tall, points):
+    """Add the value of each cell to its points."""
+    pairs, height = points.shape[1] // 2, 1 if tall is None else 2
+    for j in range(points.shape[0]):
+        cell, out = row_of(cells, neighbours, (j + above) // height), points[j]
+        if wide is None:
+            for i in range(out.size):
+                out[i] += cell[i]
+            continue
+        for i in range(pairs):
+            out[2 * i] += cell[i]
+            out[2 * i + 1] += cell[i]
+        for i in range(2 * pairs, out.size):
+            out[i] += cell[i // 2]
+
+
+@loop
+def interpolate_cells(cells, neighbours, above, wide, tall, known, points):
+    """Add to each point `1 - known` times the interpolation between cells."""
+    pairs, columns = points.shape[1] // 2, cells.shape[1]
+    line = np.empty(columns + 2, np.float32)
+    for j in range(points.shape[0]):
+        if tall is None:
+            a = cells[j + above]
+            for i in range(columns):
+                line[i + 1] = a[i]
+        else:
+            near = (j + above) // 2
+            a = row_of(cells, neighbours, near)
+            b = row_of(cells, neighbours, near + 1 if (j + above) % 2 else near - 1)
+            for i in range(columns):
+                line[i + 1] = np.float32(0.75) * a[i] + np.float32(0.25) * b[i]
+        out, weight = points[j], known[j]
+        if wide is None:
+            for i in range(columns):
+                out[i] += (1.0 - weight[i]) * line[i + 1]
+            continue
+        line[0], line[columns + 1] = line[columns], line[1]
+        for i in range(pairs):
+            middle = np.float32(0.75) * line[i + 1]
+            out[2 * i] += (1.0 - weight[2 * i]) * (middle + np.float32(0.25) * line[i])
+            out[2 * i + 1] += (1.0 - weight[2 * i + 1]) * (middle + np.float32(0.25) * line[i + 2])
+        for i in range(2 * pairs, out.size):
+            out[i] += (1.0 - weight[i]) * (np.float32(0.75) * line[i // 2 + 1] + np.float32(0.25) * line[i // 2])
+
+
+@loop
+def gather_cells(known, known_neighbours, points, neighbours, above, wide, tall, cells):
+    """Add up `1 - known` times the values of points in cells, by the weights of the interpolation."""
+    count, columns = points.shape[1], cells.shape[1]
+    width, height = columns if wide is None else 2 * columns, 1 if tall is None else 2
+    line = np.empty(width + 2, np.float32)
+    line[width] = 0.0  # beyond an odd number of points
+    for j in range(cells.shape[0]):
+        first = height * j - above
+        a, w_a = row_of(points, neighbours, first), row_of(known, known_neighbours, first)
+        if tall is None:
+            for i in range(count):
+                line[i + 1] = (1.0 - w_a[i]) * a[i]
+        else:
+            b, w_b = row_of(points, neighbours, first + 1), row_of(known, known_neighbours, first + 1)
+            over, w_over = row_of(points, neighbours, first - 1), row_of(known, known_neighbours, first - 1)
+            under, w_under = row_of(points, neighbours, first + 2), row_of(known, known_neighbours, first + 2)
+            for i in range(count):
+                outer = (1.0 - w_over[i]) * over[i] + (1.0 - w_under[i]) * under[i]
+                inner = (1.0 - w_a[i]) * a[i] + (1.0 - w_b[i]) * b[i]
+                line[i + 1] = 0.25 * outer + 0.75 * inner
+        out = cells[j]
+        if wide is None:
+            for i in range(columns):
+                out[i] = line[i + 1]
+            continue
+        line[0], line[2 * columns + 1] = line[2 * columns], line[1]
+        for i in range(columns):
+            outer, inner = line[2 * i] + line[2 * i + 3], line[2 * i + 1] + line[2 * i + 2]
+            out[i] = np.float32(0.25) * outer + np.float32(0.75) * inner
+
+
+Map = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class CellLevel:
+    """Sums over cells, interpolation between them, and the transposes of both, for one step of `pyramid`.
+
+    Maps hold the rows of this rank. `known` marks points that interpolation leaves unchanged. All but `add_up` add
+    to their last map. Collective.
+    """
+
+    step: regrid.PyramidStep
+
+    @cached_property
+    def _sides(self) -> tuple[int | None, int | None]:
+        """The shape of a cell as `cell_loops` takes it."""
+        wide, tall = self.step.shape
+        return wide if wide > 1 else None, tall if tall > 1 else None
+
+    @property
+    def coarse(self) -> Slab:
+        return self.step.coarse
+
+    @cached_property
+    def _alone(self) -> bool:
+        """True if this rank has all rows, and no row of zeros is between the last and the first: `loops.row_of` then
+        finds the rows next to a map in the map itself."""
+        return self.step.fine.comm.size == 1 and self.step.fine.ny % 2 == 0
+
+    def add_up(self, points: Map, cells: Map) -> None:
+        step = self.step
+        around = points if self._alone else step.adjacent_points(points, 0, -1)
+        add_up(points, around, step.above, *self._sides, cells[step.own])
+        step.complete(cells)
+
+    def add_up_back(self, cells: Map, points: Map) -> None:
+        step = self.step
+        around = cells if self._alone else step.adjacent_cells(cells, 0, -1)
+        add_up_back(cells[step.own], around, step.above, *self._sides, points)
+
+    def interpolate(self, cells: Map, known: Map, points: Map) -> None:
+        step = self.step
+        around = cells if self._alone else step.adjacent_cells(cells, 0, -1)
+        interpolate_cells(cells[step.own], around, step.above, *self._sides, known, points)
+
+    def interpolate_back(self, known: Map, points: Map, cells: Map) -> None:
+        step, next_known, next_points = self.step, known, points
+        if not self._alone:
+            next_known, next_points = (step.adjacent_points(field, 0, 1, -2, -1) for field in (known, points))
+        own = cells[step.own]
+        gather_cells(known, next_known, points, next_points, step.above, *self._sides, own)
+        step.complete(cells)
+
+
+def cell_levels(slab: Slab, pairs: int = 0) -> list[CellLevel]:
+    """Return all levels of a grid up to a single cell, the finest first; the first `pairs` levels join pairs."""
+    return [CellLevel(step) for step in regrid.pyramid_steps(slab, pairs)]
+
+
+def interpolate(levels: list[CellLevel], known: list[Map], maps: list[Map]) -> None:
+    """Interpolate from the largest cells down to points, adding each grid to the next finer one; collective."""
+    for k, level in reversed(list(enumerate(levels))):
+        level.interpolate(maps[k + 1], known[k], maps[k])
+
+
+def interpolate_back(levels: list[CellLevel], known: list[Map], maps: list[Map]) -> None:
+    """Apply the transpose of `interpolate`, from points to the largest cells; collective."""
+    for k, level in enumerate(levels):
+        level.interpolate_back(known[k], maps[k], maps[k + 1])
+
+
+FLOOR = 0.3  # tuning: weight of the larger cell, as a share of the points of a cell
+LONG = 16.0  # tuning: largest ratio of distances of points for which larger cells are used
+FADING = 2.7  # tuning: power with which the floor of cells longer than the reach of a layer grows
+Maps = list[NDArray[Any]]  # a map of points, followed by maps of cells on each larger grid
+
+
+class Grids(NamedTuple):
+    """Grids of larger cells: at most `most`, None for all; the first of them double cells along one side, `pairs` times
+    (`levels`); the floor of the last one is `last` times that of the others."""
+
+    most: int | None = None
+    pairs: int = 0
+    last: float = 1.0
+
+
+ALL = Grids()
+
+
+def pairs_for(dx: float, dy: float) -> int:
+    """Return how many doublings along x make points at distances dx and dy about square; negative for doublings along
+    y; 0 if the ratio exceeds LONG."""
+    if max(dx, dy) > LONG * min(dx, dy):
+        return 0
+    return round(math.log2(dy / dx))
+
+
+def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
+    """Return the grids of larger cells for points at distances dx and dy.
+
+    Where points are closer along one direction, cells are doubled along it first, until they are about square.
+    Points further away than `reach` do not act on each other: square cells have at most about this length. There are
+    at least two sizes of these; if the larger one exceeds the reach, its floor is raised.
+    """
+    if max(dx, dy) > LONG * min(dx, dy):
+        return Grids(0)
+    pairs = pairs_for(dx, dy)
+    if reach == math.inf:
+        return Grids(None, pairs)
+    sizes = max(math.log2(reach / max(dx, dy)), -10.0)
+    return Grids(abs(pairs) + max(round(sizes), 2), pairs, max(2.0 ** (FADING * (1.5 - sizes)), 1.0))
+
+
+class ExtendedPreconditioner:
+    """K on a set with the extension E. It holds two maps in single precision on each grid of larger cells.
+
+    `known` is `w/(w + f)` of each cell; for points it is the set.
+    """
+
+    def __init__(self, slab: Slab, floor: float = FLOOR, larger: Grids = ALL) -> None:
+        """Use the grids `larger` with this floor."""
+        most, pairs, last = larger
+        down, across = max(pairs, 0), max(-pairs, 0)
+        self._levels = cell_levels(slab, pairs)[:most]
+        grids = [level.coarse for level in self._levels]
+        self._floors = [
+            (np.float32(floor) * lengths(slab.ny, level - down)[grid.rows], lengths(slab.nx, level - across))
+            for level, grid in enumerate(grids, 1)
+        ]
+        if self._floors and last > 1.0:
+            rows, columns = self._floors[-1]
+            self._floors[-1] = np.float32(last) * rows, columns
+        self._known, self._cells = ([grid.empty(np.float32) for grid in grids] for _ in range(2))
+
+    def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:
+        """Replace the residual r, which is 0 outside the set, by z; z is valid on the set only. Collective."""
+        known: Maps = [working, *self._known]
+        maps: Maps = [r, *self._cells]
+        self._add_up(known)
+        for floors, weights in zip(self._floors, self._known, strict=True):
+            _compare(*floors, weights)
+        self._add_up(maps)
+        self._weigh()
+        interpolate(self._levels, known, maps)
+        preconditioner.apply(r, r)
+        interpolate_back(self._levels, known, maps)
+        self._weigh()
+        self._add_up_back(maps)
+
+    def _weigh(self) -> None:
+        """Divide by `w + f`."""
+        for floors, known, cells in zip(self._floors, self._known, self._cells, strict=True):
+            _weigh(known, *floors, cells)
+
+    # -- between each grid and the next, and the transposes of that ----------------------------------------------------
+
+    def _add_up(self, maps: Maps) -> None:
+        for k, level in enumerate(self._levels):
+            level.add_up(maps[k], maps[k + 1])
+
+    def _add_up_back(self, maps: Maps) -> None:
+        for k, level in reversed(list(enumerate(self._levels))):
+            level.add_up_back(maps[k + 1], maps[k])
+
+
+def lengths(points: int, level: int) -> NDArray[np.float32]:
+    """Return the number of points of each cell along one direction; the last cell may have fewer."""
+    length = 1 << max(level, 0)
+    return np.diff(np.minimum(np.arange(0, points + length, length), points)).astype(np.float32)
+
+
+@loop
+def _compare(floors, lengths, weights):
+    """Divide weights w by `w + f`; f is a floor for each row times a length for each column."""
+    for j in range(weights.shape[0]):
+        for i in range(weights.shape[1]):
+            weights[j, i] /= weights[j, i] + floors[j] * lengths[i]
+
+
+@loop
+def _weigh(known, floors, lengths, cells):
+    for j in range(cells.shape[0]):
+        for i in range(cells.shape[1]):
+            cells[j, i] *= (1.0 - known[j, i]) / (floors[j] * lengths[i])
+
+
+DAMPING = np.float32(0.8)  # tuning: factor on the Jacobi steps
+DECAY = 2.0  # tuning: decay length of z outside contact, over the thickness
+FINEST = 0.5  # tuning: least length of cells that are smoothed, over the thickness
+MAPS = 4  # maps on each grid
+SAME = 1e-9  # accuracy: relative difference below which two lengths are equal
+
+
+class LongWavePreconditioner:
+    """An extended preconditioner plus the part for long waves. It holds four maps in single precision on each grid of
+    cells."""
+
+    def __init__(self, slab: Slab, waves: LongWaves, extended: ExtendedPreconditioner) -> None:
+        self._extended, self._levels = extended, cell_levels(slab)
+        self._first = _first_grid(slab.nx, slab.ny, waves)
+        grids = [slab, *(level.coarse for level in self._levels)]
+        kept = [grid if level or not self._first else None for level, grid in enumerate(grids)]
+        none = np.empty((0, 0), np.float32)
+        self._given, self._z, self._left, self._diagonal = (
+            [none if grid is None else grid.empty(np.float32) for grid in kept] for _ in range(MAPS)
+        )
+        dx, dy = waves.size[0] / slab.nx, waves.size[1] / slab.ny
+        self._faces = np.float32(dy / dx), np.float32(dx / dy)
+        self._scale = dx * dy / waves.c2
+        stiffness = waves.c0 / waves.c2 + 1.0 / max(waves.size) ** 2  # 2nd term: no wave is longer than the box
+        self._inside, self._outside = dx * dy * stiffness, dx * dy / (DECAY * waves.thickness) ** 2
+        self._cell_lengths = [
+            (lengths(slab.ny, level)[grid.rows], lengths(slab.nx, level)) for level, grid in enumerate(grids)
+        ]
+
+    def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:
+        """Replace the residual r, which is 0 outside the set, by z; z is valid on the set only. Collective."""
+        self._weigh(working)
+        if not self._first:
+            self._given[0][...] = r
+        self._cycle(0, r)
+        self._extended.apply(preconditioner, working, r)
+        level = 1 if self._first else 0
+        self._z[level] *= np.float32(self._scale)
+        if level:
+            self._add_up_back(0, r)
+        else:
+            r += self._z[0]
+
+    def _weigh(self, working: NDArray[Any]) -> None:
+        """Compute the diagonals on all grids from the number of points of each cell in the set."""
+        counts = [working, *self._diagonal[1:]]
+        for k, cells in enumerate(self._levels):
+            cells.add_up(*counts[k : k + 2])
+        for level, (diagonal, lines) in enumerate(zip(self._diagonal, self._cell_lengths, strict=True)):
+            if level or not self._first:
+                faces = 2.0 * sum(self._faces)
+                _find_diagonal(counts[level], *lines, self._inside, self._outside, faces, diagonal)
+
+    def _cycle(self, level: int, r: Array) -> None:
+        """Solve for z on a grid with the right side stored there."""
+        given, z, left, diagonal = (maps[level] for maps in (self._given, self._z, self._left, self._diagonal))
+        if level == len(self._levels):  # a single cell, its own neighbour
+            z[...] = given / (diagonal - 2.0 * sum(self._faces))
+        elif level < self._first:
+            self._add_up(level, given if level else r)
+            self._cycle(level + 1, r)
+            if level:
+                z.fill(0.0)
+                self._add_up_back(level, z)
+        else:
+            np.multiply(given, DAMPING, out=z)
+            z /= diagonal
+            self._find_rest(level)
+            self._add_up(level, left)
+            self._cycle(level + 1, r)
+            self._add_up_back(level, z)
+            self._find_rest(level)
+            _correct(left, diagonal, z)
+
+    def _find_rest(self, level: int) -> None:
+        z = self._z[level]
+        neighbours = self._levels[level].step.adjacent_points(z, 0, -1)
+        _rest(z, neighbours, self._given[level], self._diagonal[level], *self._faces, self._left[level])
+
+    def _add_up(self, level: int, points: NDArray[Any]) -> None:
+        """Put the sums over the cells of the next grid into its right side."""
+        self._levels[level].add_up(points, self._given[level + 1])
+
+    def _add_up_back(self, level: int, points: NDArray[Any]) -> None:
+        """Add z of the next grid to points."""
+        self._levels[level].add_up_back(self._z[level + 1], points)
+
+
+def _first_grid(nx: int, ny: int, waves: LongWaves) -> int:
+    """Return how many times cells are doubled before the first smoothing."""
+    cell = max(waves.size[0] / nx, waves.size[1] / ny)
+    return max(math.floor(math.log2(FINEST * waves.thickness / cell * (1.0 + SAME))), 0)
+
+
+@loop
+def _find_diagonal(count, rows, columns, inside, outside, faces, out):
+    """Put `faces + inside points + outside (points - count)` into `out`, with the points of each cell."""
+    for j in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            points = rows[j] * columns[i]
+            out[j, i] = faces + inside * points + outside * (points - count[j, i])
+
+
+@loop
+def _rest(z, neighbours, given, diagonal, along_x, along_y, out):
+    """Put the residual of the equation into `out`: `given - diagonal z` plus z of the neighbours times their faces."""
+    rows, columns = z.shape
+    for j in range(rows):
+        below = z[j + 1] if j + 1 < rows else neighbours[0]
+        above = z[j - 1] if j > 0 else neighbours[1]
+        for i in range(columns):
+            left = z[j, i - 1] if i > 0 else z[j, columns - 1]
+            right = z[j, i + 1] if i + 1 < columns else z[j, 0]
+            near = along_x * (left + right) + along_y * (below[i] + above[i])
+            out[j, i] = given[j, i] - diagonal[j, i] * z[j, i] + near
+
+
+@loop
+def _correct(left, diagonal, z):
+    for j in range(z.shape[0]):
+        for i in range(z.shape[1]):
+            z[j, i] += DAMPING * left[j, i] / diagonal[j, i]

@@ -1,0 +1,112 @@
+"""Input, memory and precision of a contact solve.
+
+Contact problem, the input of solvers.
+
+Maps of one grid that contact solves work in. Between solves other parts of a run use them.
+
+Precision of search directions, and the smallest certificate that rounding allows.
+
+Directions, residuals and preconditioned residuals may be rounded to single precision: the step along a direction and
+the image of the new iterate are computed in double precision. In full contact, which one step solves, the result is
+then correct to little more than single precision.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..parallel.slab import Array, Slab
+from .constraint import Constraint
+
+
+class Operator(Protocol):
+    """Linear map of fields; `out` may be `field`. Applying it is collective."""
+
+    def apply(self, field: Array, out: Array) -> Array: ...
+
+
+class Operators(NamedTuple):
+    """Operator A of a body on one grid, from pressure to displacement, and a preconditioner K close to its inverse."""
+
+    operator: Operator
+    preconditioner: Operator
+
+
+@dataclass(frozen=True)
+class MeanPressure:
+    """Load control: the mean of p is given, the rigid approach d is unknown."""
+
+    value: float
+
+
+@dataclass(frozen=True)
+class Approach:
+    """Displacement control: the rigid approach d is given, the load is unknown."""
+
+    value: float
+
+
+Control = MeanPressure | Approach
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Find a pressure p that the `constraint` admits and whose gap `g = A p - h - d` meets its conditions.
+
+    `operator` is A, `preconditioner` is K, close to its inverse, and `heights` is the map h. `control` gives the
+    mean of p or the approach d.
+    """
+
+    operator: Operator
+    preconditioner: Operator
+    heights: Array
+    constraint: Constraint
+    control: Control
+
+    @cached_property
+    def mean(self) -> float | None:
+        """The prescribed mean pressure; None with a given approach."""
+        return self.control.value if isinstance(self.control, MeanPressure) else None
+
+
+VERY_LOOSE = 1e-3  # accuracy: least tolerance on a certificate with displacements in single precision
+ROUNDINGS = 4.0  # accuracy: least certificate that is surely reached, over the relative rounding of the largest length
+LOOSE = 1e-5  # accuracy: least tolerance on a certificate with directions in single precision
+
+
+def precision_of_directions(tolerance: float, loose: float = LOOSE) -> type[np.floating]:
+    """Return the type of maps of directions for a solver with this tolerance."""
+    return np.float32 if tolerance >= loose else np.float64
+
+
+def reachable_certificate(slab: Slab, lengths: Sequence[Array], p: Array, compliance: float, length: float) -> float:
+    """Return the smallest certificate, over `length`, that the rounding of maps of lengths and of p allows; collective.
+    An error in the last digit of p moves the body by this digit times the largest `compliance`."""
+    sizes = slab.reduce((), [float(np.abs(each).max(initial=0.0)) for each in (*lengths, p)])
+    sizes[-1] *= compliance
+    return ROUNDINGS * float(np.finfo(lengths[0].dtype).eps) * max(sizes) / length
+
+
+class Workspace:
+    """A pressure, two displacements, a search direction, and one byte per point.
+
+    The scene makes one and passes it to all that need a map temporarily. A solve overwrites all maps and leaves `A p`
+    in `displacement`, valid until the next one. Read maps as attributes at each use: they may be swapped or replaced.
+
+    Parameters: `kept`, the type of displacements, single precision if the operator has no more digits; `tolerance` of
+    solves, which decides the precision of directions.
+    """
+
+    def __init__(self, slab: Slab, tolerance: float, kept: type[np.floating] = np.float64) -> None:
+        self.slab = slab
+        self.pressure = slab.zeros()
+        self.displacement, self.other_displacement = slab.zeros(kept), slab.zeros(kept)
+        self.direction = slab.zeros(precision_of_directions(tolerance))
+        self.working: NDArray[Any] = slab.zeros(np.bool_)
+
+    def swap_displacements(self) -> None:
+        self.displacement, self.other_displacement = self.other_displacement, self.displacement

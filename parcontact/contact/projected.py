@@ -1,0 +1,364 @@
+"""Projected steps for operators that are not symmetric, in light contact and free boxes.
+
+Certificates of admissible pressures, and the contact that solvers return.
+
+Minimal residual steps, each projected onto the admissible pressures, for light contact and free boxes.
+
+On the working set c (pressure or penetration) of an admissible pressure x, a step combines the preconditioned
+residual t and the last two changes of x so that the sum of squares of `C R (A x - h)` is smallest (R: restrict to c,
+C: subtract the mean over c). Then negative pressures are put to 0, the load is restored, near by first
+(`local_load`), and A is applied to x, so that the stored changes have exact images. A need not be symmetric.
+Convergence is not guaranteed: a solve is given up when its certificate no longer halves.
+
+Steady contact in a free box: projected steps, followed by proximal points where these do not help.
+
+The symbol of a padded box has waves with a negative real part, so that its resolvents may not exist (`splitting`). If
+projected steps fail, the contact is the limit of contacts with less loss: with S symmetric and positive, the contact p'
+of the operator `A + S` for heights `h + S p` satisfies
+
+    A p' - h - d = S (p - p') where there is pressure,
+
+which is the contact for A and h when p' = p. As A is positive, each step reduces the error of p, measured by S, also
+if p' is only accurate to a share of the change (proximal points: R. T. Rockafellar, SIAM J. Control Optim. 14 (1976)
+877). S is the smallest that limits the loss tangent of `A + S` to 1: `|Im A| - Re A` for waves whose tangent is
+larger, 0 for the others.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import loop
+from ..parallel.slab import Array, Slab
+from ..physics.convolution import Convolution
+from ..physics.measures import Certificate
+from . import kernels
+from .constraint import LEAST_CUT as CONSTRAINT_LEAST_CUT
+from .constraint import LocalLoad, NonNegative
+from .preconditioner import ExtendedPreconditioner, Grids
+from .problem import Approach, Control, MeanPressure, Operator
+from .solver import Lines, certify, form_iterate
+
+
+@dataclass(frozen=True)
+class SteadyContact:
+    """A contact, solved or given up in `steps`. p is the map of the start; `u = A p` belongs to the solver and is valid
+    until its next solve. `failure` is empty, or states why the tolerance was not reached."""
+
+    p: Array
+    u: Array
+    d: float
+    certificate: Certificate
+    steps: int
+    failure: str
+
+    @property
+    def converged(self) -> bool:
+        return not self.failure
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Certifies pressures on one grid: `height` of the surface; `lines` along which the body is stiffer, if gaps are to
+    be certified for them."""
+
+    slab: Slab
+    height: float
+    lines: Lines | None = None
+
+    def certify(
+        self, p: Array, u: Array, h: Array, control: Control, working: NDArray[np.bool_]
+    ) -> tuple[float, Certificate]:
+        """Mark the working set of an admissible pressure with the displacement u. Return its approach and
+        certificate; collective."""
+        slab, constraint, given = self.slab, NonNegative(), isinstance(control, Approach)
+        iterate = form_iterate(slab, constraint, p, u, h, control.value if given else 0.0)
+        iterate, mean = (iterate, None) if given else (iterate.settled(), control.value)
+        *_, certificate = certify(slab, constraint, p, u, h, iterate, mean, self.height, working)
+        if self.lines is not None and iterate.load > 0.0:
+            certificate = certificate.shortened(self.lines.share_of_length(slab, p, u, iterate))
+        return iterate.d, certificate
+
+
+def describe_failure(reason: str, certificate: Certificate, tolerance: float) -> str:
+    """Return the reason why a solve was given up, with its residual; empty if it met the tolerance."""
+    worst = certificate.worst
+    return "" if worst <= tolerance else f"{reason}: the residual is {worst:.3g} where {tolerance:.3g} was asked for"
+
+
+Set = NDArray[np.bool_]
+DIRECTIONS = 3  # the residual and the last two changes
+SQUARES, WIDE = 5, 0.5  # tuning: grids of squares and floor of `ExtendedPreconditioner`
+NARROW = Grids(4), 1.0  # tuning: the same on lines; larger cells or a smaller floor may make sets cycle there
+WITH_PAIRS = 0.3  # tuning: floor of `ExtendedPreconditioner` with pairs
+
+
+def extension_on(nx: int, ny: int, pairs: int) -> tuple[Grids, float]:
+    """Return grids and floor of `ExtendedPreconditioner` on nx x ny points, where `pairs` doublings make
+    cells square."""
+    if 1 in (nx, ny):
+        return NARROW
+    return Grids(SQUARES + abs(pairs), pairs), WITH_PAIRS if pairs else WIDE
+
+
+class Projected:
+    """Projected steps on one grid. It holds DIRECTIONS maps t, their images w, the displacement, a byte per point, and
+    the maps of `ExtendedPreconditioner`.
+
+    `pairs` doublings make cells square. `least_cut` is LEAST_CUT of `LocalLoad` on squares, as a share of the load; the
+    smaller cells of `pairs` reduce it.
+    """
+
+    constraint = NonNegative()  # steady sliding has no other constraint
+
+    def __init__(
+        self,
+        judge: Judge,
+        operator: Operator,
+        preconditioner: Operator,
+        pairs: int = 0,
+        least_cut: float = CONSTRAINT_LEAST_CUT,
+    ) -> None:
+        self.judge, self.operator, self.preconditioner = judge, operator, preconditioner
+        self.slab = slab = judge.slab
+        self.t, self.w = ([slab.empty() for _ in range(DIRECTIONS)] for _ in range(2))
+        self._u = slab.zeros()
+        self._working: NDArray[Any] = slab.zeros(np.bool_)
+        grids, floor = extension_on(slab.nx, slab.ny, pairs)
+        self.extended = ExtendedPreconditioner(slab, floor, grids)
+        self.local_load, self._least_cut = LocalLoad(slab, pairs), least_cut / 2.0 ** abs(pairs)
+
+    def solve(
+        self, h: Array, mean: float, p: Array, tolerance: float, patience: int, near_by: bool = True
+    ) -> SteadyContact:
+        """Solve for heights h under the mean pressure `mean`; the solution overwrites the start p. A start that is 0
+        everywhere is replaced by a uniform pressure. Restore the load `near_by` first, or from all points by one
+        factor. Give up if the certificate does not halve in `patience` steps. Collective."""
+        steps, best, since = 0, math.inf, 0
+        try:
+            d, certificate = self._begin(h, mean, p)
+            while certificate.worst > tolerance and since < patience:
+                self.step(p, self._u, h, self._working, mean * self.slab.points, near_by)
+                d, certificate = self._certify(h, mean, p)
+                halved, steps = certificate.worst <= 0.5 * best, steps + 1
+                best, since = (certificate.worst, 0) if halved else (best, since + 1)
+        except ZeroDivisionError:  # no load or no points in a set; all ranks have the same sums
+            p.fill(0.0)
+            d, certificate = math.nan, Certificate(math.nan, math.nan, math.nan)
+            return SteadyContact(p, self._u, d, certificate, steps, "no point is left that carries load")
+        failure = describe_failure(f"no progress in {since} projected steps", certificate, tolerance)
+        return SteadyContact(p, self._u, d, certificate, steps, failure)
+
+    def _begin(self, h: Array, mean: float, p: Array) -> tuple[float, Certificate]:
+        """Scale the start to the load, and forget earlier changes. Return its approach and certificate."""
+        (load,) = self.slab.sum(kernels.sum_of(p))
+        if load > 0.0:
+            self.constraint.rescale_to_load(self.slab, p, load, mean * self.slab.points)
+        else:
+            p.fill(mean)
+        self.forget()
+        self.operator.apply(p, self._u)
+        return self._certify(h, mean, p)
+
+    def forget(self) -> None:
+        """Forget earlier changes."""
+        for field in (*self.t, *self.w):
+            field.fill(0.0)
+
+    def _certify(self, h: Array, mean: float, p: Array) -> tuple[float, Certificate]:
+        return self.judge.certify(p, self._u, h, MeanPressure(mean), self._working)
+
+    def step(self, x: Array, u: Array, h: Array, working: Set, load: float, near_by: bool = True) -> None:
+        """Move x to an admissible pressure with the sum `load`, and update its image u; collective."""
+        members, total = self.slab.sum(*gaps_on(working, u, h))
+        level, t = total / members, self.t[0]
+        kernels.gap_residual(working, u, h, level, t)
+        self.extended.apply(self.preconditioner, working, t)
+        (mean,) = self.slab.sum(sum_on(working, t))
+        kernels.turn(working, t, 0.0, mean / members, t)
+        self.operator.apply(t, self.w[0])
+        sums = np.array(self.slab.sum(*_gram(working, u, h, level, *self.w)))
+        a, b, c = self.slab.agree(_smallest(sums, members))
+        _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
+        self.w[2][...] = u
+        now, cut = self.local_load.advance(self.constraint, x, x, 0.0, x)
+        if not now > 0.0:  # earlier changes took all load off this set; t alone leaves it
+            np.multiply(self.t[0], sums[3] / (sums[6] - sums[0] ** 2 / members), out=x, where=working)
+            np.subtract(self.t[2], x, out=x, where=working)
+            now, cut = self.local_load.advance(self.constraint, x, x, 0.0, x)
+        self.local_load.restore(self.constraint, x, now, load, near_by and cut > self._least_cut * now)
+        self.operator.apply(x, u)
+        self._keep_change(x, u)
+
+    def _keep_change(self, x: Array, u: Array) -> None:
+        """Store the change of x and of its image; the last maps of t and w hold the old values."""
+        for kept, new in ((self.t, x), (self.w, u)):
+            np.subtract(new, kept[2], out=kept[2])
+            kept[1], kept[2] = kept[2], kept[1]
+
+
+def _smallest(sums: Array, members: float) -> list[float]:
+    """Return the length along each direction from the sums of `_gram`; 0 along directions that are 0 or left out."""
+    totals, against, pairs = sums[:3], sums[3:6], sums[6:]
+    gram = np.empty((3, 3))
+    gram[np.triu_indices(3)] = pairs
+    gram = np.triu(gram) + np.triu(gram, 1).T - np.outer(totals, totals) / members
+    size = np.sqrt(np.maximum(gram.diagonal(), 0.0))
+    if not np.all(np.isfinite(sums)) or not size[0] > 0.0:
+        return [0.0] * 3
+    size[size == 0.0] = np.inf
+    far = np.linalg.lstsq(gram / np.outer(size, size), against / size, rcond=1e-10)[0] / size
+    return [float(value) for value in far]
+
+
+@loop
+def _gram(working, u, h, level, a, b, c):
+    """Return sums over the set of a, b and c, of their products with `u - h - level`, and of aa, ab, ac,
+    bb, bc and cc."""
+    total = np.zeros(12)
+    for j in range(u.shape[0]):
+        s_a, s_b, s_c, r_a, r_b, r_c = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        a_a, a_b, a_c, b_b, b_c, c_c = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(u.shape[1]):
+            weight, here = 1.0 if working[j, i] else 0.0, u[j, i] - h[j, i] - level
+            x, y, z = weight * a[j, i], weight * b[j, i], weight * c[j, i]
+            s_a += x
+            s_b += y
+            s_c += z
+            r_a += here * x
+            r_b += here * y
+            r_c += here * z
+            a_a += x * x
+            a_b += x * y
+            a_c += x * z
+            b_b += y * y
+            b_c += y * z
+            c_c += z * z
+        total += np.array([s_a, s_b, s_c, r_a, r_b, r_c, a_a, a_b, a_c, b_b, b_c, c_c])
+    return total
+
+
+@loop
+def _move(working, along_a, along_b, along_c, a, b, c, x):
+    """Move x on the set, put 0 elsewhere, and leave the old x in c."""
+    for j in range(x.shape[0]):
+        for i in range(x.shape[1]):
+            old = x[j, i]
+            value = old - along_a * a[j, i] - along_b * b[j, i] - along_c * c[j, i]
+            x[j, i] = value if working[j, i] else 0.0
+            c[j, i] = old
+
+
+@loop
+def gaps_on(working, u, h):
+    """Return the number of points of the set, and the sum of `u - h` over it."""
+    count, total = 0.0, 0.0
+    for j in range(u.shape[0]):
+        row_count, row_total = 0.0, 0.0
+        for i in range(u.shape[1]):
+            weight = 1.0 if working[j, i] else 0.0
+            row_count += weight
+            row_total += weight * (u[j, i] - h[j, i])
+        count += row_count
+        total += row_total
+    return count, total
+
+
+@loop
+def sum_on(working, z):
+    total = 0.0
+    for j in range(z.shape[0]):
+        row = 0.0
+        for i in range(z.shape[1]):
+            row += z[j, i] if working[j, i] else 0.0
+        total += row
+    return total
+
+
+PATIENCE = 20  # tuning: limit on projected steps in which the certificate must halve
+LEAST_CUT = 1.5e-5  # tuning: as in `local_load`, share of the load, for contacts with less loss
+INNER_PATIENCE = 12  # tuning: limit on projected steps of a contact with less loss in which its certificate must halve
+SHARE, MOST = 0.3, 0.5  # tuning: tolerance of the next contact over the last certificate; up to MOST after a failure
+LEAST = 0.3  # tuning: least tolerance of a contact, over the tolerance of the solve
+MAX_CONTACTS_TO_HALVE = 20  # tuning: limit on contacts in which the certificate must halve
+Symbol = NDArray[np.inexact]
+
+
+class FreeSteadySolver:
+    """Solver on one grid with the interface of `SteadySolver`. It holds the maps of `Projected`; where that fails, also
+    those of `_Points`."""
+
+    def __init__(
+        self, judge: Judge, operator: Convolution, preconditioner: Convolution, tolerance: float, pairs: int
+    ) -> None:
+        self._judge, self._operator, self._preconditioner = judge, operator, preconditioner
+        self._tolerance, self._pairs = tolerance, pairs
+        self._projected = Projected(judge, operator, preconditioner, pairs)
+
+    def hold_all(self) -> "_Points":
+        """Allocate all maps that a solve may need."""
+        return _Points(self._judge, self._operator, self._preconditioner, self._pairs)
+
+    def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
+        """Solve for heights h under the mean pressure `mean`; collective. The solution overwrites the pressure `start`.
+        A start that is 0 everywhere is replaced by a uniform pressure."""
+        for near_by in (True, False):
+            contact = self._projected.solve(h, mean, start, self._tolerance, PATIENCE, near_by)
+            if contact.converged:
+                return contact
+        return self.hold_all().solve(h, mean, start, self._tolerance)
+
+
+class _Points:
+    """Proximal points. They hold the symbols of `A + S`, of its inverse and of S, and three maps."""
+
+    def __init__(self, judge: Judge, operator: Convolution, preconditioner: Convolution, pairs: int) -> None:
+        kind = operator.dtype
+        nearer, nearer_inverse = operator.mapped(_nearer, kind), preconditioner.mapped(_nearer_inverse, kind)
+        self._judge, self._operator, self._pull = judge, operator, operator.mapped(_pull, np.float64)
+        self._inner = Projected(judge, nearer, nearer_inverse, pairs, LEAST_CUT)
+        self._h, self._kept, self._u = (judge.slab.empty() for _ in range(3))
+        self._working: NDArray[Any] = judge.slab.zeros(np.bool_)
+
+    def solve(self, h: Array, mean: float, start: Array, tolerance: float) -> SteadyContact:
+        """Solve as `FreeSteadySolver.solve`; `steps` is the sum over all contacts. Collective."""
+        worst, best, since, share, steps = 1.0, math.inf, 0, SHARE, 0
+        while True:
+            self._kept[...] = start
+            self._pull.apply(start, self._h)
+            self._h += h
+            contact = self._inner.solve(self._h, mean, start, max(share * worst, LEAST * tolerance), INNER_PATIENCE)
+            if not math.isfinite(contact.certificate.worst):
+                return contact
+            steps, since = steps + contact.steps, since + 1
+            self._operator.apply(start, self._u)
+            d, certificate = self._judge.certify(start, self._u, h, MeanPressure(mean), self._working)
+            if contact.failure and best < certificate.worst and share < MOST and since < MAX_CONTACTS_TO_HALVE:
+                share *= 2.0
+                start[...] = self._kept
+                continue
+            worst, share = certificate.worst, max(SHARE, 0.5 * share)
+            best, since = (worst, 0) if worst <= 0.5 * best else (best, since)
+            if worst <= tolerance or since >= MAX_CONTACTS_TO_HALVE:
+                failure = describe_failure(f"no progress in {since} contacts", certificate, tolerance)
+                return SteadyContact(start, self._u, d, certificate, steps, failure)
+
+
+def _pull(symbol: Symbol) -> Symbol:
+    """Return the symbol of S from that of A."""
+    return np.maximum(np.abs(symbol.imag) - symbol.real, 0.0)
+
+
+def _nearer(symbol: Symbol) -> Symbol:
+    """Return the symbol of `A + S` from that of A."""
+    return symbol + _pull(symbol)
+
+
+def _nearer_inverse(symbol: Symbol) -> Symbol:
+    """Return the symbol of the inverse of `A + S` from that of the inverse of A; 0 where that is 0."""
+    square = np.abs(symbol) ** 2
+    own = np.divide(_pull(symbol), square, out=np.zeros_like(square), where=square > 0.0)
+    return symbol / (1.0 + own * symbol)

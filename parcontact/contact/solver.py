@@ -1,0 +1,389 @@
+"""Frictionless contact of a body with a rigid surface by projected, preconditioned conjugate gradients.
+
+Find the admissible pressure p, an `ny x nx` map, whose gap `g = A p - h - d` meets the conditions of the constraint. A
+is symmetric and positive; either mean(p) = P0 is given and d unknown, or d is given. For `constraint.NonNegative`:
+
+    p >= 0,   g >= 0,   p g = 0.
+
+The solution minimizes `f(p) = <p, A p>/2 - <p, h + d>` over the admissible p. With `R` = restrict to the working set
+and `C` = subtract the mean over it, one iteration is:
+
+1. The working set consists of the contact (p > 0) and of the points that penetrate (g < 0).
+2. The residual is `r = C R g`, preconditioned `z = C R E' K E r`. K is close to the inverse of A, and E extends r
+   beyond the set (`preconditioner`).
+3. The direction is `t = C R (z + beta t)`. Here beta makes t conjugate to the last direction and corrects an inexact
+   last step. t = z if this is a much smaller descent than z, or if much of the last step was cut off.
+4. `p <- p - alpha t`, limited to the bounds of p. Load that this adds is removed near by if it is large
+   (`local_load`), and p is scaled to the mean P0. If the hardness is far below the stiffness, alpha is limited, so
+   that few points change from one bound to the other.
+5. f must not rise. Otherwise the step is halved, p is only scaled, and the direction is forgotten.
+
+The exact step `<r, t>/<t, A t>` needs one more application of the operator. As K E is nearly the inverse of A, a fixed
+step near 1 replaces it. `A p` of the next iterate gives `<t, A t>`: if the exact step differs by more than
+MAX_STEP_RATIO, or the certificate no longer falls, the rest of the solve makes exact steps. On lines of points and on
+cells much longer than wide, all steps are exact.
+
+With d given, nothing is centred or scaled. With P0 given, d is the mean of `A p - h` over free points, weighted by p,
+so that `<p, g> = 0` and scaling p does not change f to first order. Thus f falls for every sufficiently small step (D.
+P. Bertsekas, SIAM J. Control Optim. 20 (1982) 221, for d given). Without K this is the method of I. A. Polonsky and L.
+M. Keer, Wear 231 (1999) 206; with K the number of iterations hardly depends on the grid. All numbers are dimensionless.
+
+Sums over an iterate of the contact solver, and its errors.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..parallel.slab import Array, Slab, reused
+from ..physics import loops
+from ..physics.halfspace import LongWaves
+from ..physics.measures import Certificate
+from . import kernels
+from .constraint import LEAST_CUT, Constraint, LocalLoad
+from .preconditioner import ALL, ExtendedPreconditioner, Grids, LongWavePreconditioner
+from .problem import Problem, Workspace
+
+LEAST_SHARE = 0.1  # accuracy: least length that gaps are compared with, over the mean displacement under pressure
+LEAST_HEIGHT = 1e-9  # accuracy: the same, over the height of the surface, where displacements are only rounding
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Lines of points along the sliding, of a body that is stiffer for waves along them.
+
+    `axis` of an array of rows along the lines; `contrast` c: modulus of waves along them over that of waves that do
+    not vary along them. An error of the gap that varies along the lines causes c times the pressure. So the lengths of
+    displacements that vary along the lines, and 1/c of the others, add up to the length of the certificate: a share s
+    of the length for one modulus,
+
+        s^2 = v + (1 - v)/c^2,
+
+    with v the share of the variance of u that remains with the mean of each line subtracted, weighted by the pressure.
+    """
+
+    axis: int
+    contrast: float
+
+    def share_of_length(self, slab: Slab, p: Array, u: Array, iterate: "Iterate") -> float:
+        """Return s for the image u of p and their sums; collective."""
+        loads, moments = p.sum(axis=self.axis), np.einsum("ij,ij->i" if self.axis else "ij,ij->j", p, u)
+        if not self.axis:  # lines cross the rows of all ranks
+            loads, moments = np.split(np.array(slab.sum(*loads, *moments)), 2)
+        between = np.divide(moments**2, loads, out=np.zeros_like(loads), where=loads > 0.0).sum()
+        between = slab.sum(between)[0] if self.axis else between
+        variance = iterate.squares - (2.0 * iterate.energy) ** 2 / iterate.load
+        along = min(max((iterate.squares - between) / variance, 0.0), 1.0) if variance > 0.0 else 1.0
+        return math.sqrt(along + (1.0 - along) / self.contrast**2)
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """Sums over an iterate at the approach d: of p, of p g, `energy = <p, A p>/2`, of `p (A p)^2`, and of p and p g
+    over free points.
+
+    If no point is free, `between` holds the lowest and the highest approach at which no pressure changes; the first
+    is larger than the second if there is none.
+    """
+
+    d: float
+    load: float
+    gaps: float
+    energy: float
+    squares: float
+    free_load: float
+    free_gaps: float
+    between: tuple[float, float] | None = None
+
+    @property
+    def f(self) -> float:
+        """`<p, A p>/2 - <p, h + d>`, by `h + d = A p - g`, which avoids large numbers where h has a large offset."""
+        return self.gaps - self.energy
+
+    def settled(self) -> "Iterate":
+        """Return the iterate at the approach d for which `<p, g> = 0` over free points, to rounding.
+
+        If none is free, d is the mean of `between`, or that for all points if all pressures are at one bound.
+        Without pressure d does not change.
+        """
+        if self.between is not None:
+            d = 0.5 * sum(self.between)
+        elif self.free_load > 0.0:
+            d = self.d + self.free_gaps / self.free_load
+        else:
+            d = self.d + (self.gaps / self.load if self.load > 0.0 else 0.0)
+        gaps, rest = self.gaps - (d - self.d) * self.load, self.free_gaps - (d - self.d) * self.free_load
+        return Iterate(d, self.load, gaps, self.energy, self.squares, self.free_load, rest, self.between)
+
+    def length(self, height: float) -> float:
+        """Return the length that gaps are compared with (`Certificate`), between LEAST_HEIGHT and 1 times `height`."""
+        least = LEAST_HEIGHT * height
+        if self.load <= 0.0:
+            return least
+        mean = 2.0 * self.energy / self.load
+        spread = math.sqrt(max(self.squares / self.load - mean**2, 0.0))
+        return max(min(max(spread, LEAST_SHARE * abs(mean)), height), least)
+
+
+def certify(
+    slab: Slab,
+    constraint: Constraint,
+    p: Array,
+    u: Array,
+    h: Array,
+    iterate: Iterate,
+    mean: float | None,
+    height: float,
+    working: NDArray[np.bool_],
+) -> tuple[float, float, Certificate]:
+    """Mark the working set of a pressure p with the image u. Return its size, its sum of gaps, and the certificate;
+    collective.
+
+    `mean` is the prescribed mean pressure, None with a given approach; `height` is the height of the surface.
+    """
+    *sums, deepest = constraint.mark_working_set(p, u, h, iterate.d, working)
+    wrong, members, excess, held, deepest = slab.reduce(sums, [deepest])
+    length = iterate.length(height)
+    complementarity = wrong / (iterate.load or 1.0) / length
+    load = 0.0 if mean is None else abs(iterate.load / slab.points / mean - 1.0)
+    share = (members + held) / slab.points
+    return members, excess, Certificate(complementarity, max(deepest / length, 0.0), load, length, share)
+
+
+def form_iterate(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array, d: float) -> Iterate:
+    """Return the sums over a pressure p and its image u at the approach d; collective."""
+    load, work, gaps, squares, free_load, free_gaps = slab.sum(*constraint.contact_sums(p, u, h, d))
+    between = _approaches(slab, constraint, p, u, h) if free_load <= 0.0 < load else None
+    return Iterate(d, load, gaps, 0.5 * work, squares, free_load, free_gaps, between)
+
+
+def _approaches(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array) -> tuple[float, float] | None:
+    """Return `Iterate.between` for pressures that are all at a bound; None if one of the bounds has no points;
+    collective. Gaps of points at the upper bound must be <= 0, all others >= 0."""
+    level, yields = u - h, p >= constraint.bounds[1]
+    lowest = float(level.max(where=yields, initial=-np.inf))
+    highest = float(level.min(where=~yields, initial=np.inf))
+    lowest, highest = slab.reduce((), [lowest, -highest])
+    return (lowest, -highest) if math.isfinite(lowest) and math.isfinite(highest) else None
+
+
+# tuning
+MAX_STALLED_ITERATIONS = 60  # limit on iterations without a smaller certificate
+MAX_STALLED_IN_SINGLE = 12  # the same with displacements in single precision; double precision is tried next
+MAX_HALVINGS = 12  # limit on halvings of a step that raises f; the last one is accepted
+STEP = 0.95  # fixed step at small contact areas; it tends to 1 in full contact
+MAX_STEP_RATIO = 1.25  # limit on exact step/step made and its inverse; beyond it all further steps are exact
+MAX_STEP_RATIO_FREE = 2.0  # the same in a free box and on layers, where K is less close to the inverse
+ITERATIONS_UNTIL_EXACT_STEPS = 5  # iterations without a smaller certificate after which steps are exact
+LEAST_DESCENT = 0.5  # least slope along t over that along z; below it the last direction is forgotten
+REACH = 4.0  # largest change of a pressure in one step, over the highest admissible pressure
+LARGE_CUT = 0.003  # share of the load; if more is cut off, the direction is forgotten
+# accuracy
+ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # share of <p, A p>/2 below which a rise of f is rounding
+LEAST_LOAD = float(np.finfo(np.float64).tiny)  # least mean pressure that maps can represent; less counts as none
+NOT_FINITE = "met numbers that are not finite"
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A contact, solved or given up. Maps have the shape (rows of this rank, nx).
+
+    `p` is the map that was given as the start. `u = A p` belongs to the solver and is valid until its next solve.
+    `failure` is empty, or states why the tolerance was not reached.
+    """
+
+    p: Array
+    u: Array
+    d: float
+    certificate: Certificate
+    iterations: int
+    failure: str
+
+    @property
+    def converged(self) -> bool:
+        return not self.failure
+
+
+class ContactSolver:
+    """Solver for contacts on one grid.
+
+    Parameters: `workspace`, the maps it works in; `height` of the surface, from its lowest to its highest point
+    [unit of h]; `tolerance` on the certificate; `max_iterations`; `grids` of larger cells for the extension of
+    residuals (`extension.grids_for`); `free`, True for a box with nothing around it; `long_waves` of a layer, for
+    which K is not stiff enough.
+    """
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        height: float,
+        tolerance: float,
+        max_iterations: int,
+        grids: Grids = ALL,
+        free: bool = False,
+        long_waves: LongWaves | None = None,
+    ) -> None:
+        self.workspace, self.slab = workspace, workspace.slab
+        self.height, self.tolerance, self.max_iterations = height, tolerance, max_iterations
+        extended = ExtendedPreconditioner(self.slab, larger=grids)
+        self._extended: ExtendedPreconditioner | LongWavePreconditioner = extended
+        self._rough_inverse = grids.most == 0 or min(self.slab.nx, self.slab.ny) == 1  # K E is far from the inverse
+        if long_waves is not None and not self._rough_inverse:
+            self._extended = LongWavePreconditioner(self.slab, long_waves, extended)
+        self._most_ratio = MAX_STEP_RATIO_FREE if free or long_waves is not None else MAX_STEP_RATIO
+        self._local_load = LocalLoad(self.slab)
+
+    def solve(self, problem: Problem, start: Array, tolerance: float | None = None) -> Contact:
+        """Solve from the admissible pressure `start`, which is overwritten by the solution; collective.
+
+        Under load control the start is scaled to the load, or replaced by a uniform pressure if it is 0 everywhere.
+        `tolerance` replaces the tolerance of the solver. If it is not reached, `failure` states why, and the maps
+        hold the last iterate.
+        """
+        mean = problem.mean
+        if mean is not None and 0.0 <= mean < LEAST_LOAD:
+            return self._separate(problem, start)
+        tolerance = self.tolerance if tolerance is None else tolerance
+        p, other = start, self.workspace.pressure
+        iterate = self._begin(problem, p)
+        best, slope, iteration = (np.inf, 0), 0.0, 0
+        exact = self._rough_inverse
+        while True:
+            members, excess, certificate = self._certify(problem, p, iterate)
+            best = min(best, (certificate.worst, iteration))
+            failure = self._verdict(certificate.worst, tolerance, iteration, *best)
+            if failure is not None:
+                if p is not start:
+                    start[...] = p
+                return Contact(start, self.workspace.displacement, iterate.d, certificate, iteration, failure)
+            level = iterate.d + (excess / members if mean is not None else 0.0)
+            slope, ratio = self._turn(problem, level, slope, members, other)
+            unlike = not 1.0 / self._most_ratio < ratio < self._most_ratio
+            exact |= unlike or iteration - best[1] > ITERATIONS_UNTIL_EXACT_STEPS
+            usual = None if exact else STEP + (1.0 - STEP) * (members / self.slab.points) ** 3
+            iterate, cut = self._descend(problem, p, iterate, usual, slope, other)
+            p, other = other, p
+            iteration += 1
+            exact |= cut == math.inf
+            if cut > LARGE_CUT:
+                slope = 0.0
+
+    def check(self, problem: Problem, p: Array, otherwise: str) -> Contact:
+        """Scale the admissible pressure p to the load and certify it. The contact has the failure `otherwise` unless p
+        solves the problem; collective."""
+        iterate = self._begin(problem, p)
+        *_, certificate = self._certify(problem, p, iterate)
+        failure = "" if certificate.worst <= self.tolerance else otherwise
+        return Contact(p, self.workspace.displacement, iterate.d, certificate, 0, failure)
+
+    # -- the steps of a solve ------------------------------------------------------------------------------------------
+
+    def _begin(self, problem: Problem, p: Array) -> Iterate:
+        """Scale the start to the load and forget the direction of the last solve."""
+        self.workspace.direction.fill(0.0)
+        if problem.mean is not None:
+            load = self.slab.sum(kernels.sum_of(p))[0]
+            if load > 0.0:
+                problem.constraint.rescale_to_load(self.slab, p, load, problem.mean * self.slab.points)
+            else:
+                p.fill(problem.mean)
+        problem.operator.apply(p, self.workspace.displacement)
+        return self._form_iterate(problem, p, 0.0 if problem.mean is not None else problem.control.value)
+
+    def _form_iterate(self, problem: Problem, p: Array, d: float) -> Iterate:
+        """Return the sums of a pressure, for the approach d or, under a load, the approach that it determines."""
+        iterate = form_iterate(self.slab, problem.constraint, p, self.workspace.displacement, problem.heights, d)
+        return iterate if problem.mean is None else iterate.settled()
+
+    def _certify(self, problem: Problem, p: Array, iterate: Iterate) -> tuple[float, float, Certificate]:
+        """Mark the working set. Return its size, its sum of gaps, and the certificate."""
+        u, working = self.workspace.displacement, self.workspace.working
+        constraint, h, mean = problem.constraint, problem.heights, problem.mean
+        return certify(self.slab, constraint, p, u, h, iterate, mean, self.height, working)
+
+    def _verdict(self, worst: float, tolerance: float, iteration: int, best: float, best_at: int) -> str | None:
+        """Return None to continue, an empty string if solved, else why the solve has failed."""
+        if worst <= tolerance:
+            return ""
+        if not np.isfinite(worst):
+            return NOT_FINITE
+        asked = f"{worst:.3g} where {tolerance:.3g} was asked for"
+        single = self.workspace.displacement.dtype == np.float32
+        most = MAX_STALLED_IN_SINGLE if single else MAX_STALLED_ITERATIONS
+        if iteration - best_at >= most:
+            return f"stalled: no residual below {best:.3g} in {most} iterations, now {asked}"
+        if iteration >= self.max_iterations:
+            return f"did not converge in max_iterations = {iteration}: the residual is {asked}"
+        return None
+
+    def _turn(self, problem: Problem, level: float, slope: float, members: float, free: Array) -> tuple[float, float]:
+        """Make the new search direction. Return its slope `<r, t>`, and the exact step over the last step made.
+
+        The residual is `u - h - level` on the working set. `slope` belongs to the last direction; 0 forgets it. The
+        map `free` is overwritten.
+        """
+        work, h = self.workspace, problem.heights
+        u, t, working = work.displacement, work.direction, work.working
+        z = reused(free, free.shape, t.dtype)
+        kernels.gap_residual(working, u, h, level, z)
+        self._extended.apply(problem.preconditioner, working, z)
+        sums = kernels.step_products(working, u, h, level, work.other_displacement, z, t)
+        sum_z, sum_t, sum_change, r_z, change_z, r_t = self.slab.sum(*sums)
+        centred = problem.mean is not None
+        mean_z, mean_t = (sum_z / members, sum_t / members) if centred else (0.0, 0.0)
+        beta, ratio, fallen = 0.0, 1.0, slope - r_t  # decrease of the slope along the last direction
+        if slope > 0.0:
+            ratio = slope / fallen if fallen > 0.0 else math.inf
+            beta = (max(0.0, change_z - mean_z * sum_change) + r_t) / fallen if fallen > 0.0 else 0.0
+        if r_z + beta * r_t <= LEAST_DESCENT * r_z:
+            beta = 0.0
+        kernels.turn(working, z, beta, mean_z + beta * mean_t, t)
+        return r_z + beta * r_t, ratio
+
+    def _descend(
+        self, problem: Problem, old_p: Array, old: Iterate, usual: float | None, slope: float, p: Array
+    ) -> tuple[Iterate, float]:
+        """Make a step of length `usual`, or the exact step if it is None, from `old_p` to p. The old displacement is
+        kept in the other displacement of the workspace.
+
+        Return the new iterate and the share of its load that was cut off at the bounds, infinite if the step was
+        halved.
+        """
+        work, constraint, mean = self.workspace, problem.constraint, problem.mean
+        step = usual if usual is not None else self._exact(problem, slope)
+        if constraint.bounds[1] < math.inf:
+            most, largest = REACH * constraint.bounds[1], self._largest(work.direction)
+            step = most / largest if step * largest > most else step
+        for halvings in range(MAX_HALVINGS + 1):
+            load, cut = self._local_load.advance(constraint, old_p, work.direction, step, p)
+            if mean is not None:
+                near_by = cut > LEAST_CUT * load and halvings == 0
+                self._local_load.restore(constraint, p, load, mean * self.slab.points, near_by)
+            problem.operator.apply(p, work.other_displacement)
+            work.swap_displacements()
+            new = form_iterate(self.slab, constraint, p, work.displacement, problem.heights, old.d)
+            if new.f - old.f <= ENERGY_ROUNDING * new.energy or halvings == MAX_HALVINGS:
+                break
+            work.swap_displacements()
+            step *= 0.5
+        return new if mean is None else new.settled(), cut / load if halvings == 0 and load > 0.0 else math.inf
+
+    def _largest(self, t: Array) -> float:
+        """Return the largest magnitude of a map; collective."""
+        return max(self.slab.reduce((), [float(t.max(initial=0.0)), -float(t.min(initial=0.0))]))
+
+    def _exact(self, problem: Problem, slope: float) -> float:
+        """Return the step that minimizes f along the direction, by one application of the operator."""
+        t, image = self.workspace.direction, self.workspace.other_displacement
+        curvature = self.slab.sum(loops.dot(t, problem.operator.apply(t, image)))[0]
+        return slope / curvature if curvature > 0.0 else 0.0
+
+    def _separate(self, problem: Problem, p: Array) -> Contact:
+        """Return the contact without load: no pressure, and a surface that just touches the body."""
+        p.fill(0.0)
+        self.workspace.displacement.fill(0.0)
+        highest = self.slab.reduce((), [float(problem.heights.max(initial=-np.inf))])[0]
+        failure = "" if np.isfinite(highest) else NOT_FINITE
+        return Contact(p, self.workspace.displacement, -highest, Certificate(0.0, 0.0, 0.0), 0, failure)

@@ -1,0 +1,346 @@
+"""Steady contact by accelerated splitting.
+
+Anderson acceleration of an iteration `s <- s + f(s)` for a map s.
+
+With the last changes ds_j of s and df_j of the residual f,
+
+    theta = argmin |f - sum_j theta_j df_j|,    s <- s + R f - sum_j theta_j (ds_j + R df_j),
+
+R the relaxation (D. G. Anderson, J. ACM 12 (1965) 547; H. F. Walker, P. Ni, SIAM J. Numer. Anal. 49 (2011) 1715).
+Without earlier changes this is the plain iteration, relaxed. Changes are stored in single precision: s is advanced by
+the change that is stored.
+
+Contact with a law of the interface, or with an operator that is not symmetric, by accelerated splitting.
+
+Find p >= 0 with given mean P0 or given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`solve.interface_law`). A is
+diagonal in Fourier space and c in real space, so that each is inverted exactly. With J_A(x) = (1 + gamma A)^-1 x
+shifted to the mean P0, or (1 + gamma A)^-1 (x + gamma d), with J_c the pressure of `interface_law.resolve`, and with a
+map s,
+
+    p = J_c(s),    y = J_A(2 p - s),    f = y - p,    s <- s + f
+
+(J. Douglas, H. H. Rachford, Trans. Amer. Math. Soc. 82 (1956) 421; P.-L. Lions, B. Mercier, SIAM J. Numer. Anal. 16
+(1979) 964). It converges for every gamma > 0 and every A with a real part >= 0, also for very large loss tangents, and
+is accelerated (`acceleration`). gamma is a multiple of pressure over displacement of the start, from which
+
+    s = p + gamma c(p) - gamma h where there is pressure,    s = -gamma (A p - d) elsewhere.
+
+Only the certificate of an admissible pressure with the displacement `A p + c(p)` ends a solve. As it takes an
+application of A, it is made when the rms of f is small enough, judged by the last certificate over the rms of f.
+
+Contact with an operator that is not symmetric: steady sliding in the frame of the rigid surface, in periodic boxes.
+
+Find p >= 0 with mean P0 and `g = A p - h - d >= 0`, `p g = 0`. For a lossy body sliding at constant velocity, A is
+positive but not symmetric, and there is no energy to minimize. Accelerated splitting (`splitting`) solves it. In light
+contact, and from a start that is 0, projected steps (`projected`) come first as long as they help: they take fewer
+applications of A there. Only the certificate of an admissible pressure ends a solve.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import loop
+from ..parallel.slab import Array, Slab, allocate
+from ..physics.convolution import Convolution
+from ..physics.measures import Certificate
+from . import kernels
+from .constraint import HARD, InterfaceLaw, begin_split, resolve
+from .problem import Control, MeanPressure, Operator
+from .projected import Judge, Projected, SteadyContact, describe_failure
+
+DEPTH = 5  # tuning: number of earlier changes
+RELAXATION = 1.5  # tuning: relaxation of the residual; below 2, so that the plain iteration converges, too
+TRACE_SHARE = 1e-8  # accuracy: share of the mean square of changes that is added to each, above their rounding
+
+
+class Acceleration:
+    """Acceleration on one grid. It holds the residual and, in single precision, DEPTH changes of s and of f."""
+
+    def __init__(self, slab: Slab) -> None:
+        self.slab, self.f = slab, slab.empty()
+        shape = DEPTH, *slab.shape
+        self._ds, self._df = (allocate(shape, np.float32, slab.tally) for _ in range(2))
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget all changes of s and f."""
+        self._gram = np.zeros((DEPTH, DEPTH))
+        self._count, self._last = 0, -1  # number of complete changes, and place of the last change of s
+        self._against = np.zeros(DEPTH)
+
+    def residual(self, y: Array, p: Array, shift: float) -> float:
+        """Put `y + shift - p` into the residual, and its change into the history. Return its rms; collective."""
+        if self._last < 0:
+            square = self.slab.sum(_first(y, p, shift, self.f))[0]
+            return math.sqrt(square / self.slab.points)
+        self._count = max(self._count, self._last + 1)
+        square, *sums = self.slab.sum(*_change(y, p, shift, self.f, self._df, self._last, self._count))
+        self._against[: self._count], row = sums[: self._count], sums[self._count :]
+        self._gram[self._last, : self._count] = self._gram[: self._count, self._last] = row
+        return math.sqrt(square / self.slab.points)
+
+    def advance(self, s: Array, plain: bool) -> None:
+        """Advance s, without earlier changes if `plain`."""
+        theta = np.zeros(DEPTH)
+        if self._count and not plain:
+            theta[: self._count] = self._smallest()
+        self._last = (self._last + 1) % DEPTH
+        _advance(s, self.f, self._ds, self._df, theta[: self._count], self._last)
+
+    def _smallest(self) -> Array:
+        """Return the theta that make the residual smallest."""
+        gram = self._gram[: self._count, : self._count]
+        most = TRACE_SHARE * np.trace(gram) / self._count
+        if not most > 0.0:
+            return np.zeros(self._count)
+        return np.linalg.solve(gram + most * np.eye(self._count), self._against[: self._count])
+
+
+@loop
+def _first(y, p, shift, f):
+    """Put `y + shift - p` into f. Return its sum of squares."""
+    total = 0.0
+    for j in range(f.shape[0]):
+        row = 0.0
+        for i in range(f.shape[1]):
+            f[j, i] = y[j, i] + shift - p[j, i]
+            row += f[j, i] * f[j, i]
+        total += row
+    return total
+
+
+@loop
+def _change(y, p, shift, f, df, last, count):
+    """Put `y + shift - p` into f and its change into df[last]. Return the sum of f^2, the products of f with `count`
+    changes, and those of the last change with them."""
+    total, sums = 0.0, np.zeros(1 + 2 * count)
+    for j in range(f.shape[0]):
+        row = 0.0
+        for i in range(f.shape[1]):
+            new = y[j, i] + shift - p[j, i]
+            df[last, j, i] = new - f[j, i]
+            f[j, i] = new
+            row += new * new
+        total += row
+        for k in range(count):
+            with_f, with_last = 0.0, 0.0
+            for i in range(f.shape[1]):
+                here = np.float64(df[k, j, i])
+                with_f += here * f[j, i]
+                with_last += here * df[last, j, i]
+            sums[1 + k] += with_f
+            sums[1 + count + k] += with_last
+    sums[0] = total
+    return sums
+
+
+@loop
+def _advance(s, f, ds, df, theta, last):
+    """Add `R f - sum theta (ds + R df)` to s, and put it into ds[last]."""
+    line = np.empty(s.shape[1])
+    for j in range(s.shape[0]):
+        for i in range(s.shape[1]):
+            line[i] = RELAXATION * f[j, i]
+        for k in range(theta.size):
+            for i in range(s.shape[1]):
+                line[i] -= theta[k] * (ds[k, j, i] + RELAXATION * df[k, j, i])
+        for i in range(s.shape[1]):
+            ds[last, j, i] = line[i]
+            s[j, i] += ds[last, j, i]
+
+
+GAMMA = 4.0  # tuning: gamma over the ratio of the spreads of pressure and displacement of the start
+MAX_LEVELS = 20  # accuracy: limit on steps to the level of a start with the load; about five are usual
+LEVEL_EXCESS = 1.1  # tuning: load of that start over the given one at which the level is left
+SLOW, FALL, LARGER = 500, 0.3, 16.0  # tuning: steps in which the rms of f must fall by a factor, or gamma is raised
+WORSE = 2.0  # tuning: rms of f over the least one, above which earlier changes are forgotten
+STALLED = 25  # tuning: limit on steps without a smaller rms of f
+PLAIN, PLAIN_AFTER_STALL = 3, 25  # tuning: steps without acceleration that follow
+
+
+class Splitting:
+    """Solver on one grid.
+
+    `operator` is A, not that of a free box, whose padded symbol has waves with a negative real part; `inverse` K is
+    near its inverse; `tolerance` on the certificate; `most` limits the steps. Laws and pressures are in the units of A.
+    It holds two maps, a byte per point, the maps of `Acceleration` and, during a solve, a symbol.
+    """
+
+    def __init__(self, judge: Judge, operator: Convolution, inverse: Operator, tolerance: float, most: int) -> None:
+        self.judge, self.operator, self.inverse = judge, operator, inverse
+        self.tolerance, self.most, self.slab = tolerance, most, judge.slab
+        self._s, self._y = self.slab.empty(), self.slab.empty()
+        self._working: NDArray[Any] = self.slab.zeros(np.bool_)
+        self._acceleration = Acceleration(self.slab)
+
+    def resolvent(self, gamma: float) -> Convolution:
+        """Return `(1 + gamma A)^-1`."""
+        return self.operator.mapped(lambda symbol: 1.0 / (1.0 + gamma * symbol), self.operator.dtype)
+
+    def solve(
+        self, h: Array, control: Control, law: InterfaceLaw, start: Array, tolerance: float | None = None
+    ) -> SteadyContact:
+        """Solve for heights h from the pressure `start`, which is overwritten by the solution; collective. `tolerance`
+        replaces the tolerance of the solver.
+
+        A start that is 0 everywhere is replaced by the pressure of full contact, lowered to the load. A prescribed mean
+        pressure must be positive. The displacement `u = A p` of the contact is without the closing.
+        """
+        given, p, steps = _Given(h, control, law, tolerance or self.tolerance), start, 0
+        self._begin(given, p)
+        d, certificate = self._certify(given, p)
+        gamma = self._gamma(p)
+        while certificate.worst > given.tolerance and steps < self.most:
+            begin_split(p, law.closing(p), self._y, h, d, gamma, self._s)
+            made, d, certificate = self._iterate(given, p, gamma, d, certificate, self.most - steps)
+            steps, gamma = steps + made, LARGER * gamma
+        failure = describe_failure(f"has not converged in {steps} steps", certificate, given.tolerance)
+        return SteadyContact(p, self._y, d, certificate, steps, failure)
+
+    def _iterate(
+        self, given: "_Given", p: Array, gamma: float, d: float, certificate: Certificate, most: int
+    ) -> tuple[int, float, Certificate]:
+        """Make up to `most` steps, fewer if they are slow. Return their number, and the approach and the certificate of
+        the pressure, which are `d` and `certificate` before."""
+        y, accelerated, guard, law = self._y, self._acceleration, _Guard(), given.law
+        inverse, sums = self.resolvent(gamma), law.pressures + gamma * law.closings
+        uniform, step, ratio, last = inverse.mean(), 0, 0.0, math.inf
+        accelerated.forget()
+        while certificate.worst > given.tolerance and step < most:
+            step += 1
+            (total,) = self.slab.sum(resolve(self._s, given.h, gamma, law.pressures, sums, p, y))
+            inverse.apply(y, y)
+            rms = accelerated.residual(y, p, given.shift(uniform * gamma, uniform * total / self.slab.points))
+            ratio = ratio or certificate.worst / (rms or math.inf)
+            slow = not rms < last if step % SLOW == 0 else not math.isfinite(rms)
+            if (rms * ratio <= given.tolerance or slow or step == most) and self._loads(given, p):
+                d, certificate = self._certify(given, p)
+                ratio = certificate.worst / (rms or math.inf)
+            if slow:
+                break
+            last = FALL * rms if step % SLOW == 0 else last
+            if guard.distrusts(rms):
+                accelerated.forget()
+            accelerated.advance(self._s, guard.plain > 0)
+        return step, d, certificate
+
+    def _begin(self, given: "_Given", p: Array) -> None:
+        """Replace a start that is 0 everywhere, and scale the start to a given mean."""
+        slab, mean = self.slab, given.mean or 0.0
+        (load,) = slab.sum(kernels.sum_of(p))
+        if not load > 0.0:
+            self.inverse.apply(given.h, p)
+            level = slab.sum(kernels.sum_of(p))[0] / slab.points - mean
+            for _ in range(MAX_LEVELS):
+                load, members = slab.sum(float(np.maximum(p - level, 0.0).sum()), float(np.count_nonzero(p > level)))
+                if not mean or load <= LEVEL_EXCESS * mean * slab.points:
+                    break
+                level += (load - mean * slab.points) / (members or math.nan)
+            np.maximum(p - level, 0.0, out=p)
+            (load,) = slab.sum(kernels.sum_of(p))
+        if mean:
+            p *= mean * slab.points / (load or math.nan)
+
+    def _gamma(self, p: Array) -> float:
+        """Return gamma for a start p with the displacement in y; 1 if one of them is uniform, where any gamma does."""
+        maps = p, self._y
+        sums = self.slab.sum(*(float(each.sum()) for each in maps), *(float(np.vdot(each, each)) for each in maps))
+        p_square, u_square = (sums[2 + k] - sums[k] ** 2 / self.slab.points for k in (0, 1))
+        return GAMMA * math.sqrt(p_square / u_square) if p_square > 0.0 and u_square > 0.0 else 1.0
+
+    def _loads(self, given: "_Given", p: Array) -> bool:
+        """Scale a pressure to a given mean, or return False if it has no load; collective."""
+        (load,) = self.slab.sum(kernels.sum_of(p))
+        if given.mean is not None and load > 0.0:
+            p *= given.mean * self.slab.points / load
+        return load > 0.0 or given.mean is None
+
+    def _certify(self, given: "_Given", p: Array) -> tuple[float, Certificate]:
+        """Return the approach and the certificate of an admissible pressure, and put its displacement into y."""
+        self.operator.apply(p, self._y)
+        whole = self._y if given.law is HARD else self._y + given.law.closing(p)
+        return self.judge.certify(p, whole, given.h, given.control, self._working)
+
+
+class _Given(NamedTuple):
+    """Input of a solve."""
+
+    h: Array
+    control: Control
+    law: InterfaceLaw
+    tolerance: float
+
+    @property
+    def mean(self) -> float | None:
+        """The prescribed mean pressure; None with a given approach."""
+        return self.control.value if isinstance(self.control, MeanPressure) else None
+
+    def shift(self, by_approach: float, mean: float) -> float:
+        """Return what is added to `(1 + gamma A)^-1 (2 p - s)`, which has this `mean`, to make J_A; `by_approach` is
+        the result for `gamma d` with d = 1."""
+        return by_approach * self.control.value if self.mean is None else self.mean - mean
+
+
+class _Guard:
+    """Watches the rms of f. `plain` is the number of further steps without acceleration."""
+
+    def __init__(self) -> None:
+        self._least, self._since, self.plain = math.inf, 0, 0
+
+    def distrusts(self, rms: float) -> bool:
+        """Return whether earlier changes are to be forgotten: the rms has risen, or no longer falls."""
+        self.plain -= 1
+        self._since = 0 if rms < self._least else self._since + 1
+        stalls = self._since > STALLED
+        if rms <= WORSE * self._least and not stalls:
+            self._least = min(self._least, rms)
+            return False
+        self.plain = PLAIN_AFTER_STALL if stalls else PLAIN
+        self._least, self._since = rms, 0
+        return True
+
+
+LIGHT = 0.05  # tuning: share of the points with pressure in the start, below which projected steps come first
+PATIENCE = 5  # tuning: limit on projected steps in which the certificate must halve
+
+
+class SteadySolver:
+    """Solver on one grid. It holds the maps of `Projected` while it makes projected steps, and those of `Splitting`
+    afterwards.
+
+    Parameters: `operator` A; `preconditioner` K near its inverse; `tolerance` on the certificate; `most`, a limit on
+    steps of the splitting; `pairs` of doublings that make cells square (`extension.pairs_for`).
+    """
+
+    def __init__(
+        self,
+        judge: Judge,
+        operator: Convolution,
+        preconditioner: Convolution,
+        tolerance: float,
+        most: int,
+        pairs: int = 0,
+    ) -> None:
+        self.judge, self.operator, self.preconditioner = judge, operator, preconditioner
+        self.tolerance, self.most, self.pairs = tolerance, most, pairs
+
+    def hold_all(self) -> tuple[Splitting, Convolution]:
+        """Allocate all maps that a solve may need: projected steps need fewer."""
+        splitting = Splitting(self.judge, self.operator, self.preconditioner, self.tolerance, self.most)
+        return splitting, splitting.resolvent(1.0)
+
+    def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
+        """Solve for heights h under the mean pressure `mean`; collective. The solution overwrites the pressure
+        `start`, which may be 0 everywhere."""
+        (touching,) = self.judge.slab.sum(float((start > 0.0).sum()))
+        if touching < LIGHT * self.judge.slab.points:
+            projected = Projected(self.judge, self.operator, self.preconditioner, self.pairs)
+            contact = projected.solve(h, mean, start, self.tolerance, PATIENCE)
+            if contact.converged:
+                return contact
+            del projected, contact  # frees their maps before others are made
+        splitting = Splitting(self.judge, self.operator, self.preconditioner, self.tolerance, self.most)
+        return splitting.solve(h, MeanPressure(mean), HARD, start)

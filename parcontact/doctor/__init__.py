@@ -1,1 +1,0 @@
-"""Checks of an installation: exact solutions, ranks, files, and times."""

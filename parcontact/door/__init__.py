@@ -1,0 +1,1 @@
+"""What users call: verbs of the command line, the Python interface, and the manual."""

@@ -1,0 +1,250 @@
+"""The manual in a terminal.
+
+Pages of the manual as text, with the parts that the program writes into them.
+
+A line `% written here: NAME` in a page is replaced by text that the program makes, so that it is always up to date: the
+keys of a job (`reference.keys`), the columns of tables (`columns.TABLES`), and texts of the caller, such as the options
+of the verbs.
+
+Text of the manual's page on Python, from the docstrings of functions and classes, to be read in a terminal.
+
+The web site has it from Sphinx, by the same directives: `.. autoclass:: NAME`, `:members:`, `.. autofunction:: NAME`.
+
+Reference of every key of a job: generated from the types, each with its meaning and an example.
+
+Text of the manual for a terminal: paragraphs, lists and tables within its width, code as it is.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import pydoc
+import re
+import textwrap
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import is_dataclass
+from functools import cache, partial
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ...columns import TABLES, describe_columns
+from ...errors import InputError
+from ...job import schema
+from ...job.parts import kind_key
+from ...job.schema import Key, SectionSchema
+
+ROOM = 64  # letters for the first sentence of a docstring in the list of names
+BLOCK = re.compile(r"^```\{eval-rst\}\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+DIRECTIVE = re.compile(r"^\.\. auto(?:class|function):: (\S+)\n(?:   :members:(.*)\n)?", re.MULTILINE)
+
+
+def written(page: str) -> str:
+    """A page with headings and docstrings for its blocks of directives."""
+    return BLOCK.sub(lambda block: "\n\n".join(_entries(block.group(1))), page)
+
+
+def _entries(block: str) -> Iterator[str]:
+    named = DIRECTIVE.findall(block)
+    width = max(len(_short(name)) for name, _ in named)
+    yield "```text\n" + "\n".join(f"{_short(name):{width}}  {_first_sentence(name)}" for name, _ in named) + "\n```"
+    for name, members in named:
+        found: Any = pydoc.locate(name)
+        yield f"## {_short(name)}{_parameters(found)}\n\n{inspect.getdoc(found)}"
+        named = [member.strip() for member in members.split(",") if member.strip()]
+        all_of = members == "" and f"{name}\n   :members:" in block
+        for member in named or (_public(found) if all_of else ()):
+            value = inspect.getattr_static(found, member)
+            yield f"### {member}{_parameters(getattr(value, '__func__', value))}\n\n{inspect.getdoc(value)}"
+
+
+def _short(name: str) -> str:
+    """Return a name as a program writes it: `pc.steady`."""
+    return name.replace("parcontact.", "pc.", 1)
+
+
+def _first_sentence(name: str) -> str:
+    """Return the beginning of a docstring, as far as a line of a terminal has room for it."""
+    text = re.split(r"(?<=[.:;]) ", " ".join((inspect.getdoc(pydoc.locate(name)) or "").split()))[0]
+    return textwrap.shorten(text.rstrip(".:;"), ROOM, placeholder=" ...")
+
+
+def _public(kind: type) -> list[str]:
+    return [name for name, value in vars(kind).items() if not name.startswith("_") and inspect.getdoc(value)]
+
+
+def _parameters(found: Any) -> str:
+    """Return parameters as in a call: `(job, set=None)`; '' of attributes, results and errors, which nobody calls."""
+    if not callable(found) or is_dataclass(found) or (isinstance(found, type) and issubclass(found, Exception)):
+        return ""
+    signature = inspect.signature(found)
+    plain = [
+        parameter.replace(annotation=parameter.empty)
+        for name, parameter in signature.parameters.items()
+        if name not in ("self", "cls")
+    ]
+    return str(signature.replace(parameters=plain, return_annotation=signature.empty))
+
+
+MEANINGS = Path(__file__).parent / "keys.yaml"
+
+
+@cache
+def meanings() -> dict[str, dict[str, Any]]:
+    """Return `[meaning, example]` by the names of the parts, then of their keys."""
+    found: dict[str, dict[str, Any]] = yaml.safe_load(MEANINGS.read_text(encoding="utf-8"))
+    return found
+
+
+def keys() -> str:
+    """All sections of a job and their keys, as Markdown."""
+    return "\n".join(line for section in schema.sections() for line in _section(section))
+
+
+def heading(section: SectionSchema) -> str:
+    """Return the name of a section: its place in a job, and its kind where there are several."""
+    kind = kind_key(section.part)
+    named = f"{kind}: {section.part.model_fields[kind].default}" if kind else ""
+    more = section.part.label.removeprefix(named.replace(":", "")).strip()
+    detail = f" {more}" if named and more else f": {more}" if more not in ("", section.place) else ""
+    place = f"`{section.place}`, `{named}`" if named else f"`{section.place}`"
+    return f"{place}{detail}" if section.place else "The sections of a job"
+
+
+def _section(section: SectionSchema) -> Iterator[str]:
+    yield f"\n## {heading(section)}\n"
+    yield f"{' '.join((section.part.__doc__ or '').split())}\n"
+    for word in section.part.one_of:
+        yield f"Exactly one of {_words(word)} is given.\n"
+    for word in section.part.at_most_one:
+        yield f"At most one of {_words(word)} is given.\n"
+    known = meanings().get(section.part.__name__, {})
+    for key in section.keys:
+        yield from _key(key, *known.get(key.word, ("", "")))
+
+
+def _key(key: Key, meaning: str, example: str) -> Iterator[str]:
+    facts = [f"must be {key.must_be}"]
+    facts += [f"range: {key.within}"] if key.within else []
+    facts += [f"unit: {key.unit}"] if key.unit not in ("", "-") else []
+    facts.append("required" if key.required else f"default: `{key.default}`" if key.default else "optional")
+    yield f"`{key.word}`\n: {meaning} *{_capital('; '.join(facts))}.*"
+    yield f"  Example: `{key.word}: {example}`\n" if example != "" else ""
+
+
+def _words(words: tuple[str, ...]) -> str:
+    return ", ".join(f"`{word}`" for word in words)
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+CODE = re.compile(r"^(```.*?^```$|\$\$.*?\$\$[ ,.]*$)", re.MULTILINE | re.DOTALL)
+ITEM = re.compile(r"^(\s*(?:\* |: |\d+\. )?)")  # what the first line of a paragraph begins with
+BEGINS = re.compile(r"^\s*(?:\* |: |\d+\. |#|!\[)|^  Example: |^`[^`]+`$")  # lines that go on no paragraph
+RULE = re.compile(r"^[|\s:-]+$")  # below the head of a table
+
+
+def wrapped(text: str, width: int) -> str:
+    """Return Markdown with lines of at most `width` letters; code, equations and longer words stay as they are."""
+    parts = CODE.split(text)
+    return "".join(part if number % 2 else "\n".join(_lines(part, width)) for number, part in enumerate(parts))
+
+
+def _lines(text: str, width: int) -> Iterator[str]:
+    for is_table, group in groupby(text.split("\n"), lambda line: line.startswith("|")):
+        lines = list(group)
+        yield from _table(lines, width) if is_table else _prose(lines, width)
+
+
+def _prose(lines: list[str], width: int) -> Iterator[str]:
+    paragraph: list[str] = []
+    for line in lines:
+        if paragraph and (not line.strip() or BEGINS.match(line)):
+            yield from _paragraph(paragraph, width)
+            paragraph = []
+        if line.strip():
+            paragraph.append(line)
+        else:
+            yield ""
+    yield from _paragraph(paragraph, width)
+
+
+def _paragraph(lines: list[str], width: int) -> list[str]:
+    text = " ".join([*lines[:1], *map(str.strip, lines[1:])])
+    if text.startswith(("#", "![")):
+        return [text]
+    found = ITEM.match(text)
+    return _fill(text, width, "", " " * len(found[1]) if found else "")
+
+
+def _table(lines: list[str], width: int) -> Iterator[str]:
+    """Yield a table as it is where it fits, else its rows as paragraphs: the first cell, then the others."""
+    if max(map(len, lines)) <= width:
+        yield from lines
+        return
+    for line in lines:
+        if not RULE.match(line):
+            first, *others = (cell.strip() for cell in line.strip("|").split("|"))
+            yield from _fill(first, width, "", "")
+            yield from _fill("; ".join(filter(None, others)), width, "    ", "    ")
+
+
+def _fill(text: str, width: int, first: str, hanging: str) -> list[str]:
+    return textwrap.wrap(
+        text, width, initial_indent=first, subsequent_indent=hanging, break_long_words=False, break_on_hyphens=False
+    )
+
+
+PAGES = Path(__file__).parent / "pages"
+MARK = re.compile(r"^% written here: (\w+)$", re.MULTILINE)
+FENCE = re.compile(r"^:::.*\n", re.MULTILINE)
+Writers = Mapping[str, Callable[[], str]]
+OURS: Writers = {"keys": keys, **{Path(file).stem: partial(describe_columns, table) for file, table in TABLES.items()}}
+
+
+def page_names() -> list[str]:
+    """Return the names of the pages, in the order of the table of contents."""
+    listed = re.findall(r"^([a-z_]+)$", (PAGES / "index.md").read_text(encoding="utf-8"), re.MULTILINE)
+    return ["index", *listed]
+
+
+def page_title(name: str) -> str:
+    """Return the heading of a page."""
+    found = re.search(r"^# (.+)$", (PAGES / f"{name}.md").read_text(encoding="utf-8"), re.MULTILINE)
+    return found.group(1) if found else name
+
+
+def page(name: str, writers: Writers | None = None) -> str:
+    """Return a page in full, as MyST Markdown. Raises InputError for a name that no page has."""
+    if name not in page_names():
+        close = difflib.get_close_matches(name, page_names(), n=1)
+        hint = f"; did you mean {close[0]}?" if close else f"; there are {', '.join(page_names())}"
+        raise InputError(f"the manual has no page {name!r}{hint}")
+    known = {**OURS, **(writers or {})}
+    text = (PAGES / f"{name}.md").read_text(encoding="utf-8")
+    return MARK.sub(lambda found: known[found.group(1)](), text)
+
+
+def plain_page(name: str, writers: Writers | None = None, width: int = 80) -> str:
+    """Return a page for a terminal `width` letters wide, without the marks of the web site."""
+    text = FENCE.sub("", written(page(name, writers)))
+    text = re.sub(r"\{(?:doc|download)\}`(?:([^<`]+) <([^>`]+)>|([^`]+))`", _reference, text)
+    text = re.sub(r"^\(.+\)=\n", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^```\{(\w+)\}", r"```\1", text, flags=re.MULTILINE)
+    return re.sub(r"\n{3,}", "\n\n", wrapped(text, width))
+
+
+def _reference(found: re.Match[str]) -> str:
+    words, target, alone = found.groups()
+    return f"{words} (parcontact manual {target})" if target else f"`parcontact manual {alone}`"
+
+
+def contents() -> str:
+    width = max(map(len, page_names()))
+    lines = [f"  {name:<{width}}  {page_title(name)}" for name in page_names()]
+    return "\n".join(["parcontact manual PAGE prints a page:", "", *lines])

@@ -1,0 +1,463 @@
+"""Memory and costs of a job, for its plan.
+
+Exact memory of a rank in maps, and size of a checkpoint [bytes], from the job.
+
+The constructors of a run are called on a slab that counts memory without allocating it (`parallel.slab.Slab.planned`).
+
+Trials of jobs: some steps are made in memory, and the others are assumed to cost the same.
+
+Each stage has an equal share of the time. When it is used up, one long step leads to the end of the stage. The first
+steps of a stage, where the load may jump, are not used for the others. If a job is too large to reach its steps in half
+of the time, its steps are counted and timed on a quarter of the points along each side, and the price of transforms on
+its own grid is known from what it did. Times are those of the processor, so that other programs disturb them little.
+"""
+
+import math
+import re
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from ..contact.starts import BLOCKS, LARGEST_SHARE, SHARE, WORTHWHILE
+from ..contact.starts import LEAST as STARTS_LEAST
+from ..effects.effect import EXTRAPOLATION
+from ..errors import InputError, RunError
+from ..files import wisdom
+from ..job import Job
+from ..job.history import Timeline
+from ..job.listing import plain_data
+from ..job.meaning import machines
+from ..march import scene, steady
+from ..march.choices import choices
+from ..march.controller import tolerance_before
+from ..march.curve import request
+from ..march.loop import March
+from ..march.rigid_surface import highest_waves
+from ..march.scene import Scene, build_on, outline, solver_on_tiles
+from ..march.state import parts_of
+from ..march.steady import SteadySliding
+from ..parallel.slab import Slab
+from ..parallel.tally import Tally
+from ..physics.convolution import SIDE, Convolution, MirroredConvolution, Tiles
+from ..physics.loops import shape_of
+
+FREE_SHARE = 0.7  # tuning: share of the free memory that jobs may take
+MEMINFO = Path("/proc/meminfo")
+MOST_POINTS = 2**20  # tuning: largest number of points of a case that runs on one rank of a sweep
+SPARE = 2.0  # tuning: memory of the first contact or steady state on nested grids, over the memory of steps
+NESTED = 2.5  # accuracy: largest number of maps of a first solve on coarser grids, in addition to maps of steps
+SPECTRUM = "surface spectrum"
+
+
+# names of parts of a run in a plan
+NAMES = {"contact": "pressures", "material": "body", "energy": "memory of energies", "law": "gaps"}
+
+
+def holdings(job: Job, ranks: int = 1, rank: int | None = None) -> dict[str, int]:
+    """Return the memory of a rank in maps and transform buffers [bytes], by purpose.
+
+    The default rank is the last one, which has the most, except for the spectrum of the surface, for which the largest
+    memory of all ranks is returned.
+    """
+    slab = _slab(job, ranks, rank)
+    scene = build_on(outline(job, slab))
+    _memories = scene, _completed(scene)
+    found = slab.tally.by_purpose
+    for name, effect in choices(job).effects.items():
+        if name not in scene.effects:
+            found[name] = sum(np.dtype(dtype).itemsize for dtype in effect.maps(job)) * math.prod(slab.shape)
+    if rank is None and choices(job).spectrum.on:
+        found[SPECTRUM] = _most_waves(job, ranks)
+    return found
+
+
+def total_bytes(job: Job, ranks: int = 1, rank: int | None = None) -> int:
+    return sum(holdings(job, ranks, rank).values())
+
+
+def steady_start(job: Job, ranks: int = 1, rank: int | None = None) -> int:
+    """Return the largest memory of a rank in maps [bytes] during the initial steady state, before `holdings` exist; 0
+    for a run without it. The table of the wake of a free box may briefly take more."""
+    if not choices(job).steady_start.on:
+        return 0
+    return steady_bytes(job, ranks, rank)
+
+
+def steady_bytes(job: Job, ranks: int = 1, rank: int | None = None) -> int:
+    """Return the largest memory of a rank in maps [bytes] during the initial steady state, or those of a curve."""
+    slab = _slab(job, ranks, rank)
+    first = choices(job).steady_start.on
+    most = tolerance_before(job, 0, choices(job).viscoelasticity.on) if first else math.inf
+    sliding, wanted = SteadySliding(outline(job, slab), most), None if first else request(job)
+    held = sliding.hold(wanted.velocity(wanted.velocities[0]) if wanted else job.initial.velocity)
+    bytes_held = slab.tally["map bytes"]
+    del held
+    return bytes_held
+
+
+def most_bytes(job: Job, ranks: int) -> int:
+    """Return the largest memory of rank 0 in maps [bytes]: in steps with a first solve on coarser grids and saved
+    fields, or in the steady state from which a run starts."""
+    (nx, ny), one_map = job.grid.points, 8 * job.grid.nx * job.grid.ny / ranks
+    if not job.history:
+        return steady_bytes(job, ranks)
+    steps = total_bytes(job, ranks) + len(job.output.fields) * one_map + NESTED * one_map * (nx * ny >= WORTHWHILE)
+    return int(max(steps, steady_start(job, ranks))) + on_tiles(job)
+
+
+def on_tiles(job: Job) -> int:
+    """Return the largest additional memory of rank 0 [bytes] while a dilute first contact is solved on tiles; 0 for a
+    run without tiles."""
+    chosen, (nx, ny) = choices(job), job.grid.points
+    cold = bool(job.history) and not chosen.steady_start.on and not chosen.forbidden(EXTRAPOLATION)
+    large = nx * ny >= WORTHWHILE and max(nx, ny) > BLOCKS
+    if not (cold and large):
+        return 0
+    setup = outline(job, Slab.planned(nx, ny, 1, 0))
+    make = solver_on_tiles(setup)
+    if make is None:
+        return 0
+    count = int(LARGEST_SHARE * nx * ny / SIDE**2)
+    places, before = np.zeros(count, np.intp), setup.slab.tally["map bytes"]
+    made = make(Tiles((nx, ny), places, places), max(SHARE * job.numerics.tolerance, STARTS_LEAST))
+    held = setup.slab.tally["map bytes"] - before
+    del made
+    return held + 2 * 8 * SIDE**2 * count  # the heights and the start
+
+
+def saved(job: Job) -> int:
+    """Return the size of the maps in a checkpoint [bytes], with a checksum of 4 bytes per row. Effects declare their
+    own maps, some of which exist in checkpoints only."""
+    (nx, ny), scene = job.grid.points, build_on(outline(job, _slab(job, 1, 0)))
+    memories = _completed(scene)
+    parts = {name: part for name, part in parts_of(scene).items() if name not in scene.effects}
+    entries = [entry for name, part in parts.items() for entry in part.entries(memories[name], scene.units).values()]
+    itemsizes = [np.asarray(entry.value).itemsize for entry in entries if entry.is_map]
+    for effect in choices(job).effects.values():
+        itemsizes += [np.dtype(dtype).itemsize for dtype in effect.maps(job)]
+    return sum(nx * ny * itemsize + 4 * ny for itemsize in itemsizes)
+
+
+def _slab(job: Job, ranks: int, rank: int | None) -> Slab:
+    """Return the counting slab of a rank, by default of the last one."""
+    return Slab.planned(*job.grid.points, ranks, ranks - 1 if rank is None else rank)
+
+
+def _completed(scene: Scene) -> dict[str, Any]:
+    """Return the states of all parts at rest, after the allocations of the first step."""
+    scene.slab.tally.purpose = "operators"
+    for operator in scene.operators if scene.law is None else scene.operators[:1]:  # laws of effects use one operator
+        assert isinstance(operator, Convolution | MirroredConvolution)
+        _ = operator.symbols
+    memories = {}
+    for name, part in parts_of(scene).items():
+        scene.slab.tally.purpose = NAMES.get(name, name)
+        memories[name] = part.at_rest()
+    return memories
+
+
+def _most_waves(job: Job, ranks: int) -> int:
+    """Return the largest memory of a rank for the spectrum of the surface [bytes]."""
+    count = job.grid.nx // 2 + 1
+    rows, columns = shape_of(highest_waves(job), job.grid.points, slice(0, -(-count // min(ranks, count))))
+    return rows * columns * np.dtype(np.complex128).itemsize
+
+
+def free_bytes() -> int:
+    """Return the free memory [bytes], `sys.maxsize` if unknown."""
+    try:
+        facts = dict(line.split(":") for line in MEMINFO.read_text().splitlines())
+        return int(facts["MemAvailable"].split()[0]) << 10
+    except (OSError, KeyError, ValueError):
+        return sys.maxsize
+
+
+def count_side_by_side(jobs: Sequence[Job], ranks: int) -> int:
+    """Return the number of cases to run at the same time: one per rank if small and within memory, else 1."""
+    at_once = min(ranks, len(jobs))
+    if at_once < 2:
+        return 1
+    largest = max(jobs, key=lambda job: job.grid.nx * job.grid.ny)
+    if largest.grid.nx * largest.grid.ny > MOST_POINTS:
+        return 1
+    here = -(-at_once // machines())
+    held = here * SPARE * total_bytes(largest, max(1, ranks // at_once))
+    return at_once if held <= FREE_SHARE * free_bytes() else 1
+
+
+FIRST = 2  # tuning: first steps of a stage that are not used for the cost of others
+FEWEST = 8  # tuning: least steps of a stage before a long one ends it
+FEW, FLAT = 16, 1e-3  # tiny scene: most points along a side; amplitude of its wave over the side
+COARSER, LEAST = 4, 32  # ratio of the points along a side in successive trials, and their least number
+
+
+class OutOfTimeError(Exception):
+    """The time of a trial is over."""
+
+
+class TimedSlab(Slab):
+    """A slab whose sums over ranks raise OutOfTimeError once, on all ranks, after one of them has reached the instant
+    `end` of its `process_time`.
+
+    It remembers the time of the processor and the counts before the first solve.
+    """
+
+    end = math.inf
+    begun: tuple[float, Tally] | None = None
+
+    def reduce(self, sums: Sequence[float], maxima: Sequence[float]) -> list[float]:
+        if self.begun is None and self.tally["operator"]:
+            self.begun = time.process_time(), self.tally.copy()
+        *found, late = super().reduce(sums, [*maxima, float(time.process_time() > self.end)])
+        if late:
+            self.end = math.inf
+            raise OutOfTimeError
+        return found
+
+    @property
+    def price(self) -> float:
+        """Return the time of a transform since the first solve over its N log N [s]; 0 if there was none."""
+        if self.begun is None:
+            return 0.0
+        before, tally = self.begun
+        work = 0.0
+        for name, count in self.tally.since(tally).items():
+            if match := re.match(r"fft (\d+)x(\d+) ", name):
+                work += count * _work(int(match[1]), int(match[2]))
+        return (time.process_time() - before) / work if work else 0.0
+
+
+def _work(nx: int, ny: int) -> float:
+    return nx * ny * math.log(nx * ny + 1)
+
+
+@dataclass
+class StageCost:
+    """Cost of a stage: numbers of steps and of tried steps, and sums over the FIRST tried steps and over later ones."""
+
+    steps: int
+    tried: int = 0
+    first: dict[str, float] = field(default_factory=dict)
+    later: dict[str, float] = field(default_factory=dict)
+
+    def add(self, cost: dict[str, float]) -> None:
+        sums = self.first if self.tried < FIRST else self.later
+        self.tried += 1
+        for name, value in cost.items():
+            sums[name] = sums.get(name, 0.0) + value
+
+    def total(self, name: str) -> float:
+        """Return the sum over all steps; 0 if none was tried."""
+        first, later = min(self.tried, FIRST), max(self.tried - FIRST, 0)
+        sums = self.later if later else self.first
+        each = sums.get(name, 0.0) / max(later or first, 1)
+        return self.first.get(name, 0.0) + (self.steps - first) * each
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Costs of a `job` by a trial on `ranks` ranks: those of its stages, or of its steady states as one stage.
+
+    `points` are those of the grid that was tried, `building` is the time in which its scene was set up [s], and `price`
+    the time of its transforms over their N log N, in the end relative to that on the grid of the job.
+    """
+
+    job: Job
+    ranks: int
+    points: tuple[int, int]
+    building: float
+    stages: tuple[StageCost, ...]
+    price: float = 1.0
+
+    @property
+    def steps(self) -> int:
+        return sum(stage.steps for stage in self.stages)
+
+    @property
+    def tried(self) -> int:
+        return sum(stage.tried for stage in self.stages)
+
+    def total(self, name: str) -> float:
+        """Return the sum of `seconds`, or of a count in the tally, over all steps; untried stages cost the mean."""
+        tried = [stage for stage in self.stages if stage.tried]
+        steps = sum(stage.steps for stage in tried)
+        return sum(stage.total(name) for stage in tried) * self.steps / steps if steps else 0.0
+
+    def share(self, ranks: int) -> float:
+        """Return the work of a rank, if `ranks` share the grid of the job, over that of a rank in the trial."""
+        return self.price * _work(*self.job.grid.points) / _work(*self.points) * self.ranks / ranks
+
+    def step(self, ranks: int, overhead: float) -> float:
+        """Return the mean time of a step [s], if an operator call on a few points takes `overhead` [s]."""
+        each, calls = (self.total(name) / max(self.steps, 1) for name in ("seconds", "operator"))
+        fixed = min(overhead * calls, each) if ranks > self.ranks else 0.0
+        alone = each * self.share(self.ranks)
+        return fixed + (alone - fixed) * self.ranks / ranks
+
+    def case(self, ranks: int, overhead: float) -> float:
+        """Return the time of a run without the start of the program [s]."""
+        return self.building * self.share(ranks) + self.steps * self.step(ranks, overhead)
+
+
+def try_job(job: Job, slab: Slab, seconds: float) -> Trial | None:
+    """Try a job for about `seconds` [s]; None if it is too large for that; collective.
+
+    Raises InputError for files that do not match the job.
+    """
+    prices = list[float]()
+    for tried in slab.agree([*_coarser(job)] if slab.root else []):
+        fits = total_bytes(tried, slab.comm.size) * slab.comm.size <= FREE_SHARE * free_bytes()
+        if not slab.agree(fits):
+            continue
+        seconds /= 2.0
+        own = TimedSlab(slab.comm, *tried.grid.points)
+        found, price = _attempt(tried, own, seconds), slab.agree(own.price)
+        if found:
+            ratio = prices[0] / price if prices and price else 1.0
+            return replace(found, job=job, stages=_all_steps(job, found), price=ratio)
+        prices += [price] * (price > 0.0)
+    return None
+
+
+def _attempt(job: Job, slab: TimedSlab, seconds: float) -> Trial | None:
+    """Try a job on its grid; None if too few steps are reached to stand for the others; collective."""
+    wisdom.recall(choices(job).transforms, slab, None)
+    slab.end = time.process_time() + seconds
+    try:
+        building, stages = _march(job, slab, seconds) if job.history else _slide_steadily(job, slab)
+    except OutOfTimeError:
+        return None
+    finally:
+        wisdom.keep(choices(job).transforms, slab)
+    made = Trial(job, slab.comm.size, job.grid.points, building, tuple(stages))
+    return made if made.tried >= (min(made.steps, FIRST + 1) if job.history else 1) else None
+
+
+def _all_steps(job: Job, found: Trial) -> tuple[StageCost, ...]:
+    """Return the costs of stages with the numbers of steps on the grid of the job."""
+    if job.grid.points == found.points or not job.history:
+        return found.stages
+    spans = Timeline.from_job(job).spans
+    return tuple(replace(stage, steps=s.jumps + s.count) for stage, s in zip(found.stages, spans, strict=True))
+
+
+def _coarser(job: Job) -> Iterator[Job]:
+    """Yield the job, and with fewer and fewer points as long as its surface allows it."""
+    yield job
+    data: dict[str, Any] = plain_data(job)
+    while min(n for n in data["grid"]["points"] if n > 1) >= COARSER * LEAST:
+        data["grid"]["points"] = [max(n // COARSER, 1) for n in data["grid"]["points"]]
+        cell = max(length / n for length, n in zip(data["grid"]["size"], data["grid"]["points"], strict=True) if n > 1)
+        for shape in data["surface"]:
+            if "short_wavelength" in shape:
+                shape["short_wavelength"] = max(shape["short_wavelength"], 2.0 * cell)
+        try:
+            yield Job.model_validate(data)
+        except ValidationError:  # the grid is too coarse for its waves, or its heights are in a file
+            return
+
+
+def warm_up(job: Job, slab: Slab) -> float:
+    """Make the first steps, or steady states, of a tiny scene, so that later ones include no compilation. Return the
+    time of an operator call there [s]; collective."""
+    small = _tiny(job)
+    if small is None:
+        return 0.0
+    own, costs = slab.resized(*small.grid.points), list[dict[str, float]]()
+    with suppress(RunError, InputError):
+        if small.history:
+            march = steady.first(small, own)
+            for step in islice(march.steps(), FEWEST):
+                costs.append(_cost(own, partial(march.advance, step)))
+        else:
+            wanted, sliding = request(small), SteadySliding(scene.set_up(small, own))
+            for _ in range(FIRST):
+                costs.append(_cost(own, partial(sliding.solve, (wanted.points[0][0], 0.0), wanted.points[0][1])))
+    return slab.agree(min((cost["seconds"] / cost["operator"] for cost in costs if cost["operator"]), default=0.0))
+
+
+def _tiny(job: Job) -> Job | None:
+    """Return the job with a single wave, or a sphere, on few points; None if not possible."""
+    data: dict[str, Any] = plain_data(job)
+    free, long = choices(job).isolated.on, max(job.grid.size)
+    data["grid"]["points"] = [min(n, FEW) for n in job.grid.points]
+    wave = {"shape": "wave", "amplitude": FLAT * long, "waves": [1, 0] if job.grid.nx > 1 else [0, 1]}
+    data["surface"] = [{"shape": "sphere", "radius": long} if free else wave]
+    data["numerics"]["accept_unconverged"] = True
+    try:
+        return Job.model_validate(data)
+    except ValidationError:
+        return None
+
+
+def _march(job: Job, slab: Slab, seconds: float) -> tuple[float, list[StageCost]]:
+    """Return the time to set up the scene [s], and the costs of the stages; collective."""
+    numerics = job.numerics.model_copy(update={"accept_unconverged": True})  # a long step may not converge
+    made = list[March]()
+    cost = _cost(slab, lambda: made.append(steady.first(job.model_copy(update={"numerics": numerics}), slab)))
+    return cost["seconds"], _try(made[0], seconds)
+
+
+def _slide_steadily(job: Job, slab: Slab) -> tuple[float, list[StageCost]]:
+    """Return the time to set up the scene [s], and the costs of some steady states as one stage; collective."""
+    made = list[SteadySliding]()
+    cost = _cost(slab, lambda: made.append(SteadySliding(scene.set_up(job, slab))))
+    wanted = request(job)
+    stage = StageCost(len(wanted.points))
+    with suppress(OutOfTimeError):
+        for index in _spread(stage.steps):
+            speed, pressure, temperature = wanted.points[index]
+            if temperature == temperature:
+                made[0].set_temperature(temperature)
+            stage.add(_cost(slab, partial(_solve, made[0], wanted.velocity(speed), pressure)))
+    return cost["seconds"], [stage]
+
+
+def _solve(sliding: SteadySliding, velocity: tuple[float, float], pressure: float) -> None:
+    """Solve a steady state; a failure counts, too."""
+    with suppress(RunError):
+        sliding.solve(velocity, pressure)
+
+
+def _spread(count: int) -> list[int]:
+    """Return the numbers below `count` in van der Corput's order, whose first ones are spread over the whole range."""
+    digits = max(count - 1, 1).bit_length()
+    turned = (int(f"{index:0{digits}b}"[::-1], 2) for index in range(1 << digits))
+    return [index for index in turned if index < count]
+
+
+def _try(march: March, seconds: float) -> list[StageCost]:
+    """Return the costs of all stages; root's clock decides for all ranks."""
+    slab, began, timeline = march.scene.slab, time.process_time(), march.timeline()
+    stages = [StageCost(span.jumps + span.count) for span in timeline.spans]
+    with suppress(OutOfTimeError):
+        for step in march.steps(timeline):
+            stage, span = stages[step.stage], timeline.spans[step.stage]
+            took = slab.agree(time.process_time() - began)
+            if took > seconds * (step.stage + 1) / (len(stages) + 1) and stage.tried >= FEWEST:
+                if step.stage + 1 == len(stages):
+                    break
+                march.advance(span.leap(step.number, span.last))
+                continue
+            stage.steps -= step.passed
+            stage.add(_cost(slab, partial(march.advance, step)))
+    for stage, span in zip(stages, timeline.spans, strict=True):
+        if timeline.chooses and span.stage.chooses:  # steps chosen so far, and an estimate of the others
+            stage.steps = span.jumps + span.count
+    return stages
+
+
+def _cost(slab: Slab, call: Callable[[], object]) -> dict[str, float]:
+    """Return the time [s] and the counts of a call."""
+    before, began = slab.tally.copy(), time.process_time()
+    call()
+    return {"operator": 0, **slab.tally.since(before), "seconds": time.process_time() - began}

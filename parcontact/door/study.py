@@ -1,0 +1,448 @@
+"""`parcontact study`: errors and costs of settings.
+
+`parcontact study`: a sweep over meshes, steps and integrators; then limits, errors over time, and a picture.
+
+The settings of a study: their combinations, and the changes of the job.
+
+All meshes, cells per step and integrators are combined. For each integrator the mesh is also refined with the time
+steps of the finest mesh. A rough surface of one seed has the same waves on every mesh.
+
+Stages that choose their steps do so in every case, unless there is a ladder of cells per step, which replaces them in
+sliding stages.
+
+Richardson extrapolation: the limit of values on finer and finer meshes, its order and its uncertainty.
+
+For values `f(h) = f* + c h^p` at three sizes the order p follows from the ratio of their differences, and
+
+f* = f1 + (f1 - f2)/((h2/h1)^p - 1)
+
+with f1 at the finest size (paper, Eq. 14, with p = 1.4; I. B. Celik et al., J. Fluids Eng. 130 (2008) 078001 for
+different ratios of sizes). The uncertainty is the larger change of the limit if the order changes by DOUBT, or if, with
+four sizes, the finest one is left out; at least LEAST_DOUBT of the last difference.
+
+Results of a study: limits, errors of all cases, the best settings, and sentences about them.
+"""
+
+import itertools
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
+from pathlib import Path
+
+from scipy.optimize import brentq
+
+from ..columns import STUDY, names_of
+from ..errors import InputError
+from ..files import files, run, sweep, sweep_warnings, tables
+from ..files.directory import Directory
+from ..files.run import STOPPED_EARLY, Options
+from ..job import AUTO, Case, GeometricStep, Job, Stage
+from ..job.advice import one_cell
+from ..job.listing import plain_job
+from ..job.reading import CASES
+from ..parallel.root import on_root
+from ..parallel.slab import Slab
+from ..parallel.tally import Groups
+from ..printed import per_cent, with_error
+from ..results import compound_files, sweep_table
+from ..results.results import Results
+from .memory import warm_up
+
+MakeJob = Callable[[Sequence[str]], Job]  # returns the job changed by overrides
+
+
+@dataclass(frozen=True)
+class Settings:
+    """One combination: points along x, cells per step (of its mesh; None for chosen steps), and integrator."""
+
+    mesh: int
+    cells_per_step: float | None
+    integrator: str
+
+    @property
+    def time_step(self) -> float:
+        """Return the time step in lengths of the box; for chosen steps about one cell."""
+        return (self.cells_per_step or 1.0) / self.mesh
+
+    @property
+    def effort(self) -> float:
+        """Return an estimate of the work, points times steps."""
+        return self.mesh**2 / self.time_step
+
+    def __str__(self) -> str:
+        return f"mesh {self.mesh}, {self.steps}, {self.integrator}"
+
+    @property
+    def directory(self) -> Path:
+        """Return the directory of the case in that of the study. It stays the same if ladders get longer."""
+        cells = AUTO if self.cells_per_step is None else f"{self.cells_per_step:.9g}"
+        return Path(CASES, f"{self.mesh}-{cells}-{self.integrator}")
+
+    @property
+    def steps(self) -> str:
+        if self.cells_per_step is None:
+            return "auto steps"
+        return f"{self.cells_per_step:.4g} cell{'s' if self.cells_per_step > 1.0 else ''} per step"
+
+
+@dataclass(frozen=True)
+class Ladders:
+    """Ladders from the coarsest to the finest setting; a single value without a ladder.
+
+    `shared` is the relative error that all cases may have in common: the accuracy of chosen steps, else 0. Unless
+    something `slides`, friction is not assessed.
+    """
+
+    meshes: tuple[int, ...]
+    cells: tuple[float | None, ...]
+    integrators: tuple[str, ...]
+    own: Settings
+    shared: float = 0.0
+    slides: bool = True
+
+    def combine(self) -> list[Settings]:
+        """Return all different combinations, the cheapest first."""
+        found = set(itertools.starmap(Settings, itertools.product(self.meshes, self.cells, self.integrators)))
+        coarse, finest = self.cells[0], self.meshes[-1]  # time step of the refinement of the mesh alone
+        for mesh, integrator in itertools.product(self.meshes, self.integrators):
+            found.add(Settings(mesh, coarse and coarse * mesh / finest, integrator))
+        return sorted(found, key=lambda case: (case.effort, str(astuple(case))))
+
+
+def _cells_of_time_steps(job: Job) -> float:
+    """Return the cells per step of the first sliding stage with a given time step; 1 without one."""
+    steps = ((stage, stage.time_step) for stage in job.history if stage.speed)
+    return next((dt / one_cell(stage, job.grid) for stage, dt in steps if isinstance(dt, float)), 1.0)
+
+
+def ladders(job: Job) -> Ladders:
+    """Return the ladders of a job's study. Raises InputError without ladders."""
+    study, numerics = job.study, job.numerics
+    if study is None:
+        raise InputError("no ladders: add a study section to the job, like study: {mesh: [256, 512, 1024]}")
+    own = next((stage.cells_per_step for stage in job.history if stage.cells_per_step is not None), None)
+    if own is None and not _sliding(job):
+        own = _cells_of_time_steps(job)
+    if own is None and study.cells_per_step:
+        own = 1.0
+    case = Settings(job.grid.nx, own, numerics.integrator)
+    meshes = tuple(sorted(study.mesh)) or (job.grid.nx,)
+    cells: tuple[float | None, ...] = tuple(sorted(study.cells_per_step, reverse=True)) or (own,)
+    shared = numerics.asked.of_steps if _sliding(job) and not study.cells_per_step else 0.0
+    slides = any(stage.speed for stage in job.history)
+    return Ladders(meshes, cells, study.integrator or (numerics.integrator,), case, shared, slides)
+
+
+def overrides(job: Job, own: Settings, case: Settings) -> list[str]:
+    """Return the overrides for a case of the job; all time steps change in the same proportion."""
+    ny = 1 if job.grid.ny == 1 else case.mesh * job.grid.ny // job.grid.nx
+    words = [f"grid.points=[{case.mesh}, {ny}]", "output.fields=[]", "output.every=1", "output.energy=false"]
+    words += [
+        "output.branch_dissipation=false",
+        "checkpoint.keep=0",
+        "study=null",
+        f"numerics.integrator={case.integrator}",
+    ]
+    words.append(f"numerics.tolerance={job.numerics.tolerance!r}")  # the job's tolerance, also if the accuracy chose it
+    words += [f"{key}={value!r}" for key, value in _chosen_values(job)]
+    factor = case.time_step / own.time_step
+    replaced = _sliding(job) if job.study and job.study.cells_per_step else []
+    for index, stage in enumerate(job.history):
+        place = f"history.{index}"
+        if stage in replaced:
+            words += [f"{place}.time_step=null", f"{place}.cells_per_step={case.cells_per_step!r}"]
+        elif stage.cells_per_step is not None:
+            cells = stage.cells_per_step * factor * case.mesh / own.mesh
+            words.append(f"{place}.cells_per_step={cells!r}")
+        elif isinstance(stage.time_step, GeometricStep):
+            first, growth = stage.time_step.first * factor, stage.time_step.growth**factor
+            words.append(f"{place}.time_step={{first: {first!r}, growth: {growth!r}}}")
+        elif stage.time_step is not None and stage.time_step != AUTO:
+            words.append(f"{place}.time_step={stage.time_step * factor!r}")
+    return words
+
+
+def make_cases(job: Job, refined: Ladders, make: MakeJob) -> dict[Settings, Case]:
+    """Return the cases of a study, with output directories of their own. Raises InputError with the mistakes of the
+    first case that has any."""
+    cases = dict[Settings, Case]()
+    for one in refined.combine():
+        try:
+            made = make(overrides(job, refined.own, one))
+        except InputError as error:
+            said = re.sub(r"(?m)^--set [^:]*: ", "", str(error))
+            raise InputError(f"study, case {one}: {said}") from error
+        output = made.output.model_copy(update={"directory": job.output.directory / one.directory})
+        values = {"mesh": one.mesh, "cells_per_step": one.cells_per_step or AUTO, "integrator": one.integrator}
+        cases[one] = Case(len(cases), values, made.model_copy(update={"output": output}))
+    return cases
+
+
+def _sliding(job: Job) -> list[Stage]:
+    """Return the sliding stages that choose their steps."""
+    return [stage for stage in job.history if stage.chooses and stage.speed]
+
+
+def _chosen_values(job: Job) -> list[tuple[str, float]]:
+    """Return the lengths [m] that effects choose by the mesh of the job, with their keys."""
+    return [pair for asked in job.asked("chosen_values") for pair in asked(job).items()]
+
+
+def describe_choices(job: Job) -> list[str]:
+    """Return sentences on the settings that are equal, or chosen for the accuracy, in every case."""
+    own = f"{job.grid.nx} x {job.grid.ny} points, the job's own mesh"
+    lines = [f"{key}: {value:.4g} m in every case, chosen by auto for {own}" for key, value in _chosen_values(job)]
+    refined = _sliding(job) if job.study and job.study.cells_per_step else []
+    if stages := [stage.name for stage in job.history if stage.chooses and stage not in refined]:
+        bound = f"numerics.accuracy = {job.numerics.asked.of_steps:g}"
+        lines.append(f"{', '.join(dict.fromkeys(stages))}: time steps are chosen in every case, for {bound}")
+    return lines
+
+
+LEAST_ORDER, LARGEST_ORDER = 0.3, 6.0  # accuracy: range of orders of converging values
+DOUBT = 0.5  # accuracy: uncertainty of the order
+LEAST_DOUBT = 0.25  # accuracy: least uncertainty of the limit over the last difference
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The limit of a sequence, its order (NaN if none was found), and its uncertainty (NaN if unknown)."""
+
+    value: float
+    order: float
+    uncertainty: float
+
+    @property
+    def doubt(self) -> float:
+        """Return the relative uncertainty; 0 for a value of 0, such as friction at rest."""
+        return abs(self.uncertainty / self.value) if self.value else 0.0
+
+
+def extrapolate(sizes: Sequence[float], values: Sequence[float]) -> Limit:
+    """Return the limit for size 0 of at least two values at decreasing sizes.
+
+    If there are two values only, or values do not converge monotonically, the limit is the finest value, and its
+    uncertainty the larger of the last two differences (NaN if they are 0).
+    """
+    last = abs(values[-1] - values[-2])
+    order = _order(sizes[-3:], values[-3:]) if len(values) > 2 else math.nan
+    if math.isnan(order):
+        before = abs(values[-2] - values[-3]) if len(values) > 2 else last
+        return Limit(values[-1], math.nan, max(last, before) or math.nan)
+    value = _limit(sizes, values, order)
+    doubts = [abs(_limit(sizes, values, max(order + more, LEAST_ORDER)) - value) for more in (-DOUBT, DOUBT)]
+    doubts.append(LEAST_DOUBT * last)
+    if len(values) > 3:
+        doubts.append(abs(extrapolate(sizes[:-1], values[:-1]).value - value))
+    return Limit(value, order, max(doubts))
+
+
+def _limit(sizes: Sequence[float], values: Sequence[float], order: float) -> float:
+    return values[-1] + (values[-1] - values[-2]) / ((sizes[-2] / sizes[-1]) ** order - 1.0)
+
+
+def _order(sizes: Sequence[float], values: Sequence[float]) -> float:
+    """Return the order p of three values on `f* + c h^p`; NaN if it is outside of the range of orders."""
+    before, after = values[0] - values[1], values[1] - values[2]
+    if after == 0.0 or before / after <= 0.0:
+        return math.nan
+    wanted = before / after
+    h3, h2, h1 = sizes
+
+    def ratio(p: float) -> float:
+        return float((h3**p - h2**p) / (h2**p - h1**p))
+
+    if not ratio(LEAST_ORDER) <= wanted <= ratio(LARGEST_ORDER):
+        return math.nan
+    return float(brentq(lambda p: ratio(p) - wanted, LEAST_ORDER, LARGEST_ORDER))
+
+
+QUANTITIES = ("mu_max", "mu_dyn", "contact_area", "contact_area_corrected")
+TARGETS = (0.05, 0.03, 0.01, 0.003)
+FRICTION = ("mu_max", "mu_dyn")
+NEEDED = (*FRICTION, "contact_area_corrected")  # quantities that the sentences assess
+TOGETHER, TIME, CHOSEN = "mesh and time together", "time alone", "mesh with auto steps"  # ladders
+Outcome = Mapping[str, float]  # a row of sweep.csv
+Outcomes = Mapping[Settings, Outcome]
+
+
+@dataclass(frozen=True)
+class StudyFinding:
+    """The limit of one quantity along one ladder of one integrator."""
+
+    quantity: str
+    integrator: str
+    ladder: str
+    limit: Limit
+
+    def __str__(self) -> str:
+        last = "no order found: value of the last case, and its difference to earlier and finer ones"
+        order = last if math.isnan(self.limit.order) else f"order {self.limit.order:.2f}"
+        name = f"{self.quantity} with {self.integrator}, {self.ladder}"
+        if math.isnan(self.limit.uncertainty):
+            return f"{name}: {self.limit.value:.4g} in the last cases, which do not differ: its error is unknown"
+        value = with_error(self.limit.value, abs(self.limit.value) * self.limit.doubt)
+        return f"{name}: {value} ({per_cent(self.limit.doubt)}), {order}"
+
+
+def sequences(ladders: Ladders, outcomes: Outcomes, integrator: str) -> dict[str, tuple[list[float], list[Settings]]]:
+    """Return sizes and cases of each ladder from coarse to fine: mesh and time together, mesh alone, time alone; for
+    chosen steps the mesh only."""
+    usual = [case for case in outcomes if case.integrator == integrator]
+    coarse, finest = ladders.cells[0], ladders.meshes[-1]
+    together = sorted((c for c in usual if _is_same(c.cells_per_step, coarse)), key=lambda case: case.mesh)
+    if coarse is None:
+        return {CHOSEN: ([1.0 / c.mesh for c in together], together)} if len(together) > 1 else {}
+    step = coarse / finest
+    mesh = sorted((c for c in usual if math.isclose(c.time_step, step)), key=lambda case: case.mesh)
+    time = sorted((c for c in usual if c.mesh == finest), key=lambda case: -case.time_step)
+    time = [case for case in time if any(_is_same(case.cells_per_step, cells) for cells in ladders.cells)]
+    found = {
+        TOGETHER: ([1.0 / c.mesh for c in together], together),
+        "mesh alone": ([1.0 / c.mesh for c in mesh], mesh),
+        TIME: ([c.time_step for c in time], time),
+    }
+    return {name: pair for name, pair in found.items() if len(pair[1]) > 1}
+
+
+def _is_same(one: float | None, other: float | None) -> bool:
+    """Return True if cells per step are equal; None means chosen steps."""
+    return one == other if one is None or other is None else math.isclose(one, other)
+
+
+def judged(ladders: Ladders) -> list[str]:
+    """Return the quantities whose errors are assessed: friction only if something slides."""
+    return [name for name in QUANTITIES if ladders.slides or name not in FRICTION]
+
+
+def limits(ladders: Ladders, outcomes: Outcomes) -> list[StudyFinding]:
+    """Return the limit of every quantity along every ladder."""
+    found = []
+    for integrator in ladders.integrators:
+        for name, (sizes, cases) in sequences(ladders, outcomes, integrator).items():
+            for quantity in judged(ladders):
+                values = [outcomes[case][quantity] for case in cases]
+                found.append(StudyFinding(quantity, integrator, name, extrapolate(sizes, values)))
+    return found
+
+
+def references(ladders: Ladders, outcomes: Outcomes) -> dict[str, Limit]:
+    """Return the best limit of each quantity: along mesh and time together, the least uncertain one with an order;
+    without a ladder of meshes along time alone.
+
+    Without such a ladder, or without differences, it is the most expensive case, with unknown error. Errors that all
+    cases have in common do not show in a limit, so its uncertainty is at least `ladders.shared`.
+    """
+    found = [one for one in limits(ladders, outcomes) if one.ladder == TIME]
+    if len(ladders.meshes) > 1:
+        each = [replace(ladders, cells=(cells,)) for cells in ladders.cells]
+        found = [one for part in each for one in limits(part, outcomes) if one.ladder in (TOGETHER, CHOSEN)]
+    dearest = max(outcomes, key=lambda case: case.effort)
+    best = {name: Limit(outcomes[dearest][name], math.nan, math.nan) for name in judged(ladders)}
+    for quantity in best:
+        choices = [one.limit for one in found if one.quantity == quantity and one.limit.value]
+        if choices:
+            limit = min(choices, key=lambda one: (math.isnan(one.doubt), math.isnan(one.order), one.doubt))
+            best[quantity] = replace(limit, uncertainty=max(limit.uncertainty, ladders.shared * abs(limit.value)))
+    return best
+
+
+def estimate_errors(outcome: Outcome, reference: Mapping[str, Limit]) -> dict[str, float]:
+    """Return the relative error of each quantity; NaN if the reference is 0, such as friction at rest."""
+    return {
+        name: abs(outcome[name] / limit.value - 1.0) if limit.value else math.nan for name, limit in reference.items()
+    }
+
+
+def proven(error: Mapping[str, float], reference: Mapping[str, Limit]) -> dict[str, float]:
+    """Return the errors, each at least the uncertainty of its reference."""
+    return {name: doubt if value < (doubt := reference[name].doubt) else value for name, value in error.items()}
+
+
+def worst(error: Mapping[str, float]) -> float:
+    """Return the largest of the assessed errors; NaN without any."""
+    values = [error[name] for name in NEEDED if not math.isnan(error.get(name, math.nan))]
+    return max(values, default=math.nan)
+
+
+def sentences(outcomes: Outcomes, reference: Mapping[str, Limit], ranks: int) -> list[str]:
+    """Return the settings that reach each target in the least time, and the error of the reference."""
+    error = {case: worst(proven(estimate_errors(outcome, reference), reference)) for case, outcome in outcomes.items()}
+    if all(map(math.isnan, error.values())):
+        return ["there is no contact, and no error"]
+    needed = [name for name in NEEDED if name in reference]
+    on = "1 rank" if ranks == 1 else f"{ranks} ranks"
+    lines = [f"the fastest settings with errors of {', '.join(needed)} within a bound, times of all steps on {on}:"]
+    for target in TARGETS:
+        enough = [case for case in outcomes if error[case] <= target]
+        case = min(enough, key=lambda case: outcomes[case]["seconds"], default=None)
+        found = f"{case}; {outcomes[case]['seconds']:.3g} s" if case else "none of these settings is good enough"
+        lines.append(f"for {per_cent(target)}: {found}")
+    doubt = worst({name: limit.doubt for name, limit in reference.items() if limit.value})
+    known = "is not known" if math.isnan(doubt) else f"is {100 * doubt:.2g} %"
+    return [*lines, f"the error of the reference, to which they are compared, {known}"]
+
+
+ENDS = {STOPPED_EARLY: "stopped early; run again to go on", sweep.FAILED: "some cases failed: there is no limit"}
+Errors = Mapping[Settings, Mapping[str, float]]
+
+
+def run_study(job: Job, make: MakeJob, slab: Slab, quiet: bool) -> int:
+    """Run all cases of a study, one after the other on all ranks; collective. Return the exit code.
+
+    `make` returns the job changed by overrides. All jobs are read before the first case runs. After a stop the same
+    command continues. The directory has the results of a sweep, and those of the study once all cases are finished.
+    """
+    refined = ladders(job)
+    cases = make_cases(job, refined, make)
+    directory = Directory(job.output.directory, slab, "study")
+    with directory.claimed():
+        plain = plain_job(job) if slab.root else {}
+        directory.refuse_foreign(job.path, plain, False)
+        directory.make(job.path, job.resolved(), tables.Claim(tables.kept(plain)))
+        several = list(cases.values())
+        shown = on_root(slab.comm, lambda: sweep_warnings.warn_once(several))
+        warm_up(several[0].job, slab)
+        stop = on_root(slab.comm, lambda: sweep.stop_file(several))
+
+        def act(one: Job, own: Slab, shows: sweep.Shows) -> int:
+            return run.run_job(one, own, Options(True, sweep_stop_file=stop, shows=shows))
+
+        code = sweep.SweepRun(several, Groups(slab.comm), act, stop, quiet, shown=shown).run(several)
+        lines = [] if code else on_root(slab.comm, lambda: conclude(job, refined, cases, slab.comm.size))
+        if slab.root and not quiet:
+            print(*lines, ENDS.get(code, f"study: {directory.path}"), sep="\n", flush=True)
+    return code
+
+
+def conclude(job: Job, refined: Ladders, cases: Mapping[Settings, Case], ranks: int) -> list[str]:
+    """Write limits, errors and a picture of finished cases; return the sentences of study.txt; root only."""
+    place = job.output.directory
+    rows = dict(zip(cases, Results(place, "sweep").cases, strict=True))
+    reference = references(refined, rows)
+    errors = {case: estimate_errors(row, reference) for case, row in rows.items()}
+    named = {case: {f"error_{name}": error for name, error in found.items()} for case, found in errors.items()}
+    table = [{**row, **named[case], **cases[case].settings, "case": cases[case].number} for case, row in rows.items()]
+    sweep_table.save_cases(place / "study.csv", names_of(STUDY), table)
+    lines = [*describe_choices(job), *map(str, limits(refined, rows))]
+    lines += sentences(rows, reference, ranks)
+    files.replace_file(place / "study.txt", "\n".join(lines) + "\n")
+    doubts = {name: limit.doubt for name, limit in reference.items()}
+    compound_files.plot_study(place, _curves(refined, rows, errors), doubts)
+    return lines
+
+
+def _curves(refined: Ladders, rows: Outcomes, errors: Errors) -> list[compound_files.StudyCurve]:
+    """Return the errors along each ladder."""
+    return [
+        compound_files.StudyCurve(
+            *(quantity, integrator, name, sizes),
+            [errors[case][quantity] for case in cases],
+            [rows[case]["seconds"] for case in cases],
+        )
+        for integrator in refined.integrators
+        for name, (sizes, cases) in sequences(refined, rows, integrator).items()
+        for quantity in NEEDED
+        if quantity in errors[cases[0]]
+    ]

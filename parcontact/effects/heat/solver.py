@@ -1,0 +1,457 @@
+"""Temperatures by the heat of sliding.
+
+Heat of sliding: temperature rise of the surface of a conducting half space under moving heat.
+
+Heat q [W/m^2] on the surface of a body of conductivity kappa and diffusivity D, below a contact that slides at the
+velocity v, causes the steady temperature rise, in the frame of the contact,
+
+    T^(k) = q^(k)/(kappa beta),     beta(k) = sqrt(k^2 - i k.v/D),     Re beta > 0                                (1)
+
+(H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.7). The rest of the surface is insulated.
+Heat from the depth z arrives with the factor exp(-beta z). A wave of the wavenumber q on an incompressible half space
+has strains whose squares add up to a constant times `(q z)^2 exp(-2 q z)`, the same under crests and troughs. So its
+heat has the distribution `4 q (q z)^2 exp(-2 q z) dz`, the mean depth `3/(2 q)`, and arrives with
+
+    int 4 q^3 z^2 exp(-(2 q + beta) z) dz = (1 + beta/(2 q))^-3.                                                  (2)
+
+The rubber that dissipates lies at these depths, too, and has their mean temperature. With waves cos(m z) along the
+depth, of which this distribution has the share
+
+    g(m) = int 4 q^3 z^2 exp(-2 q z) cos(m z) dz = Re (1 - i m/(2 q))^-3,                                         (3)
+
+heat of the body warms the depths where it is released by `2/(pi kappa) int g^2/(beta^2 + m^2) dm` instead of (1).
+
+A uniform heat has no steady state: after a sliding time t it has warmed a cold body by `2 q sqrt(t/pi)/e`, with the
+effusivity `e = kappa/sqrt(D)`, and each wave by `erf(beta sqrt(D t))` times (1). For an infinite time, temperatures in
+a periodic box are relative to its mean.
+
+Temperature of the surface of a conducting half space under heat that changes with time: `effects.heat.heat` in time
+steps.
+
+Each wave (j, k) of the sum of exponentials (`physics.exponentials`), along the depth and along the surface, satisfies
+
+    dc/dt = -(m_j^2 + D k^2) c + q^(k, t) g_j,     T^(k) = sum_j w_j c_j/e,                                       (1)
+
+with the effusivity e. q is linear in time within a step, over which (1) is solved exactly. For heat on the surface g =
+1; for heat of the body it is the share (3) of `heat` of the wave m_j/sqrt(D) along the depth. The temperature
+at the depths where this heat is released is `sum_j w_j g_j c_j/e`.
+
+The mean of the box (k = 0) has its own sum, of numbers, exact to 1e-9 at any time, so that no heat is lost.
+
+Heat that slides over a free half space: influence coefficients for `effects.heat.heat`.
+
+A uniform heat on one cell of `dx x dy`, while the body passes below it with the velocity -v, warms the distance (x,
+y) from the cell by the heat of all earlier times t,
+
+    K(x, y) = 1/e int_0^inf W(t) P(x + v_x t, dx, t) P(y + v_y t, dy, t) dt/sqrt(pi t),                           (1)
+    P(x, dx, t) = (erf((x + dx/2)/sqrt(4 D t)) - erf((x - dx/2)/sqrt(4 D t)))/2,
+
+with the effusivity e (H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.4). W is 1 for
+heat on the surface. For heat that waves of the wavenumber q dissipate it is, with tau = D t and s = 2 q sqrt(tau),
+
+    W(t) = sqrt(pi) s^3 erfcx''(s)/2,     erfcx''(s) = (2 + 4 s^2) erfcx(s) - 4 s/sqrt(pi),                  (2)
+
+which tends to 1 - 3/s^2. For the temperature at the depths where heat is released it is `sqrt(pi tau)` times
+`Depths.staying`. Panels of the integral resolve the passage of a cell and the spreading of heat.
+
+Temperatures of a contact: where its heat is released, and the distribution of the temperature rise over the contact.
+
+The heat of the interface is its shear stress times the sliding speed, on all points in contact. The heat of the
+body, dissipated by its branches, is distributed in proportion to the pressure.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...parallel.fft import FFT, Spectrum
+from ...parallel.slab import Array, Slab, allocate, deal
+from ...physics import loops
+from ...physics.convolution import (
+    ALL,
+    PARTS,
+    Convolution,
+    padded_lengths,
+    tabulate,
+    travelling_wavenumbers,
+    wavenumbers,
+)
+from ...physics.halfspace import HalfSpace
+from ...physics.prony import Exponentials, Prony, complex_modulus, fit_exponentials, shares_of_step
+
+Vector = tuple[float, float]
+SPACING, LOWEST, HIGHEST = 0.3, 1e-5, 30.0  # accuracy: waves m along the depth: spacing of ln m; limits over q
+BINS = 16  # accuracy: bins of wavenumbers per octave; the error of flash temperatures is 1e-4
+LAYER_DEPTH = 3.0  # physics: least wavenumber times thickness of a layer: heat lies at most half a thickness deep
+
+
+@dataclass(frozen=True)
+class Conductor:
+    """A material that conducts heat: conductivity [W/(m K)] and diffusivity [m^2/s]."""
+
+    conductivity: float
+    diffusivity: float
+
+    @property
+    def effusivity(self) -> float:
+        """The conductivity over the root of the diffusivity [W s^(1/2)/(m^2 K)]."""
+        return float(self.conductivity / np.sqrt(self.diffusivity))
+
+
+@dataclass(frozen=True)
+class Depths:
+    """Depths of the heat of the body: the share of it that waves of each wavenumber [1/m] dissipate.
+
+    Integrals over waves along the depth replace (2), as they also hold for a finite time and for heat felt at depth.
+    """
+
+    wavenumbers: Array
+    shares: Array
+
+    def cosines(self, m: Array) -> Array:
+        """Return the shares (3) of waves m [1/m] along the depth, averaged over the waves."""
+        square = (0.5 * m / self.wavenumbers[:, None]) ** 2
+        return np.asarray(self.shares @ ((1.0 - 3.0 * square) / (1.0 + square) ** 3))
+
+    def warmed(self, beta: Spectrum, felt: bool, reach: float = np.inf) -> Spectrum:
+        """Return the temperature over heat, times kappa [m], after diffusion over `reach = D t` [m^2]: that of the
+        surface or, if `felt`, that at the depths where heat is released; to 1e-5."""
+        total = np.zeros_like(beta)
+        for m, weight in zip(*self._waves(felt), strict=True):
+            square = beta**2 + m**2
+            total += weight * (-np.expm1(-square * reach) if reach < np.inf else 1.0) / square
+        return total
+
+    def staying(self, tau: Array) -> Array:
+        """Return the rest after diffusion over `tau = D t` [m^2], `2/pi int g^2 exp(-m^2 tau) dm` [1/m]."""
+        total = np.zeros_like(tau)
+        for m, weight in zip(*self._waves(True), strict=True):
+            total += weight * np.exp(-(m**2) * tau)
+        return total
+
+    def _waves(self, felt: bool) -> tuple[Array, Array]:
+        """Return waves m [1/m] and their weights in integrals of g or g^2 over m, by the trapezoidal rule in ln m."""
+        if not self.wavenumbers.size:
+            return np.zeros(0), np.zeros(0)
+        low, high = np.log(LOWEST * self.wavenumbers.min()), np.log(HIGHEST * self.wavenumbers.max())
+        m = np.exp(np.linspace(low, high, 1 + int((high - low) / SPACING)))
+        weights = 2.0 / np.pi * np.log(m[1] / m[0]) * m * self.cosines(m) ** (2 if felt else 1)
+        weights[0] /= -np.expm1(-np.log(m[1] / m[0]))  # includes all waves below
+        m[0] = 0.0
+        return m, weights
+
+
+def sliding_heat(
+    fft: FFT,
+    size: Vector,
+    body: Conductor,
+    velocity: Vector,
+    depths: Depths | None = None,
+    felt: bool = False,
+    time: float = np.inf,
+) -> Convolution:
+    """Return the operator from heat [W/m^2] to temperature rise [K] in a periodic box of `size` [m] below a contact
+    that has slid steadily at `velocity` [m/s] for a `time` [s].
+
+    The heat is on the surface or at `depths`. The temperature is that of the surface or, if `felt`, that at the
+    depths where the heat is released. It is exact for each wave except those of Nyquist.
+    """
+    reach = body.diffusivity * time
+
+    def part(rows: slice) -> Spectrum:
+        beta = _beta(fft, size, body, velocity, rows)
+        mean = beta == 0.0
+        beta[mean] = 1e-9 / max(size)
+        symbol = _on_surface(beta, reach) if depths is None else depths.warmed(beta, felt, reach)
+        if time == np.inf:
+            symbol[mean] = 0.0
+        return symbol / body.conductivity
+
+    return Convolution(fft, part, fft.complex, even=not velocity[1])
+
+
+def _on_surface(beta: Spectrum, reach: float) -> Spectrum:
+    from scipy.special import erf
+
+    return (erf(beta * np.sqrt(reach)) if reach < np.inf else 1.0) / beta
+
+
+def _beta(fft: FFT, size: Vector, body: Conductor, velocity: Vector, rows: slice = ALL) -> Spectrum:
+    """Return beta [1/m] for these rows of a spectrum, the root with a positive real part."""
+    square = np.hypot(*wavenumbers(fft, size, rows)) ** 2
+    along_x, along_y = travelling_wavenumbers(fft, size, rows)
+    return np.sqrt(square - 1j * (along_x * velocity[0] + along_y * velocity[1]) / body.diffusivity)
+
+
+def depths_of(spectrum: Spectrum, fft: FFT, body: HalfSpace, unit: float, velocity: Vector, prony: Prony) -> Depths:
+    """Return the depths at which a body dissipates under a pressure of this spectrum, sliding at `velocity` [m/s];
+    collective.
+
+    `unit` [m] is the length unit of the body. A wave loses `|p^|^2 A w Im(-1/G*(w))` with its compliance A and
+    frequency w. Waves are combined in BINS per octave, each with its mean wavenumber. On a layer the heat lies at
+    most half its thickness deep.
+    """
+    longest = max(body.size)
+    bins = 1 + int(BINS * (1.0 + np.log2(np.hypot(fft.mx, fft.my))))
+    sums = np.zeros((2, bins))
+    for rows in deal(fft.my, PARTS):
+        q = np.hypot(*wavenumbers(fft, body.size, rows))
+        along_x, along_y = travelling_wavenumbers(fft, body.size, rows)
+        omega = np.abs(along_x * velocity[0] + along_y * velocity[1] if velocity[1] else along_x * velocity[0]) / unit
+        modulus = complex_modulus(omega, *prony)
+        loss = np.divide(omega * modulus.imag, np.abs(modulus) ** 2, out=np.zeros_like(omega), where=omega > 0.0)
+        power = fft.multiplicity * np.abs(spectrum[rows]) ** 2 * body.symbol(fft, rows) * loss
+        place = (BINS * np.log2(np.maximum(q * longest / (2.0 * np.pi), 1.0))).astype(np.int64).ravel()
+        for total, weight in zip(sums, (power, power * q), strict=True):
+            total += np.bincount(place, weight.ravel(), bins)[:bins]
+    powers, moments = np.reshape(fft.slab.sum(*sums.ravel()), sums.shape)
+    there = powers > 0.0
+    found = moments[there] / powers[there] / unit
+    if body.layer is not None:
+        found = np.maximum(found, LAYER_DEPTH / (body.layer.thickness * unit))
+    return Depths(found, powers[there] / powers.sum() if there.any() else powers[there])
+
+
+MEAN_TIMES, MEAN_ERROR = (
+    (1e-12, 1e12),
+    1e-9,
+)  # accuracy: times [s] and relative error of the sum for the mean of the box
+
+
+@dataclass(frozen=True)
+class Heating:
+    """Heat in one step [W/m^2, mean over the box], at its beginning and end: on `rubbed` points, and in the body in
+    proportion to the pressure, at `depths`."""
+
+    rubbed: tuple[float, float] = (0.0, 0.0)
+    pressed: tuple[float, float] = (0.0, 0.0)
+    depths: Depths | None = None
+
+    @property
+    def whole(self) -> tuple[float, float]:
+        """The sum of both."""
+        return self.rubbed[0] + self.pressed[0], self.rubbed[1] + self.pressed[1]
+
+
+def along_depth(rates: Array, body: Conductor, depths: Depths | None) -> Array:
+    """Return g of (1) for waves along the depth, averaged over the dissipating waves; 1 without depths."""
+    return np.ones_like(rates) if depths is None else depths.cosines(np.sqrt(rates / body.diffusivity))
+
+
+class MeanMemory:
+    """Mean temperature of a box [K], as `waves` along the depth; the same on every rank."""
+
+    def __init__(self, body: Conductor) -> None:
+        self.body, self.sum = body, fit_exponentials(*MEAN_TIMES, MEAN_ERROR)
+        self.waves = np.zeros(self.sum.rates.size)
+
+    @property
+    def stored(self) -> float:
+        """Heat in the body [J/m^2, mean over the box]: the longest wave along the depth, which never decays."""
+        return float(self.waves[0])
+
+    def advance(self, dt: float, heating: Heating) -> tuple[float, float]:
+        """Advance by a step dt [s]. Return the mean temperature rises [K] of the surface and where the body releases
+        heat."""
+        known, deep = self.sum, along_depth(self.sum.rates, self.body, heating.depths)
+        before, after = shares_of_step(known.rates * dt)
+        start, end = (one + deep * other for one, other in zip(heating.rubbed, heating.pressed, strict=True))
+        self.waves = np.exp(-known.rates * dt) * self.waves + dt * (before * start + after * end)
+        fast = 2.0 / (np.pi * known.end) * heating.rubbed[1]
+        weights = known.weights / self.body.effusivity
+        return float(weights @ self.waves + fast / self.body.effusivity), float((weights * deep) @ self.waves)
+
+
+class HeatMemory:
+    """The waves (1) of a box of `size` [m], and the spectra of rubbing and pressure at the end of the last step.
+
+    Parameters: `fft`, a transform of the size of maps; `rubs`, True if there is heat on the surface in addition to
+    that of the body. The constructor and the methods are collective.
+    """
+
+    def __init__(self, fft: FFT, size: Vector, body: Conductor, known: Exponentials, rubs: bool) -> None:
+        self.fft, self.body, self.sum = fft, body, known
+        qx, qy = wavenumbers(fft, size)
+        self._spread = body.diffusivity * qx[0] ** 2, body.diffusivity * qy[:, 0] ** 2
+        tally = fft.slab.tally
+        self.waves = allocate((known.kept, *fft.shape), fft.complex, tally)
+        if not tally.only_counts:
+            self.waves.fill(0.0)
+        self.pressed = allocate(fft.shape, fft.complex, tally)
+        self.rubbed = allocate(fft.shape if rubs else (0, fft.shape[1]), fft.complex, tally)
+        self.mean = MeanMemory(body)
+
+    def set_heating(self, rubbed: Array | None, pressed: Array, scales: Vector) -> None:
+        """Set the maps of rubbing and pressure before the next step, times their scales."""
+        if rubbed is not None:
+            np.multiply(self.fft.forward(rubbed), scales[0], out=self.rubbed)
+        np.multiply(self.fft.forward(pressed), scales[1], out=self.pressed)
+
+    def advance(
+        self, dt: float, heating: Heating, rubbed: Array | None, pressed: Spectrum, scales: Vector, out: Array
+    ) -> float:
+        """Advance by a step dt [s] to these maps of rubbing and pressure, and put the temperature rise of the surface
+        [K] into `out`. Return the mean rise [K] at the depths where the body releases heat, weighted by this heat.
+
+        `pressed` is a spectrum, the buffer of the transform or a copy; `scales` give both maps the mean 1.
+        """
+        known, fft = self.sum, self.fft
+        now, fresh = pressed, np.zeros((0, fft.shape[1]), fft.complex)
+        if rubbed is not None:
+            now = pressed.copy() if pressed is fft.spectrum else pressed
+            fresh = fft.forward(rubbed)
+        deep, result = along_depth(known.rates, self.body, heating.depths), fft.spectrum
+        fall = np.exp(-known.rates[: known.kept] * dt)
+        felt = loops.conduct(
+            self.waves,
+            (known.rates, known.weights / self.body.effusivity, deep, fall, known.end),
+            (*self._spread, fft.multiplicity[0]),
+            dt,
+            (self.rubbed, fresh, self.pressed, now),
+            np.array([heating.rubbed, heating.pressed]),
+            np.array(scales),
+            self.body.effusivity,
+            result,
+        )
+        mean, mean_felt = self.mean.advance(dt, heating)
+        if fft.shape[1] and fft.columns.start == 0:
+            result[0, 0] = mean * fft.mx * fft.my
+        fft.backward(result, out)
+        return mean_felt + fft.slab.sum(felt)[0] / (fft.mx * fft.my) ** 2
+
+
+GAUSS = np.polynomial.legendre.leggauss(4)
+FIRST = 1e-4  # accuracy: end of the first panel over the shortest time scale; the integrand is smooth in sqrt(t) before
+GROWTH, PASSING = 1.3, 0.5  # accuracy: largest ratio of panel ends; largest panel over the time to pass the warm zone
+SPREAD = 6.5  # accuracy: distance over sqrt(2 D t) beyond which heat is below rounding
+LAST = 1e8  # accuracy: end of the integral over the time to spread over the box, at rest
+ASYMPTOTIC = 100.0  # accuracy: s beyond which W is 1 - 3/s^2 to 1e-7
+
+
+def sliding_heat_unbounded(
+    fft: FFT,
+    size: Vector,
+    body: Conductor,
+    velocity: Vector,
+    depths: Depths | None = None,
+    felt: bool = False,
+    time: float = np.inf,
+) -> Convolution:
+    """Return the operator from heat [W/m^2] to temperature rise [K] below a contact that has slid steadily at
+    `velocity` [m/s] for a `time` [s] and fits into a free box of `size` [m]; collective. Other parameters are those
+    of `sliding_heat`."""
+    slab = fft.slab
+    padded = FFT(slab, padded_lengths(slab.nx, slab.ny), np.float64, measured=False)
+
+    def coefficient(x: Array, y: Array, dx: float, dy: float) -> Array:
+        times, shares = _times(size, (dx, dy), body, velocity, time)
+        if depths is not None:
+            tau = body.diffusivity * times
+            shares = shares * (np.sqrt(np.pi * tau) * depths.staying(tau) if felt else _reaching(times, body, depths))
+        along_x = _covered(x[0] + velocity[0] * times[:, None], dx, times, body)
+        along_y = _covered(y[:, 0] + velocity[1] * times[:, None], dy, times, body)
+        return np.asarray((along_y * shares[:, None]).T @ along_x) / body.effusivity
+
+    table = tabulate(padded, size, coefficient)
+    return Convolution(padded, table.__getitem__, padded.complex, even=not velocity[1])
+
+
+def _covered(x: Array, dx: float, times: Array, body: Conductor) -> Array:
+    """Return P of (1), of shape (times, positions)."""
+    from scipy.special import erf
+
+    reach = np.sqrt(4.0 * body.diffusivity * times)[:, None]
+    return np.asarray(0.5 * (erf((x + 0.5 * dx) / reach) - erf((x - 0.5 * dx) / reach)))
+
+
+def _times(size: Vector, cell: Vector, body: Conductor, velocity: Vector, time: float) -> tuple[Array, Array]:
+    """Return times t [s], up to `time`, and their shares of `dt/sqrt(pi t)`, by Gauss panels in sqrt(t)."""
+    speed, smallest, longest = float(np.hypot(*velocity)), min(cell), 2.0 * float(np.hypot(*size))
+    start = FIRST * smallest / max(speed, body.diffusivity / smallest)
+    end = LAST * longest**2 / body.diffusivity
+    if speed:  # the warmed body has left when v t > longest + SPREAD sqrt(2 D t)
+        wide = SPREAD * np.sqrt(2.0 * body.diffusivity) / speed
+        end = min(end, ((wide + np.sqrt(wide**2 + 4.0 * longest / speed)) / 2.0) ** 2)
+    end = min(end, time)
+    edges = [0.0, min(start, end)]
+    while edges[-1] < end:
+        passing = max(smallest, np.sqrt(4.0 * body.diffusivity * edges[-1])) / speed if speed else np.inf
+        edges.append(min(edges[-1] * GROWTH, edges[-1] + PASSING * passing, end))
+    roots = np.sqrt(edges)
+    half = 0.5 * np.diff(roots)[:, None]
+    nodes = (roots[:-1, None] + half * (1.0 + GAUSS[0])).ravel()
+    return nodes**2, (half * GAUSS[1]).ravel() * 2.0 / np.sqrt(np.pi)
+
+
+def _reaching(times: Array, body: Conductor, depths: Depths) -> Array:
+    """Return W of (2) at these times, averaged over the waves."""
+    from scipy.special import erfcx
+
+    total = np.zeros_like(times)
+    for q, share in zip(depths.wavenumbers, depths.shares, strict=True):
+        s = 2.0 * q * np.sqrt(body.diffusivity * times)
+        near = np.minimum(s, ASYMPTOTIC)
+        bend = (2.0 + 4.0 * near**2) * erfcx(near) - 4.0 * near / np.sqrt(np.pi)
+        late = 1.0 - 3.0 / np.maximum(s, ASYMPTOTIC) ** 2
+        total += share * np.where(s < ASYMPTOTIC, 0.5 * np.sqrt(np.pi) * near**3 * bend, late)
+    return total
+
+
+SLIP_BINS = 512  # accuracy: bins of the histogram for quartiles, whose error is 1/512 of the range
+
+
+@dataclass(frozen=True)
+class Flash:
+    """Temperature rises [K] of a contact, weighted by the heat where it is released, on the surface and in the body:
+    their mean (the flash temperature), the highest on the surface, and the lower and upper quartile. `of_rubber` is the
+    highest rise at which rubber relaxes: the mean, and in bands, each at its own temperature, that of the hottest."""
+
+    mean: float = 0.0
+    highest: float = 0.0
+    lower: float = 0.0
+    upper: float = 0.0
+    hottest_band: float | None = None
+
+    @property
+    def of_rubber(self) -> float:
+        return self.mean if self.hottest_band is None else self.hottest_band
+
+
+def spread_over(slab: Slab, weights: Array, total: float) -> Array:
+    """Return `total` [W/m^2, mean over the box] distributed in proportion to a map of weights; 0 if all weights are 0.
+    Collective."""
+    whole = slab.sum(float(weights.sum(dtype=np.float64)))[0]
+    return weights * (total * slab.points / whole if whole > 0.0 else 0.0)
+
+
+def share_of(slab: Slab, rubbed: Array, own: Array, other: Array, counterbody: Array) -> float:
+    """Return the share of the heat of the interface that goes into the rubber, so that both surfaces have the same mean
+    temperature over the contact (H. Blok, Proc. Inst. Mech. Engrs. 2 (1937) 222); collective.
+
+    `own` and `counterbody` are the rises [K] that all of this heat would cause on either side, `other` is the rise
+    of the rubber by other heat. The mean is weighted by `rubbed`.
+    """
+    sums = slab.sum(*(float((rise * rubbed).sum()) for rise in (own, other, counterbody)))
+    whole = sums[0] + sums[2]
+    return min(max((sums[2] - sums[1]) / whole, 0.0), 1.0) if whole > 0.0 else 1.0
+
+
+def flash_of(slab: Slab, surface: Array, pairs: Sequence[tuple[Array, Array]]) -> Flash:
+    """Return the temperatures of a contact; collective. `surface` has the rises [K] of the surface; `pairs` are maps of
+    a rise [K] and of the heat released there."""
+    sums = [(float((rise * heat).sum()), float(heat.sum())) for rise, heat in pairs]
+    warmed, whole = slab.sum(*(math.fsum(each) for each in zip(*sums, strict=True))) if sums else (0.0, 0.0)
+    highest = float(surface.max(initial=-math.inf))
+    if not whole > 0.0:
+        return Flash()
+    values = np.concatenate([rise[heat > 0.0] for rise, heat in pairs])
+    weights = np.concatenate([heat[heat > 0.0] for _, heat in pairs])
+    ends = float(values.max(initial=-math.inf)), -float(values.min(initial=math.inf))
+    highest, top, bottom = slab.reduce((), [highest, *ends])
+    low, span = -bottom, max(top + bottom, np.finfo(float).tiny)
+    counts = np.histogram((values - low) / span, SLIP_BINS, (0.0, 1.0), weights=weights)[0]
+    shares = np.concatenate([[0.0], np.cumsum(slab.sum(*counts))]) / whole
+    lower, upper = low + span * np.interp([0.25, 0.75], shares, np.linspace(0.0, 1.0, SLIP_BINS + 1))
+    return Flash(warmed / whole, highest, float(lower), float(upper))

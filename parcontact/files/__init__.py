@@ -1,0 +1,1 @@
+"""Output directories and the runs that fill them."""

@@ -1,0 +1,298 @@
+"""Maps in HDF5 files, written by MPI-IO if h5py supports it, else by the ranks in turn; files are the same either way.
+
+A file is laid out for all maps before the first is written, and root writes everything else. Writing rows of maps does
+not change the structure, so a killed run leaves a readable file. An error on one rank is raised on all as RunError."""
+
+import errno
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import h5py
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from ..errors import InputError, RunError
+from ..parallel import root
+from ..parallel.mpi import MPI
+from ..parallel.slab import Array, Slab
+from .files import without_mark
+
+T = TypeVar("T")
+MPI_IO = h5py.get_config().mpi  # else ranks act in turn
+FAILURES = (
+    OSError,
+    RuntimeError,
+    KeyError,
+    ValueError,
+    TypeError,
+    MemoryError,
+    OverflowError,
+)  # errors that h5py raises for damaged files
+TOO_LARGE = "file too large for its file system, or for the limit that ulimit -f shows"
+MEND = "restore the whole file, or move it away to continue without its maps"
+FULL = 1 << 16  # tuning: free space below which a failure of MPI-IO means a full disk [bytes]
+DOUBLE = 8  # size of a number in a map [bytes]
+RESERVE = 1 << 20  # tuning: space tested for data other than maps, as HDF5 crashes on a full disk [bytes]
+
+
+class Slice(NamedTuple):
+    """This rank's rows of one map in a dataset `name`, below the leading indices `at`."""
+
+    name: str
+    at: tuple[int, ...]
+    rows: Array
+
+
+def write_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
+    """Write the rows of every rank; collective."""
+    _move(path, slab, list(parts), True)
+
+
+def read_rows(path: Path, slab: Slab, parts: Iterable[Slice]) -> None:
+    """Read the rows of every rank into `part.rows`; collective."""
+    _move(path, slab, list(parts), False)
+
+
+def open_results(path: Path) -> h5py.File:
+    """Open a file of results for reading. Raises FileNotFoundError, and InputError if it is damaged or has links to
+    other files."""
+    try:
+        file = h5py.File(path, "r", locking=False)
+    except FileNotFoundError:
+        raise
+    except FAILURES as error:
+        raise InputError(f"{path} cannot be read: {reason(error)}; {MEND}") from error
+    for name in file:
+        if isinstance(file.get(name, getlink=True), h5py.ExternalLink) or _has_outside_data(file[name]):
+            file.close()
+            raise InputError(f"{path}: {name} is a link to another file, which is not followed; copy it into this file")
+    return file
+
+
+def _has_outside_data(item: Any) -> bool:
+    return isinstance(item, h5py.Dataset) and (item.is_virtual or item.external is not None)
+
+
+def sync(path: Path, slab: Slab) -> None:
+    """Flush the data of all ranks to disk; collective."""
+    problem = ""
+    try:
+        sync_one(path)
+    except OSError as error:
+        problem = f"cannot write {path}: {reason(error)}"
+    raise_first(slab, problem)
+
+
+def sync_one(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def write_on_root(slab: Slab, action: Callable[[], T], what: str, kind: type[Exception] = RunError) -> T:
+    """Return the result of `action` on root; collective. If it fails, raise `kind` on all ranks, with a message that
+    begins with `what`."""
+
+    def attempt() -> T:
+        try:
+            return action()
+        except FAILURES as error:
+            raise kind(f"{what}: {reason(error)}") from error
+
+    return root.on_root(slab.comm, attempt)
+
+
+def raise_first(slab: Slab, problem: str) -> None:
+    """Raise RunError with the first rank's problem on all ranks; collective."""
+    if problem := next((text for text in slab.from_all(problem) if text), ""):
+        raise RunError(problem)
+
+
+def reason(error: BaseException) -> str:
+    """Return the reason of a failure in a few words, without HDF5's stack of calls."""
+    text = str(error)
+    if found := re.search(r"error message = '([^']+)'", text):
+        return found.group(1)
+    if found := re.search(r"truncated file: eof = (\d+), sblock->base_addr = (\d+), stored_eof = (\d+)", text):
+        return f"it is incomplete: it has {int(found[1]) + int(found[2])} of {found[3]} bytes"
+    if "file signature not found" in text:
+        return "it is not an HDF5 file, or incomplete"
+    if isinstance(error, OSError) and error.strerror and error.errno:
+        return (
+            TOO_LARGE if error.errno == errno.EFBIG else error.strerror if error.filename else os.strerror(error.errno)
+        )
+    return text.splitlines()[0] if text else type(error).__name__
+
+
+def _move(path: Path, slab: Slab, parts: Sequence[Slice], writes: bool) -> None:
+    """Write or read rows at their places; collective. If a rank cannot take part, all ranks raise before any access."""
+    what, problem, places = f"cannot {'write' if writes else 'read'} {path}", "", list[int]()
+    try:
+        os.close(os.open(path, os.O_RDWR if writes else os.O_RDONLY))
+        with h5py.File(path, "r", locking=False) as file:
+            places = [_place(file[part.name], part, slab) for part in parts]
+    except OSError as error:
+        problem = f"cannot open {path}: {reason(error)}"
+    except FAILURES as error:
+        problem = f"{what}: {reason(error)}"
+    raise_first(slab, problem)
+    if problem := (_together if MPI_IO and slab.comm.size > 1 else _by_turns)(path, slab, parts, places, writes):
+        space = os.statvfs(path)
+        full = writes and space.f_bavail * space.f_frsize < FULL
+        problem = f"{what}: {os.strerror(errno.ENOSPC) if full else problem}"
+    raise_first(slab, problem)
+
+
+def _place(dataset: h5py.Dataset, part: Slice, slab: Slab) -> int:
+    """Return the offset of this rank's rows in the file [bytes]; raises ValueError for another type or shape."""
+    if (dataset.dtype, dataset.shape[-2:], slab.shape) != (part.rows.dtype, (slab.ny, slab.nx), part.rows.shape):
+        kinds = f"{dataset.dtype} {dataset.shape}; {part.rows.dtype} with rows {part.rows.shape} was expected"
+        raise ValueError(f"{part.name} is of {kinds}")
+    if not part.rows.size:
+        return 0
+    index = int(np.ravel_multi_index((*part.at, slab.rows.start, 0), dataset.shape))
+    return int(dataset.id.get_offset()) + index * dataset.dtype.itemsize
+
+
+def _by_turns(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[int], writes: bool) -> str:
+    """Access the file by one rank after the other; returns the failure on this rank, or ''."""
+    problem = ""
+    for rank in range(slab.comm.size):
+        if rank == slab.comm.rank and slab.shape[0]:
+            try:
+                with path.open("r+b") if writes else path.open("rb") as file:
+                    for part, place in zip(parts, places, strict=True):
+                        file.seek(place)
+                        if (file.write if writes else file.readinto)(part.rows.data.cast("B")) < part.rows.nbytes:
+                            raise ValueError("the file ends too early")
+            except FAILURES as error:
+                problem = reason(error)
+        slab.comm.Barrier()
+    return problem
+
+
+def _together(path: Path, slab: Slab, parts: Sequence[Slice], places: Sequence[int], writes: bool) -> str:
+    """Access the file by all ranks at once, by MPI-IO; returns the failure on this rank, or ''."""
+    problem = ""
+    try:
+        file = MPI.File.Open(slab.comm, str(path), MPI.MODE_RDWR if writes else MPI.MODE_RDONLY)
+    except MPI.Exception as error:
+        return str(error)
+    for part, place in zip(parts, places, strict=True):
+        try:
+            (file.Write_at_all if writes else file.Read_at_all)(place, part.rows)
+        except MPI.Exception as error:
+            problem = problem or str(error)
+    try:
+        file.Close()
+    except MPI.Exception as error:
+        problem = problem or str(error)
+    return problem
+
+
+# -- files laid out with places for all maps before the first is written -----------------------------------------------
+
+
+def lay_out(path: Path, slab: Slab, build: Callable[[h5py.File], None], size: int, block: int = 0) -> None:
+    """Create a new file on root with `build(file)`, after an empty `block` [bytes]; collective.
+
+    All maps take `size` bytes. The free space and the limit on file size for everything else are tested first.
+    """
+
+    def make() -> None:
+        try:
+            with path.open("xb") as probe:
+                probe.write(bytes(RESERVE))
+                probe.truncate(RESERVE + size)
+            with h5py.File(path, "w", userblock_size=block, locking=False) as file:
+                build(file)
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
+
+    write_on_root(slab, make, f"cannot create {without_mark(path)}")
+
+
+def change(path: Path, slab: Slab, act: Callable[[h5py.File], None]) -> None:
+    """Change attributes of fixed size on root by `act(file)`; collective."""
+
+    def apply() -> None:
+        with h5py.File(path, "r+", locking=False) as file:
+            act(file)
+
+    write_on_root(slab, apply, f"cannot write {path}")
+
+
+def put(path: Path, values: Mapping[str, NDArray[Any]]) -> None:
+    """Write whole datasets other than maps; root only."""
+    with h5py.File(path, "r", locking=False) as file:
+        places = {name: file[name].id.get_offset() for name in values}
+        types = {name: file[name].dtype for name in values}
+    with path.open("r+b") as target:
+        for name, numbers in values.items():
+            target.seek(places[name])
+            target.write(numbers.astype(types[name]).tobytes())
+
+
+def save_maps(path: Path, slab: Slab, index: int, maps: Mapping[str, Array], marks: Mapping[str, float]) -> None:
+    """Write the maps of an instant or point, and then its coordinates, the `marks`; collective."""
+    write_rows(
+        path, slab, [Slice(name, (index,), np.ascontiguousarray(rows, np.float64)) for name, rows in maps.items()]
+    )
+    set_marks(path, slab, index, marks)
+
+
+def set_marks(path: Path, slab: Slab, index: Any, marks: Mapping[str, Any]) -> None:
+    """Set coordinates of instants or points (NaN: maps are not saved); collective."""
+
+    def act() -> None:
+        with h5py.File(path, "r", locking=False) as file:
+            axes = {name: file[name][...] for name in marks}
+        for name, value in marks.items():
+            axes[name][index] = value
+        put(path, axes)
+
+    write_on_root(slab, act, f"cannot write {path}")
+
+
+def fixed(file: h5py.File, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> h5py.Dataset:
+    """Add a dataset with all its space allocated, so that writing does not change the structure of the file."""
+    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plist.set_layout(h5py.h5d.CONTIGUOUS)
+    plist.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    plist.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    plist.set_obj_track_times(False)  # files with equal data are equal
+    space = h5py.h5s.create_simple(shape)
+    group, _, leaf = name.rpartition("/")
+    parent = file.require_group(group) if group else file
+    h5py.h5d.create(parent.id, leaf.encode(), h5py.h5t.py_create(np.dtype(dtype)), space, dcpl=plist)
+    return parent[leaf]
+
+
+def add_coordinate(file: h5py.File, name: str, values: Array, unit: str) -> None:
+    dataset = fixed(file, name, values.shape, np.float64)
+    dataset[...] = values
+    dataset.make_scale(name)
+    dataset.attrs["units"] = unit
+
+
+def add_maps(
+    file: h5py.File, slab: Slab, size: tuple[float, float], units: Mapping[str, str], leading: Sequence[str]
+) -> None:
+    """Add coordinates x and y [m] of a box of this `size`, and maps with `units` by name, of shape (n, y, x).
+
+    `leading` are the existing coordinates along the first axis.
+    """
+    for axis, length, points in zip("xy", size, (slab.nx, slab.ny), strict=True):
+        add_coordinate(file, axis, np.arange(points) * (length / points), "m")
+    for name, unit in units.items():
+        dataset = fixed(file, name, (len(file[leading[0]]), slab.ny, slab.nx), np.float64)
+        dataset.attrs["units"] = unit
+        for dimension, axes in enumerate((leading, "y", "x")):
+            for axis in axes:
+                dataset.dims[dimension].attach_scale(file[axis])

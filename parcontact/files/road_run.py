@@ -1,0 +1,199 @@
+"""Run of a job in bands with a history, in its output directory: marches in rounds, then all rows at once.
+
+Rows of an instant exist when the coarsest band is done. Until then finished marches are kept in a file
+(`contact_store`), so that a run that was stopped or killed goes on with the next march. `--until T` ends the history at
+T: the marches of a longer history are others."""
+
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ..bands.road_history import RoadHistory, RungTask
+from ..bands.road_sliding import TABLE
+from ..columns import BANDS_OVER_TIME, added_by, names_of, to_csv
+from ..errors import InputError
+from ..job import Job, listing
+from ..job.history import reached
+from ..march.budget import SHOWN
+from ..parallel.root import Signals, on_root
+from ..parallel.slab import Slab
+from ..streams import Bar
+from . import files, hdf5, provenance, recorder, run, tables
+from .directory import ADVICE, Directory
+from .recorder import HEAD, Console, StepRow, step_line
+from .restart import SAME
+from .run import DONE, STOPPED_EARLY, Options, Watch
+from .tables import Claim
+
+MEASURES = "measures.csv"
+RENEWED = "a run in bands goes on by itself, from checkpoint/marches.json in its output directory"
+
+
+class _StopError(Exception):
+    """The reason to stop early, raised between marches on all ranks."""
+
+
+def run_history(job: Job, slab: Slab, options: Options) -> int:
+    """Run a job, or go on with it; collective. Return the exit code. Nothing is written before the job is checked."""
+    if options.restart not in ("auto", "never"):
+        raise InputError(f"--restart: auto or never was expected for a job in bands, got {options.restart}: {RENEWED}")
+    job = ended(job, options.until)
+    directory = Directory(job.output.directory, slab)
+    with directory.claimed():
+        plain = listing.plain_job(job) if slab.root else {}
+        goes_on, done = _look(directory, job, plain, options.restart == "never")
+        if done:
+            if slab.root and not options.quiet:
+                print(f"{directory.path}: {done}", flush=True)
+            return DONE
+        road = RoadHistory(job, slab)
+        doubts = road.doubts(())
+        directory.make(job.path, job.resolved(), Claim({**tables.kept(plain), "history": plain.get("history")}))
+        if not goes_on:
+            directory.clear()
+        console = Console(directory.path / "run.log", options.quiet) if slab.root else Console(speaks=False)
+        try:
+            for text in provenance.lines(slab.comm) if slab.root else ():
+                console.log(text)
+            for doubt in doubts:
+                console.warn(str(doubt), shown=options.shows(doubt))
+            return _Run(road, directory, console, options).go()
+        finally:
+            console.close()
+
+
+def ended(job: Job, until: float | None) -> Job:
+    """Return a job whose history ends at `until` [s]. Raises InputError for a later time than its end."""
+    if until is None:
+        return job
+    kept, start = [], 0.0
+    for stage in job.history:
+        left = until - start
+        if stage.seconds and reached(left, stage.seconds):
+            left = stage.seconds
+        if left > 0.0 or not stage.seconds:
+            shorter = {} if left >= stage.seconds else {"duration": left, "distance": None}
+            kept.append(stage.model_copy(update=shorter))
+        start += stage.seconds
+    if not reached(start, until):
+        raise InputError(f"--until {until:g} is beyond the end of the history, t = {start:g} s, in a job in bands")
+    return job.model_copy(update={"history": tuple(kept)})
+
+
+def _look(directory: Directory, job: Job, plain: dict[str, Any], afresh: bool) -> tuple[bool, str]:
+    """Return whether a run of the same job is to go on, and why there is nothing to do, or ''; collective. Raises
+    InputError for a directory of another job."""
+    directory.refuse_foreign(job.path, plain, afresh)
+
+    def look() -> tuple[bool, str]:
+        claim = directory.claim
+        if afresh or claim is None:
+            return False, ""
+        if different := tables.list_differences(tables.differences(claim.job, plain, SAME)):
+            raise InputError(f"{directory.path} has a run of another job: {different}; {ADVICE}")
+        if claim.finished is None or claim.job.get("history") != plain["history"]:
+            return True, ""
+        if not all((directory.path / name).exists() for name in (MEASURES, TABLE)):
+            return False, ""
+        return True, f"finished before, at t = {claim.finished[1]:g} s (--restart never: run it again)"
+
+    return on_root(directory.slab.comm, look)
+
+
+class _Run:
+    """Marches of a road with their files; methods are collective."""
+
+    def __init__(self, road: RoadHistory, directory: Directory, console: Console, options: Options) -> None:
+        self.road, self.directory, self.console, self.options = road, directory, console, options
+        self.slab, self.job = road.slab, road.job
+        each = [len(tasks) for tasks in road.tasks()]
+        self._ends, self._made, self._calls = np.cumsum(each), 0, 0
+        self._bar = Bar(sum(each), "marches of bands", "march", self.slab.root and not options.quiet)
+        self._began = time.monotonic()
+
+    def go(self) -> int:
+        """Make all marches, then write the results; return the exit code."""
+        ranks = "1 rank" if self.slab.comm.size == 1 else f"{self.slab.comm.size} ranks"
+        self._say(
+            f"{self.job.title or self.job.path.stem}: {self._ends[-1]} marches of {len(self._ends)} bands on {ranks}"
+        )
+        for text in self.road.notes():
+            self._say(text)
+        self.road.keep_in(self.directory.path)
+        limit = run.limit_time(self.options.wall) if self.slab.root else None
+        try:
+            with Signals().noted() as signals:
+                rules = self.job.checkpoint, self.directory.stop_file, signals, limit, self.options.sweep_stop_file
+                self.watch = Watch(self.slab, *rules)
+                self.road.march(self._after)
+        except _StopError as why:
+            text = f"stopped after {self._made} of {self._ends[-1]} marches: {why}; run again to go on"
+            self._say(text)
+            return STOPPED_EARLY
+        finally:
+            self._bar.close()
+        rows = hdf5.write_on_root(self.slab, self._write, f"cannot write {self.directory.path / MEASURES}")
+        self.road.forget()
+        for text in sum_up_errors(rows):
+            self._say(text)
+        self._say(f"done: results in {self.directory.path}")
+        return DONE
+
+    def _after(self, task: RungTask, made: int, known: int) -> None:
+        """Count a round of marches, of which some were `known`; raise _StopError to stop."""
+        self._made += made
+        for _ in range(made):
+            self._bar.step()
+        if self._made in self._ends:
+            low, high = (f"{length:.3g}" for length in self.road.cut.wavelengths(task.band)[::-1])
+            passed = time.monotonic() - self._began
+            number = self.road.cut.count - task.band
+            self._say(f"band {number} of {len(self._ends)}, waves from {low} to {high} m, is done after {passed:.3g} s")
+        verdict = self.watch.decide(self._made, known < made)
+        if verdict.stop and self._made < self._ends[-1]:
+            raise _StopError(verdict.stop)
+
+    def _say(self, text: str) -> None:
+        self.console.log(text)
+        if self.slab.root and not self.options.quiet:
+            self._bar.print(text)
+
+    def _write(self) -> list[StepRow]:
+        """Write both tables, and return the rows; root only."""
+        self._say(HEAD)
+        rows, bands = list[StepRow](), list[list[float]]()
+        for row, of_bands in self.road.records():
+            rows.append(row)
+            bands += of_bands
+            self._say(step_line(row))
+        added = added_by("interface") if self.job.section("interface") is not None else ()
+        of_rows = (recorder.row_numbers(row if added else replace(row, added=()), 0) for row in rows)
+        path = self.directory.path
+        files.replace_file(path / TABLE, to_csv(names_of(BANDS_OVER_TIME), bands))
+        files.replace_file(path / MEASURES, to_csv(recorder.columns(0, added), of_rows))
+        self.directory.note(saved=True, finished=(rows[-1].step, rows[-1].time))
+        return rows
+
+
+def sum_up_errors(rows: Sequence[StepRow]) -> Iterable[str]:
+    """Yield sentences on the errors of friction and area of rows that slide: the mean over the rows, and the largest
+    with its parts."""
+    slides = [row for before, row in pairwise(rows) if row.distance > before.distance] or list(rows)
+    budgets = [(row, row.errors) for row in slides if row.errors is not None]
+    for name, known in (
+        ("friction", [(row, errors.friction) for row, errors in budgets if errors.friction is not None]),
+        ("contact area", [(row, errors.area) for row, errors in budgets]),
+    ):
+        if not known:
+            continue
+        row, worst = max(known, key=lambda one: one[1].total)
+        parts = ", ".join(f"{SHOWN[part]} {100 * value:.2g} %" for part, value in worst._asdict().items() if value)
+        mean = sum(one.total for _, one in known) / len(known)
+        yield (
+            f"error of {name}: {100 * mean:.2g} % on average, at most {100 * worst.total:.2g} % "
+            f"(t = {row.time:.4g} s, slip {row.distance:.3g} m: {parts})"
+        )

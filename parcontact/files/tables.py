@@ -1,0 +1,466 @@
+"""Tables and markers of an output directory: what is there, and reading it.
+
+Tables of numbers in csv files: reading, also while they grow, and appending.
+
+The marker of an output directory: the verbs that wrote it, their jobs and run ids.
+
+Only files that the marker or a sealed checkpoint identifies are replaced; others are refused or renamed.
+
+The points of a friction curve: requested ones, and those missing in its table.
+
+steady.lost.json: points of a friction curve that could not be solved, with the reasons.
+
+Stop files: files that make running programs stop.
+
+Reading of tables of results for display; incomplete tables are refused.
+
+A growing table must have all rows that the marker or a checkpoint states. A table written at once must end with a whole
+line.
+"""
+
+import json
+import math
+import os
+import secrets
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from itertools import islice, product
+from pathlib import Path
+from typing import Any, NamedTuple, NoReturn
+
+from ..errors import InputError
+from ..printed import quantity
+from . import files
+
+MEND = "correct the line, or move the file away to continue without its rows"
+
+
+class GrowingTable:
+    """A csv table that grows while others read it; a last line without newline is incomplete."""
+
+    def __init__(self, path: Path, names: Sequence[str]) -> None:
+        """Open the file to append, or create it with the names of the columns; raises OSError."""
+        self.path = path
+        self._file = files.open_to_append(path)
+        if self._file.tell() == 0:
+            self.append(names)
+
+    def append(self, cells: Sequence[str]) -> None:
+        """Append a line; after an error the file is unchanged."""
+        rest, size = memoryview(f"{','.join(cells)}\n".encode()), self._file.tell()
+        try:
+            while rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError:
+            with suppress(OSError):
+                self._file.truncate(size)
+            raise
+
+    def sync(self) -> None:
+        """Flush all lines to disk."""
+        os.fsync(self._file.fileno())
+
+    def close(self) -> None:
+        """Close the file; raises nothing."""
+        with suppress(OSError):
+            self._file.close()
+
+
+def whole_lines(path: Path) -> Iterator[list[str]]:
+    """Yield the cells of each whole line, first the names of the columns; raises InputError for unequal lengths."""
+    count = 0
+    with path.open("rb") as file:
+        for number, line in enumerate(file, 1):
+            if not line.endswith(b"\n"):
+                return
+            cells = line.decode(errors="replace").rstrip("\r\n").split(",")
+            if len(cells) != (count or len(cells)):
+                raise InputError(f"{path}, line {number}, has {len(cells)} values instead of {count}; {MEND}")
+            count = len(cells)
+            yield cells
+
+
+class Columns(dict[str, list[float]]):
+    """Columns by name; a missing column raises InputError."""
+
+    def __init__(self, path: Path, found: Iterable[tuple[str, list[float]]]) -> None:
+        super().__init__(found)
+        self.path = path
+
+    def __missing__(self, name: str) -> NoReturn:
+        raise InputError(f"{self.path}, line 1, has no column {name}; correct it, or move the file away")
+
+
+def read_columns(path: Path) -> Columns:
+    """Read the columns of a table by name, also of a growing one; empty cells are NaN.
+
+    Raises InputError with the line for anything but numbers.
+    """
+    rows = whole_lines(path)
+    names = next(rows, [])
+    if not names:
+        raise InputError(f"{path} is empty; a line with the names of columns was expected")
+    series: list[list[float]] = [[] for _ in names]
+    for number, texts in enumerate(rows, 2):
+        for name, text, values in zip(names, texts, series, strict=True):
+            try:
+                values.append(float(text or "nan"))
+            except ValueError:
+                raise InputError(f"{path}, line {number}: {name} is {text[:20]!r}, not a number; {MEND}") from None
+    return Columns(path, zip(names, series, strict=True))
+
+
+MARKER = ".parcontact"
+FORMAT = 1
+VERBS = {"run": "a run", "steady": "a friction curve", "study": "a study"}
+# sections in which all jobs of a directory must agree
+SCENE = ("grid", "bands", "surface", "material", "body", "counterbody")
+SHOWN = 4  # most differences of two jobs in a message
+EFFECTS = (
+    "thermal",
+    "interface",
+    "adhesion.work",
+    "adhesion.range",
+    "adhesion.law",
+    *(f"leakage.{key}" for key in ("load", "pressures", "ambient", "fluid")),
+)  # keys that change completed steps
+SECTIONS = (
+    *SCENE,
+    "thermal",
+    "interface",
+    "adhesion",
+    "leakage",
+    "initial",
+    "numerics",
+    "steady",
+)  # sections of a job that a marker keeps
+
+
+@dataclass(frozen=True)
+class Claim:
+    """The claim of a verb: the `id` of its run, its job, and whether it `saved` a checkpoint; the step and time (of a
+    curve: the number of points) after which it `finished`; how surfaces `detached`."""
+
+    job: dict[str, Any]
+    id: str = field(default_factory=lambda: secrets.token_hex(16))
+    saved: bool = False
+    finished: tuple[int, float] | None = None
+    detached: str = ""
+
+
+def kept(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the sections of a job (plain data) that a marker keeps."""
+    return {name: data[name] for name in SECTIONS if name in data}
+
+
+def read_claims(directory: Path) -> dict[str, Claim]:
+    """Read the claims of a directory by verb, none without a marker; raises OSError or ValueError."""
+    path = directory / MARKER
+    try:
+        text = path.read_bytes()
+    except FileNotFoundError:
+        return {}
+    try:
+        data = json.loads(text)
+        newer = data.pop("format") > FORMAT
+        if not newer:
+            return {verb: Claim(**{**claim, "finished": _pair(claim["finished"])}) for verb, claim in data.items()}
+    except (ValueError, TypeError, KeyError, AttributeError):
+        raise ValueError(f"{path} is damaged") from None
+    raise ValueError(f"{path} was written by a newer parcontact")
+
+
+def sound_claims(directory: Path) -> dict[str, Claim]:
+    """Return the claims of a directory; raises InputError for an unreadable marker."""
+    try:
+        return read_claims(directory)
+    except (OSError, ValueError) as error:
+        raise InputError(str(error)) from error
+
+
+def claim_of_run(directory: Path) -> Claim | None:
+    """Return the claim of the run in a directory, or None; raises InputError for an unreadable marker."""
+    return sound_claims(directory).get("run")
+
+
+def detached(directory: Path) -> str:
+    """Return how the surfaces of a run detached for good, '' if they did not; raises InputError."""
+    claim = claim_of_run(directory)
+    return "" if claim is None else claim.detached
+
+
+def _pair(value: Sequence[float] | None) -> tuple[int, float] | None:
+    return None if value is None else (int(value[0]), float(value[1]))
+
+
+def write_claims(directory: Path, claims: Mapping[str, Claim]) -> None:
+    data = {"format": FORMAT, **{verb: asdict(claim) for verb, claim in claims.items()}}
+    files.replace_file(directory / MARKER, json.dumps(data, indent=1) + "\n")
+
+
+def differences(then: Mapping[str, Any], now: Mapping[str, Any], names: Sequence[str]) -> Iterator[str]:
+    """Yield the differences of two jobs (plain data) in the named sections (`grid`) or keys (`numerics.kernel`), with
+    both values."""
+    old, new = dict(_leaves("", then)), dict(_leaves("", now))
+    for name in names:
+        for key in (key for key in {**old, **new} if f"{key}.".startswith(f"{name}.")):
+            if old.get(key) != new.get(key):
+                yield f"{key} was {old.get(key)}, is {new.get(key)}"
+
+
+def list_differences(differences: Iterator[str]) -> str:
+    """Return the first differences and the number of further ones, in one line."""
+    first = list(islice(differences, SHOWN))
+    more = sum(1 for _ in differences)
+    return "; ".join(first) + (f"; and {more} more" if more else "")
+
+
+def keep_mesh(job: Mapping[str, Any], different: str) -> str:
+    """Return advice to keep the mesh of a job (plain data) if it is among the differences, else ''."""
+    if "grid.points" not in different:
+        return ""
+    points = str(job["grid"]["points"]).replace(" ", "")
+    return f"give --set grid.points={points} to keep its mesh, or "
+
+
+def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the values in nested mappings and lists by key, such as `surface.0.seed`."""
+    if isinstance(value, list) and value and all(isinstance(part, dict) for part in value):
+        value = dict(enumerate(value))
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _leaves(f"{name}.{key}" if name else str(key), inner)
+    else:
+        yield name, value
+
+
+LOG = "steady.log"  # log of a friction curve, in the directory of its table
+CLOSE = 1e-6  # rounding: relative difference below which speeds and pressures are the same
+
+Place = tuple[float, float, float]  # speed [m/s], mean pressure [Pa], temperature [deg C]
+
+
+class Wanted(NamedTuple):
+    """A steady state: speed [m/s], mean pressure [Pa], temperature [deg C] (NaN: the temperature of the material)."""
+
+    speed: float
+    pressure: float
+    temperature: float = math.nan
+
+    def __str__(self) -> str:
+        heated = "" if math.isnan(self.temperature) else f" at {self.temperature:g} C"
+        return f"{self.speed:.4g} m/s under {quantity(self.pressure, 'Pa', 4)}{heated}"
+
+
+def requested_points(
+    speeds: Sequence[float], pressures: Sequence[float], temperatures: Sequence[float] = ()
+) -> list[Wanted]:
+    """Return all combinations of speeds, pressures and temperatures without repetition, in the order of solution."""
+    order = product(temperatures or (math.nan,), pressures, speeds)
+    return list(dict.fromkeys(Wanted(speed, pressure, temperature) for temperature, pressure, speed in order))
+
+
+def of_table(columns: Mapping[str, Sequence[float]]) -> list[Wanted]:
+    """Return the points in the columns of a table."""
+    speeds = columns["velocity"]
+    degrees = columns.get("temperature", [math.nan] * len(speeds))
+    return list(map(Wanted, speeds, columns["pressure"], degrees))
+
+
+def lacking_points(points: Sequence[Place], there: Sequence[Place]) -> list[int]:
+    """Return the indices of `points` that are not in `there`."""
+    return [number for number, point in enumerate(points) if not any(_same(point, other) for other in there)]
+
+
+def _same(one: Place, other: Place) -> bool:
+    """Return True if two points are the same; NaN temperatures are equal."""
+    pairs = zip(one, other, strict=True)
+    return all(math.isclose(a, b, rel_tol=CLOSE) or (math.isnan(a) and math.isnan(b)) for a, b in pairs)
+
+
+FILE = "steady.lost.json"
+PLACE = ("velocity", "pressure", "temperature")
+
+
+class LostPoint(NamedTuple):
+    """A point that could not be solved, and the reason."""
+
+    at: Wanted
+    why: str
+
+
+def read(directory: Path) -> list[LostPoint]:
+    """Return the lost points of a curve, without those that were solved later; raises InputError for a damaged file."""
+    path = directory / FILE
+    if not path.is_file():
+        return []
+    try:
+        found = [
+            LostPoint(Wanted(one["velocity"], one["pressure"], one.get("temperature", math.nan)), str(one["why"]))
+            for one in json.loads(path.read_text(encoding="utf-8"))
+        ]
+        return without(found, of_table(read_columns(directory / "steady.csv")))
+    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        raise InputError(f"{path} cannot be read ({error}); move it away") from None
+
+
+def without(lost: Sequence[LostPoint], solved: Sequence[Wanted]) -> list[LostPoint]:
+    """Return the points that are not among the solved ones."""
+    return [lost[k] for k in lacking_points([one.at for one in lost], solved)]
+
+
+def write(directory: Path, lost: Sequence[LostPoint]) -> None:
+    """Write the lost points of a curve, or remove the file if there is none; raises OSError."""
+    if not lost:
+        (directory / FILE).unlink(missing_ok=True)
+        return
+    data = [dict(zip((*PLACE, "why"), (*at, why), strict=True)) for at, why in lost]
+    known = [{name: value for name, value in one.items() if value == value} for one in data]  # without NaN
+    files.replace_file(directory / FILE, json.dumps(known, indent=1) + "\n")
+
+
+def name_lost(directory: Path) -> str:
+    """Return a text on the lost points of a curve: "13 of 15 points, without 10 m/s under 200 kPa at 20, 60 C: why"; ''
+    if there is none. Raises InputError for a damaged file."""
+    if not (lost := read(directory)):
+        return ""
+    solved = len(read_columns(directory / "steady.csv")["velocity"])
+    reasons: dict[str, list[Wanted]] = {}
+    for at, why in lost:
+        reasons.setdefault(why.split("; ")[0].split(". ")[0], []).append(at)
+    parts = [f"{_shorten(list(_states(places)), ', ')}: {why}" for why, places in reasons.items()]
+    return f"{solved} of {solved + len(lost)} points, without {_shorten(parts, '; without ')}"
+
+
+def _states(points: Sequence[Wanted]) -> Iterator[str]:
+    """Yield each velocity and pressure as text, with all its temperatures."""
+    warm: dict[Wanted, list[str]] = {}
+    for at in points:
+        warm.setdefault(Wanted(at.speed, at.pressure), []).append(f"{at.temperature:g}")
+    for state, degrees in warm.items():
+        yield str(state) if degrees == ["nan"] else f"{state} at {', '.join(degrees)} C"
+
+
+def _shorten(texts: Sequence[str], mark: str) -> str:
+    more = f" and {len(texts) - SHOWN} more" if len(texts) > SHOWN else ""
+    return mark.join(texts[:SHOWN]) + more
+
+
+NAME = "stop"  # name of the stop file in the output directory of a run or a sweep
+
+
+@dataclass(frozen=True)
+class StopFile:
+    """A stop file shared by all programs of a sweep, which none of them removes.
+
+    It stops programs that run when it is created or touched; a file of time `before` [ns] has no effect. By a second
+    file, `own`, the ranks of one program stop each other.
+    """
+
+    path: Path
+    before: int
+    own: Path
+
+    @classmethod
+    def from_now_on(cls, path: Path) -> "StopFile":
+        """Return a stop file that has an effect if it is created or touched after this call."""
+        return cls(path, _touched(path), path.with_name(f".{path.name}-{secrets.token_hex(8)}"))
+
+    @property
+    def asks(self) -> bool:
+        return self.own.exists() or _touched(self.path) not in (0, self.before)
+
+    def ask_own(self) -> None:
+        """Stop the other ranks of this program; if the file cannot be written, they end with their cases."""
+        with suppress(OSError):
+            self.own.touch()
+
+    def forget_own(self) -> None:
+        """Remove the file `own`, after all ranks have ended."""
+        with suppress(OSError):
+            self.own.unlink(missing_ok=True)
+
+
+def remove(path: Path) -> str:
+    """Remove a stop file; returns a message if this fails, or ''."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        return f"stopped by {path}, which cannot be removed: {os.strerror(error.errno or 0)}; remove it"
+    return ""
+
+
+def _touched(path: Path) -> int:
+    """Return the time of the last change of a file [ns], 0 without a file."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0
+
+
+RUN, CURVE = "measures.csv", "steady.csv"
+GROWING = (RUN, CURVE, "bands.csv", "steady_waves.csv")
+THEORY_FILE, OF_THEORY = "theory.csv", ("time", "distance", "friction", "contact_area")
+MEND_CUT = "correct it, or move it away"
+
+
+def read_results(path: Path) -> Columns:
+    """Return the columns of a table of results by name. Raises InputError if it is damaged, foreign or incomplete."""
+    lasts = list(_find_ends(path))  # read before the table, which may grow
+    columns = read_columns(path)
+    if path.name not in GROWING:
+        refuse_cut(path)
+    if path.name == THEORY_FILE and (without := [name for name in OF_THEORY if name not in columns]):
+        raise InputError(
+            f"{path} has no column {', '.join(without)}: it was not written by `parcontact theory`; move it away"
+        )
+    for end, what in lasts:
+        count = _last_step(columns) if path.name == RUN else len(columns["velocity"])
+        if count < end:
+            raise InputError(f"{path} is damaged: {what}, and the table lacks rows; {MEND_CUT}")
+    if path.name == "bands.csv" and "velocity" in columns and (curve := path.with_name(CURVE)).is_file():
+        points = [of_table(one) for one in (read_columns(curve), columns)]
+        if lacking := lacking_points(*points):
+            raise InputError(f"{path} is damaged: it lacks {points[0][lacking[0]]}, which {CURVE} has; {MEND_CUT}")
+    return columns
+
+
+def refuse_cut(path: Path) -> None:
+    """Raise InputError for a text that does not end with a whole line."""
+    if not path.read_bytes().endswith(b"\n"):
+        raise InputError(f"{path} is incomplete: it does not end with a whole line; write it again, or move it away")
+
+
+def find_lost_rows(directory: Path) -> str:
+    """Return a message if the table of a finished run is damaged or lacks rows, or ''; raises InputError for an
+    unreadable marker."""
+    claim = claim_of_run(directory)
+    if claim is None or claim.finished is None:
+        return ""
+    with suppress(InputError, OSError):
+        read_results(directory / RUN)
+        return ""
+    return (
+        f"{directory / RUN} is damaged: its run has finished with step {claim.finished[0]}, and the table lacks rows; "
+        f"correct it, or move {directory} away to run the job again"
+    )
+
+
+def _last_step(columns: Columns) -> float:
+    steps = columns["step"]
+    return steps[-1] if steps else -1.0
+
+
+def _find_ends(path: Path) -> Iterator[tuple[float, str]]:
+    """Yield the last step, or the number of points, that a table must have, with the reason. Raises InputError for an
+    unreadable marker."""
+    verb = {RUN: "run", CURVE: "steady"}.get(path.name, "")
+    claim = sound_claims(path.parent).get(verb) if verb else None
+    if claim is not None and claim.finished is not None:
+        number = claim.finished[0]
+        yield number, f"its run has finished with step {number}" if verb == "run" else f"its curve has {number} points"
+    if verb == "run":
+        saved = [int(one.stem[5:]) for one in path.parent.glob("checkpoint/step-*.h5") if one.stem[5:].isdecimal()]
+        if saved:
+            yield max(saved), f"its run has a checkpoint after step {max(saved)}"

@@ -1,0 +1,359 @@
+"""Suggestions of settings, for warnings and messages.
+
+Rules for a job as a whole, and warnings about settings that are allowed but probably not meant.
+
+Cells that the shortest wave of a surface needs along and across the sliding direction.
+
+The mesh causes two kinds of errors of friction and contact area, both at edges of contact. Systematic errors grow with
+the phase of the modulus, because the pressure at one edge of a spot is steeper than at the other. Random errors come
+from the positions of edges between points: with a share A in contact, the relative standard deviation at one place is
+((1 - A)/A)^0.5, and a box with N shortest waves along a side has N^2 places. `friction_error` and `area_error` add
+both; random errors, and the scatter of systematic ones between surfaces, count SURE standard deviations.
+
+The constants were fitted with share and phase as guessed by `mesh.contact_guess`, to steady states of rough surfaces of
+1 to 100 % contact with 12 or 24 shortest waves along a side: for friction 36 states on about 110 meshes each, for the
+area 24 states on about 40 meshes (maximum likelihood), with references of 160 cells per shortest wave. Fewer waves
+count as 12. `scripts/chosen_mesh.py` tests the chosen meshes on other surfaces. Along a direction (x, y) a cell is
+hypot(x dx, y dy) long. Without sliding both axes count as along the sliding direction.
+
+Warnings about the resolution of a job: mesh, box, and time steps; `meaning.py` has physics, `size.py` memory.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import product
+from typing import Any, NamedTuple, Protocol
+
+from ..doubts import Doubt
+from ..printed import per_cent
+from .calculation import Accuracy, Body, Grid, Numerics, Output
+from .materials import AnyMaterial
+from .stages import AUTO, GeometricStep, Initial, Stage, Steady
+from .surfaces import Rough
+
+
+class Sections(Protocol):
+    """The sections of a job that warnings need."""
+
+    grid: Grid
+    surface: tuple[Any, ...]
+    material: AnyMaterial
+    initial: Initial
+    history: tuple[Stage, ...]
+    numerics: Numerics
+    output: Output
+    steady: Steady | None
+    body: Body | None
+
+    @property
+    def sheared_first(self) -> bool:
+        """Return True if an effect shears the contact before it slides."""
+
+    def asked(self, name: str) -> list[Any]:
+        """Return what the effects whose sections are given have under a name."""
+
+
+Vector = tuple[float, float]
+
+SURE = 1.2  # accuracy: standard deviations within which nine of ten surfaces lie
+FEW = 12.0  # accuracy: smallest number of shortest waves along a side in the fits
+CELLS_PER_WAVE = 8  # accuracy: square cells per shortest wave for an error of 1 %
+FRICTION_ORDER, AREA_ORDER = 2.5, 1.6  # accuracy: order of convergence of the error in the number of cells
+FRICTION_ASIDE, FRICTION_ASIDE_ORDER = 3e-3, 2.5  # accuracy: error with four cells across the sliding, and its order
+AREA_ASIDE, AREA_ASIDE_ORDER = 0.0148, 1.1  # accuracy: the same for the area
+ASIDE = 0.25  # accuracy: component of a unit vector along an axis, up to which the axis is across the sliding
+LEAST_CELLS = 2.1  # accuracy: least cells per shortest wave; a grid has no waves shorter than two cells
+LONG = 1.2  # accuracy: ratio of the sides of a cell up to which it counts as square
+LONGEST = 4.0  # accuracy: largest ratio of the sides of a cell in the fits
+MOST_CELLS = 400.0  # tuning: most cells per shortest wave
+MULTIPLE = 16  # tuning: divisor of the number of points along a side, for coarser grids to start from
+SAME = 1e-9  # rounding: relative difference below which numbers are the same
+
+
+class Guess(NamedTuple):
+    """A guess before the solution: the share in contact, the phase of the modulus at the frequency of edges [units of
+    90 degrees], the number of shortest waves along a side of the box, and the slowness of sliding, `slow`, 0 to 1."""
+
+    share: float
+    phase: float
+    waves: float
+    slow: float = 0.0
+
+    @property
+    def spread(self) -> float:
+        """Return the relative standard deviation of the contact at one place."""
+        return math.sqrt((1.0 - self.share) / self.share)
+
+    @property
+    def few(self) -> float:
+        """Return the ratio of random errors to the random errors in a box of FEW waves."""
+        return FEW / max(self.waves, FEW)
+
+
+def friction_error(c: float, across: float, guess: Guess) -> float:
+    """Return the relative error of friction that nine of ten surfaces keep with `c` cells per shortest wave along the
+    sliding and `across` cells across it. Slow sliding adds the power lost in waves shorter than the cells; the last
+    term matters for few cells only."""
+    along = (4.0 / c) ** 1.5
+    steep = 0.016 * (1.0 - math.exp(-guess.phase / 1.5)) - 0.0004
+    counted = math.hypot((4.0 / c) ** 2.15, 0.13 * (4.0 / across) ** 2.7)
+    chance = guess.few * 0.0034 * (1.0 + 4.6 * guess.phase) * counted
+    unknown = SURE * math.hypot(chance, 0.007 * guess.phase * along)
+    return guess.spread * (abs(steep) * along + unknown + 0.09 * guess.slow * 4.0 / c + 0.008 * (4.0 / c) ** 4)
+
+
+def area_error(c: float, across: float, guess: Guess) -> float:
+    """Return the relative error of the corrected contact area, as `friction_error`. The correction is too large for
+    elastic bodies, and too small at edges across the sliding of viscoelastic bodies."""
+    along, aside = 4.0 / c, 4.0 / across
+    known = 0.067 * guess.phase * along - 0.005 * (along + aside)
+    chance = guess.few * 0.0078 * math.hypot(along**1.2, 0.7 * aside**1.6)
+    return guess.spread**0.8 * abs(known) + SURE * guess.spread * chance
+
+
+def one_cell(stage: Stage, grid: Grid) -> float:
+    """Return the time in which the surface slides by one cell [s]."""
+    return along(stage.velocity, stage.speed, grid) / stage.speed
+
+
+def along(way: Vector, length: float, grid: Grid) -> float:
+    """Return the length of a cell [m] along the vector `way` of the given length."""
+    return math.hypot(way[0] / length * grid.dx, way[1] / length * grid.dy)
+
+
+def has_wave(grid: Grid, shortest: float, longest: float) -> bool:
+    """Return True if a grid has a wave between the `shortest` and the `longest` wavelength [m]."""
+    least, most = (1 - SAME) / longest, (1 - SAME) / shortest
+    rows = (grid.ny - 1) // 2
+    for column in range(min(grid.nx // 2, int(most * grid.lx)) + 1):
+        rest = math.sqrt(max(least**2 - (column / grid.lx) ** 2, 0.0))
+        row = max(math.ceil(rest * grid.ly), 0 if column else 1)
+        if row <= rows and math.hypot(column / grid.lx, row / grid.ly) < most:
+            return True
+    return False
+
+
+def cells_per_wave(accuracy: float) -> int:
+    """Return the cells per shortest wave of a rough surface along the sliding, for friction."""
+    return max(2, math.ceil(CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / FRICTION_ORDER) * (1 - SAME)))
+
+
+def cells_across(accuracy: float) -> float:
+    """Return the cells per shortest wave across the sliding, for friction."""
+    return max(LEAST_CELLS, 4.0 * (FRICTION_ASIDE / accuracy) ** (1.0 / FRICTION_ASIDE_ORDER))
+
+
+def cells_for_area(accuracy: float) -> float:
+    """Return the cells per shortest wave along the sliding, for the contact area."""
+    return max(LEAST_CELLS, CELLS_PER_WAVE * (1e-2 / accuracy) ** (1.0 / AREA_ORDER))
+
+
+def needed(axis: int, directions: Sequence[Vector], asked: Accuracy) -> tuple[float, float]:
+    """Return the cells per shortest wave along an axis, for friction and for the contact area, of a surface that slides
+    along `directions` (unit vectors); without sliding both are for the area."""
+    if not directions:
+        return cells_for_area(asked.area), cells_for_area(asked.area)
+    if any(abs(way[axis]) > ASIDE for way in directions):
+        return cells_per_wave(asked.friction), cells_for_area(asked.area)
+    for_area = max(LEAST_CELLS, 4.0 * (AREA_ASIDE / asked.area) ** (1.0 / AREA_ASIDE_ORDER))
+    return cells_across(asked.friction), for_area
+
+
+def directions_of(history: Sequence[Stage | None], initial: Initial, steady: Steady | None) -> list[Vector]:
+    """Return the different sliding directions of a job (unit vectors); opposite directions count once."""
+    ways = [stage.velocity for stage in history if stage is not None and stage.speed] + [initial.velocity]
+    found = {_unit(way) for way in ways if any(way)} | ({_unit(steady.unit_direction)} if steady else set())
+    return sorted(found)
+
+
+def _unit(way: Vector) -> Vector:
+    """Return the rounded unit vector along `way` or against it that points to +x, else to +y."""
+    sign = math.copysign(1.0, way[0] or way[1]) / math.hypot(*way)
+    return round(sign * way[0], 9) + 0.0, round(sign * way[1], 9) + 0.0  # no -0
+
+
+def more_points(grid: Grid) -> str:
+    """Return the advice to use more points, along the longer side of the cells if they are not square."""
+    if 1 in grid.points or max(grid.dx, grid.dy) < LONG * min(grid.dx, grid.dy):
+        return "more grid.points"
+    return f"more grid.points along {'x' if grid.dx > grid.dy else 'y'}"
+
+
+def fast_length(least: float) -> int:
+    """Return the smallest multiple of MULTIPLE from `least` on whose other prime factors are 2, 3 and 5."""
+    count = max(1, math.ceil(least / MULTIPLE * (1.0 - SAME)))
+    while 60 ** count.bit_length() % count:  # 60 = 2 * 2 * 3 * 5
+        count += 1
+    return MULTIPLE * count
+
+
+def choose_points(
+    wave: float, size: Vector, directions: Sequence[Vector], asked: Accuracy, guesses: Sequence[Guess]
+) -> tuple[int, int]:
+    """Return the least points along x and y for the errors `asked`, for a surface with this shortest wave [m] that
+    slides along `directions` (unit vectors), or does not slide. Among meshes with equal numbers of points the mesh with
+    the smallest larger side is returned."""
+    along_x, along_y = (_fast_lengths(MOST_CELLS * length / wave) for length in size)
+    meshes = sorted(product(along_x, along_y), key=lambda points: (math.prod(points), max(points)))
+    x, y = (wave / length for length in size)
+    return next((mesh for mesh in meshes if _fits(mesh[0] * x, mesh[1] * y, directions, asked, guesses)), meshes[-1])
+
+
+def _fast_lengths(most: float) -> list[int]:
+    """Return all lengths of fast transforms up to the first one of at least `most`."""
+    found = [fast_length(1)]
+    while found[-1] < most:
+        found.append(fast_length(found[-1] + 1))
+    return found
+
+
+def _fits(cx: float, cy: float, directions: Sequence[Vector], asked: Accuracy, guesses: Sequence[Guess]) -> bool:
+    """Return True if `cx` and `cy` cells per wave along x and y keep the errors `asked`."""
+    if min(cx, cy) < LEAST_CELLS or max(cx, cy) > LONGEST * min(cx, cy):
+        return False
+    for (x, y), guess in product(directions or ((1.0, 0.0), (0.0, 1.0)), guesses):
+        c, across = 1.0 / math.hypot(x / cx, y / cy), 1.0 / math.hypot(y / cx, x / cy)
+        if area_error(c, across, guess) > asked.area:
+            return False
+        if directions and friction_error(c, across, guess) > asked.friction:
+            return False
+    return True
+
+
+LONG_WAVES = 4  # accuracy: least number of longest waves along the box for a representative surface (paper, section 3)
+MOST_LONG_WAVES = 500  # tuning: number of longest waves along the box above which its unit is doubted
+STEPS_PER_WAVE = 4  # accuracy: least time steps per shortest wave while sliding
+SAME_LENGTH = 1e-9  # rounding: relative difference below which lengths are the same
+LITTLE = 0.05  # tuning: relative lack of points that gets no warning
+
+# Relative standard deviation over 8 to 12 seeds, times the number of longest waves along a side; found with six steady
+# states of 2 to 50 % contact of bodies with one and twelve branches, in boxes of 2, 4 and 8 longest waves: 0.11 to 0.44
+# for friction, 0.05 to 0.33 for the area.
+SEED_FRICTION, SEED_AREA = 0.24, 0.17  # accuracy
+
+
+def doubts_of_resolution(job: Sections, directions: Sequence[Vector] = (), chosen: bool = False) -> Iterator[Doubt]:
+    """Yield warnings in the order of the sections; the surface slides along `directions` (unit vectors). The cells of a
+    mesh that was `chosen` for the job are not checked."""
+    grid, surface, numerics = job.grid, job.surface, job.numerics
+    for index, shape in enumerate(surface):
+        if isinstance(shape, Rough) and max(grid.points) > 1:
+            yield from _long_waves(index, shape, grid)
+            yield from doubt_size(index, shape, grid)
+            if not chosen:
+                yield from _short_waves(index, shape, grid, numerics.asked, directions)
+    short = min((shape.short_wavelength for shape in surface if isinstance(shape, Rough)), default=None)
+    times = [branch.relaxation_time for branch in job.material.fitted.branches]
+    shortest = min((time for time in times if 0 < time < math.inf), default=math.inf)
+    for index, stage in enumerate(job.history):
+        yield from _steps(index, stage, grid, shortest if numerics.integrator == "backward-euler" else math.inf, short)
+
+
+def _directions(grid: Grid) -> list[tuple[str, float, float]]:
+    """Return name, box length and cell [m] of the axes that have more than one point."""
+    found = zip("xy", grid.size, (grid.dx, grid.dy), grid.points, strict=True)
+    return [(name, length, cell) for name, length, cell, points in found if points > 1]
+
+
+def _long_waves(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
+    name, length, _ = min(_directions(grid), key=lambda direction: direction[1])
+    if length < LONG_WAVES * shape.long_wavelength * (1 - SAME_LENGTH):
+        enough = {"size": LONG_WAVES * shape.long_wavelength, "wave": length / LONG_WAVES}
+        numbers = {"waves": length / shape.long_wavelength, "axis": name, "least": LONG_WAVES, **enough}
+        yield Doubt("few long waves", f"surface.{index}", numbers)
+
+
+def doubt_size(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
+    """Yield a warning about a box of more than MOST_LONG_WAVES longest waves."""
+    length = max((length for _, length, _ in _directions(grid)), default=0.0)
+    if length > MOST_LONG_WAVES * shape.long_wavelength:
+        of_wave = {"wave": shape.long_wavelength, "times": length / shape.long_wavelength}
+        numbers = {"length": length, "in_milli": length / 1000, "key": f"surface.{index}.long_wavelength", **of_wave}
+        yield Doubt("large box", "grid.size", numbers)
+
+
+def _short_waves(
+    index: int, shape: Rough, grid: Grid, asked: Accuracy, directions: Sequence[Vector]
+) -> Iterator[Doubt]:
+    for numbers in _few_cells(shape.short_wavelength, grid, asked, directions):
+        yield Doubt("few cells", f"surface.{index}", numbers)
+
+
+def doubt_measured_waves(
+    grid: Grid, wave: float, asked: Accuracy, directions: Sequence[Vector], spiky: bool = False
+) -> Iterator[Doubt]:
+    """Yield a warning about the shortest wave [m] of a measured surface that slides along `directions`; outliers of a
+    `spiky` surface may shorten it."""
+    spikes = ", which has outliers" if spiky else ""
+    for numbers in _few_cells(wave, grid, asked, directions):
+        yield Doubt("few cells of a map", "surface", {**numbers, "known": wave, "spikes": spikes})
+
+
+def _few_cells(wave: float, grid: Grid, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[dict[str, object]]:
+    """Yield the numbers of a warning if the shortest wave [m] has too few cells: the points needed along the axis that
+    lacks most, and the factors of memory and time."""
+    wants = {name: needed("xy".index(name), directions, asked) for name, _, _ in _directions(grid)}
+    lacks = {name: max(wants[name]) * cell / wave for name, _, cell in _directions(grid)}
+    name, length, cell = max(_directions(grid), key=lambda direction: lacks[direction[0]], default=("", 0.0, 0.0))
+    more = math.prod(max(lack, 1.0) for lack in lacks.values())
+    if not name or more <= 1 + LITTLE:
+        return
+    least, of_area = wants[name]
+    reason = "a resolved contact" if math.isclose(least, of_area) else "friction" if least > of_area else "its area"
+    slides = lambda axis: not directions or any(abs(way["xy".index(axis)]) > ASIDE for way in directions)  # noqa: E731
+    finer = max((max(lack, 1.0) for axis, lack in lacks.items() if slides(axis)), default=1.0)
+    yield {
+        "cells": wave / cell,
+        "axis": name,
+        "reason": reason,
+        "needed": max(wants[name]),
+        "points": math.ceil((1 - SAME_LENGTH) * max(wants[name]) * length / wave),
+        "memory": more,
+        "time": f", about {more * finer:.2g} times the time in sliding" if directions else "",
+        "wave": max(wants[name]) * cell,
+    }
+
+
+def longest_step(stage: Stage, grid: Grid) -> float:
+    """Return the longest time step of a stage [s], before steps are fitted to its end; 0 for `time_step: auto`."""
+    step = stage.time_step
+    if step == AUTO:
+        return 0.0
+    if stage.cells_per_step is not None:
+        return min(stage.seconds, stage.cells_per_step * one_cell(stage, grid))
+    if isinstance(step, GeometricStep):  # n steps last first (growth^n - 1) / (growth - 1)
+        return min(stage.seconds, (stage.seconds * (step.growth - 1) + step.first) / step.growth)
+    return min(stage.seconds, step or 0.0)
+
+
+def _steps(index: int, stage: Stage, grid: Grid, resolved: float, short: float | None) -> Iterator[Doubt]:
+    """Yield warnings about steps longer than the time `resolved` [s], or too long for the shortest wave `short` [m]."""
+    step = longest_step(stage, grid)
+    slid = step * stage.speed
+    if stage.speed and not stage.seconds:
+        yield Doubt("slides in no time", f"history.{index}")
+    if step > resolved * (1 + SAME_LENGTH):
+        yield Doubt("long steps", f"history.{index}", {"step": step, "shortest": resolved})
+    if short is not None and slid > short / STEPS_PER_WAVE * (1 + SAME_LENGTH):
+        enough = short / STEPS_PER_WAVE / stage.speed
+        numbers = {"slid": slid, "share": slid / short, "step": enough, "cells": enough / one_cell(stage, grid)}
+        yield Doubt("skipped waves", f"history.{index}", numbers)
+
+
+def describe_sample(grid: Grid, surface: tuple[Any, ...], slides: bool) -> str:
+    """Return a sentence on the scatter of friction (if it `slides`) and contact area between seeds; '' without a seed.
+
+    The scatter falls with the square root of the number of longest waves in the box.
+    """
+    longest = max((shape.long_wavelength for shape in surface if isinstance(shape, Rough)), default=0.0)
+    if not longest:
+        return ""
+    counts = [max(length / longest, 1.0) for _, length, _ in _directions(grid)]
+    root = math.sqrt(math.prod(counts))
+    friction = f"friction by about {per_cent(SEED_FRICTION / root)} and " if slides else ""
+    return (
+        f"another seed of the surface would change {friction}the contact area by about {per_cent(SEED_AREA / root)} "
+        f"(standard deviation): {' x '.join(f'{count:.3g}' for count in counts)} of its longest waves fit into the box"
+    )

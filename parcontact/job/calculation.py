@@ -1,0 +1,501 @@
+"""Sections of the job for calculation, bands and temperature.
+
+Shares of solver, folded branches, time steps and mesh in the requested accuracy.
+
+They are shares of true errors and add up to 1. Estimates exceed errors, so that they hold in nearly all scenes: in
+the median by SOLVER_MEDIAN and TIME_MEDIAN. An estimate may exceed its share by this factor.
+
+The `grid`, `body`, `numerics`, `output`, `checkpoint` and `study` sections.
+
+The `bands` section: the spectrum of a surface cut into bands, each solved on a grid of its own.
+
+The `shift` of a material: how its relaxation times and moduli depend on temperature (`parcontact.rubber.shift`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import astuple, dataclass
+from itertools import pairwise
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, PrivateAttr, TypeAdapter, ValidationInfo
+
+from ..errors import InputError
+from ..rubber.shift import WLF, Arrhenius, Density, Factors, log_vertical
+from ..rubber.shift import Shift as Law
+from .parts import Instead, Origin, Part, Rule, chosen
+from .quantities import (
+    AUTO_POINTS,
+    FROM_SURFACE,
+    Count,
+    Flag,
+    Fraction,
+    NonNegative,
+    Number,
+    Positive,
+    Real,
+    Whole,
+    both,
+    from_home,
+    listed,
+)
+from .yaml_text import Fault, did_you_mean, quote, refuse
+
+Integrator = Literal["exponential", "exponential-linear", "backward-euler"]
+Kernel = Literal["spectral", "love"]
+Precision = Literal["double", "mixed"]
+FieldName = Literal["pressure", "displacement", "gap", "height", "temperature", "traction", "fluid_pressure"]
+
+
+def _different(name: str) -> Rule:
+    """Return the rule that the values of a list differ."""
+
+    def check(values: tuple[Any, ...]) -> Iterator[Fault]:
+        for index, value in enumerate(values):
+            if value is not None and value in values[:index]:
+                shown = value if name == "fields" else repr(value)
+                yield Fault(f"repeats {shown}", (name, index))
+
+    return Rule((name,), check)
+
+
+def _boundary(value: Any) -> Any:
+    """Return `periodic`, `free`, or the pair of both; a pair of two equal words becomes one word."""
+    pair = tuple(value) if isinstance(value, list | tuple) else (value, value)
+    if pair == STRIP[::-1]:
+        refuse(Fault("must be [periodic, free] if it is free along one axis, got [free, periodic]: exchange x and y"))
+    if len(pair) != 2 or any(one not in STRIP for one in pair):
+        refuse(Fault(f"must be {BOUNDARY}, got {quote(value)}{did_you_mean(value, STRIP)}"))
+    return pair if pair == STRIP else pair[0]
+
+
+STRIP = ("periodic", "free")  # along x and along y
+BOUNDARY = "periodic | free | [periodic, free]"
+Boundary = Literal["periodic", "free"] | tuple[Literal["periodic"], Literal["free"]]
+
+
+class Grid(Part):
+    """The box and its cells; x comes first in `points` and `size`."""
+
+    points: Annotated[tuple[Count, Count], BeforeValidator(both), FROM_SURFACE, AUTO_POINTS] = Field(
+        description="a positive whole number of points"
+    )
+    size: Annotated[tuple[Positive, Positive], BeforeValidator(both), FROM_SURFACE] = Field(
+        description="a positive length [m]"
+    )
+    boundary: Annotated[Boundary, PlainValidator(_boundary, json_schema_input_type=Boundary)] = Field(
+        default="periodic", description=BOUNDARY
+    )
+
+    @property
+    def cyclic(self) -> tuple[bool, bool]:
+        """Return whether the box is periodic along x and along y."""
+        return self.boundary != "free", self.boundary == "periodic"
+
+    @property
+    def nx(self) -> int:
+        return self.points[0]
+
+    @property
+    def ny(self) -> int:
+        return self.points[1]
+
+    @property
+    def lx(self) -> float:
+        """Length of the box along x [m]."""
+        return self.size[0]
+
+    @property
+    def ly(self) -> float:
+        """Length of the box along y [m]."""
+        return self.size[1]
+
+    @property
+    def dx(self) -> float:
+        """Length of a cell along x [m]."""
+        return self.lx / self.nx
+
+    @property
+    def dy(self) -> float:
+        """Length of a cell along y [m]."""
+        return self.ly / self.ny
+
+
+class Body(Part):
+    """A layer, bonded to a rigid base or sliding on it without friction; without this section a half space."""
+
+    thickness: Positive = Field(description="a positive thickness [m]")
+    base: Literal["bonded", "smooth"] = "bonded"
+
+
+TOLERANCE_SHARE, BRANCH_SHARE = 0.5, 0.1  # accuracy: tolerance and branch_error, over numerics.accuracy
+AREA_BY_STEPS = 0.25  # accuracy: largest error of the area by time steps, over the error of friction
+FRACTION: TypeAdapter[float] = TypeAdapter(Fraction)
+
+
+class Accuracy(Part):
+    """Relative errors of friction and of the corrected contact area that are acceptable."""
+
+    friction: Fraction = Field(default=1e-2, description="an error of friction [-] above 0 and below 1")
+    area: Fraction = Field(default=1e-2, description="an error of the contact area [-] above 0 and below 1")
+
+    @property
+    def both(self) -> tuple[float, float]:
+        """Return the accuracies of friction and of the area."""
+        return self.friction, self.area
+
+    @property
+    def strictest(self) -> float:
+        return min(self.friction, self.area)
+
+    @property
+    def of_steps(self) -> float:
+        """Return the error of friction that time steps may cause; the error of the area is at most a quarter of it."""
+        return min(self.friction, self.area / AREA_BY_STEPS)
+
+
+def _accuracy(value: Any, info: ValidationInfo) -> float | Accuracy:
+    if isinstance(value, dict | Accuracy):
+        return Accuracy.model_validate(value, context=info.context)
+    return FRACTION.validate_python(value, context=info.context)
+
+
+class Numerics(Part):
+    """Settings of the solution; `accuracy` chooses `tolerance` and `branch_error` unless they are given, and the mesh
+    of `points: auto`."""
+
+    accuracy: Annotated[float | Accuracy, PlainValidator(_accuracy, json_schema_input_type=Fraction | Accuracy)] = (
+        Field(default=1e-2, description="an error of friction and area [-] above 0 and below 1, or {friction, area}")
+    )
+    integrator: Integrator = "exponential"
+    tolerance: Fraction = Field(default=5e-3, description="a tolerance [-] above 0 and below 1")
+    max_iterations: Count = Field(default=500, description="a positive whole number of iterations")
+    branch_error: Number = Field(
+        default=1e-3, ge=0, lt=1, description="an error of friction [-] of zero or more and below 1"
+    )
+    kernel: Kernel = "spectral"  # in a free scene: love
+    precision: Precision = "double"
+    accept_unconverged: Flag = False
+    strict: Flag = False
+
+    foreign = MappingProxyType({"slope": Instead("it was removed; slopes follow from the waves of the surface")})
+    _chosen: dict[str, float] = PrivateAttr(default_factory=dict)
+
+    def model_post_init(self, context: Any) -> None:
+        """Choose tolerance and branch error by the accuracy unless they are given."""
+        least = self.asked.strictest
+        shares = {"tolerance": TOLERANCE_SHARE * least, "branch_error": BRANCH_SHARE * least}
+        self._chosen = {name: share for name, share in shares.items() if name not in self.model_fields_set}
+        self.__dict__.update(self._chosen)
+
+    @property
+    def chosen(self) -> dict[str, float]:
+        """Return the values that the accuracy chose, by key."""
+        return self._chosen
+
+    @property
+    def asked(self) -> Accuracy:
+        """Return the accuracies of friction and of the area, which are equal if one number is given."""
+        if isinstance(self.accuracy, Accuracy):
+            return self.accuracy
+        return Accuracy(friction=self.accuracy, area=self.accuracy)
+
+
+def _needs_energy(branch_dissipation: bool, energy: bool) -> Iterator[Fault]:
+    if branch_dissipation and not energy:
+        yield Fault("needs energy: true", ("branch_dissipation",))
+
+
+MEASURE_MESH = "it was removed; `parcontact study` measures the error of the mesh, with a list study.mesh"
+
+
+class Output(Part):
+    """Output files of a run; a relative directory starts at the working directory."""
+
+    directory: Annotated[Path, AfterValidator(from_home)] = Field(
+        default=Path("out"), description="the path of a directory (text)"
+    )  # default: out/<job file stem>
+    fields: Annotated[tuple[FieldName, ...], BeforeValidator(listed)] = Field(
+        default=(), description="a list of fields"
+    )
+    every: Count = Field(default=1, description="a positive whole number of steps")
+    energy: Flag = False
+    branch_dissipation: Flag = False
+
+    foreign = MappingProxyType({"mesh_check": Instead(MEASURE_MESH)})
+    rules = (Rule(("branch_dissipation", "energy"), _needs_energy), _different("fields"))
+
+    @property
+    def maps(self) -> tuple[str, ...]:
+        """Return the names of the maps of the fields; a vector has one map for each component."""
+        both = {"traction": ("traction_x", "traction_y")}
+        return tuple(name for field in self.fields for name in both.get(field, (field,)))
+
+
+class Checkpoint(Part):
+    """Intervals between checkpoints, in steps or in wall time, and the number of checkpoints that are kept."""
+
+    every: Count | None = Field(default=None, description="a positive whole number of steps")
+    minutes: Positive | None = Field(default=None, description="a positive wall time in minutes [min]")
+    keep: Whole = Field(default=2, ge=0, description="a whole number of checkpoints, zero or more")
+
+    at_most_one = (("every", "minutes"),)
+
+    @classmethod
+    def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
+        """Save every 10 minutes by default."""
+        return data if data.keys() & {"every", "minutes"} else {"minutes": 10.0, **data}
+
+
+LADDERS = ("mesh", "cells_per_step", "integrator")
+SWEPT = "it was removed; compare values of numerics.{} by a `sweep:`"
+
+
+def _some_ladder(*ladders: tuple[Any, ...]) -> Iterator[Fault]:
+    if not any(ladders):
+        yield Fault(f"needs at least one ladder: {', '.join(LADDERS)}")
+
+
+class Study(Part):
+    """Lists of values (ladders) for `parcontact study`; a missing ladder is the value of the job."""
+
+    mesh: Annotated[tuple[Count, ...], BeforeValidator(listed)] = Field(
+        default=(), description="a list of positive whole numbers of points along x"
+    )
+    cells_per_step: Annotated[tuple[Positive, ...], BeforeValidator(listed)] = Field(
+        default=(), description="a list of positive numbers of cells (fractions are allowed)"
+    )
+    integrator: Annotated[tuple[Integrator, ...], BeforeValidator(listed)] = ()
+
+    foreign = MappingProxyType({key: Instead(SWEPT.format(key)) for key in ("tolerance", "precision", "kernel")})
+    rules = (*map(_different, LADDERS), Rule(LADDERS, _some_ladder))
+
+
+SOLVER_MEDIAN = 2.0  # fitted: median of estimate over error of the solver
+TIME_MEDIAN = 2.67  # tuning: steps have 0.8 of the accuracy; 1.0 to 3.4, 1.7 in the median of six chosen marches
+FOLDED_MEDIAN = 2.0  # accuracy: bound of the folded branches over their error, at least: 4 and 6 in two marches
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Shares of the error by source. Raises ValueError unless they add up to 1."""
+
+    solver: float
+    folded: float
+    time: float
+    mesh: float
+
+    def __post_init__(self) -> None:
+        if abs(sum(astuple(self)) - 1.0) > 1e-12:  # rounding
+            raise ValueError(f"shares of the accuracy add up to {sum(astuple(self)):g}, not to 1")
+
+
+FOLDED = BRANCH_SHARE / FOLDED_MEDIAN
+FRICTION = Shares(solver=0.05, folded=FOLDED, time=0.3, mesh=0.6)
+AREA = Shares(solver=0.2, folded=FOLDED, time=0.15, mesh=0.6)
+STEADY = Shares(solver=0.1, folded=0.0, time=0.0, mesh=0.9)
+
+
+Auto = Literal["auto"]
+AUTO: Auto = "auto"
+LEAST_WAVES = 2  # longest waves along a box whose cells of wavenumbers do not reach 0
+LEAST_CELLS = 2.0  # accuracy: least cells per shortest wave of a band (Nyquist)
+
+
+class Bands(Part):
+    """Bands of the spectrum; keys that are not given follow from `numerics.accuracy`."""
+
+    count: Annotated[int, Field(ge=1, le=100)] | None = Field(
+        default=None, description="a whole number of bands from 1 to 100"
+    )
+    points: Annotated[tuple[Count, Count], BeforeValidator(both)] | None = Field(
+        default=None, description="a positive whole number of points"
+    )
+    waves: Annotated[Whole, Field(ge=LEAST_WAVES)] | None = Field(
+        default=None, description="a whole number of at least 2 of the longest waves of a band along a side of its box"
+    )
+    samples: Count | None = Field(default=None, description="a positive whole number of surfaces of each band")
+    cutoff_slope: Positive | None = Field(default=None, description="a positive rms slope [-]")
+
+
+def _choose(value: Any, info: ValidationInfo) -> Bands | Auto:
+    if value == AUTO:
+        return AUTO
+    if isinstance(value, str):
+        refuse(Fault(f"must be auto, or a mapping with count, points and waves, got {value!r}"))
+    return Bands.model_validate(value, context=info.context)
+
+
+SomeBands = Annotated[Bands | Auto, PlainValidator(_choose, json_schema_input_type=Bands | Auto)]
+
+
+def _without(name: str, why: str) -> Rule:
+    """Return the rule that a job with bands does not have a section."""
+
+    def check(bands: Any, section: Any) -> Iterator[Fault]:
+        if bands is not None and section:
+            yield Fault(f"cannot be used with bands: {why}", (name,))
+
+    return Rule(("bands", name), check)
+
+
+def _over_time(bands: Any, history: Any, initial: Any, output: Any) -> Iterator[Fault]:
+    """Check that bands can be marched through a history: under one pressure, along x, with steps of their own."""
+    if bands is None or not history or None in history:
+        return
+    load = "must be the same pressure in all stages of a job in bands, whose bands are marched at fixed pressures"
+    for index, stage in enumerate(history):
+        place = ("history", index)
+        if stage.frequency:
+            yield Fault("cannot oscillate in a job in bands, which are marched through slides and rests", place)
+            continue
+        if stage.control != "pressure":
+            yield Fault(
+                "cannot be used with bands, which have boxes of their own: give a pressure", (*place, stage.control)
+            )
+        elif not stage.load.constant or stage.load.start != (history[0].pressure or stage.load).start:
+            yield Fault(load, (*place, "pressure"))
+        elif not stage.load.start > 0.0:
+            yield Fault("must be positive in a job in bands", (*place, "pressure"))
+        if stage.velocity[1]:
+            yield Fault("must be along x in a job in bands, whose surfaces are isotropic", (*place, "velocity"))
+        for key in (key for key in ("time_step", "cells_per_step") if getattr(stage, key) not in (None, AUTO)):
+            yield Fault("cannot be used with bands, whose steps follow their own cells; leave it out", (*place, key))
+    if initial.state == "steady" and initial.pressure != history[0].load.start:
+        yield Fault("must be the pressure of the history in a job in bands", ("initial", "pressure"))
+    if initial.state == "steady" and (initial.velocity[1] or not initial.velocity[0]):
+        yield Fault("must be along x, and not zero, in a job in bands", ("initial", "velocity"))
+    if output.energy:
+        yield Fault("cannot be used with bands: the work on finer bands is in no band", ("output", "energy"))
+
+
+BAND_RULES = (
+    Rule(("bands", "history", "initial", "output"), _over_time),
+    _without("body", "a layer changes the coarsest waves only; give it a grid"),
+    _without("study", "a study refines one grid"),
+)
+
+
+LOWEST, HIGHEST = -273.15, 5000.0  # physics: range of temperatures [deg C]
+LARGEST_SHIFT = 60.0  # rounding: largest magnitude of log10 a_T for which relaxation times do not overflow
+Celsius = Annotated[Real, Field(gt=LOWEST, le=HIGHEST, description="a temperature [deg C], up to 5000")]
+
+
+def _rising(
+    temperatures: tuple[float, ...], logs: tuple[float, ...], reference: float | None = None
+) -> Iterator[Fault]:
+    if None in temperatures:  # reported separately
+        return
+    if len(temperatures) < 2 or any(b <= a for a, b in pairwise(temperatures)):
+        yield Fault("must be at least two rising temperatures [deg C]", ("temperatures",))
+    elif len(logs) != len(temperatures):
+        yield Fault(f"must be {len(temperatures)} numbers, one for each temperature, got {len(logs)}", ("logs",))
+    elif reference is not None and not temperatures[0] <= reference <= temperatures[-1]:
+        yield Fault(f"must be within {temperatures[0]:g} and {temperatures[-1]:g} C, got {reference:g}", ("reference",))
+
+
+class DensityLaw(Part):
+    """`b_T = rho T/(rho_ref T_ref)`, temperatures in K; `rho = rho_ref (1 - expansion (T - reference))`."""
+
+    law: Literal["density"] = "density"
+    expansion: NonNegative = Field(description="a loss of density per kelvin [1/K] of zero or more (rubber: 6e-4)")
+
+    def at(self, reference: float) -> Density:
+        """Return the law with the reference of its shift [deg C]."""
+        return Density(self.expansion, reference)
+
+
+class ModulusFactors(Part):
+    """log10 of b_T at given temperatures, linear between them."""
+
+    law: Literal["factors"] = "factors"
+    temperatures: tuple[Celsius, ...] = Field(description="a list of rising temperatures [deg C]")
+    logs: tuple[Real, ...] = Field(description="a list of numbers, log10 of b_T at each temperature")
+
+    rules = (Rule(("temperatures", "logs"), _rising),)
+
+    def at(self, reference: float) -> Factors:
+        """Return the law with the reference of its shift [deg C]."""
+        return Factors(self.temperatures, self.logs, reference)
+
+
+VERTICAL_LAWS = {"density": DensityLaw, "factors": ModulusFactors}
+AnyVertical = DensityLaw | ModulusFactors
+VerticalLaw = Annotated[AnyVertical, PlainValidator(chosen("law", VERTICAL_LAWS), json_schema_input_type=AnyVertical)]
+
+
+def _reaches(vertical: AnyVertical | None, reference: float) -> Iterator[Fault]:
+    if isinstance(vertical, ModulusFactors) and not vertical.temperatures[0] <= reference <= vertical.temperatures[-1]:
+        yield Fault(f"must reach the reference of the shift, {reference:g} C", ("vertical", "temperatures"))
+
+
+class ShiftLaw(Part):
+    """Base of the laws of a shift; `kind` is the class in `rubber.shift` that evaluates it."""
+
+    kind: ClassVar[Callable[..., Law]]
+    reference: Celsius
+    vertical: VerticalLaw | None = Field(default=None, description="a mapping with law: density | factors")
+
+    rules: ClassVar[tuple[Rule, ...]] = (Rule(("vertical", "reference"), _reaches),)
+
+    @property
+    def made(self) -> Law:
+        vertical = self.vertical and self.vertical.at(self.reference)
+        return self.kind(**self.model_dump(exclude={"law", "vertical"}), vertical=vertical)
+
+
+class WlfShift(ShiftLaw):
+    """`log10 a_T = -C1 (T - reference)/(C2 + T - reference)` (Williams, Landel and Ferry)."""
+
+    kind = WLF
+    law: Literal["wlf"] = "wlf"
+    C1: Positive = Field(description="a positive number, the first constant of Williams, Landel and Ferry [-]")
+    C2: Positive = Field(description="a positive number, the second constant of Williams, Landel and Ferry [K]")
+
+
+class ArrheniusShift(ShiftLaw):
+    """`log10 a_T = energy/(R ln 10) (1/T - 1/reference)`, temperatures in K."""
+
+    kind = Arrhenius
+    law: Literal["arrhenius"] = "arrhenius"
+    energy: Positive = Field(description="a positive energy of activation [J/mol]")
+
+
+class FactorsShift(ShiftLaw):
+    """log10 of a_T at given temperatures, linear between them."""
+
+    kind = Factors
+    law: Literal["factors"] = "factors"
+    temperatures: tuple[Celsius, ...] = Field(description="a list of rising temperatures [deg C]")
+    logs: tuple[Real, ...] = Field(description="a list of numbers, log10 of a_T at each temperature")
+
+    rules = (*ShiftLaw.rules, Rule(("temperatures", "logs", "reference"), _rising))
+
+
+LAWS = {"wlf": WlfShift, "arrhenius": ArrheniusShift, "factors": FactorsShift}
+AnyShift = WlfShift | ArrheniusShift | FactorsShift
+Shift = Annotated[AnyShift, PlainValidator(chosen("law", LAWS), json_schema_input_type=AnyShift)]
+
+
+def shifted(shift: AnyShift | None, temperature: float | None) -> Iterator[Fault]:
+    """Check that a material with a temperature has a shift that reaches it."""
+    if temperature is None:
+        return
+    if shift is None:
+        sentence = "needs material.shift, the dependence of relaxation times on temperature; give a shift"
+        yield Fault(sentence, ("temperature",))
+        return
+    try:
+        log = shift.made.log_factor(temperature)
+        log_vertical(shift.made, temperature)
+    except InputError as error:
+        yield Fault(f"is outside of the shift: {error}", ("temperature",))
+        return
+    if not abs(log) <= LARGEST_SHIFT:
+        sentence = (
+            f"would change the relaxation times by a factor of 10^{log:.3g}; the limits are 10^-{LARGEST_SHIFT:g} and "
+        )
+        yield Fault(f"{sentence}10^{LARGEST_SHIFT:g}", ("temperature",))

@@ -1,0 +1,334 @@
+"""Rules that relate sections of a job: loads and material, surface and mesh, history and number of steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from operator import itemgetter
+from typing import Any
+
+from ..errors import InputError
+from ..printed import rounded_up
+from .advice import SAME_LENGTH, doubt_size, has_wave, one_cell
+from .calculation import Body, Grid, Numerics, Output, Study
+from .materials import AnyMaterial, heated
+from .parts import Rule
+from .stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Oscillation, Stage, Steady
+from .surfaces import SAME_CELL, Flat, HeightArray, OnOneMesh, Rough, RoughSpectrum, Topography
+from .yaml_text import Fault
+
+LOADS = {"pressure": PRESSURE, "force": FORCE}
+BY_SPECTRUM = Rough | RoughSpectrum | Flat
+THINNEST = 1e-9  # rounding: least thickness of a layer over the longer side of its box
+MOST_STEPS = 10**8  # tuning: most steps of a history; at 1 ms each they take more than a day
+
+
+def kernel_fits(grid: Grid, numerics: Numerics) -> Iterator[Fault]:
+    if not all(grid.cyclic) and numerics.kernel == "spectral":
+        yield Fault("must be love when grid.boundary is free: the spectral kernel is periodic", ("numerics", "kernel"))
+
+
+def no_strip(what: str, grid: Grid) -> Iterator[Fault]:
+    """Refuse `what` in a box that is free along y only, which has no kernel for it."""
+    if any(grid.cyclic) and not all(grid.cyclic):
+        yield Fault(f"must be periodic or free with {what}, got [periodic, free]", ("grid", "boundary"))
+
+
+def half_space_at_rest(grid: Grid, body: Body | None, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
+    """Check that a box that is free along y only has no layer and no steady sliding."""
+    asked = {"a layer (body)": body is not None, "steady sliding": steady is not None or initial.state == "steady"}
+    for what in (what for what, given in asked.items() if given):
+        yield from no_strip(what, grid)
+
+
+def layer_is_resolved(grid: Grid, body: Body | None) -> Iterator[Fault]:
+    if body is not None and grid.boundary == "free" and body.thickness < 2 * max(grid.dx, grid.dy):
+        least = 2 * max(grid.dx, grid.dy)
+        sentence = (
+            f"must be at least two cells, {rounded_up(least)} m, when grid.boundary is free, got {body.thickness:g}"
+        )
+        yield Fault(sentence, ("body", "thickness"))
+
+
+def layer_is_in_proportion(grid: Grid, body: Body | None) -> Iterator[Fault]:
+    """Check that a layer is not so thin that its compliance underflows."""
+    if body is not None and body.thickness < THINNEST * max(grid.size):
+        sentence = (
+            f"must be at least {THINNEST:g} of the box, {THINNEST * max(grid.size):.3g} m, got {body.thickness:g}"
+        )
+        yield Fault(sentence, ("body", "thickness"))
+
+
+def no_wake_in_a_layer(grid: Grid, body: Body | None, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
+    if body is not None and grid.boundary == "free" and (initial.state == "steady" or steady is not None):
+        yield Fault("must be periodic for steady sliding on a layer", ("grid", "boundary"))
+
+
+def waves_are_independent(grid: Grid, steady: Steady | None) -> Iterator[Fault]:
+    if steady is not None and steady.waves and grid.boundary == "free":
+        yield Fault("needs a periodic box: waves in a free box are not independent", ("steady", "waves"))
+
+
+def waves_fit(grid: Grid, surface: tuple[Any, ...], bands: Any) -> Iterator[Fault]:
+    """Check that no wave is shorter than two cells (Nyquist), and that the shortest one fits into the box."""
+    if bands is not None:
+        return
+    steps = zip((grid.dx, grid.dy), grid.size, "xy", grid.points, strict=True)
+    cell, size, axis, _ = max((one for one in steps if one[-1] > 1), key=itemgetter(0), default=(0.0, 0.0, "", 0))
+    for index, shape in enumerate(surface):
+        if isinstance(shape, Rough) and shape.short_wavelength < 2 * cell * (1 - SAME_LENGTH):
+            if large := next(doubt_size(index, shape, grid), None):
+                yield Fault(f"has {large.body}", ("grid", "size"))
+                continue
+            needed = math.ceil(2 * size / shape.short_wavelength * (1 - SAME_LENGTH))
+            got = f"got {shape.short_wavelength!r}, which needs {needed} points along {axis}"
+            sentence = f"must be at least two cells, {2 * cell:.6g} m (Nyquist), {got}"
+            yield Fault(sentence, ("surface", index, "short_wavelength"))
+        if isinstance(shape, Rough) and shape.short_wavelength > max(grid.size):
+            sentence = f"must fit into the box of {max(grid.size):.6g} m, got {shape.short_wavelength!r}"
+            yield Fault(sentence, ("surface", index, "short_wavelength"))
+        elif isinstance(shape, Rough) and not has_wave(grid, shape.short_wavelength, shape.long_wavelength):
+            sentence = f"must leave a wave of the grid down to short_wavelength, {shape.short_wavelength:g} m, but has "
+            yield Fault(f"{sentence}none, got {shape.long_wavelength!r}", ("surface", index, "long_wavelength"))
+        for number, (waves, n) in enumerate(zip(getattr(shape, "waves", ()), grid.points, strict=False)):
+            if abs(waves) > n / 2:
+                sentence = f"must be within {-(n // 2)} and {n // 2} waves for {n} points (Nyquist), got {waves}"
+                yield Fault(sentence, ("surface", index, "waves", number))
+
+
+def bands_fit(bands: Any, surface: tuple[Any, ...], steady: Steady | None, output: Output) -> Iterator[Fault]:
+    """Check that the surface of a job with bands has a spectrum, after at most one measured map, and saves no maps."""
+    if bands is None:
+        return
+    for index, shape in enumerate(surface):
+        if not isinstance(shape, BY_SPECTRUM) and not (index == 0 and isinstance(shape, Topography)) and shape:
+            sentence = (
+                "must be rough in a job with bands (self-affine, or a spectrum); only the first may be a topography"
+            )
+            yield Fault(sentence, ("surface", index, "shape"))
+        if getattr(shape, "anisotropy", None) is not None:
+            yield Fault("cannot be used with bands, which are isotropic", ("surface", index, "anisotropy"))
+    if not any(shape is None or isinstance(shape, Rough | RoughSpectrum) for shape in surface):
+        yield Fault("needs a rough shape in a job with bands, for the spectrum of the finer waves", ("surface",))
+    if steady is not None and steady.waves:
+        yield Fault("cannot be used with bands: bands.csv has the friction of each band", ("steady", "waves"))
+    if output.fields:
+        yield Fault("cannot be used with bands: no grid has all waves; leave it out", ("output", "fields"))
+
+
+def study_fits(
+    study: Study | None, grid: Grid, surface: tuple[Any, ...], history: tuple[Stage, ...]
+) -> Iterator[Fault]:
+    """Check that a study has a history to compare, and whole numbers of points on all its meshes."""
+    if study is None:
+        return
+    if not history:
+        yield Fault("compares histories: the job needs a history", ("study",))
+    if study.mesh and any(isinstance(shape, OnOneMesh) for shape in surface):
+        yield Fault("must be left out: the heights of a file are given on one mesh", ("study", "mesh"))
+    for index, mesh in enumerate(study.mesh):
+        if grid.ny > 1 and mesh * grid.ny % grid.nx:
+            sentence = f"must give a whole number of points along y in a box of {grid.nx} x {grid.ny}, got {mesh}"
+            yield Fault(sentence, ("study", "mesh", index))
+
+
+def some_shape(surface: tuple[Any, ...]) -> Iterator[Fault]:
+    if not surface:
+        yield Fault("needs at least one shape, such as shape: flat", ("surface",))
+
+
+def no_temperature(output: Output) -> Iterator[Fault]:
+    """Refuse maps of the temperature; the effect `thermal` lifts this rule."""
+    if "temperature" in output.fields:
+        yield Fault("includes temperature, which needs a thermal section", ("output", "fields"))
+
+
+def no_traction(output: Output) -> Iterator[Fault]:
+    """Refuse the map of tractions in a job without `interface`; with it this rule does not hold."""
+    if "traction" in output.fields:
+        yield Fault("has traction, which needs interface: {stick: true}", ("output", "fields"))
+
+
+def no_rolling(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
+    """Refuse rolling in a job without `interface`; with it this rule does not hold."""
+    for index, stage in enumerate(history):
+        if stage is not None and stage.rolls:
+            sentence = "needs interface: {stick: true}: without it all that touches slides"
+            yield Fault(sentence, ("history", index, "creep"))
+
+
+def no_fluid_pressure(output: Output) -> Iterator[Fault]:
+    """Refuse maps of the pressure of a fluid; the effect that computes them lifts this rule."""
+    if "fluid_pressure" in output.fields:
+        yield Fault(
+            "includes fluid_pressure, which needs a fluid that carries a part of the load", ("output", "fields")
+        )
+
+
+def some_history(history: tuple[Any, ...], steady: Steady | None) -> Iterator[Fault]:
+    if not history and steady is None:
+        yield Fault("needs at least one stage, unless there is a steady section", ("history",))
+    known = steady is None or steady.pressures is not None or None in history
+    if not known and not any(stage.control != "approach" and stage.load.highest > 0.0 for stage in history):
+        sentence = "is missing; it must be positive pressures [Pa] when no stage of the history has a pressure or force"
+        yield Fault(sentence, ("steady", "pressures"))
+
+
+def some_load(history: tuple[Any, ...], initial: Initial) -> Iterator[Fault]:
+    if not history or None in history or initial.pressure or any(stage.approach for stage in history):
+        return
+    if not any(stage.load.lowest or stage.load.highest for stage in history):
+        yield Fault("must not be zero in every stage: there would be no contact", ("history", 0, history[0].control))
+
+
+def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
+    """Check that no load is tensile; the effect `adhesion` lifts this rule."""
+    for index, stage in enumerate(history):
+        if stage is None or stage.control == "approach":
+            continue
+        least = stage.load.lowest
+        if least < 0.0:
+            ends = _place_of_lowest(stage)
+            sentence = f"must be {LOADS[stage.control]}, got {least:g}; pulling needs adhesion"
+            yield Fault(sentence, ("history", index, stage.control, *ends))
+
+
+def _place_of_lowest(stage: Stage) -> tuple[str, ...]:
+    """Return the key of the lowest load within the load of a stage."""
+    if isinstance(stage.load, Oscillation):
+        return ("amplitude",)
+    return () if stage.load.constant else ("from" if stage.load.start == stage.load.lowest else "to",)
+
+
+def temperatures_are_reached(material: AnyMaterial, steady: Steady | None) -> Iterator[Fault]:
+    """Check that the shift of the material reaches the temperatures of steady states."""
+    for temperature in (steady.temperatures if steady else None) or ():
+        try:
+            heated(material, temperature)
+        except InputError as error:
+            yield Fault(f"has {temperature:g} C: {error}", ("steady", "temperatures"))
+            return
+
+
+def steady_bodies_do_not_flow(
+    grid: Grid, material: AnyMaterial, body: Body | None, initial: Initial, steady: Steady | None
+) -> Iterator[Fault]:
+    """Check that a body without long-term modulus has a steady state.
+
+    It flows at waves that do not vary along the sliding, so it has one only on a periodic line of points in the sliding
+    direction.
+    """
+    if material.fitted.long_modulus > 0.0:
+        return
+    asked = [("initial", initial.velocity)] if initial.state == "steady" else []
+    asked += [("steady", steady.unit_direction)] if steady is not None else []
+    for key, velocity in asked:
+        moves = [n > 1 and part != 0.0 for n, part in zip(grid.points, velocity, strict=True)]
+        if grid.boundary == "free" or body is not None or not any(moves) or min(grid.points) > 1:
+            sentence = "needs a material with a long-term modulus: this one flows as long as it is pressed"
+            yield Fault(f"{sentence}; give it modulus_inf > 0, or slide in a stage of the history", (key,))
+
+
+def energies_are_of_steps(history: tuple[Stage, ...], output: Output) -> Iterator[Fault]:
+    """Check that a job with energies has a history."""
+    if output.energy and not history:
+        yield Fault("needs a history: a friction curve has no work and no stored energy", ("output", "energy"))
+
+
+def energies_count_from_rest(initial: Initial, output: Output) -> Iterator[Fault]:
+    if initial.state == "steady" and output.energy:
+        yield Fault("needs initial: {state: virgin}: energies start from a body at rest", ("output", "energy"))
+
+
+def arrays_fit(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Fault]:
+    """Check that arrays have the shape of the grid, and coordinates, if any, its cells."""
+    for index, shape in enumerate(surface):
+        if not isinstance(shape, HeightArray):
+            continue
+        heights, place = shape.heights, ("surface", index, "heights")
+        if heights.shape != (grid.ny, grid.nx):
+            yield Fault(f"has shape {heights.shape}, but the grid has (ny, nx) = {grid.ny, grid.nx}", place)
+            continue
+        for axis, spacing, cell in zip("xy", heights.cell, (grid.dx, grid.dy), strict=True):
+            if abs(spacing - cell) > SAME_CELL * cell:
+                sentence = f"has a spacing of {spacing:.6g} m along {axis}, but cells of the grid are {cell:.6g} m"
+                yield Fault(sentence, place)
+
+
+def loads_are_borne(
+    grid: Grid, material: AnyMaterial, history: tuple[Stage | None, ...], initial: Initial, steady: Steady | None
+) -> Iterator[Fault]:
+    """Check that mean pressures are below the hardness, and that there is no steady sliding with a hardness."""
+    hardness = material.hardness
+    if hardness is None:
+        return
+    for key, given in (("initial", initial.state == "steady"), ("steady", steady is not None)):
+        if given:
+            yield Fault("cannot be used with material.hardness: slide into the steady state with a stage", (key,))
+    for index, stage in enumerate(history):
+        if stage is None or stage.control == "approach":
+            continue
+        mean = stage.load.highest / (grid.lx * grid.ly if stage.control == "force" else 1.0)
+        if mean >= hardness:
+            sentence = f"leads to a mean pressure of {mean:.4g} Pa; it must be below material.hardness, {hardness:g} Pa"
+            yield Fault(sentence, ("history", index, stage.control))
+
+
+def refuse_steady(section: str) -> Rule:
+    """Return the rule that excludes steady sliding with a section whose effect has its own contact law."""
+
+    def check(given: Any, initial: Initial, steady: Steady | None) -> Iterator[Fault]:
+        for key, asked in (("initial", initial.state == "steady"), ("steady", steady is not None)):
+            if given is not None and asked:
+                sentence = f"cannot be used with {section}: slide into the steady state with a stage of the history"
+                yield Fault(sentence, (key,))
+
+    return Rule((section, "initial", "steady"), check)
+
+
+def refuse_bands_over_time(section: str) -> Rule:
+    """Return the rule that excludes bands with a history for a section whose effect is not marched in bands."""
+
+    def check(given: Any, bands: Any, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
+        if given is not None and bands is not None and history:
+            yield Fault("cannot be used with bands and a history; with bands leave out one of the two", (section,))
+
+    return Rule((section, "bands", "history"), check)
+
+
+def steps_can_be_made(grid: Grid, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
+    """Check that the history has at most MOST_STEPS steps."""
+    total = 0.0
+    for index, stage in enumerate(history):
+        if stage is None:
+            return
+        if stage.seconds:
+            total += estimate_steps(stage, stage.seconds, first_step(stage, grid))
+        if total > MOST_STEPS:
+            key = "cells_per_step" if stage.cells_per_step is not None else "time_step"
+            yield Fault(f"leads to {total:.3g} steps; a history has at most {MOST_STEPS:.0e}", ("history", index, key))
+            return
+
+
+def count_steps(grid: Grid, history: tuple[Stage, ...]) -> int:
+    """Return the estimated number of steps of a history, without instantaneous stages."""
+    lasting = [stage for stage in history if stage.seconds]
+    return math.ceil(sum(estimate_steps(stage, stage.seconds, first_step(stage, grid)) for stage in lasting))
+
+
+def first_step(stage: Stage, grid: Grid) -> float:
+    """Return the first time step [s] of a stage with a duration, before steps are fitted to its end."""
+    if stage.cells_per_step is not None:
+        return stage.cells_per_step * one_cell(stage, grid)
+    if isinstance(stage.time_step, GeometricStep):
+        return stage.time_step.first
+    if stage.time_step == AUTO:
+        return one_cell(stage, grid) if stage.speed else stage.seconds
+    return stage.time_step or 0.0
+
+
+def estimate_steps(stage: Stage, seconds: float, first: float) -> float:
+    """Return the estimated number of steps of a stage of `seconds` whose first step is `first` [s]."""
+    count = seconds / first if first else math.inf
+    growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
+    return count if growth == 1.0 else min(count, math.log1p(count * (growth - 1.0)) / math.log(growth))

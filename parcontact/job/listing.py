@@ -1,0 +1,261 @@
+"""All sections of a job, those of capabilities included.
+
+A resolved job as plain data: for YAML, for comparison with other jobs, and as a table with units.
+
+Sections that effects add to a job.
+
+An effect of this package is found by its folder (`capabilities`). One of another package is registered under the name
+of its section by an entry point that names its class (`effects.effect`):
+
+    [project.entry-points."parcontact.effects"]
+    wear = "tread_wear:Wear"
+
+Effects are imported only for jobs that have their sections.
+"""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from .. import capabilities
+from ..errors import InputError, RunError
+from .calculation import Numerics
+from .parts import Part
+from .stages import Oscillation, Ramp, Swing
+from .surfaces import HeightArray
+from .yaml_text import Fault, refuse
+
+MOST_BRANCHES = 6  # largest number of branches that a table shows; of more it shows the first and the last
+
+
+def plain_data(value: Any) -> Any:
+    """Return a value of a job as plain data; keys without a value and keys chosen by the accuracy are left out."""
+    if isinstance(value, HeightArray):
+        return value.stored()
+    if isinstance(value, Part):
+        chosen = value.chosen if isinstance(value, Numerics) else ()
+        return {key: plain_data(inner) for key, inner in items(value) if key not in chosen}
+    if isinstance(value, Ramp):
+        velocity = {"velocity": value.velocity} if value.velocity else {}
+        start, end = plain_data(value.start), plain_data(value.end)
+        return start if value.constant else {"from": start, "to": end, **velocity}
+    if isinstance(value, Oscillation):
+        return asdict(value)
+    if isinstance(value, Swing):
+        return {"amplitude": list(value), "frequency": value.frequency}
+    if isinstance(value, tuple):
+        return [plain_data(inner) for inner in value]
+    return str(value) if isinstance(value, Path) else value
+
+
+def items(part: Part) -> Iterator[tuple[str, Any]]:
+    """Return the keys of a part that have a value, with their values; parts as the job gives them."""
+    names = (name for name in type(part).model_fields if name not in part.left_out())
+    found = ((name, value) for name in names if (value := getattr(part, name)) is not None)
+    return ((name, value.given if isinstance(value, Part) else value) for name, value in found)
+
+
+def plain_job(job: Any) -> dict[str, Any]:
+    """Return a job as plain data for its fingerprint, with checksums of input files in place of their paths."""
+    data: dict[str, Any] = plain_data(job)
+    data["numerics"] |= job.numerics.chosen
+    sections = [(data[name], value) for name, value in items(job) if isinstance(value, Part)]
+    for part, given in (*zip(data["surface"], job.surface, strict=True), *sections):
+        for key in ("path", "spectrum"):
+            if isinstance(path := getattr(given, key, None), Path):
+                del part[key]
+                part["content"] = f"{zlib.crc32(path.read_bytes()):08x}"
+        if isinstance(given, HeightArray):
+            del part["path"]
+            part["content"] = given.heights.checksum
+    return data
+
+
+def unit(part: Part, key: str) -> str:
+    """Return the unit of a key, from the brackets in its description; '' if it has none."""
+    found = re.search(r"\[([^\],]+)\]", type(part).model_fields[key].description or "")
+    return found.group(1) if found and found.group(1) != "-" else ""
+
+
+def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
+    """Yield key, value and unit of all keys in a part; each item of a list of parts is one row."""
+    for key, value in items(part):
+        name = f"{path}{key}"
+        if isinstance(value, Part):
+            yield from rows(value, f"{name}.")
+        elif isinstance(value, tuple) and value and isinstance(value[0], Part):
+            shown = list(enumerate(value))
+            if key == "branches" and len(value) > MOST_BRANCHES:
+                shown = [shown[0], shown[-1]]
+            for index, item in shown:
+                yield f"{name}.{index}", listed_line(item), ""
+                if index == 0 and len(shown) < len(value):
+                    yield f"{name}.1 to {len(value) - 2}", "are in job.resolved.yaml", ""
+        else:
+            yield name, text(value), _unit_of(value, part, key)
+
+
+def _unit_of(value: Any, part: Part, key: str) -> str:
+    """Return the unit of a number, with the velocity of a ramp or the frequency of an oscillation; '' for words such as
+    auto, and for mappings."""
+    if isinstance(value, Ramp) and value.velocity:
+        return f"{unit(part, key)} at {text(value.velocity)} m/s"
+    if isinstance(value, Oscillation | Swing):
+        return f"{unit(part, key)} at {text(value.frequency)} Hz"
+    return "" if isinstance(value, str | Part) else unit(part, key)
+
+
+def listed_line(part: Part) -> str:
+    """Return a part in one line."""
+    pairs = [(key, value, _unit_of(value, part, key)) for key, value in items(part)]
+    return ", ".join(f"{key} {text(value)} {unit}".rstrip() for key, value, unit in pairs)
+
+
+def text(value: Any) -> str:
+    """Return a value as text, numbers in six digits."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, Ramp):
+        return text(value.start) if value.constant else f"{text(value.start)} to {text(value.end)}"
+    if isinstance(value, Oscillation):
+        return f"{text(value.mean)} ± {text(value.amplitude)}"
+    if isinstance(value, Part):
+        return f"({listed_line(value)})"
+    if isinstance(value, tuple):
+        more = "±" * isinstance(value, Swing)
+        return f"{more}[{', '.join(text(inner) for inner in value)}]"
+    return str(value)
+
+
+def layout(lines: list[tuple[str, str, str]]) -> str:
+    """Return rows of key, value and unit as an aligned table, with an empty line between sections."""
+    key_width = max(len(key) for key, _, _ in lines)
+    value_width = max([len(value) for _, value, unit in lines if unit], default=0)
+    out: list[str] = []
+    section = lines[0][0].split(".")[0]
+    for key, value, unit_text in lines:
+        if section != key.split(".")[0]:
+            section = key.split(".")[0]
+            out.append("")
+        out.append(f"{key:<{key_width}}  {value:<{value_width}}  {unit_text}".rstrip())
+    return "\n".join(out)
+
+
+GROUP = "parcontact.effects"
+
+
+def find_effects() -> dict[str, Any]:
+    """Return all usable registered effects, by the name of their section."""
+    return {section: _load(section) for section in _registered() if not why_unusable(section)}
+
+
+def effects_of(sections: Iterable[str]) -> dict[str, Any]:
+    """Return the effects registered for some sections, by section, in the order in which they follow a step. Raises
+    ValidationError for an unusable effect."""
+    found = [section for section in sections if section in _registered()]
+    for section in found:
+        if reason := why_unusable(section):
+            refuse(Fault(reason, (section,), at_key=True))
+    ours = {each.SECTION: each for each in capabilities.folders() if hasattr(each, "SECTION")}
+    needs = {section: capabilities.needs_of(ours.get(section) or _load(section)) for section in found}
+    return {section: _load(section) for section in capabilities.in_order(needs)}
+
+
+def answers(module: str, name: str) -> list[Any]:
+    """Return what capabilities offer under a name: those of this package in modules of one name, others in their
+    classes."""
+    others = (section for section in _registered() if not is_ours(section) and not why_unusable(section))
+    found = [(section, getattr(_load(section), name)) for section in others if hasattr(_load(section), name)]
+    return [*capabilities.offers(module, name), *(_named(*each) for each in found)]
+
+
+def _named(section: str, offered: Any) -> Any:
+    """Return what an effect of another package offers; functions name it in their errors."""
+
+    def call(*given: Any) -> Iterator[Any]:
+        with naming_effect(section):
+            found = list(offered(*given))
+        yield from found
+
+    return call if callable(offered) else offered
+
+
+@contextmanager
+def naming_effect(section: str) -> Iterator[None]:
+    """Raise RunError with the name of the effect if its code fails within the context, or tries to end the program."""
+    try:
+        yield
+    except (InputError, RunError):
+        raise
+    except (Exception, SystemExit) as error:
+        raise RunError(f"{describe_effect(section)} has failed: {type(error).__name__}: {error}") from error
+
+
+def describe_effect(section: str) -> str:
+    """Return the name of the effect of a section, and the entry point of its class."""
+    return f"the effect {section} ({_registered()[section].value})"
+
+
+def is_ours(section: str) -> bool:
+    """Return True if an effect of this package adds the section."""
+    return section in own_sections()
+
+
+def unusable() -> list[str]:
+    """Return a sentence for each registered effect that cannot be used."""
+    return [f"{section} {reason}" for section in _registered() if (reason := why_unusable(section))]
+
+
+@cache
+def _registered() -> dict[str, EntryPoint]:
+    others = {entry.name: entry for entry in entry_points(group=GROUP) if not _is_ours(entry)}
+    return others | {each.SECTION: _entry_of(each) for each in capabilities.folders() if hasattr(each, "SECTION")}
+
+
+def _entry_of(folder: ModuleType) -> EntryPoint:
+    return EntryPoint(folder.SECTION, f"{folder.__name__}.effect:{folder.EFFECT}", GROUP)
+
+
+def _is_ours(entry: EntryPoint) -> bool:
+    """Return True for an effect of this package."""
+    return entry.value.startswith(f"{__package__.partition('.')[0]}.")
+
+
+def own_sections() -> list[str]:
+    """Return the sections that effects of this package add."""
+    return sorted(name for name, entry in _registered().items() if _is_ours(entry))
+
+
+@cache
+def _load(section: str) -> Any:
+    return _registered()[section].load()
+
+
+@cache
+def why_unusable(section: str) -> str:
+    """Return why the effect of a section cannot be used; '' if it can."""
+    try:
+        effect = _load(section)
+        base = f"{Part.__module__}.{Part.__name__}"
+        reason = "" if issubclass(effect.section, Part) else f"its section is not a subclass of {base}"
+        if not _are_names(effect.columns):
+            reason = f"its columns must be a tuple of different names, of letters, digits and _, got {effect.columns!r}"
+    except (Exception, SystemExit) as error:  # code of other packages may raise anything
+        reason = f"{type(error).__name__}: {error}"
+    return reason and f"belongs to the effect {_registered()[section].value}, which cannot be used: {reason}"
+
+
+def _are_names(columns: Any) -> bool:
+    kind = isinstance(columns, tuple | list) and len(set(columns)) == len(columns)
+    return kind and all(isinstance(name, str) and name.isidentifier() for name in columns)

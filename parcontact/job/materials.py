@@ -1,0 +1,322 @@
+"""The `material` section: an elastic or a generalized Zener body (paper, Eq. 8 and its state variables)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, ValidationInfo, model_validator
+
+from ..doubts import Doubt
+from ..errors import InputError
+from ..rubber import compound
+from ..rubber.shift import log_vertical
+from .calculation import Celsius, Shift, shifted
+from .parts import Instead, Part, Rule, chosen, existing_file
+from .quantities import NonNegative, Number, Positive
+from .yaml_text import Fault, quote, refuse
+
+Modulus = Annotated[NonNegative, Field(description="a shear modulus [Pa] of zero or more")]
+Hardness = Annotated[Positive | None, Field(description="a positive pressure [Pa] at which the counterbody yields")]
+Poisson = Annotated[Number, Field(gt=-1, le=0.5, description="a Poisson ratio [-] above -1 and up to 0.5")]
+ROUNDED = 1e-9  # rounding: allowed error of the sum of fractions
+YOUNG = ("young_modulus", "youngs_modulus", "elastic_modulus", "young", "e")
+BY_THREE = "moduli here are shear moduli: {} is E/(2 (1 + poisson)), a third of Young's modulus E for rubber"
+
+
+class ZenerBranch(Part):
+    """A spring G0 in series with a Kelvin element (spring G1 parallel to dashpot eta1); a Maxwell branch if G1 = 0."""
+
+    label: ClassVar[str] = "a branch of the form G0, G1, eta1"
+    G0: Positive = Field(description="a positive shear modulus [Pa]")
+    G1: Modulus
+    eta1: Number = Field(ge=0, description="a viscosity [Pa s] of zero or more, or .inf")
+
+    @property
+    def relaxation_time(self) -> float:
+        """Return the time constant of stress relaxation at constant strain, eta1 / (G0 + G1) [s]."""
+        return self.eta1 / (self.G0 + self.G1)
+
+    @property
+    def instant_modulus(self) -> float:
+        """Return the instantaneous modulus [Pa]."""
+        return self.G0 if self.eta1 > 0 else self.G0 * self.G1 / (self.G0 + self.G1)
+
+    @property
+    def long_modulus(self) -> float:
+        """Return the long-term modulus [Pa]."""
+        return self.G0 if math.isinf(self.eta1) else self.G0 * self.G1 / (self.G0 + self.G1)
+
+
+class PronyBranch(Part):
+    """A term `modulus exp(-t / relaxation_time)` of the relaxation function."""
+
+    label: ClassVar[str] = "a branch of the form modulus, relaxation_time"
+    modulus: Modulus
+    relaxation_time: Positive = Field(description="a positive time [s]")
+
+    @property
+    def instant_modulus(self) -> float:
+        """Return the instantaneous modulus [Pa]."""
+        return self.modulus
+
+    @property
+    def long_modulus(self) -> float:
+        """Return the long-term modulus, 0 [Pa]."""
+        return 0.0
+
+
+class FractionBranch(Part):
+    """A term of a Prony series as in finite-element programs: `G(t) = modulus_0 (1 - sum g (1 - exp(-t/tau)))`."""
+
+    label: ClassVar[str] = "a branch of the form g, tau"
+    g: Number = Field(ge=0, le=1, description="a fraction of modulus_0 [-] from 0 to 1")
+    tau: Positive = Field(description="a positive relaxation time [s]")
+
+    def times(self, modulus: float) -> PronyBranch:
+        """Return the branch of a body with the instantaneous modulus `modulus` [Pa]."""
+        return PronyBranch(modulus=self.g * modulus, relaxation_time=self.tau)
+
+
+MadeBranch = ZenerBranch | PronyBranch
+AnyBranch = MadeBranch | FractionBranch
+FORMS: tuple[type[AnyBranch], ...] = (ZenerBranch, PronyBranch, FractionBranch)
+
+
+def _branch(data: Any, info: ValidationInfo) -> AnyBranch:
+    """Return a branch in the form that its keys determine."""
+    if isinstance(data, AnyBranch):
+        return data
+    names = [", ".join(form.words()) for form in FORMS]
+    forms = f"{', '.join(names[:-1])} or {names[-1]}"
+    if not isinstance(data, dict):
+        refuse(Fault(f"must be a mapping of {forms}, got {quote(data)}"))
+    meant = [form for form in FORMS if any(key in data for key in form.words())]
+    if len(meant) > 1:
+        given = [key for form in meant for key in form.words() if key in data]
+        refuse(Fault(f"mixes forms of a branch: give {forms}, got {', '.join(given)}"))
+    if not meant:
+        refuse(Fault(f"must have the keys {forms}, got {', '.join(data) or 'none'}"))
+    return meant[0].model_validate(data, context=info.context)
+
+
+Branch = Annotated[MadeBranch, PlainValidator(_branch, json_schema_input_type=AnyBranch)]
+
+
+class Elastic(Part):
+    """A linear elastic body."""
+
+    model: Literal["elastic"] = "elastic"
+    poisson: Poisson = 0.5
+    shear_modulus: Positive = Field(description="a positive shear modulus [Pa]")
+    hardness: Hardness = None
+
+    branches: ClassVar[tuple[()]] = ()
+    remembers: ClassVar[bool] = False
+    time_factor: ClassVar[float] = 1.0
+    modulus_factor: ClassVar[float] = 1.0
+    foreign = dict.fromkeys(YOUNG, Instead(BY_THREE.format("shear_modulus"), ("shear_modulus",)))
+
+    @property
+    def fitted(self) -> Elastic:
+        """Return the body itself."""
+        return self
+
+    @property
+    def instant_modulus(self) -> float:
+        """Return the shear modulus, which is also the long-term modulus [Pa]."""
+        return self.shear_modulus
+
+    long_modulus = instant_modulus
+
+
+def _positive_band(band: tuple[float, float]) -> tuple[float, float]:
+    if band[0] >= band[1]:
+        refuse(Fault(f"must be a lower and a higher frequency [Hz], got {list(band)!r}"))
+    return band
+
+
+Band = Annotated[
+    tuple[Positive, Positive] | None,
+    AfterValidator(lambda band: band and _positive_band(band)),
+    Field(description="two frequencies [Hz], the measured band reduced to the reference temperature"),
+]
+
+
+Measured = Annotated[
+    tuple[Celsius, Celsius] | None,
+    Field(description="two temperatures [deg C], the lowest and the highest that were measured"),
+]
+
+
+def _fractions(modulus_0: float | None, modulus_inf: float, branches: tuple[AnyBranch | None, ...]) -> Iterator[Fault]:
+    """Check that fractions have a modulus_0, and that a body with modulus_0 has fractions only, of sum 1 at most."""
+    fractions = [branch.g for branch in branches if isinstance(branch, FractionBranch)]
+    if fractions and modulus_0 is None:
+        yield Fault(
+            "is missing: g of branches is a fraction of it; give the instantaneous shear modulus [Pa]", ("modulus_0",)
+        )
+    if modulus_0 is None:
+        return
+    if modulus_inf:
+        rest = "modulus_inf = modulus_0 (1 - sum of g); leave one of the two out"
+        yield Fault(f"cannot be given with modulus_0: {rest}", ("modulus_inf",), at_key=True)
+    if len(fractions) < len(branches) and None not in branches:
+        yield Fault("needs branches of the form g, tau", ("modulus_0",), at_key=True)
+    if sum(fractions) > 1.0 + ROUNDED:
+        yield Fault(f"have fractions g that add up to {sum(fractions):.6g}, more than 1", ("branches",))
+
+
+def _stiff(modulus_0: float | None, modulus_inf: float, branches: tuple[AnyBranch | None, ...]) -> Iterator[Fault]:
+    own = [branch for branch in branches if not isinstance(branch, FractionBranch)]
+    moduli = [branch.instant_modulus for branch in own if branch is not None]
+    if modulus_0 is None and len(own) == len(branches) and None not in branches and modulus_inf + sum(moduli) == 0:
+        yield Fault("has no stiffness: modulus_inf and all branches are zero; give one of them a modulus [Pa]")
+
+
+class Zener(Part):
+    """Springs, Kelvin and Maxwell branches in parallel with the spring `modulus_inf`, G_inf of Eq. (8).
+
+    The body is a fluid if the long-term modulus is zero. With a `shift` relaxation times and moduli are given at its
+    reference temperature; at another `temperature` times are multiplied by a_T and moduli by b_T. With the
+    instantaneous modulus `modulus_0`, branches are fractions of it.
+    """
+
+    model: Literal["zener"] = "zener"
+    poisson: Poisson = 0.5
+    modulus_inf: Modulus = 0.0
+    modulus_0: Positive | None = Field(default=None, description="a positive instantaneous shear modulus [Pa]")
+    branches: tuple[Branch, ...] = Field(default=(), description="a list of branches")
+    shift: Shift | None = Field(default=None, description="a mapping with law: wlf | arrhenius | factors")
+    temperature: Celsius | None = Field(default=None, description="a temperature [deg C], up to 5000")  # the reference
+    band: Band = None
+    temperatures: Measured = None
+    hardness: Hardness = None
+
+    foreign = dict.fromkeys(YOUNG, Instead(BY_THREE.format("each of modulus_inf and branches")))
+    rules = (
+        Rule(("modulus_0", "modulus_inf", "branches"), _fractions),
+        Rule(("modulus_0", "modulus_inf", "branches"), _stiff),
+        Rule(("shift", "temperature"), shifted),
+    )
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _with_moduli(cls, data: Any, handler: Callable[[Any], Self]) -> Self:
+        """Replace fractions of `modulus_0` by moduli."""
+        found = handler(data)
+        if (whole := found.modulus_0) is None:
+            return found
+        fractions = [branch for branch in found.branches if isinstance(branch, FractionBranch)]
+        rest = 1.0 - math.fsum(branch.g for branch in fractions)
+        changes = {"branches": tuple(branch.times(whole) for branch in fractions), "modulus_0": None}
+        return found.model_copy(update={**changes, "modulus_inf": whole * (rest if rest > ROUNDED else 0.0)})
+
+    @property
+    def fitted(self) -> Zener:
+        """Return the body itself."""
+        return self
+
+    @property
+    def remembers(self) -> bool:
+        """Return True if the body relaxes."""
+        return bool(self.branches)
+
+    @property
+    def time_factor(self) -> float:
+        """Return a_T, the ratio of relaxation times at the temperature to those at the reference [-]."""
+        if self.shift is None or self.temperature is None:
+            return 1.0
+        return float(10.0 ** self.shift.made.log_factor(self.temperature))
+
+    @property
+    def modulus_factor(self) -> float:
+        """Return b_T, the ratio of moduli at the temperature to those at the reference [-]."""
+        if self.shift is None or self.temperature is None:
+            return 1.0
+        return float(10.0 ** log_vertical(self.shift.made, self.temperature))
+
+    @property
+    def instant_modulus(self) -> float:
+        """Return the instantaneous modulus at the temperature of the body [Pa]."""
+        return self.modulus_factor * (self.modulus_inf + sum(branch.instant_modulus for branch in self.branches))
+
+    @property
+    def long_modulus(self) -> float:
+        """Return the long-term modulus at the temperature of the body [Pa]."""
+        return self.modulus_factor * (self.modulus_inf + sum(branch.long_modulus for branch in self.branches))
+
+    def at(self, temperature: float) -> Zener:
+        """Return the body at another temperature [deg C], which its shift must reach."""
+        return self.model_copy(update={"temperature": temperature})
+
+
+class Dma(Part):
+    """A material fitted to a table of measured moduli when the job is read, as by `parcontact fit`."""
+
+    model: Literal["dma"] = "dma"
+    path: Annotated[Path, AfterValidator(existing_file), Field(description="the path of a table of measured moduli")]
+    poisson: Poisson = 0.5
+    reference: Celsius | None = None  # default: the middle one of the measured temperatures
+    shift: Literal["wlf", "arrhenius", "free"] = "wlf"
+    temperature: Celsius | None = Field(default=None, description="a temperature [deg C], up to 5000")  # the reference
+    error: Positive = Field(default=0.02, description="a positive relative error of both moduli [-]")
+    weight: Literal["both", "storage", "loss"] = "both"
+    vertical: Literal["auto", "density", "free", "none"] = "auto"
+    hardness: Hardness = None
+
+    _fitted: Zener = PrivateAttr()
+    _doubts: tuple[Doubt, ...] = PrivateAttr(default=())
+
+    def model_post_init(self, context: Any) -> None:
+        try:
+            of_fit = (self.error, self.weight, self.vertical)
+            found = compound.fitted(self.path, self.poisson, self.reference, self.shift, *of_fit)
+        except InputError as error:
+            refuse(Fault(f"cannot be fitted: {error}", ("path",)))
+        made = Zener.model_validate(found.material())
+        if faults := list(shifted(made.shift, self.temperature)):
+            refuse(*faults)
+        self._doubts = tuple(Doubt("said", "material.path", {"text": text}) for text in found.doubts())
+        self._fitted = made.model_copy(update={"temperature": self.temperature, "hardness": self.hardness})
+
+    @property
+    def doubts(self) -> tuple[Doubt, ...]:
+        """Return the warnings about the fit."""
+        return self._doubts
+
+    @property
+    def fitted(self) -> Zener:
+        """Return the material as springs and Maxwell branches."""
+        return self._fitted
+
+
+def describe_temperature(material: Elastic | Zener | Dma, section: str = "material") -> str:
+    """Return a sentence on the temperature of the material of a section, '' for a material without a shift."""
+    body = material.fitted
+    if not isinstance(body, Zener) or body.shift is None:
+        return ""
+    reference = body.shift.made.reference
+    if body.temperature is None:
+        return f"{section}: at {reference:g} C, the reference of its shift; the job gives no {section}.temperature"
+    factors = f"a_T = {body.time_factor:.4g}"
+    factors += f", b_T = {body.modulus_factor:.4g}" if body.shift.vertical else ""
+    return f"{section}: at {body.temperature:g} C ({factors}, reference {reference:g} C)"
+
+
+def heated(material: Elastic | Zener | Dma, temperature: float) -> Zener:
+    """Return a material at another temperature [deg C]. Raises InputError for a material without a shift."""
+    body = material.fitted
+    if not isinstance(body, Zener):
+        raise InputError("temperatures need a material whose relaxation times depend on it: model zener or dma")
+    if faults := list(shifted(body.shift, temperature)):
+        raise InputError(f"temperature {faults[0].predicate}")
+    return body.at(temperature)
+
+
+KINDS = {"elastic": Elastic, "zener": Zener, "dma": Dma}
+CALLED = dict.fromkeys(("prony", "maxwell", "viscoelastic", "sls"), "zener")  # names in other programs
+AnyMaterial = Elastic | Zener | Dma
+Material = Annotated[AnyMaterial, PlainValidator(chosen("model", KINDS, CALLED), json_schema_input_type=AnyMaterial)]

@@ -1,0 +1,494 @@
+"""Warnings about the meaning of a job, before it runs.
+
+Warnings about jobs outside of the theory: a linear half space with small slopes and strains.
+
+Slopes, pressures and contact radii are bounded from below, so that sound jobs get no warning.
+
+Warnings about memory and disk: lower bounds of what a job needs, compared with this machine.
+
+Frequencies at which the surface of a job loads the body.
+
+Warnings about the thickness of a layer, compared with the surface, the mesh and the material.
+
+As in `meaning`, heights and lengths are bounded from below, so that sound jobs get no warning.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from ..doubts import Doubt
+from ..rubber.shift import doubt_kelvin
+from . import limits
+from .advice import Sections, more_points
+from .calculation import Grid, Output
+from .limits import count_steps
+from .materials import Elastic, PronyBranch, Zener
+from .stages import Stage
+from .surfaces import Cone, Flat, HeightFile, OnOneMesh, Pyramid, Rough, RoughSpectrum, Sphere, Topography, Wave
+
+STEEP = 0.5  # physics: largest rms slope that counts as small
+STEEPEST = 1.0  # physics: radius of contact over radius of the sphere, up to which slopes are small
+SOFTEST, HARDEST = 1e3, 1e12  # physics: range of shear moduli [Pa]; gels have 1e3, diamond 5e11
+STRAIN = 1.0  # physics: mean pressure over 2 G/(1 - nu), up to which strains are small
+LEAST = 1e-12  # rounding: smallest modulus of a fluid over its instantaneous modulus, to avoid division by 0
+NEAR = 0.4  # accuracy: distance to the starting point, over the longest wave, at which imprints overlap
+REMEMBERS = 0.1  # accuracy: relaxation time over the time since the imprint, below which it is forgotten
+ALONE = 0.01  # accuracy: limit on the relative change of the load by periodic images
+IMAGES = 20  # accuracy: number of images summed on each side; the others add 3 %
+ROUNDS = 1000  # tuning: limit on the passages through the box that are checked for imprints
+SAME = 1e-9  # rounding: relative difference below which distances are the same
+BEYOND = 100.0  # physics: frequency over the frequency of every branch, above which nothing relaxes
+
+
+def doubts_of_scene(job: Sections) -> Iterator[Doubt]:
+    """Yield warnings in the order of the sections."""
+    material = job.material.fitted
+    yield from _slopes(job.grid, job.surface)
+    yield from doubt_moduli(material)
+    yield from _pressures(job, material)
+    yield from _instants(job, material)
+    yield from _band(job, material)
+    yield from _imprints(job, material)
+    yield from _room(job, material) if not any(job.grid.cyclic) else neighbours(job, material)
+
+
+def doubt_slope(slope: float, surface: tuple[Any, ...]) -> Iterator[Doubt]:
+    """Yield a warning about an rms slope above STEEP, with the keys that heights of files may lack."""
+    if slope > STEEP:
+        yield Doubt("steep", "surface", {"slope": slope, "most": STEEP, "needed": _needed(surface)})
+
+
+def _needed(surface: tuple[Any, ...]) -> str:
+    """Return sentences on what heights of files may need and do not have."""
+    files = [shape for shape in surface if isinstance(shape, HeightFile)]
+    maps = [shape for shape in surface if isinstance(shape, Topography)]
+    keys = ["scale: 1.0e-6 (shape: file)"] * any(shape.scale == 1.0 for shape in files)
+    keys += ["unit: um (shape: topography)"] * any(shape.unit_of_heights in (None, "m") for shape in maps)
+    units = f" Heights in um need {' or '.join(keys)}." if keys else ""
+    missing = bool(files) or any(shape.nodata is None for shape in maps)
+    return units + " Missing points must be nan." * missing
+
+
+READ = OnOneMesh | RoughSpectrum | Topography  # shapes whose heights are read from files or arrays
+
+
+def says_all(surface: tuple[Any, ...]) -> bool:
+    """Return True if the rms slope of a surface follows from the job without its heights."""
+    return not any(isinstance(shape, READ) or getattr(shape, "rms_slope", 0.0) is None for shape in surface)
+
+
+def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Doubt]:
+    """Yield a warning about the rms slope if it follows from the job."""
+    if not says_all(surface):
+        return
+    square = 0.0
+    for shape in surface:
+        if isinstance(shape, Wave):
+            q = 2 * math.pi * math.hypot(shape.waves[0] / grid.lx, shape.waves[1] / grid.ly)
+            square += (q * shape.amplitude) ** 2 / 2
+        elif isinstance(shape, Rough):
+            square += (shape.rms_slope or 0.0) ** 2
+        elif isinstance(shape, Cone | Pyramid):
+            square += shape.slope**2
+    yield from doubt_slope(math.sqrt(square), surface)
+
+
+def doubt_moduli(material: Elastic | Zener) -> Iterator[Doubt]:
+    """Yield a warning about an instantaneous modulus that no solid has."""
+    modulus = material.instant_modulus
+    if modulus < SOFTEST:
+        yield Doubt("soft", "material", {"modulus": modulus, "least": SOFTEST, "in_mega": 1e6 * modulus})
+    elif modulus > HARDEST:
+        yield Doubt("hard", "material", {"modulus": modulus, "most": HARDEST})
+
+
+def doubt_temperatures(job: Sections) -> Iterator[Doubt]:
+    """Yield a warning for each key with a temperature that may be in kelvin."""
+    material, steady = job.material.given, job.steady
+    shift = getattr(material, "shift", None)
+    yield from doubt_kelvin("material.temperature", [getattr(material, "temperature", None)])
+    yield from doubt_kelvin("material.reference", [getattr(material, "reference", None)])
+    yield from doubt_kelvin("material.shift.reference", [getattr(shift, "reference", None)])
+    yield from doubt_kelvin("material.shift.temperatures", getattr(shift, "temperatures", ()))
+    yield from doubt_kelvin("steady.temperatures", (steady.temperatures if steady else None) or ())
+
+
+def instant_contact_modulus(material: Elastic | Zener) -> float:
+    """Return the instantaneous contact modulus E* = 2 G/(1 - nu) [Pa], the largest at any time."""
+    return 2.0 * material.instant_modulus / (1.0 - material.poisson)
+
+
+def _mean(stage: Stage, load: float, grid: Grid) -> float:
+    """Return the mean pressure of a stage with a load [Pa]; 0 for a stage with an approach."""
+    if stage.control == "approach":
+        return 0.0
+    return load / (grid.lx * grid.ly) if stage.control == "force" else load
+
+
+def _pressures(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+    loads = [("initial.pressure", job.initial.pressure or 0.0, 0.0)]
+    loads.append(("steady.pressures", max((job.steady.pressures if job.steady else None) or (0.0,)), 0.0))
+    least, held = 0.0, 0.0
+    for index, stage in enumerate(job.history):
+        ends = [_mean(stage, load, job.grid) for load in (stage.load.lowest, stage.load.highest)]
+        least, held = (least, held + stage.seconds) if min(ends) == least else (min(ends), stage.seconds)
+        loads += [(f"history.{index}.{stage.control}", *load) for load in ((max(ends), 0.0), (least, held))]
+    found = [(pressure / modulus_after(material, seconds), key, pressure, seconds) for key, pressure, seconds in loads]
+    strain, key, pressure, seconds = max(found)
+    if strain > STRAIN:
+        kind = "strain in time" if seconds else "strain at once"
+        yield Doubt(kind, key, {"pressure": pressure, "modulus": pressure / strain, "seconds": seconds})
+    yield from _light(job, material, *max((pressure, key) for key, pressure, _ in loads))
+
+
+def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) -> Iterator[Doubt]:
+    """Yield a warning if the largest load gives less than one point in contact by Persson, erf(sqrt(2) p/(E* h'))."""
+    pulled = any(limits.loads_press in lifted for lifted in job.asked("lifts"))
+    pulled |= any(stage.control == "approach" for stage in job.history)
+    slopes = [shape.rms_slope or 0.0 if isinstance(shape, Rough) else math.inf for shape in job.surface]
+    stiffness = 2.0 * material.long_modulus / (1.0 - material.poisson) * math.hypot(*slopes)
+    known = not pulled and pressure > 0.0 and 0.0 < stiffness < math.inf
+    touching = math.erf(math.sqrt(2.0) * pressure / stiffness) * math.prod(job.grid.points) if known else 1.0
+    if touching < 1.0:
+        yield Doubt("light", key, {"pressure": pressure, "touching": touching, "in_mega": 1e6 * pressure})
+
+
+def modulus_after(material: Elastic | Zener, seconds: float) -> float:
+    """Return an upper bound of pressure over strain after a constant pressure for `seconds`, as E* [Pa].
+
+    The bound is the mean of E*(t): int_0^t E*(t - s) J(s) ds = t with rising creep compliance J, so
+    J(t) >= t/int_0^t E*.
+    """
+    modulus = material.instant_modulus
+    for branch in material.branches:
+        ratio = seconds / (material.time_factor * branch.relaxation_time) if branch.relaxation_time else math.inf
+        kept = -math.expm1(-ratio) / ratio if ratio > 0.0 else 1.0
+        modulus -= material.modulus_factor * (branch.instant_modulus - branch.long_modulus) * (1.0 - kept)
+    return 2.0 * max(modulus, material.long_modulus, LEAST * material.instant_modulus) / (1.0 - material.poisson)
+
+
+# -- relaxation -------------------------------------------------------------------------------------------------------
+
+
+def _instants(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+    """Yield a warning if a relaxing body has several stages and none has a duration."""
+    timeless = len(job.history) > 1 and not any(stage.seconds for stage in job.history)
+    if timeless and material.instant_modulus > material.long_modulus and job.initial.state == "virgin":
+        moduli = {"modulus": material.instant_modulus, "relaxed": material.long_modulus}
+        yield Doubt("at an instant", "history", {"stages": len(job.history), **moduli})
+
+
+def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+    """Yield a warning if the angular frequencies q v of the sliding waves are far from all 1/relaxation time.
+
+    An effect may shear a contact before it slides, within far less than a wave. Then its highest frequency is not
+    known, and slow sliding gives no warning.
+    """
+    branches = [one for one in material.branches if isinstance(one, PronyBranch) or one.G0 > 0.0]
+    times = [branch.relaxation_time for branch in branches if 0.0 < branch.relaxation_time < math.inf]
+    rough = [shape for shape in job.surface if isinstance(shape, Rough)]
+    lengths = [length for shape in rough for length in (shape.long_wavelength, shape.short_wavelength)]
+    speeds = [stage.speed for stage in job.history if stage.slides and stage.seconds]
+    speeds += [math.hypot(*job.initial.velocity)] if any(job.initial.velocity) else []
+    speeds += job.steady.velocities if job.steady else ()
+    if not (times and lengths and speeds) or getattr(material, "temperature", None) is not None:
+        return  # relaxation times are given at another temperature
+    low, high = 2 * math.pi * min(speeds) / max(lengths), 2 * math.pi * max(speeds) / min(lengths)
+    slow, fast = 1.0 / max(times), 1.0 / min(times)
+    if (high * BEYOND < slow and not job.sheared_first) or low > fast * BEYOND:
+        how, modulus = ("slower", "long-term") if high < slow else ("faster", "instantaneous")
+        rates = {"low": low, "high": high, "slow": slow, "fast": fast}
+        yield Doubt("elastic", "material", {**rates, "times": BEYOND, "how": how, "modulus": modulus})
+
+
+# -- isolated contacts ------------------------------------------------------------------------------------------------
+
+
+def _room(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+    """Yield warnings if the least contact of a single sphere is too large for its radius, or the relaxed one leaves the
+    box."""
+    grid, sphere = job.grid, job.surface[0]
+    if len(job.surface) != 1 or not isinstance(sphere, Sphere) or min(grid.points) == 1:
+        return
+    x, y = sphere.center or (grid.lx / 2, grid.ly / 2)
+    modulus, found, elapsed = instant_contact_modulus(material), set(), 0.0
+    for index, stage in enumerate(job.history):
+        elapsed += stage.seconds
+        moving = stage.moving(stage.seconds)
+        x, y = x + stage.velocity[0] * moving, y + stage.velocity[1] * moving
+        radius = _hertz(stage, sphere.radius, modulus, grid)
+        if radius / sphere.radius > STEEPEST and "steep" not in found:
+            found.add("steep")
+            yield Doubt("large contact", f"history.{index}", {"contact": radius, "radius": sphere.radius})
+        room = min(x, grid.lx - x, y, grid.ly - y)
+        radius = _hertz(stage, sphere.radius, _relaxed_contact_modulus(material, elapsed), grid)
+        if radius > room and radius > 0.0 and "room" not in found:
+            found.add("room")
+            kind = "slides out of the box" if stage.speed and stage.seconds else "out of the box"
+            numbers = {"contact": radius, "lx": grid.lx, "ly": grid.ly, "x": x, "y": y, "room": max(room, 0.0)}
+            yield Doubt(kind, f"history.{index}", numbers)
+
+
+def _relaxed_contact_modulus(material: Elastic | Zener, seconds: float) -> float:
+    """Return E*(t) [Pa] after `seconds` of relaxation. Under a constant load 1/E*(t) bounds the creep compliance from
+    above, and with it the contact."""
+    modulus = material.long_modulus
+    for branch in material.branches:
+        ratio = seconds / (material.time_factor * branch.relaxation_time) if branch.relaxation_time else math.inf
+        modulus += material.modulus_factor * (branch.instant_modulus - branch.long_modulus) * math.exp(-ratio)
+    return 2.0 * max(modulus, LEAST * material.instant_modulus) / (1.0 - material.poisson)
+
+
+def _hertz(stage: Stage, radius: float, modulus: float, grid: Grid) -> float:
+    """Return the contact radius [m] by Hertz (1882) for a contact modulus [Pa], at the end of a stage or at the highest
+    load of an oscillation."""
+    if stage.control == "approach":
+        return math.sqrt(max(_final(stage), 0.0) * radius)
+    force = _mean(stage, _final(stage), grid) * grid.lx * grid.ly
+    return float((0.75 * max(force, 0.0) * radius / modulus) ** (1 / 3))
+
+
+def _final(stage: Stage) -> float:
+    """Return the load at the end of a stage, or the highest load of an oscillation."""
+    return stage.load.highest if stage.frequency else stage.load.end
+
+
+def neighbours(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+    """Yield a warning if images change the load of a single sphere in a periodic box."""
+    modulus = instant_contact_modulus(material)
+    return acting_neighbours(
+        job, lambda radius: max((_hertz(stage, radius, modulus, job.grid) for stage in job.history), default=0.0)
+    )
+
+
+def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Iterator[Doubt]:
+    """Yield a warning if periodic images of the contact change the load of a single sphere by more than ALONE.
+
+    `contact` maps the radius R of the sphere [m] to the Hertzian radius of contact a [m]. An image at the distance r
+    with the force P adds the curvature `P/(2 pi E* r^3)`, so the load at a given contact radius changes by
+    `2 a^3/(3 pi) sum 1/r^3`.
+    """
+    grid, sphere = job.grid, job.surface[0]
+    single = len(job.surface) == 1 and isinstance(sphere, Sphere) and min(grid.points) > 1
+    if not single or not all(grid.cyclic) or job.body is not None:
+        return
+    around = range(-IMAGES, IMAGES + 1)
+    images = math.fsum(math.hypot(i * grid.lx, j * grid.ly) ** -3 for i in around for j in around if i or j)
+    change = 2.0 * contact(sphere.radius) ** 3 * images / (3.0 * math.pi)
+    if change > ALONE:
+        times = (change / ALONE) ** (1.0 / 3.0)
+        yield Doubt(
+            "images", "surface.0", {"lx": grid.lx, "ly": grid.ly, "change": change, "most": ALONE, "times": times}
+        )
+
+
+# -- slides over their own imprint ------------------------------------------------------------------------------------
+
+
+def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+    """Yield a warning for each slide (consecutive stages of one velocity) that meets the imprint of its own beginning.
+
+    Surfaces of waves only are periodic by intention. A slide that begins in its steady state meets no other imprint.
+    """
+    grid, initial = job.grid, job.initial
+    times = [branch.relaxation_time for branch in material.branches if branch.relaxation_time < math.inf]
+    if not all(grid.cyclic) or not times or all(isinstance(shape, Wave) for shape in job.surface):
+        return
+    memory = max(times) * material.time_factor
+    longest = max((shape.long_wavelength for shape in job.surface if isinstance(shape, Rough)), default=0.0)
+    near = NEAR * min(longest, *grid.size)
+    steady = (initial.velocity, initial.pressure) if initial.state == "steady" else None
+    for velocity, stages in groupby(enumerate(job.history), key=lambda stage: stage[1].velocity):
+        (index, first), *more = stages
+        speed = math.hypot(*velocity)
+        seconds = first.seconds + sum(stage.seconds for _, stage in more)
+        if not first.slides or not speed * seconds or steady == (velocity, first.load.end):
+            continue
+        start = _round_trip(grid, velocity, seconds + near / speed, near) - near
+        if speed * seconds > start * (1.0 + SAME) and memory > REMEMBERS * start / speed:
+            numbers = {"way": start, "length": speed * seconds, "near": near, "memory": memory}
+            yield Doubt("imprint", f"history.{index}", numbers)
+
+
+def _round_trip(grid: Grid, velocity: tuple[float, float], most: float, near: float) -> float:
+    """Return the distance [m] after which a slide of at most `most` seconds is within `near` [m] of a periodic image of
+    its start; inf if it never is."""
+    along = [abs(one) for one in velocity]
+    main, other = (0, 1) if along[0] / grid.lx >= along[1] / grid.ly else (1, 0)
+    for count in range(1, ROUNDS):
+        seconds = count * grid.size[main] / along[main]
+        if seconds > most * (1.0 + SAME):
+            break
+        if abs(math.remainder(along[other] * seconds, grid.size[other])) <= near + SAME * grid.size[other]:
+            return math.hypot(*velocity) * seconds
+    return math.inf
+
+
+MAPS, MAPS_FREE = 9.0, 18.0  # tuning: least memory of a periodic and of a free run [8 bytes per point]
+MOST_INSTANTS = 10**6  # tuning: most saved instants in one file, which reserves space for all of them
+GIGA = 1e9
+CGROUP = Path("/sys/fs/cgroup/memory.max")
+
+
+def doubts_of_size(job: Sections) -> Iterator[Doubt]:
+    """Yield warnings about memory and disk."""
+    grid, output = job.grid, job.output
+    yield from doubt_memory(grid)
+    if output.fields:
+        count = count_steps(grid, job.history)
+        saved = -(-count // output.every)
+        needed, free = float(saved) * len(output.maps) * grid.nx * grid.ny * 8, _free(output.directory)
+        if needed > free:
+            disk = {"needed": needed / GIGA, "free": free / GIGA, "directory": str(output.directory)}
+            yield Doubt("disk", "output.fields", {"instants": saved, "every": output.every, **disk})
+
+
+def doubt_memory(grid: Grid) -> Iterator[Doubt]:
+    """Yield a warning if the grid cannot fit into the memory of the machines."""
+    needed = (MAPS if all(grid.cyclic) else MAPS_FREE) * 8.0 * grid.nx * grid.ny
+    each, count = _memory(), machines()
+    if needed > each * count:
+        have = "this machine has" if count == 1 else f"{count} such machines have"
+        numbers = {"nx": grid.nx, "ny": grid.ny, "needed": needed / GIGA, "has": each * count / GIGA}
+        yield Doubt("memory", "grid.points", {**numbers, "machines": have, "count": int(needed / each) + 1})
+
+
+def beyond_file(count: int, output: Output) -> str:
+    """Return a message if a run of `count` steps saves more than MOST_INSTANTS instants of fields, or ''."""
+    saved = -(-count // output.every)
+    if not output.fields or saved <= MOST_INSTANTS:
+        return ""
+    least = -(-count // MOST_INSTANTS)
+    return (
+        f"output.every: {saved:.4g} instants of fields would be saved, but a file holds at most {MOST_INSTANTS}; use "
+        f"every: {least} or more"
+    )
+
+
+def machines() -> int:
+    """Return the number of machines of this program, from the environment variables of its launcher."""
+
+    def number(name: str) -> int:
+        text = os.environ.get(name, "")
+        return int(text) if text.isdecimal() else 0
+
+    ranks, here = number("OMPI_COMM_WORLD_SIZE"), number("OMPI_COMM_WORLD_LOCAL_SIZE")
+    return max(1, number("SLURM_JOB_NUM_NODES"), -(-ranks // here) if here else 1)
+
+
+def _memory() -> float:
+    """Return the memory of this machine, or the limit of this program's control group [bytes]."""
+    whole = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    try:
+        return min(whole, float(CGROUP.read_text()))
+    except (OSError, ValueError):  # no such limit
+        return whole
+
+
+def _free(directory: Path) -> float:
+    """Return the free disk space [bytes] of the directory, or of its nearest existing parent."""
+    for place in (directory.absolute(), *directory.absolute().parents):
+        try:
+            return float(shutil.disk_usage(place).free)
+        except OSError:
+            continue
+    return float("inf")
+
+
+def excited_band(job: Sections) -> tuple[float, float] | None:
+    """Return the range of frequencies [Hz] at which the waves of a job's surface load a point of the body, over all
+    stages and steady velocities; None if the surface does not move and no load oscillates."""
+    velocities = [*(stage.velocity for stage in job.history), job.initial.velocity]
+    speeds = [*(math.hypot(*velocity) for velocity in velocities), *(job.steady.velocities if job.steady else ())]
+    turns = [stage.frequency for stage in job.history if stage.frequency]
+    moving, waves = (
+        [speed for speed in speeds if speed > 0.0],
+        [number for shape in job.surface for number in wave_numbers(shape, job.grid)],
+    )
+    if moving and waves:
+        turns += [min(moving) * min(waves) / (2 * math.pi), max(moving) * max(waves) / (2 * math.pi)]
+    return (min(turns), max(turns)) if turns else None
+
+
+def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
+    """Return the wavenumbers [rad/m] of a shape, or the lowest and the highest one; none for a flat surface. Round
+    shapes and files may have every wave from the box to two cells."""
+    longest = 2.0 * math.pi / max(grid.size)
+    cells = [cell for cell, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1]
+    if isinstance(shape, Flat):
+        return ()
+    if isinstance(shape, Wave):
+        waves = [2.0 * math.pi * n / length for n, length in zip(shape.waves, grid.size, strict=True)]
+        return (math.hypot(*waves),) if any(waves) else ()
+    if isinstance(shape, Rough):
+        ratio = shape.anisotropy.ratio if shape.anisotropy else 1.0
+        return max(2.0 * math.pi / (ratio * shape.long_wavelength), longest), 2.0 * math.pi / shape.short_wavelength
+    return longest, max(math.pi / min(cells, default=math.inf), longest)
+
+
+THICKEST = 1 / 3  # physics: limit of small strains for the indentation over the thickness of a layer
+FEWEST_CELLS = 2.0  # accuracy: least cells in a thickness, the length over which pressure falls at the edge of contact
+LONGEST = 100.0  # physics: wavelength over thickness above which the compressibility of rubber matters
+NEARLY = 1e-4  # physics: distance of Poisson's ratio from 1/2 below which a body counts as incompressible
+
+
+def doubts_of_layer(job: Sections) -> Iterator[Doubt]:
+    """Yield warnings about the `body` section of a job, if it has one."""
+    grid, surface, body, poisson = job.grid, job.surface, job.body, job.material.poisson
+    if body is None:
+        return
+    cell = max(grid.dx, grid.dy)
+    smooth = all(isinstance(shape, Wave | Flat) for shape in surface)
+    if body.thickness < FEWEST_CELLS * cell and grid.boundary == "periodic" and not smooth:
+        numbers = {"thickness": body.thickness, "least": FEWEST_CELLS, "cell": cell, "more": more_points(grid)}
+        yield Doubt("thin", "body.thickness", numbers)
+    yield from doubt_height(2.0 * _rms_height(grid, surface), body.thickness)
+    yield from _indented(surface, body.thickness, job.history)
+    longest = max(_wavelengths(grid, surface), default=0.0)
+    if longest > LONGEST * body.thickness and poisson > 0.5 - NEARLY and body.base == "bonded":
+        numbers = {"wave": longest, "times": LONGEST, "thickness": body.thickness, "poisson": poisson}
+        yield Doubt("incompressible", "material.poisson", numbers)
+
+
+def doubt_height(height: float, thickness: float) -> Iterator[Doubt]:
+    """Yield a warning if a surface of this height [m] is too high for a layer of this thickness [m]."""
+    if height > THICKEST * thickness:
+        yield Doubt("high for a layer", "body.thickness", {"height": height, "thickness": thickness})
+
+
+def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, ...]) -> Iterator[Doubt]:
+    """Yield a warning if the approach of a sphere is too large for the thickness [m]."""
+    if len(surface) != 1 or not isinstance(surface[0], Sphere):
+        return
+    approaches = [(stage.load.highest, index) for index, stage in enumerate(history) if stage.control == "approach"]
+    deepest, index = max(approaches, default=(0.0, 0))
+    if deepest > THICKEST * thickness:
+        numbers = {"approach": deepest, "thickness": thickness}
+        yield Doubt("deep for a layer", f"history.{index}.approach", numbers)
+
+
+def _rms_height(grid: Grid, surface: tuple[Any, ...]) -> float:
+    """Return a lower bound of the rms height [m] of waves and roughness; slopes count for the shortest waves."""
+    square = 0.0
+    for shape in surface:
+        if isinstance(shape, Wave):
+            square += shape.amplitude**2 / 2
+        elif isinstance(shape, Rough):
+            by_slope = (shape.rms_slope or 0.0) * shape.short_wavelength / (2 * math.pi)
+            square += max(shape.rms_height or 0.0, by_slope) ** 2
+    return math.sqrt(square)
+
+
+def _wavelengths(grid: Grid, surface: tuple[Any, ...]) -> Iterator[float]:
+    for shape in surface:
+        if isinstance(shape, Wave) and any(shape.waves):
+            yield 1.0 / math.hypot(shape.waves[0] / grid.lx, shape.waves[1] / grid.ly)
+        elif isinstance(shape, Rough):
+            yield shape.long_wavelength

@@ -1,0 +1,252 @@
+"""Base of all sections of a job: frozen pydantic models that report all mistakes at once, as sentences.
+
+A `Part` declares its keys as fields. The description of a field completes the sentence "grid.size must be ..." and
+contains its unit, `[m]`. Pydantic checks each field; the base class checks several keys together: `one_of` and
+`at_most_one` for keys that exclude each other, and `rules`, each of which runs if the fields that it needs are correct,
+even if others are not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
+from itertools import combinations
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetJsonSchemaHandler,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
+from pydantic_core import CoreSchema, ErrorDetails
+
+from .overrides import Included
+from .quantities import from_home
+from .yaml_text import AT_KEY, AT_VALUE, Fault, closest, did_you_mean, in_si, is_storable, list_words, quote, refuse
+
+
+class Origin(NamedTuple):
+    """Origin of a job: its absolute path, and the files of included materials; `mesh` describes chosen points.
+    `approaches` are the places of the approaches of the stages, `strict` is the place of `numerics.strict` ('' for jobs
+    from Python).
+
+    `numbers_as_texts`: texts such as 1e-3 may be numbers, as PyYAML's `safe_load` returns them. `names_directory`: the
+    job gives its output directory.
+    """
+
+    path: Path = Path("job.yaml")
+    included: tuple[Included, ...] = ()
+    from_file: bool = True
+    numbers_as_texts: bool = False
+    names_directory: bool = False
+    mesh: str = ""
+    approaches: tuple[str, ...] = ()
+    strict: str = ""
+
+
+def existing_file(path: Path, info: ValidationInfo) -> Path:
+    """Return the absolute path of a file that a job names; relative ones start at the job file."""
+    found = (info.context.path.parent if info.context else Path.cwd()) / from_home(path)
+    if not found.is_file():
+        refuse(Fault(f"must be an existing file, got {str(path)!r} (looked for {found})"))
+    return found
+
+
+class Rule(NamedTuple):
+    """A check of the fields in `needs`; it runs if all of them are correct (wrong items of lists are None)."""
+
+    needs: tuple[str, ...]
+    check: Callable[..., Iterator[Fault]]
+
+
+class Instead(NamedTuple):
+    """Advice for an unknown key, and the keys that are possibly meant."""
+
+    advice: str
+    keys: tuple[str, ...] = ()
+
+
+class Part(BaseModel):
+    """Base of all sections."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    label: ClassVar[str] = ""  # name of the part in messages, by default its kind, such as "shape sphere"
+    foreign: ClassVar[Mapping[str, Instead]] = {}  # advice for removed keys and for keys of other programs
+    one_of: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    at_most_one: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    rules: ClassVar[tuple[Rule, ...]] = ()
+
+    @classmethod
+    def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
+        """Return `data` with the defaults that depend on other keys or on the job file."""
+        return data
+
+    @property
+    def given(self) -> Part:
+        """Return the part as the job gives it; another one if effects changed it."""
+        return self
+
+    def left_out(self) -> tuple[str, ...]:
+        """Return the keys that are not written although they have a value."""
+        return ()
+
+    @classmethod
+    def words(cls) -> tuple[str, ...]:
+        """Return the keys as they are written in a job."""
+        return tuple(cls.model_fields)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _every_mistake(cls, data: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
+        """Run pydantic's own validation, then the checks of keys, then the rules; refuse with all faults together."""
+        if isinstance(data, cls):
+            return data
+        if not isinstance(data, dict):
+            refuse(Fault(f"must be a mapping of keys, got {quote(data)}"))
+        if odd := [key for key in data if isinstance(key, str) and not is_storable(key)]:
+            refuse(*(Fault("is not a known key", (key,), at_key=True) for key in odd))
+        known = cls.words()  # a key without a value is absent if it is known, and a mistake otherwise
+        given = {key: value for key, value in data.items() if value is not None or key not in known}
+        filled = cls.filled(dict(given), info.context)
+        part, errors = None, list[ErrorDetails]()
+        try:
+            part = handler(filled)
+        except ValidationError as failure:
+            # a list with a wrong value is not too short
+            errors = [error for error in failure.errors() if error["type"] != "too_short" or not error["input"]]
+        # a default that depends on a wrong value is not a second mistake
+        of_user = [error for error in errors if _absent(error) or error["loc"][:1] in {(), *((key,) for key in given)}]
+        meant = {word for key in given if key not in known for word in cls._instead(str(key)).keys}
+        reported = [error for error in of_user or errors if not (_absent(error) and error["loc"][0] in meant)]
+        faults = [cls._fault(error, filled) for error in reported]
+        faults += cls._exclusive_faults(given, meant)
+        for rule in cls.rules:
+            values = [_value(cls, name, part, filled, errors, info.context) for name in rule.needs]
+            if not any(value is WRONG for value in values):
+                faults += rule.check(*values)
+        if faults:
+            refuse(*faults)
+        return part
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return pydantic's schema with the exclusions between keys."""
+        found = handler.resolve_ref_schema(handler(core))
+        rules: list[Any] = [{"oneOf": [{"required": [word]} for word in group]} for group in cls.one_of]
+        rules += [{"not": {"required": list(pair)}} for group in cls.at_most_one for pair in combinations(group, 2)]
+        if rules:
+            found["allOf"] = rules
+        if kind := kind_key(cls):
+            found["required"] = [kind, *found.get("required", ())]
+        found["description"] = re.split(r"(?<=\.) (?=[A-Z])", " ".join((cls.__doc__ or "").split()))[0]
+        return found
+
+    @classmethod
+    def _fault(cls, error: ErrorDetails, filled: dict[str, Any]) -> Fault:
+        """Return pydantic's error as a fault."""
+        kind, path, value = error["type"], error["loc"], error["input"]
+        if kind in (AT_VALUE, AT_KEY):
+            return Fault(error["msg"], path, kind == AT_KEY)
+        name = str(path[0])
+        if kind == "extra_forbidden":
+            word = kind_key(cls)
+            label = cls.label or (word and f"{word} {cls.model_fields[word].default}")
+            what = f"is not a key of {label}" if label else "is not a known key"
+            advice = cls._instead(name).advice or f"known keys: {', '.join(cls.words())}"
+            return Fault(f"{what}; {advice}", path, at_key=True)
+        field = cls.model_fields[name]
+        words = literal_words(field.annotation) if _absent(error) or kind == "literal_error" else ()
+        expected = f"must be {list_words(words) if words else field.description}"
+        if _absent(error):
+            return Fault(f"is missing; it {expected}", path)
+        got = quote(filled[name] if kind == "missing" else value)
+        return Fault(f"{expected}, got {got}{did_you_mean(value, words)}{in_si(value)}", path)
+
+    @classmethod
+    def _instead(cls, word: str) -> Instead:
+        """Return advice for an unknown word, empty if no key resembles it."""
+        close = closest(word, cls.words())
+        misspelt = Instead(f"did you mean {close}?", (close,)) if close else Instead("")
+        return cls.foreign.get(word.lower(), misspelt)
+
+    @classmethod
+    def _exclusive_faults(cls, given: Mapping[str, Any], meant: Collection[str]) -> Iterator[Fault]:
+        """Check the keys that exclude each other; keys that unknown words are `meant` to be do not count as missing."""
+        for group in (*cls.one_of, *cls.at_most_one):
+            present = [word for word in group if word in given]
+            lacks = group in cls.one_of and not any(word in meant for word in group)
+            if len(present) > 1 or (not present and lacks):
+                number = "needs exactly one of" if group in cls.one_of else "takes at most one of"
+                yield Fault(f"{number} {list_words(group)}, got {' and '.join(present) or 'none'}")
+
+
+WRONG = object()  # in place of the value of a field with mistakes
+
+
+def _value(
+    kind: type[Part], name: str, part: Part | None, filled: Mapping[str, Any], errors: list[ErrorDetails], context: Any
+) -> Any:
+    """Return the value of one field, also if other fields have mistakes.
+
+    A value with mistakes is WRONG; in a list, wrong items are None.
+    """
+    if part is not None:
+        return getattr(part, name)
+    field, wrong = kind.model_fields[name], [error["loc"] for error in errors if error["loc"][:1] == (name,)]
+    if not wrong and name not in filled:
+        return field.get_default(call_default_factory=True, validated_data=dict(filled))
+    if not wrong:
+        annotation: Any = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+        return TypeAdapter(annotation).validate_python(filled[name], context=context)
+    item, *more = get_args(field.annotation) or (Any,)
+    bad = {loc[1] if len(loc) > 1 else "" for loc in wrong}
+    if more != [...] or not isinstance(filled.get(name), list) or not all(isinstance(index, int) for index in bad):
+        return WRONG
+    adapter: TypeAdapter[Any] = TypeAdapter(item)
+    items = enumerate(filled[name])
+    return tuple(None if index in bad else adapter.validate_python(one, context=context) for index, one in items)
+
+
+def kind_key(part: type[Part]) -> str:
+    """Return the key that selects the kind of a part (shape, model, law), or ''."""
+    kinds = (word for word in ("shape", "model", "law") if word in part.model_fields)
+    return next((word for word in kinds if len(get_args(part.model_fields[word].annotation)) == 1), "")
+
+
+def _absent(error: ErrorDetails) -> bool:
+    return error["type"] == "missing" and len(error["loc"]) == 1
+
+
+def literal_words(annotation: Any) -> tuple[str, ...]:
+    """Return the words of a Literal, also inside a tuple or a union."""
+    words = [word for word in get_args(annotation) if isinstance(word, str)]
+    for inner in get_args(annotation):
+        words += literal_words(inner) if get_origin(inner) else ()
+    return tuple(words)
+
+
+def chosen(
+    key: str, kinds: Mapping[str, type[Part]], called: Mapping[str, str] | None = None
+) -> Callable[[Any, ValidationInfo], Any]:
+    """Return a validator that takes the kind of a part from its `key`; `called` are other names of kinds."""
+
+    def choose(data: Any, info: ValidationInfo) -> Any:
+        if isinstance(data, tuple(kinds.values())):
+            return data
+        if not isinstance(data, dict):
+            refuse(Fault(f"must be a mapping with {key}: {list_words(kinds)}, got {quote(data)}"))
+        word = data.get(key)
+        if word is None:
+            refuse(Fault(f"is missing; it must be {list_words(kinds)}", (key,)))
+        if not isinstance(word, str) or word not in kinds:
+            other = (called or {}).get(str(word).lower())
+            advice = f"; did you mean {other}?" if other else did_you_mean(word, kinds)
+            refuse(Fault(f"must be {list_words(kinds)}, got {quote(word)}{advice}", (key,)))
+        return kinds[word].model_validate(data, context=info.context)
+
+    return choose

@@ -1,0 +1,415 @@
+"""Text of a job, with the places of its values.
+
+YAML text as a `Source`: plain data with the places of all values and keys.
+
+Unlike in PyYAML, `1e-3` is a number, repeated keys are a mistake, and numbers are decimal: `12:30` and `010` are text.
+The size of a text and the number of its values after expansion of aliases are limited.
+
+Mistakes as predicates of sentences about a key, and their transport through pydantic.
+
+Plain data with the place of each value in its file, for messages about mistakes.
+
+Jobs given as Python data instead of a file; messages about mistakes name the key.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import reprlib
+import stat
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, NamedTuple, NoReturn
+
+import yaml
+from pydantic import ValidationError
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+Key = tuple[str | int, ...]  # the way to a value: ("history", 0, "pressure")
+
+
+class Place(NamedTuple):
+    """A place in a file; `line` is 0 if `origin` is the whole place, such as a command-line override."""
+
+    origin: str
+    line: int = 0
+    column: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.origin}:{self.line}:{self.column}" if self.line else self.origin
+
+
+class Mistake(NamedTuple):
+    """A place and a sentence about the mistake there."""
+
+    place: Place
+    sentence: str
+
+    def __str__(self) -> str:
+        text = f"{self.place}: {self.sentence}" if self.place.origin else self.sentence
+        return text.encode(errors="backslashreplace").decode()  # without halves of surrogate pairs
+
+
+class _Unreadable:
+    def __repr__(self) -> str:
+        return "something unreadable"
+
+
+UNREADABLE: Final = _Unreadable()  # in place of a value whose mistake is already noted
+NOWHERE: Final = Place("")
+
+
+class Located(NamedTuple):
+    """The result of following a path: the path as the user wrote it, and the places of its value and of its key.
+
+    The places of a missing value are the place of the mapping that lacks it.
+    """
+
+    path: Key
+    place: Place
+    key_place: Place
+    readable: bool = True
+
+
+@dataclass
+class Source:
+    """The data of a file, of a mapping or of an override, with its place and its mistakes.
+
+    `places` has the places of key and value by path; other values have the place of the list or mapping around them.
+    """
+
+    data: Any = None
+    place: Place = NOWHERE
+    mistakes: list[Mistake] = field(default_factory=list)
+    places: dict[Key, tuple[Place, Place]] = field(default_factory=dict)
+
+    def note(self, place: Place, sentence: str) -> None:
+        self.mistakes.append(Mistake(place, sentence))
+
+    def put(self, path: Key, value: Any, key_place: Place, place: Place) -> None:
+        """Set a value in an existing mapping or list, with the places of its key and of the value."""
+        node = self.data
+        for step in path[:-1]:
+            node = node[step]
+        node[path[-1]] = value
+        self.places = {key: known for key, known in self.places.items() if key[: len(path)] != path}
+        self.places[path] = key_place, place
+
+    def locate(self, path: Key) -> Located:
+        """Follow a path; indices into a list that was given as a single value are ignored."""
+        node, place, key_place, steps = self.data, self.place, self.place, Key()
+        for step in path:
+            if isinstance(node, dict | list) and (step in node if isinstance(node, dict) else step in range(len(node))):
+                node, steps = node[step], (*steps, step)  # type: ignore[index]
+                key_place, place = self.places.get(steps, (place, place))
+            elif isinstance(node, dict) and isinstance(step, str):
+                return Located((*steps, step), place, place)
+        return Located(steps, place, key_place, not _holds_unreadable(node))
+
+
+def _holds_unreadable(node: Any) -> bool:
+    items = node.values() if isinstance(node, dict) else node if isinstance(node, list) else ()
+    return node is UNREADABLE or any(map(_holds_unreadable, items))
+
+
+MAX_WORD = 40  # tuning: longest word that is checked for misspelling [characters]
+BOUNDED = reprlib.Repr()  # a `repr` of limited length
+BOUNDED.maxlist = BOUNDED.maxtuple = BOUNDED.maxset = 60
+BOUNDED.maxstring = BOUNDED.maxlong = BOUNDED.maxother = 500
+PREFIXES = {"": 1.0, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
+UNITS = {f"{prefix}{unit}": size for prefix, size in PREFIXES.items() for unit in ("m", "s", "Pa", "N", "m/s")}
+AT_VALUE, AT_KEY = "at value", "at key"  # types of this module's errors in pydantic
+
+
+class Fault(NamedTuple):
+    """A mistake: the predicate of a sentence whose subject is a key, and the path to the key."""
+
+    predicate: str
+    path: Key = ()
+    at_key: bool = False  # point at the key itself instead of its value
+
+
+def refuse(*faults: Fault) -> NoReturn:
+    """Raise the faults as a ValidationError, which pydantic collects."""
+    raise ValidationError.from_exception_data("job", [_line(fault) for fault in faults])
+
+
+def _line(fault: Fault) -> InitErrorDetails:
+    kind = PydanticCustomError(AT_KEY if fault.at_key else AT_VALUE, "{text}", {"text": fault.predicate})
+    return InitErrorDetails(type=kind, loc=fault.path, input=None)
+
+
+def faults_of(error: ValidationError) -> Iterator[Fault]:
+    """Yield the faults inside an error that `refuse` raised."""
+    for line in error.errors():
+        yield Fault(line["msg"], line["loc"], line["type"] == AT_KEY)
+
+
+def shorten(text: str, most: int = 200) -> str:
+    """Return a text without its middle if it has more than `most` characters."""
+    return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"
+
+
+def is_storable(text: str) -> bool:
+    """Return False for a text with half of a surrogate pair, which UTF-8 does not have."""
+    return text.isascii() or not re.search("[\ud800-\udfff]", text)
+
+
+def quote(value: Any) -> str:
+    """Return a value as shown after "got"."""
+    if value is None or isinstance(value, dict):
+        return "nothing" if value is None else "a mapping"
+    text = str(value).lower() if isinstance(value, bool) else BOUNDED.repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def list_words(words: Iterable[str]) -> str:
+    """Return the words to choose from."""
+    return " | ".join(words)
+
+
+def closest(word: Any, words: Iterable[str]) -> str:
+    """Return the one of `words` that is closest to a misspelt `word`, '' if none is close."""
+    if len(str(word)) > MAX_WORD:
+        return ""
+    known = {candidate.lower(): candidate for candidate in words}
+    close = difflib.get_close_matches(str(word).lower(), known, n=1, cutoff=0.65)
+    return known[close[0]] if close else ""
+
+
+def in_si(value: Any) -> str:
+    """Return the ending '; write 1.0e-3' if a value is a number with a unit, such as '1 mm', else ''."""
+    found = (
+        re.fullmatch(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S+)", value.strip()) if isinstance(value, str) else None
+    )
+    if not found or (unit := UNITS.get(found[2])) is None:
+        return ""
+    try:
+        digits, exponent = f"{float(found[1]) * unit:.9e}".split("e")
+    except ValueError:
+        return ""
+    return f"; write {float(digits)}e{int(exponent)}"
+
+
+def did_you_mean(word: Any, words: Iterable[str]) -> str:
+    """Return the ending '; did you mean X?' if one of `words` is close to `word`, else ''."""
+    found = closest(word, words)
+    return f"; did you mean {found}?" if found else ""
+
+
+YAML_TAG = "tag:yaml.org,2002:"
+RESOLVERS = (  # tag, pattern of its scalars, their first characters; tried in this order
+    ("bool", r"^(?:yes|Yes|YES|no|No|NO|true|True|TRUE|false|False|FALSE|on|On|ON|off|Off|OFF)$", "yYnNtTfFoO"),
+    ("int", r"^[-+]?(?:0|[1-9][0-9_]*)$", "-+0123456789"),
+    ("float", r"^[-+]?(?:[0-9][0-9_]*\.?[0-9_]*|\.[0-9][0-9_]*)[eE][-+]?[0-9]+$", "-+.0123456789"),
+    ("float", r"^[-+]?(?:[0-9][0-9_]*\.[0-9_]*|\.[0-9][0-9_]*)$", "-+.0123456789"),
+    ("float", r"^[-+]?\.(?:inf|Inf|INF)$|^\.(?:nan|NaN|NAN)$", "-+."),
+    ("merge", r"^<<$", "<"),
+    ("null", r"^(?:~|null|Null|NULL|)$", ["~", "n", "N", ""]),
+)
+SCALAR_TAGS = tuple(YAML_TAG + name for name in ("bool", "int", "float", "null", "str"))
+# Limits far above the size of any job, against broken files.
+MAX_BYTES = 2_000_000  # tuning: largest size of a file [bytes]
+MAX_VALUES = 100_000  # tuning: most values in a text after its YAML aliases are expanded
+
+
+def _implicit_resolvers() -> dict[str, list[tuple[str, re.Pattern[str]]]]:
+    resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}
+    for tag, pattern, first_characters in RESOLVERS:
+        for character in first_characters:
+            resolvers.setdefault(character, []).append((YAML_TAG + tag, re.compile(pattern)))
+    return resolvers
+
+
+class JobLoader(yaml.SafeLoader):
+    """PyYAML's safe loader with RESOLVERS."""
+
+    yaml_implicit_resolvers = _implicit_resolvers()
+
+
+class JobDumper(yaml.SafeDumper):
+    """PyYAML's safe dumper with RESOLVERS: it quotes texts that `JobLoader` would not read as text."""
+
+    yaml_implicit_resolvers = _implicit_resolvers()
+
+
+def dump(data: Any) -> str:
+    """Return plain data as YAML text that `parse` reads back as equal data."""
+    return yaml.dump(data, Dumper=JobDumper, default_flow_style=None, sort_keys=False, allow_unicode=True, width=120)
+
+
+def read_source(path: Path, shown: str) -> Source:
+    """Return the `Source` of a YAML file, called `shown` in messages; an unreadable file is noted as a mistake."""
+    return read_with_content(path, shown)[1]
+
+
+def read_with_content(path: Path, shown: str) -> tuple[bytes, Source]:
+    """Return the bytes of a YAML file, and its `Source`."""
+    try:
+        if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():  # a pipe might never end
+            raise OSError(0, "it is not a regular file")
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+        if len(content) <= MAX_BYTES:
+            return content, parse(content, shown)
+        reason = f"it is larger than {MAX_BYTES / 1e6:g} MB, the limit for a job"
+    except FileNotFoundError:
+        reason = "there is no such file"
+    except (OSError, ValueError) as error:  # ValueError: a null character in its name
+        reason = getattr(error, "strerror", None) or str(error)
+        if isinstance(error, IsADirectoryError) and (path / "job.resolved.yaml").is_file():
+            reason += f"; the job of the run in it is {Path(shown) / 'job.resolved.yaml'}"
+    found = Source(UNREADABLE, Place(shorten(shown)))
+    found.note(found.place, f"cannot be read: {reason}")
+    return b"", found
+
+
+def _remedy(problem: str) -> str:
+    """Return the remedy for a frequent message of PyYAML, or ''."""
+    if "\\t" in problem:
+        return "; indent by blanks, not by tabs"
+    if problem.startswith("mapping values"):
+        return "; keys of one mapping must begin in the same column, and a text with a colon needs quotes"
+    return ""
+
+
+def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
+    """Return YAML text as a `Source`; `origin` is its name in places, unless `whole` is the place of all values."""
+    start = whole or Place(origin, 1, 1)
+    source = Source(UNREADABLE, start)
+    reader = _Reader(source, origin, whole)
+    try:
+        source.data = reader.read(text)
+    except yaml.MarkedYAMLError as error:
+        began = f" ({error.context} in line {error.context_mark.line + 1})" if error.context_mark else ""
+        mark = error.problem_mark or error.context_mark
+        source.note(reader.place(mark), f"cannot be read as YAML: {error.problem}{began}{_remedy(str(error.problem))}")
+    except yaml.reader.ReaderError as error:
+        source.note(start, f"is not a text file in UTF-8: {error.reason} at position {error.position}")
+    except yaml.YAMLError as error:
+        source.note(start, str(error))
+    except RecursionError:
+        source.note(start, "cannot be read as YAML: it is nested too deeply, or an alias contains itself")
+    return source
+
+
+class _Reader:
+    """Converts YAML nodes to plain data, and notes places and mistakes in a `Source`."""
+
+    def __init__(self, source: Source, origin: str, whole: Place | None):
+        self.source, self.origin, self.whole = source, origin, whole
+        self.count = 0  # number of values so far
+
+    def place(self, mark: yaml.Mark | None) -> Place:
+        if self.whole is not None or mark is None:
+            return self.source.place
+        return Place(self.origin, mark.line + 1, mark.column + 1)
+
+    def refuse(self, node: yaml.Node, sentence: str) -> Any:
+        self.source.note(self.place(node.start_mark), sentence)
+        return UNREADABLE
+
+    def read(self, text: str | bytes) -> Any:
+        self.loader = JobLoader(text)
+        root = self.loader.get_single_node()
+        return None if root is None else self.value(root, ())
+
+    def value(self, node: yaml.Node, path: Key) -> Any:
+        self.count += 1
+        if self.count > MAX_VALUES:
+            raise yaml.YAMLError(
+                f"has more than {MAX_VALUES} values after expansion of its aliases, the limit for a job"
+            )
+        if isinstance(node, yaml.MappingNode) and node.tag == YAML_TAG + "map":
+            return self.mapping(node, path)
+        if isinstance(node, yaml.SequenceNode) and node.tag == YAML_TAG + "seq":
+            return [self.item(child, child, (*path, index)) for index, child in enumerate(node.value)]
+        if isinstance(node, yaml.ScalarNode) and node.tag in SCALAR_TAGS:
+            try:
+                return self.loader.construct_object(node)
+            except (ValueError, LookupError):  # !!int '', and more digits than Python reads
+                pass
+        return self.refuse(node, f"{shorten(node.tag.replace(YAML_TAG, '!!'))} does not belong in a job")
+
+    def item(self, key: yaml.Node, child: yaml.Node, path: Key) -> Any:
+        """Return the value of a mapping or a list, and record its place unless it is already known."""
+        self.source.places.setdefault(path, (self.place(key.start_mark), self.place(child.start_mark)))
+        return self.value(child, path)
+
+    def mapping(self, node: yaml.MappingNode, path: Key) -> dict[str, Any]:
+        """Return a mapping; its own keys override keys merged by `<<`."""
+        found: dict[str, Any] = {}
+        merged: list[yaml.Node] = []
+        for key, child in node.value:
+            if key.tag == YAML_TAG + "merge":
+                merged += child.value if isinstance(child, yaml.SequenceNode) else [child]
+            elif not isinstance(key, yaml.ScalarNode) or key.tag != YAML_TAG + "str" or _is_no_word(key, child):
+                got = repr(shorten(key.value)) if isinstance(key, yaml.ScalarNode) else "a list or a mapping"
+                comma = "; write decimals with a point" if _follows_a_comma(key, child) else ""
+                self.refuse(key, f"a key must be a word, got {got}{comma}")
+            elif key.value in found:
+                name, line = ".".join(map(str, (*path, key.value))), self.source.places[*path, key.value][0].line
+                self.refuse(key, f"{shorten(name)} is given twice" + f", first in line {line}" * bool(line))
+            else:
+                found[key.value] = self.item(key, child, (*path, key.value))
+        for other in merged:
+            if isinstance(inherited := self.value(other, path), dict):
+                found = inherited | found
+            else:
+                self.refuse(other, "<< must be a mapping, or a list of mappings")
+        return found
+
+
+def _is_no_word(key: yaml.ScalarNode, child: yaml.Node) -> bool:
+    return not is_storable(key.value) or _follows_a_comma(key, child)
+
+
+def _follows_a_comma(key: yaml.Node, child: yaml.Node) -> bool:
+    """Return True if a key is probably the digits after a decimal comma, as in {thickness: 0,02}: it has no value."""
+    return isinstance(key, yaml.ScalarNode) and key.value[:1].isdigit() and not child.value
+
+
+def source_of(data: Any, place: Place = NOWHERE) -> Source:
+    """Return Python data as a `Source` with one place."""
+    source = Source(place=place)
+    try:
+        source.data = _plain(data, (), source)
+    except RecursionError:
+        source.data = UNREADABLE
+        source.note(place, "is nested too deeply")
+    return source
+
+
+def is_array(value: Any) -> bool:
+    """Return True for an array of numpy, or of a library with the same interface."""
+    return hasattr(value, "__array__") and getattr(value, "ndim", 0) > 0
+
+
+def _plain(value: Any, path: Key, source: Source) -> Any:
+    """Return a value as plain data, as read from YAML; note a mistake if this is impossible."""
+    if is_array(value) and _is_map(value, path):
+        return value
+    if hasattr(value, "tolist"):  # numpy's numbers and arrays
+        value = value.tolist()
+    if isinstance(value, os.PathLike):
+        value = os.fspath(value)
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, list | tuple | range):
+        return [_plain(item, (*path, index), source) for index, item in enumerate(value)]
+    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+        return {key: _plain(item, (*path, key), source) for key, item in value.items()}
+    if isinstance(value, Mapping):
+        wrong = f"has a key that is not a text, {quote(next(key for key in value if not isinstance(key, str)))}"
+    else:
+        wrong = f"must be numbers, texts, lists or mappings, got {shorten(repr(value), 60)}"
+    source.note(source.place, f"{'.'.join(map(str, path)) or 'the job'} {wrong}")
+    return UNREADABLE
+
+
+def _is_map(value: Any, path: Key) -> bool:
+    """Return True if an array is at the path of heights, or is the value of an override (an empty path)."""
+    return path == ("surface",) or path[-1:] == ("heights",) or (value.ndim == 2 and path[:-1] in ((), ("surface",)))

@@ -1,0 +1,417 @@
+"""The error budget.
+
+Sources of error: estimates for the solver, time steps, folded branches and the mesh, of friction and contact area.
+
+Each estimates a relative error from numbers of a step; its constants are fitted to true errors (`constants`). c is the
+counted minus the corrected area, over the latter, and N is the number of spots of contact.
+
+solver: proportional to the `complementarity` C of the certificate (`solve.certificate`) for friction, and smaller
+for many
+    spots. Where friction is far below the slopes it is a small difference of large forces: errors of pressures then
+    count more, by the root of the ratio, and pressures with the error C may have tangential forces of this share of the
+    slopes (NOISE). For the area: the points that penetrate without pressure, and a small part that varies as C^0.7.
+time: from the distance by which spots of contact, or waves of the surface, pass in a step, and from the embedded
+pair
+    (`time_error`).
+folded: the bound for the branches without a map; for the area times the open share. mesh: for the area AREA
+c/N^(1/4) while the surface slides and errors of its positions average out, STILL at rest and in
+    steady sliding, at least one cell. For friction in a march VIEWS times the difference of friction by the slopes of
+    the rigid surface and of the body. For steady friction, a sum of squares without cancellation, the loss at edges in
+    waves shorter than the cells, and STEADY_AREA c/N^(1/4). Identical contacts have the same position on the grid:
+    their errors do not average out (N = 1), and those of the area and of steady friction are larger by IDENTICAL.
+    A map lacks waves on a grid with less than FEW_CELLS per shortest wave, with a further error of friction
+    WAVES (4/cells)^2.5.
+
+Loss at edges: the pressure rises from an edge of contact as the root of the distance, so that the mean square of its
+waves of wavenumber q across the edge falls as q^-3. In steady sliding these lose power in proportion to q^-3 sin
+delta(q v), with the loss angle delta of the body at the frequency with which they pass. For Hertzian contacts of a body
+whose loss angle grows with the frequency, all waves together lose as much as this law gives from a wavenumber q0 on: q0
+= 2/(pi a) for a strip of half width a, q0 = 3/(pi a) for a circle of radius a, from the integrals of J1(x)^2/x and
+j1(x)^2. A mesh of cells of length dx has waves up to Q = pi/dx. The share of the loss in shorter waves is
+
+    s m = (q0/Q)^2 M(Q v)/M(q0 v),      M(w) = int_0^1 2 t sin delta(w/t) dt,      s = q0/Q.
+
+Far below the frequencies of the body m is 1, and the share is of first order in the cell; far above m is s^2.
+
+The error budget: estimated errors of friction and contact area by source, of a step and of a whole run.
+
+The errors of the sources (`sources`) are added. They are calibrated estimates that hold in nearly all scenes; a true
+error may happen to be much smaller.
+"""
+
+import math
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..physics.entries import Entry, Saved
+from ..physics.prony import Prony, complex_modulus
+from ..printed import per_cent
+from .constants import (
+    AREA,
+    FREE_LOST,
+    IDENTICAL,
+    LOST,
+    NOISE,
+    PENETRATING,
+    SOLVER,
+    SOLVER_AREA,
+    STEADY_AREA,
+    STILL,
+    VIEWS,
+    WAVES,
+    Fit,
+)
+from .time_error import (
+    RunProperties,
+    StepObservation,
+    cell_along,
+    count_spots,
+    error_of_rise,
+    mean_over_spots,
+    radius_of,
+    resolves,
+    share_of_area,
+    time_error,
+)
+
+STRIP, CIRCLE = 2.0 / math.pi, 3.0 / math.pi  # physics: q0 times the half width, and times the radius
+NODES = 16  # accuracy: nodes of the integral; its error is 2 % for one branch
+AT, WEIGHTS = np.polynomial.legendre.leggauss(NODES)
+STRAIGHT_POWER = 0.5  # accuracy: power of m along edges that follow the grid
+GAPS = 2.0  # accuracy: factor on the open share; above half contact radii are those of gaps
+FEW_CELLS = 3.0  # accuracy: cells per shortest wave below which a map lacks waves
+ROUNDING = 1e-12  # rounding: least complementarity in errors by NOISE, and in steady sliding
+
+
+@dataclass(frozen=True)
+class ErrorPair:
+    """Relative errors of friction and of the corrected contact area."""
+
+    friction: float
+    area: float
+
+
+@dataclass(frozen=True)
+class ErrorSource:
+    """A source of error: its name, a remedy, and a function that gives its errors for an observation."""
+
+    name: str
+    remedy: str
+    error: Callable[[RunProperties, StepObservation], ErrorPair]
+    shown: str = ""  # its name in sentences, if different
+
+
+def solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
+    """Return the errors by the solve of a step."""
+    certificate, ratio = observed.complementarity, observed.slope / observed.body if observed.body else 0.0
+    friction = SOLVER.value * certificate * math.sqrt(max(1.0, ratio)) * mean_over_spots(run, observed)
+    noise = NOISE.value * max(certificate, ROUNDING) * ratio / math.sqrt(count_spots(run, observed))
+    return ErrorPair(max(friction, noise), _solver_of_area(observed))
+
+
+def steady_solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
+    """Return the same for steady sliding, whose friction is a sum of squares."""
+    friction = SOLVER.value * max(observed.complementarity, ROUNDING) * mean_over_spots(run, observed)
+    return ErrorPair(friction, _solver_of_area(observed))
+
+
+def _solver_of_area(observed: StepObservation) -> float:
+    return SOLVER_AREA.value * observed.complementarity**SOLVER_AREA.order + PENETRATING.value * observed.penetrating
+
+
+def steps_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
+    """Return the errors by the length of a step, including a rise of friction within it. The error that a body states
+    itself is also the one of the area."""
+    error = time_error(run, observed)
+    if observed.own_error is not None:
+        return ErrorPair(error, error)
+    return ErrorPair(max(error, error_of_rise(run, observed)), share_of_area(run, observed) * error)
+
+
+def folded_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
+    """Return the bound on the errors by folded branches."""
+    return ErrorPair(run.folded, run.folded * (1.0 - observed.area))
+
+
+def mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
+    """Return the errors by the mesh in a step of a march."""
+    friction = VIEWS.value * observed.friction_mismatch / observed.body if observed.body else 0.0
+    return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(AREA if any(observed.way) else STILL, run, observed))
+
+
+def steady_mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
+    """Return the same for steady sliding."""
+    correction = observed.correction * mean_over_spots(run, observed)
+    friction = _grow_if_identical(run) * (lost_at_edges(run, observed) + STEADY_AREA.value * correction)
+    return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(STILL, run, observed))
+
+
+def _lacking_waves(run: RunProperties) -> float:
+    """Return the error of friction by waves that a map lacks on a coarse grid."""
+    cells = run.cells_per_wave
+    if not run.measured or cells is None or cells >= FEW_CELLS:
+        return 0.0
+    return WAVES.value * (4.0 / cells) ** WAVES.order
+
+
+def _mesh_of_area(fit: Fit, run: RunProperties, observed: StepObservation) -> float:
+    error = fit.value * _grow_if_identical(run) * observed.correction * mean_over_spots(run, observed)
+    return max(error, 1.0 / (run.points * observed.area)) if observed.area > 0.0 else error
+
+
+def _grow_if_identical(run: RunProperties) -> float:
+    return IDENTICAL.value if run.identical_contacts else 1.0
+
+
+def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
+    """Return an upper bound on the share of friction that edges of contact lose in waves shorter than the cells along
+    the sliding; 0 at rest, and for an elastic body."""
+    if run.prony is None or not any(observed.way):
+        return 0.0
+    cell = cell_along(run, observed.way)
+    size = radius_of(run, observed) * (run.mean_cell / cell)
+    share, slow = lost_in_short_waves(run.prony, size, math.hypot(*observed.way) / cell, run.edges_follow_grid)
+    few = min(1.0, GAPS * (1.0 - observed.area))
+    most = FREE_LOST.value if run.free else LOST.value
+    return min(1.0, most * few * share * slow ** (STRAIGHT_POWER if run.edges_follow_grid else 1.0))
+
+
+def lost_in_short_waves(prony: Prony, radius: float, speed: float, edges_follow_grid: bool) -> tuple[float, float]:
+    """Return s and s m of the module for spots with a `radius` in cells, or straight ones of this half width, that
+    slide by `speed` cells per second; both at most 1, and 0 without edges or losses."""
+    if radius == math.inf or not prony.moduli.size:
+        return 0.0, 0.0
+    first = (STRIP if edges_follow_grid else CIRCLE) / radius if radius > 0.0 else math.inf
+    if first >= math.pi:
+        return 1.0, 1.0
+    share = first / math.pi
+    return share, share * _mean_loss(prony, math.pi * speed) / _mean_loss(prony, first * speed)
+
+
+def _mean_loss(prony: Prony, frequency: float) -> float:
+    """Return M at a frequency [rad/s]."""
+    t = 0.5 * (1.0 + AT)
+    modulus = complex_modulus(frequency / t, *prony)
+    return float(np.sum(WEIGHTS * t * (modulus.imag / np.abs(modulus))))
+
+
+SOLVE = ErrorSource("solver", "a smaller numerics.tolerance", solver_error)
+MARCH_SOURCES = (
+    SOLVE,
+    ErrorSource("time", "shorter time steps", steps_error, "time steps"),
+    ErrorSource("folded", "a smaller numerics.branch_error", folded_error, "folded branches"),
+    ErrorSource("mesh", "a finer grid", mesh_error),
+)
+STEADY_SOURCES = (replace(SOLVE, error=steady_solver_error), replace(MARCH_SOURCES[-1], error=steady_mesh_error))
+
+
+UNKNOWN = 0.5  # accuracy: relative error of friction above which friction cannot be distinguished from 0
+AT_REST, AT_ONCE = 1e-100, 1e-200  # weights [m] of a second at rest and of a jump in means over the distance slid
+LEAST_WAY = 1e-60  # m: least weight of sliding
+ROUNDED = 1.01  # accuracy: least ratio of an error to its limit that counts as larger, as three digits are printed
+SUMS = "sums"  # its name in a checkpoint
+SMALLER = "a smaller numerics.accuracy"  # the remedy if the accuracy has chosen the setting
+OF_BANDS = {
+    "method": "fewer bands with more points each (bands.count)",
+    "scatter": "more surfaces of each band (bands.samples)",
+}
+REMEDIES = {source.name: source.remedy for source in MARCH_SOURCES} | OF_BANDS
+SHOWN = {source.name: source.shown or source.name for source in MARCH_SOURCES}
+SHOWN |= {"method": "coupling of bands", "scatter": "surfaces"}
+
+
+class ErrorParts(NamedTuple):
+    """Relative errors by source. For surfaces in bands, `method` is the error of their coupling, and `scatter` the
+    variation between surfaces with the same spectrum."""
+
+    solver: float
+    time: float
+    folded: float
+    mesh: float
+    method: float = 0.0
+    scatter: float = 0.0
+
+    @property
+    def total(self) -> float:
+        return sum(self)
+
+    @property
+    def of_friction(self) -> float:
+        """The stated error of friction: at least 1 if it exceeds UNKNOWN. Such a friction is the small difference of
+        large forces, and its error is known to an order of magnitude only."""
+        return max(self.total, 1.0) if self.total > UNKNOWN else self.total
+
+    def plain(self) -> dict[str, float]:
+        """Return the parts and their total."""
+        return {name: getattr(self, name) for name in NAMES} | {"total": self.total}
+
+
+NAMES = ErrorParts._fields
+
+
+@dataclass(frozen=True)
+class ErrorBudget:
+    """Errors at one instant. `friction` is None without friction; its error may exceed 1. They are not stated unless
+    the mesh is `resolved`: spots of contact have more than a few cells."""
+
+    friction: ErrorParts | None
+    area: ErrorParts
+    resolved: bool = True
+
+    def take_from_time(self, error: float) -> "ErrorBudget":
+        """Return the budget with a smaller error of friction by the time steps."""
+        friction = self.friction and self.friction._replace(time=self.friction.time - error)
+        return replace(self, friction=friction)
+
+    def with_rounds(self, friction: float, area: float) -> "ErrorBudget":
+        """Return the budget with relative errors by the rounds of a fixed point, as part of the solver's."""
+        own = self.friction and self.friction._replace(solver=self.friction.solver + friction)
+        return ErrorBudget(own, self.area._replace(solver=self.area.solver + area))
+
+
+def estimate(run: RunProperties, observed: StepObservation) -> ErrorBudget:
+    """Return the budget of a step."""
+    return _estimate(MARCH_SOURCES, run, observed)
+
+
+def estimate_steady(run: RunProperties, observed: StepObservation) -> ErrorBudget:
+    """Return the budget of steady sliding, for friction by energy."""
+    return _estimate(STEADY_SOURCES, run, observed)
+
+
+def _estimate(sources: Sequence[ErrorSource], run: RunProperties, observed: StepObservation) -> ErrorBudget:
+    """Return the errors of the sources. The error of friction is relative to the sum of body and interface; the
+    interface has the relative error of the area."""
+    pairs = {source.name: source.error(run, observed) for source in sources}
+    missing = dict.fromkeys(("solver", "time", "folded", "mesh"), 0.0)
+    area = ErrorParts(**missing | {name: pair.area for name, pair in pairs.items()})
+    resolved = resolves(run, observed)
+    if observed.friction <= 0.0:
+        return ErrorBudget(None, area, resolved)
+    shares = observed.body / observed.friction, observed.interface / observed.friction
+    friction = {name: shares[0] * pair.friction + shares[1] * pair.area for name, pair in pairs.items()}
+    return ErrorBudget(ErrorParts(**missing | friction), area, resolved)
+
+
+def add_shear(
+    budget: ErrorBudget, body: float, shear: float, whole: float, solver: float, share: float, time: float, mesh: float
+) -> ErrorBudget:
+    """Return the budget of friction `whole`, the sum of the part of the `body`, with its `budget`, and of `shear` by
+    tractions.
+
+    The tractions have the relative errors `solver` of their solve, `time` of the step and `mesh` of the stiffness of
+    spots, and a `share` of them has the error of the area.
+    """
+    if whole <= 0.0:
+        return replace(budget, friction=None)
+    of_body = budget.friction or ErrorParts(*(0.0 for _ in NAMES))
+    parts = {name: body * one + shear * share * two for name, one, two in zip(NAMES, of_body, budget.area, strict=True)}
+    parts["solver"] += shear * solver
+    parts["time"] += shear * time
+    parts["mesh"] += shear * mesh
+    return replace(budget, friction=ErrorParts(**{name: part / whole for name, part in parts.items()}))
+
+
+def weight_of(slid: float, seconds: float) -> float:
+    """Return the weight of a step in a mean: the distance slid, or a far smaller one for its duration at rest."""
+    return slid or seconds * AT_REST or AT_ONCE
+
+
+@dataclass(frozen=True)
+class ErrorSums:
+    """Sums of the budgets of many steps, weighted by the distance slid; friction also by its value.
+
+    Without sliding the weight is the duration, and for steps without duration a still smaller one, so that rest does
+    not dilute the errors of a slide. `sums` has a row for friction and one for the area: the weight, and the
+    weighted sum of each part.
+    """
+
+    sums: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 1 + len(NAMES))))
+
+    def plus(self, budget: ErrorBudget, friction: float, seconds: float, slid: float = 0.0) -> "ErrorSums":
+        """Return the sums with one more step of `seconds`, in which the surface slid by `slid` [m]."""
+        far, sums = weight_of(slid, seconds), self.sums.copy()
+        for row, parts, weight in zip(sums, (budget.friction, budget.area), (friction, 1.0), strict=True):
+            if parts is not None:
+                row += weight * far * np.array([1.0, *parts])
+        return ErrorSums(sums)
+
+    def entries(self) -> dict[str, Entry]:
+        """Return its entry, which is optional."""
+        return {SUMS: Entry(self.sums.ravel(), optional=True)}
+
+    @classmethod
+    def restored(cls, saved: Saved) -> "ErrorSums":
+        """Return the sums of a checkpoint, or new ones if another version has written them."""
+        own = cls()
+        found = np.asarray(saved.get(SUMS, own.sums))
+        return cls(found.reshape(own.sums.shape)) if found.size == own.sums.size else own
+
+    @property
+    def friction(self) -> ErrorParts | None:
+        """Mean over the distance slid; None without sliding or friction."""
+        return self._mean(0)
+
+    @property
+    def friction_within(self) -> float:
+        """Absolute error of the friction coefficient, as a mean over the distance slid."""
+        parts, weight = self.friction, float(self.sums[1, 0])
+        return parts.of_friction * float(self.sums[0, 0]) / weight if parts and weight > 0.0 else math.nan
+
+    @property
+    def area(self) -> ErrorParts | None:
+        """Mean over the distance slid, or over time without sliding; None without contact."""
+        return self._mean(1)
+
+    def _mean(self, index: int) -> ErrorParts | None:
+        weight, *sums = self.sums[index].tolist()
+        return ErrorParts(*(value / weight for value in sums)) if weight > 0.0 else None
+
+    def facts(self, accuracy: Any) -> dict[str, Any]:
+        """Return the requested accuracy and the relative errors by part, and in total, as plain data."""
+        found = {"friction": self.friction, "contact_area_corrected": self.area}
+        parts = {name: each.plain() for name, each in found.items() if each is not None}
+        if self.friction is not None:
+            parts["friction"]["total"] = self.friction.of_friction
+        return {"accuracy": accuracy, **parts}
+
+    def lines(self, asked: tuple[float, float], chosen: Collection[str] = ()) -> list[str]:
+        """Return sentences for run.log, with remedies if friction or the area exceeds the `asked` accuracies. The
+        accuracy has `chosen` the settings of these parts."""
+        found = zip(("friction", "the corrected contact area"), (self.friction, self.area), asked, strict=True)
+        way = "the distance slid" if self.sums[1, 0] > LEAST_WAY else "time"
+        lines = [
+            f"estimated error of {name}: {describe(parts, name)}, mean over {way}{advice(parts, accuracy, chosen)}"
+            for name, parts, accuracy in found
+            if parts is not None
+        ]
+        if self.friction is not None and self.friction.of_friction >= 1.0:
+            lines.append(f"friction is 0 ± {self.friction_within:.2g}: it is smaller than its estimated error")
+        return lines
+
+
+def advice(parts: ErrorParts, accuracy: float, chosen: Collection[str] = ()) -> str:
+    """Return a text with a remedy if the error exceeds `accuracy`, or that it does not."""
+    if not exceeds(parts.total, accuracy):
+        return f"; within the {100 * accuracy:g} % that numerics.accuracy asks for"
+    worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
+    remedy = SMALLER if worst in chosen else REMEDIES[worst]
+    return f"; more than the {100 * accuracy:g} % that numerics.accuracy asks for: try {remedy}"
+
+
+def exceeds(error: float, accuracy: float) -> bool:
+    """Return whether an estimated error exceeds the requested accuracy, also as it is printed."""
+    return error > ROUNDED * accuracy
+
+
+def describe(parts: ErrorParts, name: str) -> str:
+    """Return the total error of "friction", or of another quantity, in per cent, and its parts."""
+    there = [part for part in NAMES if getattr(parts, part)]
+    shares = ", ".join(f"{SHOWN[part]} {per_cent(getattr(parts, part))}" for part in there)
+    total = parts.of_friction if name == "friction" else parts.total
+    more = " or more" if name == "friction" and total >= 1.0 else ""
+    return f"{per_cent(total, 3)}{more} ({shares or 'no part'})"

@@ -1,0 +1,314 @@
+"""The tolerance of solves and the length of steps, both from the error budget of the steps made so far.
+
+**Tolerance.** `numerics.tolerance` suits the worst scene. If `numerics.accuracy` has chosen it, solves may have a
+larger one, as long as the error of the solver stays below its share (`shares`) of the accuracy, or of the other
+parts of the budget if these are larger. Errors are proportional to the certificate of a solve. The factor is a mean
+over the last steps, rounded to a power of the square root of two against rounding errors, and a part of the state,
+so that a restarted run continues identically. The last solve before a change of velocity or load is a close one, and
+so is a steady start: the body remembers the error of the displacement, and a much larger modulus may multiply it
+after the change. The last step of a stage seldom moves the surface by whole cells, so that its start is worse than
+those from which the factor was learnt.
+
+**Length.** The error E of a step of length dt is estimated from that step alone (`time_error`). E0 is the share of
+time steps in the accuracy. As E varies as dt^p (p = 3 for a displacement quadratic in time, 1.7 for a linear one, 1
+for backward Euler), the next step is
+
+    dt <- dt clip(SAFETY (E0/E)^(1/p), 1, MOST_GROWTH),
+
+and a step with E > REJECTED E0 is repeated from the same state, `max((REJECTED E0/E)^(1/p), MOST_SHRINK)` times as
+long; the step after it does not grow (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I
+(1993), II.4). At rest steps are the shortest one times powers of the fourth root of two, against rounding errors.
+While the surface slides, steps end at multiples of their length, counted in cells from the first position of the
+surface (block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after a
+jump, parts of a cell, as large as E allows, lead back to whole cells, by which heights are moved without a
+transform. Halves, thirds and quarters start from the pressure one whole cell earlier (`march.starts`)."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+from ..job import Job
+from ..job.advice import one_cell
+from ..job.calculation import AREA, FRICTION, SOLVER_MEDIAN, TIME_MEDIAN, Accuracy
+from ..job.history import Bounds, ChosenEnds, ChosenSteps, MadeStep, Span, Step, Timeline, reached
+from ..physics.body import Body, remembers
+from ..physics.entries import Entry, Saved, Units
+from .budget import ErrorBudget, ErrorParts
+from .time_error import order_of_time_error
+
+MOST = 8.0  # accuracy: largest tolerance of a solve over the tolerance of the job
+LOOSEST = 0.05  # accuracy: largest tolerance of a solve
+CLOSE = 2.5e-4  # accuracy: largest tolerance before a change of velocity or load
+FIRST = 0.01  # accuracy: largest tolerance in the first and the last step of a stage
+NEWEST = 0.25  # tuning: weight of the last step in the mean factor
+NAME = "mean logarithm"  # its name in a checkpoint
+SAFETY = 0.98  # tuning: length of a step over that with the allowed error
+REJECTED = 1.19  # accuracy: error of a rejected step over the allowed one
+MOST_GROWTH, MOST_SHRINK = 2.0, 1.0 / 16.0  # tuning: limits on a step over the one before, or over a rejected one
+LEAST_SHEAR = 1.0 / 1024.0  # accuracy: cells in the first step if shear comes first; spots slide in a hundredth
+LEVELS = 2  # tuning: log2 of the number of lengths per factor of two, for steps below a quarter of a cell
+REST_LEVELS = 4  # tuning: number of lengths per factor of two at rest
+LEAST_WAY_LEFT = 0.35  # tuning: least length of a step that ends at a multiple, over its nominal length
+STRETCH = 1.1  # tuning: largest stretch of the last step of a stage, to avoid a short rest
+SNAP_SHARE = 1.0 / 64.0  # accuracy: step over the longest of the stage, below which the edge of contact may snap
+RELAXING = 0.1  # accuracy: the same over the shortest relaxation time; and the first step at rest after a jump
+SAME_LEVEL = 1e-6  # rounding: relative tolerance on a length
+
+
+@dataclass(frozen=True)
+class StepTolerance:
+    """Memory of the tolerance of steps: mean over the last ones of log2 of the ratio to the tolerance of the job."""
+
+    mean: float = 0.0
+
+
+class TolerancePart:
+    """Tolerance of solves, an optional part of checkpoints."""
+
+    def at_rest(self) -> StepTolerance:
+        return StepTolerance()
+
+    def entries(self, memory: StepTolerance, units: Units) -> dict[str, Entry]:
+        return {NAME: Entry(memory.mean, optional=True)}
+
+    def restored(self, memory: StepTolerance, saved: Saved) -> StepTolerance:
+        return StepTolerance(float(saved[NAME])) if NAME in saved else StepTolerance()
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Controller of a run: of a job with its stages and `body`; `energies` is True if the job asks for them, `exact`
+    if contacts are solved to the job's tolerance."""
+
+    job: Job
+    timeline: Timeline
+    body: Body
+    energies: bool = False
+    exact: bool = False
+
+    @property
+    def relaxes(self) -> bool:
+        return remembers(self.body)
+
+    @cached_property
+    def asked(self) -> Accuracy:
+        """The accuracies that the job asks for."""
+        return self.job.numerics.asked
+
+    # -- tolerance ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def follows(self) -> bool:
+        """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen the tolerance of the
+        job, and stages have steps."""
+        return "tolerance" in self.job.numerics.chosen and self.timeline.lasts and not self.exact
+
+    def tolerance(self, memory: StepTolerance, step: Step) -> float | None:
+        """Return the tolerance of the solve of a step, None for the tolerance of the job, as in a jump. It is smaller
+        before a change and in the first and last step of a stage."""
+        if step.dt == 0.0:
+            return None
+        own, most = self.job.numerics.tolerance, self.largest_tolerance(step)
+        if not self.follows:
+            return most if most < own else None
+        return float(min(own * 2.0 ** (0.5 * round(2.0 * memory.mean)), max(LOOSEST, own), most))
+
+    def largest_tolerance(self, step: Step) -> float:
+        """Return a limit on the tolerance of a step before a change, and of the first and last step of a stage; else
+        infinite, as in a jump."""
+        if step.dt == 0.0:
+            return math.inf
+        span = self.timeline.spans[step.stage]
+        ends = reached(step.time, span.time(span.count))
+        most = tolerance_before(self.job, step.stage + 1, self.relaxes) if ends else math.inf
+        return min(most, FIRST) if (step.growth == 0.0 or ends) and self.relaxes else most
+
+    def learn(self, memory: StepTolerance, certificate: float, budget: ErrorBudget | None) -> StepTolerance:
+        """Return the memory after a step with this budget, whose solve has reached `certificate`."""
+        if not self.follows or budget is None or certificate <= 0.0:
+            return memory
+        room = _room(budget.area, AREA.solver, self.asked.area)
+        if budget.friction is not None:
+            room = min(room, _room(budget.friction, FRICTION.solver, self.asked.friction))
+        ratio = certificate * room / self.job.numerics.tolerance
+        now = min(max(math.log2(ratio) if ratio > 0.0 else 0.0, 0.0), math.log2(MOST))
+        return StepTolerance(memory.mean + NEWEST * (now - memory.mean))
+
+    # -- length of steps ----------------------------------------------------------------------------------------------
+
+    def propose(self, chosen: ChosenSteps, span: Span, number: int) -> Step:
+        """Return step `number` of a stage that chooses its steps; `chosen` are those made."""
+        first = number == span.before + span.jumps + 1
+        return self._step(chosen, span, number, self._first(chosen, span) if first else chosen.next)
+
+    def decide(
+        self,
+        chosen: ChosenSteps,
+        span: Span,
+        step: Step,
+        end: float,
+        rejected: bool,
+        error: float,
+        front: float = 0.0,
+        begins: bool = False,
+    ) -> Step | MadeStep:
+        """Return a shorter step to make instead of one with this error, or the record of the accepted step.
+
+        The step ends at `end` [s] of the stage; `rejected` is True if a longer one was tried before. In contacts
+        with attraction the edge has moved by `front` half process zones: one is allowed, unless it snaps. Steps in
+        which it snaps, `begins` or ends are limited to a share of the shortest relaxation time, so that a jump meets
+        the body before it relaxes. With energies this also applies to points that close; the square root of the
+        accuracy is then allowed.
+        """
+        order = order_of_time_error(self.job.numerics.integrator, step.growth > 0.0)
+        ratio = error / (FRICTION.time * TIME_MEDIAN * self.asked.of_steps)
+        jump = min(SNAP_SHARE * _bounds(span).most, RELAXING * self.body.shortest_time)
+        if step.dt > jump:
+            allowed = math.sqrt(self.asked.of_steps) if self.relaxes and self.energies else 1.0
+            at_once = (step.dt / jump) ** order if begins and self.relaxes else 0.0
+            ratio = max(ratio, (front / allowed) ** order, at_once)
+        wanted = SAFETY * ratio ** (-1.0 / order) if ratio > 0.0 else MOST_GROWTH
+        if ratio > REJECTED:
+            share = max((REJECTED / ratio) ** (1.0 / order), MOST_SHRINK)
+            if shorter := self._shorter(chosen, span, step, share):
+                return shorter
+            rejected = True
+        most = 1.0 if rejected else MOST_GROWTH
+        return MadeStep(span.index, end, self._level(span, step.dt * min(max(wanted, 1.0), most)))
+
+    def limit(self, made: MadeStep, dt: float, turned: float) -> MadeStep:
+        """Return the record of a step of length dt in which the mean traction has changed by the share `turned` of its
+        bound, with a next step in which it changes by the root of the accuracy at most, if it changes as fast."""
+        most = math.sqrt(self.asked.of_steps)
+        if turned * made.next <= most * dt:
+            return made
+        return made._replace(next=self._level(self.timeline.spans[made.stage], most / turned * dt))
+
+    def _shorter(self, chosen: ChosenSteps, span: Span, step: Step, share: float) -> Step | None:
+        """Return a step of at most this share of a step, None if that one is the shortest."""
+        least, dt = _bounds(span).least, share * step.dt
+        while True:
+            wanted = self._level(span, dt)
+            shorter = self._step(chosen, span, step.number, wanted, rejected=True)
+            if shorter.dt < step.dt * (1.0 - SAME_LEVEL):
+                return shorter
+            if wanted <= least:
+                return None
+            dt = 0.5 * wanted
+
+    def _level(self, span: Span, dt: float) -> float:
+        """Return the longest admissible length of a step that does not exceed dt."""
+        limits = _bounds(span)
+        if dt <= limits.least or dt >= limits.most:
+            return min(max(dt, limits.least), limits.most)
+        if span.stage.slides:
+            cell = one_cell(span.stage, self.job.grid)
+            return min(cell * cells_per_step(dt / cell), limits.most)
+        power = math.floor(REST_LEVELS * math.log2(dt / limits.least) + SAME_LEVEL)
+        return min(limits.least * 2.0 ** (power / REST_LEVELS), limits.most)
+
+    def _first(self, chosen: ChosenSteps, span: Span) -> float:
+        """Return the length of the first step of a stage."""
+        limits = _bounds(span)
+        if self._goes_on(span) and chosen.next:
+            return self._level(span, chosen.next)
+        if span.stage.speed:
+            cell = one_cell(span.stage, self.job.grid)
+            return min(limits.most, max(limits.least, self._first_shear() * cell) if self.job.sheared_first else cell)
+        return self._level(span, RELAXING * self.body.shortest_time)
+
+    def _first_shear(self) -> float:
+        """Return the cells slid in the first step of a stage if points are sheared first. A body that is stiffer at
+        once reaches the bounds of tractions, which belong to the relaxed body, after a shorter way."""
+        body = self.job.material.fitted
+        return LEAST_SHEAR * body.long_modulus / body.instant_modulus
+
+    def _goes_on(self, span: Span) -> bool:
+        """Return whether the stage before chose its steps and had the same velocity and load."""
+        if span.index == 0 or span.jumps:
+            return False
+        before = self.timeline.history[span.index - 1]
+        return before.chooses and before.velocity == span.stage.velocity
+
+    def _step(self, chosen: ChosenSteps, span: Span, number: int, dt: float, rejected: bool = False) -> Step:
+        """Return a step of about this length that ends at a multiple of its length, or with the stage."""
+        ends = span.ends
+        assert isinstance(ends, ChosenEnds)
+        now = ends.made[-1] if ends.made else 0.0
+        stop = ends.next_stop(now)
+        if span.stage.slides:
+            dt = self._to_a_multiple(span, now, dt)
+        elif STRETCH * dt < stop - now < 2.0 * dt:
+            dt = 0.5 * (stop - now)
+        if stop - now <= (STRETCH if not span.stage.slides else 1.0 + SAME_LEVEL) * dt:
+            return self._ending(chosen, span, number, stop - now, stop, rejected)
+        return self._ending(chosen, span, number, dt, now + dt, rejected)
+
+    def _to_a_multiple(self, span: Span, now: float, dt: float) -> float:
+        """Return the time until the surface is at a multiple of the way of such a step: at least LEAST_WAY of it.
+
+        After half a multiple the step is a half, so that a step that has just grown is not three times as long as
+        the last one.
+        """
+        if span.stage.velocity[1]:
+            return dt
+        (x, _), (along, _) = span.origin, span.stage.velocity
+        cell = one_cell(span.stage, self.job.grid)
+        at = math.copysign(1.0, along) * x / self.job.grid.dx + now / cell
+        size = dt / cell
+        if at + SAME_LEVEL * size == at:  # positions do not resolve the step
+            return dt
+        way = (math.ceil(at / size + LEAST_WAY_LEFT) * size - at) * cell
+        return dt if math.isclose(way, dt, rel_tol=SAME_LEVEL) else way
+
+    def _ending(self, chosen: ChosenSteps, span: Span, number: int, dt: float, end: float, rejected: bool) -> Step:
+        """Return the step of this length and end [s after the start of the stage]."""
+        (x, y), (along_x, along_y), moving = span.origin, span.stage.velocity, span.stage.moving(end)
+        made = chosen.ends.get(span.index, [])
+        last = made[-1] - (made[-2] if len(made) > 1 else 0.0) if made else 0.0
+        step = Step(
+            number,
+            span.index,
+            span.start + end,
+            dt,
+            (x + along_x * moving, y + along_y * moving),
+            span.mean_velocity(end, dt),
+            span.stage.control,
+            span.stage.load.at(end / span.stage.seconds, end),
+            dt / last if last > 0.0 else 0.0,
+        )
+        return step._replace(decide=partial(self.decide, chosen, span, step, end, rejected))
+
+
+def tolerance_before(job: Job, stage: int, relaxes: bool) -> float:
+    """Return the largest tolerance of the solve before a stage: CLOSE if velocity, control or load change there and the
+    body relaxes, else infinite."""
+    history, start = job.history, job.initial
+    if stage == len(history) or not relaxes:
+        return math.inf
+    before = start.velocity, "pressure", start.pressure or 0.0
+    if stage:
+        before = history[stage - 1].velocity, history[stage - 1].control, history[stage - 1].load.end
+    after = history[stage].velocity, history[stage].control, history[stage].load.start
+    return math.inf if before == after else CLOSE
+
+
+def cells_per_step(most: float) -> float:
+    """Return the longest admissible way of a step up to `most`: 1, 2, 4 cells, or a half, a 3rd, ... 8th, 10th, ... of
+    one."""
+    if most >= 1.0 - SAME_LEVEL:
+        return 2.0 ** math.floor(math.log2(most) + SAME_LEVEL)
+    count = (1.0 - SAME_LEVEL) / most
+    unit = max(1, 2 ** (math.floor(math.log2(count)) - LEVELS))
+    return 1.0 / (math.ceil(count / unit) * unit)
+
+
+def _room(parts: ErrorParts, share: float, accuracy: float) -> float:
+    """Return the factor by which the estimated error of the solver may grow; infinite if it is 0."""
+    allowed = share * SOLVER_MEDIAN * max(accuracy, parts.total - parts.solver)
+    return allowed / parts.solver if parts.solver > 0.0 else math.inf
+
+
+def _bounds(span: Span) -> Bounds:
+    assert isinstance(span.ends, ChosenEnds)
+    return span.ends.limits

@@ -1,0 +1,502 @@
+"""Friction curves.
+
+Friction curves: steady sliding solved directly at many velocities and pressures, written to steady.csv and a
+picture.
+
+steady.csv and steady_waves.csv: a line for each point of a friction curve, and messages about it; on root.
+"""
+
+import math
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from .. import streams
+from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
+from ..doubts import Doubt
+from ..errors import InputError, RunError, UnsolvedError
+from ..files import files, hdf5, tables, wisdom
+from ..files.directory import ADVICE, Directory
+from ..files.fields import SteadyMaps
+from ..files.provenance import Link, Provenance, cite_lines
+from ..files.recorder import Console, always
+from ..files.tables import LOG, GrowingTable, LostPoint, StopFile, Wanted
+from ..job import Job, listing
+from ..job.advice import describe_sample, more_points
+from ..job.history import Timeline
+from ..job.listing import answers
+from ..job.materials import describe_temperature
+from ..parallel.root import Signals, on_root
+from ..parallel.slab import Array, Slab
+from ..printed import per_cent
+from . import choices, sanity, scene
+from .budget import advice, describe, exceeds
+from .point import Point
+from .scene import Setup
+from .steady import SteadySliding
+
+WAVES = ("steady_waves.csv", names_of(STEADY_WAVES))  # an additional table
+HEAD = "velocity [m/s]    load [Pa] corr.area  error  friction  error  calls  residual"  # corr.area: corrected area
+
+
+Draw = Callable[[], Path]  # draws the picture of a curve and returns its path
+
+
+class EarlierPoint(NamedTuple):
+    """A point solved by an earlier run, and its relative errors of friction and of the corrected area."""
+
+    at: Wanted
+    errors: tuple[float, float]
+
+
+class CurveTable:
+    """The tables in a directory, continued or new; raises OSError, and InputError for a table that cannot be read."""
+
+    def __init__(
+        self, directory: Path, setup: Setup, further: tuple[str, Sequence[str]] | None, heated: bool, quiet: bool
+    ) -> None:
+        self._console, self._job = Console(directory / LOG, quiet, 0), setup.job
+        self.path, self.heated, self.quiet = directory / "steady.csv", heated, quiet
+        branches = setup.prony.moduli.size if self._job.grid.boundary == "periodic" else 0
+        thermal = self._job.section("thermal")
+        there = {
+            "temperatures": heated,
+            "interface": bool(setup.choices.shears),
+            "softening": self._job.section("softening") is not None,
+            "thermal": thermal is not None,
+            "feedback": thermal is not None and thermal.feedback != "none",
+        }
+        self._columns = choose_columns(STEADY, branches, [what for what, known in there.items() if known])
+        self._names = names_of(self._columns)
+        self.known = self._read()
+        self._file = GrowingTable(self.path, self._names)
+        self._lost = tables.read(directory)
+        if further:
+            self._keep_known(directory / further[0], heated)
+        self._further = GrowingTable(directory / further[0], further[1]) if further else None
+        self._points: list[Point] = []
+        self._bar = streams.Bar(0, "")
+        if self._job.origin.mesh:
+            self.say(self._job.origin.mesh)
+        if not heated and (text := describe_temperature(self._job.material)):
+            self.say(text)
+        self.say(f"{HEAD}   T [C]" if heated else HEAD)
+
+    def _read(self) -> list[Wanted]:
+        """Return the points of the table; an incomplete line is removed."""
+        if not self.path.exists():
+            return []
+        columns = tables.read_columns(self.path)
+        if tuple(columns) != self._names:
+            files.put_aside(self.path)
+            return []
+        whole = self.path.read_bytes()
+        if not whole.endswith(b"\n"):
+            with files.replaced(self.path) as new:
+                new.write(whole[: whole.rfind(b"\n") + 1])
+        return tables.of_table(columns)
+
+    def _keep_known(self, path: Path, heated: bool) -> None:
+        """Remove lines of an additional table that belong to no point, such as one that was interrupted."""
+        if not path.exists():
+            return
+        head, *lines = tables.whole_lines(path)
+        places = [head.index(name) for name in ("velocity", "pressure", "temperature") if name in head]
+        kept = []
+        for line in lines:
+            speed, pressure, *degrees = (float(line[place] or "nan") for place in places)
+            point = Wanted(speed, pressure, degrees[0] if heated and degrees else math.nan)
+            kept += [] if tables.lacking_points([point], self.known) else [line]
+        files.replace_file(path, "".join(f"{','.join(line)}\n" for line in [head, *kept]))
+
+    def lacking(self, points: Sequence[Wanted], bare: Sequence[int] = ()) -> list[int]:
+        """Return the numbers of the missing points, and of those `bare` of requested maps."""
+        found = tables.lacking_points(points, self.known)
+        if len(found) < len(points):
+            self.say(f"{len(points) - len(found)} of {len(points)} points are there already")
+        if again := sorted({*bare} - {*found}):
+            self.say(f"{len(again)} of these are solved again, for their maps")
+            found = sorted([*found, *again])
+        self._bar = streams.Bar(len(found), "steady states", "point", not self.quiet)
+        return found
+
+    @property
+    def count(self) -> int:
+        """Number of points in the table."""
+        return len(self.known) + len(self._points)
+
+    def pass_on(self) -> None:
+        """Count a point, solved or not."""
+        self._bar.step()
+
+    def say(self, text: str) -> None:
+        if not self.quiet or text.startswith("parcontact"):
+            self._bar.print(text)
+        self._console.log(text)
+
+    def warn(self, doubts: Sequence[Doubt], shown: Callable[[Doubt], bool] = always) -> None:
+        """Write warnings to the log, and print those that are `shown`, also with --quiet."""
+        for doubt in doubts:
+            self._console.warn(str(doubt), shown(doubt))
+
+    def write(self, point: Point, rows: Sequence[Sequence[float]]) -> None:
+        """Add a point, unless it exists and is solved for its maps only."""
+        m, speed = point.measures, point.speed
+        if not tables.lacking_points([Wanted(speed, m.pressure, point.temperature)], self.known):
+            return
+        if self._further:
+            for row in rows:
+                self._further.append(cells(map(float, row)))
+        self._file.append(cells(float(column.value(point)) for column in self._columns))
+        self._points.append(point)
+        self.say(
+            f"{speed:14.6g} {m.pressure:12.5g} {m.contact_area_corrected:9.5f} {_percent(point.error_area)} "
+            f"{point.friction:9.6f} "
+            f"{_percent(point.error_friction)} {point.operator_calls:6.0f} "
+            f"{point.certificate.worst:9.2e}{f' {point.temperature:7g}' if self.heated else ''}"
+        )
+
+    def lose(self, at: Wanted, why: str) -> None:
+        """Store a point that could not be solved, unless it exists; raises OSError."""
+        self._lost = tables.without([*tables.without(self._lost, [at]), LostPoint(at, why)], self.known)
+        tables.write(self.path.parent, self._lost)
+
+    def conclude(self, failures: int, draw: Draw | None) -> None:
+        """Sort a curve that was solved in parts, `draw` it, and report failures; raises OSError."""
+        self._bar.close()
+        self._file.sync()
+        if self.known:
+            self._sort()
+        found = [asked(self._points, self._job) for asked in answers("steady", "doubts_of_points")]
+        of_points = [doubt for doubts in found for doubt in doubts]
+        for warning in (*of_points, *describe_missed(self._points, self._job, self._earlier())):
+            self._console.warn(str(warning))
+        if self._points and (text := describe_sample(self._job.grid, self._job.surface, slides=True)):
+            self.say(text)
+        solved = [Wanted(point.speed, point.measures.pressure, point.temperature) for point in self._points]
+        tables.write(self.path.parent, tables.without(self._lost, solved))
+        picture = f" and {draw()}" if draw else ""
+        there = tables.name_lost(self.path.parent) or "all points"
+        failed = f"parcontact: {failures} of the points could not be solved; {self.path} has {there}"
+        self.say(failed if failures else f"done: {self.path}{picture}")
+
+    def _earlier(self) -> list[EarlierPoint]:
+        """Return the points of earlier runs."""
+        if not self.known:
+            return []
+        columns = tables.read_columns(self.path)
+        errors = zip(columns["error_friction"], columns["error_area"], strict=True)
+        there = map(EarlierPoint, tables.of_table(columns), errors)
+        return [one for one in there if not tables.lacking_points([one.at], self.known)]
+
+    def _sort(self) -> None:
+        """Sort the lines by temperature, then by pressure, then by speed."""
+        columns = tables.read_columns(self.path)
+        head, *lines = self.path.read_text().splitlines()
+        degrees = columns["temperature"] if self.heated else [0.0] * len(lines)
+        points = zip(degrees, columns["pressure"], columns["velocity"], strict=True)
+        keys = [(t, round(math.log(p), 5), v) for t, p, v in points]
+        order = sorted(range(len(lines)), key=keys.__getitem__)
+        files.replace_file(self.path, "\n".join([head, *(lines[k] for k in order)]) + "\n")
+
+    def close(self) -> None:
+        self._bar.close()
+        self._console.close()
+        self._file.close()
+        if self._further:
+            self._further.close()
+
+
+def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[Doubt]:
+    """Yield warnings about friction and the corrected area of points whose error exceeds the accuracy of the job, also
+    of `earlier` ones, for which the parts of the error are not known."""
+    chosen = ["solver"] * ("tolerance" in job.numerics.chosen) + ["mesh"] * bool(job.origin.mesh)
+    known = [point for point in points if point.errors.resolved]
+    friction = [(point, point.errors.friction) for point in known if point.errors.friction is not None]
+    area = [(point, point.errors.area) for point in known]
+    names = ("friction", "the corrected contact area")
+    for column, (name, each) in enumerate(zip(names, (friction, area), strict=True)):
+        accuracy = job.numerics.asked.both[column]
+        missed = [(parts.total, point, parts) for point, parts in each if exceeds(parts.total, accuracy)]
+        before = [(one.errors[column], one.at) for one in earlier if exceeds(one.errors[column], accuracy)]
+        many = f"at {len(missed) + len(before)} of {len(points) + len(earlier)} points"
+        if missed:
+            _, point, parts = max(missed, key=lambda one: one[0])
+            place = Wanted(point.speed, point.pressure, point.temperature)
+            text = f"{describe(parts, name)}, at {place}{advice(parts, accuracy, chosen)}"
+            yield Doubt("inaccurate points", "", {"of": name, "where": f"{many}: up to {text}"})
+        elif before:
+            error, place = max(before, key=lambda one: one[0])
+            asked = f"more than the {100 * accuracy:g} % that numerics.accuracy asks for"
+            where = f"{many}: up to {per_cent(error, 3)}, at {place}; {asked}"
+            yield Doubt("inaccurate points", "", {"of": name, "where": where})
+
+
+def _percent(share: float) -> str:
+    """Return a relative error in six characters."""
+    return "     -" if math.isnan(share) else "> 100%" if share >= 1.0 else f"{100 * share:5.2g}%"
+
+
+DONE, FAILED, AGAIN = 0, 1, 3  # exit codes: all points solved; some have failed; stopped early, run again
+SAME = (*tables.SCENE, *tables.EFFECTS, *(f"numerics.{key}" for key in ("kernel", "precision", "slope", "tolerance")))
+
+
+@dataclass(frozen=True)
+class Request:
+    """Request for steady states: speeds [m/s] along a unit `direction`, each under each of the mean pressures [Pa] and
+    at each of the temperatures [deg C], if there are any."""
+
+    velocities: tuple[float, ...]
+    pressures: tuple[float, ...]
+    direction: tuple[float, float] = (1.0, 0.0)
+    waves: bool = False
+    temperatures: tuple[float, ...] = ()
+
+    @property
+    def points(self) -> list[Wanted]:
+        """All points, in the order in which they are solved."""
+        return tables.requested_points(self.velocities, self.pressures, self.temperatures)
+
+    def velocity(self, speed: float) -> tuple[float, float]:
+        return speed * self.direction[0], speed * self.direction[1]
+
+
+def request(
+    job: Job, velocities: Sequence[float] = (), pressures: Sequence[float] = (), temperatures: Sequence[float] = ()
+) -> Request:
+    """Return the request of a job's `steady` section, or of the arguments; raises InputError for an incomplete one."""
+    section = job.steady
+    speeds = tuple(velocities) or (section.velocities if section else ())
+    loads = tuple(pressures) or (section.pressures if section and section.pressures else _pressures(job))
+    if not speeds:
+        raise InputError("no velocities: give --velocities first:last:count [m/s], or a steady section in the job")
+    if not loads:
+        raise InputError("no pressure: give --pressures [Pa], or a stage with a pressure or force in the job")
+    if any(not 0.0 < value < math.inf for value in (*speeds, *loads)):
+        raise InputError("velocities [m/s] and pressures [Pa] of steady sliding must be positive")
+    for why in filter(None, (ask(job) for ask in job.asked("why_no_curve"))):
+        raise InputError(why)
+    direction = section.unit_direction if section else (1.0, 0.0)
+    degrees = tuple(temperatures) or (section.temperatures if section and section.temperatures else ())
+    for temperature in degrees:
+        job.at_temperature(temperature)
+    return Request(speeds, loads, direction, bool(section and section.waves), degrees)
+
+
+def _pressures(job: Job) -> tuple[float, ...]:
+    area = job.grid.lx * job.grid.ly
+    for stage in job.history:
+        if stage.control != "approach" and stage.load.end > 0.0:
+            return (stage.load.end / area if stage.control == "force" else stage.load.end,)
+    return ()
+
+
+class States(Protocol):
+    """Steady states of a job, one velocity and pressure after the other; collective.
+
+    `setup` is the setup of the states. `table` is the name of an additional table with its columns, or None; `rows` are
+    its lines for the last state at a velocity [m/s]. Intermediate results may be stored by `keep_in` a directory,
+    until `forget` is called after the state is written.
+    """
+
+    setup: Setup
+    table: tuple[str, Sequence[str]] | None
+
+    def doubts(self, temperatures: Sequence[float]) -> list[Doubt]: ...
+
+    def notes(self) -> list[str]: ...
+
+    def keep_in(self, directory: Path) -> None: ...
+
+    def forget(self) -> None: ...
+
+    def set_temperature(self, temperature: float) -> None: ...
+
+    def solve(self, velocity: tuple[float, float], pressure: float) -> Point: ...
+
+    def rows(self, velocity: tuple[float, float]) -> list[list[float]]: ...
+
+    def field(self, name: str) -> Array: ...
+
+
+def on_one_grid(job: Job, slab: Slab) -> States:
+    """Return the steady states of a job on its grid; collective."""
+    return SteadySliding(scene.set_up(job, slab))
+
+
+def transforms_of(job: Job) -> list[Any]:
+    """Return facts that, with the number of ranks, determine the transforms of a curve."""
+    return [*choices.choices(job).transforms, "curve"]
+
+
+def run_curve(
+    job: Job,
+    slab: Slab,
+    wanted: Request,
+    quiet: bool,
+    restart: str = "auto",
+    shows: Callable[[Doubt], bool] = always,
+    sweep_stop_file: StopFile | None = None,
+    make: Callable[[Job, Slab], States] = on_one_grid,
+    limit: float | None = None,
+    draw: Draw | None = None,
+) -> int:
+    """Solve all missing points, and write each at once; collective. Return the exit code.
+
+    If a point fails, the others are still solved, and the exit code is 1. `restart` is `auto` or `never`; warnings
+    are printed if `shows` returns True. `sweep_stop_file` is shared by all cases of a sweep; it is not removed.
+    `make` makes the steady states; `draw` draws the finished curve, on root. The last point must be solved by the time
+    `limit` (of `time.monotonic`), if any.
+    """
+    directory = Directory(job.output.directory, slab, "steady")
+    with directory.claimed():
+        sanity.refuse_impossible(job, Timeline.from_job(job))
+        plain = _identity(job, wanted) if slab.root else {}
+        directory.refuse_foreign(job.path, plain, restart == "never")
+        goes_on = restart != "never" and on_root(slab.comm, lambda: _goes_on(directory, plain))
+        transforms = transforms_of(job)
+        wisdom.recall(transforms, slab, None)
+        sliding = make(job, slab)
+        wisdom.keep(transforms, slab)
+        doubts = sliding.doubts(wanted.temperatures)
+        directory.make(job.path, job.resolved(), tables.Claim(plain))
+        if not goes_on:
+            directory.clear()
+        table = _table(directory.path, sliding, wanted, quiet)
+        if table:
+            for text in sliding.notes():
+                table.say(text)
+            table.warn(doubts, shows)
+        maps = _maps(job, slab, wanted, directory)
+        sliding.keep_in(directory.path)
+        try:
+            with Signals().noted() as signals:
+                return _Curve(sliding, wanted, table, maps, directory, signals, shows, sweep_stop_file, limit).go(draw)
+        finally:
+            if table:
+                table.close()
+
+
+def _identity(job: Job, wanted: Request) -> dict[str, Any]:
+    """Return the data that identify a curve; of the `steady` section only those that must agree for all points."""
+    steady = {"direction": list(wanted.direction), "waves": wanted.waves}
+    return {**tables.kept(listing.plain_job(job)), "steady": steady}
+
+
+def _goes_on(directory: Directory, plain: Mapping[str, Any]) -> bool:
+    """Return whether points of the same curve exist; root only. Raises InputError if they belong to another curve, with
+    advice on keeping several meshes."""
+    if (claim := directory.claim) is None or not directory.results():
+        return False
+    if different := tables.list_differences(tables.differences(claim.job, plain, (*SAME, "steady"))):
+        kept = tables.keep_mesh(claim.job, different)
+        raise InputError(f"{directory.path} holds the friction curve of another job: {different}; {kept}{ADVICE}")
+    return True
+
+
+def _table(path: Path, sliding: States, wanted: Request, quiet: bool) -> CurveTable | None:
+    """Start the tables, or continue them, on root; collective. Raises InputError if that fails."""
+    further, made = WAVES if wanted.waves else sliding.table, list[CurveTable]()
+    act = lambda: made.append(CurveTable(path, sliding.setup, further, bool(wanted.temperatures), quiet))  # noqa: E731
+    hdf5.write_on_root(sliding.setup.slab, act, "cannot write the table of the curve", InputError)
+    return made[0] if made else None
+
+
+def _maps(job: Job, slab: Slab, wanted: Request, directory: Directory) -> SteadyMaps | None:
+    """Make the file for the maps of the job, if it has some; collective."""
+    if not job.output.fields:
+        return None
+    cited = cite_lines(listing.plain_data(job))
+    provenance = Provenance((Link(job.resolved(), slab.comm.size),), references=cited)
+    points = [point if wanted.temperatures else point[:2] for point in wanted.points]
+    return SteadyMaps(directory.path / "steady.h5", slab, job.grid.size, job.output.fields, points, provenance)
+
+
+@dataclass
+class _Curve:
+    """The points of a curve, solved one after the other; methods are collective."""
+
+    sliding: States
+    wanted: Request
+    table: CurveTable | None
+    maps: SteadyMaps | None
+    directory: Directory
+    signals: Signals
+    shows: Callable[[Doubt], bool]
+    sweep_stop_file: StopFile | None
+    limit: float | None
+    failures: int = 0
+    longest: float = -math.inf
+
+    def __post_init__(self) -> None:
+        chosen, self.slab = self.sliding.setup.choices, self.sliding.setup.slab
+        self.watch = sanity.ContactWatch(chosen.numerics.strict, chosen.timeline, more=more_points(chosen.grid))
+
+    def go(self, draw: Draw | None) -> int:
+        """Solve missing points; collective. Return the exit code."""
+        bare = self.maps.lacking() if self.maps and self.slab.root else []
+        lacking = self.slab.agree(self.table.lacking(self.wanted.points, bare) if self.table else [])
+        for count, index in enumerate(lacking):
+            if self._stopped():
+                self._say(f"stopped with {len(lacking) - count} points to go; run again to go on")
+                return AGAIN
+            began = time.monotonic()
+            self._solve(index)
+            self.longest = max(self.longest, time.monotonic() - began)
+            if self.table:
+                self.table.pass_on()
+        on_root(self.slab.comm, lambda: self.table.conclude(self.failures, draw) if self.table else None)
+        if self.table:
+            self.directory.note(finished=(self.table.count, 0.0))
+        return FAILED if self.failures else DONE
+
+    def _stopped(self) -> bool:
+        """Return whether a stop was requested, or a point that takes twice the longest time so far would come too late;
+        its own stop file is then removed."""
+        late = self.limit is not None and time.monotonic() + 2.0 * self.longest > self.limit
+        others = late or (self.sweep_stop_file is not None and self.sweep_stop_file.asks)
+        asked = self.signals.stop or (self.slab.root and (others or os.path.lexists(self.directory.stop_file)))
+        if not self.slab.reduce((), [float(asked)])[0]:
+            return False
+        if problem := self.slab.agree(tables.remove(self.directory.stop_file) if self.slab.root else ""):
+            raise RunError(problem)
+        return True
+
+    def _say(self, text: str) -> None:
+        if self.table:
+            self.table.say(text)
+
+    def _lose(self, wanted: Wanted, error: RunError) -> None:
+        """Report and store a point that could not be solved."""
+        self.failures += 1
+        self._say(f"parcontact: {error}")
+        why = error.reason if isinstance(error, UnsolvedError) else str(error)
+        act = lambda: self.table.lose(wanted, why) if self.table else None  # noqa: E731
+        hdf5.write_on_root(self.slab, act, f"cannot write {self.directory.path / tables.FILE}")
+        self.sliding.forget()
+
+    def _solve(self, index: int) -> None:
+        """Solve and write a point; a failure is reported."""
+        wanted, table = self.wanted.points[index], self.table
+        velocity = self.wanted.velocity(wanted.speed)
+        try:
+            if not math.isnan(wanted.temperature):
+                self.sliding.set_temperature(wanted.temperature)
+            point = self.sliding.solve(velocity, wanted.pressure)
+        except RunError as error:
+            self._lose(wanted, error)
+            return
+        rows = self.sliding.rows(velocity) if self.wanted.waves or self.sliding.table else []
+        if self.maps:
+            self.maps.save(index, {name: self.sliding.field(name) for name in self.maps.names})
+
+        def write() -> None:
+            if table:
+                table.write(point, rows)
+                table.warn(self.watch.check_point(point.measures, str(wanted)), self.shows)
+
+        hdf5.write_on_root(self.slab, write, f"cannot write {self.directory.path / 'steady.csv'}")
+        self.sliding.forget()

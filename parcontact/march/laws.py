@@ -1,0 +1,305 @@
+"""The contact laws of a step: its start, its solve and its failure.
+
+Errors of failed steps: their place, their cause, and possible remedies.
+
+Start of the solve of a step.
+
+Pressures change with time and move with the surface. If the surface has moved by whole cells since one of the last
+steps, the pressure of that step is moved by as many cells, without rounding: in steady sliding it is already the
+solution. With steps of a whole cell it is the last pressure, extrapolated with the one before it; with steps of half a
+cell it is the one before; with thirds and quarters it is an earlier one, stored in slides with chosen steps.
+
+Otherwise the last two pressures are extrapolated in the body's frame.
+
+Contact law of surfaces that do not attract: a constraint on pressures (`solve.constraint`), solved from the last
+pressures.
+
+Contact law of a surface whose finer roughness is a law of its interface (`solve.interface_law`).
+
+Under pressure the mean planes of the finer roughness approach by the closing c. With the modulus alpha of a step, in
+which the pressure is `alpha p`,
+
+    p >= 0,    w = A p + c(alpha p) - h - d >= 0,    p w = 0.
+
+The gap `u - h - d` is measured to the highest points of the finer roughness, so that it is `-c` in contact. An
+effect provides this law (`effects.effect.Effect.law`); it is solved by splitting (`solve.nonsymmetric.splitting`).
+Energies of the run do not include the work on the finer roughness.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..contact import starts
+from ..contact.constraint import InterfaceLaw, NonNegative
+from ..contact.problem import Control, MeanPressure, Problem, reachable_certificate
+from ..contact.projected import Judge
+from ..contact.solver import Contact
+from ..contact.splitting import Splitting
+from ..effects.effect import ContactLaw, Detached, EdgeMotion, PreviousContacts, PreviousPressure, SolvedContact
+from ..errors import InputError, RunError
+from ..job.history import Step
+from ..parallel import regrid
+from ..parallel.slab import Array
+from ..physics import loops
+from ..physics.body import Trial
+from ..physics.entries import Entry, Saved, Units
+from ..physics.measures import Measures
+from ..physics.motion import are_whole, cells_between
+from ..printed import rounded_up
+from . import sanity
+from .scene import Scene, solver_on, solver_on_tiles
+
+FINITE = "look for heights, loads or moduli that are not finite or of very different magnitude"
+UNITS = {"pressure": " Pa", "force": " N", "approach": " m"}
+USEFUL = 0.1  # accuracy: largest certificate of a useful contact
+MANY_CELLS = 1.5  # tuning: least motion of the surface in a step [cells] for the advice on smaller steps
+
+
+class StepError(RunError):
+    """A step that failed; the run keeps the state before it. `beyond_precision` is True if its tolerance needs more
+    digits than numbers of its precision have."""
+
+    def __init__(self, text: str, beyond_precision: bool = False) -> None:
+        super().__init__(text)
+        self.beyond_precision = beyond_precision
+
+
+class DetachedError(Exception):
+    """The surfaces have detached in a step that ends at `time` [s] under a `load`; the run keeps the state
+    before it."""
+
+    def __init__(self, time: float, load: float) -> None:
+        super().__init__(time, load)
+        self.time, self.load = time, load
+
+
+def accepts(scene: Scene, contact: Contact) -> bool:
+    """Return whether the job accepts a solve that did not reach the tolerance."""
+    return scene.choices.numerics.accept_unconverged and math.isfinite(contact.certificate.worst)
+
+
+def describe_place(scene: Scene, step: Step) -> str:
+    """Return number, time and stage of a step."""
+    return f"step {step.number} at t = {step.time:g} s (stage {scene.choices.timeline.history[step.stage].name!r})"
+
+
+def not_finite(scene: Scene, step: Step, measures: Measures) -> StepError:
+    """Return the error of a converged step whose measures are not finite."""
+    wrong = ", ".join(name for name, value in asdict(measures).items() if not math.isfinite(value))
+    return StepError(f"{describe_place(scene, step)}: {wrong} would not be finite; {FINITE}")
+
+
+def of_solve(
+    scene: Scene, step: Step, failed: Contact, last: Contact, tried: list[str], h: Array, moved: float
+) -> StepError:
+    """Return the error of a contact solve for heights h that has `failed`, and of the attempts `tried`, which end with
+    `last`; collective. In the step the surface moves by `moved` cells."""
+    also = f", also with {', with '.join(tried)}" if tried else ""
+    numerics, what = scene.choices.numerics, f"{describe_place(scene, step)}: the contact solve {failed.failure}{also}"
+    if not np.isfinite(last.certificate.worst):
+        return StepError(f"{what}; {FINITE}")
+    compliance = scene.setup.half_space.largest_compliance
+    reach = reachable_certificate(scene.slab, (last.u, h), last.p, compliance, last.certificate.length)
+    if numerics.tolerance < reach:
+        change = "try a larger numerics.tolerance" if reach <= USEFUL else FINITE
+        text = f"{what}; {numerics.precision} precision reaches only about {reach:.1g} here: {change}"
+        return StepError(text, beyond_precision=True)
+    return StepError(f"{what}; {', or '.join(_changes(scene, step, failed, last, moved)) or FINITE}")
+
+
+def _changes(scene: Scene, step: Step, failed: Contact, last: Contact, moved: float) -> Iterator[str]:
+    """Yield possible remedies, the likeliest first."""
+    numerics = scene.choices.numerics
+    if "max_iterations" in failed.failure:
+        yield f"try numerics.max_iterations above {numerics.max_iterations}"
+    if moved > MANY_CELLS:
+        yield f"try smaller steps: in this step the surface moves by {moved:.3g} cells"
+    elif step.dt > 0.0:
+        yield "try smaller steps"
+    if last.certificate.worst <= USEFUL:
+        yield f"try numerics.tolerance above {rounded_up(last.certificate.worst, 1)}"
+
+
+def refuse_beyond_full_contact(scene: Scene, step: Step, effective: Array) -> None:
+    """Raise StepError if a step prescribes an approach beyond full contact; collective."""
+    if sanity.has_full_contact(scene.setup):
+        mean = scene.slab.sum(float(effective.sum(dtype=np.float64)))[0] / scene.slab.points
+        if text := sanity.beyond_full_contact(scene.setup, step.load, mean * scene.units.height):
+            raise StepError(f"{describe_place(scene, step)}: {text}")
+
+
+def make_start(scene: Scene, pasts: Sequence[PreviousPressure], step: Step, alpha: float, out: Array) -> None:
+    """Put the start of a step, a map of p for the modulus `alpha`, into `out`. `pasts` are the last pressures, the
+    newest first."""
+    if len(pasts) == 1:
+        out[...] = pasts[0].pressure
+        return
+    now, before = pasts[:2]
+    growth = step.growth if before.alpha > 0.0 else 0.0
+    past = _whole_cells_ago(scene, pasts, step) if growth > 0.0 else None
+    if past is not None:
+        now, growth = past, 0.0
+    _travel(scene, step, now, before, growth, alpha, out)
+
+
+def cells_moved(scene: Scene, step: Step, since: tuple[float, float]) -> tuple[float, float]:
+    """Return by how many cells, along x and y, the surface moves from the position `since` [m] to the end of a step."""
+    grid = scene.choices.grid
+    return cells_between(since, step.position, (grid.dx, grid.dy))
+
+
+def _whole_cells_ago(scene: Scene, pasts: Sequence[PreviousPressure], step: Step) -> PreviousPressure | None:
+    """Return the newest pressure since which the surface has moved by whole cells; None if it is the last one."""
+    last, *older = pasts
+    if are_whole(cells_moved(scene, step, last.position)):
+        return None
+    known = (past for past in older if past.alpha > 0.0)
+    return next((past for past in known if are_whole(cells_moved(scene, step, past.position))), None)
+
+
+def _travel(
+    scene: Scene, step: Step, now: PreviousPressure, before: PreviousPressure, growth: float, alpha: float, out: Array
+) -> None:
+    """Put `(1 + growth) now - growth before`, moved with the surface by whole cells, into `out`."""
+    slab, points = scene.slab, scene.choices.grid.points
+    along_x, along_y = (
+        round(moved) % count  # against overflow in long steps
+        for moved, count in zip(cells_moved(scene, step, now.position), points, strict=True)
+    )
+    older, share = before.pressure, growth * before.alpha / alpha
+    if along_y and growth > 0.0:
+        older = regrid.roll_rows(slab, before.pressure, along_y, out)
+    bounds = scene.constraint(alpha).bounds
+    loops.travel(now.pressure, older, (1.0 + growth) * now.alpha / alpha, share, along_x, *bounds, out)
+    if along_y:
+        out[...] = regrid.roll_rows(slab, out, along_y, scene.solver.workspace.pressure)
+
+
+def choose_contact_law(scene: Scene) -> ContactLaw[Any]:
+    """Return the contact law that an effect of the scene provides, or the law of its constraint. A law that solves by
+    the latter gets it by its method `upon`."""
+    dry, law = DryLaw(scene), scene.law
+    return dry if law is None else law.upon(dry) if hasattr(law, "upon") else law
+
+
+@dataclass(frozen=True)
+class DryLaw:
+    """Law of a scene's constraint. It has no memory of its own."""
+
+    scene: Scene
+    may_shorten = False
+
+    def solve(
+        self,
+        trial: Trial,
+        step: Step,
+        control: Control,
+        memory: None,
+        past: PreviousContacts,
+        before: Measures,
+        tolerance: float | None,
+    ) -> SolvedContact[None]:
+        """Solve a step; see `effects.contact_protocol.ContactLaw.solve`. Raises StepError."""
+        scene, contact, remark = self.scene, None, ""
+        most = control.value * scene.slab.points if isinstance(control, MeanPressure) else math.inf
+        problem = Problem(*scene.operators, trial.effective, scene.constraint(trial.alpha, most), control)
+        make_start(scene, past.pressures, step, trial.alpha, past.spare)
+        if past.last.alpha == 0.0:  # nothing has been solved before
+            on = partial(solver_on, scene.setup)
+            contact = starts.prepare_start(scene.solver, problem, past.spare, on, solver_on_tiles(scene.setup))
+        contact = contact or scene.solver.solve(problem, past.spare, tolerance=tolerance)
+        if contact.failure:
+            contact, remark = self._retry(step, past, problem, contact)
+        return SolvedContact(contact, None, problem.constraint.touches(contact.p), remark=remark)
+
+    def _retry(self, step: Step, past: PreviousContacts, problem: Problem, failed: Contact) -> tuple[Contact, str]:
+        """Retry a failed solve; only in double precision if the job accepts unconverged solves. Raises StepError if all
+        attempts fail. Return the contact, and a sentence on the attempt that succeeded; collective."""
+        scene, would_do = self.scene, accepts(self.scene, failed)
+        in_double = (lambda: scene.in_double) if failed.u.dtype == np.float32 else None
+        if would_do and in_double is None:
+            return failed, ""
+        on, most = partial(solver_on, scene.setup), 1 if would_do else None
+        contact, tried = starts.retry_solve(scene.solver, problem, failed, on, in_double, most)
+        if contact.failure:
+            if would_do and accepts(scene, contact):
+                return contact, ""
+            moved = math.hypot(*cells_moved(scene, step, past.last.position))
+            raise of_solve(scene, step, failed, contact, tried, problem.heights, moved)
+        return contact, f"the contact solve {failed.failure}; solved when retried with {', with '.join(tried)}"
+
+    def motion(self, solved: SolvedContact[None], before: Measures, now: Measures) -> EdgeMotion:
+        """Return no motion: the motion of edges in a step is not limited."""
+        return EdgeMotion()
+
+    def gap(self, memory: None) -> Array | None:
+        """Return None: the pressure is the unknown."""
+        return None
+
+    def detached(self, memory: None) -> Detached | None:
+        """Return None: a compressive load is always carried."""
+        return None
+
+    def with_end(self, memory: None, end: Detached) -> None:
+        """Return None, the memory."""
+
+    def at_rest(self) -> None:
+        """Return None, the memory."""
+
+    def entries(self, memory: None, units: Units) -> dict[str, Entry]:
+        """Return no entries."""
+        return {}
+
+    def restored(self, memory: None, saved: Saved) -> None:
+        """Return None."""
+
+
+SOFTER = 4.0  # tuning: most modulus of the last step over that of this one, for a start from its pressures
+MOST_STEPS = 20000  # tuning: limit on the steps of the splitting for one contact
+
+
+class ClosingLaw(DryLaw):
+    """Law of a scene with the closing c [m] as a function of the pressure [Pa], at the end of each step. It has no
+    memory of its own.
+
+    Raises InputError for a body that moves in the mean, and for a hardness.
+    """
+
+    def __init__(self, scene: Scene, law: Callable[[Step], InterfaceLaw]) -> None:
+        super().__init__(scene)
+        body, setup = scene.setup.half_space, scene.setup
+        if body.moves_in_the_mean or scene.job.material.hardness is not None:
+            raise InputError("finer roughness as a law of the interface needs a periodic half space without a hardness")
+        judge = Judge(scene.slab, setup.height / scene.units.height)
+        self._law = law
+        self._splitting = Splitting(
+            judge, body.operator(setup.fft), body.inverse(setup.fft), scene.choices.numerics.tolerance, MOST_STEPS
+        )
+
+    def solve(
+        self,
+        trial: Trial,
+        step: Step,
+        control: Control,
+        memory: None,
+        past: PreviousContacts,
+        before: Measures,
+        tolerance: float | None,
+    ) -> SolvedContact[None]:
+        """Solve a step; see `effects.contact_protocol.ContactLaw.solve`."""
+        if isinstance(control, MeanPressure) and control.value == 0.0:
+            return super().solve(trial, step, control, memory, past, before, tolerance)
+        scene, p = self.scene, past.spare
+        if 0.0 < past.last.alpha <= SOFTER * trial.alpha:  # a contact is known, of about as many points
+            make_start(scene, past.pressures, step, trial.alpha, p)
+        else:
+            p.fill(0.0)
+        law = self._law(step).in_units(trial.alpha * scene.units.pressure, scene.units.height)
+        found = self._splitting.solve(trial.effective, control, law, p, tolerance)
+        contact = Contact(p, found.u, found.d, found.certificate, found.steps, found.failure)
+        return SolvedContact(contact, None, NonNegative().touches(p))

@@ -1,0 +1,70 @@
+"""Warnings for jobs outside the frequencies and temperatures at which their rubber was measured."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from ..doubts import Doubt
+from ..effects.relaxation import time_factor_of
+from ..job import Job, Zener
+from ..job.meaning import excited_band
+from ..rubber.shift import doubt_kelvin
+
+NEAR = 0.5  # accuracy: decades beyond the measured band without a warning
+
+
+class ExcitedBand(NamedTuple):
+    """Frequencies [Hz] that a job excites at a temperature [deg C], and the shift factor a_T there.
+
+    The temperature is None if moduli do not depend on it.
+    """
+
+    temperature: float | None
+    factor: float
+    band: tuple[float, float]
+
+    @property
+    def reduced(self) -> tuple[float, float]:
+        """Frequencies [Hz] with the same moduli at the reference temperature."""
+        return self.band[0] * self.factor, self.band[1] * self.factor
+
+
+def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedBand]:
+    """Return the frequencies that a job excites at each temperature of a friction curve, or at the temperature of the
+    material; none if the surface does not move."""
+    if (band := excited_band(job)) is None:
+        return []
+    body = _body(job)
+    if body is None or body.shift is None:
+        return [ExcitedBand(None, 1.0, band)]
+    reference = body.shift.made.reference
+    degrees = temperatures or (reference if body.temperature is None else body.temperature,)
+    return [ExcitedBand(value, time_factor_of(job.at_temperature(value).material), band) for value in degrees]
+
+
+def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
+    """Yield warnings about frequencies and temperatures at which the material was not measured. `temperatures` [deg C]
+    belong to a friction curve; without them the temperature of the material counts."""
+    if (body := _body(job)) is None:
+        return
+    if job.steady is None or tuple(temperatures) != job.steady.temperatures:  # given apart from the job
+        yield from doubt_kelvin("temperatures", temperatures)
+    degrees = [value for value in temperatures or (body.temperature,) if value is not None]
+    if body.temperatures is not None:
+        low, high = body.temperatures
+        if beyond := [value for value in degrees if not low <= value <= high]:
+            degrees_text = ", ".join(f"{value:g}" for value in beyond)
+            yield Doubt("temperatures", "material", {"degrees": degrees_text, "low": low, "high": high})
+    found = excited_bands(job, temperatures)
+    if body.band is None or not found:
+        return
+    low, high = min(one.reduced[0] for one in found), max(one.reduced[1] for one in found)
+    for decades, side in ((math.log10(body.band[0] / low), "below"), (math.log10(high / body.band[1]), "above")):
+        if decades > NEAR:
+            measured = {"decades": decades, "side": side, "first": body.band[0], "last": body.band[1]}
+            yield Doubt("frequencies", "material", {"low": low, "high": high, **measured})
+
+
+def _body(job: Job) -> Zener | None:
+    """Return the material as springs and branches; None if it is elastic."""
+    return job.material.fitted if isinstance(job.material.fitted, Zener) else None

@@ -1,0 +1,147 @@
+"""A steady state and its losses.
+
+A steady state as data: its parameters, its measures, and its cost.
+
+Branch maps of a body in a steady state, and the power lost in each branch.
+
+A wave u^ loses the power `|u^|^2/A |w| G_k''(|w|)` in branch k, with A its displacement over its pressure for a
+modulus of 1 and w the frequency with which it passes a point.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..contact.projected import SteadyContact
+from ..parallel.slab import Array, deal
+from ..physics.convolution import PARTS, wavenumbers
+from ..physics.measures import Certificate, Measures
+from ..physics.prony import Prony
+from .budget import ErrorBudget
+from .constants import FLASH
+from .scene import Setup
+
+if TYPE_CHECKING:
+    from ..effects.heat.solver import Flash
+
+Vector = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Point:
+    """A steady state: velocity [m/s], pressure [Pa], temperature [deg C] (NaN if none is given), relaxation times over
+    those at the reference, measures, certificate, and cost.
+
+    `friction` is the dissipated power over load and velocity, plus that of an interface; `errors` is its budget. The
+    friction of `measures` is by the slopes of the rigid surface; the difference is a mesh error. `operator_calls`
+    count applications on the finest grid. `dissipated` is the power [W] of each branch (empty for a free scene, whose
+    wake continues outside the box). `flash` has the temperatures of the contact, None without `thermal`. With
+    feedback, found in `rounds`, the shift factor is that of the flash temperature, and `friction_cold` is friction
+    without feedback. `strain_amplitude` is the strain that softens the rubber, NaN without `softening`.
+    """
+
+    velocity: Vector
+    pressure: float
+    temperature: float
+    shift_factor: float
+    measures: Measures
+    friction: float
+    errors: ErrorBudget
+    certificate: Certificate
+    operator_calls: float
+    seconds: float
+    dissipated: tuple[float, ...]
+    flash: Flash | None = None
+    rounds: int = 1
+    friction_cold: float = math.nan
+    strain_amplitude: float = math.nan
+
+    @property
+    def speed(self) -> float:
+        """Magnitude of the velocity [m/s]."""
+        return math.hypot(*self.velocity)
+
+    @property
+    def error_friction(self) -> float:
+        """Relative error of friction, 1 or more if friction is smaller than its error; NaN without friction, and if
+        spots may be smaller than a cell."""
+        return self.errors.friction.of_friction if self.errors.friction and self.errors.resolved else math.nan
+
+    @property
+    def error_area(self) -> float:
+        """Relative error of the corrected area; NaN if spots may be smaller than a cell."""
+        return self.errors.area.total if self.errors.resolved else math.nan
+
+    @property
+    def error_flash(self) -> float:
+        """The relative error of the flash temperature, FLASH times that of friction; NaN where there is none."""
+        return FLASH.value * self.error_friction if self.flash and self.flash.mean else math.nan
+
+
+def in_rounds(points: Sequence[Point]) -> Point:
+    """Return the last round of a fixed point, with the cost of all rounds, and with the relative changes in the last
+    round as errors."""
+    *_, before, last = [*points[-1:], *points]
+    friction, area = (
+        abs(one - other) / one if one > 0.0 else 0.0
+        for one, other in (
+            (last.friction, before.friction),
+            (last.measures.contact_area_corrected, before.measures.contact_area_corrected),
+        )
+    )
+    calls, seconds = (sum(getattr(point, name) for point in points) for name in ("operator_calls", "seconds"))
+    return replace(last, errors=last.errors.with_rounds(friction, area), operator_calls=calls, seconds=seconds)
+
+
+ROUNDING = 1e-9  # accuracy: relative rounding of wavelengths at the limits of octaves
+
+
+def branch_powers(setup: Setup, contact: SteadyContact, velocity: Vector) -> Array:
+    """Return the power [W] lost in each branch to waves of each octave, shape (branches, octaves); collective.
+
+    The first octave is from the longer side of the box to half of it. Scenes must be periodic, so that waves are
+    independent.
+    """
+    fft, prony, grid, half_space = setup.fft, setup.prony, setup.grid, setup.half_space
+    spectrum, speed, longest = fft.forward(contact.u), setup.in_units(velocity), max(grid.size)
+    powers = np.zeros((prony.moduli.size, count_octaves(setup)))
+    for rows in deal(fft.my, PARTS):
+        omega = np.abs(half_space.frequencies(fft, speed, rows))
+        compliance = half_space.symbol(fft, rows)
+        waves = fft.multiplicity * np.abs(spectrum[rows]) ** 2
+        waves = np.divide(waves, compliance, out=np.zeros_like(waves), where=compliance > 0.0)
+        q = np.hypot(*wavenumbers(fft, grid.size, rows))
+        if half_space.factors is not None:
+            waves *= half_space.factors(q * setup.units.length)[1]
+        octave = np.floor(np.log2(np.maximum(q * longest / (2 * np.pi), 1.0) * (1 + ROUNDING))).astype(np.int64)
+        for branch, modulus, tau in zip(powers, prony.moduli, prony.relaxation_times, strict=True):
+            loss = waves * omega * modulus * omega * tau / (1.0 + (omega * tau) ** 2)
+            branch += np.bincount(octave.ravel(), loss.ravel(), branch.size)
+    unit = setup.units.pressure * setup.units.height * grid.lx * grid.ly / (grid.nx * grid.ny) ** 2
+    return np.array(setup.slab.sum(*powers.ravel())).reshape(powers.shape) * unit
+
+
+def count_octaves(setup: Setup) -> int:
+    """Return the number of octaves of wavelengths from the longer side of the box to the shortest waves of the grid."""
+    cells = max(setup.grid.size) / min(setup.grid.dx, setup.grid.dy)  # along the longer side, of the smaller length
+    return 2 + int(np.log2(cells * (1 + ROUNDING)))
+
+
+def branch_maps(setup: Setup, contact: SteadyContact, velocity: Vector, out: Array) -> Iterator[Array]:
+    """Yield the map h_k of each branch in a steady state at a velocity [m/s], each in `out`; collective."""
+    fft, half_space, speed = setup.fft, setup.half_space, setup.in_units(velocity)
+    if half_space.free:
+        for k in range(setup.prony.moduli.size):
+            yield half_space.branch_operator(fft, speed, setup.prony, k).apply(contact.p, out)
+        return
+    u = fft.forward(contact.u).copy()
+    for modulus, tau in zip(setup.prony.moduli, setup.prony.relaxation_times, strict=True):
+        own = Prony(0.0, np.array([modulus]), np.array([tau]))
+        for rows in deal(fft.my, PARTS):
+            np.multiply(half_space.sliding_modulus(fft, speed, own, rows), u[rows], out=fft.spectrum[rows])
+        yield fft.backward(fft.spectrum, out)

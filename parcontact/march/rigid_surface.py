@@ -1,0 +1,212 @@
+"""The rigid surface of a job: the sum of shapes, waves, roughness and maps from files."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import reduce
+from operator import add
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import job as jobs
+from ..doubts import Doubt
+from ..job import Grid, Job, meaning
+from ..parallel.fft import FFT, Spectrum
+from ..parallel.root import on_root
+from ..parallel.slab import Array, Slab, allocate
+from ..physics import surface
+from ..physics.loops import lowest, shape_of
+from ..physics.roughness import Roughness, shortest_wave
+from ..physics.surface import Conical, FlatEnded, Pyramidal, Round, Shape, Surface, single_wave
+
+ROUNDING = 1e-8  # accuracy: relative, by which the shortest wavelength of a table is reduced so that it is included
+FLAT = 1e-14  # accuracy: range of heights over their magnitude, up to which a surface is flat
+
+
+class Remarks(NamedTuple):
+    """Remarks on measured maps: sentences on how they were prepared (on root), and warnings (on every rank)."""
+
+    notes: list[str]
+    doubts: list[Doubt]
+
+
+def make_surface(job: Job, fft: FFT) -> tuple[Surface, Remarks]:
+    """Return the rigid surface of a job, and remarks on its measured maps; collective. Raises InputError."""
+    grid, remarks = job.grid, Remarks([], [])
+    spectral = [part for part in job.surface if isinstance(part, jobs.Spectral)]
+    waves = reduce(add, (_waves(part, grid, fft, remarks) for part in spectral)) if spectral else None
+    shapes = [_indenter(part, grid) for part in job.surface if isinstance(part, jobs.Indenter)]
+    surface = Surface(fft.slab, fft, grid.size, waves, shapes, grid.cyclic)
+    surface.level()
+    if surface.waves is not None:
+        surface.waves = lowest(surface.waves, fft, highest_waves(job))
+        fft.slab.tally.hold(surface.waves)
+    return surface, remarks
+
+
+def outline_surface(job: Job, fft: FFT) -> Surface:
+    """Return the surface of a job for planning: its waves have no values."""
+    waves = None
+    if any(isinstance(part, jobs.Spectral) for part in job.surface):
+        waves = allocate(shape_of(highest_waves(job), (fft.mx, fft.my), fft.columns), fft.complex, fft.slab.tally)
+    return Surface(fft.slab, fft, job.grid.size, waves)
+
+
+def _indenter(part: jobs.Indenter, grid: Grid) -> Shape:
+    centre = part.center or (grid.lx / 2, grid.ly / 2)
+    if isinstance(part, jobs.Cone | jobs.Pyramid):
+        return (Conical if isinstance(part, jobs.Cone) else Pyramidal)(part.slope, centre)
+    if isinstance(part, jobs.Punch):
+        return FlatEnded(part.radius, part.edge, centre)
+    along = (1.0, 1.0)
+    if isinstance(part, jobs.Cylinder):
+        along = (1.0, 0.0) if part.axis == "y" else (0.0, 1.0)
+    return Round(part.radius, centre, along, part.profile == "exact")
+
+
+def shortest_measured(job: Job, surface: Surface) -> float | None:
+    """Return the shortest wave [m] of a measured surface, from its spectrum on the grid; collective.
+
+    It is None for a surface whose waves the job gives, or without slopes. A map that is not periodic is multiplied
+    by a window, as a jump or a crease at its edges has waves of any length. The window adds up to one wave to the
+    shortest, of which half is subtracted.
+    """
+    if surface.waves is None or not any(isinstance(part, meaning.READ) for part in job.surface):
+        return None
+    spectrum = surface.waves
+    maps = [part for part in job.surface if isinstance(part, jobs.Topography)]
+    windows = 2 if any(part.periodic == "mirror" for part in maps) else 1  # next to each other
+    windowed = not all(job.grid.cyclic) or bool(maps)
+    if windowed:
+        heights = replace(surface, shapes=()).heights((0.0, 0.0), surface.slab.empty())
+        rows, columns = (
+            np.sin(np.pi * windows * (np.arange(n) + 0.5) / n) ** 2 if n > 1 else np.ones(1)
+            for n in (surface.slab.ny, surface.slab.nx)
+        )
+        heights *= rows[surface.slab.rows, None] * columns
+        spectrum = surface.fft.forward(heights)
+    found = shortest_wave(spectrum, surface.fft, job.grid.size)
+    waves = max(job.grid.size) / found - (0.5 * windows if windowed else 0.0)
+    return max(job.grid.size) / waves if waves >= 1.0 else None
+
+
+def shortest_of(job: Job) -> float | None:
+    """Return `shortest_measured` of a job on its grid, on this rank alone."""
+    slab = Slab.alone(*job.grid.points)
+    return shortest_measured(job, make_surface(job, FFT(slab, measured=False))[0])
+
+
+def highest_waves(job: Job) -> tuple[int, int]:
+    """Return the largest numbers of waves in the box, along x and y, of the parts that are given by waves."""
+    grid, found = job.grid, [(0, 0)]
+    for part in job.surface:
+        if isinstance(part, jobs.Wave):
+            found.append((abs(part.waves[0]), abs(part.waves[1])))
+        elif isinstance(part, jobs.Rough):
+            found.append((int(grid.lx / part.short_wavelength), int(grid.ly / part.short_wavelength)))
+        elif isinstance(part, jobs.Spectral):
+            found.append((grid.nx // 2, grid.ny // 2))
+    return max(x for x, _ in found), max(y for _, y in found)
+
+
+def _waves(part: jobs.Spectral, grid: Grid, fft: FFT, remarks: Remarks) -> Spectrum:
+    """Return the spectrum of one part of a surface, adding to its `remarks`; collective."""
+    if isinstance(part, jobs.Wave):
+        return single_wave(fft, part.amplitude, part.waves, part.phase)
+    if isinstance(part, jobs.RoughSpectrum):
+        return _measured_spectrum(part, grid, fft, remarks.notes)
+    if isinstance(part, jobs.Topography):
+        return _measured_map(part, grid, fft, remarks)
+    if isinstance(part, jobs.HeightFile):
+        return _transform(surface.read_heights(part.path, part.dataset, fft.slab, part.scale), fft)
+    if isinstance(part, jobs.HeightArray):
+        return _transform(fft.slab.from_root(part.heights.values), fft)
+    limits = part.long_wavelength, part.rolloff_wavelength, part.short_wavelength
+    amplitude, lay = (part.rms_slope, part.rms_height, part.psd_constant), part.anisotropy
+    stretch = (lay.ratio, math.radians(lay.angle)) if lay else (1.0, 0.0)
+    random = part.amplitudes == "random"
+    return Roughness(part.hurst, *limits, part.seed, random, *amplitude, stretch).spectrum(fft, grid.size)
+
+
+def _measured_map(part: jobs.Topography, grid: Grid, fft: FFT, remarks: Remarks) -> Spectrum:
+    """Return the transform of a map, or of a surface with the spectrum of a line scan, adding to its `remarks`;
+    collective."""
+    from ..job import map_files, measured_maps
+    from . import map_sentences
+
+    heights: list[Array] = []
+
+    def make() -> tuple[list[Doubt], tuple[measured_maps.MeasuredSpectrum, tuple[float, float]] | None]:
+        found = map_files.read_map(part)
+        if found.is_line:
+            remarks.notes.append(map_sentences.describe_line(part, found))
+            return [], measured_maps.of_line(part, found)
+        prepared = measured_maps.prepare(part, grid, found)
+        heights.append(prepared.heights)
+        remarks.notes.extend(map_sentences.describe_treatment(prepared))
+        return [*map_sentences.doubt_sizes(prepared), *map_sentences.doubt_outliers(prepared)], None
+
+    doubts, line = on_root(fft.slab.comm, make)
+    if line is not None:
+        return _random_surface(*line, grid, fft, remarks.notes)
+    remarks.doubts.extend(doubts)
+    return _transform(fft.slab.from_root(heights[0] if heights else None), fft)
+
+
+def _measured_spectrum(part: jobs.RoughSpectrum, grid: Grid, fft: FFT, notes: list[str]) -> Spectrum:
+    from ..job import measured_maps
+
+    found, (long, short) = on_root(fft.slab.comm, lambda: measured_maps.read_spectrum(part))
+    if fft.slab.root:
+        notes.append(f"spectrum: waves from {long:.4g} to {short:.4g} m of {part.spectrum.name}")
+    return _random_surface(found, (long, short), grid, fft, notes, part.seed, part.amplitudes == "random")
+
+
+def _random_surface(
+    found: Callable[[Array], Array],
+    ends: tuple[float, float],
+    grid: Grid,
+    fft: FFT,
+    notes: list[str],
+    seed: int = 0,
+    random: bool = True,
+) -> Spectrum:
+    """Return the transform of a random surface with a measured spectrum between its longest and shortest wavelengths
+    [m], and add to the notes on root; collective."""
+    cells = (length / n for length, n in zip(grid.size, grid.points, strict=True) if n > 1)
+    (long, short), cell = ends, max(cells, default=max(grid.size))
+    if fft.slab.root:
+        if short < 2 * cell:
+            notes.append(f"spectrum: the grid has no waves shorter than two cells, {2 * cell:.4g} m")
+        if long > max(grid.size) * (1.0 + ROUNDING):
+            notes.append(f"spectrum: the box has no waves longer than {max(grid.size):.4g} m")
+    limits = long, long, short * (1.0 - ROUNDING)  # the last point of a table is among its waves
+    return Roughness(1.0, *limits, seed, random, psd_constant=1.0, measured=found).spectrum(fft, grid.size)
+
+
+def _transform(heights: Array, fft: FFT) -> Spectrum:
+    """Return the transform of heights. Their mean is added in Fourier space, to keep digits; collective."""
+    mean = fft.slab.sum(float(heights.sum()))[0] / fft.slab.points
+    spectrum = fft.forward(heights - mean)
+    if fft.columns.start == 0 < fft.columns.stop:
+        spectrum[0, 0] += mean * fft.slab.points
+    return spectrum
+
+
+class HeightRange(NamedTuple):
+    """Heights [m] of a surface: from the lowest to the highest point (Sz, 0 if that is rounding), and the highest point
+    and the mean, relative to the datum of the surface."""
+
+    span: float
+    highest: float
+    mean: float
+
+
+def heights_of(surface: Surface) -> HeightRange:
+    """Return the range of heights of a surface; collective."""
+    heights = surface.heights((0.0, 0.0), surface.slab.empty())
+    extremes = [float(heights.max(initial=-np.inf)), float((-heights).max(initial=-np.inf))]
+    total, top, bottom = surface.slab.reduce([float(heights.sum(dtype=np.float64))], extremes)
+    span = top + bottom if top + bottom > FLAT * max(abs(top), abs(bottom), abs(surface.datum)) else 0.0
+    return HeightRange(span, top, total / surface.slab.points)

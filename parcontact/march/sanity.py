@@ -1,0 +1,258 @@
+"""Warnings about a scene, from its heights before a run and from its contacts during it.
+
+Warnings that follow from a job alone are in `job/checks/meaning.py`. Sums over all points decide, so that all ranks
+agree."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..doubts import Doubt
+from ..errors import InputError, JobError, RunError
+from ..job import Job, OnOneMesh, advice, meaning
+from ..job.advice import more_points
+from ..job.history import Timeline
+from ..job.limits import MOST_STEPS
+from ..parallel import regrid
+from ..parallel.slab import Array, Slab
+from ..physics.convolution import wavenumbers
+from ..physics.measures import Measures
+from ..printed import rounded_up
+from .measured_range import doubt_band
+from .scene import Setup, set_up
+from .time_error import RunProperties, StepObservation, properties_of, resolves
+
+SEAM = 2.0  # accuracy: least jump across the edge, over the largest increment inside, for a warning
+FEW_CELLS = 0.15  # accuracy: least excess of the counted area, as a share of it, for a warning
+FEW_POINTS = 2**22  # tuning: largest number of points whose heights are computed for a check; this takes seconds
+STRICT = "an error with numerics.strict"
+BINS = 12  # accuracy: bins of wavenumbers in an octave
+LEAST = 1e-6  # accuracy: share of the mean square slope below which a bin has no waves
+RESOLVED = 1e-6  # accuracy: largest rounding of heights over an approach
+FULL_CONTACT_ROUNDING = 1e-14  # rounding: relative rounding of a sum of lengths
+
+
+def refuse_impossible(job: Job, timeline: Timeline) -> None:
+    """Raise InputError for a run with too many points for the memory, or with too many instants."""
+    count = timeline.count
+    endless = f"the history would have {count:.3g} steps; it has at most {MOST_STEPS:.0e}" if count > MOST_STEPS else ""
+    refuse_memory(job)
+    for text in (meaning.beyond_file(count, job.output), endless):
+        if text:
+            raise InputError(text)
+
+
+def refuse_memory(job: Job) -> None:
+    """Raise InputError for a grid that cannot fit into the memory of the machines."""
+    for doubt in meaning.doubt_memory(job.grid):
+        raise InputError(str(doubt))
+
+
+def is_quickly_made(job: Job) -> bool:
+    """Return whether the heights of a job decide about warnings, and are few enough to be computed for these."""
+    return job.depends_on_heights and job.grid.nx * job.grid.ny <= FEW_POINTS
+
+
+def describe_waves(job: Job) -> list[str]:
+    """Return sentences of effects on the waves of a surface on one grid, which is made for it on one rank; none for a
+    flat surface, or for one of too many points."""
+    if job.grid.nx * job.grid.ny > FEW_POINTS:
+        return []
+    setup = set_up(job, Slab.alone(*job.grid.points))
+    q = np.hypot(*wavenumbers(setup.fft, setup.size)).ravel() / setup.units.length
+    heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
+    slopes = (setup.fft.multiplicity * np.abs(setup.fft.forward(heights) / setup.slab.points) ** 2).ravel() * q**2
+    bins = np.rint(BINS * np.log2(np.maximum(q / q[q > 0.0].min(), 1.0))).astype(np.int64)
+    sums, weighted = (np.bincount(bins, weights) for weights in (slopes, slopes * q))
+    kept = sums > LEAST * sums.sum()
+    if not kept.any():
+        return []
+    middle = weighted[kept] / sums[kept]
+    return [text for describe in job.asked("describe_waves") for text in describe(job, middle, sums[kept])]
+
+
+def find_doubts(setup: Setup, temperatures: Sequence[float] = ()) -> list[Doubt]:
+    """Return warnings about a job at temperatures [deg C] and about its heights; collective. Raises InputError with
+    `numerics.strict`."""
+    return [*setup.job.doubts, *doubt_band(setup.job, temperatures), *check_heights(setup)]
+
+
+def check_heights(setup: Setup) -> list[Doubt]:
+    """Return warnings about the heights of a scene; collective. Raises InputError with `numerics.strict`."""
+    found = list(_check_heights(setup))
+    if found and setup.choices.numerics.strict:
+        place = f"{setup.job.origin.strict}: " if setup.job.origin.strict else ""
+        raise InputError("\n".join(f"{place}{doubt} ({STRICT})" for doubt in found))
+    return found
+
+
+def _check_heights(setup: Setup) -> Iterator[Doubt]:
+    known = {doubt.kind for doubt in setup.job.doubts}
+    if setup.roughness and "steep" not in known:
+        yield from meaning.doubt_slope(setup.roughness.rms_slope, setup.job.surface)
+    yield from setup.remarks.doubts
+    seams: list[Doubt] = []
+    if any(isinstance(shape, OnOneMesh) for shape in setup.job.surface) and setup.grid.boundary == "periodic":
+        seams = list(_seams(setup, setup.surface.heights((0.0, 0.0), setup.slab.empty())))
+        yield from seams
+    body, span = setup.job.body, setup.heights.span
+    if body is not None and setup.roughness and "high for a layer" not in known:
+        yield from meaning.doubt_height(span, body.thickness)
+    if setup.roughness and not setup.surface.shapes:
+        for doubt_heights in setup.job.asked("doubt_heights"):
+            yield from doubt_heights(setup.job, span)
+    if setup.shortest is not None and not (seams or setup.job.origin.mesh):  # a seam has further waves
+        asked, spiky = setup.choices.numerics.asked, any(doubt.kind == "outliers" for doubt in setup.remarks.doubts)
+        yield from advice.doubt_measured_waves(setup.grid, setup.shortest, asked, setup.job.directions, spiky)
+
+
+# -- full contact -----------------------------------------------------------------------------------------------------
+
+
+def has_full_contact(setup: Setup) -> bool:
+    """Return whether there is a largest approach: on a periodic half space and on an incompressible layer, whose mean
+    level is fixed, unless the rigid surface yields."""
+    return not setup.half_space.moves_in_the_mean and setup.choices.hardness is None
+
+
+def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
+    """Return a sentence on an approach [m] beyond full contact, or ''; `mean` [m] is the mean height relative to the
+    datum."""
+    closed = -mean - setup.surface.datum
+    rounding = FULL_CONTACT_ROUNDING * (abs(approach) + abs(setup.surface.datum) + setup.height)
+    if approach - closed <= rounding:
+        return ""
+    return (
+        f"an approach of {approach:.6g} m is beyond full contact, which a periodic body reaches at "
+        f"{closed if abs(closed) > rounding else 0.0:.6g} m; approach no further, or prescribe a pressure instead"
+    )
+
+
+def below_rounding(setup: Setup, approach: float) -> str:
+    """Return a sentence on an approach [m] that is lost in the rounding of the heights, or ''; 0 is never lost."""
+    heights = setup.heights.span + abs(setup.surface.datum)
+    least = float(np.finfo(np.float64).eps) / RESOLVED * heights
+    if not 0.0 < abs(approach) < least:
+        return ""
+    return (
+        f"an approach of {approach:.3g} m is lost in the rounding of heights that span {heights:.3g} m; give 0 or at "
+        f"least {rounded_up(least)} m, check the unit of the heights, or prescribe a pressure"
+    )
+
+
+def refuse_approaches(setup: Setup) -> None:
+    """Raise JobError for stages whose approach exceeds the approach at full contact, or is lost in the rounding of the
+    heights."""
+    mistakes, bounded = [], has_full_contact(setup)
+    for index, stage in enumerate(setup.job.history):
+        if stage.control != "approach":
+            continue
+        ends = stage.load.lowest, stage.load.highest
+        text = below_rounding(setup, max(ends, key=abs))
+        text = text or (beyond_full_contact(setup, max(ends), setup.heights.mean) if bounded else "")
+        if text:
+            place = next(iter(setup.job.origin.approaches[index:]), "")
+            mistakes.append(f"{place}: history.{index}: {text}" if place else f"history.{index}: {text}")
+    if mistakes:
+        raise JobError(mistakes)
+
+
+# -- the edge of a periodic box ---------------------------------------------------------------------------------------
+
+
+def _seams(setup: Setup, heights: Array) -> Iterator[Doubt]:
+    """Yield warnings if opposite edges of a periodic box do not fit together."""
+    unit, grid = setup.units.height, setup.grid
+    for name, (jump, inside, rise), length in (
+        ("x", _along_x(setup.slab, heights), grid.lx),
+        ("y", _along_y(setup.slab, heights), grid.ly),
+    ):
+        if jump <= SEAM * inside:
+            continue
+        kind = "tilt" if math.sqrt(max(jump**2 - rise**2, 0.0)) <= SEAM * inside else "seam"
+        times, tilt = jump / inside if inside else math.inf, abs(rise) / length * unit
+        yield Doubt(kind, "surface", {"axis": name, "jump": jump * unit, "times": times, "tilt": tilt})
+
+
+def _along_x(slab: Slab, heights: Array) -> tuple[float, float, float]:
+    """Return the rms jump across the edge, the largest rms increment inside, and the mean rise across the box."""
+    if slab.nx < 3:
+        return 0.0, 0.0, 0.0
+    steps = np.roll(heights, -1, axis=1) - heights
+    squares = slab.sum(*(steps**2).sum(axis=0).tolist(), -float(steps[:, -1].sum()))
+    *columns, rise = squares
+    rms = np.sqrt(np.array(columns) / slab.ny)
+    return float(rms[-1]), float(rms[:-1].max()), rise / slab.ny
+
+
+def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
+    """Return the same from row to row: the rms jump, the largest rms increment and the mean rise."""
+    before = regrid.before_first(slab, heights, True)
+    if slab.ny < 3:
+        return 0.0, 0.0, 0.0
+    steps = np.diff(np.concatenate([np.atleast_2d(before), heights]), axis=0) if len(heights) else heights
+    rms = np.sqrt((steps**2).mean(axis=1))
+    first = slab.rows.start == 0 and len(heights) > 0
+    at_edge = float(rms[0]) if first else 0.0
+    inside = float(rms[1 if first else 0 :].max(initial=0.0))
+    rise, jump, most = slab.reduce([-float(steps[0].mean()) if first else 0.0], [at_edge, inside])
+    return jump, most, rise
+
+
+# -- contacts ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class ContactWatch:
+    """Checks of the contact of each step; each kind of warning is given once. `sticks` is True for a periodic box whose
+    contact may stick; `mesh` has the points of the grid."""
+
+    strict: bool
+    timeline: Timeline
+    seen: set[str] = field(default_factory=set)
+    more: str = "more grid.points"
+    sticks: bool = False
+    mesh: RunProperties = field(default_factory=lambda: RunProperties(1))
+
+    @classmethod
+    def of(cls, job: Job, timeline: Timeline) -> "ContactWatch":
+        """Return the checks of a job."""
+        sticks = job.sheared_first and all(job.grid.cyclic)
+        mesh = properties_of(job, None)
+        return cls(job.numerics.strict, timeline, more=more_points(job.grid), sticks=sticks, mesh=mesh)
+
+    def check_step(self, step: int, measures: Measures) -> list[Doubt]:
+        """Return warnings about a step; raises RunError if these are errors."""
+        ends_a_stage = 0 < step <= self.timeline.count and self.timeline.span(step).last == step
+        return self.check_point(measures, f"step {step}", ends_a_stage)
+
+    def check_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
+        """Return warnings about a contact, about its cells if it is `final`; raises RunError if these are errors."""
+        found = [*doubt_edge(measures, where), *(doubt_cells(measures, self.mesh, where, self.more) if final else ())]
+        if self.sticks and measures.contact_area == 1.0:
+            found.append(Doubt("whole box sticks", "", {"where": where}))
+        new = [doubt for doubt in found if doubt.kind not in self.seen]
+        self.seen |= {doubt.kind for doubt in new}
+        if new and self.strict:
+            raise RunError("; ".join(f"{doubt} ({STRICT})" for doubt in new))
+        return new
+
+
+def doubt_edge(measures: Measures, where: str) -> Iterator[Doubt]:
+    """Yield a warning about a contact that reaches the edge of its box."""
+    if measures.at_edge:
+        yield Doubt("edge", "", {"where": where})
+
+
+def doubt_cells(measures: Measures, mesh: RunProperties, where: str, more: str) -> Iterator[Doubt]:
+    """Yield a warning about contacts that consist mainly of edge cells, or of parts of a cell; `more` states how to
+    refine them."""
+    area, corrected = measures.contact_area, measures.contact_area_corrected
+    if not resolves(mesh, StepObservation(0.0, 0.0, area, corrected, spared=measures.spared)):
+        yield Doubt("below a cell", "", {"where": where, "more": more})
+        return
+    excess = 1.0 - measures.contact_area_corrected / area if area > 0.0 else 0.0
+    if excess > FEW_CELLS:
+        yield Doubt("cells", "", {"where": where, "excess": excess, "most": FEW_CELLS, "more": more})

@@ -1,0 +1,392 @@
+"""Steady sliding, solved directly.
+
+Steady sliding of a job's surface, solved directly: points of a friction curve, and starts of marches.
+
+Start of a march from steady sliding: contact, displacement and branches of a surface that has always slid.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..contact import kernels, starts
+from ..contact.constraint import NonNegative
+from ..contact.preconditioner import pairs_for
+from ..contact.problem import reachable_certificate
+from ..contact.projected import FreeSteadySolver, Judge, SteadyContact
+from ..contact.solver import Lines
+from ..contact.splitting import SteadySolver
+from ..doubts import Doubt
+from ..effects.relaxation import highest_temperature_of, temperature_of
+from ..errors import InputError, UnsolvedError
+from ..files.checkpoint import Contents
+from ..job import Job
+from ..job.listing import answers
+from ..parallel.fft import FFT
+from ..parallel.slab import Array, Slab
+from ..physics.convolution import Convolution
+from ..physics.measures import Certificate, Measures
+from ..physics.prony import complex_modulus
+from . import sanity
+from .budget import ErrorBudget, estimate_steady
+from .choices import choices
+from .controller import tolerance_before
+from .loop import March
+from .point import Point, branch_maps, branch_powers
+from .scene import Scene, Setup, build_on, set_up
+from .state import first_state, pressed_state
+from .time_error import RunProperties, StepObservation, properties_of
+
+if TYPE_CHECKING:
+    from ..effects.heat.solver import Flash
+    from ..effects.heat.steady import Feedback
+
+COARSE_TOLERANCE = 0.04  # tuning: tolerance on the certificate on all grids but the finest
+# accuracy: factors on tolerances above LOOSE, in periodic and in free boxes, by `scripts/random_steady.py --exact`:
+# friction and areas as accurate as in marches
+LOOSE, AS_RIGHT, AS_RIGHT_FREE = 1e-3, 0.3, 0.6
+STEPS_RATIO = 20  # tuning: limit on steps of the splitting over max_iterations
+NEAR = 1.1  # tuning: largest ratio of a velocity to the last one for a start from the last state
+HIGHEST = 1e3  # rounding: largest contrast of lines, as larger displacements between them have rounding errors
+Vector = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class SteadyLevel:
+    """One grid: the rows of each rank, its transform, and the heights."""
+
+    slab: Slab
+    fft: FFT
+    heights: Array
+
+
+class SteadySliding:
+    """Steady states of one job's surface and body; the constructor and the methods are collective.
+
+    Solves start from coarser grids, or from the last state if its velocity is nearly the same. The tolerance on
+    certificates follows from the tolerance of the job and is at most `most`.
+    """
+
+    def __init__(self, setup: Setup, most: float = math.inf) -> None:
+        self.setup = setup
+        self._tolerance = min(tolerance_of(setup.choices.numerics.tolerance, setup.half_space.free), most)
+        self.probe = setup.probe()
+        heights = setup.surface.heights((0.0, 0.0), setup.slab.empty())
+        finest, *coarser = starts.coarser_levels(setup.slab, heights)
+        self.levels = [SteadyLevel(setup.slab, setup.fft, finest.heights)]
+        self.levels += [SteadyLevel(level.slab, FFT(level.slab), level.heights) for level in coarser]
+        self._known = properties_of(setup.job, setup.shortest)
+        self.contact: SteadyContact | None = None
+        self._rise: Array | None = None
+        self._speed = self._pressure = 0.0  # speed times shift factor, on which a state depends
+        self.temperature, self._own_temperature = math.nan, temperature_of(setup.job.material)
+        self.loops = [loop for loops in answers("steady", "loops") for loop in loops(setup)]
+        self._feedback: Feedback | None = None
+
+    def hold(self, velocity: Vector) -> tuple[Any, ...]:
+        """Allocate and return all that a solve at a velocity [m/s] may hold on the finest grid."""
+        p, (solver, operator) = self.setup.slab.empty(), self._solver(self.levels[0], velocity)
+        return p, solver, operator, solver.hold_all()
+
+    def set_temperature(self, temperature: float) -> None:
+        """Set the temperature [deg C] of further solves; raises InputError if the material has no shift."""
+        if temperature != self.temperature:
+            self._set_material(temperature)
+            self.temperature = temperature
+
+    def _set_material(self, temperature: float) -> None:
+        """Set the material at this temperature [deg C] for the next solve."""
+        self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
+        self.probe = self.setup.probe()
+
+    def solve(self, velocity: Vector, pressure: float) -> Point:
+        """Return the steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
+
+        With feedback from heat all rubber has the flash temperature. Raises RunError, with the certificate reached,
+        if no start leads to a solution, or if no fixed point of the temperature is found.
+        """
+        section = self.setup.job.section("thermal")
+        if section is None or section.feedback == "none":
+            return self._settle(velocity, pressure)
+        from ..effects.heat.steady import Feedback, describe_cold_state
+
+        self._feedback = self._feedback or Feedback()
+        cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
+        highest, speed = highest_temperature_of(self.setup.job.material), math.hypot(*velocity)
+
+        def warmed(rise: float) -> Point:
+            try:
+                self._set_material(min(cold + rise, highest))
+            except InputError as error:
+                place = describe_cold_state(speed, pressure, cold)
+                raise UnsolvedError(place, f"no material at the flash temperature: {error}") from None
+            return self._settle(velocity, pressure)
+
+        tolerance = self.setup.choices.numerics.tolerance
+        return self._feedback.solve_fixed_point(warmed, speed, (pressure, cold), tolerance, highest - cold)
+
+    def _settle(self, velocity: Vector, pressure: float) -> Point:
+        """Return the steady state at the temperature that was set, in the loops of all effects that have one."""
+        solve = self._solve
+        for loop in self.loops:
+            solve = partial(loop.solve, self, solve)
+        return solve(velocity, pressure)
+
+    def _solve(self, velocity: Vector, pressure: float) -> Point:
+        """Return the steady state at the temperature and with the factors of moduli that were set."""
+        began, calls, speed = time.perf_counter(), 0.0, math.hypot(*velocity)
+        what, factor = f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa", self.setup.choices.time_factor
+        for start in self._starts(velocity, pressure):
+            contact, more, by_energy = self._descend(velocity, pressure / self.setup.units.pressure, start)
+            calls += more
+            if contact.converged:
+                break
+        else:
+            raise UnsolvedError(what, f"{contact.failure}{self._advise(contact)}")
+        self.contact, self._speed, self._pressure = contact, factor * speed, pressure
+        heights = self.levels[0].heights
+        touching = NonNegative().touches(contact.p)
+        measures = self.probe.measure(contact.p, 1.0, contact.u, heights, contact.d, touching, (0.0, 0.0), velocity)
+        if not measures.finite:
+            raise UnsolvedError(what, "its results would not be finite")
+        powers = None if self.setup.half_space.free else branch_powers(self.setup, contact, velocity)
+        lost = () if powers is None else tuple(powers.sum(axis=1).tolist())
+        judged = self._known, contact.certificate, by_energy, velocity, measures
+        friction, errors = judge_state(self.setup, *judged)
+        flash = self._find_temperatures(contact, by_energy, velocity, measures)
+        seconds, place = time.perf_counter() - began, (velocity, pressure, self.temperature, factor)
+        return Point(*place, measures, friction, errors, contact.certificate, calls, seconds, lost, flash)
+
+    def _advise(self, contact: SteadyContact) -> str:
+        """Return advice for a contact that was not solved; collective."""
+        compliance, length = self.setup.half_space.largest_compliance, contact.certificate.length
+        reach = reachable_certificate(self.setup.slab, [contact.u], contact.p, compliance, length)
+        if self.setup.choices.numerics.tolerance < reach:
+            what = "look for loads or moduli of very different magnitude"
+            return f"; double precision reaches only about {reach:.1g} here: {what}"
+        return ". Try a velocity nearer to one that works, a finer grid, or another numerics.tolerance."
+
+    def _find_temperatures(
+        self, contact: SteadyContact, friction: float, velocity: Vector, measures: Measures
+    ) -> Flash | None:
+        """Return the temperatures of the contact; None without a thermal section; collective."""
+        section = self.setup.job.section("thermal")
+        if section is None:
+            return None
+        from ..effects.heat.steady import find_temperatures
+
+        touching = NonNegative().touches(contact.p)
+        flash, self._rise = find_temperatures(self.setup, section, contact.p, touching, measures, friction, velocity)
+        return flash
+
+    def field(self, name: str) -> Array:
+        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], or the rise of
+        `temperature` [K] in the last state."""
+        assert self.contact is not None
+        if name == "temperature":
+            assert self._rise is not None
+            return self._rise
+        contact, setup, heights = self.contact, self.setup, self.levels[0].heights
+        if name == "pressure":
+            return contact.p * setup.units.pressure
+        if name == "height":
+            return heights * setup.units.height + setup.surface.datum
+        return (contact.u if name == "displacement" else contact.u - heights - contact.d) * setup.units.height
+
+    table: tuple[str, Sequence[str]] | None = None
+
+    def doubts(self, temperatures: Sequence[float]) -> list[Doubt]:
+        """Return warnings about the job, also at these temperatures [deg C]; collective."""
+        return sanity.find_doubts(self.setup, temperatures)
+
+    def notes(self) -> list[str]:
+        return []
+
+    def keep_in(self, directory: Path) -> None:
+        """Do nothing: a point is one solve."""
+
+    def forget(self) -> None:
+        """Do nothing."""
+
+    def rows(self, velocity: Vector) -> list[list[float]]:
+        """Return the lines of steady_waves.csv for the last state; collective."""
+        assert self.contact is not None
+        place = math.hypot(*velocity), self._pressure
+        return [[*place, *pair] for pair in zip(*map(np.ndarray.tolist, self.shares(velocity)), strict=True)]
+
+    def shares(self, velocity: Vector) -> tuple[Array, Array]:
+        """Return the wavelengths [m] of `branch_powers`, and the share of the friction power in the octave of each;
+        collective."""
+        assert self.contact is not None
+        power = branch_powers(self.setup, self.contact, velocity)
+        total = power.sum()
+        wavelengths = max(self.setup.grid.size) / 2.0 ** np.arange(power.shape[1])
+        return wavelengths, power.sum(axis=0) / (total if total > 0.0 else 1.0)
+
+    # -- starts and levels --------------------------------------------------------------------------------------------
+
+    def _starts(self, velocity: Vector, pressure: float) -> Iterator[Array | None]:
+        """Yield pressures on the finest grid to start from, None for coarser grids from a uniform pressure.
+
+        The last state is the better start only at nearly the same velocity. Extrapolating it is no better, as contact
+        spots appear and vanish.
+        """
+        speed = self.setup.choices.time_factor * math.hypot(*velocity)
+        near = max(speed, self._speed) <= NEAR * min(speed, self._speed)
+        if self.contact is not None and pressure == self._pressure and near:
+            yield self.contact.p
+        yield None
+
+    def _descend(self, velocity: Vector, mean: float, start: Array | None) -> tuple[SteadyContact, float, float]:
+        """Solve on all grids, the coarsest first, or on the finest from `start`. Return the contact, the operator
+        calls, and friction by energy without an interface."""
+        tally, calls = self.setup.slab.tally, 0.0
+
+        def solve(level: SteadyLevel, p: Array) -> tuple[SteadyContact, Convolution]:
+            nonlocal calls
+            before = tally["operator"]
+            solver, operator = self._solver(level, velocity)
+            contact = solver.solve(level.heights, mean, p)
+            calls += (tally["operator"] - before) * level.slab.points / self.setup.slab.points
+            return contact, operator
+
+        p = self.setup.slab.empty()
+        if start is None:
+            starts.descend(self.levels, lambda level, below: solve(level, below)[0].p, p)
+        else:
+            p[...] = start
+        contact, operator = solve(self.levels[0], p)
+        unit, load = self.setup.units.height / self.setup.units.length, kernels.sum_of(p)
+        lost = max(operator.loss(p, self.setup.size, _direction(velocity)), 0.0)  # rounding for an elastic body
+        return contact, calls, lost / (self.setup.slab.sum(load)[0] or math.nan) * unit
+
+    def _solver(self, level: SteadyLevel, velocity: Vector) -> tuple[SteadySolver | FreeSteadySolver, Convolution]:
+        setup, slab, finest = self.setup, level.slab, level is self.levels[0]
+        operators = operator, _ = self._operators(level, velocity)
+        lines = stiffer_lines(setup, velocity) if finest else None  # coarse grids only give starts
+        judge = Judge(slab, setup.height / setup.units.height, lines)
+        tolerance = max(self._tolerance, 0.0 if finest else COARSE_TOLERANCE)
+        pairs = pairs_for(setup.grid.lx / slab.nx, setup.grid.ly / slab.ny)
+        if setup.half_space.free:
+            return FreeSteadySolver(judge, *operators, tolerance, pairs), operator
+        most = STEPS_RATIO * setup.choices.numerics.max_iterations
+        return SteadySolver(judge, *operators, tolerance, most, pairs), operator
+
+    def _operators(self, level: SteadyLevel, velocity: Vector) -> tuple[Convolution, Convolution]:
+        """Return the operator at a velocity [m/s], and its inverse, approximate for a free body."""
+        body, moved = self.setup.half_space, (level.fft, self.setup.in_units(velocity), self.setup.prony)
+        return body.sliding_operator(*moved), body.sliding_inverse(*moved)
+
+
+def judge_state(
+    setup: Setup, known: RunProperties, certificate: Certificate, by_energy: float, velocity: Vector, measures: Measures
+) -> tuple[float, ErrorBudget]:
+    """Return friction by energy, including an interface, and the errors of friction and area."""
+    friction = by_energy + measures.friction_interface
+    seen = StepObservation(
+        certificate.complementarity,
+        friction=friction,
+        area=measures.contact_area,
+        corrected=measures.contact_area_corrected,
+        interface=measures.friction_interface,
+        penetrating=max(certificate.members / measures.contact_area - 1.0, 0.0),
+        way=velocity,
+    )
+    return friction, estimate_steady(replace(known, prony=setup.prony), seen)
+
+
+def stiffer_lines(setup: Setup, velocity: Vector) -> Lines | None:
+    """Return the lines along a velocity [m/s], with |G| of the longest wave along them over the modulus G_inf of waves
+    that do not vary along them; None for an elastic body, on a line of points, in a free box, and for oblique
+    velocities."""
+    grid = setup.grid
+    if setup.half_space.free or 1 in (grid.nx, grid.ny) or np.count_nonzero(velocity) != 1:
+        return None
+    if not setup.prony.moduli.size:
+        return None
+    along = 0 if velocity[0] else 1
+    frequency = 2.0 * np.pi * abs(velocity[along]) / grid.size[along]
+    modulus = float(np.abs(complex_modulus(np.array([frequency]), *setup.prony))[0])
+    return Lines(1 - along, min(modulus / setup.prony.modulus_inf, HIGHEST))
+
+
+def tolerance_of(asked: float, free: bool = False) -> float:
+    """Return the tolerance on the certificate of a steady state for the tolerance of a job, in a free box or not."""
+    return max((AS_RIGHT_FREE if free else AS_RIGHT) * asked, min(LOOSE, asked))
+
+
+def _direction(velocity: Vector) -> tuple[float, float]:
+    """Return the unit vector of a velocity; the unit vector of x at rest."""
+    speed = math.hypot(*velocity)
+    return (velocity[0] / speed, velocity[1] / speed) if speed > 0.0 else (1.0, 0.0)
+
+
+def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = None) -> March:
+    """Return a march before the first step of a job, or after the step of a checkpoint; collective.
+
+    It can continue to the end of the history or, if later, to `until` [s]. Raises InputError for files that do not
+    fit, and for approaches beyond full contact.
+    """
+    setup = set_up(job, slab, until)
+    sanity.refuse_approaches(setup)
+    if saved is None and setup.choices.steady_start.on:
+        return _from_steady_sliding(setup)
+    march = March(build_on(setup))
+    if saved is not None:
+        march.restore(saved)
+    return march
+
+
+def start_march(scene: Scene, contact: SteadyContact | None = None, **of_row: Any) -> March:
+    """Return a march on a scene from rest, or from a `contact` in steady sliding at the velocity of its job's `initial`
+    section, with the values `of_row` in the row of time 0; collective."""
+    if contact is None:
+        return March(scene)
+    body, workspace = scene.material.at_rest(), scene.solver.workspace
+    maps = branch_maps(scene.setup, contact, scene.job.initial.velocity, workspace.other_displacement)
+    scene.material.start_from(body, contact.u, maps)
+    state = first_state(scene, body)
+    return March(scene, pressed_state(scene, state, replace(state.row, **of_row), contact.p, contact.d))
+
+
+def _from_steady_sliding(setup: Setup) -> March:
+    """Return a march in the steady state of its job's `initial` section; collective. Maps of the scene are made after
+    those of the steady solver are freed; meanwhile the pressure is in a map of the workspace."""
+    point, contact = _solve(setup)
+    scene = build_on(setup)
+    workspace, body = scene.solver.workspace, scene.material.at_rest()
+    branches = branch_maps(setup, contact, setup.job.initial.velocity, workspace.other_displacement)
+    scene.material.start_from(body, contact.u, branches)
+    workspace.pressure[...] = contact.p
+    iterations, approach = contact.steps, contact.d
+    del contact
+    state = first_state(scene, body)
+    row = replace(
+        state.row,
+        measures=point.measures,
+        iterations=iterations,
+        certificate=point.certificate,
+        errors=point.errors if point.errors.resolved else None,
+        operator_calls=round(point.operator_calls),
+        seconds=point.seconds,
+    )
+    return March(scene, pressed_state(scene, state, row, workspace.pressure, approach))
+
+
+def _solve(setup: Setup) -> tuple[Point, SteadyContact]:
+    """Return the state and its contact, without the maps of the solver; collective."""
+    sliding, initial = (
+        SteadySliding(setup, tolerance_before(setup.job, 0, setup.choices.viscoelasticity.on)),
+        setup.job.initial,
+    )
+    point = sliding.solve(initial.velocity, initial.pressure or 0.0)
+    assert sliding.contact is not None
+    return point, sliding.contact

@@ -1,0 +1,314 @@
+"""The error of time steps, and what it is estimated from.
+
+Input of the error budget: properties of a run, and observations of a step or of a steady state.
+
+Spots of contact are taken as round. With S cell sides between points in contact and others, on n points of which a
+share A touches, their mean radius in cells is
+
+    r = (8/pi) min(A, 1 - A) n/S,
+
+or the radius of the gaps between them if these are smaller. Contacts of waves, cylinders and flats are identical: they
+have the same position on the grid and count as one.
+
+The error of friction by the length of a time step, estimated in two ways.
+
+A linear step takes the displacement as linear in time. For a harmonic wave that turns by an angle theta in a step, the
+force of a branch with z = dt/tau then has an error of theta^2/12 of its loss if the branch is slow, theta^2/6 if it is
+fast, and is delayed by L/2 of a step,
+
+    L(z) = coth(z/2) - 2/z,      z/6 for small z, 1 for large ones.
+
+In full contact friction is the loss, with the error theta^2 (1 + <L>)/12, where <L> = sum w L/sum w over the shares of
+friction of the branches, w = G omega tau/(1 + (omega tau)^2). theta is the angle of a wave with the height and the
+change of the surface; shorter waves contribute more to friction, so that the error of many waves is 1.5 times as large
+(LINEAR_TURNING). Where contact spots of radius a pass by x = (way of the step)/a, delayed forces move their edges:
+
+    E = LINEAR_PASSING (1 - A^4) x (<L> + PASSING_LOSS x),      omega = x/dt.
+
+A quadratic step also follows the bend of the motion. In full contact the error of its loss is 0.25 to 0.33 of theta^2
+<L> plus theta^4/75 (`prony.discrete_modulus`); TURNING and TURNING_4 are 1.5 times as large. Edges leave an error of
+third order, PASSING x^3.
+
+The embedded pair (`embedded`) shows jumps, changes of load, and creep. The error of a quadratic step is its difference
+to a linear one. The pair of a linear step differs in second order if all branches are slow, and in first order if some
+are fast; the accumulated error of linear steps has the order 1.7. In a slide PAIR_SHARE of the pair counts, for errors
+not caused by edges. Backward Euler is of first order: its error varies as the root of the difference.
+
+Friction that changes from step to step is delayed by at most <L> of the change, CURVED_RISE of it in quadratic steps
+(`error_of_rise`). Right after a jump of the load friction is 0 up to mesh errors, as for an elastic body, so that the
+next change is unknown. The error of the area is a share of that of friction, which falls with the open area.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..job import Cylinder, Flat, Job, Rough, Wave
+from ..physics.measures import excess_of
+from ..physics.prony import Prony, complex_modulus
+from .constants import (
+    CURVED_RISE,
+    EQUAL_DIFFERENCE,
+    EULER,
+    EULER_AREA,
+    LINEAR_PAIR,
+    LINEAR_PASSING,
+    LINEAR_TURNING,
+    PAIR,
+    PAIR_SHARE,
+    PASSING,
+    TIME_AREA,
+    TURNING,
+    TURNING_4,
+)
+
+REGULAR = Cylinder | Wave | Flat  # shapes whose contacts are identical
+ROUND = 8.0 / math.pi  # physics: radius of a round spot [cells] over the ratio of its cells to sides on its edge
+MANY_RADIUS = 0.7  # accuracy: least resolved radius or half width [cells] of many spots: more than single cells
+ONE_RADIUS = 1.3  # accuracy: the same of one spot, and of identical ones: more than five cells, or strips two wide
+SPOTS_POWER = 0.25  # accuracy: power of the number of spots by which the error of their mean falls
+Vector = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class RunProperties:
+    """Properties of a run that are known before it starts.
+
+    `points` of the grid; `cell`: its sides [m]; `cells_per_wave`: longer sides of a cell per shortest wave of a
+    rough surface, or None; `measured`: the surface has a map, which may lack waves on a coarse grid;
+    `edges_follow_grid`: edges of contact follow it; `identical_contacts`: as those of waves; `free`: the box is
+    free; `prony`: relaxation function, None for an elastic body; `folded`: bound on the error of folded branches;
+    `exponential`: the integrator is exponential.
+    """
+
+    points: int
+    cell: Vector = (1.0, 1.0)
+    cells_per_wave: float | None = None
+    measured: bool = False
+    edges_follow_grid: bool = False
+    identical_contacts: bool = False
+    free: bool = False
+    prony: Prony | None = None
+    folded: float = 0.0
+    exponential: bool = True
+
+    @cached_property
+    def mean_cell(self) -> float:
+        """Mean of the sides of a cell, the unit of the radii of spots."""
+        return 0.5 * (self.cell[0] + self.cell[1])
+
+    @cached_property
+    def excess(self) -> float:
+        """Excess cells of the contact area per side of a cell on its edge."""
+        return excess_of(*self.cell, self.edges_follow_grid)
+
+
+@dataclass(frozen=True)
+class StepObservation:
+    """Observation of a step, or of a steady state.
+
+    `complementarity` of the certificate; `penetrating`: points that penetrate without pressure, as a share of those
+    in contact; `slope`: rms slope of the surface under the pressure; `friction`, and the part of an `interface`;
+    `area`, counted, and `corrected`, as shares; `spared`: the correction not made at points on the edge that have
+    yielded; `friction_mismatch`: difference of friction by the slopes of the rigid surface and of the body; `way`:
+    direction of sliding, (0, 0) at rest.
+
+    For steps also: `difference` of the embedded pair, and its `order`; cells (of mean sides) `slid` in `seconds`;
+    the `angle` of the pair; `curved`: the displacement is quadratic in time; the `change` of friction since the step
+    before, infinite after a jump; `own_error`: error by the length of the step that a body without branches
+    states; `uneven`: largest minus mean pressure over the mean, at most 1.
+    """
+
+    complementarity: float
+    friction: float
+    area: float
+    corrected: float
+    slope: float = 0.0
+    interface: float = 0.0
+    penetrating: float = 0.0
+    spared: float = 0.0
+    friction_mismatch: float = 0.0
+    way: Vector = (0.0, 0.0)
+    difference: float = 0.0
+    order: float = 2.0
+    slid: float = 0.0
+    seconds: float = 0.0
+    angle: float = 0.0
+    curved: bool = False
+    change: float = 0.0
+    own_error: float | None = None
+    uneven: float = 1.0
+
+    @cached_property
+    def body(self) -> float:
+        """Magnitude of the friction of the body."""
+        return abs(self.friction - self.interface)
+
+    @cached_property
+    def correction(self) -> float:
+        """The counted minus the corrected area, over the latter."""
+        return (self.area - self.corrected) / self.corrected if self.corrected > 0.0 else 0.0
+
+
+def properties_of(job: Job, shortest: float | None, folded: float = 0.0, prony: Prony | None = None) -> RunProperties:
+    """Return the properties of a job: `shortest` is the shortest wave of its map [m], `folded` the bound on the error
+    of its folded branches, and `prony` its relaxation function."""
+    waves = [shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)]
+    waves += [shortest] if shortest is not None else []
+    (nx, ny), (dx, dy) = job.grid.points, (job.grid.dx, job.grid.dy)
+    cell = (dx if nx > 1 else dy, dy if ny > 1 else dx)  # a line of points has one direction
+    line = 1 in job.grid.points
+    return RunProperties(
+        points=nx * ny,
+        cell=cell,
+        cells_per_wave=min(waves) / max(cell) if waves else None,
+        measured=shortest is not None,
+        edges_follow_grid=line or _ridges(job.surface),
+        identical_contacts=line or all(isinstance(shape, REGULAR) for shape in job.surface),
+        free=job.grid.boundary == "free",
+        prony=prony,
+        folded=folded,
+        exponential=job.numerics.integrator != "backward-euler",
+    )
+
+
+def _ridges(shapes: Sequence[Any]) -> bool:
+    """Return whether the surface consists of cylinders and waves along one axis of the grid; edges of contact then
+    follow it."""
+    across = {"y" if shape.axis == "x" else "x" for shape in shapes if isinstance(shape, Cylinder)}
+    waves = [shape.waves for shape in shapes if isinstance(shape, Wave)]
+    across |= {axis for x, y in waves for axis, count in (("x", x), ("y", y)) if count}
+    return len(across) == 1 and all(isinstance(shape, REGULAR) for shape in shapes)
+
+
+def radius_of(run: RunProperties, observed: StepObservation) -> float:
+    """Return the radius of round spots of contact, or of smaller gaps between them, in cells of mean sides; half the
+    width of straight ones; infinite without edges."""
+    sides = (observed.area - observed.corrected + observed.spared) * run.points / run.excess
+    if sides <= 0.0:
+        return math.inf
+    radius = ROUND * min(observed.area, 1.0 - observed.area) * run.points / sides
+    return radius / ROUND if run.edges_follow_grid else radius
+
+
+def count_spots(run: RunProperties, observed: StepObservation) -> float:
+    """Return the number of spots of contact, or of smaller gaps between them; 1 for identical contacts; in full contact
+    the number of half waves of the shortest length."""
+    radius, share = radius_of(run, observed), min(observed.area, 1.0 - observed.area)
+    if run.identical_contacts:
+        return 1.0
+    if run.cells_per_wave is not None:
+        share = share if radius < math.inf else observed.area
+        radius = min(radius, 0.5 * run.cells_per_wave * (max(run.cell) / run.mean_cell))
+    one = math.pi * radius**2 * run.mean_cell**2 / (run.cell[0] * run.cell[1])
+    return max(1.0, share * run.points / one) if one > 0.0 else 1.0
+
+
+def resolves(run: RunProperties, observed: StepObservation) -> bool:
+    """Return False if the true spots of contact may be smaller than a cell, so that no error of their area is known.
+    Errors of many spots average out, except for single cells."""
+    if not 0.0 < observed.area < 0.5:
+        return True
+    return radius_of(run, observed) >= (ONE_RADIUS if count_spots(run, observed) < 2.0 else MANY_RADIUS)
+
+
+def mean_over_spots(run: RunProperties, observed: StepObservation) -> float:
+    """Return the factor by which the error of the mean over all spots is smaller than that of one spot."""
+    return count_spots(run, observed) ** -SPOTS_POWER
+
+
+def cell_along(run: RunProperties, way: Vector) -> float:
+    """Return the length of cells along a direction, in the unit of `run.cell`; the longer side at rest."""
+    (dx, dy), (x, y) = run.cell, way
+    length = math.hypot(x, y)
+    return math.hypot(x * dx, y * dy) / length if length else max(dx, dy)
+
+
+PASSING_LOSS = 0.19  # accuracy: relative error of the loss in a linear step over x
+SLOW = 1e-3  # rounding: z below which L is computed by its series
+LEAST_POWER = 0.25  # accuracy: least difference of the orders of error and of a linear pair
+FULL_POWER = 4  # accuracy: power of the contact area that weights the error in full contact
+FIXED_EDGES = 0.9  # accuracy: share of the error of a linear pair that edges cause
+
+
+def time_error(run: RunProperties, observed: StepObservation) -> float:
+    """Return the error of friction by the length of a time step, also at rest; at most 1."""
+    if observed.own_error is not None:
+        return observed.own_error
+    if not run.exponential:
+        return EULER.value * observed.difference**EULER.order
+    pair = _error_by_pair(observed)
+    if not observed.slid or run.prony is None:
+        return pair
+    full, late = observed.area**FULL_POWER, _late(run.prony, observed.angle, observed.seconds)
+    x, angle = _share_passed(run, observed), observed.angle
+    if observed.curved:
+        passing, turning = PASSING.value * x**3, TURNING.value * late * angle**2 + TURNING_4.value * angle**4
+        least = PAIR_SHARE.value
+    else:
+        passing = LINEAR_PASSING.value * x * (_late(run.prony, x, observed.seconds) + PASSING_LOSS * x)
+        turning = LINEAR_TURNING.value * angle**2 * (1.0 + late)
+        least = full + (1.0 - full) * PAIR_SHARE.value
+    return min(1.0, max((1.0 - full) * passing + full * turning, least * pair))
+
+
+def _error_by_pair(observed: StepObservation) -> float:
+    """Return the error by the embedded pair. For linear steps it has the order LINEAR_PAIR.order, the difference
+    `order`."""
+    if observed.curved:
+        return PAIR.value * observed.difference
+    power = max(LEAST_POWER, LINEAR_PAIR.order / max(observed.order, 1.0) - 1.0)
+    fixed = 1.0 - FIXED_EDGES * observed.area**2
+    more = (observed.difference / EQUAL_DIFFERENCE.value) ** power
+    return min(1.0, fixed * LINEAR_PAIR.value * observed.difference * more)
+
+
+def error_of_rise(run: RunProperties, observed: StepObservation) -> float:
+    """Return the error of a change of friction since the step before, as after rest: it is delayed by <L> of a step.
+    After a jump the change is the slope times the sine of the loss angle, times `uneven`."""
+    if run.prony is None or not run.exponential or not observed.slid or observed.body <= 0.0:
+        return 0.0
+    x = max(_share_passed(run, observed), observed.angle)
+    if x == 0.0:
+        return 0.0
+    change = observed.change
+    if math.isinf(change):
+        modulus = complex_modulus(np.array(x / observed.seconds), *run.prony)
+        change = observed.uneven * observed.slope * float(modulus.imag / abs(modulus))
+    late = _late(run.prony, x, observed.seconds) * (CURVED_RISE.value if observed.curved else 1.0)
+    return late * abs(change) / observed.body
+
+
+def share_of_area(run: RunProperties, observed: StepObservation) -> float:
+    """Return the error of area by the time steps over that of friction."""
+    open_share = 1.0 - observed.area
+    if run.exponential:
+        return TIME_AREA.value * open_share**TIME_AREA.order
+    return EULER_AREA.value * open_share**EULER_AREA.order + observed.correction
+
+
+def order_of_time_error(integrator: str, curved: bool) -> float:
+    """Return the order of the error in the length of a step; `curved` if the displacement is quadratic in time."""
+    if integrator == "backward-euler":
+        return 1.0
+    return PASSING.order if integrator == "exponential" and curved else LINEAR_PAIR.order
+
+
+def _share_passed(run: RunProperties, observed: StepObservation) -> float:
+    """Return the distance slid in a step over the radius of spots."""
+    radius = radius_of(run, observed)
+    return observed.slid / radius if radius > 0.0 else 0.0
+
+
+def _late(prony: Prony, angle: float, seconds: float) -> float:
+    """Return the delay of forces over half a step, <L>, averaged over the branches that cause friction."""
+    z = seconds / prony.relaxation_times
+    slow = np.maximum(z, SLOW)
+    late = np.where(z > SLOW, 1.0 / np.tanh(0.5 * slow) - 2.0 / slow, z / 6.0)
+    lost = prony.moduli * angle * z / (z**2 + angle**2)
+    total = float(lost.sum())
+    return float((lost * late).sum()) / total if total > 0.0 else 0.0

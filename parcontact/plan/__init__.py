@@ -1,1 +1,0 @@
-"""The plan of a job before it runs: effects, memory, steps and time."""

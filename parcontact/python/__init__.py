@@ -1,1 +1,0 @@
-"""The public Python interface; `parcontact` exports its parts."""

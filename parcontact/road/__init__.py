@@ -1,1 +1,0 @@
-"""Measured roads: files of many instruments, their treatment, their spectra, and heights on a grid."""

@@ -1,1 +1,0 @@
-"""Runs of jobs in output directories, with restarts, signals and time limits."""

@@ -1,1 +1,0 @@
-"""Further attempts at a contact whose solve has failed."""

@@ -1,1 +1,0 @@
-"""Contact with operators that are not symmetric: steady sliding."""

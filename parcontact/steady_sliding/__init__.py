@@ -1,1 +1,0 @@
-"""Steady sliding, solved on nested grids: as the start of a march, and along friction curves."""
