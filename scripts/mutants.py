@@ -22,18 +22,18 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 HOUSE, TESTS = ROOT / "parcontact", ROOT / "tests"
-ROOMS = ("accuracy", "physics", "parallel", "solve", "march", "scene", "storage", "plan", "effects", "history")
+ROOMS = ("physics", "parallel", "contact", "march", "files", "effects", "job")
 LONGEST = 600.0  # seconds for the tests of one change
 SEEN = 0.8  # share of the changes that tests must detect
 FEWEST = 8  # least places to break in a part
 SLIDING = "scenarios/test_sliding_runs.py"
 OTHERS = {  # further tests of a part
     "march/step.py": f"march/test_adhesive_steps.py scenarios/test_viscoelastic.py {SLIDING}",
-    "march/step_errors.py": SLIDING,
+    "march/state.py": SLIDING,
     "physics/body.py": "scenarios/test_viscoelastic.py",
-    "effects/adhesion/adhesion_doubts.py": "effects/adhesion/test_effect.py",
-    "effects/adhesion/gap_kernels.py": "effects/adhesion/test_gap_solver.py",
-    **dict.fromkeys(("solve/constraint.py", "solve/kernels.py"), "solve/test_contact.py"),
+    "effects/adhesion/section.py": "effects/adhesion/test_effect.py",
+    "effects/adhesion/law.py": "effects/adhesion/test_gap_solver.py",
+    **dict.fromkeys(("contact/constraint.py", "contact/kernels.py"), "solve/test_contact.py"),
     "physics/loops.py": "physics/test_material.py physics/test_probe.py physics/test_surface.py physics/test_energy.py "
     "effects/heat/test_heat.py accuracy/test_embedded.py",
 }
@@ -45,13 +45,11 @@ Change = tuple[str, Callable[[], None]]  # description, and a function that chan
 
 
 def tests_of(part: str) -> tuple[str, ...]:
-    """Return the tests of a file of the program: `tests/ROOM/test_NAME*.py`, else tests of its room that import it."""
+    """Return the tests of a file of the program: those that import it or from it, and those named in OTHERS."""
     path = Path(part)
-    own = sorted((TESTS / path).parent.glob(f"test_{path.stem}*.py"))
-    if not own:
-        room = r"\.".join(path.parent.parts)
-        name = re.compile(rf"from parcontact\.{room}(\.{path.stem} import| import .*\b{path.stem}\b)")
-        own = sorted(test for test in (TESTS / path.parts[0]).rglob("test_*.py") if name.search(test.read_text()))
+    room = r"\.".join(path.parent.parts)
+    name = re.compile(rf"from parcontact\.{room}(\.{path.stem} import| import .*\b{path.stem}\b)")
+    own = sorted(test for test in TESTS.rglob("test_*.py") if name.search(test.read_text()))
     own += [TESTS / name for name in OTHERS.get(part, "").split()]
     return tuple(str(path.relative_to(ROOT)) for path in own)
 
