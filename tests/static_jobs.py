@@ -5,7 +5,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from parcontact import job as jobs
+from parcontact import job
 from parcontact.files.recorder import StepRow
 from parcontact.march import scene
 from parcontact.march.loop import March, run_steps
@@ -16,7 +16,7 @@ Fields = dict[str, NDArray[Any]]
 
 def run(path: Path, *overrides: str) -> list[tuple[StepRow, Fields]]:
     """What each step of a job gave: its row and fields. The steps of these jobs are static solves."""
-    loaded = jobs.load(path, overrides)
+    loaded = job.load(path, overrides)
     ready = March(scene.build(loaded, Slab.alone(*loaded.grid.points)))
     steps = []
 

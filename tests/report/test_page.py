@@ -14,8 +14,7 @@ import pytest
 from drawing import ELASTIC, LOADS, MAPS, SLIDE, WAVE, ZENER, ran
 from PIL import Image
 
-from parcontact import __main__
-from parcontact import job as jobs
+from parcontact import __main__, job
 from parcontact.errors import InputError
 from parcontact.march import curve
 from parcontact.parallel.slab import Slab
@@ -110,7 +109,7 @@ def test_run(tmp_path: Path) -> None:
 def solved(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "curve.yaml"
     path.write_text(text)
-    loaded = jobs.load(path, [f"output.directory={tmp_path / 'steady'}", "steady.pressures=[1.0e3]"])
+    loaded = job.load(path, [f"output.directory={tmp_path / 'steady'}", "steady.pressures=[1.0e3]"])
     assert curve.run_curve(loaded, Slab.alone(*loaded.grid.points), curve.request(loaded), quiet=True) == 0
     return tmp_path / "steady"
 
@@ -144,7 +143,7 @@ def test_the_errors_of_a_run_are_those_of_its_log_and_its_last_step(tmp_path: Pa
     (tmp_path / "run.log").write_text("".join(lines))
     columns = {"error_friction": [16.0, 0.02, 0.03, np.nan], "error_area": [np.nan] * 4}  # the first one at rest
     (tmp_path / "job.yaml").write_text(WAVE + ZENER + SLIDE + "numerics: {accuracy: 0.01}\n")
-    slide = jobs.load(tmp_path / "job.yaml")
+    slide = job.load(tmp_path / "job.yaml")
     section = page.describe_errors(columns, page.read_logs(tmp_path), slide, of_curve=False)
     assert section.sentences == [f"{said.format('1.25')}."]
     assert section.tables[0].rows == [("friction", "3 %", "1 %")]
@@ -153,7 +152,7 @@ def test_the_errors_of_a_run_are_those_of_its_log_and_its_last_step(tmp_path: Pa
 def test_a_seal(tmp_path: Path) -> None:
     """Where nothing slides no error of friction is stated; the table of leakage is in the data."""
     out = ran(tmp_path, WAVE + ELASTIC + LOADS + MAPS)
-    resting, columns = jobs.load(out / "job.resolved.yaml"), {"error_friction": [16.0, 8.0], "error_area": [0.1, 0.2]}
+    resting, columns = job.load(out / "job.resolved.yaml"), {"error_friction": [16.0, 8.0], "error_area": [0.1, 0.2]}
     section = page.describe_errors(columns, page.read_logs(tmp_path), resting, of_curve=False)
     assert [row[0] for row in section.tables[0].rows] == ["contact area"]
     assert __main__.main(["leak", str(out)]) == 0
