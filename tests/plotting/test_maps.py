@@ -187,8 +187,8 @@ def test_maps_of_a_pull_off(tmp_path: Path, drawn: list[Figure]) -> None:
     out = ran(tmp_path, WAVE + ELASTIC + f"history: [{loads}]\noutput: {{fields: pressure}}\n")
     run = PlottedRun(out)
     for name, values in {"pressure": [0, 3, 1, -2, 0, 0], "approach": [0, -1, -2, -3, -4, -5]}.items():
-        run._all[name] = np.array(values, dtype=float)
-    run._all["contact_area"] = np.array([0.0, 0.3, 0.2, 0.1, 0.0, 0.0])
+        run.table[name] = [float(value) for value in values]
+    run.table["contact_area"] = [0.0, 0.3, 0.2, 0.1, 0.0, 0.0]
     assert run.telling_step == 3
     with h5py.File(out / "fields.h5", "r+") as file:
         file["t"][2] = np.nan

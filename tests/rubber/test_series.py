@@ -8,7 +8,7 @@ import pytest
 import yaml
 from numpy.testing import assert_allclose
 
-from parcontact import job
+from parcontact import job as jobs
 from parcontact.errors import InputError
 from parcontact.job.meaning import modulus_after
 from parcontact.rubber import compound, series
@@ -133,10 +133,10 @@ history: [{{pressure: 1.0e4, velocity: 0.1, distance: 1.0e-4, cells_per_step: 1}
 """
 
 
-def load(tmp_path: Path, material: str) -> job.Job:
+def load(tmp_path: Path, material: str) -> jobs.Job:
     path = tmp_path / "job.yaml"
     path.write_text(JOB.format(material=material))
-    return job.load(path)
+    return jobs.load(path)
 
 
 def test_a_material_file_and_a_table_in_a_job_are_the_same(tmp_path: Path) -> None:
@@ -189,7 +189,7 @@ def test_a_material_file_and_a_table_in_a_job_are_the_same(tmp_path: Path) -> No
 def test_mistakes_in_a_job(tmp_path: Path, material: str, sentence: str) -> None:
     measured.write_sweeps(tmp_path / "rubber.csv")
     (tmp_path / "bad.csv").write_text("1 2 3\n")
-    with pytest.raises(job.JobError) as failure:
+    with pytest.raises(jobs.JobError) as failure:
         load(tmp_path, material)
     (line,) = failure.value.mistakes
     assert sentence in line
@@ -338,7 +338,7 @@ def test_laws_in_a_job(tmp_path: Path) -> None:
         ),
         (SHIFTED.format(30, "{law: wlf}"), "must be density | factors, got 'wlf'"),
     ):
-        with pytest.raises(job.JobError) as failure:
+        with pytest.raises(jobs.JobError) as failure:
             load(tmp_path, material)
         (line,) = failure.value.mistakes
         assert sentence in line
