@@ -205,7 +205,7 @@ class Decision:
 @dataclass(frozen=True)
 class Sheared:
     """Effect of tractions along the surface in a step: the measures including them, their force [N] on the rigid
-    surface, and the energy lost in slip [J]. With `thermal` the map `slipping` is in proportion to the power of slip;
+    surface, and the energy lost in slip [J]. With heat the map `slipping` is in proportion to the power of slip;
     at rest, or if nothing slips, to the bounds of tractions. `error` is the relative error of their solve, a `share` of
     them has the error of the area, and `time` and `mesh` are their relative errors by the length of the step and by the
     stiffness of spots on the mesh."""

@@ -17,7 +17,6 @@ from .cycles import friction_along, way_along
 
 EARLY = 0.05  # half of the rows within this share of the time make a linear axis useless
 FEW_ROWS = 8
-FLASH = "flash_temperature"
 ENERGIES = {
     "work done": "work",
     "dissipated": "dissipated",
@@ -155,12 +154,6 @@ def _find_charts(run: PlottedRun, along: Abscissa) -> Iterator[Chart]:
             load_axis,
             {"": load},
             run.lasts and along.axis != load_axis and np.ptp(load) > 1e-9 * np.abs(load).max(),
-        ),
-        (
-            "temperature",
-            Axis("temperature rise", "K"),
-            {"flash": columns.get(FLASH, np.zeros(1)), "highest": columns.get("max_temperature", np.zeros(1))},
-            FLASH in columns,
         ),
         (
             "energy",

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..job import Initial, Ramp, Stage
+from ..job.listing import answers
 from ..printed import quantity, stated_error, with_error
 
 LATE = 0.9  # accuracy: share of the distance beyond which a maximum may still rise
@@ -93,9 +94,9 @@ def absolute_errors(history: Sequence[Stage], columns: Mapping[str, Sequence[flo
         return {}
     if not math.isnan(known.get(ERRORS[0], math.nan) + slid.mu_dyn):
         found["mu_max"] = _highest(columns, rows, cell)[1]
-        found["mu_dyn"] = _mean(columns, rows, "friction", ERRORS[0])[1]
+        found["mu_dyn"] = mean_of_slide(columns, rows, "friction", ERRORS[0])[1]
     if CORRECTED in columns and not math.isnan(known.get(ERRORS[1], math.nan)):
-        found["contact_area"] = _mean(columns, rows, CORRECTED, ERRORS[1])[1]
+        found["contact_area"] = mean_of_slide(columns, rows, CORRECTED, ERRORS[1])[1]
     return found
 
 
@@ -152,7 +153,9 @@ def _highest(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cel
     return float(friction[at]), wave + float(error), wave
 
 
-def _mean(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str, error: str) -> tuple[float, float]:
+def mean_of_slide(
+    columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str, error: str
+) -> tuple[float, float]:
     """Return the mean of a column over the last three quarters, and the mean of its known errors."""
     distance, values = (np.asarray(columns[key], float)[rows] for key in ("distance", name))
     within = np.abs(values) * np.nan_to_num(np.asarray(columns.get(error, np.zeros(len(columns[name]))), float)[rows])
@@ -192,12 +195,10 @@ def describe_slide(
     )
     area = f"{found.contact_area:.4g} by counting points"
     if CORRECTED in columns:
-        area = f"{with_error(*_mean(columns, rows, CORRECTED, ERRORS[1]))} corrected for its edges, and {area}"
+        area = f"{with_error(*mean_of_slide(columns, rows, CORRECTED, ERRORS[1]))} corrected for its edges, and {area}"
     yield f"the mean contact area over the same distance is {area}"
-    if "flash_temperature" in columns:
-        flash, _ = _mean(columns, rows, "flash_temperature", "")
-        hottest = largest(columns["max_temperature"][row] for row in rows[1:])
-        yield f"the mean flash temperature over the same distance is {flash:.3g} K, at most {hottest:.3g} K at a point"
+    for said_of in answers("results", "said_of_slide"):
+        yield from said_of(columns, rows)
     known = {name: value for name, value in slide_errors(so_far, columns).items() if value == value}
     if known:
         what = dict(zip(ERRORS, ("friction", "contact area"), strict=True))
@@ -220,7 +221,7 @@ def _describe_friction(
     error = wave if math.isnan(error) else error
     rippled = f" ({wave:.2g} of it a ripple with the period of a cell)" if wave > 0.1 * error else ""
     yield f"mu_max, the highest friction of the slide, is {with_error(mu_max, error)}{rippled}, {after}"
-    length, dynamic = quantity(way, "m"), with_error(*_mean(columns, rows, "friction", ERRORS[0]))
+    length, dynamic = quantity(way, "m"), with_error(*mean_of_slide(columns, rows, "friction", ERRORS[0]))
     yield f"mu_dyn, the mean friction over the last three quarters of this slide of {length}, is {dynamic}"
     yield from _unsettled(columns, rows)
 

@@ -1,5 +1,18 @@
-"""Panel of heat: temperature by band."""
+"""Panels of heat: temperatures of a run, and the temperature by band."""
 
-from ...results.charts import Axis
+from collections.abc import Iterator
+from dataclasses import replace
 
+from ...results.charts import Axis, Chart, PlottedRun
+from ...results.histories import Abscissa
+
+KEYS = ("temperature",)
 BAND_PANELS = {"flash_temperature": ("bands heat", Axis("temperature rise", "K"))}
+
+
+def panels(run: PlottedRun, along: Abscissa) -> Iterator[Chart]:
+    """Yield the panel of temperatures: the mean rise in the contact, and the highest one."""
+    if "flash_temperature" in run.columns:
+        lines = along.series({"flash": run.columns["flash_temperature"], "highest": run.columns["max_temperature"]})
+        found = Chart("temperature", along.axis, BAND_PANELS["flash_temperature"][1], lines, bottom=True)
+        yield found if along.marked or along.loop else replace(found, spikes=True)
