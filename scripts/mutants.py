@@ -25,6 +25,7 @@ HOUSE, TESTS = ROOT / "parcontact", ROOT / "tests"
 ROOMS = ("physics", "parallel", "contact", "march", "files", "effects", "job")
 LONGEST = 600.0  # seconds for the tests of one change
 SEEN = 0.8  # share of the changes that tests must detect
+MOST_TESTS = 3  # files of tests of a part, of those that import it
 FEWEST = 8  # least places to break in a part
 SLIDING = "scenarios/test_sliding_runs.py"
 OTHERS = {  # further tests of a part
@@ -45,11 +46,13 @@ Change = tuple[str, Callable[[], None]]  # description, and a function that chan
 
 
 def tests_of(part: str) -> tuple[str, ...]:
-    """Return the tests of a file of the program: those that import it or from it, and those named in OTHERS."""
+    """Return the tests of a file of the program: the files that import it and name it most, and those of OTHERS."""
     path = Path(part)
     room = r"\.".join(path.parent.parts)
     name = re.compile(rf"from parcontact\.{room}(\.{path.stem} import| import .*\b{path.stem}\b)")
-    own = sorted(test for test in TESTS.rglob("test_*.py") if name.search(test.read_text()))
+    texts = {test: test.read_text() for test in sorted(TESTS.rglob("test_*.py"))}
+    found = [test for test, text in texts.items() if name.search(text)]
+    own = sorted(found, key=lambda test: -texts[test].count(path.stem))[:MOST_TESTS]
     own += [TESTS / name for name in OTHERS.get(part, "").split()]
     return tuple(str(path.relative_to(ROOT)) for path in own)
 
