@@ -46,11 +46,11 @@ def recall(transforms: Sequence[Any], slab: Slab, saved: NDArray[np.uint8] | Non
 
 
 def keep(transforms: Sequence[Any], slab: Slab) -> None:
-    """Store the wisdom of this run for later ones, unless there is some; collective."""
+    """Store the wisdom of this run for later ones, unless theirs is as large; collective."""
     data = gather(slab).tobytes()
     with suppress(OSError):  # a run without stored wisdom works too
         place = _place(transforms, slab) if slab.root else None
-        if place and not place.exists():
+        if place and not (place.exists() and place.stat().st_size >= len(data)):
             with files.replaced(place) as file:
                 file.write(data)
 
