@@ -446,7 +446,10 @@ def _try(march: March, seconds: float) -> list[StageCost]:
             if took > seconds * (step.stage + 1) / (len(stages) + 1) and stage.tried >= FEWEST:
                 if step.stage + 1 == len(stages):
                     break
-                march.advance(span.leap(step.number, span.last))
+                rest = span.leap(step.number, span.last)
+                if timeline.chooses and span.stage.chooses:  # the stage ends with this step, whatever its number
+                    rest = rest._replace(number=step.number, passed=0)
+                march.advance(rest)
                 continue
             stage.steps -= step.passed
             stage.add(_cost(slab, partial(march.advance, step)))

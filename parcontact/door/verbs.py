@@ -308,9 +308,7 @@ def plan(options: argparse.Namespace) -> int:
     from .plan import Planner
 
     chosen = on_root(world, lambda: cases_of(options)[1])
-    first = chosen[0].job  # heights of other cases are not made for warnings, which `check` lists
-    find = lambda job: _doubts(job, []) if job is first else list(job.doubts)  # noqa: E731
-    doubts = on_root(world, lambda: sentences_of(chosen, find))
+    doubts = on_root(world, lambda: sentences_of(chosen, lambda job: _doubts(job, [])))
     planner = Planner(options.ranks or sorted({1, world.size, cores()}), options.seconds, started)
     if chosen[0].job.bands is not None:
         from ..bands.band_plan import plan_bands

@@ -24,7 +24,7 @@ from .tables import SCENE, VERBS, Claim
 MAX_SECONDS_TO_RELEASE = 3.0  # tuning: longest wait for the lock of a killed run [s]
 MARCHES = "checkpoint/marches.json"  # finished marches of bands
 RESULTS = {
-    "run": ("measures.csv", "cycles.csv", "bands.csv", "fields.h5", "fields.xdmf", "run.log", MARCHES),
+    "run": ("measures.csv", "fields.h5", "cycles.csv", "bands.csv", "fields.xdmf", "run.log", MARCHES),
     "steady": (
         "steady.csv",
         "steady_waves.csv",

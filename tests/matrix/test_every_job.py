@@ -17,7 +17,7 @@ from parcontact.job.history import Timeline
 from parcontact.march import mesh
 
 OF_JOBS = {"check", "plan", "run", "steady", "theory", "study", "surface"}
-OF_RESULTS = {"plot", "report", "leak", "info", "cite"}
+OF_RESULTS = {"export", "plot", "report", "leak", "info", "cite"}
 OTHERS = {"fit", "doctor", "manual", "schema"}  # take no job and no result
 
 
