@@ -38,7 +38,7 @@ WHOLE: dict[str, Any] = {  # what a block of YAML that is not a whole job is put
     "history": [{"pressure": 1.0e5, "velocity": 1.0, "distance": 1.0e-4, "cells_per_step": 1}],
 }
 OTHER_PROGRAMS = {  # in shell blocks; what is parcontact's is parsed
-    *("apptainer", "cp", "docker", "env", "env/bin/pip", "module", "python3", "sbatch"),
+    *("apptainer", "cp", "docker", "env", "env/bin/pip", "module", "python3", "rsync", "sbatch"),
     *("scripts/demo", "scripts/manual", "scripts/setup", "scripts/test", "."),
 }
 
@@ -228,6 +228,22 @@ def run_code(pieces: list[str]) -> None:
     from matplotlib import pyplot
 
     pyplot.close("all")
+
+
+@pytest.mark.parametrize(("code", "again"), [(0, False), (3, True), (2, False)])
+def test_the_batch_script(code: int, again: bool, tmp_path: Path) -> None:
+    """With a launcher and an sbatch that note their words: it submits itself after exit code 3, and only then."""
+    (script,) = [block for block in blocks("text", "cluster") if block.startswith("#!/bin/bash")]
+    (tmp_path / "job.sh").write_text(script)
+    for name, end in (("mpirun", code), ("sbatch", 0)):
+        (tmp_path / name).write_text(f'#!/bin/bash\necho {name} "${{@: -2}}"\nexit {end}\n')
+        (tmp_path / name).chmod(0o755)
+    environment = {"PATH": f"{tmp_path}:/usr/bin:/bin", "PARCONTACT_BIN": str(tmp_path), "SLURM_NTASKS": "4"}
+    words = ["bash", "job.sh", "job.yaml", "--quiet"]
+    done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=20)
+    lines = ["mpirun job.yaml --quiet", *(["sbatch job.yaml --quiet"] if again else [])]
+    assert (done.stdout.splitlines(), done.stderr) == (lines, "")
+    assert done.returncode == (0 if again else code)
 
 
 # -- verbs -----------------------------------------------------------------------------------------------------------
