@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 import yaml
 from csv_rows import rows
-from marched_jobs import JOBS, ROOT
+from marched_jobs import JOBS, ROOT, marched
 from mpi4py import MPI
+from numpy.testing import assert_allclose
 from pydantic import TypeAdapter
 
 import parcontact as pc
@@ -26,6 +27,7 @@ from parcontact import __main__
 from parcontact.columns import TABLES
 from parcontact.door.arguments import parse_arguments
 from parcontact.door.manual import texts
+from parcontact.effects import effect
 from parcontact.job import schema, yaml_text
 from parcontact.march import mesh
 
@@ -38,7 +40,7 @@ WHOLE: dict[str, Any] = {  # what a block of YAML that is not a whole job is put
     "history": [{"pressure": 1.0e5, "velocity": 1.0, "distance": 1.0e-4, "cells_per_step": 1}],
 }
 OTHER_PROGRAMS = {  # in shell blocks; what is parcontact's is parsed
-    *("apptainer", "cp", "docker", "env", "env/bin/pip", "module", "python3", "sbatch"),
+    *("apptainer", "cp", "docker", "env", "env/bin/pip", "module", "python3", "rsync", "sbatch"),
     *("scripts/demo", "scripts/manual", "scripts/setup", "scripts/test", "."),
 }
 
@@ -230,6 +232,43 @@ def run_code(pieces: list[str]) -> None:
     pyplot.close("all")
 
 
+def test_the_constraint_of_the_page_on_effects(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An even pressure moves no point of a periodic half space: the fluid adds its pressure to that of dry surfaces."""
+    (block,) = [block for block in blocks("python", "effects") if block.startswith("# in_fluid.py")]
+    space: dict[str, Any] = {}
+    exec(compile(block, "in_fluid.py", "exec"), space)
+    job = {
+        "grid": {"points": 32, "size": 1e-3},
+        "surface": {"shape": "wave", "amplitude": 1e-5, "waves": [1, 1]},
+        "material": {"model": "elastic", "shear_modulus": 1e6},
+        "numerics": {"tolerance": 1e-8},
+    }
+    dry, rows = marched({**job, "history": [{"pressure": 3e4}]})
+    monkeypatch.setattr(effect, "constraint_of", lambda job, unit=1.0, most=0.0: space["InFluid"](4e4 / unit))
+    wet, others = marched({**job, "history": [{"pressure": 7e4}]})
+    area = rows[-1].measures.contact_area
+    assert 0.1 < area < 0.9
+    assert others[-1].measures.contact_area == area
+    tolerance = 1e-6 * rows[-1].measures.max_pressure  # a hundred times that of the solver
+    assert_allclose(wet.field("pressure") - 4e4, dry.field("pressure"), rtol=0, atol=tolerance)
+
+
+@pytest.mark.parametrize(("code", "again"), [(0, False), (3, True), (2, False)])
+def test_the_batch_script(code: int, again: bool, tmp_path: Path) -> None:
+    """With a launcher and an sbatch that note their words: it submits itself after exit code 3, and only then."""
+    (script,) = [block for block in blocks("text", "cluster") if block.startswith("#!/bin/bash")]
+    (tmp_path / "job.sh").write_text(script)
+    for name, end in (("mpirun", code), ("sbatch", 0)):
+        (tmp_path / name).write_text(f'#!/bin/bash\necho {name} "${{@: -2}}"\nexit {end}\n')
+        (tmp_path / name).chmod(0o755)
+    environment = {"PATH": f"{tmp_path}:/usr/bin:/bin", "PARCONTACT_BIN": str(tmp_path), "SLURM_NTASKS": "4"}
+    words = ["bash", "job.sh", "job.yaml", "--quiet"]
+    done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=20)
+    lines = ["mpirun job.yaml --quiet", *(["sbatch job.yaml --quiet"] if again else [])]
+    assert (done.stdout.splitlines(), done.stderr) == (lines, "")
+    assert done.returncode == (0 if again else code)
+
+
 # -- verbs -----------------------------------------------------------------------------------------------------------
 
 
@@ -382,7 +421,7 @@ def compare_table(text: str, path: Path) -> None:
 
 # -- pages in a terminal of 80 letters: no prose is wider, code is as it was, no word is lost -------------------------
 
-TABLES_terminal = re.compile(r"^[|\s:-]+$|[|;]", re.MULTILINE)  # rules and marks of tables, and of the web site
+TABLE_LINES = re.compile(r"^\|.*\n?", re.MULTILINE)
 
 
 @pytest.mark.parametrize("name", texts.page_names())
@@ -398,15 +437,29 @@ def test_no_word_is_lost(name: str) -> None:
     text = texts.FENCE.sub("", texts.page(name, {"verbs": lambda: ""}))
     found = texts.wrapped(text, 80)
     assert texts.CODE.findall(found) == texts.CODE.findall(text)
-    assert TABLES_terminal.sub(" ", found).split() == TABLES_terminal.sub(" ", text).split()
+    plain = TABLE_LINES.sub("", text)
+    assert texts.wrapped(plain, 80).split() == plain.split()
+    printed = " ".join(found.split())
+    for line in TABLE_LINES.findall(texts.CODE.sub("", text)):
+        if not texts.RULE.match(line):
+            cells = [" ".join(cell.replace(r"\|", "|").split()) for cell in texts.BAR.split(line.strip())]
+            assert [cell for cell in cells if cell not in printed] == []
+
+
+def test_a_table_that_fits_has_even_columns() -> None:
+    """Nineteen letters hold the widest cells and two blanks between columns; a bar in a cell is none of the table."""
+    text = "| a | b | c |\n|---|---|---|\n| `x\\|y` | 1 | two three |\n"
+    even = ["a      b  c", "-----  -  ---------", "`x|y`  1  two three"]
+    assert texts.wrapped(text, 19).splitlines() == even
+    assert texts.wrapped(text, 18).splitlines() != even
 
 
 def test_lists_keys_and_tables() -> None:
-    """Items hang, keys and examples keep their lines; a row of a wide table is its first cell and the others."""
+    """Items hang, keys and examples keep their lines; a row of a wide table is a block under its first cell."""
     text = (
         "* one two three\n  four five\n\n`key`\n: what it means\n  Example: `key: 1`\n\n| a | b | c |\n|---|---|---|\n"
     )
-    assert texts.wrapped(f"{text}| row | one | two three |", 16).splitlines() == [
+    assert texts.wrapped(f"{text}| row | one | two three four |\n| next | no | no |", 16).splitlines() == [
         "* one two three",
         "  four five",
         "",
@@ -415,9 +468,12 @@ def test_lists_keys_and_tables() -> None:
         "  Example: `key:",
         "  1`",
         "",
-        "a",
-        "    b; c",
-        "row",
-        "    one; two",
-        "    three",
+        "",
+        "a: row",
+        "  b: one",
+        "  c: two three",
+        "    four",
+        "",
+        "a: next",
+        "  b, c: no",
     ]

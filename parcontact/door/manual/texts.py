@@ -146,7 +146,8 @@ def _capital(text: str) -> str:
 CODE = re.compile(r"^(```.*?^```$|\$\$.*?\$\$[ ,.]*$)", re.MULTILINE | re.DOTALL)
 ITEM = re.compile(r"^(\s*(?:\* |: |\d+\. )?)")  # what the first line of a paragraph begins with
 BEGINS = re.compile(r"^\s*(?:\* |: |\d+\. |#|!\[)|^  Example: |^`[^`]+`$")  # lines that go on no paragraph
-RULE = re.compile(r"^[|\s:-]+$")  # below the head of a table
+RULE = re.compile(r"^\|[\s:-]*-[|\s:-]*$")  # below the head of a table
+BAR = re.compile(r"(?<!\\)\|")  # between cells
 
 
 def wrapped(text: str, width: int) -> str:
@@ -183,15 +184,32 @@ def _paragraph(lines: list[str], width: int) -> list[str]:
 
 
 def _table(lines: list[str], width: int) -> Iterator[str]:
-    """Yield a table as it is where it fits, else its rows as paragraphs: the first cell, then the others."""
-    if max(map(len, lines)) <= width:
-        yield from lines
+    """Yield a table with columns of even width where it fits, else a block for each row."""
+    head, *rows = [_cells(line) for line in lines if not RULE.match(line)]
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    if sum(widths) + 2 * (len(widths) - 1) > width:
+        for row in rows:
+            yield from _block(head, row, width)
         return
-    for line in lines:
-        if not RULE.match(line):
-            first, *others = (cell.strip() for cell in line.strip("|").split("|"))
-            yield from _fill(first, width, "", "")
-            yield from _fill("; ".join(filter(None, others)), width, "    ", "    ")
+    for cells in (head, ["-" * room for room in widths], *rows):
+        yield "  ".join(cell.ljust(room) for cell, room in zip(cells, widths, strict=True)).rstrip()
+
+
+def _cells(line: str) -> list[str]:
+    return [cell.strip().replace("\\|", "|") for cell in BAR.split(line.strip())[1:-1]]
+
+
+def _block(head: list[str], row: list[str], width: int) -> Iterator[str]:
+    """Yield the first cell of a row as heading, then each other cell once, after the columns that have it."""
+    yield ""
+    yield from _fill(f"{head[0]}: {row[0]}" if head[0] else row[0], width, "", "  ")
+    columns: dict[str, list[str]] = {}
+    for name, cell in zip(head[1:], row[1:], strict=True):
+        if cell:
+            columns.setdefault(cell, []).append(name)
+    for cell, names in columns.items():
+        named = ", ".join(filter(None, names))
+        yield from _fill(f"{named}: {cell}" if named else cell, width, "  ", "    ")
 
 
 def _fill(text: str, width: int, first: str, hanging: str) -> list[str]:
