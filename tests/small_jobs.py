@@ -42,7 +42,12 @@ def every_job() -> Iterator[Found]:
 def is_whole(found: Found) -> bool:
     """Return True if a text is a job, not a material or a part of a job."""
     data = yaml.safe_load(found.text)
-    return isinstance(data, dict) and data.keys() >= PARTS and bool(data.keys() & LOADS) and bool(data.keys() & {"grid", "bands"})
+    return (
+        isinstance(data, dict)
+        and data.keys() >= PARTS
+        and bool(data.keys() & LOADS)
+        and bool(data.keys() & {"grid", "bands"})
+    )
 
 
 JOBS = {found.name: found for found in every_job() if is_whole(found)}

@@ -189,12 +189,15 @@ def _draw_ladders(axes: Axes, name: str, curves: Sequence[StudyCurve], doubt: fl
 
 
 def _draw_times(axes: Axes, name: str, curves: Sequence[StudyCurve], doubt: float) -> None:
-    """Draw errors of a quantity over the time of all steps."""
+    """Draw errors of a quantity over the time of all steps, on an axis of at least a decade."""
     for curve in curves:
         curve.draw(axes, curve.seconds)
     axes.set(xscale="log", xlabel="time of all steps [s]", ylabel=f"{NAMES[name]}:\nerror [%]")
     _scale_errors(axes, curves, doubt)
-    few = max(axes.get_xlim()) < WIDE * min(axes.get_xlim())
+    low, high = axes.get_xlim()
+    middle, half = math.sqrt(low * high), max(math.sqrt(high / low), math.sqrt(10.0))
+    axes.set_xlim(middle / half, middle * half)  # a decade at least: there are ticks in it
+    few = half**2 < WIDE
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=5))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
