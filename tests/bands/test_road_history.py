@@ -134,6 +134,18 @@ def test_rests_bracket_and_stops_age() -> None:
     assert rows[0].measures.friction == pytest.approx(rows[-1].measures.friction, rel=0.08)
 
 
+@pytest.mark.usefixtures("few_rungs")
+def test_an_elastic_body_has_no_friction_through_rests_and_slides() -> None:
+    """Its area is that of the first instant throughout a rest, as it has no memory."""
+    stop = {"pressure": 1e5, "duration": 0.03}
+    elastic = {"model": "elastic", "shear_modulus": 1e6}
+    rows = rows_of(history(material=elastic, history=[stop, {**SLIDE, "distance": LONG / 8}, stop]))[1:]
+    areas = column(rows, "contact_area")
+    assert areas[:51] == pytest.approx(areas[0], rel=1e-3)
+    assert areas[-50:] == pytest.approx(areas[-1], rel=1e-3)
+    assert column(rows, "friction").max() < 0.01
+
+
 class StoppedError(Exception):
     pass
 
