@@ -189,7 +189,8 @@ def test_ranks_agree() -> None:
 
 @pytest.mark.usefixtures("few_rungs")
 def test_files_and_a_shorter_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Frictions of bands add up to that of measures.csv; a second run does nothing; `--until` ends the history."""
+    """Frictions of bands add up to that of measures.csv; a second run does nothing; `--until` ends the history; another
+    velocity does not replace the results."""
     monkeypatch.chdir(tmp_path)
     Path("job.yaml").write_text(dump({**JOB, "history": [{"pressure": 1e5}, SLIDE]}))
     assert main(["job.yaml", "--quiet"]) == 0
@@ -199,6 +200,9 @@ def test_files_and_a_shorter_history(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert np.reshape(bands["time"], (-1, 2))[:, 0] == pytest.approx(np.array(table["time"])[1:])
     before = Path("out/job/measures.csv").stat().st_mtime_ns
     assert main(["job.yaml", "--quiet"]) == 0
+    assert main(["job.yaml", "--quiet", "--set", "history.1.velocity=2.0"]) == 2
     assert Path("out/job/measures.csv").stat().st_mtime_ns == before
+    assert main(["job.yaml", "--quiet", "--until", "1e-3"]) == 0
+    assert tables.read_columns(Path("out/job/measures.csv"))["time"][-1] == pytest.approx(1e-3)
     job = ended(jobs.load("job.yaml"), 1e-3)
     assert [stage.seconds for stage in job.history] == [0.0, 1e-3]
