@@ -194,8 +194,9 @@ def sum_up_errors(rows: Sequence[StepRow]) -> Iterable[str]:
     with its parts."""
     slides = [row for before, row in pairwise(rows) if row.distance > before.distance] or list(rows)
     budgets = [(row, row.errors) for row in slides if row.errors is not None]
+    slid = rows[-1].distance > 0.0
     for name, known in (
-        ("friction", [(row, errors.friction) for row, errors in budgets if errors.friction is not None]),
+        ("friction", [(row, errors.friction) for row, errors in budgets if slid and errors.friction is not None]),
         ("contact area", [(row, errors.area) for row, errors in budgets]),
     ):
         if not known:

@@ -17,7 +17,7 @@ from parcontact.bands.road_history import RoadHistory, RungTask
 from parcontact.bands.road_sliding import RoadSliding
 from parcontact.files import tables
 from parcontact.files.recorder import StepRow
-from parcontact.files.road_run import ended
+from parcontact.files.road_run import ended, sum_up_errors
 from parcontact.job.yaml_text import dump
 from parcontact.parallel.slab import Array, Slab
 from parcontact.results import prediction
@@ -144,6 +144,7 @@ def test_an_elastic_body_has_no_friction_through_rests_and_slides() -> None:
     assert areas[:51] == pytest.approx(areas[0], rel=1e-3)
     assert areas[-50:] == pytest.approx(areas[-1], rel=1e-3)
     assert column(rows, "friction").max() < 0.01
+    assert [text.split(":")[0] for text in sum_up_errors(rows[:51])] == ["error of contact area"]
 
 
 class StoppedError(Exception):
