@@ -20,7 +20,7 @@ from parcontact.files.recorder import StepRow
 from parcontact.files.road_run import ended, sum_up_errors
 from parcontact.job.yaml_text import dump
 from parcontact.parallel.slab import Array, Slab
-from parcontact.results import prediction
+from parcontact.results import info, prediction
 
 LONG = 4e-3
 ROUGH = {
@@ -191,10 +191,10 @@ def test_ranks_agree() -> None:
 @pytest.mark.usefixtures("few_rungs")
 def test_files_and_a_shorter_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Frictions of bands add up to that of measures.csv; a second run does nothing; `--until` ends the history; another
-    velocity does not replace the results."""
+    velocity does not replace the results; `info` counts the marches of a run that was stopped."""
     monkeypatch.chdir(tmp_path)
     Path("job.yaml").write_text(dump({**JOB, "history": [{"pressure": 1e5}, SLIDE]}))
-    assert main(["job.yaml", "--quiet"]) == 0
+    assert main(["job.yaml", "--quiet", "--wall", "00:01:00"]) == 0  # of which 5 s are reserved
     table, bands = (tables.read_columns(Path("out/job") / name) for name in ("measures.csv", "bands.csv"))
     friction = np.reshape(bands["friction"], (-1, 2)).sum(axis=1)
     assert np.abs(friction) == pytest.approx(np.array(table["friction"])[1:], abs=1e-12)
@@ -207,3 +207,5 @@ def test_files_and_a_shorter_history(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert tables.read_columns(Path("out/job/measures.csv"))["time"][-1] == pytest.approx(1e-3)
     job = ended(jobs.load("job.yaml"), 1e-3)
     assert [stage.seconds for stage in job.history] == [0.0, 1e-3]
+    assert main(["job.yaml", "--quiet", "--restart", "never", "--wall", "00:00:01"]) == 3
+    assert "not finished; finished marches: 1" in info.describe_path(Path("out/job"))[0]
