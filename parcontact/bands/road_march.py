@@ -41,7 +41,7 @@ class BandMarch:
         march = self._begin(pressure, law)
         if self.band.setup.job.initial.state == "steady":
             rows.append(self._measure(march, pressure, below))
-        steps = (step._replace(load=pressure) for step in march.steps())
+        steps = (step._replace(load=pressure) for step in march.timeline())  # all: the clock has a place for each
         run_steps(march, [lambda march: rows.append(self._measure(march, pressure, below))], steps)
         return track_of(rows)
 

@@ -5,7 +5,7 @@ Rows of an instant exist when the coarsest band is done. Until then finished mar
 T: the marches of a longer history are others."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -96,12 +96,22 @@ def _look(directory: Directory, job: Job, plain: dict[str, Any], afresh: bool) -
         if different := tables.list_differences(tables.differences(claim.job, plain, SAME)):
             raise InputError(f"{directory.path} has a run of another job: {different}; {ADVICE}")
         if claim.finished is None or claim.job.get("history") != plain["history"]:
+            if claim.finished and not _continues(claim.job["history"], plain["history"]):
+                different = tables.list_differences(tables.differences(claim.job, plain, ["history"]))
+                raise InputError(f"{directory.path} has the results of another history: {different}; {ADVICE}")
             return True, ""
         if not all((directory.path / name).exists() for name in (MEASURES, TABLE)):
             return False, ""
         return True, f"finished before, at t = {claim.finished[1]:g} s (--restart never: run it again)"
 
     return on_root(directory.slab.comm, look)
+
+
+def _continues(then: Sequence[Mapping[str, Any]], now: Sequence[Mapping[str, Any]]) -> bool:
+    """Return whether one of two histories (plain data) is the beginning of the other; it may end within a stage."""
+    shared = min(len(then), len(now)) - 1
+    last = ({**stages[shared], "duration": None, "distance": None} for stages in (then, now))
+    return list(then[:shared]) == list(now[:shared]) and next(last) == next(last)
 
 
 class _Run:
@@ -184,8 +194,9 @@ def sum_up_errors(rows: Sequence[StepRow]) -> Iterable[str]:
     with its parts."""
     slides = [row for before, row in pairwise(rows) if row.distance > before.distance] or list(rows)
     budgets = [(row, row.errors) for row in slides if row.errors is not None]
+    slid = rows[-1].distance > 0.0
     for name, known in (
-        ("friction", [(row, errors.friction) for row, errors in budgets if errors.friction is not None]),
+        ("friction", [(row, errors.friction) for row, errors in budgets if slid and errors.friction is not None]),
         ("contact area", [(row, errors.area) for row, errors in budgets]),
     ):
         if not known:

@@ -78,7 +78,7 @@ class Watch:
     _saved: float = field(default_factory=time.monotonic)
     _looked: float = 0.0
     _made: int = 0
-    _last: float = 0.0
+    _last: float = field(default_factory=time.monotonic)  # or the first step would be as long as the machine is up
     _write: float = -1.0
     _steps: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))
 

@@ -189,7 +189,10 @@ def loads_press(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
         least = stage.load.lowest
         if least < 0.0:
             ends = _place_of_lowest(stage)
-            sentence = f"must be {LOADS[stage.control]}, got {least:g}; pulling needs adhesion"
+            got = f"must be {LOADS[stage.control]}, got {least:g}"
+            if isinstance(stage.load, Oscillation):
+                got = f"must be at most the mean, {stage.load.mean:g}, got {stage.load.amplitude:g}"
+            sentence = f"{got}; pulling needs adhesion"
             yield Fault(sentence, ("history", index, stage.control, *ends))
 
 
@@ -291,7 +294,10 @@ def refuse_bands_over_time(section: str) -> Rule:
 
     def check(given: Any, bands: Any, history: tuple[Stage | None, ...]) -> Iterator[Fault]:
         if given is not None and bands is not None and history:
-            yield Fault("cannot be used with bands and a history; with bands leave out one of the two", (section,))
+            yield Fault(
+                "cannot be used with bands and a history: give bands a steady section, or the history a grid",
+                (section,),
+            )
 
     return Rule((section, "bands", "history"), check)
 

@@ -31,12 +31,14 @@ OUTSIDE = ("frequencies", "temperatures")  # kinds of warnings for which a point
 def export_results(directory: Path, form: str, out: Path | None = None) -> Iterator[str]:
     """Write the tables of a directory as `csv` or `abaqus`, each to a file in it or the only one to `out`; yield
     sentences. Raises InputError if there is none in this form, or a file cannot be written."""
+    if not directory.is_dir():
+        raise InputError(f"{directory} is not a directory")
     results = Results(directory)
     found = [_friction(directory)] if "curve" in results.kinds else []
     for offered in answers("results", "exported"):
         found += offered(results) if form == "csv" and "run" in results.kinds else ()
     if not found:
-        what = "a friction curve (steady.csv)" + " or leakage (leak.csv)" * (form == "csv")
+        what = "a friction curve (steady.csv)" + " or leakage (leak.csv, by parcontact leak)" * (form == "csv")
         raise InputError(f"{directory} has no table for {form}: it needs {what}")
     if out is not None and (len(found) > 1 or out.suffix != SUFFIX[form]):
         raise InputError(f"--out must end in {SUFFIX[form]}, and is for one table; got {out} for {len(found)}")

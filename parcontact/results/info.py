@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from .. import capabilities
 from ..errors import InputError
 from ..files import checkpoint, fields, hdf5, tables
+from ..files.directory import MARCHES
 from ..files.provenance import PROGRAM, Link, read_budget, read_chain, references_of
 from ..files.recorder import meshes_of, warnings_of
 from ..job import Job
@@ -219,6 +220,12 @@ def _saved_states(found: Results) -> Iterator[str]:
         yield f"  checkpoint after step {contents.step}, t = {quantity(contents.time, 's', 4)}"
 
 
+def _marches(found: Results) -> Iterator[str]:
+    with (found.path / MARCHES).open("rb") as file:
+        count = sum(1 for _ in file)
+    yield f"  run in bands: not finished; finished marches: {count}"
+
+
 def _saved_maps(found: Results) -> Iterator[str]:
     with found.open_maps() as file:
         layout = fields.SavedFields(file)
@@ -258,6 +265,7 @@ PARTS: dict[str, Describe] = {  # descriptions of the parts of an output directo
     theory_table.TABLE: _theory,
     "steady.csv": _curve,
     "checkpoint": _saved_states,
+    MARCHES: _marches,
     "fields.h5": _saved_maps,
     **{name: part for parts in capabilities.offers("results", "PARTS") for name, part in parts.items()},
     KINDS["sweep"]: _sweep,

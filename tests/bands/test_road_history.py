@@ -17,10 +17,10 @@ from parcontact.bands.road_history import RoadHistory, RungTask
 from parcontact.bands.road_sliding import RoadSliding
 from parcontact.files import tables
 from parcontact.files.recorder import StepRow
-from parcontact.files.road_run import ended
+from parcontact.files.road_run import ended, sum_up_errors
 from parcontact.job.yaml_text import dump
 from parcontact.parallel.slab import Array, Slab
-from parcontact.results import prediction
+from parcontact.results import info, prediction
 
 LONG = 4e-3
 ROUGH = {
@@ -134,6 +134,19 @@ def test_rests_bracket_and_stops_age() -> None:
     assert rows[0].measures.friction == pytest.approx(rows[-1].measures.friction, rel=0.08)
 
 
+@pytest.mark.usefixtures("few_rungs")
+def test_an_elastic_body_has_no_friction_through_rests_and_slides() -> None:
+    """Its area is that of the first instant throughout a rest, as it has no memory."""
+    stop = {"pressure": 1e5, "duration": 0.03}
+    elastic = {"model": "elastic", "shear_modulus": 1e6}
+    rows = rows_of(history(material=elastic, history=[stop, {**SLIDE, "distance": LONG / 8}, stop]))[1:]
+    areas = column(rows, "contact_area")
+    assert areas[:51] == pytest.approx(areas[0], rel=1e-3)
+    assert areas[-50:] == pytest.approx(areas[-1], rel=1e-3)
+    assert column(rows, "friction").max() < 0.01
+    assert [text.split(":")[0] for text in sum_up_errors(rows[:51])] == ["error of contact area"]
+
+
 class StoppedError(Exception):
     pass
 
@@ -177,16 +190,22 @@ def test_ranks_agree() -> None:
 
 @pytest.mark.usefixtures("few_rungs")
 def test_files_and_a_shorter_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Frictions of bands add up to that of measures.csv; a second run does nothing; `--until` ends the history."""
+    """Frictions of bands add up to that of measures.csv; a second run does nothing; `--until` ends the history; another
+    velocity does not replace the results; `info` counts the marches of a run that was stopped."""
     monkeypatch.chdir(tmp_path)
     Path("job.yaml").write_text(dump({**JOB, "history": [{"pressure": 1e5}, SLIDE]}))
-    assert main(["job.yaml", "--quiet"]) == 0
+    assert main(["job.yaml", "--quiet", "--wall", "00:01:00"]) == 0  # of which 5 s are reserved
     table, bands = (tables.read_columns(Path("out/job") / name) for name in ("measures.csv", "bands.csv"))
     friction = np.reshape(bands["friction"], (-1, 2)).sum(axis=1)
     assert np.abs(friction) == pytest.approx(np.array(table["friction"])[1:], abs=1e-12)
     assert np.reshape(bands["time"], (-1, 2))[:, 0] == pytest.approx(np.array(table["time"])[1:])
     before = Path("out/job/measures.csv").stat().st_mtime_ns
     assert main(["job.yaml", "--quiet"]) == 0
+    assert main(["job.yaml", "--quiet", "--set", "history.1.velocity=2.0"]) == 2
     assert Path("out/job/measures.csv").stat().st_mtime_ns == before
+    assert main(["job.yaml", "--quiet", "--until", "1e-3"]) == 0
+    assert tables.read_columns(Path("out/job/measures.csv"))["time"][-1] == pytest.approx(1e-3)
     job = ended(jobs.load("job.yaml"), 1e-3)
     assert [stage.seconds for stage in job.history] == [0.0, 1e-3]
+    assert main(["job.yaml", "--quiet", "--restart", "never", "--wall", "00:00:01"]) == 3
+    assert "not finished; finished marches: 1" in info.describe_path(Path("out/job"))[0]

@@ -207,8 +207,9 @@ def test_a_cut_off_leaves_steep_waves_out() -> None:
     ],
 )
 def test_what_does_not_go_with_bands(changes: dict[str, object], sentence: str) -> None:
-    with pytest.raises(JobError, match=re.escape(sentence)):
+    with pytest.raises(JobError, match=re.escape(sentence)) as found:
         jobs.load({**JOB, "bands": "auto", **changes})
+    assert "on cells of" not in str(found.value)  # a job in bands has no grid
 
 
 def test_a_curve_that_was_killed_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

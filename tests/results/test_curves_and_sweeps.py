@@ -70,6 +70,8 @@ def test_leakage_over_the_load(tmp_path: Path) -> None:
     assert rows == ["1.0,7.0,8.0", "2.0,3.0,4.0"]
     with pytest.raises(InputError, match="has no table for abaqus"):
         list(export.export_results(tmp_path, "abaqus"))
+    with pytest.raises(InputError, match="is not a directory"):
+        list(export.export_results(tmp_path / "nowhere", "csv"))
 
 
 # -- the first tables of a report ------------------------------------------------------------------------------------

@@ -179,7 +179,7 @@ def test_what_is_said_of_the_last_two_cycles(tmp_path: Path) -> None:
     [
         ({"force": {"mean": 1.0, "amplitude": 0.5, "frequency": 1.0}}, "needs cycles"),
         ({"force": {"mean": 1.0, "amplitude": 0.5}, "cycles": 1}, "frequency is missing"),
-        ({"force": {"mean": 1.0, "amplitude": 2.0, "frequency": 1.0}, "cycles": 1}, "pulling needs adhesion"),
+        ({"force": {"mean": 1.0, "amplitude": 2.0, "frequency": 1.0}, "cycles": 1}, "at most the mean, 1, got 2"),
         ({"force": 1.0, "cycles": 1}, "needs a load {mean, amplitude, frequency}"),
         ({"force": 1.0, "velocity": {"amplitude": 0.0, "frequency": 1.0}, "cycles": 1}, "nothing would move"),
         ({"force": 1.0, "velocity": {"amplitude": 0.1, "frequency": 1.0}, "cycles": 1, "duration": 1.0}, "at most one"),

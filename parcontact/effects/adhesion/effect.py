@@ -50,9 +50,9 @@ def _bodies(adhesion: Adhesion | None, material: Any) -> Iterator[Fault]:
         yield Fault("must be a length [m] for a body without long-term modulus, got auto", ("adhesion", "range"))
 
 
-def _zone_is_resolved(adhesion: Adhesion | None, grid: Any, material: Any) -> Iterator[Fault]:
+def _zone_is_resolved(adhesion: Adhesion | None, grid: Any, material: Any, bands: Any) -> Iterator[Fault]:
     """Refuse viscoelastic bodies whose process zone the mesh does not resolve."""
-    if adhesion is None or grid is None or not material.fitted.branches:
+    if adhesion is None or grid is None or bands is not None or not material.fitted.branches:
         return
     if adhesion.range == AUTO or material.fitted.long_modulus == 0.0:
         return
@@ -129,7 +129,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
     columns: ClassVar[tuple[str, ...]] = added_by("adhesion")
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("adhesion", "material"), _bodies),
-        Rule(("adhesion", "grid", "material"), _zone_is_resolved),
+        Rule(("adhesion", "grid", "material", "bands"), _zone_is_resolved),
         Rule(("adhesion", "bands"), _no_bands),
         Rule(("adhesion", "grid"), _no_strip),
     )

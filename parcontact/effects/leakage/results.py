@@ -79,10 +79,11 @@ def said_at_end(run: Results) -> Iterator[str]:
     if run.detached and known:
         high, load = (quantity(columns[name][known[-1]], "Pa") for name in ("high_pressure", "pressure"))
         yield f"the fluid lifts the seal off: up to {high} it has an equilibrium under {load}, in the next step none"
-    leaking = [row for row in known if columns["flow_rate"][row] > 0.0]
+    drop = [high - low for high, low in zip(columns["high_pressure"], columns["low_pressure"], strict=True)]
+    leaking = [row for row in known if columns["flow_x"][row] > 0.0 and drop[row] > 0.0]
     if leaking:
         yield _describe_leak(columns, leaking[-1])
-    elif known:
+    elif known and not any(columns["flow_x"][row] for row in known):
         yield "contact closes the seal in all steps"
 
 
@@ -91,7 +92,8 @@ def _describe_leak(columns: Columns, row: int) -> str:
     errors = {"mesh": "error_x", "rounds": "error_rounds", "small leak": "error_leak"}
     said = ", ".join(f"{name} {stated_error(columns[key][row])}" for name, key in errors.items())
     pressures = span(columns["low_pressure"][row], columns["high_pressure"][row], "Pa")
-    leak = f"{columns['flow_rate'][row]:.3g} m³/s leak through the box between {pressures}"
+    name, unit = ("flow_rate", "m³/s") if columns["flow_rate"][row] > 0.0 else ("mass_flow", "kg/s")  # into a vacuum
+    leak = f"{columns[name][row]:.3g} {unit} leak through the box between {pressures}"
     return f"{leak}, at t = {quantity(columns['time'][row], 's')} (errors: {said})"
 
 

@@ -76,6 +76,30 @@ def test_where_leakage_stops(flows: list[float], pressures: list[float], said: s
     assert results.describe_axis({"flow_x": flows, "pressure": pressures, "time": times}, "x") == said
 
 
+OPENED = "the seal opens between 1 and 2 MPa of the fluid, under 3 MPa"
+
+
+@pytest.mark.parametrize(
+    ("flows", "lows", "rates", "said"),
+    [
+        ([0.0, 2e-18], [0.0, 0.0], [math.nan] * 2, [OPENED, "7e-09 kg/s leak through the box between 0 Pa and 2 MPa"]),
+        ([0.0, 2e-18], [1e6, 2e6], [0.0, 0.0], [OPENED]),
+        ([0.0, 0.0], [0.0, 0.0], [math.nan] * 2, ["contact closes the seal in all steps"]),
+    ],
+    ids=["into a vacuum", "without a drop of pressure", "closed"],
+)
+def test_a_seal_without_a_flow_rate(
+    flows: list[float], lows: list[float], rates: list[float], said: list[str], tmp_path: Path
+) -> None:
+    """A gas into a vacuum has a mass flow alone; a seal may open while both pressures are equal."""
+    head = "time,pressure,high_pressure,low_pressure,flow_x,flow_rate,mass_flow,error_x,error_rounds,error_leak"
+    rows = zip(lows, flows, rates, strict=True)
+    text = [f"{k},3e6,{k + 1}e6,{low},{flow},{rate},7e-9,0.1,,0.1" for k, (low, flow, rate) in enumerate(rows)]
+    (tmp_path / "measures.csv").write_text("\n".join([head, *text, ""]))
+    found = list(results.said_at_end(Results(tmp_path, "run")))
+    assert [sentence.split(", at t")[0] for sentence in found] == said
+
+
 def test_directions_that_agree_share_a_sentence(tmp_path: Path) -> None:
     text = "time,pressure,flow_x,flow_y\n0,1.05e6,1e-18,2e-18\n1,1.1e6,0,0\n"
     (tmp_path / "leak.csv").write_text(text)
