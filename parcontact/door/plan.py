@@ -240,6 +240,8 @@ def measure_program(slab: Slab) -> int:
 
     Collective.
     """
+    from ..files import run  # noqa: F401  # a run imports it
+
     return int(slab.reduce((), [float(peak_memory())])[0])
 
 
