@@ -283,7 +283,7 @@ FIELDS: Table = (
     Column("step", "", "steps of the maps"),
 )
 
-STEADY: Table = (  # rows are `steady_sliding.point.Point`
+STEADY: Table = (  # rows are `march.point.Point`
     Column("velocity", "m/s", "speed", attrgetter("speed")),
     _measured("pressure", "Pa", PRESSURE),
     *FORCES,

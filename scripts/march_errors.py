@@ -9,7 +9,7 @@ calls. The second compares the part `time` of the error budget with this error, 
 error by the mesh is below AGREE. The third is for chosen steps: operator calls, errors, and how often the errors of
 mu_dyn and mu_max are within the estimates of the run.
 
-PASSING of `accuracy.constants` was fitted to 30 of 60 other marches, of an earlier version of this script. Results are
+PASSING of `march.constants` was fitted to 30 of 60 other marches, of an earlier version of this script. Results are
 on the manual's pages `method` and `accuracy`.
 """
 

@@ -6,7 +6,7 @@
 The marches are those of `march_errors`, with steps of one cell on one mesh, so that all other errors are the same. For
 each tolerance the table has the median of true errors, and of the part `solver` of the error budget over them with the
 range of 90 % of the steps, and the share of the steps in which it is at least the true error. SOLVER, SOLVER_AREA and
-PENETRATING of `accuracy.constants` are judged by it; an estimate grows in proportion to its constant.
+PENETRATING of `march.constants` are judged by it; an estimate grows in proportion to its constant.
 """
 
 import sys

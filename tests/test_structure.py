@@ -244,5 +244,5 @@ def test_functions_have_a_name_of_their_own() -> None:
 
 
 def test_rows_are_annotated_with_every_column() -> None:
-    """In the order of the registry: a new column of measures.csv needs its annotation in `python.row.Row`."""
+    """In the order of the registry: a new column of measures.csv needs its annotation in `door.simulation.Row`."""
     assert list(parcontact.Row.__annotations__) == [each.name for each in MEASURES if each.name != PER_BRANCH]

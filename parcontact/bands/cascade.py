@@ -128,7 +128,7 @@ class BandResult:
 
     Its weights and load [Pa]; friction of its waves over the whole load [-], by energy and by slopes; area at its
     shortest wave, counted and corrected; share of the load above its ladder; power [W/m^2] per branch; S_j and g of
-    its heat (`effects.heat.bands`), averaged over the load; squares of strains at all depths and their weights
+    its heat (`effects.heat.steady`), averaged over the load; squares of strains at all depths and their weights
     (`Rung`), averaged over the power; absolute errors of friction and of area by solver, time steps and grid.
     """
 

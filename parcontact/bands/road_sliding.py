@@ -83,7 +83,7 @@ class BandSearch:
 class RoadSliding:
     """Steady states of a job in bands, on the ranks of `slab`; the constructor and the methods are collective.
 
-    It has the interface of `steady_sliding.sliding.SteadySliding` for friction curves.
+    It has the interface of `march.steady.SteadySliding` for friction curves.
     """
 
     table: tuple[str, Sequence[str]] | None = (TABLE, names_of(BANDS))

@@ -12,7 +12,7 @@ the change that is stored.
 
 Contact with a law of the interface, or with an operator that is not symmetric, by accelerated splitting.
 
-Find p >= 0 with given mean P0 or given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`solve.interface_law`). A is
+Find p >= 0 with given mean P0 or given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`contact.constraint`). A is
 diagonal in Fourier space and c in real space, so that each is inverted exactly. With J_A(x) = (1 + gamma A)^-1 x
 shifted to the mean P0, or (1 + gamma A)^-1 (x + gamma d), with J_c the pressure of `interface_law.resolve`, and with a
 map s,

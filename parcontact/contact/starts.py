@@ -12,7 +12,7 @@ can touch only if
 
 with L the length by which u varies within the contact (`certificate.Certificate`). Tiles with such blocks, with
 blocks under pressure, or with neighbours of these are stacked to one map. There `contact.ContactSolver` solves the
-same problem with operators on tiles (`physics.tile_operator`). These also give the displacement at all points of the
+same problem with operators on tiles (`physics.convolution`). These also give the displacement at all points of the
 grid, so that `contact.ContactSolver.check` can check the pressure everywhere. For tolerances below FINEST, or if the
 check fails, the operator of the whole grid checks the pressure, and the solve continues on the whole grid. Root
 solves and sends the result to all ranks.

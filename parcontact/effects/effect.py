@@ -2,7 +2,7 @@
 
 Interface of effects: a decision from the job alone, and what is made, remembered and written if the effect is on.
 
-An effect is one class, found by the section that it adds to a job (`job.added_sections`); no other file refers to
+An effect is one class, found by the section that it adds to a job (`job.listing`); no other file refers to
 it. It may provide the contact law, and it is called after each step.
 
 The contact law of a job: admissible pressures, and where surfaces touch in saved maps.
@@ -10,7 +10,7 @@ The contact law of a job: admissible pressures, and where surfaces touch in save
 Interface of contact laws: how a step is solved, its memory, and where surfaces touch.
 
 `ContactLaw` is the interface that a march uses. By itself it is a constraint on pressures
-(`march.dry_law`). Effects may provide other laws, in which, say, the gap is the unknown.
+(`march.laws`). Effects may provide other laws, in which, say, the gap is the unknown.
 """
 
 from __future__ import annotations

@@ -173,7 +173,7 @@ def warnings_of(log: Path) -> list[str]:
 
 
 def meshes_of(log: Path) -> list[str]:
-    """Return the last message of a log on chosen meshes (`mesh.chosen_mesh`), if any."""
+    """Return the last message of a log on chosen meshes (`march.mesh`), if any."""
     return [line for line in log_lines(log) if line.startswith(MESH)][-1:]
 
 

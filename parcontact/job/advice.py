@@ -10,7 +10,7 @@ from the positions of edges between points: with a share A in contact, the relat
 ((1 - A)/A)^0.5, and a box with N shortest waves along a side has N^2 places. `friction_error` and `area_error` add
 both; random errors, and the scatter of systematic ones between surfaces, count SURE standard deviations.
 
-The constants were fitted with share and phase as guessed by `mesh.contact_guess`, to steady states of rough surfaces of
+The constants were fitted with share and phase as guessed by `march.mesh`, to steady states of rough surfaces of
 1 to 100 % contact with 12 or 24 shortest waves along a side: for friction 36 states on about 110 meshes each, for the
 area 24 states on about 40 meshes (maximum likelihood), with references of 160 cells per shortest wave. Fewer waves
 count as 12. `scripts/chosen_mesh.py` tests the chosen meshes on other surfaces. Along a direction (x, y) a cell is

@@ -2,7 +2,7 @@
 
 Stages that choose their own time steps: bounds, chosen steps, and an estimate of the steps to come.
 
-The next step is decided after the one before has been made (`accuracy.controller`). Chosen steps are stored, so that
+The next step is decided after the one before has been made (`march.controller`). Chosen steps are stored, so that
 steps have numbers and a run can restart. Steps to come are estimated as a ladder: they double from the shortest to
 the longest that is allowed and then stay constant.
 

@@ -5,7 +5,7 @@ Sources of error: estimates for the solver, time steps, folded branches and the 
 Each estimates a relative error from numbers of a step; its constants are fitted to true errors (`constants`). c is the
 counted minus the corrected area, over the latter, and N is the number of spots of contact.
 
-solver: proportional to the `complementarity` C of the certificate (`solve.certificate`) for friction, and smaller
+solver: proportional to the `complementarity` C of the certificate (`physics.measures`) for friction, and smaller
 for many
     spots. Where friction is far below the slopes it is a small difference of large forces: errors of pressures then
     count more, by the root of the ratio, and pressures with the error C may have tangential forces of this share of the

@@ -193,7 +193,7 @@ class Choices:
 
     @decided("chosen time steps")
     def chosen_steps(self) -> Verdict:
-        """Time steps chosen from the error of the last step (`accuracy.controller`)."""
+        """Time steps chosen from the error of the last step (`march.controller`)."""
         why = describe_steps(self.job)
         return bool(why) and self.job.remembers, why or "every stage gives its steps"
 

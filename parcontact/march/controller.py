@@ -21,7 +21,7 @@ long; the step after it does not grow (E. Hairer, S. P. Norsett, G. Wanner, Solv
 While the surface slides, steps end at multiples of their length, counted in cells from the first position of the
 surface (block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after a
 jump, parts of a cell, as large as E allows, lead back to whole cells, by which heights are moved without a
-transform. Halves, thirds and quarters start from the pressure one whole cell earlier (`march.starts`)."""
+transform. Halves, thirds and quarters start from the pressure one whole cell earlier (`march.laws`)."""
 
 import math
 from dataclasses import dataclass

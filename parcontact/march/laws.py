@@ -11,10 +11,10 @@ cell it is the one before; with thirds and quarters it is an earlier one, stored
 
 Otherwise the last two pressures are extrapolated in the body's frame.
 
-Contact law of surfaces that do not attract: a constraint on pressures (`solve.constraint`), solved from the last
+Contact law of surfaces that do not attract: a constraint on pressures (`contact.constraint`), solved from the last
 pressures.
 
-Contact law of a surface whose finer roughness is a law of its interface (`solve.interface_law`).
+Contact law of a surface whose finer roughness is a law of its interface (`contact.constraint`).
 
 Under pressure the mean planes of the finer roughness approach by the closing c. With the modulus alpha of a step, in
 which the pressure is `alpha p`,
@@ -22,7 +22,7 @@ which the pressure is `alpha p`,
     p >= 0,    w = A p + c(alpha p) - h - d >= 0,    p w = 0.
 
 The gap `u - h - d` is measured to the highest points of the finer roughness, so that it is `-c` in contact. An
-effect provides this law (`effects.effect.Effect.law`); it is solved by splitting (`solve.nonsymmetric.splitting`).
+effect provides this law (`effects.effect.Effect.law`); it is solved by splitting (`contact.splitting`).
 Energies of the run do not include the work on the finer roughness.
 """
 
@@ -204,7 +204,7 @@ class DryLaw:
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[None]:
-        """Solve a step; see `effects.contact_protocol.ContactLaw.solve`. Raises StepError."""
+        """Solve a step; see `effects.effect.ContactLaw.solve`. Raises StepError."""
         scene, contact, remark = self.scene, None, ""
         most = control.value * scene.slab.points if isinstance(control, MeanPressure) else math.inf
         problem = Problem(*scene.operators, trial.effective, scene.constraint(trial.alpha, most), control)
@@ -291,7 +291,7 @@ class ClosingLaw(DryLaw):
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[None]:
-        """Solve a step; see `effects.contact_protocol.ContactLaw.solve`."""
+        """Solve a step; see `effects.effect.ContactLaw.solve`."""
         if isinstance(control, MeanPressure) and control.value == 0.0:
             return super().solve(trial, step, control, memory, past, before, tolerance)
         scene, p = self.scene, past.spare

@@ -7,8 +7,8 @@ Jobs whose grid is given by words: `points: auto`, and `from surface` for points
 Words for numbers of the grid: `points: auto`, and `from surface` for points and size of a measured map.
 
 `auto` is the mesh with the fewest points for which the errors are those of `numerics.accuracy`. It follows from the
-shortest wave of the surface, the directions of sliding (`job.checks.cells`) and a guess of the contact area
-(`mesh.contact_guess`). The mesh has its share of the error (`accuracy.shares`).
+shortest wave of the surface, the directions of sliding (`job.advice`) and a guess of the contact area
+(`march.mesh`). The mesh has its share of the error (`job.calculation`).
 
 A guess of the contact area before any solve, for the mesh that `points: auto` chooses.
 
@@ -20,7 +20,7 @@ under a mean pressure p on a surface of rms slope h' the share in contact is
 here with the modulus G at FEW times the frequency with which the shortest wave passes. Sliding surfaces have the
 larger area 1 - (1 - A)^MORE. The phase of the modulus is taken at EDGES times this frequency. If the loss angle is
 still proportional to the frequency at FINEST times this frequency, sliding is slow, and edges lose power in waves
-shorter than the cells (`accuracy.sources`).
+shorter than the cells (`march.budget`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Warnings about a scene, from its heights before a run and from its contacts during it.
 
-Warnings that follow from a job alone are in `job/checks/meaning.py`. Sums over all points decide, so that all ranks
+Warnings that follow from a job alone are in `job/meaning.py`. Sums over all points decide, so that all ranks
 agree."""
 
 import math

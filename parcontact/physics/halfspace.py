@@ -10,14 +10,14 @@ An elastic half space of shear modulus 1 under the pressure p moves by the Bouss
 For a modulus G divide by G. Lengths have any unit: displacements are in this unit times pressure over modulus. The
 kernel `spectral` uses this symbol; `love` takes the pressure as constant on each cell (`physics.love`) and the
 displacement at cell centres. The mean displacement of a periodic half space is arbitrary and set to 0. A layer on a
-rigid base (`physics.layer`) multiplies the symbol by its compliance ratio.
+rigid base (`physics.halfspace`) multiplies the symbol by its compliance ratio.
 
 A pressure wave `exp(i q x)` that moves with the surface at the velocity v loads a point of a viscoelastic body at
 the angular frequency `-q v`, so that in the frame of the surface
 
     u^(q) = (1 - nu)/(|q| G*(-q v)) p^(q).
 
-The wake of an isolated contact is not periodic: its influence coefficients are integrals along it (`physics.wake`).
+The wake of an isolated contact is not periodic: its influence coefficients are integrals along it (`physics.love`).
 
 A layer on a rigid base: the ratio of the displacement of its surface to that of a half space.
 
@@ -198,7 +198,7 @@ class HalfSpace:
     """A half space of shear modulus 1, loaded inside a box of `size = (lx, ly)` [any unit of length].
 
     With `free`, nothing surrounds the box, and the coefficients are Love's; with `repeats_along_x` the box is
-    periodic along x only (`physics.strip`). Otherwise the box is periodic, with the `kernel`. `fft` parameters of
+    periodic along x only (`physics.love`). Otherwise the box is periodic, with the `kernel`. `fft` parameters of
     methods are transforms of maps; operators compute in their precision, and symbols have their shape, or the shape
     of the requested rows. A free half space makes its own padded transform for each operator. `factors` multiply the
     storage and the loss modulus of waves in steady sliding, by wavenumber; None for a linear body.
@@ -255,7 +255,7 @@ class HalfSpace:
         At q = 0, where a periodic half space has no inverse, it has the value of the smallest wavenumber, which
         keeps it positive. Waves on a layer that are longer than its softest one get the stiffness of this one: they
         would join patches of contact. Their higher stiffness within patches is left to
-        `solve.preconditioner.long_waves`.
+        `contact.preconditioner`.
         """
         q = np.hypot(*wavenumbers(fft, self.size, rows))
         q[q == 0.0] = 2 * np.pi / max(self.size)

@@ -275,7 +275,7 @@ def displace(h, rows, along_x, along_y, out):
 @loop
 def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
     """Advance all waves of heat, put the spectrum of the temperature into `out`, and store the present sources. Return
-    the sum of the temperature at depth times the pressure (`effects.heat.heat_memory`), without the mean.
+    the sum of the temperature at depth times the pressure (`effects.heat.solver`), without the mean.
 
     `known` has rates, weights, shares of heat at depth, decays and the end of the sum; `spread` the squared
     wavenumbers times the diffusivity, and the multiplicity of columns; `sources` the spectra of rubbing and

@@ -15,7 +15,7 @@ Between two rows F and s are Hermite's cubics with slopes by differences. The er
 * by this interpolation: that over pairs of steps, of an order of at least three;
 * where something slides, the error of friction, weighted with the force;
 * else by the length of steps: that of a harmonic motion with these steps (`prony.discrete_modulus`), times HARMONICS;
-* by the solver, as for the area (`accuracy.sources`), over the root of the number of steps, and over sin phase, as the
+* by the solver, as for the area (`march.budget`), over the root of the number of steps, and over sin phase, as the
   loop is the small difference of two paths; and by the mesh, MESH of the error of the area."""
 
 import math

@@ -56,7 +56,7 @@ def predict(job: Job, slab: Slab, gamma: float, waves: WavesOf) -> Iterator[Pred
 
     The waves represent the job's spectrum on an unbounded surface (`continuum`), or its heights in the box
     (`lattice`). Stages that choose their steps have the steps of the run in the job's directory; before a run, steps
-    double up to one cell (`history.chosen`). Raises InputError for jobs outside the theory.
+    double up to one cell (`job.history`). Raises InputError for jobs outside the theory.
     """
     _refuse_unknown(job)
     timeline = Timeline.from_job(job).follow(_times_of_run(job))

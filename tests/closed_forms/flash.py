@@ -11,7 +11,7 @@ with conductivity kappa and diffusivity D: the kernel of B. N. J. Persson, J. Ph
 writes it for the power per volume. He sums it over all waves of the spectrum, each under its own temperature; that sum
 is no closed form. Here the heat of one wave is made in the contact only, while it stays there; the mean of all heat of
 the slide comes on top. Strains below a wave on an incompressible body are deeper than this density, 3/(2 q) in the mean
-(`effects.heat.heat`): a wave of 3/8 of the wavenumber is as warm at once, and nearly as deep. Arguments are in SI
+(`effects.heat.solver`): a wave of 3/8 of the wavenumber is as warm at once, and nearly as deep. Arguments are in SI
 units and broadcast.
 """
 

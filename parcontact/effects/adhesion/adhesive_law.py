@@ -209,7 +209,7 @@ class AdhesiveLaw:
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[AdhesiveMemory]:
-        """Solve a step from the last gap; see `effects.contact_protocol.ContactLaw.solve`. Solves have the tolerance of
+        """Solve a step from the last gap; see `effects.effect.ContactLaw.solve`. Solves have the tolerance of
         the job. If the surfaces detach and the job continues, they are moved far from each other."""
         law, path = self.law(trial.alpha), self._path(trial, control, past, before)
         walk = self._walk(law, memory, step, trial, path, past.spare)

@@ -1,4 +1,4 @@
-"""Heat of sliding: temperatures of the rubber below the contact (`effects.heat.heat`, `effects.heat.heat_memory`)."""
+"""Heat of sliding: temperatures of the rubber below the contact (`effects.heat.solver`, `effects.heat.solver`)."""
 
 from __future__ import annotations
 

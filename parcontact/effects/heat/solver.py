@@ -25,10 +25,10 @@ A uniform heat has no steady state: after a sliding time t it has warmed a cold 
 effusivity `e = kappa/sqrt(D)`, and each wave by `erf(beta sqrt(D t))` times (1). For an infinite time, temperatures in
 a periodic box are relative to its mean.
 
-Temperature of the surface of a conducting half space under heat that changes with time: `effects.heat.heat` in time
+Temperature of the surface of a conducting half space under heat that changes with time: `effects.heat.solver` in time
 steps.
 
-Each wave (j, k) of the sum of exponentials (`physics.exponentials`), along the depth and along the surface, satisfies
+Each wave (j, k) of the sum of exponentials (`physics.prony`), along the depth and along the surface, satisfies
 
     dc/dt = -(m_j^2 + D k^2) c + q^(k, t) g_j,     T^(k) = sum_j w_j c_j/e,                                       (1)
 
@@ -38,7 +38,7 @@ at the depths where this heat is released is `sum_j w_j g_j c_j/e`.
 
 The mean of the box (k = 0) has its own sum, of numbers, exact to 1e-9 at any time, so that no heat is lost.
 
-Heat that slides over a free half space: influence coefficients for `effects.heat.heat`.
+Heat that slides over a free half space: influence coefficients for `effects.heat.solver`.
 
 A uniform heat on one cell of `dx x dy`, while the body passes below it with the velocity -v, warms the distance (x,
 y) from the cell by the heat of all earlier times t,

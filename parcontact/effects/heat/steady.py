@@ -7,7 +7,7 @@ Temperatures of bands: the rise in each band by its own heat and by that of all 
 
 Heat of a band lies where its waves strain the rubber, and is distributed over the contact in proportion to the
 pressure. With waves cos(m z) along the depth, in which the heat of band i and the temperature of band k have the
-shares g_i(m) and g_k(m) of `effects.heat.heat`, 1 on the surface, the rise of band k is
+shares g_i(m) and g_k(m) of `effects.heat.solver`, 1 on the surface, the rise of band k is
 
     T_k = sum_i h_i 2/pi int g_i g_k (S(m) + sum_(j <= i, k) S_j(m)) dm,
 

@@ -1,4 +1,4 @@
-"""Interface friction: a shear stress on the area in contact (`physics.interface_friction`)."""
+"""Interface friction: a shear stress on the area in contact (`physics.motion`)."""
 
 from __future__ import annotations
 

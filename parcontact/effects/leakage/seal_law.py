@@ -95,7 +95,7 @@ class SealLaw:
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[SealMemory]:
-        """Solve a step; see `effects.contact_protocol.ContactLaw.solve`. With a pressure of the fluid, solves have the
+        """Solve a step; see `effects.effect.ContactLaw.solve`. With a pressure of the fluid, solves have the
         tolerance of the job, at most SHARP."""
         assert self._dry is not None
         drop, (share, gap) = drop_at(self.scene.job, step.stage, step.time), memory.spare

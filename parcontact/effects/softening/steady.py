@@ -228,7 +228,7 @@ class StrainLoop:
 
     def solve(self, sliding: Any, solve: Callable[[Vector, float], Point], velocity: Vector, pressure: float) -> Point:
         """Return the steady state with the moduli at its strain; collective. `solve` solves one with the `setup` of
-        `sliding`, a `steady_sliding.sliding.SteadySliding`. Raises RunError."""
+        `sliding`, a `march.steady.SteadySliding`. Raises RunError."""
         points, rounds = list[Point](), list[Round]()
 
         def once(softened: Softened) -> Round:

@@ -10,7 +10,7 @@ there are no tractions, and the highest strength bounds them.
 
 A point in contact slips by `s = D - u`: its slip grows along t where `|t| = f`, and is constant where `|t| < f`. In an
 incompressible half space tractions and pressures move the surface independently of each other
-(`effects.stick.shear_operator`), so that the tractions of a step follow from its pressures. The body obeys the law of
+(`effects.stick.solver`), so that the tractions of a step follow from its pressures. The body obeys the law of
 `physics.body` in both components,
 
     A t = G_inf u + sum_k h_k,

@@ -29,7 +29,7 @@ sum of |t|: of the traction that the slip w gives, `sum |P(t + kappa w) - t|` wi
 of the change in step 3, where K measures residuals of all wavelengths. It is 0 for the solution alone, and the
 relative error of tractions where K is close. Over many small steps errors of each would add up, as points slip by
 them. So it must also be below a share of the change of t since the last step, but for a tenth of the tolerance. For
-the related constraint p >= 0 the method is that of `solve.contact`.
+the related constraint p >= 0 the method is that of `contact.solver`.
 
 Fused loops over tractions that are bounded at each point; each returns partial sums for one reduction.
 
