@@ -54,12 +54,12 @@ def rows_of(road: RoadHistory) -> list[StepRow]:
 def test_one_band_is_a_run_on_its_grid() -> None:
     """With the same heights and steps: to the tolerance of solves, 1e-5, over the share in contact. A band
     leaves out the force across the sliding, which is 0 on average."""
-    changes = {"bands": {"count": 1, "points": 32, "samples": 1}, "numerics": {"tolerance": 1e-5}}
+    changes: dict[str, Any] = {"bands": {"count": 1, "points": 32, "samples": 1}, "numerics": {"tolerance": 1e-5}}
     road = history(**changes)
     rows = rows_of(road)
     heights, grid = on_a_grid(road, 0)
     stages = [
-        {"pressure": 1e5, "velocity": part.speed, "duration": part.seconds, "time_step": dict(part.time_step)}
+        {"pressure": 1e5, "velocity": part.speed, "duration": part.seconds, "time_step": part.time_step}
         for part, _ in Band(road.job, road.cut, 0, 0).parts
     ]
     _, direct = marched({**JOB, **changes, "surface": heights, "grid": grid, "bands": None, "history": stages})
@@ -111,8 +111,7 @@ def test_a_slide_comes_to_the_steady_bands() -> None:
     )
     for found, expected, stated in pairs:
         assert found == pytest.approx(expected, rel=min(stated, 0.05))
-    calls = road.track(0, 0)[0].operator_calls
-    assert calls.mean() <= 15.0
+    assert np.mean(road.track(0, 0)[0].operator_calls) <= 15.0
 
 
 STEADY = {"velocities": [1.0], "pressures": [1e5]}
