@@ -266,6 +266,27 @@ def test_bands_in_full_contact(hurst: float, slope: float, ratio: float) -> None
     assert frictions[1] / frictions[0] == pytest.approx(ratio, rel=0.03)
 
 
+@pytest.mark.parametrize(("hurst", "slope", "ratio"), [(0.8, 0.1, 0.698), (0.5, 1.0, 0.331)])
+def test_octaves_on_one_grid_in_full_contact(hurst: float, slope: float, ratio: float) -> None:
+    """The same spectra on one profile of four longest waves, with one strain an octave: within 3 % of finite elements.
+    One longest wave would stand for an octave of them."""
+    frictions = []
+    for table in (None, TABLE):
+        data: Json = {
+            "grid": {"points": [16384, 1], "size": [4e-3, 1e-3 / 4096]},
+            "surface": {
+                **{"shape": "rough", "hurst": max(hurst - 0.5, 1e-3), "rms_slope": slope, "amplitudes": "fixed"},
+                **{"long_wavelength": 1e-3, "short_wavelength": 1e-6, "seed": 1},
+            },
+            "material": POWER_LAW,
+            "steady": {"velocities": [SPEED], "pressures": [1e8]},
+            "numerics": {"accuracy": 0.02},
+        }
+        job = jobs.load({**data, **({"softening": {"table": table}} if table else {})})
+        frictions.append(SteadySliding(scene.set_up(job, Slab.alone(16384, 1))).solve((SPEED, 0.0), 1e8).friction)
+    assert frictions[1] / frictions[0] == pytest.approx(ratio, rel=0.03)
+
+
 def test_partial_contact_in_bands_and_on_one_grid() -> None:
     """Friction of two bands, with a strain each, within the stated error of one grid of all waves with one per octave;
     softening raises friction, as the area grows."""
