@@ -97,6 +97,9 @@ def reduced(data: Json) -> Json:
     if found.get("bands"):
         found["bands"] = {"samples": 1}
         found["surface"] = [part for part in _list(found["surface"]) if part["shape"] != "topography"]  # 128 x 128
+        if found.get("sweep") and not found.get("history"):
+            found["bands"]["count"] = 2
+            found["surface"] = [{**part, "short_wavelength": part["long_wavelength"] / 16} for part in found["surface"]]
         if found.get("history"):
             found["bands"]["count"] = 1 if found.get("sweep") else 2
             found["surface"] = [{**part, "short_wavelength": part["long_wavelength"] / 4} for part in found["surface"]]
