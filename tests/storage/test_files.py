@@ -218,6 +218,16 @@ def test_wisdom_of_a_checkpoint(cache: Path) -> None:
     assert kept.stat().st_mtime_ns == before
 
 
+def test_more_wisdom_replaces_less(cache: Path) -> None:
+    """A trial of few steps plans fewer transforms than a run; those that are missing would be chosen anew each time."""
+    slab = Slab.alone(16, 4)
+    wisdom.keep(["a"], slab)
+    (kept,) = (cache / "parcontact" / "plans").iterdir()
+    kept.write_bytes(b"less")
+    wisdom.keep(["a"], slab)
+    assert kept.read_bytes() == wisdom.gather(slab).tobytes()
+
+
 # -- which points of a friction curve are asked for, and which its table lacks ----------------------------------------
 
 
