@@ -64,7 +64,7 @@ def open_text(path: Path) -> TextIO:
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a file writes its rows: the `mark` between cells (None for blanks), decimal commas, and whether every row
+    """Form of the rows of a file: the `mark` between cells (None for blanks), decimal commas, and whether every row
     begins or ends with a mark."""
 
     mark: str | None

@@ -1,1 +1,1 @@
-"""What users call: verbs of the command line, the Python interface, and the manual."""
+"""The door holds the verbs of the command line, the Python interface, and the manual."""

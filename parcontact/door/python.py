@@ -1,4 +1,4 @@
-"""The public Python interface beside `Simulation`: curves, results, surfaces and materials.
+"""The public Python interface without `Simulation`: curves, results, surfaces and materials.
 
 Steady sliding from Python: friction curves.
 

@@ -163,7 +163,7 @@ class Results:
 
     @cached_property
     def detached(self) -> str:
-        """How the surfaces of a run detached for good; '' if they did not."""
+        """The way in which the surfaces of a run detached for good, as text; '' if they did not."""
         return self._detached or tables.detached(self.path)
 
     @property
@@ -211,7 +211,7 @@ class Results:
 
     @property
     def unfinished(self) -> list[str]:
-        """What was asked for and is missing, with reasons: points of a curve, cases of a sweep, steps of a run."""
+        """The missing results with reasons: points of a curve, cases of a sweep, steps of a run."""
         if self.kind == "sweep":
             return [*self.failed_cases(), *self._cases_to_go()]
         return list(self._lost_points() if self.kind == "curve" else self._steps_to_go())
@@ -310,7 +310,7 @@ class Results:
 
     @property
     def progress(self) -> str:
-        """How far a run or a curve is, as text; '' before its first row."""
+        """The progress of a run or a curve, as text; '' before its first row."""
         job = self.job
         if self.kind == "run" and job is not None and self.table["time"]:
             whole = sum(stage.seconds for stage in job.history)

@@ -1,4 +1,4 @@
-"""What ranks send each other: rows go to those that want them, only transforms send from all to all."""
+"""Messages of ranks: rows go to those that want them, only transforms send from all to all."""
 
 from collections import Counter
 from typing import Any

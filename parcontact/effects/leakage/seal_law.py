@@ -63,7 +63,7 @@ class SealMemory:
 
 
 class _Verdict(NamedTuple):
-    """Whether rounds have settled, or the seal lifts off; and the relative change of the flow in the last round."""
+    """Verdict on the last round: the rounds have settled, or the seal lifts off; the flow changed by `change`."""
 
     settled: bool
     lifted: bool

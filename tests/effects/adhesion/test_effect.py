@@ -205,7 +205,7 @@ def test_a_range_above_the_roughness() -> None:
 
 
 def test_a_range_that_follows_the_cells_is_not_asked_to() -> None:
-    """Of `auto`, cells of 6.25e-6 m make a range of 0.5 um or so, which is far above a wave of 10 nm."""
+    """With `auto`, cells of 6.25e-6 m make a range of 0.5 um or so, which is far above a wave of 10 nm."""
     wave, stated = {"shape": "wave", "amplitude": 1e-8, "waves": [4, 0]}, []
     for reach in ("auto", 1e-6):
         one = ball(surface=wave, grid={"points": 64, "size": 4e-4}, adhesion={"work": 0.05, "range": reach})

@@ -269,7 +269,7 @@ def test_the_theory_takes_the_pair() -> None:
 
 
 def test_editors_know_its_keys() -> None:
-    """Those of `material`, with `include`."""
+    """The counterbody takes the forms of `material`, with `include`."""
     found = json_schema()["properties"]
     assert found["counterbody"]["anyOf"][0] == found["material"]["anyOf"][0]
     kinds = [set(re.findall(r"defs/(\w+)", str(found[name]["anyOf"][1]))) for name in BODIES]
