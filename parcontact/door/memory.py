@@ -33,7 +33,7 @@ from ..effects.effect import EXTRAPOLATION
 from ..errors import InputError, RunError
 from ..files import wisdom
 from ..job import Job
-from ..job.history import Timeline
+from ..job.history import MadeStep, Timeline
 from ..job.listing import plain_data
 from ..job.meaning import machines
 from ..march import scene, steady
@@ -439,6 +439,7 @@ def _try(march: March, seconds: float) -> list[StageCost]:
     """Return the costs of all stages; root's clock decides for all ranks."""
     slab, began, timeline = march.scene.slab, time.process_time(), march.timeline()
     stages = [StageCost(span.jumps + span.count) for span in timeline.spans]
+    estimates = dict[int, int]()
     with suppress(OutOfTimeError):
         for step in march.steps(timeline):
             stage, span = stages[step.stage], timeline.spans[step.stage]
@@ -448,15 +449,22 @@ def _try(march: March, seconds: float) -> list[StageCost]:
                     break
                 rest = span.leap(step.number, span.last)
                 if timeline.chooses and span.stage.chooses:  # the stage ends with this step, whatever its number
-                    rest = rest._replace(number=step.number, passed=0)
+                    estimates[step.stage] = span.jumps + span.count
+                    record = MadeStep(step.stage, span.stage.seconds, step.dt)
+                    rest = rest._replace(number=step.number, passed=0, decide=partial(_accept, record))
                 march.advance(rest)
                 continue
             stage.steps -= step.passed
             stage.add(_cost(slab, partial(march.advance, step)))
-    for stage, span in zip(stages, timeline.spans, strict=True):
+    for index, (stage, span) in enumerate(zip(stages, timeline.spans, strict=True)):
         if timeline.chooses and span.stage.chooses:  # steps chosen so far, and an estimate of the others
-            stage.steps = span.jumps + span.count
+            stage.steps = estimates.get(index, span.jumps + span.count)
     return stages
+
+
+def _accept(record: MadeStep, *_: float) -> MadeStep:
+    """Accept a step whatever its errors are."""
+    return record
 
 
 def _cost(slab: Slab, call: Callable[[], object]) -> dict[str, float]:

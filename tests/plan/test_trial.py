@@ -1,6 +1,7 @@
 """What a plan tries: steps and steady states that stand for others, also on coarser grids; counts, never times."""
 
 import itertools
+import math
 import time
 from functools import partial
 
@@ -12,7 +13,7 @@ from parcontact.door import memory
 from parcontact.door.memory import FEWEST, StageCost, Trial, try_job
 from parcontact.job import Job
 from parcontact.job.history import Timeline
-from parcontact.march import scene
+from parcontact.march import scene, steady
 from parcontact.march.choices import choices
 from parcontact.march.steady import SteadySliding
 from parcontact.parallel.slab import Slab
@@ -143,3 +144,16 @@ def test_steady_states_are_tried_as_they_are_solved(comm: MPI.Intracomm) -> None
     assert seen.steps == seen.tried == 8
     for count in ("fft", "allreduce", "operator"):
         assert seen.total(count) == spent[count]
+
+
+def test_a_stage_that_chooses_its_steps_ends_with_a_long_one(comm: MPI.Intracomm) -> None:
+    """Each stage but the last ends after a few steps, and those of the next begin there."""
+    slide = {"pressure": 1e4, "velocity": 0.1, "distance": 2.5e-4}
+    march = steady.first(
+        job(material=TWO, history=[{"pressure": 1e4, "duration": 1e-2}, slide]), memory.TimedSlab(comm, 48, 40)
+    )
+    march.scene.slab.end = math.inf
+    press, _ = memory._try(march, 0.0)
+    first, second = (span.ends.made for span in march.timeline().spans)
+    assert press.tried == FEWEST == len(first) < press.steps  # a jump, and the long step in place of it
+    assert (first[-1], len(second)) == (pytest.approx(1e-2), FEWEST)
