@@ -370,7 +370,7 @@ def _finite(path: Path, number: int, cell: str, name: str, dialect: Dialect) -> 
 
 HEADER_BYTES = 1_000_000  # largest header of an .npy file [bytes]
 TEXTS = (".txt", ".xyz", ".csv", ".dat", ".asc")
-OWN_FORMATS = (".npy", *TEXTS)  # formats of maps; SurfaceTopography reads others
+OWN_FORMATS = (".npy", ".h5", ".mat", *TEXTS)  # formats of maps; SurfaceTopography reads others
 LOWEST, HIGHEST = 1e-70, 1e70  # rounding: range of the largest height [m] whose fourth power does not overflow
 
 

@@ -1,13 +1,17 @@
-"""Read measured maps and line scans: `.npy` and tables of text; all other formats by SurfaceTopography, if installed.
+"""Read measured maps and line scans. Each format has one reader, whatever is installed.
 
-Heights point up, out of the road: the highest points touch first."""
+Arrays (`.npy`, `.h5`, `.mat`) and texts of numbers are read here; formats of instruments, and texts whose header gives
+the size or the unit as instruments write them, by SurfaceTopography. Heights point up, out of the road: the highest
+points touch first."""
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from .. import text_tables
@@ -19,8 +23,9 @@ from . import Topography
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9}
 UNITS |= {"km": 1e3, "cm": 1e-2, "Å": 1e-10, "A": 1e-10, "pm": 1e-12, "in": 0.0254}
 TO_GIVE = "m | mm | um | nm"  # as a job writes them; files may have the others
-OF_NUMPY = ("npy", "npz")  # formats that SurfaceTopography reads with the first axis along x
-ROWS_ALONG_X = ("h5", "mat")  # arrays without axes, whose first index is of x for SurfaceTopography and of y here
+SIZED = r"(?i)\b(width|height|[xy]-(length|unit|pixels)|pixel[_ ]size|(unit|scale) [xy]|wyko ascii|file format)\b"
+ARRAYS = ("npy", "npz", "h5", "mat")  # formats without axes: SurfaceTopography has x first, and y is first here
+NUMBERS = ("xyz", "asc")  # its names of texts
 LARGEST_FILE = 4_000_000_000  # tuning: largest file of a map [bytes]
 IRREGULAR = 0.1  # accuracy: largest relative difference between steps of rounded positions
 FEWEST = 4  # tuning: least points along a direction
@@ -61,7 +66,7 @@ def read_map(part: Topography) -> Map:
         if path.stat().st_size > LARGEST_FILE:
             raise InputError(f"{path} has more than {LARGEST_FILE / 1e9:g} GB; crop the map first")
         ending = path.suffix.lower()
-        readers = {".npy": _array, **dict.fromkeys(text_tables.TEXTS, _text)}
+        readers = {".npy": _array, ".h5": _hdf5, ".mat": _matlab, **dict.fromkeys(text_tables.TEXTS, _text)}
         found = _in_metres(part, readers.get(ending, _instrument)(part))
     except InputError:
         raise
@@ -108,9 +113,37 @@ def _array(part: Topography) -> MapContents:
     return MapContents(text_tables.open_numbers(part.path))
 
 
+def _hdf5(part: Topography) -> MapContents:
+    found: dict[str, Any] = {}
+    with h5py.File(part.path) as file:
+        file.visititems(lambda name, node: found.update({name: node}))
+        return _named_array(part, found)
+
+
+def _matlab(part: Topography) -> MapContents:
+    import scipy.io  # slow import
+
+    return _named_array(part, scipy.io.loadmat(part.path))
+
+
+def _named_array(part: Topography, found: dict[str, Any]) -> MapContents:
+    """Return the array that the job names, or else the first one, of those with numbers and two axes."""
+    flat = {name: each for name, each in found.items() if len(getattr(each, "shape", ())) == 2}
+    maps = {name: each for name, each in flat.items() if each.size and each.dtype.kind in "biuf"}
+    _check_channel(part, list(maps))
+    return MapContents(maps[part.channel or next(iter(maps))][()])
+
+
+def _check_channel(part: Topography, names: list[str]) -> None:
+    """Raise InputError unless a file has a channel, and that of the job."""
+    if not names:
+        raise InputError(f"{part.path} has no channel of heights")
+    if part.channel not in (None, *names):
+        raise InputError(f"{part.path} has no channel {part.channel!r}; it has {', '.join(map(str, names))}")
+
+
 def _text(part: Topography) -> MapContents:
-    """Read a matrix of heights, rows of x, y, z, an ESRI grid, or a line (rows of x, z or z); a text with any other
-    header is read by SurfaceTopography."""
+    """Read a matrix of heights, rows of x, y, z, an ESRI grid, or a line (rows of x, z or z)."""
     path = part.path
     with text_tables.open_text(path) as file:
         head, rows = text_tables.number_rows(path, file)
@@ -118,9 +151,7 @@ def _text(part: Topography) -> MapContents:
         first = next(rows, None)
         columns = len(first[1]) if first else 0
         esri = {line.split()[0].lower(): line.split()[1:] for line in head}
-        comments = not any(text_tables.COMMENT.sub("", line) for line in head)
-        known = comments and part.unit_of_heights and (part.size or part.pixel)
-        if first is None or (head and columns > 3 and "cellsize" not in esri and not known):
+        if first is None or (columns > 3 and "cellsize" not in esri and re.search(SIZED, "\n".join(head))):
             return _instrument(part)
         table = _table(path, chain([first], rows), columns in (2, 3))
     if "cellsize" in esri:  # an ESRI grid, whose first row has the largest y
@@ -199,13 +230,15 @@ def _instrument(part: Topography) -> MapContents:
         raise InputError(
             f"{path} cannot be read: it is damaged, or in a format that SurfaceTopography does not know"
         ) from error
-    if reader.format() in OF_NUMPY:
-        raise InputError(f"{path} may have x or y first; save its array by numpy.save as .npy, whose rows are along x")
-    names = [found.name for found in reader.channels]
-    if not names or (reader.format() == "hgt" and path.suffix.lower() != ".hgt"):  # this reader accepts any file
-        raise InputError(f"{path} has no channel of heights")
-    if part.channel is not None and part.channel not in names:
-        raise InputError(f"{path} has no channel {part.channel!r}; it has {', '.join(map(str, names))}")
+    kind, ending = reader.format(), path.suffix.lower()
+    if kind in ARRAYS or (kind in NUMBERS and ending not in text_tables.TEXTS):
+        raise InputError(
+            f"{path} holds an array or a text of numbers: rename it to end in {', '.join(text_tables.OWN_FORMATS)}; "
+            "save an array of another kind by numpy.save, with rows along x"
+        )
+    accepts_any = kind == "hgt" and ending != ".hgt"
+    names = [] if accepts_any else [found.name for found in reader.channels]
+    _check_channel(part, names)
     chosen = reader.channels[names.index(part.channel)] if part.channel is not None else reader.default_channel
     size = chosen.physical_sizes
     unsized = size is None and chosen.is_uniform
@@ -216,8 +249,7 @@ def _instrument(part: Topography) -> MapContents:
         places = np.linspace(x[0], x[-1], len(x))
         return MapContents(np.interp(places, x, z), unit, (places[1] * len(x) - x[0] * len(x),), unit)
     heights = np.ma.filled(np.ma.masked_invalid(topography.heights()), np.nan)
-    heights = heights if reader.format() in ROWS_ALONG_X else heights.T
-    return MapContents(heights, unit, None if size is None else tuple(topography.physical_sizes), unit)
+    return MapContents(heights.T, unit, None if size is None else tuple(topography.physical_sizes), unit)
 
 
 def _scale(path: Path, unit: Any) -> float:

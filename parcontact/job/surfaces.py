@@ -270,7 +270,7 @@ class MapUnits(Part):
 
 
 class Topography(Part):
-    """A measured map of heights, in any format that SurfaceTopography reads, or .npy and text.
+    """A measured map of heights, in any format that SurfaceTopography reads, or .npy, .h5, .mat and text.
 
     The part of the map around `centre` that is as large as the box is levelled, filled, made periodic and resampled to
     the grid.

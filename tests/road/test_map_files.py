@@ -1,6 +1,7 @@
 """Maps from files: all formats give the same map, and what will not do is one sentence."""
 
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -169,15 +170,15 @@ def test_a_word_between_blanks(tmp_path: Path) -> None:
     assert np.argwhere(np.isnan(read(tmp_path / "road.xyz", "um").heights)).tolist() == [[3, 5]]
 
 
-@pytest.mark.parametrize("ending", ["h5", "mat"])
-def test_arrays_without_axes(tmp_path: Path, ending: str) -> None:
-    """Rows are along x, as in .npy and in a height file."""
-    if ending == "h5":
-        with h5py.File(tmp_path / "road.h5", "w") as file:
-            file["heights"] = HEIGHTS
-    else:
-        scipy.io.savemat(tmp_path / "road.mat", {"heights": HEIGHTS})
-    assert np.array_equal(read(tmp_path / f"road.{ending}", "m", SIZE).heights, HEIGHTS)
+def test_the_array_that_the_job_names(tmp_path: Path) -> None:
+    """The first one with numbers and two axes, or that of `channel`, also in a group; rows are along x, as in .npy."""
+    with h5py.File(tmp_path / "road.h5", "w") as file:
+        file["area"], file["heights"], file["more/heights"] = 1.0, HEIGHTS, 2.0 * HEIGHTS
+    scipy.io.savemat(tmp_path / "road.mat", {"name": "road", "heights": HEIGHTS, "more/heights": 2.0 * HEIGHTS})
+    for ending in ("h5", "mat"):
+        path = tmp_path / f"road.{ending}"
+        assert np.array_equal(read(path, "m", SIZE).heights, HEIGHTS)
+        assert np.array_equal(read(path, "m", SIZE, "more/heights").heights, 2.0 * HEIGHTS)
 
 
 def test_a_file_of_matlab_7_3_is_refused(tmp_path: Path) -> None:
@@ -185,8 +186,8 @@ def test_a_file_of_matlab_7_3_is_refused(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "road.mat", "w", userblock_size=512) as file:
         file["heights"] = HEIGHTS.T
     with (tmp_path / "road.mat").open("r+b") as start:
-        start.write(b"MATLAB 7.3 MAT-file".ljust(512))
-    with pytest.raises(InputError, match=r"road\.mat has no channel of heights"):
+        start.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM")
+    with pytest.raises(InputError, match=r"road\.mat cannot be read: .* matlab v7\.3"):
         read(tmp_path / "road.mat", "m", SIZE)
 
 
@@ -220,6 +221,10 @@ def test_positions_given_twice_are_refused(tmp_path: Path) -> None:
 
 
 def save(path: Path, values: object) -> None:
+    if path.suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            file["heights"] = values
+            return
     with path.open("wb") as file:
         np.save(file, np.asarray(values), allow_pickle=True)
 
@@ -279,7 +284,15 @@ BAD = {
         "positions along x are not equally spaced",
     ),
     "a size twice": ("road.xyz", SQUARE, ("m", SIZE, None), "leave out size"),
-    "an array in a file of another name": ("road.npz", HEIGHTS, ("m", SIZE, None), "may have x or y first; save its"),
+    "an array in a file of another name": (
+        "road.npz",
+        HEIGHTS,
+        ("m", SIZE, None),
+        "save an array of another kind by numpy.save",
+    ),
+    "numbers in a file of another name": ("road.map", rows(), ("um", None, None), "rename it to end in .npy, .h5"),
+    "a channel that HDF5 lacks": ("road.h5", HEIGHTS, ("m", SIZE, "Gloss"), "has no channel 'Gloss'; it has heights"),
+    "the size of a header, twice": ("headed.txt", None, ("um", SIZE, None), "leave out size"),
     "a unit twice": ("road.nc", None, ("mm", None, None), "leave out unit"),
     "its size twice": ("road.nc", None, (None, SIZE, None), "leave out size"),
     "an unknown channel": ("road.nc", None, (None, None, "Gloss"), "has no channel 'Gloss'; it has Default"),
@@ -322,11 +335,20 @@ def test_half_a_file(tmp_path: Path, ending: str) -> None:
         read(path, None, None, None)
 
 
-def test_what_is_not_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import sys
+READ_WITHOUT = ("road.npy", "road.h5", "road.mat", "road.txt", "road.xyz", "noted.csv")
 
-    write(tmp_path)
+
+@pytest.mark.parametrize("name", [*READ_WITHOUT, "road.x3p", "headed.txt"])
+def test_numbers_do_not_depend_on_what_is_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """Without SurfaceTopography a map is the same to the last digit, or is refused; headers without a size are text."""
+    _, unit, size = {"noted.csv": (None, "um", SIZE), **write(tmp_path)}.get(name, (None, "um", SIZE))
+    save(tmp_path / "road.h5", HEIGHTS * 1e6)
+    scipy.io.savemat(tmp_path / "road.mat", {"name": "road", "heights": HEIGHTS * 1e6})
+    np.savetxt(tmp_path / "noted.csv", HEIGHTS * 1e6, fmt="%.17g", delimiter=",", header="date: a day\nunit: um")
+    found = read(tmp_path / name, unit, size)
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
+    if name in READ_WITHOUT:
+        assert np.array_equal(read(tmp_path / name, unit, size).heights, found.heights)
+        return
     with pytest.raises(InputError, match="pip install 'parcontact"):
-        read(tmp_path / "road.x3p", None, None, None)
-    assert read(tmp_path / "road.npy", "um", SIZE, None).heights.shape == (16, 24)
+        read(tmp_path / name, unit, size)
