@@ -330,7 +330,7 @@ STEADY_WAVES: Table = (
     Column("wavelength", "m", "of a band of waves"),
     Column("share", "", "of friction that comes from the band"),
 )
-BANDS: Table = (
+_OF_BANDS: Table = (
     Column("velocity", "m/s", "speed"),
     Column("pressure", "Pa", "nominal mean pressure"),
     Column("temperature", "°C", "of the rubber; empty if the curve has no temperatures"),
@@ -340,12 +340,11 @@ BANDS: Table = (
     Column("friction", "", "of the waves of the band; the finest band includes the friction of an `interface`"),
     Column("contact_area", "", "share in contact with the waves of this and all coarser bands"),
     Column("rms_slope", "", "of the waves of the band"),
-    Column("flash_temperature", "K", "temperature rise of the rubber in this band; empty without `thermal`"),
     Column("load_lost", "", "share of the load at pressures above the highest one solved for the band"),
     Column("rms_slope_to", "", "of this and all coarser bands"),
     Column("strain_to", "", "rms strain of these waves in full contact, at the depth where it is largest"),
-    Column("strain_amplitude", "", "strain that softens the rubber of the band; empty without `softening`"),
 )
+BANDS: Table = (*_OF_BANDS, *_offered("BANDS"))
 
 CYCLES: Table = (
     Column("stage", "", "number of the stage, from 0"),
@@ -366,7 +365,7 @@ CYCLES: Table = (
 BANDS_OVER_TIME: Table = (
     Column("time", "s", "since the start of the history"),
     Column("distance", "m", "slid since the start"),
-    *BANDS[1:],
+    *_OF_BANDS[1:],
 )
 
 THEORY: Table = (

@@ -71,7 +71,7 @@ def case_of(number: int, seed: int, line: bool, along: int) -> tuple[dict[str, A
     shape = [points, 1] if line else points
     of_all = jobs.load({**job, "bands": {"count": 1, "points": shape}})
     band = Band(of_all, cut_bands(of_all), 0, 0)
-    band.slide((speed, 0.0), 1.0)
+    band.slide((speed, 0.0))
     text = f"{name:10} H {hurst:4} slope {slope:5.3f} v {speed:7.3g} points {points}"
     return {**job, "title": text}, points, speed, load * band.full_contact_rms
 

@@ -134,8 +134,8 @@ def _steady(job: Job) -> Json:
     point = sliding.solve(wanted.velocity(speed), pressure)
     row = {"time": 0.0, "place": 0, "weight": 1.0, "friction": point.friction}
     row |= {"area": point.measures.contact_area_corrected, "counted": point.measures.contact_area}
-    if point.flash is not None:
-        row |= {"flash_temperature": point.flash.mean, "error_flash": point.error_friction}
+    if "thermal" in point.effects:
+        row |= {"flash_temperature": point.effects["thermal"].mean, "error_flash": point.error_friction}
     (properties, observed), *_ = SEEN
     row |= {"stated": _stated(point.errors), "seen": asdict(observed)}
     return {"rows": [row], "run": _plain(properties)}

@@ -71,6 +71,7 @@ FILES = {
     "results": "results",
     "pictures": "results",
     "steady": "steady",
+    "bands": "bands",
 }  # that any capability may have, and who asks them
 
 

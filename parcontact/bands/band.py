@@ -16,9 +16,10 @@ the load is conserved. Functions linear in p would conserve it, too, but underes
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from ..contact.projected import Judge, SteadyContact
 from ..contact.splitting import Splitting
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job
+from ..job.listing import answers
 from ..job.surfaces import GivenHeights
 from ..march.budget import ErrorBudget
 from ..march.choices import choices
@@ -42,9 +44,6 @@ from ..physics.convolution import Convolution, wavenumbers
 from ..physics.roughness import Roughness
 from .band_steps import parts_of_history
 from .choice import Cut
-
-if TYPE_CHECKING:
-    from ..effects.heat.steady import Warming
 
 RUNGS, LOWEST = 14, 5e-4  # accuracy: number of rungs, and the first one over the last
 NODES = 4  # accuracy: rungs per interpolation
@@ -99,10 +98,8 @@ class Rung:
 
     Friction of its waves by energy and by slopes [-]; area as a share, counted and corrected; approach [m] (in
     `Cascade.climb` including finer bands); highest pressure [Pa]; `weights` of the rungs of the next finer band, and
-    the share of the load above them; power [W/m^2] lost in each branch; S_j and g of its heat (`heat.bands`), one 0
-    without `thermal`; squares of the strain of its waves at all depths and their weights in its strain
-    (`softening.strain`), one 0 without `softening`; relative errors of friction and area by solver and grid; residual,
-    and operator calls.
+    the share of the load above them; power [W/m^2] lost in each branch; arrays that effects `found` (`Probe`), by their
+    names; relative errors of friction and area by solver and grid; residual, and operator calls.
     """
 
     pressure: float
@@ -115,14 +112,32 @@ class Rung:
     weights: Array
     load_lost: float
     powers: Array
-    warming: Array
-    depths: Array
-    squares: Array
-    strain_weights: Array
+    found: Mapping[str, Array]
     errors: Array  # friction by solver, time steps and grid, and the same of area
     residual: float
     penetration: float
     operator_calls: float
+
+
+Means = Mapping[str, Callable[[Any], Array]]  # weights of rungs in the mean of an array, by its name: `cascade.by_load`
+
+
+class Probe(Protocol):
+    """What an effect measures in each contact of a band; modules `bands` of capabilities offer `probes` of a job and
+    its bands (`choice.Cut`). Methods are local."""
+
+    means: ClassVar[Means]
+
+    def slide(self, setup: Setup, velocity: Vector) -> None:
+        """Prepare for a velocity [m/s]."""
+
+    def measure(self, setup: Setup, contact: SteadyContact, velocity: Vector) -> Mapping[str, Array]:
+        """Return the arrays of a contact by their names."""
+
+
+def probes_of(job: Job, cut: Cut) -> list[Probe]:
+    """Return new probes of all effects of a job."""
+    return [probe for made in answers("bands", "probes") for probe in made(job, cut)]
 
 
 class Band:
@@ -146,9 +161,7 @@ class Band:
         self.parts = parts_of_history(job, grid, cut.wavelengths(number)[0])
         history = tuple(stage for stage, _ in self.parts)
         own = job.model_copy(update={"grid": grid, "surface": surface, "bands": None, "history": history})
-        self._wavenumbers = float(cut.edges[0]), float(cut.edges[-1])  # of all bands
-        self.warming: Warming | None = None
-        self._warmed_for: tuple[Vector, float] | None = None
+        self.probes = probes_of(job, cut)
         self._set_up(set_up(own, slab, measured=False))  # the same digits in every run, on any number of ranks
         self.heights = self.setup.surface.heights((0.0, 0.0), slab.empty())
 
@@ -162,24 +175,19 @@ class Band:
         """Set the temperature [deg C] of the material. Raises InputError if it has no shift."""
         self._set_up(replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature))))
 
-    def soften(self, table: Any, strain: float) -> None:
-        """Set the strain of all waves, and with it the factors of the moduli by a `StrainTable`."""
-        self._set_up(replace(self.setup, factors=table.at(strain)))
+    def set_factors(self, factors: Any) -> None:
+        """Set the factors of the moduli of each wave (`physics.halfspace.HalfSpace.factors`)."""
+        self._set_up(replace(self.setup, factors=factors))
 
-    def slide(self, velocity: Vector, seconds: float) -> None:
-        """Set the velocity [m/s] and, for heat, the time of sliding [s]."""
+    def slide(self, velocity: Vector) -> None:
+        """Set the velocity [m/s]."""
         if velocity != self._velocity:
             body, moved = self.setup.half_space, (self.setup.fft, self.setup.in_units(velocity), self.setup.prony)
             self.operator: Convolution = body.sliding_operator(*moved)
             self._inverse = body.sliding_inverse(*moved)
             self._full = float(np.std(self._inverse.apply(self.heights, self.setup.slab.empty())))
-            section = self.setup.job.section("thermal")
-            if section is not None and self._warmed_for != (velocity, seconds):
-                from ..effects.heat.steady import warming_of, waves_along_depth
-
-                waves, _ = waves_along_depth(*self._wavenumbers)
-                self.warming = warming_of(self.setup, section, seconds, velocity, waves)
-                self._warmed_for = velocity, seconds
+            for probe in self.probes:
+                probe.slide(self.setup, velocity)
             self._velocity = velocity
 
     @property
@@ -222,34 +230,12 @@ class Band:
             weights,
             above,
             branch_powers(setup, contact, velocity).sum(axis=1) / area,
-            *self._heat_of(contact.p),
-            *self._strains_of(contact.u),
+            {name: array for probe in self.probes for name, array in probe.measure(setup, contact, velocity).items()},
             rung_errors(budget),
             contact.certificate.worst,
             contact.certificate.penetration,
             float(contact.steps),
         )
-
-    def _heat_of(self, pressure: Array) -> tuple[Array, Array]:
-        """Return S_j and g of the heat for a map of pressure."""
-        if self.warming is None:
-            return np.zeros(1), np.zeros(1)
-        from ..effects.heat.steady import shares_of_depth, waves_along_depth
-
-        waves, _ = waves_along_depth(*self._wavenumbers)
-        shares = shares_of_depth(self.setup, pressure, self._velocity, waves)
-        return self.warming.apply(self.setup, pressure), shares
-
-    def _strains_of(self, u: Array) -> tuple[Array, Array]:
-        """Return the squares of strains at all depths for a displacement, and their weights."""
-        if self.setup.factors is None:
-            return np.zeros(1), np.zeros(1)
-        from ..effects.softening.steady import depths_between, strains_of
-
-        setup, all_waves = self.setup, np.zeros(self.setup.fft.shape, np.int64)
-        depths = depths_between(*self._wavenumbers) / setup.units.length
-        found = strains_of(setup, u, self._velocity, depths, all_waves, 1)
-        return found.squares, found.weights[0]
 
 
 def rung_errors(budget: ErrorBudget | None) -> Array:

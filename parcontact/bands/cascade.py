@@ -22,7 +22,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -34,7 +34,7 @@ from ..errors import InputError, RunError
 from ..files import hdf5
 from ..job import Job, listing
 from ..parallel.slab import Array, Slab
-from .band import Band, PressureLadder, Rung, Vector
+from .band import Band, PressureLadder, Rung, Vector, probes_of
 from .choice import Cut
 
 IGNORED = ("title", "steady", "output")  # sections on which no contact depends
@@ -99,13 +99,21 @@ class ContactStore:
 
 
 def _plain(rung: Rung) -> dict[str, Any]:
-    return {name: np.asarray(value).tolist() for name, value in asdict(rung).items()}
+    values = asdict(rung)
+    found = values.pop("found")
+    return {**_lists(values), "found": _lists(found)}
+
+
+def _lists(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: np.asarray(value).tolist() for name, value in values.items()}
 
 
 def _rung(numbers: dict[str, Any]) -> Rung:
-    values = [numbers[each.name] for each in fields(Rung)]
-    known: list[Any] = [np.array(value) if isinstance(value, list) else value for value in values]
-    return Rung(*known)
+    return Rung(**{**_arrays(numbers), "found": _arrays(numbers["found"])})
+
+
+def _arrays(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: np.array(value) if isinstance(value, list) else value for name, value in values.items()}
 
 
 T = TypeVar("T")
@@ -127,9 +135,9 @@ class BandResult:
     """Result of one band under a distribution of pressure.
 
     Its weights and load [Pa]; friction of its waves over the whole load [-], by energy and by slopes; area at its
-    shortest wave, counted and corrected; share of the load above its ladder; power [W/m^2] per branch; S_j and g of
-    its heat (`effects.heat.steady`), averaged over the load; squares of strains at all depths and their weights
-    (`Rung`), averaged over the power; absolute errors of friction and of area by solver, time steps and grid.
+    shortest wave, counted and corrected; share of the load above its ladder; power [W/m^2] per branch; arrays that
+    effects `found`, averaged over its rungs (`band.Probe`); absolute errors of friction and of area by solver, time
+    steps and grid.
     """
 
     weights: Array
@@ -140,11 +148,34 @@ class BandResult:
     contact_area_corrected: float
     load_lost: float
     powers: Array
-    warming: Array
-    depths: Array
-    squares: Array
-    strain_weights: Array
+    found: Mapping[str, Array]
     errors: Array
+
+
+class Shares(NamedTuple):
+    """Rungs under a distribution of pressure: their pressures and loads [Pa], the mean pressure of the road [Pa], and
+    the power of each to a common factor."""
+
+    pressures: Array
+    loads: Array
+    mean: float
+    power: Array
+
+
+def by_load(shares: Shares) -> Array:
+    """Return the weights of rungs in a mean over the load."""
+    return shares.loads / shares.loads.sum()
+
+
+def by_square(shares: Shares) -> Array:
+    """Return the weights of rungs in a mean over the square of the pressure, relative to that of the road."""
+    return shares.loads * shares.pressures / shares.mean**2
+
+
+def by_power(shares: Shares) -> Array:
+    """Return the weights of rungs in a mean over the power; 0 without power."""
+    weights = np.maximum(shares.power, 0.0)
+    return np.asarray(weights / max(float(weights.sum()), TINY))
 
 
 Results = tuple[BandResult, ...]
@@ -161,7 +192,8 @@ class Cascade:
         self.job, self.cut, self.slab, self.store = job, cut, slab, ContactStore(slab)
         self._bands: dict[tuple[int, int], Band] = {}
         self._temperatures = [math.nan] * cut.count
-        self._strains: tuple[Any, list[float]] | None = None
+        self._factors: tuple[Callable[[float], Any], list[float]] | None = None
+        self._means = {name: mean for probe in probes_of(job, cut) for name, mean in probe.means.items()}
         self.velocity: Vector = (1.0, 0.0)
         self.ladders: list[PressureLadder] = []
         self.pressure = math.nan
@@ -172,18 +204,12 @@ class Cascade:
             self._bands[number, sample] = Band(self.job, self.cut, number, sample)
             if not math.isnan(temperature := self._temperatures[number]):
                 self._bands[number, sample].set_temperature(temperature)
-            if self._strains is not None:
-                self._bands[number, sample].soften(self._strains[0], self._strains[1][number])
+            if self._factors is not None:
+                at, values = self._factors
+                self._bands[number, sample].set_factors(at(values[number]))
         found = self._bands[number, sample]
-        found.slide(self.velocity, self.seconds)
+        found.slide(self.velocity)
         return found
-
-    @property
-    def seconds(self) -> float:
-        """Time for which the rubber has slid [s]: over the distance of `thermal`, or over the box of the
-        coarsest band."""
-        section = self.job.section("thermal")
-        return ((section and section.distance) or self.cut.box) / (math.hypot(*self.velocity) or math.inf)
 
     def set_temperatures(self, temperatures: Sequence[float]) -> None:
         """Set the temperatures [deg C] of the bands; NaN for the temperature of the material."""
@@ -192,11 +218,11 @@ class Cascade:
                 band.set_temperature(temperatures[number])
         self._temperatures = list(temperatures)
 
-    def soften(self, table: Any, strains: Sequence[float]) -> None:
-        """Set the strain of each band, and with it the factors of its moduli."""
-        self._strains = table, list(strains)
+    def set_factors(self, at: Callable[[float], Any], values: Sequence[float]) -> None:
+        """Set the factors of the moduli of each band, which are those `at` a value of the band."""
+        self._factors = at, list(values)
         for (number, _), band in self._bands.items():
-            band.soften(table, strains[number])
+            band.set_factors(at(values[number]))
 
     def press(self, velocity: Vector, pressure: float) -> None:
         """Set the velocity [m/s] and the mean pressure [Pa]."""
@@ -246,6 +272,7 @@ class Cascade:
         energy = np.array([rung.friction for rung in rungs])
         areas = weights * [rung.contact_area_corrected for rung in rungs]
         errors = np.array([rung.errors for rung in rungs])
+        shares = Shares(ladder.rungs, loads, self.pressure, loads * energy)
         return BandResult(
             weights,
             float(loads.sum()),
@@ -255,11 +282,7 @@ class Cascade:
             min(float(areas.sum()), 1.0),
             0.0,
             np.sum([w * rung.powers for w, rung in zip(weights, rungs, strict=True)], axis=0),
-            np.sum([w * rung.warming for w, rung in zip(loads * ladder.rungs, rungs, strict=True)], axis=0)
-            / self.pressure**2,
-            np.sum([w * rung.depths for w, rung in zip(loads / loads.sum(), rungs, strict=True)], axis=0),
-            _mean_over(loads * energy, [rung.squares for rung in rungs]),
-            _mean_over(loads * energy, [rung.strain_weights for rung in rungs]),
+            {name: mean(shares) @ np.array([rung.found[name] for rung in rungs]) for name, mean in self._means.items()},
             np.array([*((loads * energy) @ errors[:, :3] / self.pressure), *(areas @ errors[:, 3:])]),
         )
 
@@ -281,7 +304,7 @@ class Cascade:
     def solve_tasks(self, tasks: Sequence[Task]) -> list[Rung]:
         """Return the solved contacts in the order of the tasks. Raises RunError on all ranks if one is not found."""
         laws = [(task.law.pressures.tobytes(), task.law.closings.tobytes()) for task in tasks]
-        here = self.velocity, self.pressure, self._temperatures, self._strains and self._strains[1]
+        here = self.velocity, self.pressure, self._temperatures, self._factors and self._factors[1]
         states = [(here, task[:3], law) for task, law in zip(tasks, laws, strict=True)]
         return self.store.find(states, lambda lacking: self.share([tasks[number] for number in lacking], self._solve))
 
@@ -312,12 +335,6 @@ class Cascade:
         return self.band(task.band, task.sample).solve(pressure, task.law, below)
 
 
-def _mean_over(power: Array, each: Sequence[Array]) -> Array:
-    """Return the mean of arrays of rungs, weighted by their power; 0 without power."""
-    weights = np.maximum(power, 0.0)
-    return np.asarray(weights @ np.array(each) / max(float(weights.sum()), TINY))
-
-
 def mean_rungs(found: Solved, band: int, samples: Sequence[int]) -> list[Rung]:
     """Return the rungs of a band, averaged over samples."""
     each = zip(*(found[band, sample] for sample in samples), strict=True)
@@ -329,7 +346,13 @@ def _mean(rungs: Sequence[Rung]) -> Rung:
         return rungs[0]
     worst = ("residual", "penetration", "max_pressure")
     values = {
-        name: (max if name in worst else lambda each: sum(each) / len(each))([getattr(rung, name) for rung in rungs])
+        name: (max if name in worst else _average)([getattr(rung, name) for rung in rungs])
         for name in Rung.__dataclass_fields__
+        if name != "found"
     }
-    return Rung(**values)
+    found = {name: _average([rung.found[name] for rung in rungs]) for name in rungs[0].found}
+    return Rung(**values, found=found)
+
+
+def _average(each: Sequence[Any]) -> Any:
+    return sum(each) / len(each)

@@ -1,6 +1,5 @@
 """March of one band over a history, under the pressure of one rung, with the closing of all finer bands."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from typing import Any
@@ -49,7 +48,7 @@ class BandMarch:
         scene, band, initial = self.scene, self.band, self.band.setup.job.initial
         if initial.state == "virgin":
             return start_march(scene)
-        band.slide(initial.velocity, math.inf)
+        band.slide(initial.velocity)
         contact = band.contact(pressure, law(Place(0, BEFORE)) if law is not None else HARD)
         seen = contact.p, 1.0, contact.u, band.heights, contact.d, contact.p > 0.0
         measures = scene.probe.measure(*seen, (0.0, 0.0), initial.velocity)
@@ -63,7 +62,7 @@ class BandMarch:
         friction = -m.force_x / (pressure * grid.lx * grid.ly)
         values: Any = (
             *(pressure, friction, friction, m.contact_area, m.contact_area_corrected, m.approach, m.max_pressure),
-            *(weights, lost, NONE, NONE, NONE, NONE, NONE, rung_errors(row.errors)),
+            *(weights, lost, NONE, {}, rung_errors(row.errors)),
             *(row.certificate.worst, row.certificate.penetration, float(row.operator_calls)),
         )
         return Rung(*values)
@@ -72,7 +71,7 @@ class BandMarch:
 def track_of(rows: Sequence[Rung]) -> Rung:
     """Return rungs at successive places as one track."""
     values: dict[str, Any] = {name: np.array([getattr(row, name) for row in rows]) for name in NAMES}
-    return Rung(**values)
+    return Rung(**values, found={})
 
 
 def instant_of(track: Rung, before: int, after: int, share: float, sign: float = 1.0) -> Rung:
@@ -81,8 +80,8 @@ def instant_of(track: Rung, before: int, after: int, share: float, sign: float =
     def between(values: Any) -> Any:
         return (1.0 - share) * values[before] + share * values[after]
 
-    found = Rung(**{name: between(getattr(track, name)) for name in NAMES})
+    found = Rung(**{name: between(getattr(track, name)) for name in NAMES}, found={})
     return replace(found, friction=sign * found.friction, friction_slopes=sign * found.friction_slopes)
 
 
-NAMES = tuple(each.name for each in fields(Rung))
+NAMES = tuple(each.name for each in fields(Rung) if each.name != "found")

@@ -2,18 +2,19 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from ..columns import BANDS, names_of
+from ..columns import BANDS, choose_columns, names_of
 from ..doubts import Doubt
-from ..effects.relaxation import feeds_back, highest_temperature_of, temperature_of
-from ..errors import InputError, RunError, UnsolvedError
+from ..effects.relaxation import temperature_of
+from ..errors import RunError, UnsolvedError
 from ..job import Job
+from ..job.listing import answers
 from ..march.budget import ErrorBudget, ErrorParts
 from ..march.choices import choices
 from ..march.curve import States, on_one_grid
@@ -25,15 +26,12 @@ from .band import Rung, Vector, direction_of
 from .cascade import BandResult, Cascade, Results, Solved, mean_rungs
 from .choice import FEWEST, MOST, SAMPLE_SHARE, STRAIN, cut_bands, describe_cut, doubts_of_bands
 
-MOST_ROUNDS = 20  # tuning: limit on rounds of the temperatures
-LEAST_ERROR, RELATIVE = 0.1, 0.02  # accuracy: error of the rise of a band [K], and relative
+MOST_ROUNDS = 20  # tuning: limit on rounds of the loops of effects
 HARD_SHARE = 0.25  # fitted: error of the method over the difference to hard walls; 1 for profiles
 LEAST_METHOD = 0.03  # fitted: least relative error of the method (`scripts/band_errors.py`)
 LEAST_OF_AREA = 0.09  # fitted: the same of a small area; it falls with the open share (`scripts/band_errors.py`)
 NEARLY_ALL = 0.1  # accuracy: open area below which errors fall to 0 with it
 SURE = 2.0  # accuracy: error by the scatter of surfaces over its standard error
-ROUND_SHARE = 0.2  # accuracy: change of friction in a round of strains over the accuracy of the job
-TINY = 1e-300  # rounding: least square of a change, to avoid division by 0
 TABLE = "bands.csv"
 
 
@@ -70,14 +68,31 @@ class BandOutcome:
         return [max(share * abs(hard - law), lowest * law) for hard, law, lowest in ends]
 
 
-@dataclass(frozen=True)
-class BandSearch:
-    """Search for the temperatures and the strains of bands: the number of `rounds`, friction of cold rubber, and the
-    relative `changes` of friction and area in the last round."""
+class BandLoop(Protocol):
+    """What an effect changes in bands, and finds in them; modules `bands` of capabilities offer `loops` of a job and of
+    its bands (`choice.Cut`). All loops that `move` share the rounds of one fixed point; methods are collective."""
 
-    rounds: int = 1
-    friction_cold: float = math.nan
-    changes: tuple[float, float] = (0.0, 0.0)
+    moves: bool  # False if the effect only finds something in a state
+    words: tuple[str, str]  # what it changes, and what to try if that does not settle
+
+    def begin(self, road: "RoadSliding") -> None:
+        """Begin a new state."""
+
+    def act(self, road: "RoadSliding") -> None:
+        """Set what the effect changes in the bands of the next round."""
+
+    def settles(self, road: "RoadSliding", results: Results, changes: tuple[float, float], others: bool) -> bool:
+        """Return True if a round changes it no more. `changes` are the relative ones of friction and area in the round;
+        `others` is True if all loops before it have settled."""
+
+    def move(self, road: "RoadSliding", results: Results) -> None:
+        """Change it for the next round; raises RunError."""
+
+    def found(self, road: "RoadSliding", point: Point, results: Results, changes: tuple[float, float]) -> Point:
+        """Return the point of a state with what the effect found."""
+
+    def values(self, results: Results) -> Mapping[str, Sequence[float]]:
+        """Return the values of its columns of bands.csv, one for each band."""
 
 
 class RoadSliding:
@@ -86,20 +101,19 @@ class RoadSliding:
     It has the interface of `march.steady.SteadySliding` for friction curves.
     """
 
-    table: tuple[str, Sequence[str]] | None = (TABLE, names_of(BANDS))
+    table: tuple[str, Sequence[str]] | None
 
     def __init__(self, job: Job, slab: Slab) -> None:
         self.job, self.slab, self.cut = job, slab, cut_bands(job)
-        self.table = None if job.history else RoadSliding.table  # of a history it has the history
+        self.loops: list[BandLoop] = [loop for made in answers("bands", "loops") for loop in made(job, self.cut)]
+        options = [option for asked in job.asked("curve_options") for option in asked(job)]
+        self._columns = names_of(choose_columns(BANDS, when=options))
+        self.table = None if job.history else (TABLE, self._columns)  # of a history it has the history
         self._cascade = Cascade(job, self.cut, slab)
         self.setup: Setup = replace(self._cascade.band(0, 0).setup, slab=slab)
         self.temperature, self._own_temperature = math.nan, temperature_of(job.material)
         self._point: Point | None = None
         self._results: Results = ()
-        self._rises: list[float] = []
-        section = job.section("softening")
-        self._table: Any = section and section.made
-        self._strains = np.full(self.cut.count, self._table.start if section else math.nan)
 
     def doubts(self, temperatures: Sequence[float]) -> list[Doubt]:
         """Return warnings about the job."""
@@ -120,8 +134,7 @@ class RoadSliding:
     def set_temperature(self, temperature: float) -> None:
         """Set the temperature [deg C] of further solves; raises InputError if the material has no shift."""
         if temperature != self.temperature:
-            self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
-            self._cascade.set_temperatures([temperature] * self.cut.count)
+            self.set_temperatures([temperature] * self.cut.count)
             self.temperature = temperature
 
     def field(self, name: str) -> Array:
@@ -131,21 +144,13 @@ class RoadSliding:
         """Return the steady state at a velocity [m/s] under a mean pressure [Pa]; raises RunError."""
         began = time.perf_counter()
         self._cascade.press(velocity, pressure)
-        search = self._solve_fixed_point() if feeds_back(self.job) or self._table else BandSearch()
+        moving = [loop for loop in self.loops if loop.moves]
+        changes = self._solve_fixed_point(moving) if moving else (0.0, 0.0)
         outcome = self._solve()
         self._results = outcome.results
         point = self._to_point(outcome, velocity, pressure, time.perf_counter() - began)
-        if self.job.section("thermal") is not None:
-            from ..effects.heat.steady import flash_of_bands
-
-            self._rises = self._rises_of(outcome.results, point.measures.force_interface)
-            heats = [result.friction for result in outcome.results]
-            heats[-1] += point.measures.friction_interface
-            flash = flash_of_bands(self._rises, heats)
-            point = replace(point, flash=flash, rounds=search.rounds, friction_cold=search.friction_cold)
-        if self._table:
-            errors = point.errors.with_rounds(*search.changes)
-            point = replace(point, errors=errors, strain_amplitude=self._amplitude(outcome.results))
+        for loop in self.loops:
+            point = loop.found(self, point, outcome.results, changes)
         self._point = point
         return point
 
@@ -157,117 +162,74 @@ class RoadSliding:
     def _rows(self, point: Point, instant: Sequence[float]) -> list[list[float]]:
         """Return the lines of bands.csv for a state; `instant` has its first columns."""
         cut, rows = self.cut, []
+        values = {name: each for loop in self.loops for name, each in loop.values(self._results).items()}
+        added = [values[name] for name in self._columns if name in values]
         for number, result in enumerate(self._results):
             last = number + 1 == cut.count
             friction = result.friction + (point.measures.friction_interface if last else 0.0)
             slope_to = cut.rms_slope(number, 0)
             place = *instant, point.measures.pressure, point.temperature, float(number)
-            rise = self._rises[number] if self._rises else math.nan
-            found = friction, result.contact_area, cut.rms_slope(number), rise, result.load_lost
-            strains = slope_to, STRAIN * slope_to, self._strains_of(self._results)[number] if self._table else math.nan
-            rows.append([*place, *cut.wavelengths(number), *found, *strains])
+            found = friction, result.contact_area, cut.rms_slope(number), result.load_lost
+            strains = slope_to, STRAIN * slope_to
+            rows.append([*place, *cut.wavelengths(number), *found, *strains, *(each[number] for each in added)])
         return rows
 
-    # -- temperatures -------------------------------------------------------------------------------------------------
+    # -- loops of effects ---------------------------------------------------------------------------------------------
 
-    def _rises_of(self, results: Results, rubbing: float) -> list[float]:
-        """Return the rises [K] of all bands; `rubbing` [N] is the force of the interface on the coarsest box."""
-        from ..effects.heat.steady import rises_of, uniform, waves_along_depth
-
-        cascade, section = self._cascade, self.job.section("thermal")
-        speed, box = math.hypot(*cascade.velocity), self.setup.grid.lx * self.setup.grid.ly
-        heats = [result.friction * cascade.pressure * speed for result in results]
-        m, weights = waves_along_depth(float(self.cut.edges[0]), float(self.cut.edges[-1]))
-        whole = uniform(section.conductor, m, cascade.seconds)
-        shares, warmings = [result.depths for result in results], [result.warming for result in results]
-        return rises_of(weights, whole, shares, warmings, heats, rubbing / box * speed)
-
-    def _solve_fixed_point(self) -> BandSearch:
-        """Find the fixed point of the temperatures and the strains of all bands, with one surface per band, and set
-        them in the cascade. Raises RunError if it is not found.
-
-        Rounds use Aitken's relaxation for temperatures, and a power mean for strains; the first is for cold bands. No
-        temperature above the range of the material's shift is tried.
-        """
-        cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
-        warms = feeds_back(self.job)
-        highest = highest_temperature_of(self.job.material) if warms else math.inf
-        place, most = (*self._place(), cold), highest - cold if warms else math.inf
-        enough = ROUND_SHARE * self.job.numerics.asked.both[0]
-        rises: Array = np.zeros(self.cut.count)
-        last: Array = np.zeros(0)
-        relax, friction_cold, seen = 1.0, math.nan, list[tuple[float, float]]()
-        for rounds in range(1, MOST_ROUNDS + 1):
-            self._set_state(np.minimum(cold + rises, highest))
+    def _solve_fixed_point(self, moving: Sequence["BandLoop"]) -> tuple[float, float]:
+        """Find the fixed point of all effects that change the bands, with one surface per band, and set it in the
+        cascade. Return the relative changes of friction and area in the last round. Raises RunError if it is not
+        found."""
+        seen = list[tuple[float, float]]()
+        for loop in moving:
+            loop.begin(self)
+        for _ in range(MOST_ROUNDS):
+            for loop in moving:
+                loop.act(self)
+            self._cascade.press(*self.place)
             rungs = self._cascade.climb([0])
             results = self._cascade.fall(lambda band, _: rungs[band, 0])  # noqa: B023
             seen.append(_sums(results))
-            changes = _changes(seen[-2], seen[-1]) if rounds > 1 else (math.inf, math.inf)
-            over = self._rises_beyond(rises, results)
-            softened = not self._table or changes[0] <= enough
-            if math.isnan(friction_cold):  # no heat before the strains of cold rubber are found
-                over, friction_cold = (over, seen[-1][0]) if softened else (0.0 * over, math.nan)
-            settled = np.abs(over) <= np.maximum(LEAST_ERROR, RELATIVE * rises)
-            if np.all(settled) and softened:
-                return BandSearch(rounds, friction_cold, changes)
-            if not np.all(settled) and np.all(settled | ((rises == most) & (over > 0.0))):
-                from ..effects.heat.steady import beyond_shift
-
-                raise beyond_shift(*place, most, most + float(over[rises == most].max()))
-            if last.any():
-                change = over - last
-                relax = float(np.clip(-relax * float(last @ change) / max(float(change @ change), TINY), 0.1, 1.0))
-            rises, last = np.clip(rises + relax * over, 0.0, most), over
-            if self._table:
-                self._strains = self._table.mixed(self._strains_of(results), self._strains)
-        at = "" if math.isnan(cold) else f" and {cold:.4g} C"
+            changes = _changes(*seen[-2:]) if len(seen) > 1 else (math.inf, math.inf)
+            settled = True
+            for loop in moving:
+                settled = loop.settles(self, results, changes, settled) and settled
+            if settled:
+                return changes
+            for loop in moving:
+                loop.move(self, results)
+        what, advice = (" and ".join(filter(None, each)) for each in zip(*(loop.words for loop in moving), strict=True))
+        at = "" if math.isnan(self.own_temperature) else f" and {self.own_temperature:.4g} C"
         raise UnsolvedError(
-            f"steady sliding at {place[0]:.4g} m/s under {place[1]:.4g} Pa{at}",
-            f"temperatures and strains of bands did not settle in {MOST_ROUNDS} rounds. Try feedback: none",
+            f"steady sliding at {self.speed:.4g} m/s under {self.place[1]:.4g} Pa{at}",
+            f"{what} of bands did not settle in {MOST_ROUNDS} rounds{advice and f'. Try {advice}'}",
         )
 
-    def _place(self) -> tuple[float, float]:
-        """Return the velocity [m/s] and the pressure [Pa] of the state."""
-        return math.hypot(*self._cascade.velocity), self._cascade.pressure
+    @property
+    def place(self) -> tuple[Vector, float]:
+        """The velocity [m/s] and the pressure [Pa] of the state."""
+        return self._cascade.velocity, self._cascade.pressure
 
-    def _rises_beyond(self, rises: Array, results: Results) -> Array:
-        """Return the rises [K] of all bands that results cause, over these rises; 0 without feedback."""
-        if not feeds_back(self.job):
-            return np.zeros(self.cut.count)
-        rubbing = self._rub(results) * self.setup.grid.lx * self.setup.grid.ly
-        return np.array(self._rises_of(results, rubbing)) - rises
+    @property
+    def speed(self) -> float:
+        """The magnitude of the velocity [m/s]."""
+        return math.hypot(*self._cascade.velocity)
 
-    def _set_state(self, temperatures: Array) -> None:
-        """Set the temperatures [deg C] and the strains of the bands, as far as the job has them."""
-        if self._table:
-            self._cascade.soften(self._table, self._strains.tolist())
-        if feeds_back(self.job):
-            self._set_temperatures(temperatures)
-        self._cascade.press(self._cascade.velocity, self._cascade.pressure)
+    @property
+    def own_temperature(self) -> float:
+        """The temperature of cold rubber [deg C]; NaN without a shift."""
+        return self._own_temperature if math.isnan(self.temperature) else self.temperature
 
-    def _amplitude(self, results: Results) -> float:
-        """Return the root of the mean square strain of all bands, weighted by friction; NaN without friction."""
-        weights = np.maximum([result.friction for result in results], 0.0)
-        return math.sqrt(np.average(self._strains_of(results) ** 2, weights=weights)) if weights.any() else math.nan
+    def set_factors(self, at: Callable[[float], Any], values: Sequence[float]) -> None:
+        """Set the factors of the moduli of each band, which are those `at` a value of the band."""
+        self._cascade.set_factors(at, values)
 
-    def _strains_of(self, results: Results) -> Array:
-        """Return the strain of each band, by the waves of all bands."""
-        squares = np.sum([result.squares for result in results], axis=0)
-        return np.sqrt([result.strain_weights @ squares for result in results])
+    def set_temperatures(self, temperatures: Sequence[float]) -> None:
+        """Set the temperatures [deg C] of the bands; raises InputError outside the range of the material's shift."""
+        self._cascade.set_temperatures(temperatures)
+        self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperatures[-1])))
 
-    def _set_temperatures(self, temperatures: Array) -> None:
-        """Set the temperatures [deg C] of the bands; raises RunError outside the range of the material's shift."""
-        try:
-            self._cascade.set_temperatures(temperatures.tolist())
-            finest = self.setup.job.at_temperature(float(temperatures[-1]))
-            self.setup = replace(self.setup, choices=choices(finest))
-        except InputError as error:
-            from ..effects.heat.steady import describe_cold_state
-
-            place = describe_cold_state(*self._place(), self.temperature)
-            raise UnsolvedError(place, f"no material at the flash temperature: {error}") from None
-
-    def _rub(self, results: Results) -> float:
+    def rub(self, results: Results) -> float:
         """Return the shear stress [Pa] of the interface, averaged over the nominal area."""
         area, shears = results[-1].contact_area_corrected, self.setup.choices.shears
         forces = [shear.force(area, self._cascade.velocity) for shear in shears]
@@ -309,7 +271,7 @@ class RoadSliding:
 
     def _to_point(self, outcome: BandOutcome, velocity: Vector, pressure: float, seconds: float) -> Point:
         results, finest, coarsest = outcome.results, outcome.results[-1], outcome.rungs[0][0]
-        box, rubbed = self.setup.grid.lx * self.setup.grid.ly, self._rub(results)
+        box, rubbed = self.setup.grid.lx * self.setup.grid.ly, self.rub(results)
         slopes = sum(result.friction_slopes for result in results) + rubbed / pressure
         friction = outcome.friction + rubbed / pressure
         direction = direction_of(velocity) if any(velocity) else (1.0, 0.0)

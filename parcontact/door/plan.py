@@ -20,6 +20,7 @@ from pathlib import Path
 from .. import streams
 from ..job import Case, Job
 from ..job.history import Timeline
+from ..job.listing import find_effects
 from ..march.choices import choices
 from ..march.curve import request
 from ..parallel.slab import Slab
@@ -32,7 +33,6 @@ DAY, YEAR = 86400.0, 365.25 * 86400.0  # [s]
 LARGE = 1e10  # least size that is printed in GB [bytes]
 OF_STEADY_STATES = (
     *("viscoelasticity", "isolated contact", "layer", "surface spectrum", "preconditioner in single precision"),
-    *("interface", "thermal", "counterbody", "softening"),
 )
 ON_TILES = "more on rank 0 (tiles), at most"
 TO_ASK_FOR = "to ask a batch system for"
@@ -41,7 +41,9 @@ STEADY_START, STEADY_STATES = "steady start, before", "steady states"
 
 def effects(job: Job) -> Iterator[str]:
     """Yield a line for each effect, on or off, and why; for a friction curve only effects of steady states."""
-    found = [effect for effect in choices(job).decisions if job.history or effect.name in OF_STEADY_STATES]
+    own = [section for section, effect in find_effects().items() if getattr(effect, "in_curves", False)]
+    known = {*OF_STEADY_STATES, *own}
+    found = [effect for effect in choices(job).decisions if job.history or effect.name in known]
     width = max(len(effect.name) for effect in found)
     yield "effects"
     for effect in sorted(found, key=lambda effect: not effect.on):

@@ -281,14 +281,16 @@ class Effect(Protocol[Memory]):
     which give warnings (`doubts.Doubt`, or sentences) and sentences about the section. `describe_waves` of a job gives
     sentences on the waves of its surface on one grid, from bins of wavenumbers [rad/m] and their mean square slopes.
     `changed_material` of a job is in place of its material; `why_no_curve` and `why_no_theory` return why it has no
-    friction curve, and no prediction by Persson's theory. Methods are collective unless stated. The base class has no
-    memory.
+    friction curve, and no prediction by Persson's theory, `why_not_folded` why all branches of the body need maps.
+    `curve_options` yields what its columns of friction curves require (`Column.when`). Methods are collective unless
+    stated. The base class has no memory.
     """
 
     section: ClassVar[type[Part]]  # section that it adds to a job
     columns: ClassVar[tuple[str, ...]]  # columns that it adds to measures.csv
     fields: ClassVar[tuple[str, ...]] = ()  # maps that effects of this package add to those of output.fields
     in_bands_over_time: ClassVar[bool] = False  # True for classes that jobs in bands with a history may have
+    in_curves: ClassVar[bool] = False  # True for classes that act in friction curves
     brings_law: ClassVar[bool] = False  # True for classes with a `law`; they exclude steady sliding
     forbids: ClassVar[Mapping[str, str]] = {}  # what is not done with it (EXTRAPOLATION, SINGLE, ...), with reasons
 

@@ -1,7 +1,6 @@
 """Relaxation function of a material from its section of a job."""
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -53,9 +52,3 @@ def factor_at(material: Material, rise: float) -> float:
     """Return relaxation times of a material after a temperature rise [K] over those at its own temperature [-]. Raises
     InputError outside the range of its shift."""
     return time_factor_of(heated(material, temperature_of(material) + rise)) / time_factor_of(material)
-
-
-def feeds_back(job: Any) -> bool:
-    """Return whether the heat of sliding changes the relaxation times of a job's material (`effects.heat.effect`)."""
-    section = job.section("thermal")
-    return section is not None and section.feedback != "none"

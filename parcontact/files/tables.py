@@ -29,6 +29,7 @@ from itertools import islice, product
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
+from ..capabilities import folders
 from ..errors import InputError
 from ..printed import quantity
 from . import files
@@ -115,26 +116,13 @@ MARKER = ".parcontact"
 FORMAT = 1
 VERBS = {"run": "a run", "steady": "a friction curve", "study": "a study"}
 # sections in which all jobs of a directory must agree
-SCENE = ("grid", "bands", "surface", "material", "body", "counterbody")
+_MATERIALS = [one.SECTION for one in folders() if hasattr(one, "MATERIAL")]
+SCENE = ("grid", "bands", "surface", "material", "body", *_MATERIALS)
 SHOWN = 4  # most differences of two jobs in a message
-EFFECTS = (
-    "thermal",
-    "interface",
-    "adhesion.work",
-    "adhesion.range",
-    "adhesion.law",
-    *(f"leakage.{key}" for key in ("load", "pressures", "ambient", "fluid")),
-)  # keys that change completed steps
-SECTIONS = (
-    *SCENE,
-    "thermal",
-    "interface",
-    "adhesion",
-    "leakage",
-    "initial",
-    "numerics",
-    "steady",
-)  # sections of a job that a marker keeps
+_ADDED = {one.SECTION: one for one in folders() if hasattr(one, "SECTION")}
+# sections and keys of effects that change completed steps
+EFFECTS = tuple(key for name, one in _ADDED.items() for key in getattr(one, "CHANGES_STEPS", (name,)))
+SECTIONS = (*SCENE, *_ADDED, "initial", "numerics", "steady")  # sections of a job that a marker keeps
 
 
 @dataclass(frozen=True)

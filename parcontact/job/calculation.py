@@ -23,6 +23,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, PrivateAttr, TypeAdapter, ValidationInfo
 
+from ..capabilities import stated
 from ..errors import InputError
 from ..rubber.shift import WLF, Arrhenius, Density, Factors, log_vertical
 from ..rubber.shift import Shift as Law
@@ -47,7 +48,9 @@ from .yaml_text import Fault, did_you_mean, quote, refuse
 Integrator = Literal["exponential", "exponential-linear", "backward-euler"]
 Kernel = Literal["spectral", "love"]
 Precision = Literal["double", "mixed"]
-FieldName = Literal["pressure", "displacement", "gap", "height", "temperature", "traction", "fluid_pressure"]
+FIELDS_NEED = {name: need for fields in stated("FIELDS_NEED") for name, need in fields.items()}  # maps of effects
+VECTORS = [name for names in stated("VECTORS") for name in names]
+FieldName: Any = Literal["pressure", "displacement", "gap", "height", *FIELDS_NEED]
 
 
 def _different(name: str) -> Rule:
@@ -212,6 +215,11 @@ def _needs_energy(branch_dissipation: bool, energy: bool) -> Iterator[Fault]:
 MEASURE_MESH = "it was removed; `parcontact study` measures the error of the mesh, with a list study.mesh"
 
 
+def components_of(field: str) -> tuple[str, ...]:
+    """Return the names of the maps of a field: one for each component of a vector."""
+    return (f"{field}_x", f"{field}_y") if field in VECTORS else (field,)
+
+
 class Output(Part):
     """Output files of a run; a relative directory starts at the working directory."""
 
@@ -231,8 +239,7 @@ class Output(Part):
     @property
     def maps(self) -> tuple[str, ...]:
         """Return the names of the maps of the fields; a vector has one map for each component."""
-        both = {"traction": ("traction_x", "traction_y")}
-        return tuple(name for field in self.fields for name in both.get(field, (field,)))
+        return tuple(name for field in self.fields for name in components_of(field))
 
 
 class Checkpoint(Part):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 from operator import itemgetter
 from typing import Any
 
 from ..errors import InputError
 from ..printed import rounded_up
 from .advice import SAME_LENGTH, doubt_size, has_wave, one_cell
-from .calculation import Body, Grid, Numerics, Output, Study
+from .calculation import FIELDS_NEED, Body, Grid, Numerics, Output, Study
 from .materials import AnyMaterial, heated
 from .parts import Rule
 from .stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Oscillation, Stage, Steady
@@ -137,16 +138,12 @@ def some_shape(surface: tuple[Any, ...]) -> Iterator[Fault]:
         yield Fault("needs at least one shape, such as shape: flat", ("surface",))
 
 
-def no_temperature(output: Output) -> Iterator[Fault]:
-    """Refuse maps of the temperature; the effect `thermal` lifts this rule."""
-    if "temperature" in output.fields:
-        yield Fault("includes temperature, which needs a thermal section", ("output", "fields"))
+def _refuse_field(name: str, output: Output) -> Iterator[Fault]:
+    if name in output.fields:
+        yield Fault(f"includes {name}, which needs {FIELDS_NEED[name]}", ("output", "fields"))
 
 
-def no_traction(output: Output) -> Iterator[Fault]:
-    """Refuse the map of tractions in a job without `interface`; with it this rule does not hold."""
-    if "traction" in output.fields:
-        yield Fault("has traction, which needs interface: {stick: true}", ("output", "fields"))
+no_field = {name: partial(_refuse_field, name) for name in FIELDS_NEED}  # checks that effects which have a map lift
 
 
 def no_rolling(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
@@ -155,14 +152,6 @@ def no_rolling(history: tuple[Stage | None, ...]) -> Iterator[Fault]:
         if stage is not None and stage.rolls:
             sentence = "needs interface: {stick: true}: without it all that touches slides"
             yield Fault(sentence, ("history", index, "creep"))
-
-
-def no_fluid_pressure(output: Output) -> Iterator[Fault]:
-    """Refuse maps of the pressure of a fluid; the effect that computes them lifts this rule."""
-    if "fluid_pressure" in output.fields:
-        yield Fault(
-            "includes fluid_pressure, which needs a fluid that carries a part of the load", ("output", "fields")
-        )
 
 
 def some_history(history: tuple[Any, ...], steady: Steady | None) -> Iterator[Fault]:

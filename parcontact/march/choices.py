@@ -18,7 +18,7 @@ import numpy as np
 from ..contact.problem import LOOSE, VERY_LOOSE
 from ..effects.effect import EXTRAPOLATION, SINGLE, Decision, Effect, guarded
 from ..effects.folded_branches import FoldedBranches, bounded_error, fold_branches, time_scales
-from ..effects.relaxation import feeds_back, relaxation_of, time_factor_of
+from ..effects.relaxation import relaxation_of, time_factor_of
 from ..job import Grid, Job, Numerics, Output, Spectral, listing
 from ..job.history import Timeline, describe_steps
 from ..physics.motion import Shear
@@ -105,7 +105,7 @@ class Choices:
         """Which branches of the material have maps (`effects.folded_branches`)."""
         reason = "" if self.numerics.branch_error else "numerics.branch_error is 0"
         reason = "output.energy counts the energy of every branch" if self.energies.on else reason
-        reason = "heat changes them" if feeds_back(self.job) else reason
+        reason = next(filter(None, (why(self.job) for why in self.job.asked("why_not_folded"))), reason)
         reason = reason if self.prony.moduli.size else "the body has no branch"
         scales = time_scales(Timeline.from_job(self.job, self.until), self.steady_start.on)
         return fold_branches(self.prony, scales, self.numerics.integrator, self.numerics.branch_error, reason)

@@ -32,9 +32,6 @@ VIEWS = Fit("friction of marches: times the difference of its two views", 0.75, 
 STEADY_AREA = Fit("steady friction: times the correction of the area over N^(1/4)", 0.1, 1.0, COVERAGE, OF_FRICTION)
 LOST = Fit("steady friction: what edges lose, times s m", 2.0, 1.0, COVERAGE, OF_FRICTION)
 FREE_LOST = Fit("the same in free boxes, with sampled coefficients", 6.0, 1.0, COVERAGE, OF_FRICTION)
-FLASH = Fit(
-    "flash temperature: times the error of friction", 3.0, 1.0, COVERAGE, "6.3, 1.1 to 150, in 96 % of 127 scenes"
-)
 ENERGY = Fit("energies: times the error of area", 0.4, 1.0, COVERAGE, "20, in 95 % of 44 scenes with adhesion")
 PULL_OFF = Fit(
     "pull-off: times the median error of the area", 0.15, 1.0, COVERAGE, "5.5, 1.1 to 58, in 97 % of 58 scenes"

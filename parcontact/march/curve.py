@@ -61,15 +61,9 @@ class CurveTable:
         self._console, self._job = Console(directory / LOG, quiet, 0), setup.job
         self.path, self.heated, self.quiet = directory / "steady.csv", heated, quiet
         branches = setup.prony.moduli.size if self._job.grid.boundary == "periodic" else 0
-        thermal = self._job.section("thermal")
-        there = {
-            "temperatures": heated,
-            "interface": bool(setup.choices.shears),
-            "softening": self._job.section("softening") is not None,
-            "thermal": thermal is not None,
-            "feedback": thermal is not None and thermal.feedback != "none",
-        }
-        self._columns = choose_columns(STEADY, branches, [what for what, known in there.items() if known])
+        options = [option for asked in self._job.asked("curve_options") for option in asked(self._job)]
+        there = [*options, *["temperatures"] * heated, *["shear"] * bool(setup.choices.shears)]
+        self._columns = choose_columns(STEADY, branches, there)
         self._names = names_of(self._columns)
         self.known = self._read()
         self._file = GrowingTable(self.path, self._names)

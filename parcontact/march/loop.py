@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..capabilities import stated
 from ..effects.effect import Detached, nothing_holds
 from ..errors import InputError
 from ..files.checkpoint import Contents, Facts
 from ..files.recorder import StepRow
+from ..job.calculation import FIELDS_NEED, components_of
 from ..job.history import Step, Timeline
 from ..parallel.slab import Array
 from ..physics.body import remembers
@@ -19,7 +19,7 @@ from .scene import Scene
 from .state import State, entries, first_state, restored, save_state
 from .step import make_step
 
-FIELDS_OF_EFFECTS = {name: key for fields in stated("FIELDS_NEED") for name, key in fields.items()}
+FIELDS_OF_EFFECTS = {part: need for name, need in FIELDS_NEED.items() for part in components_of(name)}
 
 
 class March:

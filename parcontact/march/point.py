@@ -11,9 +11,9 @@ modulus of 1 and w the frequency with which it passes a point.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -23,11 +23,7 @@ from ..physics.convolution import PARTS, wavenumbers
 from ..physics.measures import Certificate, Measures
 from ..physics.prony import Prony
 from .budget import ErrorBudget
-from .constants import FLASH
 from .scene import Setup
-
-if TYPE_CHECKING:
-    from ..effects.heat.solver import Flash
 
 Vector = tuple[float, float]
 
@@ -40,9 +36,7 @@ class Point:
     `friction` is the dissipated power over load and velocity, plus that of an interface; `errors` is its budget. The
     friction of `measures` is by the slopes of the rigid surface; the difference is a mesh error. `operator_calls`
     count applications on the finest grid. `dissipated` is the power [W] of each branch (empty for a free scene, whose
-    wake continues outside the box). `flash` has the temperatures of the contact, None without `thermal`. With
-    feedback, found in `rounds`, the shift factor is that of the flash temperature, and `friction_cold` is friction
-    without feedback. `strain_amplitude` is the strain that softens the rubber, NaN without `softening`.
+    wake continues outside the box). `effects` has what effects found in this state, by their sections.
     """
 
     velocity: Vector
@@ -56,10 +50,7 @@ class Point:
     operator_calls: float
     seconds: float
     dissipated: tuple[float, ...]
-    flash: Flash | None = None
-    rounds: int = 1
-    friction_cold: float = math.nan
-    strain_amplitude: float = math.nan
+    effects: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def speed(self) -> float:
@@ -77,10 +68,9 @@ class Point:
         """Relative error of the corrected area; NaN if spots may be smaller than a cell."""
         return self.errors.area.total if self.errors.resolved else math.nan
 
-    @property
-    def error_flash(self) -> float:
-        """The relative error of the flash temperature, FLASH times that of friction; NaN where there is none."""
-        return FLASH.value * self.error_friction if self.flash and self.flash.mean else math.nan
+    def with_effect(self, section: str, found: Any) -> Point:
+        """Return the point with what the effect of a section found."""
+        return replace(self, effects={**self.effects, section: found})
 
 
 def in_rounds(points: Sequence[Point]) -> Point:

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,8 +25,7 @@ from ..contact.projected import FreeSteadySolver, Judge, SteadyContact
 from ..contact.solver import Lines
 from ..contact.splitting import SteadySolver
 from ..doubts import Doubt
-from ..effects.relaxation import highest_temperature_of, temperature_of
-from ..errors import InputError, UnsolvedError
+from ..errors import UnsolvedError
 from ..files.checkpoint import Contents
 from ..job import Job
 from ..job.listing import answers
@@ -44,10 +43,6 @@ from .point import Point, branch_maps, branch_powers
 from .scene import Scene, Setup, build_on, set_up
 from .state import first_state, pressed_state
 from .time_error import RunProperties, StepObservation, properties_of
-
-if TYPE_CHECKING:
-    from ..effects.heat.solver import Flash
-    from ..effects.heat.steady import Feedback
 
 COARSE_TOLERANCE = 0.04  # tuning: tolerance on the certificate on all grids but the finest
 # accuracy: factors on tolerances above LOOSE, in periodic and in free boxes, by `scripts/random_steady.py --exact`:
@@ -85,11 +80,9 @@ class SteadySliding:
         self.levels += [SteadyLevel(level.slab, FFT(level.slab), level.heights) for level in coarser]
         self._known = properties_of(setup.job, setup.shortest)
         self.contact: SteadyContact | None = None
-        self._rise: Array | None = None
         self._speed = self._pressure = 0.0  # speed times shift factor, on which a state depends
-        self.temperature, self._own_temperature = math.nan, temperature_of(setup.job.material)
+        self.temperature = math.nan
         self.loops = [loop for loops in answers("steady", "loops") for loop in loops(setup)]
-        self._feedback: Feedback | None = None
 
     def hold(self, velocity: Vector) -> tuple[Any, ...]:
         """Allocate and return all that a solve at a velocity [m/s] may hold on the finest grid."""
@@ -99,42 +92,20 @@ class SteadySliding:
     def set_temperature(self, temperature: float) -> None:
         """Set the temperature [deg C] of further solves; raises InputError if the material has no shift."""
         if temperature != self.temperature:
-            self._set_material(temperature)
+            self.set_material(temperature)
             self.temperature = temperature
 
-    def _set_material(self, temperature: float) -> None:
+    def set_material(self, temperature: float) -> None:
         """Set the material at this temperature [deg C] for the next solve."""
         self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
         self.probe = self.setup.probe()
 
     def solve(self, velocity: Vector, pressure: float) -> Point:
-        """Return the steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
+        """Return the steady state at a velocity [m/s] of the surface under a mean pressure [Pa], within the loops of
+        all effects that have one (`loops` of their modules `steady`).
 
-        With feedback from heat all rubber has the flash temperature. Raises RunError, with the certificate reached,
-        if no start leads to a solution, or if no fixed point of the temperature is found.
+        Raises RunError, with the certificate reached, if no start leads to a solution, or if a loop does not settle.
         """
-        section = self.setup.job.section("thermal")
-        if section is None or section.feedback == "none":
-            return self._settle(velocity, pressure)
-        from ..effects.heat.steady import Feedback, describe_cold_state
-
-        self._feedback = self._feedback or Feedback()
-        cold = self._own_temperature if math.isnan(self.temperature) else self.temperature
-        highest, speed = highest_temperature_of(self.setup.job.material), math.hypot(*velocity)
-
-        def warmed(rise: float) -> Point:
-            try:
-                self._set_material(min(cold + rise, highest))
-            except InputError as error:
-                place = describe_cold_state(speed, pressure, cold)
-                raise UnsolvedError(place, f"no material at the flash temperature: {error}") from None
-            return self._settle(velocity, pressure)
-
-        tolerance = self.setup.choices.numerics.tolerance
-        return self._feedback.solve_fixed_point(warmed, speed, (pressure, cold), tolerance, highest - cold)
-
-    def _settle(self, velocity: Vector, pressure: float) -> Point:
-        """Return the steady state at the temperature that was set, in the loops of all effects that have one."""
         solve = self._solve
         for loop in self.loops:
             solve = partial(loop.solve, self, solve)
@@ -161,9 +132,8 @@ class SteadySliding:
         lost = () if powers is None else tuple(powers.sum(axis=1).tolist())
         judged = self._known, contact.certificate, by_energy, velocity, measures
         friction, errors = judge_state(self.setup, *judged)
-        flash = self._find_temperatures(contact, by_energy, velocity, measures)
         seconds, place = time.perf_counter() - began, (velocity, pressure, self.temperature, factor)
-        return Point(*place, measures, friction, errors, contact.certificate, calls, seconds, lost, flash)
+        return Point(*place, measures, friction, errors, contact.certificate, calls, seconds, lost)
 
     def _advise(self, contact: SteadyContact) -> str:
         """Return advice for a contact that was not solved; collective."""
@@ -174,26 +144,13 @@ class SteadySliding:
             return f"; double precision reaches only about {reach:.1g} here: {what}"
         return ". Try a velocity nearer to one that works, a finer grid, or another numerics.tolerance."
 
-    def _find_temperatures(
-        self, contact: SteadyContact, friction: float, velocity: Vector, measures: Measures
-    ) -> Flash | None:
-        """Return the temperatures of the contact; None without a thermal section; collective."""
-        section = self.setup.job.section("thermal")
-        if section is None:
-            return None
-        from ..effects.heat.steady import find_temperatures
-
-        touching = NonNegative().touches(contact.p)
-        flash, self._rise = find_temperatures(self.setup, section, contact.p, touching, measures, friction, velocity)
-        return flash
-
     def field(self, name: str) -> Array:
-        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], or the rise of
-        `temperature` [K] in the last state."""
+        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], or of a map of an effect
+        in the last state."""
         assert self.contact is not None
-        if name == "temperature":
-            assert self._rise is not None
-            return self._rise
+        for loop in self.loops:
+            if name in loop.fields:
+                return np.asarray(loop.fields[name])
         contact, setup, heights = self.contact, self.setup, self.levels[0].heights
         if name == "pressure":
             return contact.p * setup.units.pressure

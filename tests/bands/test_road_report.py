@@ -13,8 +13,9 @@ from parcontact import job as jobs
 from parcontact.__main__ import main
 from parcontact.bands.band_plan import plan_bands
 from parcontact.bands.choice import cut_bands, doubts_of_bands, on_one_grid_of_all
+from parcontact.effects.heat.bands import flash_of_bands
 from parcontact.effects.heat.solver import Flash
-from parcontact.effects.heat.steady import describe_hot, describe_unmeasured, flash_of_bands
+from parcontact.effects.heat.steady import describe_hot, describe_unmeasured
 from parcontact.job.meaning import excited_band
 from parcontact.parallel.slab import Slab
 from parcontact.results import report_sections
@@ -91,7 +92,7 @@ def test_heat_beyond_the_measurement() -> None:
     surface = {"shape": "rough", "hurst": 0.8, "rms_slope": 0.2, "long_wavelength": LONG, "short_wavelength": LONG / 8}
     for feedback in ("mean", "none"):
         job = jobs.load(job_of(surface, thermal={"conductivity": 0.2, "diffusivity": 1e-7, "feedback": feedback}))
-        point: Any = SimpleNamespace(temperature=40.0, speed=1.0, flash=Flash(30.0, 50.0))
+        point: Any = SimpleNamespace(temperature=40.0, speed=1.0, effects={"thermal": Flash(30.0, 50.0)})
         found = list(map(str, describe_unmeasured([point], job)))
         assert [bool(re.search("beyond the -20 to 60 C .* at 1 of 1 points, up to 70 C", text)) for text in found] == (
             [True] * (feedback == "mean")
@@ -109,7 +110,7 @@ def test_heat_of_the_hottest_band(tmp_path: Path) -> None:
     ):
         flash = flash_of_bands([1.0, hottest], [1.0, 1.0 / hottest])
         assert flash.mean < 2.5
-        point: Any = SimpleNamespace(temperature=40.0, speed=1.0, flash=flash)
+        point: Any = SimpleNamespace(temperature=40.0, speed=1.0, effects={"thermal": flash})
         assert [words in str(doubt) for doubt in find([point])] == [True]
 
 

@@ -93,7 +93,7 @@ def test_a_slide_comes_to_the_steady_band() -> None:
     job = in_bands(2, 64, ZENER, 1e-3)
     *_, law = finer(job, 1.0, 1e5)
     steady = Band(job, cut_bands(job), 0, 0)
-    steady.slide((1.0, 0.0), 1.0)
+    steady.slide((1.0, 0.0))
     expected = steady.solve(1e5, law, None)
     history = [
         {"pressure": 1e5, "duration": 1e-3, "time_step": 5e-4},

@@ -153,14 +153,30 @@ def test_curve_of_a_sweep_has_only_begun_while_points_lack(
     assert states("steady.temperatures=[20.0]", shift) == ["begun", "begun"]
 
 
-def test_points_of_another_effect_are_not_gone_on_with(main: Main, tmp_path: Path) -> None:
-    """An interface changes friction of all points, as another material does."""
-    words = (*CURVE, "--set", "interface={shear_stress: 1.0e5}")
-    assert main(*words) == (DONE, "")
+@pytest.mark.parametrize(
+    ("first", "second", "sentence"),
+    [
+        (
+            "interface={shear_stress: 1.0e5}",
+            "interface={shear_stress: 2.0e5}",
+            "interface.shear_stress was 100000.0, is 200000.0",
+        ),
+        (
+            "softening={table: [[1.0e-3, 1.0, 1.0], [1.0, 0.5, 0.5]]}",
+            "softening={table: [[1.0e-3, 1.0, 1.0], [1.0, 0.2, 0.5]]}",
+            "softening.table was",
+        ),
+    ],
+)
+def test_points_of_another_effect_are_not_gone_on_with(
+    main: Main, tmp_path: Path, first: str, second: str, sentence: str
+) -> None:
+    """An interface or softening changes friction of all points, as another material does."""
+    assert main(*CURVE, "--set", first) == (DONE, "")
     before = (tmp_path / "out" / "steady.csv").read_bytes()
-    code, said = main(*CURVE, "--set", "interface={shear_stress: 2.0e5}")
+    code, said = main(*CURVE, "--set", second)
     assert code == BAD_INPUT
-    assert "another job: interface.shear_stress was 100000.0, is 200000.0" in said
+    assert f"another job: {sentence}" in said
     assert (tmp_path / "out" / "steady.csv").read_bytes() == before
 
 

@@ -430,5 +430,4 @@ def test_at_rest_nothing_is_warm() -> None:
     march = steady.first(planned, Slab.alone(16, 16))
     assert march.scene.effects["thermal"].values(march.state.memories["thermal"])[:2] == (0.0, 0.0)
     point = SteadySliding(march.scene.setup).solve((0.0, 0.0), 1e5)
-    assert point.flash is not None
-    assert (point.flash.mean, point.flash.highest) == (0.0, 0.0)
+    assert (point.effects["thermal"].mean, point.effects["thermal"].highest) == (0.0, 0.0)

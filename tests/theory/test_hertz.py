@@ -123,7 +123,7 @@ def test_friction_of_rubber_that_warms_itself() -> None:
         return float(flash.flash_temperature(heat, share / ELLIPSE, passing, sliding, q, KAPPA, D))
 
     rises = np.array([brentq(lambda t, v=v: rise_of(t, v) - t, 0.0, 500.0) for v in SPEEDS])
-    found = np.array([point.flash.mean if point.flash else 0.0 for point in warm])
+    found = np.array([point.effects["thermal"].mean for point in warm])
     expected = np.interp(np.log(SPEEDS * np.array([factor(rise) for rise in rises])), at, friction)
     simulated = np.array([point.friction for point in warm])
     rising = slice(2, 6)  # the cold curve begins at the first speed, and above the maximum it is steep
@@ -136,4 +136,4 @@ def test_friction_of_rubber_that_warms_itself() -> None:
     assert np.all(np.diff(simulated[top:]) < 0.0)
     below = highest(friction) > SPEEDS
     assert np.all(simulated[below] <= friction[below])
-    assert max(point.rounds for point in warm) <= 10
+    assert max(point.effects["thermal"].rounds for point in warm) <= 10

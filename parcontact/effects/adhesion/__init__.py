@@ -8,6 +8,7 @@ Sentences of the warnings about adhesion (`doubts.Doubt`).
 from ...column import Column, Table
 
 SECTION, EFFECT = "adhesion", "AdhesionColumns"
+CHANGES_STEPS = ("adhesion.work", "adhesion.range", "adhesion.law")  # see `capabilities`
 
 
 MEASURES: Table = (

@@ -82,6 +82,7 @@ class CounterbodyThatDeforms(Effect[None]):
     """A counterbody that deforms."""
 
     section: ClassVar[type[Part]] = Counterbody
+    in_curves: ClassVar[bool] = True
     in_bands_over_time: ClassVar[bool] = True
     columns: ClassVar[tuple[str, ...]] = ()
     rules: ClassVar[tuple[Rule, ...]] = (

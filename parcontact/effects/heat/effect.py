@@ -19,14 +19,14 @@ from ...job.listing import effects_of
 from ...job.parts import Part, Rule
 from ...job.quantities import Positive
 from ...job.yaml_text import Fault
-from ...march.constants import FLASH
 from ...parallel import fft
 from ...parallel.fft import Spectrum
 from ...parallel.slab import Array
 from ...physics.entries import Entry, Saved, Units
 from ...physics.prony import Exponentials, Prony, fit_exponentials
 from ..effect import Changes, Decision, Effect, Instant
-from ..relaxation import factor_at, feeds_back, temperature_of
+from ..relaxation import factor_at, temperature_of
+from . import ERROR
 from .solver import Conductor, Depths, Heating, HeatMemory, depths_of
 
 LOOSEST, SHARE = 1e-3, 0.1  # accuracy: error of the memory of heat: at most, and as a share of the job's accuracy
@@ -145,6 +145,12 @@ def _pulls(job: Any) -> bool:
     return any(limits.loads_press in lifted for lifted in job.asked("lifts"))
 
 
+def feeds_back(job: Any) -> bool:
+    """Return whether the heat of sliding changes the relaxation times of a job's material."""
+    section = job.section("thermal")
+    return section is not None and section.feedback != "none"
+
+
 class ThermalColumns(Effect[ThermalMemory]):
     """Columns: the mean temperature rise of the contact, weighted by heat, and the highest rise of the surface [K].
 
@@ -153,6 +159,7 @@ class ThermalColumns(Effect[ThermalMemory]):
 
     section: ClassVar[type[Part]] = Thermal
     columns: ClassVar[tuple[str, ...]] = added_by("thermal")
+    in_curves: ClassVar[bool] = True
     fields: ClassVar[tuple[str, ...]] = ("temperature",)
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("thermal", "material"), _shifts),
@@ -160,7 +167,7 @@ class ThermalColumns(Effect[ThermalMemory]):
         Rule(("thermal", "history", "grid", "bands"), _in_curves),
         Rule(("thermal", "grid"), _no_strip_of_heat),
     )
-    lifts: ClassVar[tuple[Any, ...]] = (limits.no_temperature,)
+    lifts: ClassVar[tuple[Any, ...]] = (limits.no_field["temperature"],)
 
     @staticmethod
     def decide(job: Any) -> Decision:
@@ -169,6 +176,16 @@ class ThermalColumns(Effect[ThermalMemory]):
             return Decision("thermal", False, "there is no thermal section")
         why = f"feedback is {section.feedback}"
         return Decision("thermal", True, f"{why}; {exponentials_of(job).kept} exponentials" if job.history else why)
+
+    @staticmethod
+    def curve_options(job: Any) -> Iterator[str]:
+        """Yield what columns of friction curves require."""
+        yield from ("thermal", *["feedback"] * feeds_back(job))
+
+    @staticmethod
+    def why_not_folded(job: Any) -> str:
+        """Return why all branches of the material must have maps; '' if they need not."""
+        return "heat changes them" if feeds_back(job) else ""
 
     @staticmethod
     def facts(job: Any) -> Iterator[str]:
@@ -257,10 +274,10 @@ class ThermalColumns(Effect[ThermalMemory]):
         return Heating(rubbed, pressed), replace(memory, force=force, area=measures.contact_area)
 
     def values(self, memory: ThermalMemory) -> Sequence[float]:
-        """Return the flash temperature, the highest rise, and the relative error of the former, FLASH times that of
+        """Return the flash temperature, the highest rise, and the relative error of the former, ERROR times that of
         friction; NaN if unknown."""
         known = memory.flash != 0.0 and math.isfinite(memory.error)
-        return memory.flash, memory.highest, FLASH.value * memory.error if known else math.nan
+        return memory.flash, memory.highest, ERROR * memory.error if known else math.nan
 
     def field(self, memory: ThermalMemory, name: str) -> Array:
         """Return this rank's rows of the temperature rise [K]."""

@@ -406,13 +406,16 @@ SLIP_BINS = 512  # accuracy: bins of the histogram for quartiles, whose error is
 class Flash:
     """Temperature rises [K] of a contact, weighted by the heat where it is released, on the surface and in the body:
     their mean (the flash temperature), the highest on the surface, and the lower and upper quartile. `of_rubber` is the
-    highest rise at which rubber relaxes: the mean, and in bands, each at its own temperature, that of the hottest."""
+    highest rise at which rubber relaxes: the mean, and in bands, each at its own temperature, that of the hottest. With
+    feedback, found in `rounds`, `friction_cold` is friction without feedback."""
 
     mean: float = 0.0
     highest: float = 0.0
     lower: float = 0.0
     upper: float = 0.0
     hottest_band: float | None = None
+    rounds: int = 1
+    friction_cold: float = math.nan
 
     @property
     def of_rubber(self) -> float:

@@ -30,13 +30,13 @@ STEADY: Table = (
         *("friction_viscous", ""),
         "part of friction from the body (with `interface`)",
         lambda point: point.friction - point.measures.friction_interface,
-        "interface",
+        "shear",
     ),
     Column(
         *("friction_interface", ""),
         "part of friction from the shear of the corrected contact area (with `interface`)",
         attrgetter("measures.friction_interface"),
-        "interface",
+        "shear",
     ),
 )
 SHOWN = ("friction_viscous", "friction_interface")  # columns of a run whose ends a report shows

@@ -91,9 +91,12 @@ def _no_adhesion(interface: Any, adhesion: Any) -> Iterator[Fault]:
         yield Fault("cannot be used with adhesion: leave one of them out", ("interface", "stick"))
 
 
+OF_TRACTIONS = [check for name, check in limits.no_field.items() if name == "traction"]  # none without `effects.stick`
+
+
 def _has_tractions(interface: Any, output: Any) -> Iterator[Fault]:
     if interface is None or not interface.stick:
-        yield from limits.no_traction(output)
+        yield from (fault for check in OF_TRACTIONS for fault in check(output))
 
 
 def _needs_its_folder(stick: bool, coefficient: float | None) -> Iterator[Fault]:
@@ -134,6 +137,7 @@ class InterfaceEffect(Effect[Memory]):
     """An effect of the section."""
 
     section: ClassVar[type[Part]] = Interface
+    in_curves: ClassVar[bool] = True
     in_bands_over_time: ClassVar[bool] = True
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("interface", "material"), _incompressible),
@@ -143,7 +147,7 @@ class InterfaceEffect(Effect[Memory]):
         Rule(("interface", "adhesion"), _no_adhesion),
         Rule(("interface", "output"), _has_tractions),
     )
-    lifts: ClassVar[tuple[Any, ...]] = (limits.no_traction, limits.no_rolling)
+    lifts: ClassVar[tuple[Any, ...]] = (*OF_TRACTIONS, limits.no_rolling)
 
     @staticmethod
     def remembers(job: Any) -> bool:

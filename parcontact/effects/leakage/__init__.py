@@ -6,6 +6,7 @@ Columns of leakage.
 from ...column import COUNTED, Column, Table
 
 SECTION, EFFECT = "leakage", "LeakageColumns"
+CHANGES_STEPS = tuple(f"leakage.{key}" for key in ("load", "pressures", "ambient", "fluid"))  # see `capabilities`
 
 
 MEASURES: Table = (

@@ -39,7 +39,7 @@ class LeakageColumns(Effect[tuple[float, ...]]):
     columns: ClassVar[tuple[str, ...]] = added_by("leakage")
     stage: ClassVar[type[Stage]] = SealStage
     rules: ClassVar[tuple[Rule, ...]] = RULES
-    lifts: ClassVar[tuple[Any, ...]] = (limits.no_fluid_pressure,)
+    lifts: ClassVar[tuple[Any, ...]] = (limits.no_field["fluid_pressure"],)
     brings_law: ClassVar[bool] = False  # a rule excludes steady sliding with `load: total`
 
     @staticmethod

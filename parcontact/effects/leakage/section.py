@@ -203,7 +203,7 @@ def _no_steady(leakage: Leakage | None, initial: Any, steady: Any) -> Iterator[F
 
 def _has_map(leakage: Leakage | None, output: Any) -> Iterator[Fault]:
     if leakage is None or not leakage.total:
-        yield from limits.no_fluid_pressure(output)
+        yield from limits.no_field["fluid_pressure"](output)
 
 
 RULES = (

@@ -15,8 +15,12 @@ STEADY: Table = (
     Column(
         *("strain_amplitude", ""),
         "amplitude of the shear strain that softens the rubber, weighted by power (with `softening`)",
-        when="softening",
+        lambda point: point.effects["softening"],
+        "softening",
     ),
+)
+BANDS: Table = (
+    Column("strain_amplitude", "", "strain that softens the rubber of the band (with `softening`)", when="softening"),
 )
 
 

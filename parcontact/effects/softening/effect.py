@@ -19,6 +19,7 @@ class SofteningEffect(Effect[None]):
     """Strain softening; histories are refused, so that no march makes it."""
 
     section: ClassVar[type[Part]] = Softening
+    in_curves: ClassVar[bool] = True
     columns: ClassVar[tuple[str, ...]] = ()
     rules: ClassVar[tuple[Rule, ...]] = RULES
     forbids: ClassVar[Mapping[str, str]] = {
@@ -30,6 +31,11 @@ class SofteningEffect(Effect[None]):
         """Yield a sentence on the strain at which moduli are those of the material."""
         if text := job.section("softening").fact:
             yield text
+
+    @staticmethod
+    def curve_options(job: Any) -> Iterator[str]:
+        """Yield what columns of friction curves require."""
+        yield "softening"
 
     @staticmethod
     def describe_waves(job: Any, q: Array, slopes: Array) -> Iterator[str]:

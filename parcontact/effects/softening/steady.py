@@ -26,10 +26,10 @@ Strains and factors of bands in full contact, from the spectrum alone.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement, pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -222,6 +222,8 @@ def settle(first: Softened, solve: Callable[[Softened], Round], accuracy: float)
 class StrainLoop:
     """The fixed point of the strains of the octaves on one grid; the next state starts from those of the last."""
 
+    fields: ClassVar[Mapping[str, Array]] = {}
+
     def __init__(self, setup: Setup) -> None:
         section = setup.job.section("softening")
         self.softened = Softened(section.made, max(setup.size), (section.made.start,) * count_octaves(setup))
@@ -240,7 +242,7 @@ class StrainLoop:
             return rounds[-1]
 
         settle(self.softened, once, sliding.setup.job.numerics.asked.both[0])
-        return replace(in_rounds(points), strain_amplitude=rounds[-1].amplitude)
+        return in_rounds(points).with_effect("softening", rounds[-1].amplitude)
 
 
 def loops(setup: Setup) -> Iterator[StrainLoop]:
@@ -252,12 +254,12 @@ def loops(setup: Setup) -> Iterator[StrainLoop]:
 def doubts_of_points(points: Sequence[Point], job: Any) -> Iterator[Doubt]:
     """Yield a warning if strains of a curve are outside of the table."""
     section = job.section("softening")
-    strained = [point for point in points if section and point.strain_amplitude > 0.0]  # NaN without friction
-    beyond = [point for point in strained if not section.made.reaches(point.strain_amplitude)]
+    strained = [(point.effects["softening"], point.speed) for point in points if section]
+    beyond = [each for each in strained if each[0] > 0.0 and not section.made.reaches(each[0])]  # NaN without friction
     if beyond:
         low, high = section.made.strain[0], section.made.strain[-1]
-        worst = max(beyond, key=lambda point: abs(math.log(point.strain_amplitude / math.sqrt(low * high))))
-        facts = {"strain": worst.strain_amplitude, "speed": worst.speed, "low": low, "high": high}
+        strain, speed = max(beyond, key=lambda each: abs(math.log(each[0] / math.sqrt(low * high))))
+        facts = {"strain": strain, "speed": speed, "low": low, "high": high}
         yield Doubt("strains beyond the sweep", "softening", {**facts, "count": len(beyond), "points": len(points)})
 
 

@@ -27,7 +27,8 @@ FIELDS: Table = (
     Column("traction_x", "Pa", "traction on the body along x (with `interface.stick`)"),
     Column("traction_y", "Pa", "traction on the body along y"),
 )
-FIELDS_NEED = dict.fromkeys(("traction_x", "traction_y"), "interface.stick")  # what the maps need
+FIELDS_NEED = {"traction": "interface: {stick: true}"}  # what the map needs
+VECTORS = ("traction",)  # maps with two components
 
 
 SENTENCES = {

@@ -67,11 +67,10 @@ def test_a_wave_in_full_contact() -> None:
     means = MeanMemory(Conductor(0.2, 1e-7)).advance(1.0, uniform)
     assert found[0].real / 32 == pytest.approx(means[0], rel=3e-5)
     within = wave / WARM["conductivity"] * Depths(np.array([k]), np.ones(1)).warmed(np.array([beta]), True)[0]
-    assert point.flash is not None
     mean = 2 * (np.fft.fft(pressure[0])[2].conj() * within).real / 32 / pressure[0].sum()
-    assert point.flash.mean == pytest.approx(means[1] + mean, rel=3e-5)
-    assert point.flash.highest == rise.max()
-    assert point.flash.lower < point.flash.mean < point.flash.upper
+    assert point.effects["thermal"].mean == pytest.approx(means[1] + mean, rel=3e-5)
+    assert point.effects["thermal"].highest == rise.max()
+    assert point.effects["thermal"].lower < point.effects["thermal"].mean < point.effects["thermal"].upper
 
 
 # -- feedback of steady sliding ----------------------------------------------------------------------------------------
@@ -94,14 +93,12 @@ def test_the_rubber_has_the_temperature_that_it_makes(speed: float) -> None:
     """Solved anew, as cold rubber at that temperature, friction and flash temperature are the same: to 1e-3, the error
     of the fixed point. It takes at most 10 rounds, and the first one is the cold body."""
     found = hot(speed)
-    assert found.flash is not None
-    again = hot(speed, thermal=WARM, material={**WARMED, "temperature": 20.0 + found.flash.mean})
+    again = hot(speed, thermal=WARM, material={**WARMED, "temperature": 20.0 + found.effects["thermal"].mean})
     cold = hot(speed, thermal=WARM)
     assert found.friction == pytest.approx(again.friction, rel=3e-3)
-    assert again.flash is not None
-    assert again.flash.mean == pytest.approx(found.flash.mean, rel=3e-3, abs=0.02)
-    assert found.rounds <= 10
-    assert found.friction_cold == cold.friction
+    assert again.effects["thermal"].mean == pytest.approx(found.effects["thermal"].mean, rel=3e-3, abs=0.02)
+    assert found.effects["thermal"].rounds <= 10
+    assert found.effects["thermal"].friction_cold == cold.friction
     assert found.shift_factor == pytest.approx(again.shift_factor, rel=0.03)
 
 
@@ -121,9 +118,7 @@ def test_blok_shares_the_heat_of_the_interface() -> None:
         thermal = {**WARM, "counterbody": {"conductivity": conductivity, "diffusivity": 4e-7}}
         point = hot(1.0, interface=RUBS, material=ELASTIC, surface={"shape": "flat"}, thermal=thermal)
         alone = hot(1.0, interface=RUBS, material=ELASTIC, surface={"shape": "flat"}, thermal=WARM)
-        assert point.flash is not None
-        assert alone.flash is not None
-        shares.append(point.flash.mean / alone.flash.mean)
+        shares.append(point.effects["thermal"].mean / alone.effects["thermal"].mean)
         own, other = Conductor(0.2, 1e-7).effusivity, Conductor(conductivity, 4e-7).effusivity
         assert shares[-1] == pytest.approx(own / (own + other), rel=1e-9)
     assert shares == sorted(shares, reverse=True)
@@ -167,7 +162,7 @@ def test_the_error_of_the_flash_temperature(seed: int, speed: float) -> None:
     for count in (32, 128):
         made = job(grid={"points": count, "size": LENGTH}, surface={**rough, "seed": seed}, numerics={})
         points.append(states(made).solve((speed, 0.0), 1e4))
-    flash = [point.flash.mean for point in points if point.flash is not None]
+    flash = [point.effects["thermal"].mean for point in points]
     error = next(column for column in STEADY if column.name == "error_flash").value(points[0])
     assert abs(flash[0] - flash[1]) < error * flash[1] < 40.0 * abs(flash[0] - flash[1])
 
@@ -281,7 +276,7 @@ def test_without_it_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     for place in places:
         monkeypatch.setattr(f"parcontact.{place}", refuse)
     plain = marched(march_data(thermal=None))[0]
-    assert states(job(thermal=None)).solve((SPEED, 0.0), PRESSURE).flash is None
+    assert states(job(thermal=None)).solve((SPEED, 0.0), PRESSURE).effects == {}
     assert "thermal" not in plain.scene.effects
     held = warm.scene.slab.tally["map bytes"] - plain.scene.slab.tally["map bytes"]
     spectrum = 16 * 4 * 17  # bytes, of 32 x 4 points

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -162,12 +163,16 @@ def test_a_curve_says_its_temperature(tmp_path: Path, main: Main) -> None:
     assert "material: at" not in out
 
 
+NOTHING: Any = None
+
+
 def rise_in_round(friction_of: Callable[[float], float], guesses: list[float]) -> Callable[[float], Point]:
     """A body whose flash temperature is a function of its own; the rises that are tried are listed."""
 
     def warmed(rise: float) -> Point:
         guesses.append(rise)
-        return Point((1.0, 0.0), 1e5, 0.0, 1.0, None, 0.1, None, None, 1.0, 0.0, (), Flash(friction_of(rise)))  # type: ignore[arg-type]
+        found: Any = {"thermal": Flash(friction_of(rise))}
+        return Point((1.0, 0.0), 1e5, 0.0, 1.0, NOTHING, 0.1, NOTHING, NOTHING, 1.0, 0.0, (), found)
 
     return warmed
 
@@ -180,8 +185,7 @@ def test_trial_temperatures_stay_within_the_shift() -> None:
     point = Feedback().solve_fixed_point(body, 1.0, (1e5, 5.0), 1e-3, most=40.0)
     exact = 20.0 * float(lambertw(4.0).real)
     assert max(tried) == 40.0
-    assert point.flash is not None
-    assert point.flash.mean == pytest.approx(exact, abs=0.05)  # stops at a difference of .02 K and 1e-3
+    assert point.effects["thermal"].mean == pytest.approx(exact, abs=0.05)  # stops at a difference of .02 K and 1e-3
     with pytest.raises(RunError, match=r"at 1 m/s under 1e\+05 Pa and 5 C.*is above 45 C.*warmed to 85 C"):
         Feedback().solve_fixed_point(rise_in_round(lambda _: 80.0, tried), 1.0, (1e5, 5.0), 1e-3, most=40.0)
     assert max(tried) == 40.0

@@ -1,0 +1,89 @@
+"""Strains of bands: their squares and weights in each contact, and the fixed point of the strains of all bands."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from ...bands.band import Means
+from ...bands.cascade import Results, by_power
+from ...bands.choice import Cut
+from ...bands.road_sliding import RoadSliding
+from ...contact.projected import SteadyContact
+from ...job import Job
+from ...march.point import Point
+from ...march.scene import Setup
+from ...parallel.slab import Array
+from .steady import SHARE, Vector, depths_between, strains_of
+
+
+class StrainProbe:
+    """Squares of the strain in the contacts of a band at all depths, and their weights in its strain."""
+
+    means: ClassVar[Means] = {"squares": by_power, "strain_weights": by_power}
+
+    def __init__(self, job: Job, cut: Cut) -> None:
+        self._depths = depths_between(float(cut.edges[0]), float(cut.edges[-1]))
+
+    def slide(self, setup: Setup, velocity: Vector) -> None:
+        """Do nothing."""
+
+    def measure(self, setup: Setup, contact: SteadyContact, velocity: Vector) -> dict[str, Array]:
+        """Return the squares and weights of a contact."""
+        depths, all_waves = self._depths / setup.units.length, np.zeros(setup.fft.shape, np.int64)
+        found = strains_of(setup, contact.u, velocity, depths, all_waves, 1)
+        return {"squares": found.squares, "strain_weights": found.weights[0]}
+
+
+def probes(job: Job, cut: Cut) -> Iterator[StrainProbe]:
+    """Yield the probe of a job with softening."""
+    if job.section("softening") is not None:
+        yield StrainProbe(job, cut)
+
+
+class StrainsOfBands:
+    """Strains of bands, which change by a power mean; the next state starts from those of the last."""
+
+    moves = True
+    words: ClassVar[tuple[str, str]] = ("strains", "")
+
+    def __init__(self, job: Job, cut: Cut) -> None:
+        self._table = job.section("softening").made
+        self._strains = np.full(cut.count, self._table.start)
+        self._enough = SHARE * job.numerics.asked.both[0]
+
+    def begin(self, road: RoadSliding) -> None:
+        """Do nothing."""
+
+    def act(self, road: RoadSliding) -> None:
+        road.set_factors(self._table.at, self._strains.tolist())
+
+    def settles(self, road: RoadSliding, results: Results, changes: tuple[float, float], others: bool) -> bool:
+        return changes[0] <= self._enough
+
+    def move(self, road: RoadSliding, results: Results) -> None:
+        self._strains = self._table.mixed(_strains_in(results), self._strains)
+
+    def found(self, road: RoadSliding, point: Point, results: Results, changes: tuple[float, float]) -> Point:
+        """Return the point with the root of the mean square strain of all bands, weighted by friction; NaN without
+        friction."""
+        weights = np.maximum([result.friction for result in results], 0.0)
+        whole = math.sqrt(np.average(_strains_in(results) ** 2, weights=weights)) if weights.any() else math.nan
+        return replace(point, errors=point.errors.with_rounds(*changes)).with_effect("softening", whole)
+
+    def values(self, results: Results) -> Mapping[str, Sequence[float]]:
+        return {"strain_amplitude": _strains_in(results).tolist()}
+
+
+def _strains_in(results: Results) -> Array:
+    """Return the strain of each band, by the waves of all bands."""
+    squares = np.sum([result.found["squares"] for result in results], axis=0)
+    return np.sqrt([result.found["strain_weights"] @ squares for result in results])
+
+
+def loops(job: Job, cut: Cut) -> Iterator[StrainsOfBands]:
+    """Yield the loop of a job with softening."""
+    if job.section("softening") is not None:
+        yield StrainsOfBands(job, cut)
