@@ -492,7 +492,9 @@ class InterfaceLaw:
 
     def closing(self, p: Array) -> Array:
         """Return c(p), of the shape of p."""
-        return np.interp(p, self.pressures, self.closings)
+        found, pressed = np.zeros(p.shape), p > 0.0
+        found[pressed] = np.interp(p[pressed], self.pressures, self.closings)
+        return found
 
 
 HARD = InterfaceLaw(np.array([0.0, 1.0]), np.zeros(2))  # no closing
@@ -529,9 +531,9 @@ def resolve(s, h, gamma, pressures, sums, p, reflected):
 
 
 @loop
-def begin_split(p, closing, u, h, d, gamma, s):
-    """Put `p + gamma c(p) - gamma h` where there is pressure, and `-gamma (u - d)` elsewhere, into s."""
+def begin_split(p, whole, u, h, d, gamma, s):
+    """Put `p + gamma (c - h)` where there is pressure, c = whole - u, and `-gamma (u - d)` elsewhere, into s."""
     for j in range(s.shape[0]):
         for i in range(s.shape[1]):
-            pressed = p[j, i] + gamma * (closing[j, i] - h[j, i])
+            pressed = p[j, i] + gamma * (whole[j, i] - u[j, i] - h[j, i])
             s[j, i] = pressed if p[j, i] > 0.0 else gamma * (d - u[j, i])

@@ -21,7 +21,8 @@ map s,
 
 (J. Douglas, H. H. Rachford, Trans. Amer. Math. Soc. 82 (1956) 421; P.-L. Lions, B. Mercier, SIAM J. Numer. Anal. 16
 (1979) 964). It converges for every gamma > 0 and every A with a real part >= 0, also for very large loss tangents, and
-is accelerated (`acceleration`). gamma is a multiple of pressure over displacement of the start, from which
+is accelerated (`acceleration`). gamma is a multiple of pressure over displacement of the start, and over its closing as
+well if the start is near the solution: in light contact the law is softer than the body. From the start
 
     s = p + gamma c(p) - gamma h where there is pressure,    s = -gamma (A p - d) elsewhere.
 
@@ -84,19 +85,33 @@ class Acceleration:
 
     def advance(self, s: Array, plain: bool) -> None:
         """Advance s, without earlier changes if `plain`."""
-        theta = np.zeros(DEPTH)
-        if self._count and not plain:
-            theta[: self._count] = self._smallest()
+        theta = _smallest(self._gram, self._against, 0 if plain else self._count)
         self._last = (self._last + 1) % DEPTH
-        _advance(s, self.f, self._ds, self._df, theta[: self._count], self._last)
+        _advance(s, self.f, self._ds, self._df, theta, self._last)
 
-    def _smallest(self) -> Array:
-        """Return the theta that make the residual smallest."""
-        gram = self._gram[: self._count, : self._count]
-        most = TRACE_SHARE * np.trace(gram) / self._count
-        if not most > 0.0:
-            return np.zeros(self._count)
-        return np.linalg.solve(gram + most * np.eye(self._count), self._against[: self._count])
+
+@loop
+def _smallest(gram, against, count):
+    """Return the `count` theta that make the residual smallest, by elimination of the normal equations."""
+    theta, left = against[:count].copy(), gram[:count, :count].copy()
+    added = 0.0
+    for k in range(count):
+        added += TRACE_SHARE * gram[k, k] / count
+    if not added > 0.0:
+        return np.zeros(count)
+    for k in range(count):
+        left[k, k] += added
+    for k in range(count):
+        for j in range(k + 1, count):
+            factor = left[j, k] / left[k, k]
+            for i in range(k, count):
+                left[j, i] -= factor * left[k, i]
+            theta[j] -= factor * theta[k]
+    for k in range(count - 1, -1, -1):
+        for j in range(k + 1, count):
+            theta[k] -= left[k, j] * theta[j]
+        theta[k] /= left[k, k]
+    return theta
 
 
 @loop
@@ -153,6 +168,7 @@ def _advance(s, f, ds, df, theta, last):
 
 
 GAMMA = 4.0  # tuning: gamma over the ratio of the spreads of pressure and displacement of the start
+SOFTENED = 2.0  # tuning: the same with the closing in the displacement, from a start near the solution
 MAX_LEVELS = 20  # accuracy: limit on steps to the level of a start with the load; about five are usual
 LEVEL_EXCESS = 1.1  # tuning: load of that start over the given one at which the level is left
 SLOW, FALL, LARGER = 500, 0.3, 16.0  # tuning: steps in which the rms of f must fall by a factor, or gamma is raised
@@ -190,48 +206,50 @@ class Splitting:
         pressure must be positive. The displacement `u = A p` of the contact is without the closing.
         """
         given, p, steps = _Given(h, control, law, tolerance or self.tolerance), start, 0
-        self._begin(given, p)
-        d, certificate = self._certify(given, p)
-        gamma = self._gamma(p)
-        while certificate.worst > given.tolerance and steps < self.most:
-            begin_split(p, law.closing(p), self._y, h, d, gamma, self._s)
-            made, d, certificate = self._iterate(given, p, gamma, d, certificate, self.most - steps)
+        cold = self._begin(given, p)
+        last = self._certify(given, p)
+        gamma = self._gamma(p, self._y if cold else last.whole)
+        while last.certificate.worst > given.tolerance and steps < self.most:
+            begin_split(p, last.whole, self._y, h, last.d, gamma, self._s)
+            made, last = self._iterate(given, p, gamma, last, self.most - steps)
             steps, gamma = steps + made, LARGER * gamma
+        d, certificate = last.d, last.certificate
         failure = describe_failure(f"has not converged in {steps} steps", certificate, given.tolerance)
         return SteadyContact(p, self._y, d, certificate, steps, failure)
 
     def _iterate(
-        self, given: "_Given", p: Array, gamma: float, d: float, certificate: Certificate, most: int
-    ) -> tuple[int, float, Certificate]:
-        """Make up to `most` steps, fewer if they are slow. Return their number, and the approach and the certificate of
-        the pressure, which are `d` and `certificate` before."""
+        self, given: "_Given", p: Array, gamma: float, known: "_Certified", most: int
+    ) -> tuple[int, "_Certified"]:
+        """Make up to `most` steps, fewer if they are slow. Return their number, and the pressure's certificate, which
+        is `known` before."""
         y, accelerated, guard, law = self._y, self._acceleration, _Guard(), given.law
         inverse, sums = self.resolvent(gamma), law.pressures + gamma * law.closings
         uniform, step, ratio, last = inverse.mean(), 0, 0.0, math.inf
         accelerated.forget()
-        while certificate.worst > given.tolerance and step < most:
+        while known.certificate.worst > given.tolerance and step < most:
             step += 1
             (total,) = self.slab.sum(resolve(self._s, given.h, gamma, law.pressures, sums, p, y))
             inverse.apply(y, y)
             rms = accelerated.residual(y, p, given.shift(uniform * gamma, uniform * total / self.slab.points))
-            ratio = ratio or certificate.worst / (rms or math.inf)
+            ratio = ratio or known.certificate.worst / (rms or math.inf)
             slow = not rms < last if step % SLOW == 0 else not math.isfinite(rms)
             if (rms * ratio <= given.tolerance or slow or step == most) and self._loads(given, p):
-                d, certificate = self._certify(given, p)
-                ratio = certificate.worst / (rms or math.inf)
+                known = self._certify(given, p)
+                ratio = known.certificate.worst / (rms or math.inf)
             if slow:
                 break
             last = FALL * rms if step % SLOW == 0 else last
             if guard.distrusts(rms):
                 accelerated.forget()
             accelerated.advance(self._s, guard.plain > 0)
-        return step, d, certificate
+        return step, known
 
-    def _begin(self, given: "_Given", p: Array) -> None:
-        """Replace a start that is 0 everywhere, and scale the start to a given mean."""
+    def _begin(self, given: "_Given", p: Array) -> bool:
+        """Replace a start that is 0 everywhere, and scale the start to a given mean. Return whether it was 0."""
         slab, mean = self.slab, given.mean or 0.0
         (load,) = slab.sum(kernels.sum_of(p))
-        if not load > 0.0:
+        cold = not load > 0.0
+        if cold:
             self.inverse.apply(given.h, p)
             level = slab.sum(kernels.sum_of(p))[0] / slab.points - mean
             for _ in range(MAX_LEVELS):
@@ -243,13 +261,15 @@ class Splitting:
             (load,) = slab.sum(kernels.sum_of(p))
         if mean:
             p *= mean * slab.points / (load or math.nan)
+        return cold
 
-    def _gamma(self, p: Array) -> float:
-        """Return gamma for a start p with the displacement in y; 1 if one of them is uniform, where any gamma does."""
-        maps = p, self._y
+    def _gamma(self, p: Array, whole: Array) -> float:
+        """Return gamma for a start p with a displacement, which has the closing if it is another map than y; 1 if one
+        of them is uniform, where any gamma does."""
+        maps, share = (p, whole), GAMMA if whole is self._y else SOFTENED
         sums = self.slab.sum(*(float(each.sum()) for each in maps), *(float(np.vdot(each, each)) for each in maps))
         p_square, u_square = (sums[2 + k] - sums[k] ** 2 / self.slab.points for k in (0, 1))
-        return GAMMA * math.sqrt(p_square / u_square) if p_square > 0.0 and u_square > 0.0 else 1.0
+        return share * math.sqrt(p_square / u_square) if p_square > 0.0 and u_square > 0.0 else 1.0
 
     def _loads(self, given: "_Given", p: Array) -> bool:
         """Scale a pressure to a given mean, or return False if it has no load; collective."""
@@ -258,11 +278,19 @@ class Splitting:
             p *= given.mean * self.slab.points / load
         return load > 0.0 or given.mean is None
 
-    def _certify(self, given: "_Given", p: Array) -> tuple[float, Certificate]:
-        """Return the approach and the certificate of an admissible pressure, and put its displacement into y."""
+    def _certify(self, given: "_Given", p: Array) -> "_Certified":
+        """Return the certificate of an admissible pressure, and put its displacement into y."""
         self.operator.apply(p, self._y)
         whole = self._y if given.law is HARD else self._y + given.law.closing(p)
-        return self.judge.certify(p, whole, given.h, given.control, self._working)
+        return _Certified(*self.judge.certify(p, whole, given.h, given.control, self._working), whole)
+
+
+class _Certified(NamedTuple):
+    """Approach and certificate of a pressure, and its displacement with the closing."""
+
+    d: float
+    certificate: Certificate
+    whole: Array
 
 
 class _Given(NamedTuple):

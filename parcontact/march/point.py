@@ -131,7 +131,7 @@ def branch_maps(setup: Setup, contact: SteadyContact, velocity: Vector, out: Arr
         return
     u = fft.forward(contact.u).copy()
     for modulus, tau in zip(setup.prony.moduli, setup.prony.relaxation_times, strict=True):
-        own = Prony(0.0, np.array([modulus]), np.array([tau]))
+        moduli = half_space.sliding_moduli(fft, speed, Prony(0.0, np.array([modulus]), np.array([tau])))
         for rows in deal(fft.my, PARTS):
-            np.multiply(half_space.sliding_modulus(fft, speed, own, rows), u[rows], out=fft.spectrum[rows])
+            np.multiply(moduli(rows), u[rows], out=fft.spectrum[rows])
         yield fft.backward(fft.spectrum, out)

@@ -376,15 +376,12 @@ class HalfSpace:
         qx, qy = travelling_wavenumbers(fft, self.size, rows)
         return np.asarray(qx * velocity[0] + qy * velocity[1])
 
-    def sliding_modulus(self, fft: FFT, velocity: Vector, prony: Prony, rows: slice = ALL) -> Spectrum:
-        """Return G*(-q v) of each wave, times `factors`; at a Nyquist wavenumber, which has two signs, the mean of
-        both. The result broadcasts to the rows of a spectrum: without factors all rows are equal if the surface slides
-        along x."""
-        return self._moduli(fft, velocity, prony)(rows)
+    def sliding_moduli(self, fft: FFT, velocity: Vector, prony: Prony) -> Callable[[slice], Spectrum]:
+        """Return a function that gives G*(-q v) of each wave of rows, times `factors`; at a Nyquist wavenumber, which
+        has two signs, the mean of both.
 
-    def _moduli(self, fft: FFT, velocity: Vector, prony: Prony) -> Callable[[slice], Spectrum]:
-        """Return a function that gives `sliding_modulus` of rows. Under a surface that slides along x the modulus
-        without factors is the same in all rows, and made once."""
+        Its result broadcasts to the rows: under a surface that slides along x all rows are equal without factors, and
+        made once."""
         if velocity[1]:
             return lambda rows: self._with_factors(fft, self._linear_modulus(fft, velocity, prony, rows), rows)
         of_a_row = self._linear_modulus(fft, velocity, prony, slice(0, 1))
@@ -411,7 +408,7 @@ class HalfSpace:
         free. Raises InputError for a free body that flows, as its wake never ends."""
         if self.free:
             return self._along_wake(fft, velocity, _creep(prony), fft.dtype)
-        moduli = self._moduli(fft, velocity, prony)
+        moduli = self.sliding_moduli(fft, velocity, prony)
 
         def part(rows: slice) -> Spectrum:
             symbol, modulus = self.symbol(fft, rows), moduli(rows)
@@ -421,7 +418,7 @@ class HalfSpace:
 
     def sliding_inverse(self, fft: FFT, velocity: Vector, prony: Prony) -> Convolution:
         """Return the operator from displacement to pressure, as `inverse`."""
-        moduli = self._moduli(fft, velocity, prony)
+        moduli = self.sliding_moduli(fft, velocity, prony)
 
         def part(rows: slice) -> Spectrum:
             return np.asarray(self.inverse_symbol(fft, rows) * moduli(rows))

@@ -124,7 +124,7 @@ def _power(setup: Setup, q: Array, velocity: Vector) -> Array:
     """Return the dissipated power of each wave over the square of its amplitude, to a common factor."""
     speed = setup.in_units(velocity)
     omega = np.abs(setup.half_space.frequencies(setup.fft, speed))
-    modulus = setup.half_space.sliding_modulus(setup.fft, speed, setup.prony)
+    modulus = setup.half_space.sliding_moduli(setup.fft, speed, setup.prony)(slice(None))
     return np.asarray(q * omega * np.abs(modulus.imag))
 
 
