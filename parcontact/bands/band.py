@@ -24,9 +24,9 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from ..contact import kernels
-from ..contact.constraint import InterfaceLaw, NonNegative
-from ..contact.problem import MeanPressure
-from ..contact.projected import Judge, SteadyContact
+from ..contact.certificate import Judge
+from ..contact.constraint import Constraint
+from ..contact.problem import Contact, MeanPressure
 from ..contact.splitting import Splitting
 from ..errors import RunError
 from ..job import Grid, HeightArray, Job
@@ -131,7 +131,7 @@ class Probe(Protocol):
     def slide(self, setup: Setup, velocity: Vector) -> None:
         """Prepare for a velocity [m/s]."""
 
-    def measure(self, setup: Setup, contact: SteadyContact, velocity: Vector) -> Mapping[str, Array]:
+    def measure(self, setup: Setup, contact: Contact, velocity: Vector) -> Mapping[str, Array]:
         """Return the arrays of a contact by their names."""
 
 
@@ -195,7 +195,7 @@ class Band:
         """Rms pressure [Pa] of its waves in full contact."""
         return self._full * self.setup.units.pressure
 
-    def contact(self, pressure: float, law: InterfaceLaw) -> SteadyContact:
+    def contact(self, pressure: float, law: Constraint) -> Contact:
         """Return the contact in steady sliding under a mean pressure [Pa]; see `solve`."""
         setup, units = self.setup, self.setup.units
         judge = Judge(setup.slab, setup.height / units.height)
@@ -207,12 +207,12 @@ class Band:
             raise RunError(f"a band of {max(setup.grid.size):.3g} m under {pressure:.3g} Pa {contact.failure}")
         return contact
 
-    def solve(self, pressure: float, law: InterfaceLaw, below: PressureLadder | None) -> Rung:
+    def solve(self, pressure: float, law: Constraint, below: PressureLadder | None) -> Rung:
         """Return the steady state under a mean pressure [Pa] with the closing of all finer bands [m over Pa], and its
         distribution over `below`, the ladder of the next finer band. Raises RunError if it is not found."""
         setup, velocity, contact = self.setup, self._velocity, self.contact(pressure, law)
         units = setup.units
-        seen = contact.u, self.heights, contact.d, NonNegative().touches(contact.p)
+        seen = contact.u, self.heights, contact.d, law.touches(contact.p)
         measures = self.probe.measure(contact.p, 1.0, *seen, (0.0, 0.0), velocity)
         lost = self.operator.loss(contact.p, setup.size, direction_of(velocity)) / kernels.sum_of(contact.p)
         by_energy = lost * units.height / units.length
@@ -234,7 +234,7 @@ class Band:
             rung_errors(budget),
             contact.certificate.worst,
             contact.certificate.penetration,
-            float(contact.steps),
+            float(contact.iterations),
         )
 
 

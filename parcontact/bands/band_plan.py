@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 
-from ..contact.constraint import HARD
+from ..contact.constraint import Box
 from ..job import Job
 from ..march.curve import request
 from ..parallel.slab import Slab
@@ -26,7 +26,7 @@ def plan_bands(job: Job, slab: Slab) -> Iterator[str]:
     cascade.press(wanted.velocity(fastest), wanted.pressures[0])
     for number in sorted({0, cut.count // 2, cut.count - 1}):
         rungs = range(len(cascade.ladders[number].rungs))
-        cascade.solve_tasks([Task(number, 0, rung, HARD) for rung in rungs])
+        cascade.solve_tasks([Task(number, 0, rung, Box()) for rung in rungs])
         contacts += len(rungs)
     each = slab.agree((time.perf_counter() - began) / contacts)
     samples = cut.samples or FEWEST

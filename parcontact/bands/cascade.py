@@ -29,7 +29,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from .. import __version__
-from ..contact.constraint import HARD, InterfaceLaw
+from ..contact.constraint import Box, Constraint, InterfaceLaw
 from ..errors import InputError, RunError
 from ..files import hdf5
 from ..job import Job, listing
@@ -127,7 +127,7 @@ class Task(NamedTuple):
     band: int
     sample: int
     rung: int
-    law: InterfaceLaw
+    law: Constraint
 
 
 @dataclass(frozen=True)
@@ -233,7 +233,8 @@ class Cascade:
     def climb(self, samples: Sequence[int]) -> dict[tuple[int, int], list[Rung]]:
         """Solve all rungs of all bands with the laws of finer ones (upward pass), separately for each sample."""
         found: dict[tuple[int, int], list[Rung]] = {}
-        laws, touching = dict.fromkeys(samples, HARD), dict.fromkeys(samples, 0.0)
+        laws: dict[int, Constraint] = dict.fromkeys(samples, Box())
+        touching = dict.fromkeys(samples, 0.0)
         for number in reversed(range(self.cut.count)):
             rungs = range(len(self.ladders[number].rungs))
             tasks = [Task(number, sample, rung, laws[sample]) for sample in samples for rung in rungs]
@@ -292,7 +293,7 @@ class Cascade:
         def solve(number: int, weights: Array) -> Sequence[Rung]:
             ladder = self.ladders[number]
             there = np.flatnonzero(np.abs(weights) * ladder.rungs > NEGLIGIBLE * self.pressure)
-            solved = self.solve_tasks([Task(number, sample, int(rung), HARD) for rung in there])
+            solved = self.solve_tasks([Task(number, sample, int(rung), Box()) for rung in there])
             nothing = replace(solved[0], friction=0.0, friction_slopes=0.0, contact_area=0.0)
             found = [nothing] * len(ladder.rungs)
             for rung, one in zip(there, solved, strict=True):
@@ -303,7 +304,7 @@ class Cascade:
 
     def solve_tasks(self, tasks: Sequence[Task]) -> list[Rung]:
         """Return the solved contacts in the order of the tasks. Raises RunError on all ranks if one is not found."""
-        laws = [(task.law.pressures.tobytes(), task.law.closings.tobytes()) for task in tasks]
+        laws = [tuple(np.asarray(value).tobytes() for value in vars(task.law).values()) for task in tasks]
         here = self.velocity, self.pressure, self._temperatures, self._factors and self._factors[1]
         states = [(here, task[:3], law) for task, law in zip(tasks, laws, strict=True)]
         return self.store.find(states, lambda lacking: self.share([tasks[number] for number in lacking], self._solve))

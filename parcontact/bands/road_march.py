@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.constraint import HARD, InterfaceLaw
+from ..contact.constraint import Box, Constraint
 from ..job.history import Step
 from ..march.laws import ClosingLaw
 from ..march.loop import March, run_steps
@@ -16,7 +16,7 @@ from ..parallel.slab import Array
 from .band import Band, PressureLadder, Rung, rung_errors
 from .band_steps import BEFORE, Place
 
-LawAt = Callable[[Place], InterfaceLaw]
+LawAt = Callable[[Place], Constraint]
 NOTHING: Array = np.zeros(0)
 NONE: Array = np.zeros(1)  # of what only steady states have
 
@@ -49,10 +49,10 @@ class BandMarch:
         if initial.state == "virgin":
             return start_march(scene)
         band.slide(initial.velocity)
-        contact = band.contact(pressure, law(Place(0, BEFORE)) if law is not None else HARD)
+        contact = band.contact(pressure, law(Place(0, BEFORE)) if law is not None else Box())
         seen = contact.p, 1.0, contact.u, band.heights, contact.d, contact.p > 0.0
         measures = scene.probe.measure(*seen, (0.0, 0.0), initial.velocity)
-        facts = {"certificate": contact.certificate, "operator_calls": contact.steps}
+        facts = {"certificate": contact.certificate, "operator_calls": contact.iterations}
         return start_march(scene, contact, measures=measures, **facts)
 
     def _measure(self, march: March, pressure: float, below: PressureLadder | None) -> Rung:

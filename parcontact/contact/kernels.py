@@ -3,26 +3,88 @@
 Sums are taken in double precision, first along rows and then over rows: their rounding error grows with the sum of
 both numbers of points, not with the product."""
 
+import numpy as np
+
 from ..compiled import loop
 
 
 @loop
-def pressure_sums(p, u, h, d):
-    """Return the sums of p, p u, p g and p u^2, with `g = u - h - d`."""
-    load, work, squares, gaps = 0.0, 0.0, 0.0, 0.0
+def contact_sums(p, u, h, d, lowest, highest):
+    """Return, with `g = u - h - d`, the sums of p, p u, p g and p u^2, and those of `p - lowest` and `(p - lowest) g`
+    over points below `highest`."""
+    load, work, gaps, squares, free_load, free_gaps = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(p.shape[0]):
-        row_load, row_work, row_squares, row_gaps = 0.0, 0.0, 0.0, 0.0
+        row_load, row_work, row_gaps, row_squares, row_free_load, row_free_gaps = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(p.shape[1]):
-            pressed = p[j, i] * u[j, i]
+            pressed, gap = p[j, i] * u[j, i], u[j, i] - h[j, i] - d
+            free = p[j, i] - lowest if p[j, i] < highest else 0.0
             row_load += p[j, i]
             row_work += pressed
+            row_gaps += p[j, i] * gap
             row_squares += pressed * u[j, i]
-            row_gaps += p[j, i] * (u[j, i] - h[j, i] - d)
+            row_free_load += free
+            row_free_gaps += free * gap
         load += row_load
         work += row_work
-        squares += row_squares
         gaps += row_gaps
-    return load, work, gaps, squares
+        squares += row_squares
+        free_load += row_free_load
+        free_gaps += row_free_gaps
+    return load, work, gaps, squares, free_load, free_gaps
+
+
+@loop
+def mark_working_set(p, u, h, d, lowest, highest, working):
+    """Mark points above `lowest` and points that penetrate, but no points at `highest` with `g = u - h - d <= 0`, which
+    are held. Return the sum of `(p - lowest) |g|` over points that are not held; the number of marked points and their
+    sum of g; the number of points held; and the largest -g of points below `highest`.
+
+    The lowest gap is kept for each column: a single running minimum would not be vectorized.
+    """
+    wrong, count, gaps, held = 0.0, 0.0, 0.0, 0.0
+    least, deepest = np.empty(p.shape[1]), -np.inf
+    for i in range(least.size):
+        least[i] = np.inf
+    for j in range(p.shape[0]):
+        row_wrong, row_count, row_gaps, row_held = 0.0, 0.0, 0.0, 0.0
+        for i in range(p.shape[1]):
+            gap = u[j, i] - h[j, i] - d
+            yields = p[j, i] >= highest
+            stays = yields & (gap <= 0.0)
+            inside = ((p[j, i] > lowest) | (gap < 0.0)) & ~stays
+            working[j, i] = inside
+            weight = 1.0 if inside else 0.0
+            row_wrong += 0.0 if stays else (p[j, i] - lowest) * abs(gap)
+            row_count += weight
+            row_gaps += weight * gap
+            row_held += 1.0 if stays else 0.0
+            least[i] = min(least[i], np.inf if yields else gap)
+        wrong += row_wrong
+        count += row_count
+        gaps += row_gaps
+        held += row_held
+    for i in range(least.size):
+        deepest = max(deepest, -least[i])
+    return wrong, count, gaps, held, deepest
+
+
+@loop
+def advance(p_old, t, step, lowest, highest, p):
+    """Put `p_old - step t`, limited to the bounds, into p. Return the sums of p and of the magnitude of what limiting
+    has changed."""
+    load, cut = 0.0, 0.0
+    for j in range(p.shape[0]):
+        row_load, row_cut = 0.0, 0.0
+        for i in range(p.shape[1]):
+            value = p_old[j, i] - step * t[j, i]
+            kept = lowest if value < lowest else value
+            kept = highest if kept > highest else kept
+            p[j, i] = kept
+            row_load += kept
+            row_cut += abs(kept - value)
+        load += row_load
+        cut += row_cut
+    return load, cut
 
 
 @loop

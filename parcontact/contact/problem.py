@@ -1,10 +1,4 @@
-"""Input, memory and precision of a contact solve.
-
-Contact problem, the input of solvers.
-
-Maps of one grid that contact solves work in. Between solves other parts of a run use them.
-
-Precision of search directions, and the smallest certificate that rounding allows.
+"""Input, memory, precision and result of a contact solve.
 
 Directions, residuals and preconditioned residuals may be rounded to single precision: the step along a direction and
 the image of the new iterate are computed in double precision. In full contact, which one step solves, the result is
@@ -13,14 +7,14 @@ then correct to little more than single precision.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..parallel.slab import Array, Slab
-from .constraint import Constraint
+from ..physics.measures import Certificate
+from .constraint import Box
 
 
 class Operator(Protocol):
@@ -42,12 +36,18 @@ class MeanPressure:
 
     value: float
 
+    @property
+    def mean(self) -> float | None:
+        """The prescribed mean pressure."""
+        return self.value
+
 
 @dataclass(frozen=True)
 class Approach:
     """Displacement control: the rigid approach d is given, the load is unknown."""
 
     value: float
+    mean = None
 
 
 Control = MeanPressure | Approach
@@ -55,7 +55,7 @@ Control = MeanPressure | Approach
 
 @dataclass(frozen=True)
 class Problem:
-    """Find a pressure p that the `constraint` admits and whose gap `g = A p - h - d` meets its conditions.
+    """Find a pressure p between the bounds of the `constraint` whose gap `g = A p - h - d` meets its conditions.
 
     `operator` is A, `preconditioner` is K, close to its inverse, and `heights` is the map h. `control` gives the
     mean of p or the approach d.
@@ -64,13 +64,28 @@ class Problem:
     operator: Operator
     preconditioner: Operator
     heights: Array
-    constraint: Constraint
+    constraint: Box
     control: Control
 
-    @cached_property
-    def mean(self) -> float | None:
-        """The prescribed mean pressure; None with a given approach."""
-        return self.control.value if isinstance(self.control, MeanPressure) else None
+
+@dataclass(frozen=True)
+class Contact:
+    """A contact, solved or given up. Maps have the shape (rows of this rank, nx).
+
+    `p` is the map that was given as the start. `u = A p` belongs to the solver and is valid until its next solve.
+    `failure` is empty, or states why the tolerance was not reached.
+    """
+
+    p: Array
+    u: Array
+    d: float
+    certificate: Certificate
+    iterations: int
+    failure: str
+
+    @property
+    def converged(self) -> bool:
+        return not self.failure
 
 
 VERY_LOOSE = 1e-3  # accuracy: least tolerance on a certificate with displacements in single precision

@@ -1,20 +1,16 @@
 """Projected steps for operators that are not symmetric, in light contact and free boxes.
 
-Certificates of admissible pressures, and the contact that solvers return.
+Minimal residual steps, each projected onto the admissible pressures. On the working set c (pressure or penetration) of
+an admissible pressure x, a step combines the preconditioned residual t and the last two changes of x so that the sum of
+squares of `C R (A x - h)` is smallest (R: restrict to c, C: subtract the mean over c). Then negative pressures are put
+to 0, the load is restored, near by first (`LocalLoad`), and A is applied to x, so that the stored changes have exact
+images. A need not be symmetric. Convergence is not guaranteed: a solve is given up when its certificate no longer
+halves.
 
-Minimal residual steps, each projected onto the admissible pressures, for light contact and free boxes.
-
-On the working set c (pressure or penetration) of an admissible pressure x, a step combines the preconditioned
-residual t and the last two changes of x so that the sum of squares of `C R (A x - h)` is smallest (R: restrict to c,
-C: subtract the mean over c). Then negative pressures are put to 0, the load is restored, near by first
-(`local_load`), and A is applied to x, so that the stored changes have exact images. A need not be symmetric.
-Convergence is not guaranteed: a solve is given up when its certificate no longer halves.
-
-Steady contact in a free box: projected steps, followed by proximal points where these do not help.
-
-The symbol of a padded box has waves with a negative real part, so that its resolvents may not exist (`splitting`). If
-projected steps fail, the contact is the limit of contacts with less loss: with S symmetric and positive, the contact p'
-of the operator `A + S` for heights `h + S p` satisfies
+In a free box (`FreeSteadySolver`) proximal points follow where these steps do not help. The symbol of a padded box has
+waves with a negative real part, so that its resolvents may not exist (`splitting`). There the contact is the limit of
+contacts with less loss: with S symmetric and positive, the contact p' of the operator `A + S` for heights `h + S p`
+satisfies
 
     A p' - h - d = S (p - p') where there is pressure,
 
@@ -25,71 +21,139 @@ larger, 0 for the others.
 """
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import loop
+from ..parallel.regrid import RowExchange
 from ..parallel.slab import Array, Slab
 from ..physics.convolution import Convolution
 from ..physics.measures import Certificate
 from . import kernels
-from .constraint import LEAST_CUT as CONSTRAINT_LEAST_CUT
-from .constraint import LocalLoad, NonNegative
+from .certificate import Judge, describe_failure
+from .constraint import Box, scale_to_load
 from .preconditioner import ExtendedPreconditioner, Grids
-from .problem import Approach, Control, MeanPressure, Operator
-from .solver import Lines, certify, form_iterate
+from .problem import Contact, MeanPressure, Operator
+
+CELL = 16  # tuning: side of a cell of `LocalLoad` [points]
+LEAST_SIDE = 4  # tuning: least side of a cell [points]; contacts may cycle with fewer
+MOST_GIVEN_BACK = 0.5  # tuning: largest share of its load that a cell loses
 
 
-@dataclass(frozen=True)
-class SteadyContact:
-    """A contact, solved or given up in `steps`. p is the map of the start; `u = A p` belongs to the solver and is valid
-    until its next solve. `failure` is empty, or states why the tolerance was not reached."""
+class Cells(NamedTuple):
+    """Cells of `LocalLoad` on a rank: each has `rows` x `columns` points, and `above` rows of the first one belong to
+    another rank."""
 
-    p: Array
-    u: Array
-    d: float
-    certificate: Certificate
-    steps: int
-    failure: str
-
-    @property
-    def converged(self) -> bool:
-        return not self.failure
+    rows: int
+    above: int
+    columns: int
 
 
-@dataclass(frozen=True)
-class Judge:
-    """Certifies pressures on one grid: `height` of the surface; `lines` along which the body is stiffer, if gaps are to
-    be certified for them."""
+class LocalLoad:
+    """Removal of the load that cutting off negative pressures adds, near the points where it was added.
 
-    slab: Slab
-    height: float
-    lines: Lines | None = None
+    Scaling all pressures by one factor would remove it, but waves as long as the box would move every spot by more than
+    the gaps at its edge, and points would penetrate again. So each cell of CELL x CELL points loses what was added in
+    it, which changes the displacement only near by. Where points are closer along one direction, cells have fewer
+    points along the other, so that they are about square: in long cells, one spot would lose what another has gained,
+    and projected steps may cycle. Cells are the same on any number of ranks. The object holds no maps.
+    """
 
-    def certify(
-        self, p: Array, u: Array, h: Array, control: Control, working: NDArray[np.bool_]
-    ) -> tuple[float, Certificate]:
-        """Mark the working set of an admissible pressure with the displacement u. Return its approach and
-        certificate; collective."""
-        slab, constraint, given = self.slab, NonNegative(), isinstance(control, Approach)
-        iterate = form_iterate(slab, constraint, p, u, h, control.value if given else 0.0)
-        iterate, mean = (iterate, None) if given else (iterate.settled(), control.value)
-        *_, certificate = certify(slab, constraint, p, u, h, iterate, mean, self.height, working)
-        if self.lines is not None and iterate.load > 0.0:
-            certificate = certificate.shortened(self.lines.share_of_length(slab, p, u, iterate))
-        return iterate.d, certificate
+    def __init__(self, slab: Slab, pairs: int = 0) -> None:
+        """Make cells on a grid where `pairs` doublings make cells square (`preconditioner.pairs_for`)."""
+        self._slab = slab
+        if slab.only_counts:
+            return
+        rows, columns = (max(CELL >> max(count, 0), LEAST_SIDE) for count in (pairs, -pairs))
+        touched = [_rows_of_cells(part, rows) for part in slab.dealt]
+        rank, self._width = slab.comm.rank, -(-slab.nx // columns)
+        ends = np.cumsum([0] + [part.stop - part.start for part in touched]).tolist()
+        stacked = [slice(start, stop) for start, stop in pairwise(ends)]
+        self._stack = Slab(slab.comm, 2 * self._width, ends[-1], slab.tally, stacked.__getitem__)
+        numbers = np.concatenate([np.arange(part.start, part.stop) for part in touched])
+        wanted = np.searchsorted(numbers, [(part.start, part.stop) for part in touched])
+        self._exchange = RowExchange.of_parts(self._stack, wanted)
+        own = np.arange(touched[rank].start, touched[rank].stop)
+        self._starts = np.searchsorted(numbers[slice(*wanted[rank].tolist())], own)
+        self._cells = Cells(rows, slab.rows.start % rows, columns)
+        self._sums = np.zeros(self._stack.shape)
+
+    def cut_off(self, p: Array) -> tuple[float, float]:
+        """Put negative pressures to 0. Return the sum of p and of what this has added; collective."""
+        cut_off_cells(p, self._cells, self._sums)
+        loads, added = self._sums[:, : self._width], self._sums[:, self._width :]
+        load, cut = self._slab.sum(float(loads.sum()), float(added.sum()))
+        return load, cut
+
+    def restore(self, p: Array, load: float, total: float, near_by: bool) -> None:
+        """Scale p from the sum `load`, as `cut_off` returned it, to the sum `total`; collective. If `near_by`, each
+        cell first loses what was added in it, at most MOST_GIVEN_BACK of its load."""
+        if not near_by:
+            p *= total / load
+            return
+        loads, shares = self._sums[:, : self._width], self._shares()
+        load -= self._slab.sum(float(np.sum(shares * loads)))[0]
+        scale_cells(p, self._cells, total / load * (1.0 - shares))
+
+    def _shares(self) -> Array:
+        """Return the share of its load that each cell with points on this rank loses; collective."""
+        parts = self._exchange.fetch(self._sums)
+        whole = np.add.reduceat(parts, self._starts, axis=0) if len(parts) else parts
+        loads, added = whole[:, : self._width], whole[:, self._width :]
+        shares = np.divide(added, loads, out=np.zeros_like(loads), where=loads > 0.0)
+        return np.minimum(shares, MOST_GIVEN_BACK)
 
 
-def describe_failure(reason: str, certificate: Certificate, tolerance: float) -> str:
-    """Return the reason why a solve was given up, with its residual; empty if it met the tolerance."""
-    worst = certificate.worst
-    return "" if worst <= tolerance else f"{reason}: the residual is {worst:.3g} where {tolerance:.3g} was asked for"
+def _rows_of_cells(part: slice, rows: int) -> slice:
+    """Return the rows of cells that contain given rows of points, for cells of `rows` rows."""
+    start = part.start // rows
+    return slice(start, max(-(-part.stop // rows), start) if part.stop > part.start else start)
+
+
+@loop
+def cut_off_cells(p, cells, sums):
+    """Put `max(p, 0)` into p; put the sums of p over cells into the first half of `sums`, and those of what was added
+    into the second. Rows of a cell are added up first, so that the loop is vectorized."""
+    columns = sums.shape[1] // 2
+    load, cut = np.empty(p.shape[1]), np.empty(p.shape[1])
+    for j in range(sums.shape[0]):
+        for i in range(sums.shape[1]):
+            sums[j, i] = 0.0
+    for i in range(p.shape[1]):
+        load[i] = cut[i] = 0.0
+    for j in range(p.shape[0]):
+        for i in range(p.shape[1]):
+            value = p[j, i]
+            kept = 0.0 if value < 0.0 else value
+            p[j, i] = kept
+            load[i] += kept
+            cut[i] += kept - value
+        if (j + cells.above + 1) % cells.rows == 0 or j + 1 == p.shape[0]:
+            row = sums[(j + cells.above) // cells.rows]
+            for i in range(p.shape[1]):
+                row[i // cells.columns] += load[i]
+                row[columns + i // cells.columns] += cut[i]
+                load[i] = cut[i] = 0.0
+
+
+@loop
+def scale_cells(p, cells, factors):
+    """Multiply each pressure by the factor of its cell."""
+    line = np.empty(p.shape[1])
+    for j in range(p.shape[0]):
+        if j == 0 or (j + cells.above) % cells.rows == 0:
+            row = factors[(j + cells.above) // cells.rows]
+            for i in range(line.size):
+                line[i] = row[i // cells.columns]
+        for i in range(p.shape[1]):
+            p[j, i] *= line[i]
 
 
 Set = NDArray[np.bool_]
+LEAST_CUT = 3e-4  # tuning: share of the load; less added load is removed by one factor for all points
 DIRECTIONS = 3  # the residual and the last two changes
 SQUARES, WIDE = 5, 0.5  # tuning: grids of squares and floor of `ExtendedPreconditioner`
 NARROW = Grids(4), 1.0  # tuning: the same on lines; larger cells or a smaller floor may make sets cycle there
@@ -108,19 +172,12 @@ class Projected:
     """Projected steps on one grid. It holds DIRECTIONS maps t, their images w, the displacement, a byte per point, and
     the maps of `ExtendedPreconditioner`.
 
-    `pairs` doublings make cells square. `least_cut` is LEAST_CUT of `LocalLoad` on squares, as a share of the load; the
-    smaller cells of `pairs` reduce it.
+    `pairs` doublings make cells square. `least_cut` is the least added load that is removed near by, over the
+    load and on squares; the smaller cells of `pairs` reduce it.
     """
 
-    constraint = NonNegative()  # steady sliding has no other constraint
-
     def __init__(
-        self,
-        judge: Judge,
-        operator: Operator,
-        preconditioner: Operator,
-        pairs: int = 0,
-        least_cut: float = CONSTRAINT_LEAST_CUT,
+        self, judge: Judge, operator: Operator, preconditioner: Operator, pairs: int = 0, least_cut: float = LEAST_CUT
     ) -> None:
         self.judge, self.operator, self.preconditioner = judge, operator, preconditioner
         self.slab = slab = judge.slab
@@ -131,9 +188,7 @@ class Projected:
         self.extended = ExtendedPreconditioner(slab, floor, grids)
         self.local_load, self._least_cut = LocalLoad(slab, pairs), least_cut / 2.0 ** abs(pairs)
 
-    def solve(
-        self, h: Array, mean: float, p: Array, tolerance: float, patience: int, near_by: bool = True
-    ) -> SteadyContact:
+    def solve(self, h: Array, mean: float, p: Array, tolerance: float, patience: int, near_by: bool = True) -> Contact:
         """Solve for heights h under the mean pressure `mean`; the solution overwrites the start p. A start that is 0
         everywhere is replaced by a uniform pressure. Restore the load `near_by` first, or from all points by one
         factor. Give up if the certificate does not halve in `patience` steps. Collective."""
@@ -148,17 +203,14 @@ class Projected:
         except ZeroDivisionError:  # no load or no points in a set; all ranks have the same sums
             p.fill(0.0)
             d, certificate = math.nan, Certificate(math.nan, math.nan, math.nan)
-            return SteadyContact(p, self._u, d, certificate, steps, "no point is left that carries load")
+            return Contact(p, self._u, d, certificate, steps, "no point is left that carries load")
         failure = describe_failure(f"no progress in {since} projected steps", certificate, tolerance)
-        return SteadyContact(p, self._u, d, certificate, steps, failure)
+        return Contact(p, self._u, d, certificate, steps, failure)
 
     def _begin(self, h: Array, mean: float, p: Array) -> tuple[float, Certificate]:
         """Scale the start to the load, and forget earlier changes. Return its approach and certificate."""
         (load,) = self.slab.sum(kernels.sum_of(p))
-        if load > 0.0:
-            self.constraint.rescale_to_load(self.slab, p, load, mean * self.slab.points)
-        else:
-            p.fill(mean)
+        scale_to_load(self.slab, Box(), p, load, mean * self.slab.points)
         self.forget()
         self.operator.apply(p, self._u)
         return self._certify(h, mean, p)
@@ -184,12 +236,12 @@ class Projected:
         a, b, c = self.slab.agree(_smallest(sums, members))
         _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
         self.w[2][...] = u
-        now, cut = self.local_load.advance(self.constraint, x, x, 0.0, x)
+        now, cut = self.local_load.cut_off(x)
         if not now > 0.0:  # earlier changes took all load off this set; t alone leaves it
             np.multiply(self.t[0], sums[3] / (sums[6] - sums[0] ** 2 / members), out=x, where=working)
             np.subtract(self.t[2], x, out=x, where=working)
-            now, cut = self.local_load.advance(self.constraint, x, x, 0.0, x)
-        self.local_load.restore(self.constraint, x, now, load, near_by and cut > self._least_cut * now)
+            now, cut = self.local_load.cut_off(x)
+        self.local_load.restore(x, now, load, near_by and cut > self._least_cut * now)
         self.operator.apply(x, u)
         self._keep_change(x, u)
 
@@ -279,7 +331,7 @@ def sum_on(working, z):
 
 
 PATIENCE = 20  # tuning: limit on projected steps in which the certificate must halve
-LEAST_CUT = 1.5e-5  # tuning: as in `local_load`, share of the load, for contacts with less loss
+LEAST_CUT_INSIDE = 1.5e-5  # tuning: LEAST_CUT of contacts with less loss
 INNER_PATIENCE = 12  # tuning: limit on projected steps of a contact with less loss in which its certificate must halve
 SHARE, MOST = 0.3, 0.5  # tuning: tolerance of the next contact over the last certificate; up to MOST after a failure
 LEAST = 0.3  # tuning: least tolerance of a contact, over the tolerance of the solve
@@ -302,7 +354,7 @@ class FreeSteadySolver:
         """Allocate all maps that a solve may need."""
         return _Points(self._judge, self._operator, self._preconditioner, self._pairs)
 
-    def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
+    def solve(self, h: Array, mean: float, start: Array) -> Contact:
         """Solve for heights h under the mean pressure `mean`; collective. The solution overwrites the pressure `start`.
         A start that is 0 everywhere is replaced by a uniform pressure."""
         for near_by in (True, False):
@@ -319,11 +371,11 @@ class _Points:
         kind = operator.dtype
         nearer, nearer_inverse = operator.mapped(_nearer, kind), preconditioner.mapped(_nearer_inverse, kind)
         self._judge, self._operator, self._pull = judge, operator, operator.mapped(_pull, np.float64)
-        self._inner = Projected(judge, nearer, nearer_inverse, pairs, LEAST_CUT)
+        self._inner = Projected(judge, nearer, nearer_inverse, pairs, LEAST_CUT_INSIDE)
         self._h, self._kept, self._u = (judge.slab.empty() for _ in range(3))
         self._working: NDArray[Any] = judge.slab.zeros(np.bool_)
 
-    def solve(self, h: Array, mean: float, start: Array, tolerance: float) -> SteadyContact:
+    def solve(self, h: Array, mean: float, start: Array, tolerance: float) -> Contact:
         """Solve as `FreeSteadySolver.solve`; `steps` is the sum over all contacts. Collective."""
         worst, best, since, share, steps = 1.0, math.inf, 0, SHARE, 0
         while True:
@@ -333,7 +385,7 @@ class _Points:
             contact = self._inner.solve(self._h, mean, start, max(share * worst, LEAST * tolerance), INNER_PATIENCE)
             if not math.isfinite(contact.certificate.worst):
                 return contact
-            steps, since = steps + contact.steps, since + 1
+            steps, since = steps + contact.iterations, since + 1
             self._operator.apply(start, self._u)
             d, certificate = self._judge.certify(start, self._u, h, MeanPressure(mean), self._working)
             if contact.failure and best < certificate.worst and share < MOST and since < MAX_CONTACTS_TO_HALVE:
@@ -344,7 +396,7 @@ class _Points:
             best, since = (worst, 0) if worst <= 0.5 * best else (best, since)
             if worst <= tolerance or since >= MAX_CONTACTS_TO_HALVE:
                 failure = describe_failure(f"no progress in {since} contacts", certificate, tolerance)
-                return SteadyContact(start, self._u, d, certificate, steps, failure)
+                return Contact(start, self._u, d, certificate, steps, failure)
 
 
 def _pull(symbol: Symbol) -> Symbol:

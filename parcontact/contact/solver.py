@@ -1,7 +1,7 @@
 """Frictionless contact of a body with a rigid surface by projected, preconditioned conjugate gradients.
 
 Find the admissible pressure p, an `ny x nx` map, whose gap `g = A p - h - d` meets the conditions of the constraint. A
-is symmetric and positive; either mean(p) = P0 is given and d unknown, or d is given. For `constraint.NonNegative`:
+is symmetric and positive; either mean(p) = P0 is given and d unknown, or d is given. Without a hardness:
 
     p >= 0,   g >= 0,   p g = 0.
 
@@ -13,10 +13,9 @@ and `C` = subtract the mean over it, one iteration is:
    beyond the set (`preconditioner`).
 3. The direction is `t = C R (z + beta t)`. Here beta makes t conjugate to the last direction and corrects an inexact
    last step. t = z if this is a much smaller descent than z, or if much of the last step was cut off.
-4. `p <- p - alpha t`, limited to the bounds of p. Load that this adds is removed near by if it is large
-   (`local_load`), and p is scaled to the mean P0. If the hardness is far below the stiffness, alpha is limited, so
-   that few points change from one bound to the other.
-5. f must not rise. Otherwise the step is halved, p is only scaled, and the direction is forgotten.
+4. `p <- p - alpha t`, limited to the bounds of p and scaled to the mean P0. If the hardness is far below the
+   stiffness, alpha is limited, so that few points change from one bound to the other.
+5. f must not rise. Otherwise the step is halved, and the direction is forgotten.
 
 The exact step `<r, t>/<t, A t>` needs one more application of the operator. As K E is nearly the inverse of A, a fixed
 step near 1 replaces it. `A p` of the next iterate gives `<t, A t>`: if the exact step differs by more than
@@ -27,147 +26,21 @@ With d given, nothing is centred or scaled. With P0 given, d is the mean of `A p
 so that `<p, g> = 0` and scaling p does not change f to first order. Thus f falls for every sufficiently small step (D.
 P. Bertsekas, SIAM J. Control Optim. 20 (1982) 221, for d given). Without K this is the method of I. A. Polonsky and L.
 M. Keer, Wear 231 (1999) 206; with K the number of iterations hardly depends on the grid. All numbers are dimensionless.
-
-Sums over an iterate of the contact solver, and its errors.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..parallel.slab import Array, Slab, reused
+from ..parallel.slab import Array, reused
 from ..physics import loops
 from ..physics.halfspace import LongWaves
 from ..physics.measures import Certificate
 from . import kernels
-from .constraint import LEAST_CUT, Constraint, LocalLoad
+from .certificate import Iterate, certify, form_iterate
+from .constraint import scale_to_load
 from .preconditioner import ALL, ExtendedPreconditioner, Grids, LongWavePreconditioner
-from .problem import Problem, Workspace
-
-LEAST_SHARE = 0.1  # accuracy: least length that gaps are compared with, over the mean displacement under pressure
-LEAST_HEIGHT = 1e-9  # accuracy: the same, over the height of the surface, where displacements are only rounding
-
-
-@dataclass(frozen=True)
-class Lines:
-    """Lines of points along the sliding, of a body that is stiffer for waves along them.
-
-    `axis` of an array of rows along the lines; `contrast` c: modulus of waves along them over that of waves that do
-    not vary along them. An error of the gap that varies along the lines causes c times the pressure. So the lengths of
-    displacements that vary along the lines, and 1/c of the others, add up to the length of the certificate: a share s
-    of the length for one modulus,
-
-        s^2 = v + (1 - v)/c^2,
-
-    with v the share of the variance of u that remains with the mean of each line subtracted, weighted by the pressure.
-    """
-
-    axis: int
-    contrast: float
-
-    def share_of_length(self, slab: Slab, p: Array, u: Array, iterate: "Iterate") -> float:
-        """Return s for the image u of p and their sums; collective."""
-        loads, moments = p.sum(axis=self.axis), np.einsum("ij,ij->i" if self.axis else "ij,ij->j", p, u)
-        if not self.axis:  # lines cross the rows of all ranks
-            loads, moments = np.split(np.array(slab.sum(*loads, *moments)), 2)
-        between = np.divide(moments**2, loads, out=np.zeros_like(loads), where=loads > 0.0).sum()
-        between = slab.sum(between)[0] if self.axis else between
-        variance = iterate.squares - (2.0 * iterate.energy) ** 2 / iterate.load
-        along = min(max((iterate.squares - between) / variance, 0.0), 1.0) if variance > 0.0 else 1.0
-        return math.sqrt(along + (1.0 - along) / self.contrast**2)
-
-
-@dataclass(frozen=True)
-class Iterate:
-    """Sums over an iterate at the approach d: of p, of p g, `energy = <p, A p>/2`, of `p (A p)^2`, and of p and p g
-    over free points.
-
-    If no point is free, `between` holds the lowest and the highest approach at which no pressure changes; the first
-    is larger than the second if there is none.
-    """
-
-    d: float
-    load: float
-    gaps: float
-    energy: float
-    squares: float
-    free_load: float
-    free_gaps: float
-    between: tuple[float, float] | None = None
-
-    @property
-    def f(self) -> float:
-        """`<p, A p>/2 - <p, h + d>`, by `h + d = A p - g`, which avoids large numbers where h has a large offset."""
-        return self.gaps - self.energy
-
-    def settled(self) -> "Iterate":
-        """Return the iterate at the approach d for which `<p, g> = 0` over free points, to rounding.
-
-        If none is free, d is the mean of `between`, or that for all points if all pressures are at one bound.
-        Without pressure d does not change.
-        """
-        if self.between is not None:
-            d = 0.5 * sum(self.between)
-        elif self.free_load > 0.0:
-            d = self.d + self.free_gaps / self.free_load
-        else:
-            d = self.d + (self.gaps / self.load if self.load > 0.0 else 0.0)
-        gaps, rest = self.gaps - (d - self.d) * self.load, self.free_gaps - (d - self.d) * self.free_load
-        return Iterate(d, self.load, gaps, self.energy, self.squares, self.free_load, rest, self.between)
-
-    def length(self, height: float) -> float:
-        """Return the length that gaps are compared with (`Certificate`), between LEAST_HEIGHT and 1 times `height`."""
-        least = LEAST_HEIGHT * height
-        if self.load <= 0.0:
-            return least
-        mean = 2.0 * self.energy / self.load
-        spread = math.sqrt(max(self.squares / self.load - mean**2, 0.0))
-        return max(min(max(spread, LEAST_SHARE * abs(mean)), height), least)
-
-
-def certify(
-    slab: Slab,
-    constraint: Constraint,
-    p: Array,
-    u: Array,
-    h: Array,
-    iterate: Iterate,
-    mean: float | None,
-    height: float,
-    working: NDArray[np.bool_],
-) -> tuple[float, float, Certificate]:
-    """Mark the working set of a pressure p with the image u. Return its size, its sum of gaps, and the certificate;
-    collective.
-
-    `mean` is the prescribed mean pressure, None with a given approach; `height` is the height of the surface.
-    """
-    *sums, deepest = constraint.mark_working_set(p, u, h, iterate.d, working)
-    wrong, members, excess, held, deepest = slab.reduce(sums, [deepest])
-    length = iterate.length(height)
-    complementarity = wrong / (iterate.load or 1.0) / length
-    load = 0.0 if mean is None else abs(iterate.load / slab.points / mean - 1.0)
-    share = (members + held) / slab.points
-    return members, excess, Certificate(complementarity, max(deepest / length, 0.0), load, length, share)
-
-
-def form_iterate(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array, d: float) -> Iterate:
-    """Return the sums over a pressure p and its image u at the approach d; collective."""
-    load, work, gaps, squares, free_load, free_gaps = slab.sum(*constraint.contact_sums(p, u, h, d))
-    between = _approaches(slab, constraint, p, u, h) if free_load <= 0.0 < load else None
-    return Iterate(d, load, gaps, 0.5 * work, squares, free_load, free_gaps, between)
-
-
-def _approaches(slab: Slab, constraint: Constraint, p: Array, u: Array, h: Array) -> tuple[float, float] | None:
-    """Return `Iterate.between` for pressures that are all at a bound; None if one of the bounds has no points;
-    collective. Gaps of points at the upper bound must be <= 0, all others >= 0."""
-    level, yields = u - h, p >= constraint.bounds[1]
-    lowest = float(level.max(where=yields, initial=-np.inf))
-    highest = float(level.min(where=~yields, initial=np.inf))
-    lowest, highest = slab.reduce((), [lowest, -highest])
-    return (lowest, -highest) if math.isfinite(lowest) and math.isfinite(highest) else None
-
+from .problem import Contact, Problem, Workspace
 
 # tuning
 MAX_STALLED_ITERATIONS = 60  # limit on iterations without a smaller certificate
@@ -184,26 +57,6 @@ LARGE_CUT = 0.003  # share of the load; if more is cut off, the direction is for
 ENERGY_ROUNDING = 64 * float(np.finfo(np.float64).eps)  # share of <p, A p>/2 below which a rise of f is rounding
 LEAST_LOAD = float(np.finfo(np.float64).tiny)  # least mean pressure that maps can represent; less counts as none
 NOT_FINITE = "met numbers that are not finite"
-
-
-@dataclass(frozen=True)
-class Contact:
-    """A contact, solved or given up. Maps have the shape (rows of this rank, nx).
-
-    `p` is the map that was given as the start. `u = A p` belongs to the solver and is valid until its next solve.
-    `failure` is empty, or states why the tolerance was not reached.
-    """
-
-    p: Array
-    u: Array
-    d: float
-    certificate: Certificate
-    iterations: int
-    failure: str
-
-    @property
-    def converged(self) -> bool:
-        return not self.failure
 
 
 class ContactSolver:
@@ -233,7 +86,6 @@ class ContactSolver:
         if long_waves is not None and not self._rough_inverse:
             self._extended = LongWavePreconditioner(self.slab, long_waves, extended)
         self._most_ratio = MAX_STEP_RATIO_FREE if free or long_waves is not None else MAX_STEP_RATIO
-        self._local_load = LocalLoad(self.slab)
 
     def solve(self, problem: Problem, start: Array, tolerance: float | None = None) -> Contact:
         """Solve from the admissible pressure `start`, which is overwritten by the solution; collective.
@@ -242,7 +94,7 @@ class ContactSolver:
         `tolerance` replaces the tolerance of the solver. If it is not reached, `failure` states why, and the maps
         hold the last iterate.
         """
-        mean = problem.mean
+        mean = problem.control.mean
         if mean is not None and 0.0 <= mean < LEAST_LOAD:
             return self._separate(problem, start)
         tolerance = self.tolerance if tolerance is None else tolerance
@@ -283,25 +135,23 @@ class ContactSolver:
     def _begin(self, problem: Problem, p: Array) -> Iterate:
         """Scale the start to the load and forget the direction of the last solve."""
         self.workspace.direction.fill(0.0)
-        if problem.mean is not None:
-            load = self.slab.sum(kernels.sum_of(p))[0]
-            if load > 0.0:
-                problem.constraint.rescale_to_load(self.slab, p, load, problem.mean * self.slab.points)
-            else:
-                p.fill(problem.mean)
+        mean = problem.control.mean
+        if mean is not None:
+            (load,) = self.slab.sum(kernels.sum_of(p))
+            scale_to_load(self.slab, problem.constraint, p, load, mean * self.slab.points)
         problem.operator.apply(p, self.workspace.displacement)
-        return self._form_iterate(problem, p, 0.0 if problem.mean is not None else problem.control.value)
+        return self._form_iterate(problem, p, 0.0 if mean is not None else problem.control.value)
 
     def _form_iterate(self, problem: Problem, p: Array, d: float) -> Iterate:
-        """Return the sums of a pressure, for the approach d or, under a load, the approach that it determines."""
+        """Return the sums over p and its image at the approach d; under a load, at the approach that they determine."""
         iterate = form_iterate(self.slab, problem.constraint, p, self.workspace.displacement, problem.heights, d)
-        return iterate if problem.mean is None else iterate.settled()
+        return iterate if problem.control.mean is None else iterate.settled()
 
     def _certify(self, problem: Problem, p: Array, iterate: Iterate) -> tuple[float, float, Certificate]:
         """Mark the working set. Return its size, its sum of gaps, and the certificate."""
         u, working = self.workspace.displacement, self.workspace.working
-        constraint, h, mean = problem.constraint, problem.heights, problem.mean
-        return certify(self.slab, constraint, p, u, h, iterate, mean, self.height, working)
+        box, h, mean = problem.constraint, problem.heights, problem.control.mean
+        return certify(self.slab, box, p, u, h, iterate, mean, self.height, working)
 
     def _verdict(self, worst: float, tolerance: float, iteration: int, best: float, best_at: int) -> str | None:
         """Return None to continue, an empty string if solved, else why the solve has failed."""
@@ -331,7 +181,7 @@ class ContactSolver:
         self._extended.apply(problem.preconditioner, working, z)
         sums = kernels.step_products(working, u, h, level, work.other_displacement, z, t)
         sum_z, sum_t, sum_change, r_z, change_z, r_t = self.slab.sum(*sums)
-        centred = problem.mean is not None
+        centred = problem.control.mean is not None
         mean_z, mean_t = (sum_z / members, sum_t / members) if centred else (0.0, 0.0)
         beta, ratio, fallen = 0.0, 1.0, slope - r_t  # decrease of the slope along the last direction
         if slope > 0.0:
@@ -351,19 +201,19 @@ class ContactSolver:
         Return the new iterate and the share of its load that was cut off at the bounds, infinite if the step was
         halved.
         """
-        work, constraint, mean = self.workspace, problem.constraint, problem.mean
+        work, box, mean = self.workspace, problem.constraint, problem.control.mean
         step = usual if usual is not None else self._exact(problem, slope)
-        if constraint.bounds[1] < math.inf:
-            most, largest = REACH * constraint.bounds[1], self._largest(work.direction)
+        if box.highest < math.inf:
+            most, largest = REACH * box.highest, self._largest(work.direction)
             step = most / largest if step * largest > most else step
         for halvings in range(MAX_HALVINGS + 1):
-            load, cut = self._local_load.advance(constraint, old_p, work.direction, step, p)
+            sums = kernels.advance(old_p, work.direction, step, box.lowest, box.highest, p)
+            load, cut = self.slab.sum(*sums)
             if mean is not None:
-                near_by = cut > LEAST_CUT * load and halvings == 0
-                self._local_load.restore(constraint, p, load, mean * self.slab.points, near_by)
+                scale_to_load(self.slab, box, p, load, mean * self.slab.points)
             problem.operator.apply(p, work.other_displacement)
             work.swap_displacements()
-            new = form_iterate(self.slab, constraint, p, work.displacement, problem.heights, old.d)
+            new = form_iterate(self.slab, box, p, work.displacement, problem.heights, old.d)
             if new.f - old.f <= ENERGY_ROUNDING * new.energy or halvings == MAX_HALVINGS:
                 break
             work.swap_displacements()

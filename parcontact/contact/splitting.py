@@ -14,7 +14,7 @@ Contact with a law of the interface, or with an operator that is not symmetric, 
 
 Find p >= 0 with given mean P0 or given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`contact.constraint`). A is
 diagonal in Fourier space and c in real space, so that each is inverted exactly. With J_A(x) = (1 + gamma A)^-1 x
-shifted to the mean P0, or (1 + gamma A)^-1 (x + gamma d), with J_c the pressure of `interface_law.resolve`, and with a
+shifted to the mean P0, or (1 + gamma A)^-1 (x + gamma d), with J_c the pressure of `Constraint.resolve`, and with a
 map s,
 
     p = J_c(s),    y = J_A(2 p - s),    f = y - p,    s <- s + f
@@ -48,9 +48,10 @@ from ..parallel.slab import Array, Slab, allocate
 from ..physics.convolution import Convolution
 from ..physics.measures import Certificate
 from . import kernels
-from .constraint import HARD, InterfaceLaw, begin_split, resolve
-from .problem import Control, MeanPressure, Operator
-from .projected import Judge, Projected, SteadyContact, describe_failure
+from .certificate import Judge, describe_failure
+from .constraint import Box, Constraint
+from .problem import Contact, Control, MeanPressure, Operator
+from .projected import Projected
 
 DEPTH = 5  # tuning: number of earlier changes
 RELAXATION = 1.5  # tuning: relaxation of the residual; below 2, so that the plain iteration converges, too
@@ -197,8 +198,8 @@ class Splitting:
         return self.operator.mapped(lambda symbol: 1.0 / (1.0 + gamma * symbol), self.operator.dtype)
 
     def solve(
-        self, h: Array, control: Control, law: InterfaceLaw, start: Array, tolerance: float | None = None
-    ) -> SteadyContact:
+        self, h: Array, control: Control, law: Constraint, start: Array, tolerance: float | None = None
+    ) -> Contact:
         """Solve for heights h from the pressure `start`, which is overwritten by the solution; collective. `tolerance`
         replaces the tolerance of the solver.
 
@@ -210,25 +211,24 @@ class Splitting:
         last = self._certify(given, p)
         gamma = self._gamma(p, self._y if cold else last.whole)
         while last.certificate.worst > given.tolerance and steps < self.most:
-            begin_split(p, last.whole, self._y, h, last.d, gamma, self._s)
+            _begin_split(p, last.whole, self._y, h, last.d, gamma, self._s)
             made, last = self._iterate(given, p, gamma, last, self.most - steps)
             steps, gamma = steps + made, LARGER * gamma
         d, certificate = last.d, last.certificate
         failure = describe_failure(f"has not converged in {steps} steps", certificate, given.tolerance)
-        return SteadyContact(p, self._y, d, certificate, steps, failure)
+        return Contact(p, self._y, d, certificate, steps, failure)
 
     def _iterate(
         self, given: "_Given", p: Array, gamma: float, known: "_Certified", most: int
     ) -> tuple[int, "_Certified"]:
         """Make up to `most` steps, fewer if they are slow. Return their number, and the pressure's certificate, which
         is `known` before."""
-        y, accelerated, guard, law = self._y, self._acceleration, _Guard(), given.law
-        inverse, sums = self.resolvent(gamma), law.pressures + gamma * law.closings
+        y, accelerated, guard, inverse = self._y, self._acceleration, _Guard(), self.resolvent(gamma)
         uniform, step, ratio, last = inverse.mean(), 0, 0.0, math.inf
         accelerated.forget()
         while known.certificate.worst > given.tolerance and step < most:
             step += 1
-            (total,) = self.slab.sum(resolve(self._s, given.h, gamma, law.pressures, sums, p, y))
+            (total,) = self.slab.sum(given.law.resolve(self._s, given.h, gamma, p, y))
             inverse.apply(y, y)
             rms = accelerated.residual(y, p, given.shift(uniform * gamma, uniform * total / self.slab.points))
             ratio = ratio or known.certificate.worst / (rms or math.inf)
@@ -246,7 +246,7 @@ class Splitting:
 
     def _begin(self, given: "_Given", p: Array) -> bool:
         """Replace a start that is 0 everywhere, and scale the start to a given mean. Return whether it was 0."""
-        slab, mean = self.slab, given.mean or 0.0
+        slab, mean = self.slab, given.control.mean or 0.0
         (load,) = slab.sum(kernels.sum_of(p))
         cold = not load > 0.0
         if cold:
@@ -257,7 +257,8 @@ class Splitting:
                 if not mean or load <= LEVEL_EXCESS * mean * slab.points:
                     break
                 level += (load - mean * slab.points) / (members or math.nan)
-            np.maximum(p - level, 0.0, out=p)
+            p -= level
+            given.law.project(p)
             (load,) = slab.sum(kernels.sum_of(p))
         if mean:
             p *= mean * slab.points / (load or math.nan)
@@ -274,14 +275,14 @@ class Splitting:
     def _loads(self, given: "_Given", p: Array) -> bool:
         """Scale a pressure to a given mean, or return False if it has no load; collective."""
         (load,) = self.slab.sum(kernels.sum_of(p))
-        if given.mean is not None and load > 0.0:
-            p *= given.mean * self.slab.points / load
-        return load > 0.0 or given.mean is None
+        mean = given.control.mean
+        if mean is not None and load > 0.0:
+            p *= mean * self.slab.points / load
+        return load > 0.0 or mean is None
 
     def _certify(self, given: "_Given", p: Array) -> "_Certified":
         """Return the certificate of an admissible pressure, and put its displacement into y."""
-        self.operator.apply(p, self._y)
-        whole = self._y if given.law is HARD else self._y + given.law.closing(p)
+        whole = given.law.add_closing(self.operator.apply(p, self._y), p)
         return _Certified(*self.judge.certify(p, whole, given.h, given.control, self._working), whole)
 
 
@@ -298,18 +299,22 @@ class _Given(NamedTuple):
 
     h: Array
     control: Control
-    law: InterfaceLaw
+    law: Constraint
     tolerance: float
-
-    @property
-    def mean(self) -> float | None:
-        """The prescribed mean pressure; None with a given approach."""
-        return self.control.value if isinstance(self.control, MeanPressure) else None
 
     def shift(self, by_approach: float, mean: float) -> float:
         """Return what is added to `(1 + gamma A)^-1 (2 p - s)`, which has this `mean`, to make J_A; `by_approach` is
         the result for `gamma d` with d = 1."""
-        return by_approach * self.control.value if self.mean is None else self.mean - mean
+        return by_approach * self.control.value if self.control.mean is None else self.control.mean - mean
+
+
+@loop
+def _begin_split(p, whole, u, h, d, gamma, s):
+    """Put `p + gamma (c - h)` where there is pressure, c = whole - u, and `-gamma (u - d)` elsewhere, into s."""
+    for j in range(s.shape[0]):
+        for i in range(s.shape[1]):
+            pressed = p[j, i] + gamma * (whole[j, i] - u[j, i] - h[j, i])
+            s[j, i] = pressed if p[j, i] > 0.0 else gamma * (d - u[j, i])
 
 
 class _Guard:
@@ -360,7 +365,7 @@ class SteadySolver:
         splitting = Splitting(self.judge, self.operator, self.preconditioner, self.tolerance, self.most)
         return splitting, splitting.resolvent(1.0)
 
-    def solve(self, h: Array, mean: float, start: Array) -> SteadyContact:
+    def solve(self, h: Array, mean: float, start: Array) -> Contact:
         """Solve for heights h under the mean pressure `mean`; collective. The solution overwrites the pressure
         `start`, which may be 0 everywhere."""
         (touching,) = self.judge.slab.sum(float((start > 0.0).sum()))
@@ -371,4 +376,4 @@ class SteadySolver:
                 return contact
             del projected, contact  # frees their maps before others are made
         splitting = Splitting(self.judge, self.operator, self.preconditioner, self.tolerance, self.most)
-        return splitting.solve(h, MeanPressure(mean), HARD, start)
+        return splitting.solve(h, MeanPressure(mean), Box(), start)

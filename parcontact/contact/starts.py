@@ -51,10 +51,10 @@ from ..parallel.slab import Array, Slab, allocate
 from ..physics import loops
 from ..physics.convolution import SIDE, TileConvolution, TileOperator, Tiles, tiles_along
 from . import kernels
-from .constraint import Constraint
+from .constraint import Box
 from .preconditioner import Grids
-from .problem import Control, MeanPressure, Operators, Problem
-from .solver import Contact, ContactSolver
+from .problem import Contact, Control, MeanPressure, Operators, Problem
+from .solver import ContactSolver
 
 
 @dataclass(frozen=True)
@@ -132,13 +132,13 @@ def is_block_grid(slab: Slab, finest: Slab) -> bool:
 
 
 def choose_tiles(
-    blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array, constraint: Constraint
+    blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array, box: Box
 ) -> Tiles | None:
     """Return the tiles of a grid that may touch, given the contact `below` on the next coarser grid; collective. Return
     None if there are none, or if they have more than LARGEST_SHARE of the points."""
     most = LARGEST_SHARE * slab.points / SIDE**2
     p = below.p if below.slab is blocks else regrid.restrict(below.slab, blocks, below.p)
-    touching = constraint.touches(p) != 0.0
+    touching = box.touches(p) != 0.0
     if _tiles_with(blocks, touching, slab).count > most:
         return None
     u = operators.operator.apply(p, blocks.empty())
@@ -321,7 +321,7 @@ class _Descent:
         self, solver: ContactSolver, problem: Problem, solver_on: SolverOn, on_tiles: SolverOnTiles | None
     ) -> None:
         self._solver, self._problem, self._solver_on = solver, problem, solver_on
-        self._on_tiles, self._tally = on_tiles if problem.constraint.bounds[0] == 0.0 else None, solver.slab.tally
+        self._on_tiles, self._tally = on_tiles if problem.constraint.lowest == 0.0 else None, solver.slab.tally
         self._cost, self._before = 0.0, self._tally["operator"]
         self._blocks: tuple[Slab, Operators] | None = None
         self._below: Found | None = None
@@ -391,7 +391,7 @@ def solve(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
     for count in range(1, MAX_SETS + 1):
         iterations += search.solve_on_set(contact.u, GAP_SHARE * solver.tolerance * contact.certificate.length)
         chosen = search.next_set(contact.u)
-        problem.constraint.clip(start)
+        problem.constraint.project(start)
         limit = ITERATIONS_RATIO * solver.max_iterations
         spent = f" in {ITERATIONS_RATIO} times max_iterations = {limit}" if iterations >= limit else ""
         contact = solver.check(problem, start, f"found no contact among {count} sets of points{spent}")
@@ -406,7 +406,7 @@ class _Search:
 
     def __init__(self, solver: ContactSolver, problem: Problem, x: Array) -> None:
         self.solver, self.problem, self.h, self.slab, self.x = solver, problem, problem.heights, solver.slab, x
-        self.load = None if problem.mean is None else problem.mean * self.slab.points
+        self.load = None if problem.control.mean is None else problem.control.mean * self.slab.points
         self.d = 0.0 if self.load is not None else problem.control.value
         self.working = np.zeros(x.shape, np.bool_)
         self.members = 0.0
@@ -414,7 +414,8 @@ class _Search:
     def begin(self, contact: Contact) -> None:
         """Mark the first set: contact and points that penetrate. If these are all points under a given approach, which
         may have no solution, mark those that would penetrate the undeformed body."""
-        self.problem.constraint.mark_working_set(self.x, contact.u, self.h, contact.d, self.working)
+        box = self.problem.constraint
+        kernels.mark_working_set(self.x, contact.u, self.h, contact.d, box.lowest, box.highest, self.working)
         if self.load is None and self.slab.sum(float(np.count_nonzero(self.working)))[0] == self.slab.points:
             self.working[...] = self.h + self.d > 0.0
 
@@ -444,16 +445,18 @@ class _Search:
         return iterations
 
     def next_set(self, u: Array) -> NDArray[np.bool_]:
-        """Return points of the set with pressure, and other points that penetrate."""
-        return self.problem.constraint.next_set(self.x, u - self.h - self.d, self.working)
+        """Return free points of the set, and other points whose gap violates its condition."""
+        x, gap, box = self.x, u - self.h - self.d, self.problem.constraint
+        free, below = (x > box.lowest) & (x < box.highest), x < box.highest
+        return np.where(self.working, free, np.where(below, gap < 0.0, gap > 0.0))
 
     # -- parts ---------------------------------------------------------------------------------------------------------
 
     def _restrict(self, u: Array) -> None:
         """Put x to a bound outside the set, and make up for a given load on the set; update `u = A x`."""
         x, working = self.x, self.working
-        lower, upper = self.problem.constraint.bounds
-        x[...] = np.where(working, x, np.where(x < upper, lower, upper))
+        box = self.problem.constraint
+        x[...] = np.where(working, x, np.where(x < box.highest, box.lowest, box.highest))
         self.members, total = self.slab.sum(float(np.count_nonzero(working)), kernels.sum_of(x))
         if self.load is not None and self.members:
             x += (self.load - total) / self.members * working

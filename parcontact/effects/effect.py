@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, P
 
 from numpy.typing import DTypeLike, NDArray
 
-from ..contact.constraint import Bounded, Constraint, Mask, NonNegative
+from ..contact.constraint import Box, Mask
 from ..doubts import Doubt
 from ..errors import InputError
 from ..job import Job, listing
@@ -39,8 +39,7 @@ from ..physics.measures import Measures
 from ..physics.motion import Shear, Vector
 
 if TYPE_CHECKING:
-    from ..contact.problem import Control
-    from ..contact.solver import Contact
+    from ..contact.problem import Contact, Control
     from ..physics.body import Trial
     from ..physics.energy import EnergyMemory
 
@@ -479,11 +478,11 @@ def _numbers(name: str, effect: Effect[Any], memory: Any) -> list[float]:
     return found
 
 
-def constraint_of(job: Job, unit: float = 1.0, most: float = math.inf) -> Constraint:
+def constraint_of(job: Job, unit: float = 1.0, most: float = math.inf) -> Box:
     """Return the constraint of a job without a law of its own, for a `unit` of pressure [Pa]; pressures are at
     most `most` units."""
     hardness = job.material.hardness
-    return NonNegative() if hardness is None or hardness / unit >= most else Bounded(hardness / unit)
+    return Box() if hardness is None or hardness / unit >= most else Box(highest=hardness / unit)
 
 
 def touching_of(job: Job, pressure: Array, gap: Array) -> Mask:

@@ -35,10 +35,9 @@ from typing import Any
 import numpy as np
 
 from ..contact import starts
-from ..contact.constraint import InterfaceLaw, NonNegative
-from ..contact.problem import Control, MeanPressure, Problem, reachable_certificate
-from ..contact.projected import Judge
-from ..contact.solver import Contact
+from ..contact.certificate import Judge
+from ..contact.constraint import Constraint
+from ..contact.problem import Contact, Control, MeanPressure, Problem, reachable_certificate
 from ..contact.splitting import Splitting
 from ..effects.effect import ContactLaw, Detached, EdgeMotion, PreviousContacts, PreviousPressure, SolvedContact
 from ..errors import InputError, RunError
@@ -174,8 +173,8 @@ def _travel(
     older, share = before.pressure, growth * before.alpha / alpha
     if along_y and growth > 0.0:
         older = regrid.roll_rows(slab, before.pressure, along_y, out)
-    bounds = scene.constraint(alpha).bounds
-    loops.travel(now.pressure, older, (1.0 + growth) * now.alpha / alpha, share, along_x, *bounds, out)
+    box = scene.constraint(alpha)
+    loops.travel(now.pressure, older, (1.0 + growth) * now.alpha / alpha, share, along_x, box.lowest, box.highest, out)
     if along_y:
         out[...] = regrid.roll_rows(slab, out, along_y, scene.solver.workspace.pressure)
 
@@ -270,7 +269,7 @@ class ClosingLaw(DryLaw):
     Raises InputError for a body that moves in the mean, and for a hardness.
     """
 
-    def __init__(self, scene: Scene, law: Callable[[Step], InterfaceLaw]) -> None:
+    def __init__(self, scene: Scene, law: Callable[[Step], Constraint]) -> None:
         super().__init__(scene)
         body, setup = scene.setup.half_space, scene.setup
         if body.moves_in_the_mean or scene.job.material.hardness is not None:
@@ -300,6 +299,5 @@ class ClosingLaw(DryLaw):
         else:
             p.fill(0.0)
         law = self._law(step).in_units(trial.alpha * scene.units.pressure, scene.units.height)
-        found = self._splitting.solve(trial.effective, control, law, p, tolerance)
-        contact = Contact(p, found.u, found.d, found.certificate, found.steps, found.failure)
-        return SolvedContact(contact, None, NonNegative().touches(p))
+        contact = self._splitting.solve(trial.effective, control, law, p, tolerance)
+        return SolvedContact(contact, None, law.touches(p))

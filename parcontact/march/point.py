@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.projected import SteadyContact
+from ..contact.problem import Contact
 from ..parallel.slab import Array, deal
 from ..physics.convolution import PARTS, wavenumbers
 from ..physics.measures import Certificate, Measures
@@ -91,7 +91,7 @@ def in_rounds(points: Sequence[Point]) -> Point:
 ROUNDING = 1e-9  # accuracy: relative rounding of wavelengths at the limits of octaves
 
 
-def branch_powers(setup: Setup, contact: SteadyContact, velocity: Vector) -> Array:
+def branch_powers(setup: Setup, contact: Contact, velocity: Vector) -> Array:
     """Return the power [W] lost in each branch to waves of each octave, shape (branches, octaves); collective.
 
     The first octave is from the longer side of the box to half of it. Scenes must be periodic, so that waves are
@@ -122,7 +122,7 @@ def count_octaves(setup: Setup) -> int:
     return 2 + int(np.log2(cells * (1 + ROUNDING)))
 
 
-def branch_maps(setup: Setup, contact: SteadyContact, velocity: Vector, out: Array) -> Iterator[Array]:
+def branch_maps(setup: Setup, contact: Contact, velocity: Vector, out: Array) -> Iterator[Array]:
     """Yield the map h_k of each branch in a steady state at a velocity [m/s], each in `out`; collective."""
     fft, half_space, speed = setup.fft, setup.half_space, setup.in_units(velocity)
     if half_space.free:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.constraint import Constraint
+from ..contact.constraint import Box
 from ..contact.preconditioner import grids_for
 from ..contact.problem import Operators, Workspace
 from ..contact.solver import ContactSolver
@@ -205,7 +205,7 @@ class Scene:
         run's units."""
         return (displacement - self.heights(position) - approach) * self.units.height
 
-    def constraint(self, alpha: float, most: float = math.inf) -> Constraint:
+    def constraint(self, alpha: float, most: float = math.inf) -> Box:
         """Return the constraint on p in a step of modulus alpha, in which the pressure is `alpha p`, at most `most`."""
         return effect.constraint_of(self.job, alpha * self.units.pressure, most)
 

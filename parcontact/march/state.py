@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.solver import Contact
+from ..contact.problem import Contact
 from ..effects.effect import Memories, PreviousContacts, PreviousPressure, Sheared, SolvedContact, effect_values
 from ..errors import InputError
 from ..files import checkpoint, wisdom

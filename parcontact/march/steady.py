@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from ..contact import kernels, starts
-from ..contact.constraint import NonNegative
+from ..contact.certificate import Judge, Lines
+from ..contact.constraint import Box
 from ..contact.preconditioner import pairs_for
-from ..contact.problem import reachable_certificate
-from ..contact.projected import FreeSteadySolver, Judge, SteadyContact
-from ..contact.solver import Lines
+from ..contact.problem import Contact, reachable_certificate
+from ..contact.projected import FreeSteadySolver
 from ..contact.splitting import SteadySolver
 from ..doubts import Doubt
 from ..errors import UnsolvedError
@@ -79,7 +79,7 @@ class SteadySliding:
         self.levels = [SteadyLevel(setup.slab, setup.fft, finest.heights)]
         self.levels += [SteadyLevel(level.slab, FFT(level.slab), level.heights) for level in coarser]
         self._known = properties_of(setup.job, setup.shortest)
-        self.contact: SteadyContact | None = None
+        self.contact: Contact | None = None
         self._speed = self._pressure = 0.0  # speed times shift factor, on which a state depends
         self.temperature = math.nan
         self.loops = [loop for loops in answers("steady", "loops") for loop in loops(setup)]
@@ -124,7 +124,7 @@ class SteadySliding:
             raise UnsolvedError(what, f"{contact.failure}{self._advise(contact)}")
         self.contact, self._speed, self._pressure = contact, factor * speed, pressure
         heights = self.levels[0].heights
-        touching = NonNegative().touches(contact.p)
+        touching = Box().touches(contact.p)
         measures = self.probe.measure(contact.p, 1.0, contact.u, heights, contact.d, touching, (0.0, 0.0), velocity)
         if not measures.finite:
             raise UnsolvedError(what, "its results would not be finite")
@@ -135,7 +135,7 @@ class SteadySliding:
         seconds, place = time.perf_counter() - began, (velocity, pressure, self.temperature, factor)
         return Point(*place, measures, friction, errors, contact.certificate, calls, seconds, lost)
 
-    def _advise(self, contact: SteadyContact) -> str:
+    def _advise(self, contact: Contact) -> str:
         """Return advice for a contact that was not solved; collective."""
         compliance, length = self.setup.half_space.largest_compliance, contact.certificate.length
         reach = reachable_certificate(self.setup.slab, [contact.u], contact.p, compliance, length)
@@ -202,12 +202,12 @@ class SteadySliding:
             yield self.contact.p
         yield None
 
-    def _descend(self, velocity: Vector, mean: float, start: Array | None) -> tuple[SteadyContact, float, float]:
+    def _descend(self, velocity: Vector, mean: float, start: Array | None) -> tuple[Contact, float, float]:
         """Solve on all grids, the coarsest first, or on the finest from `start`. Return the contact, the operator
         calls, and friction by energy without an interface."""
         tally, calls = self.setup.slab.tally, 0.0
 
-        def solve(level: SteadyLevel, p: Array) -> tuple[SteadyContact, Convolution]:
+        def solve(level: SteadyLevel, p: Array) -> tuple[Contact, Convolution]:
             nonlocal calls
             before = tally["operator"]
             solver, operator = self._solver(level, velocity)
@@ -302,7 +302,7 @@ def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = Non
     return march
 
 
-def start_march(scene: Scene, contact: SteadyContact | None = None, **of_row: Any) -> March:
+def start_march(scene: Scene, contact: Contact | None = None, **of_row: Any) -> March:
     """Return a march on a scene from rest, or from a `contact` in steady sliding at the velocity of its job's `initial`
     section, with the values `of_row` in the row of time 0; collective."""
     if contact is None:
@@ -323,7 +323,7 @@ def _from_steady_sliding(setup: Setup) -> March:
     branches = branch_maps(setup, contact, setup.job.initial.velocity, workspace.other_displacement)
     scene.material.start_from(body, contact.u, branches)
     workspace.pressure[...] = contact.p
-    iterations, approach = contact.steps, contact.d
+    iterations, approach = contact.iterations, contact.d
     del contact
     state = first_state(scene, body)
     row = replace(
@@ -338,7 +338,7 @@ def _from_steady_sliding(setup: Setup) -> March:
     return March(scene, pressed_state(scene, state, row, workspace.pressure, approach))
 
 
-def _solve(setup: Setup) -> tuple[Point, SteadyContact]:
+def _solve(setup: Setup) -> tuple[Point, Contact]:
     """Return the state and its contact, without the maps of the solver; collective."""
     sliding, initial = (
         SteadySliding(setup, tolerance_before(setup.job, 0, setup.choices.viscoelasticity.on)),

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from runs import Json, begun
 
 from parcontact.contact import starts
-from parcontact.contact.constraint import NonNegative
-from parcontact.contact.problem import MeanPressure, Operators, Problem, Workspace
-from parcontact.contact.solver import Contact, ContactSolver
+from parcontact.contact.constraint import Box
+from parcontact.contact.problem import Contact, MeanPressure, Operators, Problem, Workspace
+from parcontact.contact.solver import ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace
@@ -67,7 +67,7 @@ class Cold:
         return solver, Operators(half.operator(fft), half.inverse(other))
 
     def problem(self, operators: Operators) -> Problem:
-        return Problem(*operators, self.heights, NonNegative(), MeanPressure(self.load * MODULUS))
+        return Problem(*operators, self.heights, Box(), MeanPressure(self.load * MODULUS))
 
     def start(self, solver: Solver) -> Map:
         """Return the first guess of the pressure, from nested grids."""

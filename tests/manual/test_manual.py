@@ -16,9 +16,8 @@ import numpy as np
 import pytest
 import yaml
 from csv_rows import rows
-from marched_jobs import JOBS, ROOT, marched
+from marched_jobs import JOBS, ROOT
 from mpi4py import MPI
-from numpy.testing import assert_allclose
 from pydantic import TypeAdapter
 
 import parcontact as pc
@@ -27,7 +26,6 @@ from parcontact import __main__
 from parcontact.columns import TABLES
 from parcontact.door.arguments import parse_arguments
 from parcontact.door.manual import texts
-from parcontact.effects import effect
 from parcontact.job import schema, yaml_text
 from parcontact.march import mesh
 
@@ -230,27 +228,6 @@ def run_code(pieces: list[str]) -> None:
     from matplotlib import pyplot
 
     pyplot.close("all")
-
-
-def test_the_constraint_of_the_page_on_effects(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An even pressure moves no point of a periodic half space: the fluid adds its pressure to that of dry surfaces."""
-    (block,) = [block for block in blocks("python", "effects") if block.startswith("# in_fluid.py")]
-    space: dict[str, Any] = {}
-    exec(compile(block, "in_fluid.py", "exec"), space)
-    job = {
-        "grid": {"points": 32, "size": 1e-3},
-        "surface": {"shape": "wave", "amplitude": 1e-5, "waves": [1, 1]},
-        "material": {"model": "elastic", "shear_modulus": 1e6},
-        "numerics": {"tolerance": 1e-8},
-    }
-    dry, rows = marched({**job, "history": [{"pressure": 3e4}]})
-    monkeypatch.setattr(effect, "constraint_of", lambda job, unit=1.0, most=0.0: space["InFluid"](4e4 / unit))
-    wet, others = marched({**job, "history": [{"pressure": 7e4}]})
-    area = rows[-1].measures.contact_area
-    assert 0.1 < area < 0.9
-    assert others[-1].measures.contact_area == area
-    tolerance = 1e-6 * rows[-1].measures.max_pressure  # a hundred times that of the solver
-    assert_allclose(wet.field("pressure") - 4e4, dry.field("pressure"), rtol=0, atol=tolerance)
 
 
 @pytest.mark.parametrize(("code", "again"), [(0, False), (3, True), (2, False)])

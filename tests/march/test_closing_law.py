@@ -11,7 +11,7 @@ from parcontact import job as jobs
 from parcontact.bands.band import Band, PressureLadder
 from parcontact.bands.cascade import Cascade
 from parcontact.bands.choice import cut_bands
-from parcontact.contact.constraint import HARD, InterfaceLaw
+from parcontact.contact.constraint import Box, Constraint, InterfaceLaw
 from parcontact.errors import InputError
 from parcontact.files.recorder import StepRow
 from parcontact.march.laws import ClosingLaw
@@ -47,7 +47,7 @@ def finer(job: jobs.Job, velocity: float, pressure: float) -> tuple[Cascade, Any
 
 
 def march_with(
-    law: InterfaceLaw | None, heights: Array, comm: MPI.Intracomm = MPI.COMM_SELF, **job: Any
+    law: Constraint | None, heights: Array, comm: MPI.Intracomm = MPI.COMM_SELF, **job: Any
 ) -> tuple[March, list[StepRow]]:
     data = {"surface": heights, "grid": {"points": len(heights), "size": 4 * LONG}, **job}
     march, rows = begun(jobs.load(data), comm), list[StepRow]()
@@ -116,7 +116,7 @@ def test_hard_walls_are_the_usual_law(comm: MPI.Intracomm) -> None:
     job: dict[str, Any] = {"material": ZENER, "history": history, "numerics": {"tolerance": 1e-7}}
     heights = heights_of(in_bands(2, 32, ZENER, 1e-3))
     _, dry = march_with(None, heights, **job)
-    _, rows = march_with(HARD, heights, comm, **job)
+    _, rows = march_with(Box(), heights, comm, **job)
     for name in ("pressure", "contact_area", "friction", "mean_gap"):
         usual = column(dry, name)
         assert column(rows, name) == pytest.approx(usual, rel=0, abs=1e-5 * np.abs(usual).max())
@@ -126,4 +126,4 @@ def test_bodies_that_cannot_have_it() -> None:
     heights = heights_of(in_bands(2, 32, ELASTIC, 1e-3))
     job: dict[str, Any] = {"material": {**ELASTIC, "hardness": 1e7}, "history": [{"pressure": 1e5}]}
     with pytest.raises(InputError, match="without a hardness"):
-        march_with(HARD, heights, **job)
+        march_with(Box(), heights, **job)

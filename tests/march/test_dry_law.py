@@ -16,7 +16,7 @@ def test_only_the_first_contact_starts_cold(monkeypatch: pytest.MonkeyPatch) -> 
     prepare, cold = starts.prepare_start, list[float]()
 
     def note(solver: Any, problem: Any, *others: Any) -> Any:
-        cold.append(problem.mean)
+        cold.append(problem.control.mean)
         return prepare(solver, problem, *others)
 
     monkeypatch.setattr(starts, "prepare_start", note)

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from restarting import ELASTIC, PRESS, ROUGH, SLIDE, SPHERE, ZENER, Bench, cut, maps, rows, same
 
 from parcontact.contact import starts
-from parcontact.contact.solver import Contact, ContactSolver
+from parcontact.contact.problem import Contact
+from parcontact.contact.solver import ContactSolver
 from parcontact.effects.adhesion.adhesive_law import AdhesiveLaw
 from parcontact.effects.adhesion.effect import AdhesionColumns, AdhesionMemory
 from parcontact.effects.effect import Changes, Instant

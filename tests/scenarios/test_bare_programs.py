@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from counting import ELASTIC, ITERATIONS, NX, NY, PRESS, RUBBER, SLIDE, STAND, Json, job, whole
 
-from parcontact.contact.constraint import NonNegative
+from parcontact.contact.constraint import Box
 from parcontact.contact.problem import MeanPressure, Operators, Problem, Workspace
 from parcontact.contact.solver import ContactSolver
 from parcontact.job import Job
@@ -31,7 +31,7 @@ def bare(planned: Job) -> Counter[str]:
     for stage in planned.history:
         load = MeanPressure(stage.load.end / (base.prony.modulus_inf * base.units.pressure))
         p[...] = last
-        contact = solver.solve(Problem(*operators, heights, NonNegative(), load), p)
+        contact = solver.solve(Problem(*operators, heights, Box(), load), p)
         last, p = p, last
         probe.measure(contact.p, base.prony.modulus_inf, contact.u, heights, contact.d, contact.p, (0.0, 0.0))
     return slab.tally.copy()
@@ -59,7 +59,7 @@ def lasting(planned: Job) -> Counter[str]:
         loops.travel(last, earlier, now, before, heights.offset - cells, 0.0, np.inf, p)
         moduli, cells = [moduli[1], alpha], heights.offset
         load_of_step = MeanPressure(step.load / (alpha * base.units.pressure))
-        contact = solver.solve(Problem(*operators, trial.effective, NonNegative(), load_of_step), p)
+        contact = solver.solve(Problem(*operators, trial.effective, Box(), load_of_step), p)
         found = probe.measure(contact.p, alpha, contact.u, trial.effective, contact.d, contact.p, step.position)
         held = body.commit(held, trial, contact.u, p if held.displacement is None else held.displacement)
         if isinstance(body, ZenerBody):

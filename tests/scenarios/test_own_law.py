@@ -4,8 +4,8 @@ The reference is the usual law, `p - q >= 0`, under the load that the fluid does
 point of a periodic half space against another.
 """
 
+import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,10 @@ from marched_jobs import column, marched
 from numpy.testing import assert_allclose
 
 import parcontact as pc
-from parcontact.contact.constraint import Cells, Mask, NonNegative, Set
+from parcontact.door.manual import texts
 from parcontact.effects import effect
 from parcontact.effects.leakage.over_time import Gaps
 from parcontact.job import Job
-from parcontact.parallel.slab import Array, Slab
 from parcontact.results import maps
 
 FLUID, LOAD = 4e4, 6e4  # pressure of the fluid, and the load that it does not bear [Pa]
@@ -29,57 +28,14 @@ ZENER = {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 2e6, "re
 CELL = 1e-3 / 32
 
 
-@dataclass(frozen=True)
-class InFluid:
-    """`p >= q`, `g >= 0`, `(p - q) g = 0`."""
-
-    fluid: float
-    dry: NonNegative = field(default_factory=NonNegative)
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        return self.fluid, np.inf
-
-    def touches(self, p: Array) -> Mask:
-        return p > self.fluid
-
-    def contact_sums(self, p: Array, u: Array, h: Array, d: float) -> tuple[float, ...]:
-        load, gap = p - self.fluid, u - h - d
-        sums = float(p.sum()), float((p * u).sum()), float((p * gap).sum()), float((p * u**2).sum())
-        return *sums, float(load.sum()), float((load * gap).sum())
-
-    def mark_working_set(self, p: Array, u: Array, h: Array, d: float, working: Set) -> tuple[float, ...]:
-        return self.dry.mark_working_set(p - self.fluid, u, h, d, working)
-
-    def advance(self, p_old: Array, t: Array, step: float, p: Array, cells: Cells, sums: Array) -> tuple[float, float]:
-        load, cut = self.dry.advance(p_old - self.fluid, t, step, p, cells, sums)
-        p += self.fluid
-        return load + self.fluid * p.size, cut
-
-    def restore(self, slab: Slab, p: Array, load: float, total: float, kept: Array, cells: Cells) -> None:
-        even = self.fluid * slab.points
-        p -= self.fluid
-        self.dry.restore(slab, p, load - even, total - even, kept, cells)
-        p += self.fluid
-
-    def rescale_to_load(self, slab: Slab, p: Array, load: float, total: float) -> None:
-        even = self.fluid * slab.points
-        if load <= even * (1.0 + slab.points * np.finfo(float).eps):  # the fluid bears it, to rounding
-            p[...] = total / slab.points
-        else:
-            p[...] = self.fluid + (p - self.fluid) * ((total - even) / (load - even))
-
-    def clip(self, p: Array) -> float:
-        return float(np.maximum(p, self.fluid, out=p).sum())
-
-    def next_set(self, x: Array, gap: Array, working: Set) -> Set:
-        return self.dry.next_set(x - self.fluid, gap, working)
-
-
 @pytest.fixture
 def with_fluid(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
-    """All that a law of one's own needs."""
-    return lambda: monkeypatch.setattr(effect, "constraint_of", lambda job, unit=1.0, most=0.0: InFluid(FLUID / unit))
+    """The constraint of the manual's page `effects`, in place of the usual one."""
+    (module,) = re.findall(r"```python\n(# in_fluid.py\n.*?)```", texts.page("effects"), re.S)
+    names: dict[str, Any] = {}
+    exec(module, names)
+    assert names["FLUID"] == FLUID
+    return lambda: monkeypatch.setattr(effect, "constraint_of", names["constraint_of"])
 
 
 def job(load: float, points: int = 32, **changes: Any) -> dict[str, Any]:

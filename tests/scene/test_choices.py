@@ -26,7 +26,7 @@ from counting import (
 )
 from marched_jobs import begun, marched
 
-from parcontact.contact.constraint import NonNegative
+from parcontact.contact.constraint import Box
 from parcontact.contact.problem import Approach, Problem
 from parcontact.job.history import Timeline
 from parcontact.march import choices
@@ -153,7 +153,7 @@ def test_displacement_control() -> None:
     spent = slab.tally["allreduce"]
     heights = march.scene.motion.at((0.0, 0.0)).base
     control = Approach(-5e-7 / march.scene.units.height)
-    solver.solve(Problem(*march.scene.operators, heights, NonNegative(), control), slab.zeros())
+    solver.solve(Problem(*march.scene.operators, heights, Box(), control), slab.zeros())
     of_solve = slab.tally["allreduce"] - spent
     of_measures = 2
     before = begun(planned).scene.slab.tally["allreduce"]

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from parcontact.contact.constraint import Constraint, NonNegative
-from parcontact.contact.problem import Approach, MeanPressure, Operator, Operators, Problem, Workspace
-from parcontact.contact.solver import Contact, ContactSolver
+from parcontact.contact.constraint import Box
+from parcontact.contact.problem import Approach, Contact, MeanPressure, Operator, Operators, Problem, Workspace
+from parcontact.contact.solver import ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.halfspace import HalfSpace
@@ -49,7 +49,7 @@ class Bench:
     solver: ContactSolver
     operator: Operator
     preconditioner: Operator
-    constraint: Constraint = field(default_factory=NonNegative)
+    constraint: Box = field(default_factory=Box)
 
     @property
     def slab(self) -> Slab:

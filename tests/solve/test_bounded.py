@@ -9,9 +9,8 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
 from parcontact.contact import starts
-from parcontact.contact.constraint import Bounded
-from parcontact.contact.problem import Approach, MeanPressure
-from parcontact.contact.solver import Contact
+from parcontact.contact.constraint import Box
+from parcontact.contact.problem import Approach, Contact, MeanPressure
 
 from .bodies import BODIES, TIGHT, Bench, Map, rough, solver, white
 
@@ -21,7 +20,7 @@ LOADS = [0.1, 0.5, 3.0]
 
 def bounded(h: Map, highest: float, **options: Any) -> Bench:
     body = solver(h, **options)
-    body.constraint = Bounded(highest)
+    body.constraint = Box(highest=highest)
     return body
 
 

@@ -12,11 +12,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact.contact import starts
-from parcontact.contact.constraint import CELL, MOST_GIVEN_BACK, LocalLoad, NonNegative
 from parcontact.contact.problem import Approach, MeanPressure, Operators
 from parcontact.contact.solver import ContactSolver
 from parcontact.parallel.fft import FFT
@@ -25,7 +23,7 @@ from parcontact.physics import measures
 from parcontact.physics.halfspace import HalfSpace
 
 from . import polonsky_keer
-from .bodies import BODIES, MODULUS, ROUNDING, TIGHT, Map, keep, rough, solve, solver, white
+from .bodies import BODIES, MODULUS, ROUNDING, TIGHT, keep, rough, solve, solver, white
 
 # -- against others ----------------------------------------------------------------------------------------------------
 
@@ -345,77 +343,3 @@ def test_last_gap_between_points(side: float) -> None:
             assert_allclose(found.p, mean + waves, rtol=0, atol=1e-9 * float(waves.max()))
     assert max(counts) < 20
     assert all(before >= after for before, after in pairwise(counts))
-
-
-# -- cutting off at 0 and taking back near by, against the same with blocks of numpy, on any ranks --------------------
-
-CUT_ROUNDING, TOTAL = 1e-13, 3.0
-ANY_RANKS = pytest.mark.parametrize("shape", [(1, 1), (7, 40), (33, 16), (50, 37), (64, 64)])
-
-
-def cut_off(values: Map, near_by: bool = True, pairs: int = 0) -> tuple[slice, Map, float, float]:
-    """The rows that this rank has, their pressure after the cut, made to have the sum TOTAL, and the load and the cut
-    that are returned."""
-    slab = Slab(MPI.COMM_WORLD, values.shape[1], values.shape[0])
-    p, t = values[slab.rows] + 2.0, np.full(values[slab.rows].shape, 4.0)
-    local = LocalLoad(slab, pairs)
-    load, cut = local.advance(NonNegative(), p, t, 0.5, p)
-    if load > 0.0:
-        local.restore(NonNegative(), p, load, TOTAL, near_by)
-    return slab.rows, p, load, cut
-
-
-def expected(values: Map, rows: int, columns: int) -> Map:
-    """Cell by cell, of a given number of rows and columns."""
-    out = np.maximum(values, 0.0)
-    for j in range(0, values.shape[0], rows):
-        for i in range(0, values.shape[1], columns):
-            cell = np.s_[j : j + rows, i : i + columns]
-            load = out[cell].sum()
-            share = min((load - values[cell].sum()) / load, MOST_GIVEN_BACK) if load > 0.0 else 0.0
-            out[cell] *= 1.0 - share
-    return out
-
-
-def pressures(shape: tuple[int, int], sunk: float) -> Map:
-    """Random numbers from -sunk to 1 - sunk."""
-    return np.random.default_rng(1).random(shape) - sunk
-
-
-@pytest.mark.mpi
-@ANY_RANKS
-@pytest.mark.parametrize("sunk", [0.1, 0.45, 0.9])
-@pytest.mark.parametrize(
-    ("near_by", "pairs", "cell"),
-    [
-        (True, 0, (CELL, CELL)),
-        (True, 1, (8, CELL)),
-        (True, 4, (4, CELL)),
-        (True, -2, (CELL, 4)),
-        (False, 0, (CELL, CELL)),
-    ],
-)
-def test_each_cell_gives_back_what_was_added_in_it(
-    shape: tuple[int, int], sunk: float, near_by: bool, pairs: int, cell: tuple[int, int]
-) -> None:
-    """Cells have fewer rows where pairs along x make square cells, fewer columns where pairs along y do, but four at
-    least."""
-    values = pressures(shape, sunk) + 2.0 - 2.0  # with the rounding of what is advanced
-    rows, p, load, cut = cut_off(values, near_by, pairs)
-    whole = np.maximum(values, 0.0)
-    assert_allclose(load, whole.sum(), rtol=CUT_ROUNDING)
-    assert_allclose(cut, (whole - values).sum(), rtol=CUT_ROUNDING, atol=CUT_ROUNDING)
-    if load > 0.0:
-        kept = expected(values, *cell) if near_by else whole
-        assert_allclose(p, (TOTAL / kept.sum() * kept)[rows], rtol=CUT_ROUNDING)
-
-
-def test_nothing_and_not_a_number() -> None:
-    """Pressures that are all negative leave 0; what is not a number stays so."""
-    assert cut_off(np.full((20, 20), -1.0))[2] == 0.0
-    values = pressures((20, 20), 0.4)
-    values[3, 3] = np.nan
-    _, p, load, cut = cut_off(values)
-    assert np.isnan(load)
-    assert np.isnan(cut)
-    assert np.isnan(p[3, 3])

@@ -8,9 +8,9 @@ import pytest
 from mpi4py import MPI
 
 from parcontact.contact import starts
-from parcontact.contact.constraint import NonNegative
-from parcontact.contact.problem import Approach, MeanPressure, Operators, Problem, Workspace
-from parcontact.contact.solver import Contact, ContactSolver
+from parcontact.contact.constraint import Box
+from parcontact.contact.problem import Approach, Contact, MeanPressure, Operators, Problem, Workspace
+from parcontact.contact.solver import ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics.convolution import SIDE, Tiles
@@ -56,7 +56,7 @@ def found(
         return solver, *BODY.on_tiles(tiles, slab.tally)
 
     solver, operators = solver_on(slab, tolerance)
-    problem, p = Problem(*operators, h, NonNegative(), control), slab.zeros()
+    problem, p = Problem(*operators, h, Box(), control), slab.zeros()
     contact = starts.prepare_start(solver, problem, p, solver_on, tiles_on if on_tiles else None)
     before = slab.tally["operator"]
     contact = contact or solver.solve(problem, p)
@@ -124,7 +124,7 @@ def test_all_ranks_learn_that_root_failed(comm: MPI.Intracomm) -> None:
         raise MemoryError("no room for tiles")
 
     nothing: Any = None
-    problem = Problem(nothing, nothing, slab.zeros(), NonNegative(), Approach(1.0))
+    problem = Problem(nothing, nothing, slab.zeros(), Box(), Approach(1.0))
     with pytest.raises(MemoryError, match="no room for tiles"):
         starts.OnTheseTiles(tiles, on, problem, slab, 1.0).solve(1e-3, slab.zeros())
     assert slab.sum(1.0) == [comm.size]
@@ -156,7 +156,7 @@ def test_points_beyond_the_end_of_the_grid_do_not_touch() -> None:
 
     heights = np.random.default_rng(1).uniform(-3.0, -1.0, (36, 40))
     nothing: Any = None
-    problem = Problem(nothing, nothing, heights, NonNegative(), Approach(1.0))
+    problem = Problem(nothing, nothing, heights, Box(), Approach(1.0))
     starts.OnTheseTiles(grid, on, problem, slab, 2.0).solve(1e-3, slab.zeros())
     (stacked,) = found
     assert (stacked[:36, :40] == heights).all()

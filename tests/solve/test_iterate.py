@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from parcontact.contact.constraint import NonNegative
-from parcontact.contact.solver import Lines, form_iterate
+from parcontact.contact.certificate import Lines, form_iterate
+from parcontact.contact.constraint import Box
 from parcontact.parallel.slab import Slab
 
 ROUNDING = 1e-12  # of sums over some hundred points
@@ -26,7 +26,7 @@ def test_share_of_length(comm: MPI.Intracomm, axis: int, along: float, between: 
     first, second = (along, between) if axis else (between, along)
     u = np.where(inside, 5.0 + first * wave + second * other, 1e3)
     p, u = np.where(inside, 2.0, 0.0)[slab.rows], u[slab.rows].copy()
-    iterate = form_iterate(slab, NonNegative(), p, u, 0.0 * u, 0.0)
+    iterate = form_iterate(slab, Box(), p, u, 0.0 * u, 0.0)
     share = Lines(axis, 50.0).share_of_length(slab, p, u, iterate)
     expected = math.sqrt((along**2 + between**2 / 50.0**2) / (along**2 + between**2))
     assert share == pytest.approx(expected, rel=ROUNDING, abs=0.0)

@@ -6,15 +6,29 @@ precision the terms themselves are rounded, 1e-6.
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from parcontact.contact import constraint, kernels
-from parcontact.contact.constraint import CELL, Cells, NonNegative
+from parcontact.contact import kernels
+from parcontact.contact.constraint import Box, scale_to_load
+from parcontact.contact.projected import CELL, Cells, cut_off_cells, scale_cells
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 
 from .random_maps import ROUNDING, SHAPES, Maps
 
 pytestmark = pytest.mark.parametrize("dtype", [np.float64, np.float32])
+BOXES = pytest.mark.parametrize("box", [Box(), Box(highest=0.8), Box(lowest=0.3), Box(0.3, 0.8)], ids=str)
+
+
+def within(box: Box, maps: Maps) -> NDArray[np.float64]:
+    """Put an admissible pressure into the maps, with points at each bound; return it in double precision."""
+    maps.p = np.clip(maps.p, maps.dtype(box.lowest), maps.dtype(box.highest))
+    bounds = (maps.p == maps.dtype(bound) for bound in (box.lowest, box.highest))
+    p = maps.wide("p")
+    for bound, value in zip(bounds, (box.lowest, box.highest), strict=True):
+        p[bound] = value
+    maps.p = p  # pressures are in double precision
+    return p
 
 
 def test_nothing_hides_a_nan(dtype: type[np.floating]) -> None:
@@ -22,44 +36,92 @@ def test_nothing_hides_a_nan(dtype: type[np.floating]) -> None:
     for name in ("p", "u", "h"):
         maps = Maps((5, 32), dtype)
         getattr(maps, name)[2, 3] = np.nan
-        assert np.isnan(kernels.pressure_sums(maps.p, maps.u, maps.h, 0.0)[2])
+        assert np.isnan(kernels.contact_sums(maps.p, maps.u, maps.h, 0.0, 0.0, np.inf)[2])
+        assert np.isnan(kernels.mark_working_set(maps.p, maps.u, maps.h, 0.0, 0.0, np.inf, maps.working)[0])
     maps = Maps((5, 32), dtype)
     maps.t[2, 3] = np.nan
     assert np.isnan(loops.dot(maps.t, maps.t))
-
-
-# -- pressures that are not negative, against the same expressions of numpy; tolerances as in `test_kernels` ----------
-
-
-def test_no_load_is_held_at_a_bound(dtype: type[np.floating]) -> None:
-    """Any pressure above 0 may change; one of another load is that times a factor."""
-    maps = Maps((5, 32), dtype)
-    assert NonNegative().mark_working_set(maps.p, maps.u, maps.h, 0.25, maps.working)[3] == 0.0
-    before = maps.wide("p").copy()
-    NonNegative().rescale_to_load(Slab.alone(32, 5), maps.p, float(before.sum()), 3.0)
-    assert maps.close(3.0, maps.wide("p"))
-    assert np.allclose(maps.wide("p"), 3.0 / before.sum() * before, rtol=4 * ROUNDING[dtype], atol=0.0)
+    p = maps.wide("p").copy()
+    assert np.all(np.isnan(kernels.advance(p, maps.t, 1.0, 0.0, np.inf, p)))
+    assert np.isnan(p[2, 3])
 
 
 @SHAPES
-def test_mark(shape: tuple[int, int], dtype: type[np.floating]) -> None:
+@BOXES
+def test_contact_sums(shape: tuple[int, int], box: Box, dtype: type[np.floating]) -> None:
     maps = Maps(shape, dtype)
+    p, u, gap = within(box, maps), maps.wide("u"), maps.wide("u") - maps.wide("h") - 0.25
+    free = np.where(p < box.highest, p - box.lowest, 0.0)
+    found = kernels.contact_sums(maps.p, maps.u, maps.h, 0.25, box.lowest, box.highest)
+    for sum_, terms in zip(found, (p, p * u, p * gap, p * u**2, free, free * gap), strict=True):
+        assert maps.close(sum_, terms)
+
+
+@SHAPES
+@BOXES
+def test_mark(shape: tuple[int, int], box: Box, dtype: type[np.floating]) -> None:
+    maps = Maps(shape, dtype)
+    p, gap = within(box, maps), maps.wide("u") - maps.wide("h") - 0.25
     working = np.ones(shape, dtype=np.bool_)
-    wrong, count, gaps, deepest = constraint.mark_working_set(maps.p, maps.u, maps.h, 0.25, working)
-    p, gap = maps.wide("p"), maps.wide("u") - maps.wide("h") - 0.25
-    assert np.array_equal(working, (p > 0) | (gap < 0))
-    assert maps.close(wrong, p * np.abs(gap))
-    assert count == np.count_nonzero(working)
+    sums = kernels.mark_working_set(maps.p, maps.u, maps.h, 0.25, box.lowest, box.highest, working)
+    wrong, count, gaps, held, deepest = sums
+    stays, below = (p == box.highest) & (gap <= 0.0), gap[p < box.highest]
+    assert np.array_equal(working, ((p > box.lowest) | (gap < 0)) & ~stays)
+    assert maps.close(wrong, np.where(stays, 0.0, (p - box.lowest) * np.abs(gap)))
+    assert (count, held) == (np.count_nonzero(working), np.count_nonzero(stays))
     assert maps.close(gaps, gap[working])
-    assert deepest == -np.inf if gap.size == 0 else abs(deepest + gap.min()) <= 4 * ROUNDING[dtype]
+    assert deepest == -np.inf if below.size == 0 else abs(deepest + below.min()) <= 4 * ROUNDING[dtype]
 
 
 @SHAPES
-def test_next_set(shape: tuple[int, int], dtype: type[np.floating]) -> None:
-    """Pressed points of the set, and others that penetrate."""
+@BOXES
+def test_advance(shape: tuple[int, int], box: Box, dtype: type[np.floating]) -> None:
     maps = Maps(shape, dtype)
-    found = NonNegative().next_set(maps.z, maps.u, maps.working)
-    assert np.array_equal(found, (maps.working & (maps.z > 0.0)) | (~maps.working & (maps.u < 0.0)))
+    p, before = np.empty(shape), maps.wide("u")
+    load, cut = kernels.advance(before, maps.t, 0.7, box.lowest, box.highest, p)
+    value = before - 0.7 * maps.wide("t")
+    kept = np.clip(value, box.lowest, box.highest)
+    np.testing.assert_allclose(p, kept, rtol=0, atol=10 * ROUNDING[dtype])
+    assert maps.close(load, kept)
+    assert abs(cut - np.abs(kept - value).sum()) <= 1e3 * ROUNDING[dtype]
+
+
+@SHAPES
+@BOXES
+def test_resolve(shape: tuple[int, int], box: Box, dtype: type[np.floating]) -> None:
+    """The nearest admissible pressure to s + gamma h."""
+    maps = Maps(shape, dtype)
+    p, reflected, projected = np.empty(shape), np.empty(shape), maps.wide("z") + 0.7 * maps.wide("h")
+    total = box.resolve(maps.wide("z"), maps.wide("h"), 0.7, p, reflected)
+    box.project(projected)
+    np.testing.assert_allclose(p, projected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(reflected, 2.0 * projected - maps.wide("z"), rtol=0, atol=1e-14)
+    assert total == pytest.approx(reflected.sum(), abs=1e-12)
+
+
+@BOXES
+@pytest.mark.parametrize("share", [0.01, 0.5, 0.99])
+def test_scale_to_load(box: Box, share: float, dtype: type[np.floating]) -> None:
+    """From pressures at both bounds and between them to the load, which is a share of the range of one with a highest
+    pressure; points at the lowest one stay there unless the others cannot carry the load."""
+    maps, slab = Maps((5, 32), dtype), Slab.alone(32, 5)
+    p = within(box, maps)
+    lowest, before = p == box.lowest, p.copy()
+    total = slab.points * (box.lowest + share * (min(box.highest, 0.9) - box.lowest))
+    scale_to_load(slab, box, p, float(p.sum()), total)
+    assert p.sum() == pytest.approx(total, rel=1e-11)
+    assert box.lowest <= p.min() <= p.max() <= box.highest
+    if box.highest == np.inf:
+        factor = (total - box.lowest * p.size) / (before - box.lowest).sum()
+        np.testing.assert_allclose(p - box.lowest, factor * (before - box.lowest), rtol=0, atol=1e-14)
+    if share < 0.4:
+        assert np.all(p[lowest] == box.lowest)
+    p.fill(box.lowest)
+    scale_to_load(slab, box, p, float(p.sum()), total)
+    np.testing.assert_allclose(p, total / slab.points, rtol=1e-14)
+
+
+# -- cells that give back the load that was added in them -------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("high", "above"), [(CELL, 0), (CELL, 3), (4, 3)])
@@ -68,32 +130,18 @@ def test_next_set(shape: tuple[int, int], dtype: type[np.floating]) -> None:
 def test_cells(shape: tuple[int, int], high: int, above: int, wide: int, dtype: type[np.floating]) -> None:
     """Pressures cut off at 0, what that adds to each cell, and cells scaled one by one; the first is cut by a rank."""
     maps = Maps(shape, dtype)
-    p, step = np.empty(shape), 0.7
+    p = maps.wide("u").copy()
     rows, columns = (shape[0] + above - 1) // high + 1, (shape[1] - 1) // wide + 1
     sums, factors = np.full((rows, 2 * columns), 9.0), np.random.default_rng(2).random((rows, columns))
-    load, cut = NonNegative().advance(maps.u, maps.t, step, p, Cells(high, above, wide), sums)
-    value = maps.wide("u") - step * maps.wide("t")
-    kept = np.maximum(value, 0.0)
-    np.testing.assert_allclose(p, kept, rtol=0, atol=10 * ROUNDING[dtype])
+    cut_off_cells(p, Cells(high, above, wide), sums)
+    kept = np.maximum(maps.wide("u"), 0.0)
+    assert np.array_equal(p, kept)
     whole = np.zeros((2, rows * high, columns * wide))
     whole[0, above : above + shape[0], : shape[1]] = kept
-    whole[1, above : above + shape[0], : shape[1]] = kept - value
+    whole[1, above : above + shape[0], : shape[1]] = kept - maps.wide("u")
     expected = whole.reshape(2, rows, high, columns, wide).sum(axis=(2, 4))
-    np.testing.assert_allclose(sums, np.hstack(list(expected)), atol=1e3 * ROUNDING[dtype])
-    np.testing.assert_allclose([load, cut], expected.sum(axis=(1, 2)), rtol=1e3 * ROUNDING[dtype])
+    np.testing.assert_allclose(sums, np.hstack(list(expected)), atol=1e-12)
     before = p.copy()
-    constraint.scale_cells(p, Cells(high, above, wide), factors)
+    scale_cells(p, Cells(high, above, wide), factors)
     of_points = np.repeat(np.repeat(factors, high, axis=0), wide, axis=1)[above : above + shape[0], : shape[1]]
     np.testing.assert_allclose(p, before * of_points, rtol=1e-15)
-
-
-def test_nothing_hides_a_nan_constraint(dtype: type[np.floating]) -> None:
-    """A NaN in a gap shows even where there is no pressure."""
-    for name in ("p", "u", "h"):
-        maps = Maps((5, 32), dtype)
-        getattr(maps, name)[2, 3] = np.nan
-        assert np.isnan(constraint.mark_working_set(maps.p, maps.u, maps.h, 0.0, maps.working)[0])
-    maps = Maps((5, 32), dtype)
-    maps.t[2, 3] = np.nan
-    assert np.isnan(constraint.clip(maps.t))
-    assert np.isnan(maps.t[2, 3])

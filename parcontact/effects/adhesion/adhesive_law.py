@@ -23,8 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...contact.problem import Approach, Control, MeanPressure
-from ...contact.solver import Contact
+from ...contact.problem import Approach, Contact, Control, MeanPressure
 from ...job.history import Step
 from ...march.constants import ENERGY
 from ...parallel import regrid

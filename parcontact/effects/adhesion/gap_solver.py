@@ -61,9 +61,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import kernels
-from ...contact.problem import Approach, Control, MeanPressure, Operator, Workspace
-from ...contact.solver import LEAST_SHARE as SOLVER_LEAST_SHARE
-from ...contact.solver import Contact
+from ...contact.certificate import LEAST_SHARE as SOLVER_LEAST_SHARE
+from ...contact.problem import Approach, Contact, Control, MeanPressure, Operator, Workspace
 from ...parallel.slab import Array, Slab
 from ...physics.measures import Certificate
 from . import law as gap_kernels

@@ -25,7 +25,7 @@ from ...bands.band import Means
 from ...bands.cascade import Results, by_load, by_square
 from ...bands.choice import Cut
 from ...bands.road_sliding import RoadSliding
-from ...contact.projected import SteadyContact
+from ...contact.problem import Contact
 from ...errors import InputError
 from ...job import Job
 from ...march.point import Point
@@ -145,7 +145,7 @@ class HeatProbe:
             body, seconds = self._job.section("thermal").conductor, seconds_of(self._job, self._cut, velocity)
             self._warming, self._velocity = warming_of(setup, body, seconds, velocity, self._waves), velocity
 
-    def measure(self, setup: Setup, contact: SteadyContact, velocity: Vector) -> dict[str, Array]:
+    def measure(self, setup: Setup, contact: Contact, velocity: Vector) -> dict[str, Array]:
         """Return g and S_j of a contact."""
         depths = shares_of_depth(setup, contact.p, velocity, self._waves)
         return {"depths": depths, "warming": self._warming.apply(setup, contact.p)}

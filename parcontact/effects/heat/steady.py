@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...contact.constraint import Mask, NonNegative
+from ...contact.constraint import Box, Mask
 from ...doubts import Doubt
 from ...errors import InputError, UnsolvedError
 from ...job import Job, Zener
@@ -146,7 +146,7 @@ class HeatLoop:
     def _heat(self, sliding: Any, point: Point) -> Point:
         """Return the last state with its temperatures, whose map is kept; collective."""
         p, by_energy = sliding.contact.p, point.friction - point.measures.friction_interface
-        contact = p, NonNegative().touches(p), point.measures, by_energy, point.velocity
+        contact = p, Box().touches(p), point.measures, by_energy, point.velocity
         flash, self.fields["temperature"] = find_temperatures(sliding.setup, self._section, *contact)
         return point.with_effect("thermal", flash)
 

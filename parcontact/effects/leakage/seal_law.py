@@ -16,8 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...contact.problem import Control, MeanPressure
-from ...contact.solver import Contact
+from ...contact.problem import Contact, Control, MeanPressure
 from ...job.history import Step
 from ...parallel import regrid
 from ...parallel.root import on_root

@@ -11,7 +11,7 @@ from ...bands.band import Means
 from ...bands.cascade import Results, by_power
 from ...bands.choice import Cut
 from ...bands.road_sliding import RoadSliding
-from ...contact.projected import SteadyContact
+from ...contact.problem import Contact
 from ...job import Job
 from ...march.point import Point
 from ...march.scene import Setup
@@ -30,7 +30,7 @@ class StrainProbe:
     def slide(self, setup: Setup, velocity: Vector) -> None:
         """Do nothing."""
 
-    def measure(self, setup: Setup, contact: SteadyContact, velocity: Vector) -> dict[str, Array]:
+    def measure(self, setup: Setup, contact: Contact, velocity: Vector) -> dict[str, Array]:
         """Return the squares and weights of a contact."""
         depths, all_waves = self._depths / setup.units.length, np.zeros(setup.fft.shape, np.int64)
         found = strains_of(setup, contact.u, velocity, depths, all_waves, 1)

@@ -9,8 +9,8 @@ from mpi4py import MPI
 from numpy.testing import assert_allclose
 
 from parcontact.contact import starts
-from parcontact.contact.problem import Approach, MeanPressure, Operators, Workspace
-from parcontact.contact.solver import Contact, ContactSolver
+from parcontact.contact.problem import Approach, Contact, MeanPressure, Operators, Workspace
+from parcontact.contact.solver import ContactSolver
 from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Slab
 from parcontact.physics.halfspace import HalfSpace

@@ -8,9 +8,10 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from parcontact.contact.constraint import HARD, InterfaceLaw
+from parcontact.contact.certificate import Judge
+from parcontact.contact.constraint import Box, InterfaceLaw
 from parcontact.contact.problem import Approach, MeanPressure
-from parcontact.contact.projected import Judge, Projected
+from parcontact.contact.projected import CELL, MOST_GIVEN_BACK, LocalLoad, Projected
 from parcontact.contact.splitting import RELAXATION, Acceleration, Splitting
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
@@ -92,6 +93,79 @@ def test_pressures_are_cut_off_and_stay_on_the_set() -> None:
     assert x[1, 1] > 1.0
     assert x.sum() == pytest.approx(6.0, rel=1e-15)
     np.testing.assert_array_equal(u, x)
+
+
+# -- cutting off at 0 and taking back near by, against the same with blocks of numpy, on any ranks --------------------
+
+CUT_ROUNDING, TOTAL = 1e-13, 3.0
+ANY_RANKS = pytest.mark.parametrize("shape", [(1, 1), (7, 40), (33, 16), (50, 37), (64, 64)])
+
+
+def cut_off(values: Map, near_by: bool = True, pairs: int = 0) -> tuple[slice, Map, float, float]:
+    """The rows that this rank has, their pressure after the cut, made to have the sum TOTAL, and the load and the cut
+    that are returned."""
+    slab = Slab(MPI.COMM_WORLD, values.shape[1], values.shape[0])
+    p, local = values[slab.rows].copy(), LocalLoad(slab, pairs)
+    load, cut = local.cut_off(p)
+    if load > 0.0:
+        local.restore(p, load, TOTAL, near_by)
+    return slab.rows, p, load, cut
+
+
+def expected(values: Map, rows: int, columns: int) -> Map:
+    """Cell by cell, of a given number of rows and columns."""
+    out = np.maximum(values, 0.0)
+    for j in range(0, values.shape[0], rows):
+        for i in range(0, values.shape[1], columns):
+            cell = np.s_[j : j + rows, i : i + columns]
+            load = out[cell].sum()
+            share = min((load - values[cell].sum()) / load, MOST_GIVEN_BACK) if load > 0.0 else 0.0
+            out[cell] *= 1.0 - share
+    return out
+
+
+def pressures(shape: tuple[int, int], sunk: float) -> Map:
+    """Random numbers from -sunk to 1 - sunk."""
+    return np.random.default_rng(1).random(shape) - sunk
+
+
+@pytest.mark.mpi
+@ANY_RANKS
+@pytest.mark.parametrize("sunk", [0.1, 0.45, 0.9])
+@pytest.mark.parametrize(
+    ("near_by", "pairs", "cell"),
+    [
+        (True, 0, (CELL, CELL)),
+        (True, 1, (8, CELL)),
+        (True, 4, (4, CELL)),
+        (True, -2, (CELL, 4)),
+        (False, 0, (CELL, CELL)),
+    ],
+)
+def test_each_cell_gives_back_what_was_added_in_it(
+    shape: tuple[int, int], sunk: float, near_by: bool, pairs: int, cell: tuple[int, int]
+) -> None:
+    """Cells have fewer rows where pairs along x make square cells, fewer columns where pairs along y do, but four at
+    least."""
+    values = pressures(shape, sunk)
+    rows, p, load, cut = cut_off(values, near_by, pairs)
+    whole = np.maximum(values, 0.0)
+    np.testing.assert_allclose(load, whole.sum(), rtol=CUT_ROUNDING)
+    np.testing.assert_allclose(cut, (whole - values).sum(), rtol=CUT_ROUNDING, atol=CUT_ROUNDING)
+    if load > 0.0:
+        kept = expected(values, *cell) if near_by else whole
+        np.testing.assert_allclose(p, (TOTAL / kept.sum() * kept)[rows], rtol=CUT_ROUNDING)
+
+
+def test_nothing_and_not_a_number() -> None:
+    """Pressures that are all negative leave 0; what is not a number stays so."""
+    assert cut_off(np.full((20, 20), -1.0))[2] == 0.0
+    values = pressures((20, 20), 0.4)
+    values[3, 3] = np.nan
+    _, p, load, cut = cut_off(values)
+    assert np.isnan(load)
+    assert np.isnan(cut)
+    assert np.isnan(p[3, 3])
 
 
 # -- acceleration -----------------------------------------------------------------------------------------------------
@@ -191,7 +265,7 @@ def test_a_layer_moves_in_the_mean(comm: MPI.Intracomm, poisson: float) -> None:
     splitting, operator = made(1e-8, comm, poisson=poisson, layer=layer)
     slab, mean = splitting.slab, 0.5
     h = HEIGHTS[slab.rows]
-    found = splitting.solve(h, MeanPressure(mean), HARD, slab.zeros())
+    found = splitting.solve(h, MeanPressure(mean), Box(), slab.zeros())
     assert found.converged
     p, gap = found.p.copy(), operator.apply(found.p, slab.empty()) - h - found.d
     load, wrong = slab.sum(float(p.sum()), float((p * np.abs(gap)).sum()))
@@ -199,7 +273,7 @@ def test_a_layer_moves_in_the_mean(comm: MPI.Intracomm, poisson: float) -> None:
     assert load == pytest.approx(mean * N * N, rel=1e-12)
     assert wrong / load < 2e-8 * np.ptp(HEIGHTS)
     assert deepest < 2e-8 * np.ptp(HEIGHTS)
-    other = splitting.solve(h, Approach(found.d), HARD, slab.zeros())
+    other = splitting.solve(h, Approach(found.d), Box(), slab.zeros())
     assert other.converged
     assert slab.sum(float(other.p.sum()))[0] == pytest.approx(load, rel=1e-6)
 
@@ -210,7 +284,7 @@ def test_a_start_that_is_the_solution_takes_one_application() -> None:
     splitting.tolerance, tally = 1e-5, splitting.slab.tally
     before = tally["operator"]
     again = splitting.solve(HEIGHTS, MeanPressure(1.0), LAW, p)
-    assert (again.steps, tally["operator"] - before) == (0, 1)
+    assert (again.iterations, tally["operator"] - before) == (0, 1)
 
 
 @pytest.mark.parametrize("worst", [np.nan, np.inf])
@@ -219,9 +293,9 @@ def test_numbers_that_are_not_finite_end_a_solve(worst: float) -> None:
     heights = HEIGHTS.copy()
     heights[3, 4] = worst
     with np.errstate(invalid="ignore"):
-        found = splitting.solve(heights, MeanPressure(1.0), HARD, np.ones((N, N)))
+        found = splitting.solve(heights, MeanPressure(1.0), Box(), np.ones((N, N)))
     assert found.failure
-    assert found.steps <= 1
+    assert found.iterations <= 1
 
 
 def test_closings_that_fall_are_refused() -> None:
