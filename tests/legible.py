@@ -42,6 +42,9 @@ def watch_pictures() -> Iterator[list[Figure]]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Saved, "savefig", judge)
         yield figures
+    for number, figure in enumerate(figures, 1):
+        if figure.stale:  # has changed since it was saved: its last frame
+            faults += [f"picture {number}: {fault}" for fault in find_faults(figure)]
     assert not faults, "\n".join(faults)
 
 

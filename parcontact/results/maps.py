@@ -19,6 +19,7 @@ import h5py
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -354,7 +355,8 @@ def draw_frames(
     size: tuple[float, float] = (4.5, 4.0),
     dpi: int = 110,
 ) -> Iterator[Image.Image]:
-    """Draw a saved map of shape (instant, y, x) at each index that has a label, with one range of colours."""
+    """Draw a saved map of shape (instant, y, x) at each index that has a label, with one range of colours. Only the map
+    and its title are drawn anew for each."""
 
     def read(index: int) -> Array:
         if name in STICK_MAPS:
@@ -365,18 +367,26 @@ def draw_frames(
 
     ranges = [find_range(read(index)) for index in labels]
     limits = min(low for low, _ in ranges), max(high for _, high in ranges)
-    figure, x, y = Figure(figsize=size, layout="constrained"), file["x"][...], file["y"][...]
-    axes = figure.subplots()
+    figure, x, y = Figure(figsize=size, dpi=dpi, layout="constrained"), file["x"][...], file["y"][...]
+    axes, canvas = figure.subplots(), FigureCanvasAgg(figure)
     fill = (_draw_line if min(x.size, y.size) <= STRIP else _draw_map)(axes, name, (x, y), limits)
+    changing = (*axes.collections, *axes.lines, *axes.spines.values(), axes.title)
+    axes.set_title(f"{_words(name)}, {next(iter(labels.values()))}")
+    style.arrange(figure)  # the layout of the first frame is kept for all
+    figure.set_layout_engine(None)
+    for one in changing:
+        one.set_visible(False)
+    figure.savefig(io.BytesIO(), format="raw", dpi=dpi)  # draws on the canvas what does not change
+    background = canvas.copy_from_bbox(figure.bbox)
+    for one in changing:
+        one.set_visible(True)
     for index, label in labels.items():
         fill(read(index))
         axes.set_title(f"{_words(name)}, {label}")
-        if figure.get_layout_engine() is not None:  # the layout of the first frame is kept for all
-            style.arrange(figure)
-            figure.set_layout_engine(None)
-        png = io.BytesIO()
-        figure.savefig(png, format="png", dpi=dpi)
-        yield Image.open(png).convert("RGB")
+        canvas.restore_region(background)
+        for one in changing:
+            axes.draw_artist(one)
+        yield Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
 
 
 FRAMES = 200  # most frames of a movie; other instants are left out

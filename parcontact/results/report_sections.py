@@ -227,17 +227,20 @@ def _browse_file(
 
 def _browse_map(file: h5py.File, name: str, labels: dict[int, str], job: Job, chosen: int) -> Browser:
     counted = streams.with_bar(list(labels), f"maps of {name}", "map")
-    images = zip(maps.draw_frames(file, name, labels, job, MAP_SIZE, MAP_DPI), counted, strict=True)
-    first = max(sum(index <= chosen for index in labels) - 1, 0)
-    return name, [(to_uri(to_small_png(image), "image/png"), labels[index]) for image, index in images], first
+    images = _in_few_colors(maps.draw_frames(file, name, labels, job, MAP_SIZE, MAP_DPI))
+    pictures = [(to_uri(image, "image/png"), labels[index]) for index, image in zip(counted, images, strict=True)]
+    return name, pictures, max(sum(index <= chosen for index in labels) - 1, 0)
 
 
-def to_small_png(image: Image.Image) -> bytes:
-    """Return a PNG with COLORS colours, chosen so that rare colours are kept."""
-    png = io.BytesIO()
-    few = image.quantize(COLORS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    few.save(png, "png", optimize=True)
-    return png.getvalue()
+def _in_few_colors(images: Iterator[Image.Image]) -> Iterator[bytes]:
+    """Yield a PNG of each image with the same COLORS colours: those of the first, whose bar of colours has all."""
+    few: Image.Image | None = None
+    for image in images:
+        if few is None:
+            few = image.quantize(COLORS, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+        png = io.BytesIO()
+        image.quantize(palette=few, dither=Image.Dither.NONE).save(png, "png")
+        yield png.getvalue()
 
 
 def _label_states(area: float, file: h5py.File) -> dict[int, str]:

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from PIL import Image
 
 from parcontact.job import Job
 from parcontact.results import maps, plots, report_sections
@@ -59,6 +60,18 @@ def test_one_look(tmp_path: Path, drawn: list[Figure]) -> None:
             assert (ours.norm.vmin, ours.norm.vmax) == (theirs.norm.vmin, theirs.norm.vmax)
             np.testing.assert_array_equal(values(ours), values(theirs))
             assert np.isnan(values(ours)).any() == (name != "height")
+
+
+@pytest.mark.rendered
+@pytest.mark.parametrize("scene", [WAVE, STRIP])
+def test_frames_are_whole_pictures(tmp_path: Path, drawn: list[Figure], scene: str) -> None:
+    """The last frame has the points of its figure drawn as a whole: nothing of earlier frames is left."""
+    run = PlottedRun(ran(tmp_path, scene + ELASTIC + LOADS + ALL))
+    with run.open_maps() as file:
+        *_, frame = maps.draw_frames(file, "pressure", label_frames(run, file), run.job)
+    drawn[-1].savefig(tmp_path / "whole.png")
+    with Image.open(tmp_path / "whole.png") as whole:
+        np.testing.assert_array_equal(np.asarray(whole.convert("RGB")), np.asarray(frame))
 
 
 @pytest.mark.parametrize(
