@@ -14,7 +14,7 @@ from parcontact import streams
 from parcontact.__main__ import main
 from parcontact.files.recorder import Console, StepRow
 from parcontact.results import report_sections
-from parcontact.results.charts import PlottedRun
+from parcontact.results.plotted_run import PlottedRun
 
 
 class Terminal(io.StringIO):

@@ -34,17 +34,8 @@ from ..job.listing import answers
 from ..job.reading import STEADY_RESOLVED
 from ..parallel.slab import Array
 from . import style
-from .charts import (
-    FRACTION,
-    Axis,
-    Chart,
-    ChartLine,
-    PlottedRun,
-    count_different,
-    round_digits,
-    to_contact_area,
-    to_load,
-)
+from .panels import Axis, Line, Panel
+from .plotted_run import FRACTION, PlottedRun, count_different, round_digits, to_contact_area, to_load
 from .results import CURVES, PLACES, Results, read_cases, swept_keys
 from .slide import CORRECTED
 from .sweep_table import SAMPLES
@@ -57,12 +48,12 @@ AREA = Axis(FRACTION)
 THEORY_LOOK = {"color": style.GREY, "linestyle": ":", "linewidth": THIN_LINE}
 OVER_TIME, STEADY = "theory.csv", "steady.csv"
 STEADY_LOOK = {"color": style.GREY, "linestyle": "-", "linewidth": THIN_LINE}
-STEADY_ENTRY = ChartLine("steady sliding", np.zeros(0), np.zeros(0), STEADY_LOOK)
+STEADY_ENTRY = Line("steady sliding", np.zeros(0), np.zeros(0), STEADY_LOOK)
 SAME = 1e-9  # rounding: of distances
-ENTRY = ChartLine("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
+ENTRY = Line("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
 
 
-def chart_bands(directory: Path) -> list[Chart]:
+def chart_bands(directory: Path) -> list[Panel]:
     """Return panels of a table of bands of a curve, for its first pressure and temperature."""
     curve = Results(directory, "curve")
     if "velocity" not in curve.read(BANDS):
@@ -83,21 +74,21 @@ def chart_bands(directory: Path) -> list[Chart]:
     return found
 
 
-def chart_slips(run: PlottedRun) -> list[Chart]:
+def chart_slips(run: PlottedRun) -> list[Panel]:
     """Return panels of a history in bands over the slip since the start of each slide: friction and area, and friction
     by band in the last slide; none without a slide."""
     slides = [number for number, stage in enumerate(run.job.history) if stage.slides and stage.seconds]
     if not slides or "distance" not in run.read(BANDS):
         return []
     x, starts = Axis("slip of the stage", "m"), _starts(run)
-    friction, area = list[ChartLine](), list[ChartLine]()
+    friction, area = list[Line](), list[Line]()
     for count, number in enumerate(slides):
         rows, look, name = run.rows_of_stages[number], style.line(count), run.job.history[number].name
         rows = [row for row in rows if run.columns["distance"][row] > starts[number]]
         slip = run.columns["distance"][rows] - starts[number]
         name = name if len(slides) > 1 else ""
-        friction.append(ChartLine(name, slip, run.columns["friction"][rows], look))
-        area.append(ChartLine(name, slip, run.columns["contact_area_corrected"][rows], look))
+        friction.append(Line(name, slip, run.columns["friction"][rows], look))
+        area.append(Line(name, slip, run.columns["contact_area_corrected"][rows], look))
         others = [*_theory_of(run, starts[number], slip), *_steady_of(run, number, slip)]
         friction += [line for line, _ in others]
         area += [line for _, line in others]
@@ -109,8 +100,8 @@ def chart_slips(run: PlottedRun) -> list[Chart]:
     own = {name: values[kept] for name, values in stages.items()}
     own["slip"] = own["distance"] - start
     return [
-        Chart("bands slip", x, Axis("friction coefficient"), [*friction, *entries], log_x=True),
-        Chart("bands slip area", x, Axis(FRACTION), [*area, *entries], log_x=True),
+        Panel("bands slip", x, Axis("friction coefficient"), [*friction, *entries], log_x=True),
+        Panel("bands slip area", x, Axis(FRACTION), [*area, *entries], log_x=True),
         _stacked(own, "slip", x),
     ]
 
@@ -125,18 +116,18 @@ def _starts(run: PlottedRun) -> Array:
     return np.cumsum([0.0, *(_way(run, number) for number in range(len(run.job.history)))])
 
 
-def _theory_of(run: PlottedRun, start: float, slip: Array) -> Iterator[tuple[ChartLine, ChartLine]]:
+def _theory_of(run: PlottedRun, start: float, slip: Array) -> Iterator[tuple[Line, Line]]:
     """Yield friction and area of the theory over the slip of a stage."""
     if not run.has(OVER_TIME):
         return
     theory = run.read(OVER_TIME).arrays(("distance", "friction", "contact_area"))
     there = theory["distance"] - start
     rows = (there >= slip[0]) & (there <= slip[-1])
-    of = lambda name: ChartLine("", there[rows], theory[name][rows], THEORY_LOOK)  # noqa: E731
+    of = lambda name: Line("", there[rows], theory[name][rows], THEORY_LOOK)  # noqa: E731
     yield of("friction"), of("contact_area")
 
 
-def _steady_of(run: PlottedRun, number: int, slip: Array) -> Iterator[tuple[ChartLine, ChartLine]]:
+def _steady_of(run: PlottedRun, number: int, slip: Array) -> Iterator[tuple[Line, Line]]:
     """Yield lines at friction and area of steady sliding at the velocity of a stage, over the last decade."""
     if not run.has(STEADY):
         return
@@ -145,7 +136,7 @@ def _steady_of(run: PlottedRun, number: int, slip: Array) -> Iterator[tuple[Char
     same = np.isclose(curve["velocity"], stage.speed) & np.isclose(curve["pressure"], stage.load.start)
     for row in np.flatnonzero(same)[:1]:
         ends = np.array([max(slip[0], slip[-1] / 10.0), slip[-1]])
-        yield tuple(ChartLine("", ends, np.full(2, curve[name][row]), STEADY_LOOK) for name in names[2:])  # type: ignore[misc]
+        yield tuple(Line("", ends, np.full(2, curve[name][row]), STEADY_LOOK) for name in names[2:])  # type: ignore[misc]
 
 
 def _describe_first(columns: dict[str, Array]) -> str:
@@ -166,31 +157,31 @@ def _choose(columns: dict[str, Array]) -> dict[str, Array]:
     return {name: values[same] for name, values in columns.items()}
 
 
-def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Chart:
+def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Panel:
     """Return a chart of the friction of each band over velocity, with the theory's sum as a line."""
     found = _stacked(columns, "velocity", Axis("sliding velocity", "m/s"))
     if theory is None:
         return found
     speeds = np.unique(theory["velocity"])
     sums = np.array([theory["friction"][theory["velocity"] == speed].sum() for speed in speeds])
-    return replace(found, series=[*found.series, ENTRY, ChartLine("", speeds, sums, THEORY_LOOK)])
+    return replace(found, series=[*found.series, ENTRY, Line("", speeds, sums, THEORY_LOOK)])
 
 
-def _stacked(columns: dict[str, Array], over: str, x: Axis) -> Chart:
+def _stacked(columns: dict[str, Array], over: str, x: Axis) -> Panel:
     """Return a chart of the friction of each band over a column, stacked from the coarsest."""
-    series, bands, edges = list[ChartLine](), np.unique(columns["band"]), list[float]()
+    series, bands, edges = list[Line](), np.unique(columns["band"]), list[float]()
     for band, color in zip(bands, style.sequence(bands.size), strict=True):
         rows = np.flatnonzero(columns["band"] == band)
         rows = rows[np.argsort(columns[over][rows], kind="stable")]
         long, short = (float(columns[f"{end}_wavelength"][rows[0]]) for end in ("long", "short"))
         edges += [short] if edges else [long, short]
-        series.append(ChartLine("", columns[over][rows], columns["friction"][rows], {"color": color}, stack=0))
-    return Chart("bands", x, Axis("friction by band,\nlongest waves below"), series, log_x=True, edges=edges)
+        series.append(Line("", columns[over][rows], columns["friction"][rows], {"color": color}, stack=0))
+    return Panel("bands", x, Axis("friction by band,\nlongest waves below"), series, log_x=True, edges=edges)
 
 
 def _over_bands(
     key: str, columns: dict[str, Array], theory: dict[str, Array] | None, name: str, y: Axis = AREA
-) -> Chart:
+) -> Panel:
     """Return a chart of the area over magnification, or of another column over wavelength, for some velocities."""
     area, longest = y is AREA, float(columns["long_wavelength"].max())
     x = Axis("magnification") if area else Axis("shortest wave of the band", "m")
@@ -201,9 +192,9 @@ def _over_bands(
             rows = rows[np.argsort(table["band"][rows])]
             short = table["short_wavelength"][rows]
             label = printed.quantity(speed, "m/s") if table is columns else ""
-            series.append(ChartLine(label, longest / short if area else short, table[name][rows], look))
+            series.append(Line(label, longest / short if area else short, table[name][rows], look))
     series += [] if theory is None else [ENTRY]
-    return Chart(key, x, y, series, log_x=True)
+    return Panel(key, x, y, series, log_x=True)
 
 
 def _tables(
@@ -226,7 +217,7 @@ EMPTY = np.zeros(0)
 THIN = {"theory": ":", "without feedback": "--"}  # dashes of thin lines, drawn in addition to the simulation
 
 
-def chart_steady(directory: Path, over: str = "") -> list[Chart]:
+def chart_steady(directory: Path, over: str = "") -> list[Panel]:
     """Return panels of a table of steady states; none without states, or if `over` is not possible."""
     curve = Results(directory, "curve")
     columns, area = curve.table.arrays(NEEDED), curve.free_area
@@ -264,7 +255,7 @@ def chart_steady(directory: Path, over: str = "") -> list[Chart]:
         if name in theory:
             one = along == "reduced" and "load" not in lines  # over a_T v the theory is one line
             series += _make_thin(theory, along, name, {} if one else lines, "theory")
-        found.append(Chart(key, axes[along], axes[name], series, log_x=True))
+        found.append(Panel(key, axes[along], axes[name], series, log_x=True))
     with suppress(InputError):  # files of the job no longer exist
         job = load(directory / STEADY_RESOLVED)
         found += [chart for panels_of in answers("pictures", "curve_panels") for chart in panels_of(job, columns)]
@@ -287,7 +278,7 @@ def _add_derived(columns: dict[str, Array], area: float) -> None:
         columns["reduced"] = columns["shift_factor"] * columns["velocity"]
 
 
-def _make_lines(columns: dict[str, Array], x: str, y: str, by: dict[str, str]) -> Iterator[ChartLine]:
+def _make_lines(columns: dict[str, Array], x: str, y: str, by: dict[str, str]) -> Iterator[Line]:
     """Yield a line for each combination of the columns `by`, given with their units."""
     error = columns.get(f"error_{y}")
     places = np.array([round_digits(columns[name]) for name in by]).reshape(len(by), columns[x].size)
@@ -297,15 +288,15 @@ def _make_lines(columns: dict[str, Array], x: str, y: str, by: dict[str, str]) -
         rows = rows[np.argsort(columns[x][rows], kind="stable")]
         label = ", ".join(printed.quantity(value, unit) for value, unit in zip(place, by.values(), strict=True))
         look = style.line(number, values.shape[1]) | {"marker": "o"}
-        yield ChartLine(label, columns[x][rows], columns[y][rows], look, None if error is None else error[rows])
+        yield Line(label, columns[x][rows], columns[y][rows], look, None if error is None else error[rows])
 
 
-def _make_thin(columns: dict[str, Array], x: str, y: str, by: dict[str, str], label: str) -> Iterator[ChartLine]:
+def _make_thin(columns: dict[str, Array], x: str, y: str, by: dict[str, str], label: str) -> Iterator[Line]:
     """Yield thin lines, drawn in addition to the simulation, and their entry of the legend."""
     look = {"color": style.GREY, "linestyle": THIN[label], "linewidth": THIN_LINE}
-    yield ChartLine(label, EMPTY, EMPTY, look)
+    yield Line(label, EMPTY, EMPTY, look)
     for line in _make_lines(columns, x, y, by):
-        yield ChartLine("", line.x, line.y, look | ({"color": line.look["color"]} if by else {}))
+        yield Line("", line.x, line.y, look | ({"color": line.look["color"]} if by else {}))
 
 
 UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N", "size": "m", "distance": "m"}
@@ -348,7 +339,7 @@ def all_panels() -> Panels:
     return tuple(sorted(found, key=lambda panel: place(next(iter(panel[2].values())))))
 
 
-def chart_sweep(directory: Path) -> list[Chart]:
+def chart_sweep(directory: Path) -> list[Panel]:
     """Return panels of a sweep; none without results, or without a swept key of numbers."""
     table = Results(directory, "sweep").points
     rows, panels = read_cases(table), all_panels()
@@ -367,7 +358,7 @@ def chart_sweep(directory: Path) -> list[Chart]:
         if any(one.y.any() for one in series):  # after detachment there is neither friction nor area
             values = np.concatenate([one.x for one in series])
             wide = bool(values.min() > 0.0 and values.max() >= WIDE * values.min())
-            found.append(Chart(panel, x, y, series, log_x=wide))
+            found.append(Panel(panel, x, y, series, log_x=wide))
     return found
 
 
@@ -414,14 +405,14 @@ def _named(key: str, value: Any) -> str:
     return text if word in PLACES else f"{word.replace('_', ' ')} {text}"
 
 
-def _make_series(rows: Rows, key: str, columns: dict[str, str]) -> list[ChartLine]:
+def _make_series(rows: Rows, key: str, columns: dict[str, str]) -> list[Line]:
     """Return entries of the legend, and the lines of all columns: colours for the values of the first further key,
     dashes for those of the others, marks for the columns. Without further keys, columns have colours."""
     lines = {(hue, ", ".join(rest)): own for (hue, *rest), own in _split(rows, key).items()}
     if len({rest for _, rest in lines}) > len(STYLES):
         lines = {(", ".join(names), ""): own for names, own in lines.items()}
     hues, rests = (list(dict.fromkeys(names)) for names in zip(*lines, strict=True))
-    colors, found = style.colors(max(len(hues), len(columns))), list[ChartLine]()
+    colors, found = style.colors(max(len(hues), len(columns))), list[Line]()
     names = dict[str, dict[str, Any]]()
     names |= {hue: {"color": colors[k]} for k, hue in enumerate(hues) if len(hues) > 1}
     names |= {rest: GREY | {"linestyle": STYLES[k]} for k, rest in enumerate(rests) if len(rests) > 1}
@@ -436,25 +427,25 @@ def _make_series(rows: Rows, key: str, columns: dict[str, str]) -> list[ChartLin
                 elif len(columns) > 1:
                     names.setdefault(name, GREY | {"marker": MARKERS[k], "linestyle": "none"})
                 found.append(replace(one, name=""))
-    return [*(ChartLine(name, NOTHING, NOTHING, look) for name, look in names.items()), *found]
+    return [*(Line(name, NOTHING, NOTHING, look) for name, look in names.items()), *found]
 
 
 def _make_lines_of_cases(
     names: tuple[str, str], rows: Rows, column: str, key: str, look: dict[str, Any], number: int
-) -> Iterator[ChartLine]:
+) -> Iterator[Line]:
     """Yield the means of a column as a line with points, all cases as small dots, and the theory."""
     theirs = "contact_area" if column == CORRECTED else column
     x, y, theory = (_read_column(rows, wanted) for wanted in (key, column, f"theory_{theirs}"))
     if (there := np.isfinite(y)).any():
         at, means = _average(x[there], y[there])
         error = _read_errors(rows, column, y)[there][np.argsort(x[there])] if at.size == there.sum() else None
-        yield ChartLine(names[0], at, means, look | {"marker": MARKERS[number]}, error)
+        yield Line(names[0], at, means, look | {"marker": MARKERS[number]}, error)
         if at.size < there.sum():
             dots = {"marker": ".", "linestyle": "none", "alpha": 0.5, "markersize": 3}
-            yield ChartLine("each case", x[there], y[there], look | dots)
+            yield Line("each case", x[there], y[there], look | dots)
     if (there := np.isfinite(theory)).any():
         thin = {"linestyle": DASHES[number], "linewidth": THIN_CASE}
-        yield ChartLine(names[1], *_average(x[there], theory[there]), look | thin)
+        yield Line(names[1], *_average(x[there], theory[there]), look | thin)
 
 
 def _average(x: Array, y: Array) -> tuple[Array, Array]:

@@ -9,14 +9,11 @@ Picture of a study: errors over the refinement of mesh and time step (as Fig. 6 
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator, ScalarFormatter
 
 from ..errors import InputError
 from ..files import files, hdf5
@@ -24,8 +21,10 @@ from ..parallel.slab import Array
 from ..rubber.compound import TITLE, Compound
 from ..rubber.series import log_factors, reduce_sets
 from . import style
+from .panels import Axis, Line, Panel, Shade, picture
 
 COLORS = (style.BLUE, style.RED)  # colours of storage and loss moduli
+SOLID, DOTS = {"color": "k"}, {"color": "k", "marker": "o", "linestyle": "none", "mfc": "none"}
 POINTS = 400  # number of points of a line
 
 
@@ -63,18 +62,13 @@ def write_compound(compound: Compound, target: Path, job_band: tuple[float, floa
 
 def draw_compound(compound: Compound, path: Path, job_band: tuple[float, float] | None = None) -> None:
     """Write the picture, a png, with the frequencies of a job shaded; raises OSError."""
-    with style.drawing({"axes.grid": True, "grid.alpha": 0.3, "lines.markersize": 4, "legend.frameon": False}):
-        figure = Figure(figsize=(8, 6), layout="constrained")
-        panels = figure.subplot_mosaic([["moduli", "spectrum"], ["misfit", "shift"]], width_ratios=(2, 1))
-        _draw_moduli(panels["moduli"], panels["misfit"], compound)
-        if job_band:
-            for name in ("moduli", "misfit"):
-                panels[name].axvspan(*job_band, color="#999999", alpha=0.25, lw=0, label="frequencies of the job")
-        panels["moduli"].legend(fontsize="small")
-        panels["spectrum"].loglog(compound.series.times, compound.series.moduli, "o", color="black")
-        panels["spectrum"].set(xlabel="relaxation time [s]", ylabel="shear modulus of the branch [Pa]")
-        _draw_shift(panels["shift"], compound)
-        style.save_figure(figure, path, dpi=150)
+    shades = [Shade("frequencies of the job", *job_band)] if job_band else []
+    panels = [replace(panel, shades=shades) for panel in _moduli(compound)]
+    branches = Line("", compound.series.times, compound.series.moduli, DOTS)
+    axes = Axis("relaxation time", "s"), Axis("shear modulus\nof the branch", "Pa")
+    panels.append(Panel("branches", *axes, [branches], log_x=True, log_y=True))
+    with style.drawing():
+        style.save_figure(picture("", [[*panels, *_shift(compound)]]), path)
 
 
 def _reduced(compound: Compound) -> Iterator[tuple[Array, list[Array]]]:
@@ -87,8 +81,8 @@ def _reduced(compound: Compound) -> Iterator[tuple[Array, list[Array]]]:
         yield data.at, np.split(data.moduli, 2) if kind == "frequency" else [data.moduli]
 
 
-def _draw_moduli(top: Axes, bottom: Axes, compound: Compound) -> None:
-    """Draw the measured moduli (Young's or shear), the fit, and their relative difference."""
+def _moduli(compound: Compound) -> list[Panel]:
+    """Return the panels of measured moduli (Young's or shear) with the fit, and of their relative difference."""
     measured, sets = compound.measured, list(_reduced(compound))
     letter, kind, size = ("E", "Young's", 2.0 * (1.0 + compound.poisson)) if measured.tension else ("G", "shear", 1.0)
     frequency = measured.kind == "frequency"
@@ -103,35 +97,37 @@ def _draw_moduli(top: Axes, bottom: Axes, compound: Compound) -> None:
     def fitted(at: Array, k: int) -> Array:
         return np.asarray(compound.series.response(measured.kind, at)).reshape(len(names), -1)[k]
 
+    top, bottom = list[Line](), [Line("", every / unit, np.zeros(every.size), {"color": "k", "linewidth": 0.8})]
     for k, name in enumerate(names):
-        for number, (at, moduli) in enumerate(sets):
-            look = {"ms": 3, "mfc": "none", "color": COLORS[k]}
-            label = None if number else f"{name}{notes[k]} measured"
-            top.loglog(at / unit, size * moduli[k], "os"[k], label=label, **look)
-            bottom.semilogx(at / unit, 100 * (fitted(at, k) / moduli[k] - 1.0), "os"[k], **look)
-        top.plot(line / unit, size * fitted(line, k), color=COLORS[k], label=f"{name} fitted")
-    top.set_ylabel(f"{kind} modulus [Pa]")
-    bottom.sharex(top)
-    bottom.axhline(0.0, color="black", lw=0.8)
+        at, values = np.concatenate([at for at, _ in sets]), np.concatenate([each[k] for _, each in sets])
+        look = DOTS | {"color": COLORS[k], "marker": "os"[k], "markersize": 3}
+        top.append(Line(f"{name}{notes[k]} measured", at / unit, size * values, look))
+        top.append(Line(f"{name} fitted", line / unit, size * fitted(line, k), {"color": COLORS[k]}))
+        bottom.append(Line("", at / unit, 100 * (fitted(at, k) / values - 1.0), look))
     reference = f" at {compound.shift.reference:g} °C" if compound.shift is not None else ""
-    along = f"frequency{reference} [Hz]" if frequency else f"time{reference} [s]"
-    bottom.set(xlabel=along, ylabel="fitted over measured - 1 [%]")
+    x = Axis(f"frequency{reference}", "Hz") if frequency else Axis(f"time{reference}", "s")
+    modulus, misfit = Axis(f"{kind} modulus", "Pa"), Axis("fitted over\nmeasured - 1 [%]")
+    return [Panel("moduli", x, modulus, top, log_x=True, log_y=True), Panel("misfit", x, misfit, bottom, log_x=True)]
 
 
-def _draw_shift(axes: Axes, compound: Compound) -> None:
-    temperatures = compound.measured.temperatures
-    if compound.shift is None or not temperatures:
-        axes.set_axis_off()
+def _shift(compound: Compound) -> Iterator[Panel]:
+    """Yield the panel of the shift over temperature, if it is known."""
+    temperatures, shift = compound.measured.temperatures, compound.shift
+    if shift is None or not temperatures:
         return
-    for at, look in ((np.linspace(min(temperatures), max(temperatures), POINTS), "-"), (temperatures, "o")):
-        axes.plot(at, [compound.shift.log_factor(float(t)) for t in at], look, color="black")
-    axes.set(xlabel="temperature [°C]", ylabel="log10 of the shift factor")
+    drawn = (np.linspace(min(temperatures), max(temperatures), POINTS), SOLID), (np.array(temperatures), DOTS)
+    lines = [Line("", at, np.array([shift.log_factor(float(t)) for t in at]), look) for at, look in drawn]
+    yield Panel("shift", Axis("temperature", "°C"), Axis("log10 of the shift factor"), lines, bottom=False)
 
 
 NAMES = {"mu_max": "largest friction", "mu_dyn": "dynamic friction", "contact_area_corrected": "contact area"}
-MARKS = {"mesh and time together": "o-", "mesh with auto steps": "D-", "mesh alone": "s--", "time alone": "^:"}
+MARKS = {
+    "mesh and time together": "o-",
+    "mesh with auto steps": "D-",
+    "mesh alone": "s--",
+    "time alone": "^:",
+}  # mark and dashes of a ladder
 INTEGRATORS = {"exponential": style.BLUE, "exponential-linear": style.GREEN, "backward-euler": style.RED}
-WIDE = 100.0  # ratio of the longest to the shortest time above which only powers of ten are labelled
 BAND = 5.0  # ratio of the edges of the grey band
 LEAST = 1e-7  # smallest error on the axis; smaller ones are drawn there
 
@@ -147,9 +143,11 @@ class StudyCurve:
     errors: Sequence[float]
     seconds: Sequence[float]
 
-    def draw(self, axes: Axes, x: Sequence[float]) -> None:
-        label, color = f"{self.ladder}, {self.integrator}", INTEGRATORS[self.integrator]
-        axes.plot(x, _per_cent(self.errors), MARKS[self.ladder], color=color, label=label)
+    def over(self, x: Array) -> Line:
+        """Return the line of the errors [%] over other values."""
+        mark, *dashes = MARKS[self.ladder]
+        look = {"color": INTEGRATORS[self.integrator], "marker": mark, "linestyle": "".join(dashes)}
+        return Line(f"{self.ladder}, {self.integrator}", x, _per_cent(self.errors), look)
 
 
 def plot_study(directory: Path, curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> Path | None:
@@ -168,57 +166,38 @@ def _convergence(curves: Sequence[StudyCurve], doubts: Mapping[str, float]) -> F
     own: dict[str, list[StudyCurve]] = {}
     for curve in curves:
         own.setdefault(curve.quantity, []).append(curve)
-    panels = [
-        partial(draw, name=name, curves=found, doubt=doubts[name])
-        for name, found in own.items()
-        for draw in (_draw_ladders, _draw_times)
-    ]
-    return style.figure_of("", [panels])
+    return picture("", [[panel for name, found in own.items() for panel in _errors(name, found, doubts[name])]])
 
 
-def _draw_ladders(axes: Axes, name: str, curves: Sequence[StudyCurve], doubt: float) -> None:
-    """Draw errors of a quantity over the refinement of mesh or step with respect to the coarsest."""
-    for curve in curves:
-        curve.draw(axes, [max(curve.sizes) / size for size in curve.sizes])
-    axes.set(xscale="log", xlabel="refinement, coarsest = 1", ylabel=f"{NAMES[name]}:\nerror [%]")
-    _scale_errors(axes, curves, doubt)
-    low, high = axes.get_xlim()
-    axes.xaxis.set_major_locator(FixedLocator([2.0**k for k in range(-1, 12) if low <= 2.0**k <= high]))
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(ScalarFormatter())
-
-
-def _draw_times(axes: Axes, name: str, curves: Sequence[StudyCurve], doubt: float) -> None:
-    """Draw errors of a quantity over the time of all steps, on an axis of at least a decade."""
-    for curve in curves:
-        curve.draw(axes, curve.seconds)
-    axes.set(xscale="log", xlabel="time of all steps [s]", ylabel=f"{NAMES[name]}:\nerror [%]")
-    _scale_errors(axes, curves, doubt)
-    low, high = axes.get_xlim()
-    middle, half = math.sqrt(low * high), max(math.sqrt(high / low), math.sqrt(10.0))
-    axes.set_xlim(middle / half, middle * half)  # a decade at least: there are ticks in it
-    few = half**2 < WIDE
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=5))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-
-
-def _scale_errors(axes: Axes, curves: Sequence[StudyCurve], doubt: float) -> None:
-    """Set a logarithmic axis of errors [%], of at least a decade, with few ticks; grey up to the uncertainty `doubt` of
-    the reference."""
-    errors = [error for curve in curves for error in curve.errors if math.isfinite(error)]
-    low, high = _per_cent(errors).min(), _per_cent(errors).max()
-    middle, half = math.sqrt(low * high), max((high / low) ** 0.62, math.sqrt(10.0))
-    axes.set_ylim(middle / half, middle * half)
-    axes.set_yscale("log")
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if half < 10.0 else (1.0,), numticks=5))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+def _errors(name: str, curves: Sequence[StudyCurve], doubt: float) -> list[Panel]:
+    """Return the panels of errors of a quantity over the refinement of mesh or step with respect to the coarsest, and
+    over time, on axes of at least a decade; grey up to the uncertainty `doubt` of the reference."""
+    errors = _per_cent([error for curve in curves for error in curve.errors if math.isfinite(error)])
+    low, high = _widened(errors)
+    y, shades = Axis(f"{NAMES[name]}:\nerror [%]"), list[Shade]()
     if 0.0 < doubt < math.inf:
-        low, high = axes.get_ylim()
-        low = min(max(low, 100 * doubt / BAND), 100 * doubt)
-        axes.axhspan(low, 100 * doubt, color="0.92", zorder=0)
-        axes.set_ylim(low, max(high, 200 * doubt))
+        low, high = min(max(low, 100 * doubt / BAND), 100 * doubt), max(high, 200 * doubt)
+        shades.append(Shade("", low, 100 * doubt, "y"))
+    finer = Axis("refinement, coarsest = 1"), [max(one.sizes) / np.asarray(one.sizes) for one in curves]
+    times = Axis("time of all steps", "s"), [np.asarray(one.seconds, float) for one in curves]
+    return [
+        Panel(
+            *(name, x, y, [one.over(at) for one, at in zip(curves, places, strict=True)]),
+            shades=shades,
+            log_x=True,
+            log_y=True,
+            x_range=_widened(np.concatenate(places)),
+            y_range=(low, high),
+        )
+        for x, places in (finer, times)
+    ]
+
+
+def _widened(values: Array) -> tuple[float, float]:
+    """Return limits of a logarithmic axis around values, at least a decade apart, so that there are ticks."""
+    low, high = float(values.min()), float(values.max())
+    middle, half = math.sqrt(low * high), max((high / low) ** 0.55, math.sqrt(10.0))
+    return middle / half, middle * half
 
 
 def _per_cent(errors: Sequence[float]) -> Array:

@@ -12,7 +12,6 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +25,8 @@ from ..job import Job, load
 from ..march.measured_range import excited_bands
 from ..physics.prony import complex_modulus
 from ..printed import quantity, with_error
-from . import charts, style
+from . import style
+from .panels import Panel, draw
 from .results import Results
 
 SIZE = (4.2, 2.9)  # size of a chart, half the width of a laptop's screen [inch]
@@ -85,20 +85,17 @@ class Chapter:
     headline: str = ""
 
 
-def draw_chart(chart: charts.Chart) -> Picture:
-    return draw_panel(partial(charts.draw, chart), f"{chart.y.name} over {chart.x.name}".replace("\n", " "))
-
-
-def draw_panel(panel: style.Panel, caption: str) -> Picture:
-    """Return a picture of one panel, as SVG."""
+def draw_panel(panel: Panel, caption: str = "") -> Picture:
+    """Return a picture of one panel, as SVG; its caption names its axes by default."""
     file = io.BytesIO()
     with style.drawing(RC):
         figure = Figure(figsize=SIZE, layout="constrained")
         axes = figure.subplots()
-        panel(axes)
+        draw(panel, axes)
         (extra,) = style.place_legends([[axes]])
         style.set_height(figure, SIZE[1] + extra)
         figure.savefig(file, format="svg", dpi=style.DPI, metadata={"Date": None})
+    caption = caption or f"{panel.y.name} over {panel.x.name}".replace("\n", " ")
     return to_uri(file.getvalue(), "image/svg+xml"), caption
 
 

@@ -12,8 +12,9 @@ from ..errors import InputError
 from ..job.listing import answers
 from ..parallel.slab import Array
 from . import style
-from .charts import Axis, Chart, ChartLine, PlottedRun
 from .cycles import friction_along, way_along
+from .panels import Axis, Line, Panel
+from .plotted_run import PlottedRun
 
 EARLY = 0.05  # half of the rows within this share of the time make a linear axis useless
 FEW_ROWS = 8
@@ -40,16 +41,16 @@ class Abscissa:
     marked: bool = False
     loop: bool = False
 
-    def series(self, lines: dict[str, Array]) -> list[ChartLine]:
+    def series(self, lines: dict[str, Array]) -> list[Line]:
         """Return lines with their names; a single line has no name."""
         mark = {"marker": "o"} if self.marked else {}
         looks = [style.line(number) | mark for number in range(len(lines))]
         rows = slice(None) if self.rows is None else self.rows
         drawn = zip(lines.items(), looks, strict=True)
-        return [ChartLine(name, self.values, values[rows], look) for (name, values), look in drawn]
+        return [Line(name, self.values, values[rows], look) for (name, values), look in drawn]
 
 
-def chart_histories(run: PlottedRun, over: str = "") -> list[Chart]:
+def chart_histories(run: PlottedRun, over: str = "") -> list[Panel]:
     """Return panels of the measures of a run; none for a single solve. Raises InputError if nothing can be drawn."""
     if not run.curves:
         return []
@@ -62,7 +63,7 @@ def chart_histories(run: PlottedRun, over: str = "") -> list[Chart]:
     return [first, *_chart_cycles(run), *others]
 
 
-def _chart_cycles(run: PlottedRun) -> list[Chart]:
+def _chart_cycles(run: PlottedRun) -> list[Panel]:
     """Return the loops of oscillations, or friction over displacement of a surface that sticks and is moved to and fro
     along x."""
     if any(stage.frequency for stage in run.job.history):
@@ -72,14 +73,14 @@ def _chart_cycles(run: PlottedRun) -> list[Chart]:
     ways = np.diff(run.columns["distance"], prepend=0.0)
     for number, rows in run.rows_of_stages.items():
         ways[rows] *= np.sign(run.job.history[number].velocity[0])
-    line = ChartLine("", np.cumsum(ways), run.columns["friction_x"], style.line(0))
-    return [Chart("friction", Axis("displacement along x", "m"), Axis("friction coefficient\nalong x"), [line])]
+    line = Line("", np.cumsum(ways), run.columns["friction_x"], style.line(0))
+    return [Panel("friction", Axis("displacement along x", "m"), Axis("friction coefficient\nalong x"), [line])]
 
 
-def _chart_loops(run: PlottedRun) -> Iterator[Chart]:
+def _chart_loops(run: PlottedRun) -> Iterator[Panel]:
     """Yield panels of load over approach, and of friction over displacement, with a line for each stage that
     oscillates."""
-    loads, frictions = list[ChartLine](), list[ChartLine]()
+    loads, frictions = list[Line](), list[Line]()
     load_axis, load = run.load
     starts = np.cumsum([0.0, *(stage.seconds for stage in run.job.history)]).tolist()
     for number, rows in run.rows_of_stages.items():
@@ -89,18 +90,18 @@ def _chart_loops(run: PlottedRun) -> Iterator[Chart]:
         lines = frictions if stage.speed and not stage.slides else loads
         look, name = style.line(len(lines)), stage.name
         if stage.frequency and lines is loads:
-            loads.append(ChartLine(name, columns["approach"], load[rows], look))
+            loads.append(Line(name, columns["approach"], load[rows], look))
         elif stage.frequency and (way := way_along(stage, columns, starts[number])) is not None:
             friction = friction_along(stage, columns) / (run.area * columns["pressure"])
-            frictions.append(ChartLine(name, way, friction, look))
+            frictions.append(Line(name, way, friction, look))
     if loads:
-        yield Chart("loop", Axis("approach", "m"), load_axis, _named_if_many(loads), bottom=False)
+        yield Panel("loop", Axis("approach", "m"), load_axis, _named_if_many(loads), bottom=False)
     if frictions:
         axes = Axis("displacement along the velocity", "m"), Axis("friction coefficient\nalong the velocity")
-        yield Chart("loop", *axes, _named_if_many(frictions))
+        yield Panel("loop", *axes, _named_if_many(frictions))
 
 
-def _named_if_many(lines: list[ChartLine]) -> list[ChartLine]:
+def _named_if_many(lines: list[Line]) -> list[Line]:
     """Return lines, without a name if there is one only."""
     return lines if len(lines) > 1 else [replace(line, name="") for line in lines]
 
@@ -111,7 +112,7 @@ def _steps_grow(times: Array) -> bool:
     return later.size > FEW_ROWS and bool(max(np.median(later), later[0]) < EARLY * later[-1])
 
 
-def _add_theory(chart: Chart, run: PlottedRun) -> Chart:
+def _add_theory(chart: Panel, run: PlottedRun) -> Panel:
     """Add the lines of theory.csv to friction and contact area, if it is in the directory of the run."""
     column = {"friction": "friction", "area": "contact_area"}.get(chart.key)
     table = run.path / "theory.csv"
@@ -120,13 +121,13 @@ def _add_theory(chart: Chart, run: PlottedRun) -> Chart:
     theory = run.read(table.name).arrays()
     over = "distance" if chart.x.unit == "m" else "time"
     (own,) = chart.series
-    lines = [replace(own, name="simulation"), ChartLine("theory", theory[over], theory[column], style.line(1))]
+    lines = [replace(own, name="simulation"), Line("theory", theory[over], theory[column], style.line(1))]
     if chart.key == "friction" and VISCOUS in run.columns:  # the theory excludes interface friction
-        lines.append(ChartLine("without interface", own.x, run.columns[VISCOUS], style.line(2)))
+        lines.append(Line("without interface", own.x, run.columns[VISCOUS], style.line(2)))
     return replace(chart, series=lines)
 
 
-def _find_charts(run: PlottedRun, along: Abscissa) -> Iterator[Chart]:
+def _find_charts(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
     """Yield the panels of a run that show anything: key, measure, and lines by name."""
     columns, free = run.columns, run.free
     signed = run.backwards and not along.marked  # the axis of speed has no direction
@@ -164,7 +165,7 @@ def _find_charts(run: PlottedRun, along: Abscissa) -> Iterator[Chart]:
     )
     for key, axis, lines, there in panels:
         if there:
-            found = Chart(key, along.axis, axis, along.series(lines), bottom=key != "approach")
+            found = Panel(key, along.axis, axis, along.series(lines), bottom=key != "approach")
             peak = key == "friction"
             yield found if along.marked or along.loop else replace(found, peak=peak, spikes=not peak)
     for panels_of in answers("pictures", "panels"):

@@ -10,19 +10,15 @@ Charts of pressure, and of traction, along a line: of a narrow map, or through t
 import io
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from .. import printed
@@ -33,16 +29,19 @@ from ..job import Cylinder, Elastic, Job, Sphere
 from ..parallel.slab import Array
 from ..theory import hertz
 from . import style
-from .charts import Fields, PlottedRun, choose_evenly, label_frames
+from .panels import Axis, Colors, Line, Panel, draw, drawn_points
+from .plotted_run import Fields, PlottedRun, choose_evenly, label_frames
 
 INSTANTS = 5  # most lines in a panel
 MOST_LETTERS = 30  # most letters of the name of a stage in a legend
+BLACK: dict[str, Any] = {"color": "k", "linewidth": 1.0}
 RANGE = 1.3  # shown range over the radius of contact
 
 Curve = tuple[str, Array, Array]  # name, positions [m] and pressures [Pa]
+PRESSURE, TRACTION = Axis("pressure", "Pa"), Axis("traction", "Pa")
 
 
-def line_panels(run: PlottedRun, fields: Fields, narrow: bool) -> Iterator[style.Panel]:
+def line_panels(run: PlottedRun, fields: Fields, narrow: bool) -> Iterator[Panel]:
     """Yield the panel of a narrow map, or of a surface that is a single round shape."""
     shape = run.job.surface[0]
     if narrow:
@@ -66,26 +65,17 @@ def _choose_instants(run: PlottedRun, fields: Fields) -> tuple[list[tuple[int, s
     return names, f", {loads.pop()}" if same_load else ""
 
 
-def _draw_pressures(
-    axes: Axes, curves: Sequence[Curve], along: str, title: str, theory: Sequence[Curve] = (), reach: float = 0.0
-) -> None:
-    """Draw pressures on lines up to `reach` on both sides, if given, with the theory."""
-    shades = np.linspace(0.0, 0.85, len(curves)) if len(curves) > 1 else [0.45]
-    for (name, x, pressure), shade in zip(curves, shades, strict=True):
-        axes.plot(x, pressure, color=colormaps[style.SEQUENCE](shade), label=name)
-    for (name, x, pressure), dashes in zip(theory, ("--", ":"), strict=False):
-        axes.plot(x, pressure, "k" + dashes, lw=1.0, label=name)
-    if reach:
-        axes.set_xlim(-reach, reach)
-    if not any((pressure < 0.0).any() for _, _, pressure in curves):
-        axes.set_ylim(bottom=0.0)
-    axes.set_title(title)
-    axes.locator_params(nbins=5)
-    style.label(axes.xaxis, along, "m")
-    style.label(axes.yaxis, "pressure", "Pa")
+def _pressures(
+    curves: Sequence[Curve], along: str, title: str, theory: Sequence[Curve] = (), reach: float = 0.0
+) -> Panel:
+    """Return the panel of pressures on lines up to `reach` on both sides, if given, with the theory."""
+    colors = style.sequence(len(curves)) if len(curves) > 1 else [style.BLUE]
+    lines = [Line(*curve, {"color": color}) for curve, color in zip(curves, colors, strict=True)]
+    lines += [Line(*curve, BLACK | {"linestyle": dashes}) for curve, dashes in zip(theory, ("--", ":"), strict=False)]
+    return Panel("maps", Axis(along, "m"), PRESSURE, lines, title, x_range=(-reach, reach) if reach else None)
 
 
-def _make_strip(run: PlottedRun, fields: Fields) -> style.Panel:
+def _make_strip(run: PlottedRun, fields: Fields) -> Panel:
     """Return a panel of pressures along the long side of a narrow map."""
     lies = fields.x.size > fields.y.size
     chosen, load = _choose_instants(run, fields)
@@ -93,10 +83,10 @@ def _make_strip(run: PlottedRun, fields: Fields) -> style.Panel:
     curves = [(name, fields.x, field[0]) if lies else (name, fields.y, field[:, 0]) for name, field in maps]
     some = "some of the " if len(curves) < len(fields.shown) else "the "
     title = f"pressure at {some}saved instants{load}" if run.lasts else f"pressure under {some}loads"
-    return partial(_draw_pressures, curves=curves, along="x" if lies else "y", title=title)
+    return _pressures(curves, "x" if lies else "y", title)
 
 
-def traction_panels(run: PlottedRun, fields: Fields) -> Iterator[style.Panel]:
+def traction_panels(run: PlottedRun, fields: Fields) -> Iterator[Panel]:
     """Yield the panel of tractions along the long side of a narrow map at the chosen instant, if they are saved. With a
     coefficient of friction it has the bounds."""
     lies = fields.x.size > fields.y.size
@@ -106,25 +96,16 @@ def traction_panels(run: PlottedRun, fields: Fields) -> Iterator[style.Panel]:
         return
     t, p = (field[0] if lies else field[:, 0] for field in (traction, pressure))
     instant = run.instant(int(fields.steps[fields.chosen]), float(fields.times[fields.chosen]))
-    bound = run.job.section("interface").coefficient
-    touched = place[p > 0.0]
-
-    def draw(axes: Axes) -> None:
-        axes.plot(place, t, color=style.BLUE, label="traction")
-        for sign, name in ((1, "bound"), (-1, "")) if bound is not None else ():
-            axes.plot(place, sign * bound * p, "k:", lw=1.0, label=name)
-        if touched.size:
-            margin = 0.15 * np.ptp(touched)
-            axes.set_xlim(touched.min() - margin, touched.max() + margin)
-        axes.set_title(f"traction along {along}, {instant}")
-        axes.locator_params(nbins=5)
-        style.label(axes.xaxis, along, "m")
-        style.label(axes.yaxis, "traction", "Pa")
-
-    yield draw
+    bound, touched = run.job.section("interface").coefficient, place[p > 0.0]
+    lines = [Line("traction", place, t, {"color": style.BLUE})]
+    for sign, name in ((1, "bound"), (-1, "")) if bound is not None else ():
+        lines.append(Line(name, place, sign * bound * p, BLACK | {"linestyle": ":"}))
+    margin = 0.15 * np.ptp(touched) if touched.size else 0.0
+    shown = (touched.min() - margin, touched.max() + margin) if margin else None
+    yield Panel("maps", Axis(along, "m"), TRACTION, lines, f"traction along {along}, {instant}", x_range=shown)
 
 
-def _make_profile(run: PlottedRun, fields: Fields, shape: Sphere | Cylinder) -> style.Panel:
+def _make_profile(run: PlottedRun, fields: Fields, shape: Sphere | Cylinder) -> Panel:
     """Return a panel of pressures on a line through the axis, with Hertz's pressure under the last load."""
     across = isinstance(shape, Cylinder) and shape.axis == "x"
     centre = shape.center or (run.job.grid.lx / 2, run.job.grid.ly / 2)
@@ -143,7 +124,7 @@ def _make_profile(run: PlottedRun, fields: Fields, shape: Sphere | Cylinder) -> 
         for name, modulus in _find_moduli(run):
             theory.append((name, r, hertz.pressure(np.abs(r), force, shape.radius, modulus, poisson)))
     along, title = f"{'y' if across else 'x'} from the axis", f"pressure on a line through the axis{load}"
-    return partial(_draw_pressures, curves=curves, along=along, title=title, theory=theory, reach=reach)
+    return _pressures(curves, along, title, theory, reach)
 
 
 def _find_moduli(run: PlottedRun) -> list[tuple[str, float]]:
@@ -182,14 +163,13 @@ STICK_MAPS = ("traction", "slip")  # drawn from both components and the pressure
 OUTSIDE = ("gap", "fluid_pressure")  # drawn outside of contact
 ROUNDING = 1e-6  # rounding: of a pressure, over the highest
 TENSION = "RdBu_r"  # colours of pressures of both signs
+PLACES = Axis("x", "m"), Axis("y", "m")
 STRIP = 8  # most points across of a map that is drawn as a line
-BAR = 0.9  # height of a bar of colours over that of its map
 WIDE = 2.0  # width over height of maps of which each has a row
-TICKS = 5  # most intervals of ticks, fixed so that the layout does not change
 BRIGHTEST, OUTLIER = 99.5, 1.4  # percentile, and the ratio to it above which points do not set the colour range
 
 
-def map_panels(run: PlottedRun, at: str = "") -> tuple[list[list[style.Panel]], list[style.Panel]]:
+def map_panels(run: PlottedRun, at: str = "") -> tuple[list[list[Panel]], list[Panel]]:
     """Return groups of panels, of pressures on a line and of wide maps, and panels of the other saved maps of one
     instant, or of tractions on a line.
 
@@ -213,7 +193,7 @@ def map_panels(run: PlottedRun, at: str = "") -> tuple[list[list[style.Panel]], 
         return [], []
 
 
-def _panels(run: PlottedRun, fields: Fields) -> Iterator[style.Panel]:
+def _panels(run: PlottedRun, fields: Fields) -> Iterator[Panel]:
     found = {name: fields.read(name) for name in (*LOOKS, *TRACTIONS)}
     pressure, (x, y) = found["pressure"], (found.pop(name) for name in TRACTIONS)
     if pressure is not None and x is not None and y is not None:
@@ -226,18 +206,13 @@ def _panels(run: PlottedRun, fields: Fields) -> Iterator[style.Panel]:
             yield _panel(fields, name, mask(name, values, pressure, run.job), instant, _find_window(pressure))
 
 
-def _panel(fields: Fields, name: str, values: Array, instant: str, window: Window) -> style.Panel:
+def _panel(fields: Fields, name: str, values: Array, instant: str, window: Window) -> Panel:
     rows, columns = window
     part = values[window]
     limits = find_range(part)
-
-    def draw(axes: Axes) -> None:
-        beyond = "max" if np.nanmax(part, initial=-np.inf) > limits[1] else "neither"
-        show = _draw_map(axes, name, (fields.x[columns], fields.y[rows]), limits, extend=beyond)
-        show(part)
-        axes.set_title(f"{_words(name)}{LOOKS[name].note}\n{instant}")
-
-    return draw
+    beyond = bool(np.nanmax(part, initial=-np.inf) > limits[1])
+    drawn = _colors(name, (fields.x[columns], fields.y[rows]), part, limits, beyond)
+    return Panel("maps", *PLACES, title=f"{_words(name)}{LOOKS[name].note}\n{instant}", colors=drawn)
 
 
 def _words(name: str) -> str:
@@ -296,44 +271,30 @@ def find_range(values: Array) -> tuple[float, float]:
     return min(float(finite.min()), 0.0), highest if highest < OUTLIER * most else most
 
 
-def _draw_map(
-    axes: Axes, name: str, points: tuple[Array, Array], limits: tuple[float, float], **bar: Any
-) -> Callable[[Array], None]:
-    """Draw an empty colour map, and return a function that fills it. The scale of a single value has one tick."""
+def _colors(
+    name: str, points: tuple[Array, Array], values: Array, limits: tuple[float, float], clipped: bool = False
+) -> Colors:
+    """Return a map in its colours."""
     look, (low, high) = LOOKS[name], limits
     if name == "pressure" and low < 0.0:  # white at pressure 0
         look, low, high = look._replace(colors=TENSION), min(low, -high), max(-low, high)
-    width = 1.0 if high < low else (high - low or abs(high) or 1.0)
-    norm = Normalize(low, low + width) if low <= high else Normalize(0.0, width)
-    x, y = (np.append(along, 2 * along[-1] - along[-2]) for along in points)
-    axes.set_facecolor(look.blank)
-    axes.grid(False)
-    empty = np.full((y.size - 1, x.size - 1), np.nan)
-    mesh = axes.pcolormesh(x, y, empty, cmap=look.colors, norm=norm, rasterized=True)
-    for axis, along in ((axes.xaxis, "x"), (axes.yaxis, "y")):
-        axis.set_major_locator(MaxNLocator(TICKS - (along == "x"), steps=[1, 2, 5, 10]))
-    height = style.label_map(axes, (x[-1] - x[0], y[-1] - y[0]))
-    if low <= high:
-        ticks = [low] if low == high else MaxNLocator(TICKS, steps=[1, 2, 5, 10])
-        scale = axes.figure.colorbar(mesh, ax=axes, ticks=ticks, shrink=BAR * height, **bar).ax.yaxis
-        style.label(scale, _words(name), look.unit)
-    return mesh.set_array
+    ends = [end for along in points for end in (along[0], 2 * along[-1] - along[-2])]
+    of = Axis(_words(name), look.unit)
+    return Colors(values, (*ends,), of, low, high, look.colors, look.blank, clipped)
 
 
-def _draw_line(
-    axes: Axes, name: str, points: tuple[Array, Array], limits: tuple[float, float]
-) -> Callable[[Array], None]:
-    """Draw an empty line for a narrow map, and return a function that fills it."""
-    lies = points[0].size > points[1].size
-    along, (low, high) = points[0] if lies else points[1], limits
-    (line,) = axes.plot(along, np.zeros_like(along), color=style.BLUE)
-    if high > low:
-        axes.set_ylim(low, low + 1.05 * (high - low))
-    else:  # there are no values for a scale
-        axes.set_yticks([low if high == low else 0.0])
-    style.label(axes.xaxis, "x" if lies else "y", "m")
-    style.label(axes.yaxis, _words(name), LOOKS[name].unit)
-    return lambda values: line.set_ydata(np.nan_to_num(values[0] if lies else values[:, 0]))
+def _line(name: str, points: tuple[Array, Array], values: Array, limits: tuple[float, float]) -> Panel:
+    """Return a narrow map as a line over its long side."""
+    lies, (low, high) = points[0].size > points[1].size, limits
+    line = Line("", points[0] if lies else points[1], _along(values), {"color": style.BLUE})
+    shown = (low, low + 1.05 * (high - low)) if high > low else None
+    of = Axis(_words(name), LOOKS[name].unit)
+    return Panel("maps", PLACES[not lies], of, [line], bottom=False, y_range=shown)
+
+
+def _along(values: Array) -> Array:
+    """Return a narrow map along its long side, 0 where it has no value."""
+    return np.nan_to_num(values[0] if values.shape[1] > values.shape[0] else values[:, 0])
 
 
 def dataset_of(file: h5py.File, name: str) -> str:
@@ -367,11 +328,17 @@ def draw_frames(
 
     ranges = [find_range(read(index)) for index in labels]
     limits = min(low for low, _ in ranges), max(high for _, high in ranges)
-    figure, x, y = Figure(figsize=size, dpi=dpi, layout="constrained"), file["x"][...], file["y"][...]
+    figure, points = Figure(figsize=size, dpi=dpi, layout="constrained"), (file["x"][...], file["y"][...])
     axes, canvas = figure.subplots(), FigureCanvasAgg(figure)
-    fill = (_draw_line if min(x.size, y.size) <= STRIP else _draw_map)(axes, name, (x, y), limits)
-    changing = (*axes.collections, *axes.lines, *axes.spines.values(), axes.title)
-    axes.set_title(f"{_words(name)}, {next(iter(labels.values()))}")
+    narrow = min(one.size for one in points) <= STRIP
+    index, label = next(iter(labels.items()))
+    panel = (
+        _line(name, points, read(index), limits)
+        if narrow
+        else Panel("maps", *PLACES, colors=_colors(name, points, read(index), limits))
+    )
+    draw(replace(panel, title=f"{_words(name)}, {label}"), axes)
+    changing = (*axes.images, *axes.lines, *axes.spines.values(), axes.title)
     style.arrange(figure)  # the layout of the first frame is kept for all
     figure.set_layout_engine(None)
     for one in changing:
@@ -381,7 +348,10 @@ def draw_frames(
     for one in changing:
         one.set_visible(True)
     for index, label in labels.items():
-        fill(read(index))
+        if narrow:
+            axes.lines[0].set_ydata(_along(read(index)))
+        else:
+            axes.images[0].set_data(drawn_points(read(index)))
         axes.set_title(f"{_words(name)}, {label}")
         canvas.restore_region(background)
         for one in changing:

@@ -34,7 +34,7 @@ from ..job.listing import plain_data
 from ..job.reading import CASES, RESOLVED, STEADY_RESOLVED, shown_job
 from ..printed import name_cases
 from . import info, plots, report_sections
-from .curve_tables import Chapter, ReportSection, ReportTable, compared_table, draw_chart, embed_file
+from .curve_tables import Chapter, ReportSection, ReportTable, compared_table, draw_panel, embed_file
 from .results import Results, swept_keys
 from .slide import ERRORS
 
@@ -205,7 +205,7 @@ def compare_directories(directories: Sequence[Path]) -> Iterator[Chapter]:
         shared = plots.compare_charts(directories, least=2)
         if shared:
             tables = compared_table(directories, plots.name_directories(directories))
-            together = ReportSection("Together", tables=tables, pictures=[draw_chart(one) for one in shared])
+            together = ReportSection("Together", tables=tables, pictures=[draw_panel(one) for one in shared])
             yield Chapter("Comparison", Path(), "", [together])
 
 

@@ -3,13 +3,14 @@
 The job determines the panels: friction if the surface slides, energies if they were requested, curves over the load if
 all stages are single solves, pressures along a line with Hertz's for a sphere."""
 
+import itertools
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from .. import printed
@@ -17,11 +18,15 @@ from ..errors import InputError
 from ..files import hdf5
 from ..job.listing import answers
 from ..job.reading import CASES
-from . import band_charts, charts, histories, maps, style, theory_table
-from .charts import Chart, PlottedRun
+from . import band_charts, histories, maps, style, theory_table
+from .panels import Axis, Line, Panel, picture
+from .plotted_run import PlottedRun
 from .results import KINDS, Results, read_cases, swept_keys
 
 PANELS = ("friction", "loop", "area", "approach", "gap", "pressure", "load", "loss", "phase", "energy")
+MARKERS = "os^DvP*X<>"  # marks of the lines of a run in a comparison
+MARK_EVERY = 0.15  # distance of the marks of a line of many points, over the diagonal of a panel
+PALEST = 0.75  # share of white in the bars of the longest waves in a comparison
 FAILED_CASES = 3  # most failed cases that a picture names
 
 
@@ -51,17 +56,17 @@ class PlotOptions:
     def wants(self, key: str) -> bool:
         return not self.panels or key in self.panels
 
-    def choose(self, found: Sequence[Chart]) -> list[Chart]:
+    def choose(self, found: Sequence[Panel]) -> list[Panel]:
         """Return the requested charts in the requested order."""
         return [chart for name in self.panels for chart in found if chart.key == name] if self.panels else list(found)
 
-    def group(self, found: Sequence[Chart]) -> list[list[style.Panel]]:
-        """Return the panels of a curve, and those of its bands."""
-        bands = [chart for chart in found if chart.key.startswith("bands")]
-        return [self.to_panels(part) for part in ([one for one in found if one not in bands], bands)]
 
-    def to_panels(self, found: Sequence[Chart]) -> list[style.Panel]:
-        return [partial(charts.draw, chart, log=self.log) for chart in found]
+def group(found: Sequence[Panel]) -> list[list[Panel]]:
+    """Return the panels of a curve, and those of its bands."""
+    bands = [panel.key.startswith("bands") for panel in found]
+    return [
+        [panel for panel, of_bands in zip(found, bands, strict=True) if of_bands == which] for which in (False, True)
+    ]
 
 
 def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> list[Path]:
@@ -82,9 +87,8 @@ def plot(directories: Sequence[Path], options: PlotOptions = PlotOptions()) -> l
 def draw_steady(table: Path) -> Path:
     """Draw steady.csv into its directory; returns the path of the picture."""
     with style.drawing():
-        panels = PlotOptions().group(band_charts.chart_steady(table.parent))
         title = "\n".join([band_charts.steady_title(table.parent), *_name_missing(table.parent)])
-        return _save(style.figure_of(title, panels), table.with_suffix(""))
+        return _save(picture(title, group(band_charts.chart_steady(table.parent))), table.with_suffix(""))
 
 
 def _name_missing(directory: Path) -> list[str]:
@@ -106,26 +110,26 @@ def _save(figure: Figure, stem: Path, options: PlotOptions = PlotOptions()) -> P
 
 def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
     has_run, has_curve, has_sweep = (kind in Results(directory).kinds for kind in ("run", "curve", "sweep"))
-    groups: list[Sequence[style.Panel]] = []
-    titles, fields = list[str](), list[style.Panel]()
+    groups: list[Sequence[Panel]] = []
+    titles, fields = list[str](), list[Panel]()
     if has_run:
         run = PlottedRun(directory)
         found = run.job.title or directory.absolute().name
         titles.append(found if run.curves else f"{found}\n{histories.describe_solve(run)}")
-        groups.append(options.to_panels(options.choose(histories.chart_histories(run, options.over))))
+        groups.append(options.choose(histories.chart_histories(run, options.over)))
         if not options.panels:
-            groups.append(options.to_panels(band_charts.chart_slips(run)))
+            groups.append(band_charts.chart_slips(run))
     elif options.at:
         raise InputError(f"--at {options.at}: {directory} has no run, and therefore no maps")
     if has_curve and options.wants("steady"):
         titles.append(band_charts.steady_title(directory))
-        groups += options.group(band_charts.chart_steady(directory, options.over))
+        groups += group(band_charts.chart_steady(directory, options.over))
     if has_run and options.wants("maps"):
         found_maps, fields = maps.map_panels(run, options.at or "")
         groups += found_maps
     if has_sweep:
         titles.append(getattr(Results(directory, "sweep").job, "title", "") or directory.absolute().name)
-        groups.append(options.to_panels(options.choose(band_charts.chart_sweep(directory))))
+        groups.append(options.choose(band_charts.chart_sweep(directory)))
     if not (has_run or has_curve or has_sweep):
         if not directory.exists():
             raise InputError(f"{directory} is not a directory")
@@ -134,7 +138,7 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
     if options.panels and not any((*groups, fields)):
         raise InputError(f"{directory} has none of the panels {', '.join(options.panels)}")
     lines = *titles[:1], theory_table.describe_settings(directory), *_name_missing(directory)
-    return style.figure_of("\n".join(filter(None, lines)), groups, fields)
+    return picture("\n".join(filter(None, lines)), groups, fields, options.log)
 
 
 def _suggest(path: Path) -> str:
@@ -156,17 +160,17 @@ def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figur
             raise InputError(f"{directory} has nothing to compare")
     lost = zip(name_directories(directories), (Results(one).lost for one in directories), strict=True)
     title = "\n".join(dict.fromkeys(f"{name}: {text}" for name, text in lost if text))
-    return style.figure_of(title, options.group(compare_charts(directories, options)))
+    return picture(title, group(compare_charts(directories, options)), log=options.log)
 
 
-def compare_charts(directories: Sequence[Path], options: PlotOptions = PlotOptions(), least: int = 1) -> list[Chart]:
+def compare_charts(directories: Sequence[Path], options: PlotOptions = PlotOptions(), least: int = 1) -> list[Panel]:
     """Return the charts that at least `least` directories have, with the lines of all."""
     found = [_find_charts(directory, options) for directory in directories]
-    return charts.compare([each for each in zip(name_directories(directories), found, strict=True) if each[1]], least)
+    return compare([each for each in zip(name_directories(directories), found, strict=True) if each[1]], least)
 
 
-def _find_charts(directory: Path, options: PlotOptions) -> list[Chart]:
-    found: list[Chart] = []
+def _find_charts(directory: Path, options: PlotOptions) -> list[Panel]:
+    found: list[Panel] = []
     if (directory / KINDS["run"]).is_file():
         found += options.choose(histories.chart_histories(PlottedRun(directory), options.over))
     if (directory / KINDS["curve"]).is_file() and options.wants("steady"):
@@ -202,3 +206,61 @@ def _name_value(key: str, value: Any) -> str:
     """Return a key of a sweep and its value as text, such as `velocity 100 mm/s`."""
     shown = printed.quantity(value, band_charts.UNITS.get(key, ""), 4) if isinstance(value, float) else value
     return f"{key} {shown}"
+
+
+def hide_stages(panel: Panel) -> Panel:
+    """Return a panel whose stages keep their colours, but have names that Matplotlib leaves out of legends."""
+    return replace(panel, stages=[(f"_{name}", start, end) for name, start, end in panel.stages])
+
+
+def compare(runs: Sequence[tuple[str, Sequence[Panel]]], least: int = 1) -> list[Panel]:
+    """Return the charts that at least `least` of several runs have. The colour is the run; the lines of each run have
+    marks, and bands are shares of its bar. If no run has several lines in a chart, each has its own dashes."""
+    found: dict[tuple[str, Axis, Axis], list[tuple[int, Panel]]] = {}
+    for number, (_, charts) in enumerate(runs):
+        for chart in charts:
+            found.setdefault((chart.key, chart.x, chart.y), []).append((number, chart))
+    names = [name for name, _ in runs]
+    lonely = all(len(chart.series) == 1 for group in found.values() for _, chart in group)
+    merge = _merge_lonely if lonely else _merge
+    return [_join(group, merge(group, names)) for group in found.values() if len(group) >= least]
+
+
+def _join(group: Sequence[tuple[int, Panel]], series: Sequence[Line]) -> Panel:
+    charts = [chart for _, chart in group]
+    spikes, log_x = (all(getattr(chart, name) for chart in charts) for name in ("spikes", "log_x"))
+    return replace(charts[0], series=series, stages=(), peak=False, spikes=spikes, log_x=log_x, edges=())
+
+
+def _merge_lonely(group: Sequence[tuple[int, Panel]], names: Sequence[str]) -> list[Line]:
+    """Return the only line of each run, with the colour and the dashes of the run."""
+    lines = ((number, chart.series[0]) for number, chart in group)
+    return [
+        replace(
+            one, name=", ".join(filter(None, (names[number], one.name))), look=one.look | style.line(number, len(names))
+        )
+        for number, one in lines
+    ]
+
+
+def _merge(group: Sequence[tuple[int, Panel]], names: Sequence[str]) -> list[Line]:
+    """Return all lines of the runs in a chart, and entries of the legend for the runs and for the names of lines."""
+    colors, empty = style.colors(len(names)), np.zeros(0)
+    whole = [one for _, chart in group for one in chart.series]
+    marked = dict.fromkeys(one.name for one in whole if one.name and one.x.size and one.stack is None)
+    marks = dict(zip(marked, itertools.cycle(MARKERS), strict=False)) if len(marked) > 1 else {}
+    entries = [Line(names[number], empty, empty, {"color": colors[number]}) for number, _ in group]
+    for name, mark in marks.items():
+        entries.append(Line(name, empty, empty, {"color": style.GREY, "marker": mark, "linestyle": "none"}))
+    entries += {one.name: one for one in whole if not one.x.size}.values()
+    for number, chart in group:
+        bars = sum(one.stack is not None for one in chart.series)
+        for k, one in enumerate(chart.series):
+            look = one.look | {"color": colors[number]}
+            if one.stack is not None:
+                look["color"] = style.mix(colors[number], PALEST * (1.0 - (k + 1) / bars))
+            elif one.name in marks:
+                few = "marker" in one.look
+                look |= {"linestyle": "-", "marker": marks[one.name], **({} if few else {"markevery": MARK_EVERY})}
+            entries.append(replace(one, name="", look=look, stack=None if one.stack is None else number))
+    return entries

@@ -17,7 +17,6 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from matplotlib.axes import Axes
 from PIL import Image
 
 from .. import capabilities, printed, streams
@@ -37,20 +36,20 @@ from ..parallel.slab import Slab
 from ..physics import surface_statistics
 from ..physics.prony import complex_modulus
 from ..printed import with_error
-from . import band_charts, charts, cycles, histories, maps, slide, style, surface_summary, theory_table
-from .charts import Fields, PlottedRun, choose_evenly, label_frames, to_load
+from . import band_charts, cycles, histories, maps, plots, slide, style, surface_summary, theory_table
 from .curve_tables import (
     RC,
     Browser,
     Picture,
     ReportSection,
     ReportTable,
-    draw_chart,
     draw_panel,
     friction_tables,
     scales_table,
     to_uri,
 )
+from .panels import Axis, Line, Panel, Shade
+from .plotted_run import Fields, PlottedRun, choose_evenly, label_frames, to_load
 from .results import MAPS, STATES, Results, read_cases
 from .surface_summary import NOT_SELF_AFFINE
 
@@ -92,7 +91,7 @@ def describe_run(directory: Path) -> ReportSection:
         theory_table.describe_settings(directory),
     ]
     found = histories.chart_histories(run)
-    pictures = [draw_chart(chart) for chart in (*found[:1], *map(charts.hide_stages, found[1:]))]
+    pictures = [draw_panel(chart) for chart in (*found[:1], *map(plots.hide_stages, found[1:]))]
     pictures += _more_pictures(directory)
     return ReportSection("Results of the run", list(filter(None, sentences)), [numbers], pictures, browse_run(run))
 
@@ -112,7 +111,7 @@ def describe_curve(directory: Path) -> ReportSection:
     units_of = columns.units | dict.fromkeys(slide.ERRORS, "relative")
     head = [f"{_to_words(name)} [{units_of[name]}]" if units_of[name] else _to_words(name) for name in names]
     table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
-    pictures = [draw_chart(chart) for chart in band_charts.chart_steady(directory)]
+    pictures = [draw_panel(chart) for chart in band_charts.chart_steady(directory)]
     states = partial(_label_states, curve.free_area)
     browsers = _browse_file(curve, STATES, states, curve.job) if curve.job else []
     return ReportSection("Friction curve", (), [table, *_list_main_bands(curve)], pictures, browsers)
@@ -158,7 +157,7 @@ def describe_sweep(directory: Path) -> ReportSection:
     settings, failed = theory_table.describe_settings(directory), sweep.failed_cases(MOST_ROWS)
     sentences = list(filter(None, [settings, *failed]))
     return ReportSection(
-        "Sweep", sentences, [table], [draw_chart(chart) for chart in band_charts.chart_sweep(directory)]
+        "Sweep", sentences, [table], [draw_panel(chart) for chart in band_charts.chart_sweep(directory)]
     )
 
 
@@ -315,9 +314,7 @@ def _tabulate(found: surface_statistics.Statistics, where: str) -> ReportTable:
 
 
 def _draw(sketch: surface_summary.Sketch, of: str = "") -> list[Picture]:
-    return [
-        draw_panel(partial(panel, sketch=sketch), f"{caption}{of}") for caption, panel in surface_summary.PANELS.items()
-    ]
+    return [draw_panel(panel, f"{caption}{of}") for caption, panel in surface_summary.panels_of(sketch).items()]
 
 
 DECADES = 1.5  # range of a picture beyond the relaxation times [decades]
@@ -349,7 +346,7 @@ def material_section(job: Job) -> ReportSection:
     tables.append(ReportTable(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
     if (excited := _list_bands(job)).rows:
         tables.append(excited)
-    return ReportSection("Material", tables=tables, pictures=[draw_panel(partial(_draw_moduli, job=job), CAPTION)])
+    return ReportSection("Material", tables=tables, pictures=[draw_panel(_moduli_over_frequency(job), CAPTION)])
 
 
 def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:
@@ -385,20 +382,19 @@ def _write_band(band: tuple[float, float]) -> str:
     return f"{printed.quantity(band[0], 'Hz')} to {printed.quantity(band[1], 'Hz')}"
 
 
-def _draw_moduli(axes: Axes, job: Job) -> None:
-    """Draw storage and loss modulus over frequency, and the loss tangent."""
-    series = relaxation_of(job.material)
-    ends = np.log10(1.0 / (2 * math.pi * series.relaxation_times))
-    frequency = np.logspace(ends.min() - DECADES, ends.max() + DECADES, MODULI_POINTS)
+def _moduli_over_frequency(job: Job) -> Panel:
+    """Return the panel of storage and loss modulus over frequency, and of the loss tangent, at all relaxation times and
+    frequencies that the job excites."""
+    series, band = relaxation_of(job.material), excited_band(job)
+    ends = np.log10([*(1.0 / (2 * math.pi * series.relaxation_times))])
+    ends = ends.min() - DECADES, ends.max() + DECADES
+    if band:
+        ends = min(ends[0], math.log10(band[0])), max(ends[1], math.log10(band[1]))
+    frequency = np.logspace(*ends, MODULI_POINTS)
     omega = 2 * math.pi * frequency
     value = np.asarray(complex_modulus(omega, series.modulus_inf, series.moduli, series.relaxation_times))
-    axes.loglog(frequency, value.real, label="G' storage", **style.line(0))
-    axes.loglog(frequency, value.imag, label="G'' loss", **style.line(1))
-    axes.set(xlabel="frequency [Hz]", ylabel="shear modulus [Pa]")
-    if band := excited_band(job):
-        axes.axvspan(*band, color=style.GREY, alpha=0.2, lw=0, label="excited by the job")
-    loss_axes = axes.twinx()
-    loss_axes.semilogx(frequency, value.imag / value.real, label="tan δ", **style.line(2))
-    loss_axes.set_ylabel("tan δ")
-    loss_axes.set_ylim(bottom=0.0)
-    loss_axes.grid(False)
+    moduli = [Line("G' storage", frequency, value.real), Line("G'' loss", frequency, value.imag, style.line(1))]
+    tangent = [Line("tan δ", frequency, value.imag / value.real, style.line(2))]
+    shades = [Shade("excited by the job", *band)] if band else []
+    axes = Axis("frequency", "Hz"), Axis("shear modulus", "Pa")
+    return Panel("moduli", *axes, moduli, shades=shades, log_x=True, log_y=True, right=(Axis("tan δ"), tangent))

@@ -22,14 +22,22 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, MaxNLocator, NullLocator
+from matplotlib.ticker import (
+    FixedFormatter,
+    FixedLocator,
+    FuncFormatter,
+    LogLocator,
+    MaxNLocator,
+    NullFormatter,
+    NullLocator,
+)
 from matplotlib.transforms import ScaledTranslation
 
 from ..files import files
 from ..printed import LONG_TIME, TIMES, prefixed
 from ..streams import printable
 
-Panel = Callable[[Axes], None]  # draws one panel
+Draw = Callable[[Axes], None]  # draws one panel
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito 2008, no yellow
 DASHES = ("-", "--", "-.", ":")  # with the colours, for black and white prints
@@ -122,7 +130,7 @@ def line(number: int, count: int = 0) -> dict[str, Any]:
     return {"color": colors(max(count, number + 1))[number], "linestyle": DASHES[number % len(DASHES)]}
 
 
-def figure_of(title: str, groups: Sequence[Sequence[Panel]], maps: Sequence[Panel] = ()) -> Figure:
+def figure_of(title: str, groups: Sequence[Sequence[Draw]], maps: Sequence[Draw] = ()) -> Figure:
     """Draw groups of panels below each other in even rows, then `maps`, all of one size; legends are those of
     `place_legends` for each group."""
     most = COLUMNS[sum(map(len, (*groups, maps))) > MANY_PANELS]
@@ -167,12 +175,12 @@ def wrap(text: str, most: int) -> str:
     return plain("\n".join(part for given in text.split("\n") for part in textwrap.wrap(given, most) or [""]))
 
 
-def _split_rows(group: Sequence[Panel], most: int) -> list[Sequence[Panel]]:
+def _split_rows(group: Sequence[Draw], most: int) -> list[Sequence[Draw]]:
     count = -(-len(group) // most)
     return [group[len(group) * row // count : len(group) * (row + 1) // count] for row in range(count)]
 
 
-def _draw_row(place: SubFigure, panels: Sequence[Panel], rows: int, columns: int) -> list[Axes]:
+def _draw_row(place: SubFigure, panels: Sequence[Draw], rows: int, columns: int) -> list[Axes]:
     grid = place.add_gridspec(rows, columns)
     found = [place.add_subplot(grid[divmod(number, columns)]) for number in range(len(panels))]
     for panel, axes in zip(panels, found, strict=True):
@@ -253,6 +261,8 @@ MARKS |= {"1 day": TIMES["days"], "1 year": TIMES["years"]}  # ticks of a logari
 LETTER_OF_LABEL = 0.085  # width of a letter of a tick label [inch]
 LONGEST, TALLEST = 4.0, 1.25  # most width over height of a map, and most height over width, without stretching
 FEW_MARKS = 3  # least number of ticks
+FEW_DECADES = 1.5  # decades of a logarithmic axis below which minor ticks have labels
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def label(axis: Axis, name: str, unit: str) -> None:
@@ -273,6 +283,21 @@ def label_map(axes: Axes, size: tuple[float, float]) -> float:
     for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y")):
         label(axis, f"{name}, stretched" if name == stretched else name, "m")
     return 1.0 if stretched else min(1.0, 1.0 / ratio)
+
+
+def thin_log_ticks(axis: Axis) -> bool:
+    """Set few ticks of a logarithmic axis; return True if it has few decades, else ticks are at powers of ten."""
+    low, high = axis.get_view_interval()
+    few = bool(high < 10.0**FEW_DECADES * low)
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=5))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}" if few else _power_of_ten(value)))
+    axis.set_minor_formatter(NullFormatter())
+    return few
+
+
+def _power_of_ten(value: float) -> str:
+    """Return 10⁻³ for 1e-3: plain letters are drawn in a tenth of the time of a formula."""
+    return f"10{f'{math.log10(value):.0f}'.translate(RAISED)}" if value > 0.0 else ""
 
 
 def label_log_times(axis: Axis, name: str) -> bool:

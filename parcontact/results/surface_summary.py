@@ -7,12 +7,9 @@ Picture of a rigid surface: its map, the distribution of its heights, and its sp
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from .. import printed
 from ..errors import InputError
@@ -23,12 +20,13 @@ from ..parallel.slab import Array
 from ..physics import surface_statistics
 from ..physics.surface_statistics import Statistics
 from ..printed import per_cent, quantity, with_error
-from . import charts, style
+from . import style
+from .panels import Axis, Colors, Line, Panel, drawn_points, picture
 
 BINS = 60
 FEW, OUTLYING = (1e-3, 1.5)  # share of outlying points on either side, and the drawn range over the range of the others
 RESOLVED = 8  # cells of a wave that is resolved in a contact
-COARSEST = 800  # most points of the drawn map along a side
+BARS = {"color": style.BLUE, "drawstyle": "steps-mid"}
 ROUNDING = 1e-20  # rounding: smallest drawn power over the largest
 
 
@@ -46,20 +44,24 @@ class Sketch:
 def draw_surface(sketch: Sketch, path: Path) -> None:
     """Write the picture, a png, pdf or svg; raises OSError."""
     with style.drawing():
-        figure = style.figure_of("", [[partial(panel, sketch=sketch) for panel in PANELS.values()]])
-        style.save_figure(figure, path, path.suffix[1:])
+        style.save_figure(picture("", [list(panels_of(sketch).values())]), path, path.suffix[1:])
 
 
-def _draw_map(axes: Axes, sketch: Sketch) -> None:
-    step = max(1, -(-max(sketch.heights.shape) // COARSEST))
+def panels_of(sketch: Sketch) -> dict[str, Panel]:
+    """Return the panels of a rigid surface by what they show."""
+    return {
+        "map of the heights": _map(sketch),
+        "distribution of the heights": _distribution(sketch),
+        "spectra of profiles": _profiles(sketch),
+        "spectrum over directions": _over_directions(sketch),
+    }
+
+
+def _map(sketch: Sketch) -> Panel:
+    low, high = _find_ends(drawn_points(sketch.heights))
     lx, ly = sketch.size
-    heights, place = sketch.heights[::step, ::step], (0.0, lx, 0.0, ly)
-    low, high = _find_ends(heights)
-    look: dict[str, Any] = {"origin": "lower", "extent": place, "cmap": "cividis"}
-    image = axes.imshow(heights, vmin=low, vmax=high, **look)
-    axes.grid(False)
-    height = style.label_map(axes, sketch.size)
-    style.label(axes.figure.colorbar(image, ax=axes, shrink=height).ax.yaxis, "height", "m")
+    colors = Colors(sketch.heights, (0.0, lx, 0.0, ly), Axis("height", "m"), low, high, "cividis")
+    return Panel("map", Axis("x", "m"), Axis("y", "m"), colors=colors)
 
 
 def _find_ends(heights: Array) -> tuple[float, float]:
@@ -70,50 +72,44 @@ def _find_ends(heights: Array) -> tuple[float, float]:
     return (low, high) if low < high else (float(heights.min()), float(heights.max()))
 
 
-def _draw_distribution(axes: Axes, sketch: Sketch) -> None:
+def _distribution(sketch: Sketch) -> Panel:
     heights = sketch.heights.ravel() - sketch.heights.mean()
-    ends = np.array(_find_ends(heights))
-    unit, size = printed.prefixed("m", np.abs(ends).max())
-    heights, rms, (low, high) = heights / size, sketch.heights.std() / size, ends / size
-    axes.hist(np.clip(heights, low, high), bins=BINS, density=True, color=style.BLUE, alpha=0.6, label="heights")
-    if rms > 0.0:
+    low, high = _find_ends(heights)
+    unit, size = printed.prefixed("m", max(abs(low), abs(high)))
+    density, edges = np.histogram(np.clip(heights, low, high), BINS, density=True)
+    lines = [Line("heights", 0.5 * (edges[1:] + edges[:-1]), size * density, BARS)]
+    if (rms := float(heights.std())) > 0.0:
         x = np.linspace(-4 * rms, 4 * rms, 200)
-        axes.plot(x, np.exp(-0.5 * (x / rms) ** 2) / (rms * np.sqrt(2 * np.pi)), color=style.RED, label="normal")
-    axes.margins(y=0.45)
-    axes.set(xlabel=f"height over mean [{unit}]", ylabel=f"density [1/{unit}]")
+        normal = np.exp(-0.5 * (x / rms) ** 2) / (rms / size * np.sqrt(2 * np.pi))
+        lines.append(Line("normal", x, normal, {"color": style.RED}))
+    return Panel("distribution", Axis("height over mean", "m"), Axis(f"density [1/{unit}]"), lines)
 
 
-def _draw_spectra(axes: Axes, sketch: Sketch, spectra: list[tuple[str, Array, Array, int]], name: str) -> None:
-    """Draw spectra, each with name, wavenumbers, powers and number, and the limits of the grid."""
+def _spectra(sketch: Sketch, spectra: list[tuple[str, Array, Array, int]], of: Axis) -> Panel:
+    """Return the panel of spectra, each with name, wavenumbers, powers and number, and the limits of the grid."""
+    lines, seen = list[Line](), list[float]()
     for label, q, power, number in spectra:
         drawn = power > ROUNDING * power.max(initial=0.0)
-        axes.loglog(q[drawn], power[drawn], label=label, **style.line(number))
+        lines.append(Line(label, q[drawn], power[drawn], style.line(number)))
+        seen += power[drawn].tolist()
     cell = max(length / n for length, n in zip(sketch.size, sketch.heights.shape[::-1], strict=True))
-    axes.axvline(2 * np.pi / (RESOLVED * cell), color=style.GREY, ls=":", label=f"waves of {RESOLVED} cells")
-    axes.axvline(np.pi / cell, color=style.GREY, ls="--", label="waves of 2 cells")
-    axes.set(xlabel="wavenumber [1/m]", ylabel=name)
-    for axis in (axes.xaxis, axes.yaxis):
-        charts.thin_log_ticks(axis)
+    ends = np.array([min(seen, default=1.0), max(seen, default=1.0)])
+    for cells, dashes in ((RESOLVED, ":"), (2, "--")):
+        at = np.full(2, 2 * np.pi / (cells * cell))
+        lines.append(Line(f"waves of {cells} cells", at, ends, {"color": style.GREY, "linestyle": dashes}))
+    return Panel("spectrum", Axis("wavenumber", "1/m"), of, lines, log_x=True, log_y=True)
 
 
-def _draw_profiles(axes: Axes, sketch: Sketch) -> None:
+def _profiles(sketch: Sketch) -> Panel:
     found = sketch.found
     spectra = [("along x", found.qx, found.psd_x, 0), ("along y", found.qy, found.psd_y, 1)]
-    _draw_spectra(axes, sketch, spectra, "PSD of profiles [m³]")
+    return _spectra(sketch, spectra, Axis("PSD of profiles", "m³"))
 
 
-def _draw_over_directions(axes: Axes, sketch: Sketch) -> None:
+def _over_directions(sketch: Sketch) -> Panel:
     kinds = [("measured", sketch.measured, 1), ("on the grid", sketch.found, 0)]
     spectra = [(name, each.q, each.psd_2d, number) for name, each, number in kinds if each is not None]
-    _draw_spectra(axes, sketch, spectra, "PSD over directions [m⁴]")
-
-
-PANELS = {
-    "map of the heights": _draw_map,
-    "distribution of the heights": _draw_distribution,
-    "spectra of profiles": _draw_profiles,
-    "spectrum over directions": _draw_over_directions,
-}
+    return _spectra(sketch, spectra, Axis("PSD over directions", "m⁴"))
 
 
 NOT_SELF_AFFINE = "no self-affine range was found"

@@ -12,7 +12,7 @@ from conftest import WORLD, Main
 
 from parcontact import capabilities
 from parcontact.results import histories
-from parcontact.results.charts import PlottedRun
+from parcontact.results.plotted_run import PlottedRun
 
 from .tread_wear import forget, install, shown
 
@@ -31,9 +31,9 @@ ANSWERS = """
 
     @staticmethod
     def panels(run, along):
-        from parcontact.results.charts import Axis, Chart
+        from parcontact.results.panels import Axis, Panel
 
-        yield Chart("wear", along.axis, Axis("wear", "m"), along.series({"": run.columns["wear_depth"]}))
+        yield Panel("wear", along.axis, Axis("wear", "m"), along.series({"": run.columns["wear_depth"]}))
 
     def follow("""
 

@@ -7,7 +7,8 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from parcontact.results import band_charts, charts
+from parcontact.results import band_charts
+from parcontact.results.panels import draw
 
 HEAD = "velocity,pressure,temperature,band,long_wavelength,short_wavelength,friction,contact_area,flash_temperature"
 
@@ -28,7 +29,7 @@ def test_bars_add_up(tmp_path: Path) -> None:
     table(tmp_path)
     (bars, area, heat) = band_charts.chart_bands(tmp_path)
     axes = Figure().add_subplot()
-    charts.draw(bars, axes)
+    draw(bars, axes)
     boxes = [patch for patch in axes.patches if isinstance(patch, Rectangle)]
     assert len(boxes) == 6
     assert [box.get_height() for box in boxes] == pytest.approx([0.1] * 3 + [0.2] * 3)

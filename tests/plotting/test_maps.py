@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 from drawing import ELASTIC, LOADS, SPHERE, STRIP, WAVE, ZENER, ran
 from matplotlib.axes import Axes
-from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 from PIL import Image
 
 from parcontact.job import Job
 from parcontact.results import maps, plots, report_sections
-from parcontact.results.charts import Fields, PlottedRun, label_frames
+from parcontact.results.panels import show_colors
+from parcontact.results.plotted_run import Fields, PlottedRun, label_frames
 
 ALL = "output: {fields: [pressure, displacement, gap, height]}\n"
 CREEP = "history: [{pressure: 1.0e3, duration: 2.0e-3, time_step: 2.0e-3}]\n"
@@ -23,22 +24,18 @@ UNLOAD = (
 )
 
 
-def mesh(axes: Axes) -> QuadMesh:
-    (found,) = (one for one in axes.collections if isinstance(one, QuadMesh))
+def mesh(axes: Axes) -> AxesImage:
+    (found,) = axes.images
     return found
 
 
-def values(found: QuadMesh) -> NDArray[np.float64]:
+def values(found: AxesImage) -> NDArray[np.float64]:
     return np.ma.filled(np.ma.asarray(found.get_array()), np.nan).ravel()
 
 
 def maps_of(figure: Figure) -> dict[str, Axes]:
     """By their titles."""
-    return {
-        axes.get_title(): axes
-        for axes in figure.axes
-        if any(isinstance(one, QuadMesh) for one in axes.collections) and axes.get_xlabel()
-    }
+    return {axes.get_title(): axes for axes in figure.axes if axes.images and axes.get_xlabel()}
 
 
 def test_one_look(tmp_path: Path, drawn: list[Figure]) -> None:
@@ -166,9 +163,8 @@ def test_the_colours_of_pressures_that_pull_and_push_show_both() -> None:
     pressure[8:12, 8:12], pressure[9:11, 9:11] = -2.0, 5.0
     assert maps.find_range(pressure) == (-2.0, 5.0)
     assert maps.find_range(-np.abs(pressure)) == (-5.0, 0.0)
-    axes = Figure().subplots()
-    maps._draw_map(axes, "pressure", (np.arange(65.0), np.arange(65.0)), (-2.0, 5.0))
-    assert mesh(axes).norm(np.zeros(1)) == 0.5
+    image = show_colors(Figure().subplots(), maps._colors("pressure", (np.arange(64.0),) * 2, pressure, (-2.0, 5.0)))
+    assert image.norm(np.zeros(1)) == 0.5
 
 
 HELD = "history: [{name: press, force: 0.1, duration: 1.0e-3, time_step: 2.0e-4}, %s]\n"

@@ -27,7 +27,8 @@ from drawing import (
 from matplotlib.figure import Figure
 
 from parcontact.files import tables
-from parcontact.results import charts, style
+from parcontact.results import style
+from parcontact.results.panels import Axis, Line, Panel, draw
 
 BACK = SLIDE.replace("}]", "}, {name: back, pressure: 1.0e3, velocity: -0.1, distance: 1.0e-3, cells_per_step: 1}]")
 CURVE = "velocity,pressure,friction,contact_area\n"
@@ -81,11 +82,11 @@ def test_logarithmic_axes_without_a_point(
 ) -> None:
     """A panel that has points for the logarithmic axes has them, another keeps linear axes; it is drawn either way."""
     figure = Figure()
-    line = charts.ChartLine("", np.array(x), np.array(y))
+    line = Line("", np.array(x), np.array(y))
     with style.drawing():
         axes = figure.add_subplot()
-        chart = charts.Chart("leakage", charts.Axis("load", "Pa"), charts.Axis("K", "m³"), [line], zeros=zeros)
-        charts.draw(chart, axes, log.split(","))
+        chart = Panel("leakage", Axis("load", "Pa"), Axis("K", "m³"), [line], zeros=zeros)
+        draw(chart, axes, log.split(","))
         style.save_figure(figure, tmp_path / "picture.png")
     logs = set(log.split(",")) | ({"y"} if zeros else set())
     there = ",".join(sorted(logs)) in shown.split(" ")

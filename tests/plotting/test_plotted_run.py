@@ -16,7 +16,7 @@ SLIDE = ", {pressure: 1.0e3, velocity: 0.1, distance: 1.0e-3, cells_per_step: 0.
 def title_and_highest(figure: Figure) -> tuple[str, float]:
     """Of the map of pressures."""
     axes = next(axes for axes in figure.axes if axes.get_title().startswith("pressure"))
-    return axes.get_title(), float(np.max(np.ma.filled(np.ma.asarray(axes.collections[0].get_array()), 0.0)))
+    return axes.get_title(), float(np.max(np.ma.filled(np.ma.asarray(axes.images[0].get_array()), 0.0)))
 
 
 @pytest.mark.parametrize(("at", "time"), [("3", "4 ms"), ("0.0072", "8 ms"), ("8e-3", "8 ms")])

@@ -11,7 +11,7 @@ from legible import assert_legible
 from matplotlib.figure import Figure
 
 from parcontact.results import band_charts
-from parcontact.results.charts import Chart, ChartLine
+from parcontact.results.panels import Line, Panel
 from parcontact.results.plots import PlotOptions, plot
 
 SIZES = (1e-3, 2e-3, 3e-3)
@@ -29,12 +29,12 @@ def case(velocity: float, seed: int, friction: float | str, size: float = 1.0, t
     return (0, velocity, velocity, seed, size, "done", friction, 0.1, 0.2, theory)
 
 
-def lines_of(chart: Chart) -> list[ChartLine]:
+def lines_of(chart: Panel) -> list[Line]:
     """Return the lines of a chart without the entries of its legend."""
     return [one for one in chart.series if one.x.size]
 
 
-def names_of(chart: Chart) -> list[str]:
+def names_of(chart: Panel) -> list[str]:
     return [one.name for one in chart.series if one.name]
 
 

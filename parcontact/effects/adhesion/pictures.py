@@ -1,5 +1,5 @@
 """Panels of adhesion."""
 
-from ...results.charts import Axis
+from ...results.panels import Axis
 
 SWEEP_PANELS = (("pull-off", Axis("pull-off force", "N"), {"pull-off": "pull_off"}),)

@@ -36,7 +36,7 @@ from ...parallel.mpi import MPI
 from ...parallel.root import on_root
 from ...parallel.slab import Slab
 from ...printed import per_cent, prefixed, quantity, span, stated_error
-from ...results.charts import Fields, PlottedRun
+from ...results.plotted_run import Fields, PlottedRun
 from ...results.results import Results
 from ..effect import touching_of
 from . import LEAK, pictures, results

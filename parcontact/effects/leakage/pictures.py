@@ -5,21 +5,18 @@ is too narrow for continuum flow.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
 
 from ...columns import UNITS
 from ...parallel.slab import Array
-from ...results import charts, style
-from ...results.charts import Axis, Chart, ChartLine, PlottedRun
+from ...results import style
 from ...results.histories import Abscissa
-from ...results.style import Panel
+from ...results.panels import Axis, Colors, Line, Panel, picture
+from ...results.plotted_run import PlottedRun
 from .flow import FloatMap, Flow
 
 CONTINUUM = 1e-8  # physics: gap of about thirty molecules of water, the least for continuum flow [m]
@@ -39,35 +36,36 @@ def chart(
     constrictions: Mapping[str, Array],
     log_x: bool = False,
     dotted: Mapping[str, Array] = MappingProxyType({}),
-) -> Chart:
+) -> Panel:
     """Draw conductivities K [m^3], by their names, over an axis, all of shape (n,), with their critical constrictions
     [m]; K is 0 where contact closes, and NaN where it is not known. Others are `dotted`, in the same colours."""
-    lines, thin = list[ChartLine](), list[ChartLine]()
+    lines, thin = list[Line](), list[Line]()
     for number, (name, flow) in enumerate(flows.items()):
         known = np.isfinite(flow)
-        lines.append(ChartLine(name, at[known], flow[known], style.line(number) | {"marker": "."}))
+        lines.append(Line(name, at[known], flow[known], style.line(number) | {"marker": "."}))
         narrow = known & (flow > 0.0) & is_thin(constrictions[name])
         if narrow.any():
-            thin.append(ChartLine(THIN * (not thin), at[narrow], flow[narrow], THIN_LOOK))
+            thin.append(Line(THIN * (not thin), at[narrow], flow[narrow], THIN_LOOK))
     looks = [style.line(number) | {"linestyle": ":"} for number in range(len(dotted))]
     lines += [
-        ChartLine(name, at[flow > 0.0], flow[flow > 0.0], look)
+        Line(name, at[flow > 0.0], flow[flow > 0.0], look)
         for (name, flow), look in zip(dotted.items(), looks, strict=True)
     ]
-    return Chart("leakage", over, Axis("conductivity K", "m³"), lines + thin, log_x=log_x, zeros="closed")
+    return Panel("leakage", over, Axis("conductivity K", "m³"), lines + thin, log_x=log_x, zeros="closed")
 
 
-BAR = 0.7  # height of the bar of colours over that of its map
+RING: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": "r", "ms": 11, "mew": 1.5}
+SHARE = Axis("flow over its largest")
 DECADES = 3  # decades of the flow on the colour scale
 SAME = 1e-6  # rounding: relative difference below which pressures are the same
 FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # columns of a run
 KEYS = ("leakage", "leak")  # names of panels for --panels
-SWEEP_PANELS = (("leakage", charts.Axis("conductivity", "m³"), {label: name for name, label in FLOWS.items()}),)
+SWEEP_PANELS = (("leakage", Axis("conductivity", "m³"), {label: name for name, label in FLOWS.items()}),)
 KINDS = ("flow", "constriction")  # kinds of columns per direction
 LONG = 100.0  # ratio of times above which their axis is logarithmic
 
 
-def panels(run: PlottedRun, along: Abscissa) -> Iterator[charts.Chart]:
+def panels(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
     """Yield the chart of conductivities of a run over an axis, if the gap is open at any time, and that of the leak
     over the pressure of a fluid that carries a part of the load."""
     columns = run.columns
@@ -81,7 +79,7 @@ def panels(run: PlottedRun, along: Abscissa) -> Iterator[charts.Chart]:
             yield from _leak_over_pressure(run)
 
 
-def _leak_over_pressure(run: PlottedRun) -> Iterator[charts.Chart]:
+def _leak_over_pressure(run: PlottedRun) -> Iterator[Panel]:
     """Yield the chart of the leak over the high pressure of the fluid if it changes, under the last load; dotted is
     that of a contact which carries all of this load, where the run has a row of it."""
     section, columns = run.job.section("leakage"), run.columns
@@ -91,18 +89,16 @@ def _leak_over_pressure(run: PlottedRun) -> Iterator[charts.Chart]:
     flowing = loaded & (high > low)
     if flowing.sum() < 2 or not np.ptp(high[flowing]):
         return
-    lines = [
-        charts.ChartLine("total load", high[flowing], columns["flow_rate"][flowing], style.line(0) | {"marker": "."})
-    ]
+    lines = [Line("total load", high[flowing], columns["flow_rate"][flowing], style.line(0) | {"marker": "."})]
     net = np.flatnonzero(loaded & (columns["fluid_pressure"] == 0.0) & (high == low))
     if net.size:
         drops = (
             section.drop((float(one), float(other))) for one, other in zip(high[flowing], low[flowing], strict=True)
         )
         alone = [drop.flow_rate(float(columns["flow_x"][net[0]]), *run.job.grid.size) for drop in drops]
-        lines.append(charts.ChartLine("net load", high[flowing], np.array(alone), style.line(0) | {"linestyle": ":"}))
-    axes = charts.Axis("high pressure", "Pa"), charts.Axis("leak", "m³/s")
-    yield charts.Chart("leak", *axes, lines, zeros="closed")
+        lines.append(Line("net load", high[flowing], np.array(alone), style.line(0) | {"linestyle": ":"}))
+    axes = Axis("high pressure", "Pa"), Axis("leak", "m³/s")
+    yield Panel("leak", *axes, lines, zeros="closed")
 
 
 def draw_leakage(
@@ -117,22 +113,15 @@ def draw_leakage(
 ) -> Path:
     """Draw the flow along x and along y on the map of the gap at an instant, and K of all instants."""
 
-    def flow_map(axis: str, flow: Flow, flux: FloatMap) -> Panel:
-        def panel(axes: Axes) -> None:
-            _draw_flow(axes, size, gap, flow, flux)
-            axes.set_title(f"along {axis}" if flow.percolates else f"along {axis}: closed, no path")
-
-        return panel
-
+    circled = ", constriction circled" * any(flow.percolates for flow in flows)
+    title = f"flow through the gap, {instant}\ncontact black{circled}"
+    curve = [chart_of(rows, over)] if any(row.constriction > 0.0 for row in rows[1:]) else []
+    maps = [_flow_map(axis, size, gap, *each) for axis, *each in zip("xy", flows, fluxes, strict=True)]
     with style.drawing():
-        circled = ", constriction circled" * any(flow.percolates for flow in flows)
-        title = f"flow through the gap, {instant}\ncontact black{circled}"
-        curve = [partial(charts.draw, chart_of(rows, over))] if any(row.constriction > 0.0 for row in rows[1:]) else []
-        maps = [flow_map(axis, flow, flux) for axis, flow, flux in zip("xy", flows, fluxes, strict=True)]
-        return style.save_figure(style.figure_of(title, [maps, curve] if curve else [maps]), path)
+        return style.save_figure(picture(title, [maps, curve] if curve else [maps]), path)
 
 
-def chart_of(rows: Sequence[Any], over: str) -> charts.Chart:
+def chart_of(rows: Sequence[Any], over: str) -> Panel:
     """Return the chart of K `over` pressure or time (default: time if a pressure occurs more than once).
 
     Over pressure, the last of consecutive instants at one pressure is drawn.
@@ -150,24 +139,25 @@ def chart_of(rows: Sequence[Any], over: str) -> charts.Chart:
     flows = {name: parts[:, k, 1] for k, name in enumerate(flows)} if parts.size else flows
     later = at[at > 0.0]
     log_x = over == "time" and later.size > 0 and bool(later.max() > LONG * later.min())
-    return chart(charts.Axis(over, UNITS[over]), at, flows, narrowest, log_x, dotted)
+    return chart(Axis(over, UNITS[over]), at, flows, narrowest, log_x, dotted)
 
 
-def _draw_flow(axes: Axes, size: tuple[float, float], gap: FloatMap, flow: Flow, flux: FloatMap) -> None:
-    """Draw the flow through a gap over its largest value, and circle the constriction."""
-    axes.set_facecolor("k")
-    look: dict[str, Any] = {"extent": (0.0, size[0], 0.0, size[1]), "origin": "lower", "interpolation": "nearest"}
-    axes.imshow(np.where(gap > 0.0, gap, np.nan), cmap="Greys_r", alpha=0.5, **look)
-    if flow.position is not None:
-        most = float(np.nanpercentile(flux, 99.9)) or 1.0  # all the flow may be in fewer cells
-        drawn = axes.imshow(flux / most, cmap="viridis", norm=LogNorm(10.0**-DECADES, 1.0), **look)
-        shrink = BAR * style.label_map(axes, size)  # after the pictures, which set the aspect
-        axes.figure.colorbar(drawn, ax=axes, shrink=shrink, label="flow over its largest")
-        row, column = flow.position
-        cell = size[0] / gap.shape[1], size[1] / gap.shape[0]
-        axes.plot((column + 0.5) * cell[0], (row + 0.5) * cell[1], "o", mfc="none", mec="r", ms=11, mew=1.5)
-    axes.grid(False)
-    style.label_map(axes, size)
+def _flow_map(axis: str, size: tuple[float, float], gap: FloatMap, flow: Flow, flux: FloatMap) -> Panel:
+    """Return the panel of the flow through a gap over its largest value, with a ring at the constriction."""
+    most = float(np.nanpercentile(flux, 99.9)) or 1.0  # all the flow may be in fewer cells
+    shown = flux / most if flow.position is not None else np.full_like(gap, np.nan)
+    least = 10.0**-DECADES if flow.position is not None else 2.0  # without a path there is no bar of colours
+    where = (0.0, size[0], 0.0, size[1])
+    colors = Colors(shown, where, SHARE, least, 1.0, blank="k", log=True, behind=np.where(gap > 0.0, gap, np.nan))
+    ring = [Line("", *_place(flow.position, size, gap.shape), RING)] if flow.position is not None else []
+    title = f"along {axis}" if flow.percolates else f"along {axis}: closed, no path"
+    return Panel("flow", Axis("x", "m"), Axis("y", "m"), ring, title, colors=colors)
+
+
+def _place(cell: tuple[int, int], size: tuple[float, float], shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """Return the coordinates [m] of the middle of a cell in a row and a column."""
+    x, y = ((k + 0.5) * length / n for k, length, n in zip(cell[::-1], size, shape[::-1], strict=True))
+    return np.array([x]), np.array([y])
 
 
 def flux(gap: FloatMap, pressure: FloatMap, size: tuple[float, float]) -> FloatMap:

@@ -7,14 +7,14 @@ import numpy as np
 
 from ...parallel.slab import Array
 from ...results import style
-from ...results.charts import Axis, Chart, ChartLine
+from ...results.panels import Axis, Line, Panel
 
 BAND_PANELS = {"strain_amplitude": ("bands strain", Axis("strain amplitude"))}
 POINTS = 200  # number of points of a line
 NAMES = ("G' storage", "G'' loss")
 
 
-def curve_panels(job: Any, columns: Mapping[str, Array]) -> Iterator[Chart]:
+def curve_panels(job: Any, columns: Mapping[str, Array]) -> Iterator[Panel]:
     """Yield the chart of the factors of both moduli over strain, with marks at the strains in columns of a friction
     curve, for jobs with softening."""
     section = job.section("softening")
@@ -26,6 +26,6 @@ def curve_panels(job: Any, columns: Mapping[str, Array]) -> Iterator[Chart]:
     series = []
     for number, (name, line, marks) in enumerate(zip(NAMES, table.factors(strain), table.factors(marked), strict=True)):
         look = style.line(number)
-        series.append(ChartLine(name, strain, line, look))
-        series.append(ChartLine("", marked, marks, look | {"marker": "o", "linestyle": "none"}))
-    yield Chart("steady softening", Axis("strain amplitude"), Axis("modulus /\nunsoftened"), series, log_x=True)
+        series.append(Line(name, strain, line, look))
+        series.append(Line("", marked, marks, look | {"marker": "o", "linestyle": "none"}))
+    yield Panel("steady softening", Axis("strain amplitude"), Axis("modulus /\nunsoftened"), series, log_x=True)

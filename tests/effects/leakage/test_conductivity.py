@@ -6,13 +6,13 @@ from matplotlib.figure import Figure
 
 from parcontact.effects.leakage import pictures
 from parcontact.effects.leakage.over_time import LeakInstant
-from parcontact.results import charts
+from parcontact.results.panels import Axis, Panel, draw
 
 
-def drawn(chart: charts.Chart) -> dict[str, np.ndarray]:
+def drawn(chart: Panel) -> dict[str, np.ndarray]:
     """Return what each line shows over the horizontal axis, by its label; `limits` are those of this axis."""
     axes = Figure().subplots()
-    charts.draw(chart, axes)
+    draw(chart, axes)
     lines = {str(line.get_label()).replace("\n", " "): np.array(line.get_xdata()) for line in axes.get_lines()}
     assert axes.get_yscale() == "log"
     return lines | {"limits": np.array(axes.get_xlim())}
@@ -23,7 +23,7 @@ def test_closed_instants_and_narrow_constrictions() -> None:
     9 nm."""
     at, flow = np.array([1.0, 2.0, 3.0, 4.0]), np.array([1e-20, 1e-24, 0.0, np.nan])
     narrowest = np.array([1e-6, 9e-9, 0.0, np.nan])
-    chart = pictures.chart(charts.Axis("time", "s"), at, {"along x": flow}, {"along x": narrowest})
+    chart = pictures.chart(Axis("time", "s"), at, {"along x": flow}, {"along x": narrowest})
     shown = drawn(chart)
     assert shown["closed"].tolist() == [3.0]
     assert shown["constriction under 10 nm"].tolist() == [2.0]

@@ -1,0 +1,351 @@
+"""Panels of pictures: their numbers, and how they are drawn.
+
+A picture is a list of panels, which `draw` draws: lines with errors, stacks of bars, shaded ranges, a map."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.ticker import MaxNLocator
+
+from .. import printed
+from ..parallel.slab import Array
+from . import style
+
+SPIKE_SHARE = 0.02  # first part of the abscissa, whose spikes do not set the limits
+SPIKE_HEIGHT = 1.5  # least height of a spike over the highest other value
+STAGE_WHITE = 0.87  # share of white in the shade of a stage
+MOST_EDGES = 7  # most labels of the bar of colours of bands
+HEADROOM, PEAK_ROOM = 1.08, 1.25  # upper limit over the highest value, without and with its name in the legend
+BAR_SHARE = 0.8  # width of a bar over the distance of bars, in the logarithm
+LEAST = 0.99  # largest downward error bar over the value
+ZERO_ROW = 0.05  # height of the row of marks at 0, over the height of the panel
+SAME = 1e-9  # rounding: relative difference of equal values on a logarithmic axis
+SHADE = 0.8  # share of white in the shade of a range
+COARSEST = 800  # most points of a drawn map along a side
+COLOR_BAR = 0.9  # height of a bar of colours over that of its map
+TICKS = 5  # most intervals of ticks of a bar of colours
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line: its name (or ''), values in SI units, and their relative errors if known; or bars, which stand on those
+    before in the same `stack`. A line without values is an entry of the legend only."""
+
+    name: str
+    x: Array
+    y: Array
+    look: dict[str, Any] = field(default_factory=lambda: style.line(0))
+    error: Array | None = None
+    stack: int | None = None
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The quantity of an axis and its SI unit."""
+
+    name: str
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Shade:
+    """A shaded range of an axis, x or y, with its name in the legend."""
+
+    name: str
+    low: float
+    high: float
+    axis: str = "x"
+
+
+@dataclass(frozen=True)
+class Colors:
+    """A map of `values`, shape (ny, nx), between the `ends` x0, x1, y0, y1 [m] of its box, in colours from `low` to
+    `high`; there is no bar of colours if `low` is larger. Points without a value, NaN, are `blank`, or have the grey
+    shade of the map `behind`. `clipped`: higher values have the last colour."""
+
+    values: Array
+    ends: tuple[float, float, float, float]
+    of: Axis
+    low: float
+    high: float
+    palette: str = style.SEQUENCE
+    blank: str = "0.92"
+    clipped: bool = False
+    log: bool = False
+    behind: Array | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A panel, chosen by its `key`: `series` over `x`, on a map of `colors` if there is one.
+
+    `spikes`: a spike at the beginning may be cut off. `stages`: names, starts and ends over `x`.
+    `peak`: the legend names the highest point. `zeros`: label of values of 0 on a logarithmic axis. `edges` [m] are the
+    longest and shortest waves of the bands of stacked bars, from the longest on, for a bar of colours. `x_range` and
+    `y_range` are limits of the axes, `right` is a second vertical axis with its lines.
+    """
+
+    key: str
+    x: Axis
+    y: Axis
+    series: Sequence[Line] = ()
+    title: str = ""
+    bottom: bool = True
+    spikes: bool = False
+    peak: bool = False
+    stages: Sequence[tuple[str, float, float]] = ()
+    shades: Sequence[Shade] = ()
+    log_x: bool = False
+    log_y: bool = False
+    zeros: str = ""
+    edges: Sequence[float] = ()
+    x_range: tuple[float, float] | None = None
+    y_range: tuple[float, float] | None = None
+    colors: Colors | None = None
+    right: tuple[Axis, Sequence[Line]] | None = None
+
+
+def draw(panel: Panel, axes: Axes, log: Sequence[str] = ()) -> None:
+    """Draw a panel without its legend; `log` names its logarithmic axes, which are linear if there is no point for
+    them."""
+    log_x, log_y = (
+        "none" not in log and (panel.log_x or "x" in log),
+        "none" not in log and bool(panel.log_y or panel.zeros or "y" in log),
+    )
+    series = [_drop_hidden_points(one, log_x, log_y) for one in panel.series]
+    if not any(np.isfinite(one.x * one.y).any() for one in series):
+        log_x = log_y = False
+        series = [_drop_hidden_points(one, log_x, log_y) for one in panel.series]
+    if panel.colors is not None:
+        show_colors(axes, panel.colors)
+    _draw_bars(axes, series)
+    if panel.edges:
+        _draw_edges(axes, panel)
+    _draw_lines(axes, series)
+    if panel.zeros and log_y:
+        _mark_zeros(axes, panel)
+    if panel.colors is None:
+        _set_scales(axes, panel, series, log_x, log_y)
+    _mark_stages(axes, panel.stages)
+    _draw_shades(axes, panel.shades)
+    if panel.right is not None:
+        _draw_right(axes, *panel.right)
+    axes.set_title(panel.title)
+
+
+def _draw_lines(axes: Axes, series: Sequence[Line]) -> None:
+    """Draw lines with the bars of their errors; with marks if none has two points."""
+    lonely = all(np.isfinite(one.x * one.y).sum() < 2 for one in series)
+    for one in series:
+        if one.stack is None:
+            axes.plot(one.x, one.y, label=one.name or None, **one.look | ({"marker": "o"} if lonely else {}))
+            if one.error is not None:
+                _draw_errors(axes, one, one.error)
+
+
+def _set_scales(axes: Axes, panel: Panel, series: Sequence[Line], log_x: bool, log_y: bool) -> None:
+    """Set scales, limits and labels of the axes."""
+    ranges = {"xlim": panel.x_range, "ylim": panel.y_range}
+    axes.set(**{name: ends for name, ends in ranges.items() if ends})
+    set_scale(axes, "x", panel.x, log_x)
+    set_scale(axes, "y", panel.y, log_y)
+    if not log_y and series:
+        if panel.y_range is None:
+            _set_limits(axes, panel, series, log_x)
+        if panel.peak:
+            _name_peak(axes, series[0], panel.x.unit)
+        style.label(axes.yaxis, panel.y.name, panel.y.unit)
+
+
+def _draw_shades(axes: Axes, shades: Sequence[Shade]) -> None:
+    for one in shades:
+        fill = axes.axvspan if one.axis == "x" else axes.axhspan
+        fill(one.low, one.high, color=style.mix(style.GREY, SHADE), lw=0, zorder=0, label=one.name or None)
+
+
+def _draw_right(axes: Axes, of: Axis, series: Sequence[Line]) -> None:
+    """Draw lines over a second vertical axis, which begins at 0."""
+    right = axes.twinx()
+    _draw_lines(right, series)
+    right.set_ylim(bottom=0.0)
+    right.grid(False)
+    style.label(right.yaxis, of.name, of.unit)
+
+
+def show_colors(axes: Axes, one: Colors) -> AxesImage:
+    """Draw a map with its bar of colours. The scale of a single value has one tick."""
+    axes.set_facecolor(one.blank)
+    axes.grid(False)
+    if one.behind is not None:
+        _show(axes, one, one.behind, cmap="Greys_r", alpha=0.5)
+    low, high = one.low, one.high
+    width = 1.0 if high < low else (high - low or abs(high) or 1.0)
+    start = low if low <= high else 0.0
+    norm = LogNorm(low, high) if one.log and low < high else Normalize(start, start + width)
+    image = _show(axes, one, one.values, cmap=one.palette, norm=norm)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
+    x0, x1, y0, y1 = one.ends
+    height = style.label_map(axes, (x1 - x0, y1 - y0))
+    if low <= high:
+        _draw_color_bar(axes, image, one, COLOR_BAR * height)
+    return image
+
+
+def _draw_color_bar(axes: Axes, image: AxesImage, one: Colors, height: float) -> None:
+    ticks = [one.low] if one.low == one.high else MaxNLocator(TICKS, steps=[1, 2, 5, 10])
+    bar = axes.figure.colorbar(
+        image, ax=axes, shrink=height, extend="max" if one.clipped else "neither", ticks=None if one.log else ticks
+    )
+    if one.log:
+        style.thin_log_ticks(bar.ax.yaxis)
+        bar.ax.set_ylabel(one.of.name)
+    else:
+        style.label(bar.ax.yaxis, one.of.name, one.of.unit)
+
+
+def _show(axes: Axes, one: Colors, values: Array, **look: Any) -> AxesImage:
+    return axes.imshow(drawn_points(values), extent=one.ends, origin="lower", interpolation="nearest", **look)
+
+
+def drawn_points(values: Array) -> Array:
+    """Return the points of a map that are drawn: at most COARSEST along a side."""
+    step = max(1, -(-max(values.shape) // COARSEST))
+    return values[::step, ::step]
+
+
+def _draw_bars(axes: Axes, series: Sequence[Line]) -> None:
+    """Draw stacks of bars side by side, each from its first series at the bottom."""
+    stacked = [(one.stack, one) for one in series if one.stack is not None]
+    if not stacked:
+        return
+    stacks = sorted({stack for stack, _ in stacked})
+    steps = [float(np.diff(np.log(one.x)).min()) for _, one in stacked if one.x.size > 1]
+    width = min(steps, default=1.0) * BAR_SHARE / len(stacks)
+    bottoms = {stack: np.zeros(1) for stack in stacks}
+    for stack, one in stacked:
+        left = one.x * np.exp(width * (stacks.index(stack) - 0.5 * len(stacks)))
+        look: dict[str, Any] = {"color": one.look["color"], "edgecolor": "white", "linewidth": 0.3}
+        axes.bar(left, one.y, left * np.expm1(width), bottoms[stack], align="edge", label=one.name or None, **look)
+        bottoms[stack] = bottoms[stack] + one.y
+
+
+def _draw_edges(axes: Axes, panel: Panel) -> None:
+    """Draw the bar of colours of bands, with the waves between neighbouring bands."""
+    colors = [one.look["color"] for one in panel.series if one.stack is not None]
+    norm = BoundaryNorm(range(len(colors) + 1), len(colors))
+    shown = range(0, len(panel.edges), -(-len(panel.edges) // MOST_EDGES))
+    bar = axes.figure.colorbar(ScalarMappable(norm, ListedColormap(colors)), ax=axes, ticks=list(shown), aspect=15)
+    bar.ax.set_yticklabels([printed.quantity(panel.edges[k], "m") for k in shown], fontsize=style.SMALL)
+    bar.ax.minorticks_off()
+    bar.ax.set_title("waves", fontsize=style.SMALL)
+    axes.tick_params("x", labelsize=style.SMALL)  # the bar narrows the panel
+
+
+def _drop_hidden_points(one: Line, log_x: bool, log_y: bool) -> Line:
+    """Return a line without points that logarithmic axes cannot show."""
+    x, y = np.asarray(one.x, dtype=float), np.asarray(one.y, dtype=float)
+    there = np.isfinite(x) & ((x > 0.0) | (not log_x)) & ((y > 0.0) | (not log_y))
+    return replace(one, x=np.where(there, x, np.nan), y=np.where(there, y, np.nan))
+
+
+def _mark_zeros(axes: Axes, panel: Panel) -> None:
+    """Mark zeros of the lines at the lower edge, with one row of marks per line."""
+    label = panel.zeros  # one label for all lines
+    for row, one in enumerate(one for one in panel.series if one.x.size):
+        zeros = np.asarray(one.x)[np.asarray(one.y) == 0.0]
+        if zeros.size:
+            height = np.full(zeros.size, ZERO_ROW * (row + 0.5))
+            look: dict[str, Any] = {"color": one.look["color"], "marker": "x", "linestyle": "none", "ms": 4}
+            axes.plot(zeros, height, transform=axes.get_xaxis_transform(), label=label or None, **look)
+            label = ""
+
+
+def _draw_errors(axes: Axes, one: Line, share: Array) -> None:
+    """Draw bars of the known errors; a bar of more than the value ends just above 0."""
+    size = np.where(np.isfinite(share), np.abs(share * one.y), 0.0)
+    look: dict[str, Any] = {"ecolor": one.look["color"], "elinewidth": 1.0, "capsize": 2.5, "alpha": 0.7}
+    axes.errorbar(one.x, one.y, yerr=[np.minimum(size, LEAST * np.abs(one.y)), size], fmt="none", **look)
+
+
+def set_scale(axes: Axes, which: str, of: Axis, log: bool) -> None:
+    """Set name, unit and scale of an axis, with few ticks so that labels do not overlap."""
+    axis, few = axes.xaxis if which == "x" else axes.yaxis, True
+    if log:
+        low, high = axis.get_data_interval()
+        if 0.0 < low < high < low * (1.0 + SAME):  # Matplotlib finds no limits for values that differ by rounding
+            axes.set(**{f"{which}lim": (low / 10.0, 10.0 * low)})
+        axes.set(**{f"{which}scale": "log"})
+        if of.unit == "s" and style.label_log_times(axis, of.name):
+            return
+        few = style.thin_log_ticks(axis)
+    else:
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
+    if few:
+        style.label(axis, of.name, of.unit)
+    else:  # powers of ten need no prefix
+        axis.set_label_text(f"{of.name} [{of.unit}]" if of.unit else of.name)
+
+
+def _set_limits(axes: Axes, panel: Panel, series: Sequence[Line], log_x: bool) -> None:
+    """Set limits that include 0 and error bars up to the value; cut off a spike, and print its height."""
+    stacks = {one.stack for one in series} - {None}
+    wholes = [np.sum([one.y for one in series if one.stack == stack], axis=0) for stack in stacks]
+    ys = np.concatenate([*wholes, *(one.y for one in series)])
+    highest = _highest(ys)
+    if panel.bottom and not (ys < 0.0).any():
+        bars = [one.y * (1.0 + np.nan_to_num(np.minimum(one.error, 1.0))) for one in series if one.error is not None]
+        axes.set_ylim(0.0, (PEAK_ROOM if panel.peak else HEADROOM) * max(highest, *map(_highest, bars), 0.0) or 1.0)
+        if not highest:
+            axes.set_yticks([0.0])  # there are no values for a scale
+    if panel.spikes and not log_x:
+        xs = np.concatenate([one.x for one in series])
+        late = xs > np.nanmin(xs) + SPIKE_SHARE * (np.nanmax(xs) - np.nanmin(xs))
+        rest = _highest(ys[late])
+        if 0.0 < SPIKE_HEIGHT * rest < highest:
+            axes.set_ylim(top=1.25 * rest)
+            label = f"↑ {printed.quantity(highest, panel.y.unit)}"
+            axes.text(0.12, 0.97, label, transform=axes.transAxes, va="top", color=style.RED, fontsize=9)
+
+
+def _highest(values: Array) -> float:
+    """Return the highest positive value, or 0."""
+    return float(values[np.isfinite(values)].max(initial=0.0))
+
+
+def _name_peak(axes: Axes, one: Line, unit: str) -> None:
+    """Name the highest point of a line in the legend, if it is inside the range and the line falls after it."""
+    height = np.nan_to_num(np.abs(one.y))
+    at = int(np.argmax(height))
+    if 0 < at < height.size - 1 and height[at] > 1.02 * height[-1]:
+        label = f"{one.y[at]:.3g} at {printed.quantity(one.x[at], unit)}"
+        axes.plot(one.x[at], one.y[at], "o", color=style.RED, label=label, scalex=False, scaley=False)
+
+
+def _mark_stages(axes: Axes, stages: Sequence[tuple[str, float, float]]) -> None:
+    """Shade several stages, each name in its colour, and mark their starts."""
+    shown = [stage for stage in stages if stage[1] < stage[2]]
+    names = list(dict.fromkeys(name for name, _, _ in shown))
+    shades = dict(zip(names, style.sequence(len(names)), strict=True))
+    limits = axes.get_xlim()
+    for number, (name, start, end) in enumerate(shown if len(shown) > 1 else ()):
+        axes.axvspan(start, end, color=style.mix(shades[name], STAGE_WHITE), lw=0, zorder=-1, label=name or None)
+        if number:
+            axes.axvline(start, color=style.GREY, lw=0.8, ls=":", zorder=0)
+    axes.set_xlim(limits)
+
+
+def picture(
+    title: str, groups: Sequence[Sequence[Panel]], maps: Sequence[Panel] = (), log: Sequence[str] = ()
+) -> Figure:
+    """Return a picture of groups of panels below each other, then `maps`, all of one size."""
+    drawn = [[partial(draw, panel, log=log) for panel in group] for group in (*groups, maps)]
+    return style.figure_of(title, drawn[:-1], drawn[-1])
