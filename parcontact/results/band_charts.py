@@ -18,7 +18,7 @@ Points are cases, lines their means over seeds. Each value of another key has it
 have colours, values of further keys dashes.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -34,7 +34,7 @@ from ..job.listing import answers
 from ..job.reading import STEADY_RESOLVED
 from ..parallel.slab import Array
 from . import style
-from .panels import Axis, Line, Panel
+from .panels import Axis, ColumnPanel, Line, Panel, offered
 from .plotted_run import FRACTION, PlottedRun, count_different, round_digits, to_contact_area, to_load
 from .results import CURVES, PLACES, Results, read_cases, swept_keys
 from .slide import CORRECTED
@@ -66,9 +66,10 @@ def chart_bands(directory: Path) -> list[Panel]:
     if curve.has(BANDS_THEORY):
         theory = _choose(curve.read(BANDS_THEORY).arrays(("velocity", "pressure", "temperature", "band")))
     found = [_friction(columns, theory), _over_bands("bands area", columns, theory, "contact_area")]
-    for name, (key, axis) in (pair for panels in answers("pictures", "BAND_PANELS") for pair in panels.items()):
+    for one in offered("BAND_PANELS"):
+        (name,) = one.columns.values()
         if name in columns and np.isfinite(columns[name]).any():
-            found.append(_over_bands(key, columns, None, name, axis))
+            found.append(_over_bands(one.key, columns, None, name, one.y))
     if at := _describe_first(whole):
         found = [replace(chart, y=replace(chart.y, name=f"{chart.y.name}\nat {at}")) for chart in found]
     return found
@@ -229,7 +230,6 @@ def chart_steady(directory: Path, over: str = "") -> list[Panel]:
         "temperature": Axis("temperature", "°C"),
         "reduced": Axis("shift factor × velocity", "m/s"),
         "friction": Axis("friction coefficient"),
-        "flash_temperature": Axis("flash temperature", "K"),
         "area": to_contact_area(columns["contact_area"], area)[0],
     }
     _add_derived(columns, area)
@@ -241,8 +241,11 @@ def chart_steady(directory: Path, over: str = "") -> list[Panel]:
     panels = [("steady friction", x, "friction"), ("steady area", x, "area")]
     if "temperature" in several and x == "velocity":
         panels.append(("steady master", "reduced", "friction"))
-    if "flash_temperature" in columns:
-        panels.append(("steady flash", x, "flash_temperature"))
+    for one in offered("CURVE_PANELS"):
+        (name,) = one.columns.values()
+        if name in columns:
+            axes[name] = one.y
+            panels.append((one.key, x, name))
     theory = {}
     if x == "velocity" and COLD not in columns and curve.has(THEORY):  # the theory has no feedback
         theory = curve.read(THEORY).arrays((*NEEDED, "shift_factor"))
@@ -307,18 +310,18 @@ THIN_CASE = 1.0  # tuning: width of lines of the theory [points]
 GREY, NOTHING = {"color": style.GREY}, np.zeros(0)  # entries of legends that hold for all colours
 STYLES = ("-", "--", ":", "-.")  # dashes of lines, by the values of further keys
 WIDE = 10.0  # ratio of the largest to the smallest number above which an axis is logarithmic
-Panels = tuple[tuple[str, Axis, dict[str, str]], ...]
+Panels = tuple[ColumnPanel, ...]
 FRICTION, AREA_OF_CASE = Axis("friction coefficient"), Axis(FRACTION)
-PANELS: Panels = (  # panels: columns by the names of lines
-    ("friction", FRICTION, {"highest": "mu_max", "dynamic": "mu_dyn"}),
-    ("area", AREA_OF_CASE, {"simulation": CORRECTED}),
-    ("loss", Axis("loss per cycle", "J"), {"last cycle": "loss"}),
-    ("phase", Axis("phase", "rad"), {"last cycle": "phase"}),
-    ("energy", Axis("dissipated energy", "J"), {"dissipated": "dissipated"}),
+PANELS: Panels = (
+    ColumnPanel("friction", FRICTION, {"highest": "mu_max", "dynamic": "mu_dyn"}),
+    ColumnPanel("area", AREA_OF_CASE, {"simulation": CORRECTED}),
+    ColumnPanel("loss", Axis("loss per cycle", "J"), {"last cycle": "loss"}),
+    ColumnPanel("phase", Axis("phase", "rad"), {"last cycle": "phase"}),
+    ColumnPanel("energy", Axis("dissipated energy", "J"), {"dissipated": "dissipated"}),
 )
 CURVE_PANELS: Panels = (
-    ("friction", FRICTION, {"steady sliding": "friction"}),
-    ("area", AREA_OF_CASE, {"steady sliding": CORRECTED}),
+    ColumnPanel("friction", FRICTION, {"steady sliding": "friction"}),
+    ColumnPanel("area", AREA_OF_CASE, {"steady sliding": CORRECTED}),
 )
 SHARES = {
     "friction": "error_friction",
@@ -334,9 +337,9 @@ Rows = Sequence[dict[str, Any]]
 
 def all_panels() -> Panels:
     """Return the panels of a sweep, with those of capabilities, in the order of the columns of sweep.csv."""
-    found = (*PANELS, *(panel for panels in answers("pictures", "SWEEP_PANELS") for panel in panels))
+    found = (*PANELS, *offered("SWEEP_PANELS"))
     place = names_of(SWEEP).index
-    return tuple(sorted(found, key=lambda panel: place(next(iter(panel[2].values())))))
+    return tuple(sorted(found, key=lambda panel: place(next(iter(panel.columns.values())))))
 
 
 def chart_sweep(directory: Path) -> list[Panel]:
@@ -353,12 +356,12 @@ def chart_sweep(directory: Path) -> list[Panel]:
     key = keys[0]
     word = key.split(".")[-1]
     x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
-    for panel, y, columns in panels:
-        series = _make_series(rows, key, columns)
+    for panel in panels:
+        series = _make_series(rows, key, panel.columns)
         if any(one.y.any() for one in series):  # after detachment there is neither friction nor area
             values = np.concatenate([one.x for one in series])
             wide = bool(values.min() > 0.0 and values.max() >= WIDE * values.min())
-            found.append(Panel(panel, x, y, series, log_x=wide))
+            found.append(Panel(panel.key, x, panel.y, series, log_x=wide))
     return found
 
 
@@ -405,7 +408,7 @@ def _named(key: str, value: Any) -> str:
     return text if word in PLACES else f"{word.replace('_', ' ')} {text}"
 
 
-def _make_series(rows: Rows, key: str, columns: dict[str, str]) -> list[Line]:
+def _make_series(rows: Rows, key: str, columns: Mapping[str, str]) -> list[Line]:
     """Return entries of the legend, and the lines of all columns: colours for the values of the first further key,
     dashes for those of the others, marks for the columns. Without further keys, columns have colours."""
     lines = {(hue, ", ".join(rest)): own for (hue, *rest), own in _split(rows, key).items()}

@@ -1,6 +1,6 @@
 """Charts of a run over time, distance, velocity, load or approach."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,11 +13,16 @@ from ..job.listing import answers
 from ..parallel.slab import Array
 from . import style
 from .cycles import friction_along, way_along
-from .panels import Axis, Line, Panel
+from .panels import Axis, ColumnPanel, Line, Panel, offered
 from .plotted_run import PlottedRun
 
 EARLY = 0.05  # half of the rows within this share of the time make a linear axis useless
 FEW_ROWS = 8
+LENGTHS = (
+    ColumnPanel("approach", Axis("approach", UNITS["approach"]), {"": "approach"}),
+    ColumnPanel("gap", Axis("mean gap", UNITS["mean_gap"]), {"": "mean_gap"}),
+    ColumnPanel("pressure", Axis("highest pressure", UNITS["max_pressure"]), {"": "max_pressure"}),
+)
 ENERGIES = {
     "work done": "work",
     "dissipated": "dissipated",
@@ -26,6 +31,7 @@ ENERGIES = {
     "snaps": "snap_loss",
     "slip": "slip_loss",
 }
+ENERGY = ColumnPanel("energy", Axis("energy", UNITS["work"]), ENERGIES)
 VISCOUS = "friction_viscous"  # friction of the body; in tables of runs with an interface
 
 
@@ -56,7 +62,7 @@ def chart_histories(run: PlottedRun, over: str = "") -> list[Panel]:
         return []
     along = _choose_abscissa(run, over)
     log = along.axis.unit == "s" and _steps_grow(along.values)
-    found = [replace(chart, stages=along.stages, log_x=log) for chart in _find_charts(run, along)]
+    found = [replace(chart, stages=along.stages, log_x=log) for chart in _find_panels(run, along)]
     if along.marked or along.loop:
         return found
     first, *others = (_add_theory(chart, run) for chart in found)
@@ -127,49 +133,36 @@ def _add_theory(chart: Panel, run: PlottedRun) -> Panel:
     return replace(chart, series=lines)
 
 
-def _find_charts(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
-    """Yield the panels of a run that show anything: key, measure, and lines by name."""
-    columns, free = run.columns, run.free
+def _find_panels(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
+    """Yield the panels of a run that show anything, those of columns first."""
     signed = run.backwards and not along.marked  # the axis of speed has no direction
-    friction = "friction coefficient" + "\nalong x" * signed
-    load_axis, load = run.load
-    area_axis, area = run.in_contact
-    panels: tuple[tuple[str, Axis, dict[str, Array], bool], ...] = (
-        (
-            "friction",
-            Axis(friction),
-            {"": columns["friction_x" if signed else "friction"]},
-            run.slides and bool(columns["friction"].any()),  # friction is 0 without a load
-        ),
-        ("area", area_axis, {"": area}, True),
-        (
-            "approach",
-            Axis("approach", UNITS["approach"]),
-            {"": np.where(load != 0.0, columns["approach"], np.nan)},
-            free and along.axis.name != "approach",
-        ),
-        ("gap", Axis("mean gap", UNITS["mean_gap"]), {"": columns["mean_gap"]}, not free and area.min() < 1.0),
-        ("pressure", Axis("highest pressure", UNITS["max_pressure"]), {"": columns["max_pressure"]}, True),
-        (
-            "load",
-            load_axis,
-            {"": load},
-            run.lasts and along.axis != load_axis and np.ptp(load) > 1e-9 * np.abs(load).max(),
-        ),
-        (
-            "energy",
-            Axis("energy", UNITS["work"]),
-            {name: columns[column] for name, column in ENERGIES.items() if column in columns},
-            run.lasts and bool(np.isfinite(columns["work"]).all()),
-        ),
-    )
-    for key, axis, lines, there in panels:
-        if there:
-            found = Panel(key, along.axis, axis, along.series(lines), bottom=key != "approach")
-            peak = key == "friction"
+    columns = dict(run.columns)
+    (load_axis, columns["load"]), (area_axis, columns["area"]) = run.load, run.in_contact
+    columns["approach"] = np.where(columns["load"] != 0.0, columns["approach"], np.nan)
+    friction = Axis("friction coefficient" + "\nalong x" * signed), {"": "friction_x" if signed else "friction"}
+    first = ColumnPanel("friction", *friction), ColumnPanel("area", area_axis, {"": "area"})
+    load = ColumnPanel("load", load_axis, {"": "load"})
+    shown = _shown(run, along, load_axis, columns)
+    for one in (*first, *LENGTHS, load, ENERGY, *offered("RUN_PANELS")):
+        lines = {name: columns[column] for name, column in one.columns.items() if column in columns}
+        if lines and shown.get(one.key, True):
+            found = Panel(one.key, along.axis, one.y, along.series(lines), bottom=one.key != "approach")
+            peak = one.key == "friction"
             yield found if along.marked or along.loop else replace(found, peak=peak, spikes=not peak)
     for panels_of in answers("pictures", "panels"):
         yield from panels_of(run, along)
+
+
+def _shown(run: PlottedRun, along: Abscissa, load_axis: Axis, columns: Mapping[str, Array]) -> dict[str, bool]:
+    """Return whether the panels that not all runs have show anything."""
+    load = columns["load"]
+    return {
+        "friction": run.slides and bool(columns["friction"].any()),  # friction is 0 without a load
+        "approach": run.free and along.axis.name != "approach",
+        "gap": not run.free and columns["area"].min() < 1.0,
+        "load": run.lasts and along.axis != load_axis and bool(np.ptp(load) > 1e-9 * np.abs(load).max()),
+        "energy": run.lasts and bool(np.isfinite(columns["work"]).all()),
+    }
 
 
 def describe_solve(run: PlottedRun) -> str:

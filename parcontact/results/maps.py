@@ -338,7 +338,8 @@ def draw_frames(
         else Panel("maps", *PLACES, colors=_colors(name, points, read(index), limits))
     )
     draw(replace(panel, title=f"{_words(name)}, {label}"), axes)
-    changing = (*axes.images, *axes.lines, *axes.spines.values(), axes.title)
+    lines = (one for one in axes.spines.values() if one.get_visible())
+    changing = (*axes.images, *axes.lines, *lines, axes.title)
     style.arrange(figure)  # the layout of the first frame is kept for all
     figure.set_layout_engine(None)
     for one in changing:

@@ -2,7 +2,7 @@
 
 A picture is a list of panels, which `draw` draws: lines with errors, stacks of bars, shaded ranges, a map."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -16,6 +16,7 @@ from matplotlib.image import AxesImage
 from matplotlib.ticker import MaxNLocator
 
 from .. import printed
+from ..job.listing import answers
 from ..parallel.slab import Array
 from . import style
 
@@ -53,6 +54,20 @@ class Axis:
 
     name: str
     unit: str = ""
+
+
+@dataclass(frozen=True)
+class ColumnPanel:
+    """A panel of a table, before its rows and its horizontal axis are chosen: `columns` by the names of their lines."""
+
+    key: str
+    y: Axis
+    columns: Mapping[str, str]
+
+
+def offered(name: str) -> list[ColumnPanel]:
+    """Return the panels of columns that capabilities add under a name: RUN_PANELS, CURVE_PANELS, ..."""
+    return [one for found in answers("pictures", name) for one in found]
 
 
 @dataclass(frozen=True)

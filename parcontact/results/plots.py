@@ -19,7 +19,7 @@ from ..files import hdf5
 from ..job.listing import answers
 from ..job.reading import CASES
 from . import band_charts, histories, maps, style, theory_table
-from .panels import Axis, Line, Panel, picture
+from .panels import Axis, Line, Panel, offered, picture
 from .plotted_run import PlottedRun
 from .results import KINDS, Results, read_cases, swept_keys
 
@@ -45,7 +45,10 @@ class PlotOptions:
     out: Path | None = None
 
     def __post_init__(self) -> None:
-        known = *PANELS, *(key for keys in answers("pictures", "KEYS") for key in keys), "steady", "maps"
+        others = [one.key for one in offered("RUN_PANELS")] + [
+            key for keys in answers("pictures", "KEYS") for key in keys
+        ]
+        known = *PANELS, *others, "steady", "maps"
         if unknown := [name for name in self.panels if name not in known]:
             raise InputError(f"--panels: there is no {unknown[0]!r}; choose from {', '.join(known)}")
         if unknown := [name for name in self.log if name not in ("x", "y", "none")]:

@@ -156,10 +156,12 @@ def figure_of(title: str, groups: Sequence[Sequence[Draw]], maps: Sequence[Draw]
 def set_height(figure: Figure, height: float) -> None:
     """Set the height [inch] of a figure, and lay it out for good: Matplotlib would draw it once more to save it.
 
-    A single layout keeps margins that labels needed at the height before, and the lowest leave the page.
+    At a new height a single layout keeps margins that labels needed at the height before, and the lowest leave the
+    page.
     """
+    layouts = 1 if height == figure.get_figheight() else 2
     figure.set_figheight(height)
-    for _ in range(2):
+    for _ in range(layouts):
         arrange(figure)
     figure.set_layout_engine(None)
 
@@ -211,10 +213,13 @@ def place_legends(rows: Sequence[Sequence[Axes]]) -> list[float]:
 
 def _find_entries(axes: Axes) -> dict[str, Artist]:
     """Return the entries of the legend of a panel, also those of a second vertical axis."""
-    place = axes.get_subplotspec()
-    both = [one for one in axes.figure.axes if one.get_subplotspec() == place]
-    pairs = (zip(*one.get_legend_handles_labels(), strict=True) for one in both)
+    pairs = (zip(*one.get_legend_handles_labels(), strict=True) for one in _on_the_same_place(axes))
     return {name: handle for each in pairs for handle, name in each}
+
+
+def _on_the_same_place(axes: Axes) -> list[Axes]:
+    """Return the axes of a panel: one, or two if it has a second vertical axis."""
+    return [one for one in axes.figure.axes if one.get_subplotspec() == axes.get_subplotspec()]
 
 
 def _find_look(handle: Any) -> tuple[str, ...]:
@@ -232,9 +237,9 @@ def _width(figure: Figure | SubFigure) -> float:
 def _add_legend(axes: Axes, entries: dict[str, Artist]) -> float:
     """Add the legend of a panel, and return the height that it needs below the panel [inch]."""
     width = _width(axes.figure) / panels_per_row(axes)
-    if len(entries) <= FEW_ENTRIES[width > NARROW] and ROOM + LETTER * max(map(len, entries)) < INSIDE * width:
-        top = next(one for one in reversed(axes.figure.axes) if one.get_subplotspec() == axes.get_subplotspec())
-        top.legend(entries.values(), entries)
+    few = len(entries) <= FEW_ENTRIES[width > NARROW] and len(_on_the_same_place(axes)) == 1
+    if few and ROOM + LETTER * max(map(len, entries)) < INSIDE * width:
+        axes.legend(entries.values(), entries)
         return 0.0
     under = axes.transAxes + ScaledTranslation(0.0, -UNDER_AXES, axes.figure.dpi_scale_trans)
     place = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "bbox_transform": under, "borderaxespad": 0.0}
@@ -261,6 +266,7 @@ MARKS |= {"1 day": TIMES["days"], "1 year": TIMES["years"]}  # ticks of a logari
 LETTER_OF_LABEL = 0.085  # width of a letter of a tick label [inch]
 LONGEST, TALLEST = 4.0, 1.25  # most width over height of a map, and most height over width, without stretching
 FEW_MARKS = 3  # least number of ticks
+LONG_NUMBER, ROUNDING = 1e4, 1e-9  # least number that has a power of ten in labels; of its logarithm
 FEW_DECADES = 1.5  # decades of a logarithmic axis below which minor ticks have labels
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -271,7 +277,16 @@ def label(axis: Axis, name: str, unit: str) -> None:
     if shown in TIMES and axis.get_scale() == "linear":
         axis.set_major_locator(_RoundTimes(size))
     axis.set_label_text(f"{name} [{shown}]" if shown else name)
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / size:.10g}".replace("-", "−")))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: _written(value / size)))
+
+
+def _written(value: float) -> str:
+    """Return the label of a tick: 20, or 2·10⁻⁵ for 2e-5 and 2·10⁴ for 20000."""
+    text = f"{value:.10g}"
+    if "e" not in text and abs(value) < LONG_NUMBER:
+        return text.replace("-", "−")
+    size = math.floor(math.log10(abs(value)) + ROUNDING)
+    return f"{value / 10.0**size:.10g}·{_power_of_ten(size)}".removeprefix("1·").replace("-", "−")
 
 
 def label_map(axes: Axes, size: tuple[float, float]) -> float:
@@ -290,14 +305,16 @@ def thin_log_ticks(axis: Axis) -> bool:
     low, high = axis.get_view_interval()
     few = bool(high < 10.0**FEW_DECADES * low)
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=5))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}" if few else _power_of_ten(value)))
+    axis.set_major_formatter(
+        FuncFormatter(lambda value, _: _written(value) if few else _power_of_ten(round(math.log10(value))))
+    )
     axis.set_minor_formatter(NullFormatter())
     return few
 
 
-def _power_of_ten(value: float) -> str:
-    """Return 10⁻³ for 1e-3: plain letters are drawn in a tenth of the time of a formula."""
-    return f"10{f'{math.log10(value):.0f}'.translate(RAISED)}" if value > 0.0 else ""
+def _power_of_ten(exponent: int) -> str:
+    """Return 10⁻³ for -3: plain letters are drawn in a tenth of the time of a formula."""
+    return f"10{str(exponent).translate(RAISED)}"
 
 
 def label_log_times(axis: Axis, name: str) -> bool:

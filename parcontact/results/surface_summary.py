@@ -97,7 +97,7 @@ def _spectra(sketch: Sketch, spectra: list[tuple[str, Array, Array, int]], of: A
     for cells, dashes in ((RESOLVED, ":"), (2, "--")):
         at = np.full(2, 2 * np.pi / (cells * cell))
         lines.append(Line(f"waves of {cells} cells", at, ends, {"color": style.GREY, "linestyle": dashes}))
-    return Panel("spectrum", Axis("wavenumber", "1/m"), of, lines, log_x=True, log_y=True)
+    return Panel("spectrum", Axis("wavenumber [1/m]"), of, lines, log_x=True, log_y=True)
 
 
 def _profiles(sketch: Sketch) -> Panel:
@@ -109,7 +109,7 @@ def _profiles(sketch: Sketch) -> Panel:
 def _over_directions(sketch: Sketch) -> Panel:
     kinds = [("measured", sketch.measured, 1), ("on the grid", sketch.found, 0)]
     spectra = [(name, each.q, each.psd_2d, number) for name, each, number in kinds if each is not None]
-    return _spectra(sketch, spectra, Axis("PSD over directions", "m⁴"))
+    return _spectra(sketch, spectra, Axis("PSD over directions [m⁴]"))
 
 
 NOT_SELF_AFFINE = "no self-affine range was found"

@@ -1,5 +1,5 @@
 """Panels of adhesion."""
 
-from ...results.panels import Axis
+from ...results.panels import Axis, ColumnPanel
 
-SWEEP_PANELS = (("pull-off", Axis("pull-off force", "N"), {"pull-off": "pull_off"}),)
+SWEEP_PANELS = (ColumnPanel("pull-off", Axis("pull-off force", "N"), {"pull-off": "pull_off"}),)

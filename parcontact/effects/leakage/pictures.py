@@ -15,7 +15,7 @@ from ...columns import UNITS
 from ...parallel.slab import Array
 from ...results import style
 from ...results.histories import Abscissa
-from ...results.panels import Axis, Colors, Line, Panel, picture
+from ...results.panels import Axis, Colors, ColumnPanel, Line, Panel, picture
 from ...results.plotted_run import PlottedRun
 from .flow import FloatMap, Flow
 
@@ -60,7 +60,7 @@ DECADES = 3  # decades of the flow on the colour scale
 SAME = 1e-6  # rounding: relative difference below which pressures are the same
 FLOWS = {"flow_x": "along x", "flow_y": "along y"}  # columns of a run
 KEYS = ("leakage", "leak")  # names of panels for --panels
-SWEEP_PANELS = (("leakage", Axis("conductivity", "m³"), {label: name for name, label in FLOWS.items()}),)
+SWEEP_PANELS = (ColumnPanel("leakage", Axis("conductivity", "m³"), {label: name for name, label in FLOWS.items()}),)
 KINDS = ("flow", "constriction")  # kinds of columns per direction
 LONG = 100.0  # ratio of times above which their axis is logarithmic
 

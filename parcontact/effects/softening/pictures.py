@@ -7,9 +7,9 @@ import numpy as np
 
 from ...parallel.slab import Array
 from ...results import style
-from ...results.panels import Axis, Line, Panel
+from ...results.panels import Axis, ColumnPanel, Line, Panel
 
-BAND_PANELS = {"strain_amplitude": ("bands strain", Axis("strain amplitude"))}
+BAND_PANELS = (ColumnPanel("bands strain", Axis("strain amplitude"), {"": "strain_amplitude"}),)
 POINTS = 200  # number of points of a line
 NAMES = ("G' storage", "G'' loss")
 
