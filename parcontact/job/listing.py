@@ -80,10 +80,28 @@ def plain_job(job: Any) -> dict[str, Any]:
     return data
 
 
-def unit(part: Part, key: str) -> str:
+def unit(kind: type[Part], key: str) -> str:
     """Return the unit of a key, from the brackets in its description; '' if it has none."""
-    found = re.search(r"\[([^\],]+)\]", type(part).model_fields[key].description or "")
+    found = re.search(r"\[([^\],]+)\]", kind.model_fields[key].description or "")
     return found.group(1) if found and found.group(1) != "-" else ""
+
+
+def unit_of_path(path: str) -> str:
+    """Return the unit of a key of a job such as history.1.velocity, if all keys of this name have the same; else ''."""
+    units = _units().get(path.split(".")[-1], set())
+    return next(iter(units)) if len(units) == 1 else ""
+
+
+@cache
+def _units() -> dict[str, set[str]]:
+    """Return the units of all keys by their names."""
+    capabilities.offers("section", "__name__")  # imports all sections
+    found, kinds = dict[str, set[str]](), [Part]
+    for kind in kinds:
+        kinds += kind.__subclasses__()
+        for key in kind.model_fields:
+            found.setdefault(key, set()).add(unit(kind, key).replace("deg C", "°C").replace("^2", "²"))
+    return found
 
 
 def rows(part: Part, path: str = "") -> Iterator[tuple[str, str, str]]:
@@ -108,10 +126,10 @@ def _unit_of(value: Any, part: Part, key: str) -> str:
     """Return the unit of a number, with the velocity of a ramp or the frequency of an oscillation; '' for words such as
     auto, and for mappings."""
     if isinstance(value, Ramp) and value.velocity:
-        return f"{unit(part, key)} at {text(value.velocity)} m/s"
+        return f"{unit(type(part), key)} at {text(value.velocity)} m/s"
     if isinstance(value, Oscillation | Swing):
-        return f"{unit(part, key)} at {text(value.frequency)} Hz"
-    return "" if isinstance(value, str | Part) else unit(part, key)
+        return f"{unit(type(part), key)} at {text(value.frequency)} Hz"
+    return "" if isinstance(value, str | Part) else unit(type(part), key)
 
 
 def listed_line(part: Part) -> str:

@@ -30,7 +30,7 @@ from .. import printed
 from ..columns import SWEEP, names_of
 from ..errors import InputError
 from ..job import load
-from ..job.listing import answers
+from ..job.listing import answers, unit_of_path
 from ..job.reading import STEADY_RESOLVED
 from ..parallel.slab import Array
 from . import style
@@ -183,27 +183,16 @@ def _stacked(columns: dict[str, Array], over: str, x: Axis) -> Panel:
 def _over_bands(
     key: str, columns: dict[str, Array], theory: dict[str, Array] | None, name: str, y: Axis = AREA
 ) -> Panel:
-    """Return a chart of the area over magnification, or of another column over wavelength, for some velocities."""
-    area, longest = y is AREA, float(columns["long_wavelength"].max())
-    x = Axis("magnification") if area else Axis("shortest wave of the band", "m")
-    series = []
-    for number, speed in enumerate(_some(np.unique(columns["velocity"]))):
-        for table, look in _tables(columns, theory, number):
-            rows = np.flatnonzero(np.isclose(table["velocity"], speed, rtol=1e-6))
-            rows = rows[np.argsort(table["band"][rows])]
-            short = table["short_wavelength"][rows]
-            label = printed.quantity(speed, "m/s") if table is columns else ""
-            series.append(Line(label, longest / short if area else short, table[name][rows], look))
-    series += [] if theory is None else [ENTRY]
+    """Return a panel of the area over magnification, or of another column over wavelength, for some velocities."""
+    longest = float(columns["long_wavelength"].max())
+    x = Axis("magnification") if y is AREA else Axis("shortest wave of the band", "m")
+    shown, by, series = _some(np.unique(columns["velocity"])), {"velocity": "m/s"}, list[Line]()
+    for table in filter(None, (columns, theory)):
+        kept = np.isclose(table["velocity"][:, None], shown, rtol=1e-6).any(axis=1)
+        some = {column: values[kept] for column, values in table.items()}
+        some["x"] = longest / some["short_wavelength"] if y is AREA else some["short_wavelength"]
+        series += _make_lines(some, "x", name, by) if table is columns else _make_thin(some, "x", name, by, "theory")
     return Panel(key, x, y, series, log_x=True)
-
-
-def _tables(
-    columns: dict[str, Array], theory: dict[str, Array] | None, number: int
-) -> Iterator[tuple[dict[str, Array], dict[str, object]]]:
-    yield columns, style.line(number) | {"marker": "o"}
-    if theory is not None:
-        yield theory, THEORY_LOOK | {"color": style.line(number)["color"]}
 
 
 def _some(speeds: Array) -> Sequence[float]:
@@ -302,9 +291,6 @@ def _make_thin(columns: dict[str, Array], x: str, y: str, by: dict[str, str], la
         yield Line("", line.x, line.y, look | ({"color": line.look["color"]} if by else {}))
 
 
-UNITS = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C", "force": "N", "size": "m", "distance": "m"}
-UNITS |= {"duration": "s", "work": "J/m²", "range": "m", "shear_modulus": "Pa", "modulus_inf": "Pa"}
-UNITS |= {"long_wavelength": "m", "short_wavelength": "m", "rms_height": "m", "frequency": "Hz", "amplitude": ""}
 MARKERS, DASHES = ("o", "s"), ("--", ":")  # markers of means, dashes of theories, by column of a panel
 THIN_CASE = 1.0  # tuning: width of lines of the theory [points]
 GREY, NOTHING = {"color": style.GREY}, np.zeros(0)  # entries of legends that hold for all colours
@@ -355,7 +341,7 @@ def chart_sweep(directory: Path) -> list[Panel]:
         return []
     key = keys[0]
     word = key.split(".")[-1]
-    x, found = Axis(word.replace("_", " "), UNITS.get(word, "")), []
+    x, found = Axis(word.replace("_", " "), unit_of_path(word)), []
     for panel in panels:
         series = _make_series(rows, key, panel.columns)
         if any(one.y.any() for one in series):  # after detachment there is neither friction nor area
@@ -404,7 +390,7 @@ def _named(key: str, value: Any) -> str:
     word = key.split(".")[-1].removesuffix("s")
     if not isinstance(value, float):
         return Path(str(value)).stem
-    text = printed.quantity(value, UNITS.get(word, ""))
+    text = printed.quantity(value, unit_of_path(key))
     return text if word in PLACES else f"{word.replace('_', ' ')} {text}"
 
 

@@ -23,7 +23,6 @@ from markupsafe import Markup, escape
 
 from .. import job as jobs
 from .. import streams
-from ..capabilities import offers
 from ..errors import InputError
 from ..files import files, hdf5, provenance
 from ..files.provenance import PROGRAM
@@ -35,7 +34,7 @@ from ..job.reading import CASES, RESOLVED, STEADY_RESOLVED, shown_job
 from ..printed import name_cases
 from . import info, plots, report_sections
 from .curve_tables import Chapter, ReportSection, ReportTable, compared_table, draw_panel, embed_file
-from .results import Results, swept_keys
+from .results import KINDS, Results, swept_keys
 from .slide import ERRORS
 
 LOGS = ("run.log", LOG)
@@ -147,15 +146,14 @@ def list_citations(job: Job | None) -> ReportSection:
     )
 
 
-KINDS = {  # kinds of results, by their table
-    "measures.csv": ("run", report_sections.describe_run),
-    "steady.csv": ("friction curve", report_sections.describe_curve),
-    "sweep.csv": ("sweep", report_sections.describe_sweep),
-    "study.csv": ("study", report_sections.describe_study),
+SHOWN = {  # words and sections of the kinds of results
+    "run": ("run", report_sections.describe_run),
+    "curve": ("friction curve", report_sections.describe_curve),
+    "sweep": ("sweep", report_sections.describe_sweep),
+    "study": ("study", report_sections.describe_study),
 }
-JOBS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
+ORIGINALS = {RESOLVED: "job.yaml", STEADY_RESOLVED: "steady.job.yaml", "study.resolved.yaml": "study.job.yaml"}
 MORE_TABLES = (
-    *(name for names in offers("results", "DATA") for name in names),
     *("cycles.csv", "theory.csv", "steady_waves.csv", "steady_theory.csv", "bands.csv", "bands_theory.csv"),
     *("sweep_mean.csv", "sweep_curves.csv", "sweep_curves_mean.csv"),
 )
@@ -164,35 +162,32 @@ ELSEWHERE = ("output.directory", "material.branches", "material.band")  # keys t
 
 def describe_directory(directory: Path) -> Chapter:
     """Return the chapter about a directory. Raises InputError if it has no results."""
-    there = [name for name in KINDS if (directory / name).is_file()]
+    results = Results(directory)
+    there = [kind for kind in results.kinds if kind in SHOWN]
     if not there:
-        raise InputError(f"{directory} has no results: it has none of {', '.join(KINDS)}")
-    sections = [KINDS[name][1](directory) for name in there]
-    if "steady.csv" in there:
+        raise InputError(f"{directory} has no results: it has none of {', '.join(KINDS[kind] for kind in SHOWN)}")
+    sections = [SHOWN[kind][1](directory) for kind in there]
+    if "curve" in there:
         sections.insert(0, report_sections.describe_friction(directory))
     found, title, cited, places = (read_logs(directory), "", list_citations(None), [f"{directory.absolute()}/"])
-    of_cases = (path for name in (RESOLVED, STEADY_RESOLVED) for path in sorted(directory.glob(f"cases/*/{name}")))
-    jobs_there = [*(directory / name for name in JOBS), *of_cases]
-    if resolved := next(
-        (path for path in jobs_there if path.is_file()), None
-    ):  # for a sweep, the job of its first case
+    if resolved := results.job_file:  # for a sweep, the job of its first case
         job, warnings = _read_job(resolved)
         title, places = job.title, [*_places(job), *places]
-        asked = _describe_job(job, resolved.with_name(JOBS[resolved.name]))
+        asked = _describe_job(job, resolved.with_name(ORIGINALS[resolved.name]))
         of_job = [asked, report_sections.material_section(job), report_sections.road_section(job)]
-        if there == ["sweep.csv"]:
+        if there == ["sweep"]:
             of_job[0] = replace(asked, sentences=[_describe_swept(directory)])
             of_job = [replace(one, title=f"{one.title} of the first case") for one in of_job]
             warnings = warnings_of_cases(directory) or warnings
         sections += of_job
-        if there[0] in ("measures.csv", "steady.csv"):
-            sections += costs(Results(directory, "run" if there[0] == "measures.csv" else "curve"), found, job)
+        if there[0] in ("run", "curve"):
+            sections += costs(results, found, job)
         cited = list_citations(job)
         sections.append(ReportSection("Warnings", found.warnings or warnings or ["There was no warning."]))
-    data = [embed_file(directory / name) for name in (*KINDS, *MORE_TABLES) if (directory / name).is_file()]
+    data = [embed_file(directory / name) for name in (*KINDS.values(), *MORE_TABLES) if results.has(name)]
     text = "The tables, in SI units and with all digits, are stored in this file:"
     sections += [origin_section(directory, found), cited, ReportSection("Data", [text], downloads=data)]
-    kinds = " and ".join(KINDS[name][0] for name in there)
+    kinds = " and ".join(SHOWN[kind][0] for kind in there)
     shown = [one.without(sorted(places, key=len, reverse=True)) for one in sections if one]
     here, there_is = Path.cwd(), directory.absolute()
     named = there_is.relative_to(here) if there_is.is_relative_to(here) else Path(there_is.name)

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from .. import printed
 from ..errors import InputError
 from ..files import hdf5
-from ..job.listing import answers
+from ..job.listing import answers, unit_of_path
 from ..job.reading import CASES
 from . import band_charts, histories, maps, style, theory_table
 from .panels import Axis, Line, Panel, offered, picture
@@ -207,7 +207,7 @@ def _name_cases(directories: Sequence[Path]) -> list[str]:
 
 def _name_value(key: str, value: Any) -> str:
     """Return a key of a sweep and its value as text, such as `velocity 100 mm/s`."""
-    shown = printed.quantity(value, band_charts.UNITS.get(key, ""), 4) if isinstance(value, float) else value
+    shown = printed.quantity(value, unit_of_path(key), 4) if isinstance(value, float) else value
     return f"{key} {shown}"
 
 

@@ -164,12 +164,8 @@ def describe_sweep(directory: Path) -> ReportSection:
 def _add_unit(name: str) -> str:
     """Return the name of a column of a sweep, or a key of its job, with its unit: `pull_off [N]`, `history.0.velocity
     [m/s]`."""
-    known = (
-        {column.name: column.unit for column in (*SWEEP, *STEADY)}
-        | band_charts.UNITS
-        | dict.fromkeys(slide.ERRORS, "relative")
-    )
-    unit = known.get(name) or band_charts.UNITS.get(name.split(".")[-1].removesuffix("s"), "")
+    known = {column.name: column.unit for column in (*SWEEP, *STEADY)} | dict.fromkeys(slide.ERRORS, "relative")
+    unit = known.get(name) or listing.unit_of_path(name)
     return f"{name} [{unit}]" if unit else name
 
 

@@ -10,7 +10,6 @@ from ...printed import quantity, span, stated_error, with_error
 from ...results.results import ExportedTable, Results
 
 TABLE = "leak.csv"
-DATA = (TABLE,)  # tables of a run that a report keeps
 EXPORTED = {  # columns for other programs
     "pressure": "pressure [Pa]",
     **{f"flow_{axis}": f"conductivity K along {axis} [m^3]" for axis in "xy"},
