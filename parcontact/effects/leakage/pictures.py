@@ -144,12 +144,13 @@ def chart_of(rows: Sequence[Any], over: str) -> Panel:
 
 def _flow_map(axis: str, size: tuple[float, float], gap: FloatMap, flow: Flow, flux: FloatMap) -> Panel:
     """Return the panel of the flow through a gap over its largest value, with a ring at the constriction."""
-    most = float(np.nanpercentile(flux, 99.9)) or 1.0  # all the flow may be in fewer cells
-    shown = flux / most if flow.position is not None else np.full_like(gap, np.nan)
-    least = 10.0**-DECADES if flow.position is not None else 2.0  # without a path there is no bar of colours
+    ring, least, shown = list[Line](), 2.0, np.full_like(gap, np.nan)  # without a path no bar of colours
+    if flow.position is not None:
+        ring.append(Line("", *_place(flow.position, size, gap.shape), RING))
+        most = float(np.nanpercentile(flux, 99.9)) or 1.0  # all the flow may be in fewer cells
+        least, shown = 10.0**-DECADES, flux / most
     where = (0.0, size[0], 0.0, size[1])
     colors = Colors(shown, where, SHARE, least, 1.0, blank="k", log=True, behind=np.where(gap > 0.0, gap, np.nan))
-    ring = [Line("", *_place(flow.position, size, gap.shape), RING)] if flow.position is not None else []
     title = f"along {axis}" if flow.percolates else f"along {axis}: closed, no path"
     return Panel("flow", Axis("x", "m"), Axis("y", "m"), ring, title, colors=colors)
 
