@@ -245,8 +245,8 @@ def chart_steady(directory: Path, over: str = "") -> list[Panel]:
         if name == "friction" and along == x and COLD in columns:
             series += _make_thin(columns | {name: columns[COLD]}, along, name, lines, "without feedback")
         if name in theory:
-            one = along == "reduced" and "load" not in lines  # over a_T v the theory is one line
-            series += _make_thin(theory, along, name, {} if one else lines, "theory")
+            alone = along == "reduced" and "load" not in lines  # over a_T v the theory is one line
+            series += _make_thin(theory, along, name, {} if alone else lines, "theory")
         found.append(Panel(key, axes[along], axes[name], series, log_x=True))
     with suppress(InputError):  # files of the job no longer exist
         job = load(directory / STEADY_RESOLVED)

@@ -121,12 +121,12 @@ def _shift(compound: Compound) -> Iterator[Panel]:
 
 
 NAMES = {"mu_max": "largest friction", "mu_dyn": "dynamic friction", "contact_area_corrected": "contact area"}
-MARKS = {
-    "mesh and time together": "o-",
-    "mesh with auto steps": "D-",
-    "mesh alone": "s--",
-    "time alone": "^:",
-}  # mark and dashes of a ladder
+MARKS = {  # mark and dashes of a ladder
+    "mesh and time together": ("o", "-"),
+    "mesh with auto steps": ("D", "-"),
+    "mesh alone": ("s", "--"),
+    "time alone": ("^", ":"),
+}
 INTEGRATORS = {"exponential": style.BLUE, "exponential-linear": style.GREEN, "backward-euler": style.RED}
 BAND = 5.0  # ratio of the edges of the grey band
 LEAST = 1e-7  # smallest error on the axis; smaller ones are drawn there
@@ -145,8 +145,8 @@ class StudyCurve:
 
     def over(self, x: Array) -> Line:
         """Return the line of the errors [%] over other values."""
-        mark, *dashes = MARKS[self.ladder]
-        look = {"color": INTEGRATORS[self.integrator], "marker": mark, "linestyle": "".join(dashes)}
+        mark, dashes = MARKS[self.ladder]
+        look = {"color": INTEGRATORS[self.integrator], "marker": mark, "linestyle": dashes}
         return Line(f"{self.ladder}, {self.integrator}", x, _per_cent(self.errors), look)
 
 

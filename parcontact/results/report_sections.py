@@ -382,11 +382,9 @@ def _moduli_over_frequency(job: Job) -> Panel:
     """Return the panel of storage and loss modulus over frequency, and of the loss tangent, at all relaxation times and
     frequencies that the job excites."""
     series, band = relaxation_of(job.material), excited_band(job)
-    ends = np.log10([*(1.0 / (2 * math.pi * series.relaxation_times))])
-    ends = ends.min() - DECADES, ends.max() + DECADES
-    if band:
-        ends = min(ends[0], math.log10(band[0])), max(ends[1], math.log10(band[1]))
-    frequency = np.logspace(*ends, MODULI_POINTS)
+    natural = np.log10(1.0 / (2 * math.pi * series.relaxation_times))
+    seen = [natural.min() - DECADES, natural.max() + DECADES, *map(math.log10, band or ())]
+    frequency = np.logspace(min(seen), max(seen), MODULI_POINTS)
     omega = 2 * math.pi * frequency
     value = np.asarray(complex_modulus(omega, series.modulus_inf, series.moduli, series.relaxation_times))
     moduli = [Line("G' storage", frequency, value.real), Line("G'' loss", frequency, value.imag, style.line(1))]

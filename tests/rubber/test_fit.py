@@ -46,7 +46,7 @@ def test_a_table_becomes_a_material(tmp_path: Path, main: "Main") -> None:
     found = jobs.load(job).material
     assert isinstance(found, jobs.Zener)
     assert len(found.branches) >= 12  # one for each decade
-    assert matplotlib.image.imread(tmp_path / "materials" / "rubber.png").shape[:2] == (900, 1200)
+    assert matplotlib.image.imread(tmp_path / "materials" / "rubber.png").shape[1] == 1160
     assert main(*words)[0] == 0  # its own files are made anew
     code, _, err = main("fit", "rubber.csv", "--poisson", "-1")
     assert code == 2
@@ -74,10 +74,10 @@ def moduli(tmp_path: Path, head: str, given: tuple[int, int], drawn: "list[Figur
 @pytest.mark.parametrize(
     ("head", "given", "label", "names"),
     [
-        ("f[Hz] E'[MPa] E''[MPa]", (0, 1), "Young's modulus [Pa]", ["E' measured", "E'' measured"]),
-        ("f[Hz] G'[MPa] G''[MPa]", (0, 1), "shear modulus [Pa]", ["G' measured", "G'' measured"]),
-        ("f[Hz] E'[MPa] tan_del[-]", (0, 2), "Young's modulus [Pa]", ["E' measured", "E'' = E' tan δ measured"]),
-        ("f[Hz] G''[MPa] tan_del[-]", (1, 2), "shear modulus [Pa]", ["G' = G'' / tan δ measured", "G'' measured"]),
+        ("f[Hz] E'[MPa] E''[MPa]", (0, 1), "Young's modulus [MPa]", ["E' measured", "E'' measured"]),
+        ("f[Hz] G'[MPa] G''[MPa]", (0, 1), "shear modulus [MPa]", ["G' measured", "G'' measured"]),
+        ("f[Hz] E'[MPa] tan_del[-]", (0, 2), "Young's modulus [MPa]", ["E' measured", "E'' = E' tan δ measured"]),
+        ("f[Hz] G''[MPa] tan_del[-]", (1, 2), "shear modulus [MPa]", ["G' = G'' / tan δ measured", "G'' measured"]),
     ],
 )
 def test_the_picture_shows_what_was_measured(

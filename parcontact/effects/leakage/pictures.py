@@ -116,7 +116,7 @@ def draw_leakage(
     circled = ", constriction circled" * any(flow.percolates for flow in flows)
     title = f"flow through the gap, {instant}\ncontact black{circled}"
     curve = [chart_of(rows, over)] if any(row.constriction > 0.0 for row in rows[1:]) else []
-    maps = [_flow_map(axis, size, gap, *each) for axis, *each in zip("xy", flows, fluxes, strict=True)]
+    maps = [_flow_map(axis, size, gap, flow, flux) for axis, flow, flux in zip("xy", flows, fluxes, strict=True)]
     with style.drawing():
         return style.save_figure(picture(title, [maps, curve] if curve else [maps]), path)
 
