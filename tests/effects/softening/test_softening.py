@@ -219,8 +219,8 @@ def test_pictures(tmp_path: Path) -> None:
     assert at.x.tolist() == [0.06]  # the other state has no friction
     assert (strains.key, strains.series[0].x.tolist(), strains.series[0].y.tolist()) == (
         "bands strain",
-        [1e-4, 1e-5],
-        [0.06, 0.08],
+        [1e-5, 1e-4],
+        [0.08, 0.06],
     )
     (tmp_path / "steady.resolved.yaml").write_text(data.replace("softening:", "hardening:"))  # not of this version
     assert "steady softening" not in [chart.key for chart in band_charts.chart_steady(tmp_path)]
