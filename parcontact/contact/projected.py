@@ -3,9 +3,8 @@
 Minimal residual steps, each projected onto the admissible pressures. On the working set c (pressure or penetration) of
 an admissible pressure x, a step combines the preconditioned residual t and the last two changes of x so that the sum of
 squares of `C R (A x - h)` is smallest (R: restrict to c, C: subtract the mean over c). Then negative pressures are put
-to 0, the load is restored, near by first (`LocalLoad`), and A is applied to x, so that the stored changes have exact
-images. A need not be symmetric. Convergence is not guaranteed: a solve is given up when its certificate no longer
-halves.
+to 0, x is scaled to the load, and A is applied to it, so that the stored changes have exact images. A need not be
+symmetric. Convergence is not guaranteed: a solve is given up when its certificate no longer halves.
 
 In a free box (`FreeSteadySolver`) proximal points follow where these steps do not help. The symbol of a padded box has
 waves with a negative real part, so that its resolvents may not exist (`splitting`). There the contact is the limit of
@@ -21,15 +20,13 @@ larger, 0 for the others.
 """
 
 import math
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import loop
-from ..parallel.regrid import RowExchange
-from ..parallel.slab import Array, Slab
+from ..parallel.slab import Array
 from ..physics.convolution import Convolution
 from ..physics.measures import Certificate
 from . import kernels
@@ -38,122 +35,7 @@ from .constraint import Box, scale_to_load
 from .preconditioner import ExtendedPreconditioner, Grids
 from .problem import Contact, MeanPressure, Operator
 
-CELL = 16  # tuning: side of a cell of `LocalLoad` [points]
-LEAST_SIDE = 4  # tuning: least side of a cell [points]; contacts may cycle with fewer
-MOST_GIVEN_BACK = 0.5  # tuning: largest share of its load that a cell loses
-
-
-class Cells(NamedTuple):
-    """Cells of `LocalLoad` on a rank: each has `rows` x `columns` points, and `above` rows of the first one belong to
-    another rank."""
-
-    rows: int
-    above: int
-    columns: int
-
-
-class LocalLoad:
-    """Removal of the load that cutting off negative pressures adds, near the points where it was added.
-
-    Scaling all pressures by one factor would remove it, but waves as long as the box would move every spot by more than
-    the gaps at its edge, and points would penetrate again. So each cell of CELL x CELL points loses what was added in
-    it, which changes the displacement only near by. Where points are closer along one direction, cells have fewer
-    points along the other, so that they are about square: in long cells, one spot would lose what another has gained,
-    and projected steps may cycle. Cells are the same on any number of ranks. The object holds no maps.
-    """
-
-    def __init__(self, slab: Slab, pairs: int = 0) -> None:
-        """Make cells on a grid where `pairs` doublings make cells square (`preconditioner.pairs_for`)."""
-        self._slab = slab
-        if slab.only_counts:
-            return
-        rows, columns = (max(CELL >> max(count, 0), LEAST_SIDE) for count in (pairs, -pairs))
-        touched = [_rows_of_cells(part, rows) for part in slab.dealt]
-        rank, self._width = slab.comm.rank, -(-slab.nx // columns)
-        ends = np.cumsum([0] + [part.stop - part.start for part in touched]).tolist()
-        stacked = [slice(start, stop) for start, stop in pairwise(ends)]
-        self._stack = Slab(slab.comm, 2 * self._width, ends[-1], slab.tally, stacked.__getitem__)
-        numbers = np.concatenate([np.arange(part.start, part.stop) for part in touched])
-        wanted = np.searchsorted(numbers, [(part.start, part.stop) for part in touched])
-        self._exchange = RowExchange.of_parts(self._stack, wanted)
-        own = np.arange(touched[rank].start, touched[rank].stop)
-        self._starts = np.searchsorted(numbers[slice(*wanted[rank].tolist())], own)
-        self._cells = Cells(rows, slab.rows.start % rows, columns)
-        self._sums = np.zeros(self._stack.shape)
-
-    def cut_off(self, p: Array) -> tuple[float, float]:
-        """Put negative pressures to 0. Return the sum of p and of what this has added; collective."""
-        cut_off_cells(p, self._cells, self._sums)
-        loads, added = self._sums[:, : self._width], self._sums[:, self._width :]
-        load, cut = self._slab.sum(float(loads.sum()), float(added.sum()))
-        return load, cut
-
-    def restore(self, p: Array, load: float, total: float, near_by: bool) -> None:
-        """Scale p from the sum `load`, as `cut_off` returned it, to the sum `total`; collective. If `near_by`, each
-        cell first loses what was added in it, at most MOST_GIVEN_BACK of its load."""
-        if not near_by:
-            p *= total / load
-            return
-        loads, shares = self._sums[:, : self._width], self._shares()
-        load -= self._slab.sum(float(np.sum(shares * loads)))[0]
-        scale_cells(p, self._cells, total / load * (1.0 - shares))
-
-    def _shares(self) -> Array:
-        """Return the share of its load that each cell with points on this rank loses; collective."""
-        parts = self._exchange.fetch(self._sums)
-        whole = np.add.reduceat(parts, self._starts, axis=0) if len(parts) else parts
-        loads, added = whole[:, : self._width], whole[:, self._width :]
-        shares = np.divide(added, loads, out=np.zeros_like(loads), where=loads > 0.0)
-        return np.minimum(shares, MOST_GIVEN_BACK)
-
-
-def _rows_of_cells(part: slice, rows: int) -> slice:
-    """Return the rows of cells that contain given rows of points, for cells of `rows` rows."""
-    start = part.start // rows
-    return slice(start, max(-(-part.stop // rows), start) if part.stop > part.start else start)
-
-
-@loop
-def cut_off_cells(p, cells, sums):
-    """Put `max(p, 0)` into p; put the sums of p over cells into the first half of `sums`, and those of what was added
-    into the second. Rows of a cell are added up first, so that the loop is vectorized."""
-    columns = sums.shape[1] // 2
-    load, cut = np.empty(p.shape[1]), np.empty(p.shape[1])
-    for j in range(sums.shape[0]):
-        for i in range(sums.shape[1]):
-            sums[j, i] = 0.0
-    for i in range(p.shape[1]):
-        load[i] = cut[i] = 0.0
-    for j in range(p.shape[0]):
-        for i in range(p.shape[1]):
-            value = p[j, i]
-            kept = 0.0 if value < 0.0 else value
-            p[j, i] = kept
-            load[i] += kept
-            cut[i] += kept - value
-        if (j + cells.above + 1) % cells.rows == 0 or j + 1 == p.shape[0]:
-            row = sums[(j + cells.above) // cells.rows]
-            for i in range(p.shape[1]):
-                row[i // cells.columns] += load[i]
-                row[columns + i // cells.columns] += cut[i]
-                load[i] = cut[i] = 0.0
-
-
-@loop
-def scale_cells(p, cells, factors):
-    """Multiply each pressure by the factor of its cell."""
-    line = np.empty(p.shape[1])
-    for j in range(p.shape[0]):
-        if j == 0 or (j + cells.above) % cells.rows == 0:
-            row = factors[(j + cells.above) // cells.rows]
-            for i in range(line.size):
-                line[i] = row[i // cells.columns]
-        for i in range(p.shape[1]):
-            p[j, i] *= line[i]
-
-
 Set = NDArray[np.bool_]
-LEAST_CUT = 3e-4  # tuning: share of the load; less added load is removed by one factor for all points
 DIRECTIONS = 3  # the residual and the last two changes
 SQUARES, WIDE = 5, 0.5  # tuning: grids of squares and floor of `ExtendedPreconditioner`
 NARROW = Grids(4), 1.0  # tuning: the same on lines; larger cells or a smaller floor may make sets cycle there
@@ -172,13 +54,10 @@ class Projected:
     """Projected steps on one grid. It holds DIRECTIONS maps t, their images w, the displacement, a byte per point, and
     the maps of `ExtendedPreconditioner`.
 
-    `pairs` doublings make cells square. `least_cut` is the least added load that is removed near by, over the
-    load and on squares; the smaller cells of `pairs` reduce it.
+    `pairs` doublings make cells square.
     """
 
-    def __init__(
-        self, judge: Judge, operator: Operator, preconditioner: Operator, pairs: int = 0, least_cut: float = LEAST_CUT
-    ) -> None:
+    def __init__(self, judge: Judge, operator: Operator, preconditioner: Operator, pairs: int = 0) -> None:
         self.judge, self.operator, self.preconditioner = judge, operator, preconditioner
         self.slab = slab = judge.slab
         self.t, self.w = ([slab.empty() for _ in range(DIRECTIONS)] for _ in range(2))
@@ -186,17 +65,16 @@ class Projected:
         self._working: NDArray[Any] = slab.zeros(np.bool_)
         grids, floor = extension_on(slab.nx, slab.ny, pairs)
         self.extended = ExtendedPreconditioner(slab, floor, grids)
-        self.local_load, self._least_cut = LocalLoad(slab, pairs), least_cut / 2.0 ** abs(pairs)
 
-    def solve(self, h: Array, mean: float, p: Array, tolerance: float, patience: int, near_by: bool = True) -> Contact:
+    def solve(self, h: Array, mean: float, p: Array, tolerance: float, patience: int) -> Contact:
         """Solve for heights h under the mean pressure `mean`; the solution overwrites the start p. A start that is 0
-        everywhere is replaced by a uniform pressure. Restore the load `near_by` first, or from all points by one
-        factor. Give up if the certificate does not halve in `patience` steps. Collective."""
+        everywhere is replaced by a uniform pressure. Give up if the certificate does not halve in `patience` steps.
+        Collective."""
         steps, best, since = 0, math.inf, 0
         try:
             d, certificate = self._begin(h, mean, p)
             while certificate.worst > tolerance and since < patience:
-                self.step(p, self._u, h, self._working, mean * self.slab.points, near_by)
+                self.step(p, self._u, h, self._working, mean * self.slab.points)
                 d, certificate = self._certify(h, mean, p)
                 halved, steps = certificate.worst <= 0.5 * best, steps + 1
                 best, since = (certificate.worst, 0) if halved else (best, since + 1)
@@ -223,7 +101,7 @@ class Projected:
     def _certify(self, h: Array, mean: float, p: Array) -> tuple[float, Certificate]:
         return self.judge.certify(p, self._u, h, MeanPressure(mean), self._working)
 
-    def step(self, x: Array, u: Array, h: Array, working: Set, load: float, near_by: bool = True) -> None:
+    def step(self, x: Array, u: Array, h: Array, working: Set, load: float) -> None:
         """Move x to an admissible pressure with the sum `load`, and update its image u; collective."""
         members, total = self.slab.sum(*gaps_on(working, u, h))
         level, t = total / members, self.t[0]
@@ -234,14 +112,14 @@ class Projected:
         self.operator.apply(t, self.w[0])
         sums = np.array(self.slab.sum(*_gram(working, u, h, level, *self.w)))
         a, b, c = self.slab.agree(_smallest(sums, members))
-        _move(working, a, b, c, self.t[0], self.t[1], self.t[2], x)
+        (now,) = self.slab.sum(_move(working, a, b, c, self.t[0], self.t[1], self.t[2], x))
         self.w[2][...] = u
-        now, cut = self.local_load.cut_off(x)
         if not now > 0.0:  # earlier changes took all load off this set; t alone leaves it
             np.multiply(self.t[0], sums[3] / (sums[6] - sums[0] ** 2 / members), out=x, where=working)
             np.subtract(self.t[2], x, out=x, where=working)
-            now, cut = self.local_load.cut_off(x)
-        self.local_load.restore(x, now, load, near_by and cut > self._least_cut * now)
+            np.maximum(x, 0.0, out=x)
+            (now,) = self.slab.sum(kernels.sum_of(x))
+        x *= load / now
         self.operator.apply(x, u)
         self._keep_change(x, u)
 
@@ -295,13 +173,20 @@ def _gram(working, u, h, level, a, b, c):
 
 @loop
 def _move(working, along_a, along_b, along_c, a, b, c, x):
-    """Move x on the set, put 0 elsewhere, and leave the old x in c."""
+    """Move x on the set, put 0 elsewhere and where it would be negative, and leave the old x in c. Return the sum of
+    the new x."""
+    total = 0.0
     for j in range(x.shape[0]):
+        row = 0.0
         for i in range(x.shape[1]):
             old = x[j, i]
             value = old - along_a * a[j, i] - along_b * b[j, i] - along_c * c[j, i]
+            value = 0.0 if value < 0.0 else value
             x[j, i] = value if working[j, i] else 0.0
+            row += x[j, i]
             c[j, i] = old
+        total += row
+    return total
 
 
 @loop
@@ -331,7 +216,6 @@ def sum_on(working, z):
 
 
 PATIENCE = 20  # tuning: limit on projected steps in which the certificate must halve
-LEAST_CUT_INSIDE = 1.5e-5  # tuning: LEAST_CUT of contacts with less loss
 INNER_PATIENCE = 12  # tuning: limit on projected steps of a contact with less loss in which its certificate must halve
 SHARE, MOST = 0.3, 0.5  # tuning: tolerance of the next contact over the last certificate; up to MOST after a failure
 LEAST = 0.3  # tuning: least tolerance of a contact, over the tolerance of the solve
@@ -357,10 +241,9 @@ class FreeSteadySolver:
     def solve(self, h: Array, mean: float, start: Array) -> Contact:
         """Solve for heights h under the mean pressure `mean`; collective. The solution overwrites the pressure `start`.
         A start that is 0 everywhere is replaced by a uniform pressure."""
-        for near_by in (True, False):
-            contact = self._projected.solve(h, mean, start, self._tolerance, PATIENCE, near_by)
-            if contact.converged:
-                return contact
+        contact = self._projected.solve(h, mean, start, self._tolerance, PATIENCE)
+        if contact.converged:
+            return contact
         return self.hold_all().solve(h, mean, start, self._tolerance)
 
 
@@ -371,7 +254,7 @@ class _Points:
         kind = operator.dtype
         nearer, nearer_inverse = operator.mapped(_nearer, kind), preconditioner.mapped(_nearer_inverse, kind)
         self._judge, self._operator, self._pull = judge, operator, operator.mapped(_pull, np.float64)
-        self._inner = Projected(judge, nearer, nearer_inverse, pairs, LEAST_CUT_INSIDE)
+        self._inner = Projected(judge, nearer, nearer_inverse, pairs)
         self._h, self._kept, self._u = (judge.slab.empty() for _ in range(3))
         self._working: NDArray[Any] = judge.slab.zeros(np.bool_)
 

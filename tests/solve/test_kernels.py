@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from parcontact.contact import kernels
 from parcontact.contact.constraint import Box, scale_to_load
-from parcontact.contact.projected import CELL, Cells, cut_off_cells, scale_cells
 from parcontact.parallel.slab import Slab
 from parcontact.physics import loops
 
@@ -119,29 +118,3 @@ def test_scale_to_load(box: Box, share: float, dtype: type[np.floating]) -> None
     p.fill(box.lowest)
     scale_to_load(slab, box, p, float(p.sum()), total)
     np.testing.assert_allclose(p, total / slab.points, rtol=1e-14)
-
-
-# -- cells that give back the load that was added in them -------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("high", "above"), [(CELL, 0), (CELL, 3), (4, 3)])
-@pytest.mark.parametrize("wide", [CELL, 4])
-@pytest.mark.parametrize("shape", [(40, 33), (1, 1), (16, 16)])
-def test_cells(shape: tuple[int, int], high: int, above: int, wide: int, dtype: type[np.floating]) -> None:
-    """Pressures cut off at 0, what that adds to each cell, and cells scaled one by one; the first is cut by a rank."""
-    maps = Maps(shape, dtype)
-    p = maps.wide("u").copy()
-    rows, columns = (shape[0] + above - 1) // high + 1, (shape[1] - 1) // wide + 1
-    sums, factors = np.full((rows, 2 * columns), 9.0), np.random.default_rng(2).random((rows, columns))
-    cut_off_cells(p, Cells(high, above, wide), sums)
-    kept = np.maximum(maps.wide("u"), 0.0)
-    assert np.array_equal(p, kept)
-    whole = np.zeros((2, rows * high, columns * wide))
-    whole[0, above : above + shape[0], : shape[1]] = kept
-    whole[1, above : above + shape[0], : shape[1]] = kept - maps.wide("u")
-    expected = whole.reshape(2, rows, high, columns, wide).sum(axis=(2, 4))
-    np.testing.assert_allclose(sums, np.hstack(list(expected)), atol=1e-12)
-    before = p.copy()
-    scale_cells(p, Cells(high, above, wide), factors)
-    of_points = np.repeat(np.repeat(factors, high, axis=0), wide, axis=1)[above : above + shape[0], : shape[1]]
-    np.testing.assert_allclose(p, before * of_points, rtol=1e-15)

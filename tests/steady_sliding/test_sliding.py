@@ -1,6 +1,5 @@
 """Steady sliding against tables of other methods, closed forms, and its own residual recomputed."""
 
-from functools import partialmethod
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,6 @@ from steady_scenes import CREEP_TIME, G0, RADIUS, certificate, sliding
 
 from parcontact import Simulation
 from parcontact.contact import splitting
-from parcontact.contact.projected import Projected
 from parcontact.door import memory, plan
 from parcontact.errors import RunError
 from parcontact.job import Job
@@ -222,24 +220,6 @@ def test_soft_along_the_sliding(shared_path: Path, comm: MPI.Intracomm) -> None:
         assert point.operator_calls <= 100
         if velocity[0]:
             assert certificate(states, velocity[0], 4e7) <= 1e-4 * (1 + 1e-6)
-
-
-def test_load_is_taken_back_near_by(shared_path: Path, comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Scaling all pressures for what is cut off at edges disturbs waves as long as the box, which takes more than five
-    times the calls of projected steps here. Friction agrees to 1e-3, its usual error where certificates are 5e-3."""
-    text = (
-        "grid: {points: 256, size: 1.0e-3}\n"
-        "surface: {shape: rough, hurst: 0.9, long_wavelength: 2.5e-4, short_wavelength: 6.25e-5, rms_slope: 0.02}\n"
-        "material: {model: zener, modulus_inf: 1.0e6, branches: [{modulus: 1.0e7, relaxation_time: 1.0e-3}]}\n"
-        "history: [{pressure: 1.0}]\n"
-    )
-    monkeypatch.setattr(splitting, "LIGHT", 1.1)
-    monkeypatch.setattr(splitting, "PATIENCE", 1000)  # projected steps alone
-    near_by = sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5)
-    monkeypatch.setattr(Projected, "solve", partialmethod(Projected.solve, near_by=False))
-    everywhere = sliding(shared_path, text, comm).solve((0.1, 0.0), 1e5)
-    assert 5.0 * near_by.operator_calls < everywhere.operator_calls
-    assert near_by.measures.friction == pytest.approx(everywhere.measures.friction, rel=1e-3)
 
 
 def test_random_scenes_are_right_or_say_so(shared_path: Path, comm: MPI.Intracomm) -> None:

@@ -11,7 +11,7 @@ from scipy.interpolate import PchipInterpolator
 from parcontact.contact.certificate import Judge
 from parcontact.contact.constraint import Box, InterfaceLaw
 from parcontact.contact.problem import Approach, MeanPressure
-from parcontact.contact.projected import CELL, MOST_GIVEN_BACK, LocalLoad, Projected
+from parcontact.contact.projected import Projected
 from parcontact.contact.splitting import RELAXATION, Acceleration, Splitting
 from parcontact.errors import InputError
 from parcontact.parallel.fft import FFT
@@ -93,79 +93,6 @@ def test_pressures_are_cut_off_and_stay_on_the_set() -> None:
     assert x[1, 1] > 1.0
     assert x.sum() == pytest.approx(6.0, rel=1e-15)
     np.testing.assert_array_equal(u, x)
-
-
-# -- cutting off at 0 and taking back near by, against the same with blocks of numpy, on any ranks --------------------
-
-CUT_ROUNDING, TOTAL = 1e-13, 3.0
-ANY_RANKS = pytest.mark.parametrize("shape", [(1, 1), (7, 40), (33, 16), (50, 37), (64, 64)])
-
-
-def cut_off(values: Map, near_by: bool = True, pairs: int = 0) -> tuple[slice, Map, float, float]:
-    """The rows that this rank has, their pressure after the cut, made to have the sum TOTAL, and the load and the cut
-    that are returned."""
-    slab = Slab(MPI.COMM_WORLD, values.shape[1], values.shape[0])
-    p, local = values[slab.rows].copy(), LocalLoad(slab, pairs)
-    load, cut = local.cut_off(p)
-    if load > 0.0:
-        local.restore(p, load, TOTAL, near_by)
-    return slab.rows, p, load, cut
-
-
-def expected(values: Map, rows: int, columns: int) -> Map:
-    """Cell by cell, of a given number of rows and columns."""
-    out = np.maximum(values, 0.0)
-    for j in range(0, values.shape[0], rows):
-        for i in range(0, values.shape[1], columns):
-            cell = np.s_[j : j + rows, i : i + columns]
-            load = out[cell].sum()
-            share = min((load - values[cell].sum()) / load, MOST_GIVEN_BACK) if load > 0.0 else 0.0
-            out[cell] *= 1.0 - share
-    return out
-
-
-def pressures(shape: tuple[int, int], sunk: float) -> Map:
-    """Random numbers from -sunk to 1 - sunk."""
-    return np.random.default_rng(1).random(shape) - sunk
-
-
-@pytest.mark.mpi
-@ANY_RANKS
-@pytest.mark.parametrize("sunk", [0.1, 0.45, 0.9])
-@pytest.mark.parametrize(
-    ("near_by", "pairs", "cell"),
-    [
-        (True, 0, (CELL, CELL)),
-        (True, 1, (8, CELL)),
-        (True, 4, (4, CELL)),
-        (True, -2, (CELL, 4)),
-        (False, 0, (CELL, CELL)),
-    ],
-)
-def test_each_cell_gives_back_what_was_added_in_it(
-    shape: tuple[int, int], sunk: float, near_by: bool, pairs: int, cell: tuple[int, int]
-) -> None:
-    """Cells have fewer rows where pairs along x make square cells, fewer columns where pairs along y do, but four at
-    least."""
-    values = pressures(shape, sunk)
-    rows, p, load, cut = cut_off(values, near_by, pairs)
-    whole = np.maximum(values, 0.0)
-    np.testing.assert_allclose(load, whole.sum(), rtol=CUT_ROUNDING)
-    np.testing.assert_allclose(cut, (whole - values).sum(), rtol=CUT_ROUNDING, atol=CUT_ROUNDING)
-    if load > 0.0:
-        kept = expected(values, *cell) if near_by else whole
-        np.testing.assert_allclose(p, (TOTAL / kept.sum() * kept)[rows], rtol=CUT_ROUNDING)
-
-
-def test_nothing_and_not_a_number() -> None:
-    """Pressures that are all negative leave 0; what is not a number stays so."""
-    assert cut_off(np.full((20, 20), -1.0))[2] == 0.0
-    values = pressures((20, 20), 0.4)
-    values[3, 3] = np.nan
-    _, p, load, cut = cut_off(values)
-    assert np.isnan(load)
-    assert np.isnan(cut)
-    assert np.isnan(p[3, 3])
 
 
 # -- acceleration -----------------------------------------------------------------------------------------------------
