@@ -47,7 +47,7 @@ SMALL = {
     ),
     "error_coverage": Small(["--scenes", "2", "--from", "15"], r"(?s)fitted: 2 \| area .*2 scenes; written: ", (0, 1)),
     "every_job": Small(["--only", "westergaard"], r"(?m)^westergaard: good .*\n1 jobs: 0 wrong"),
-    "fuzz_jobs": Small(["--jobs", "40"], r"(?m)^40 made: 0 with faults; "),
+    "fuzz_jobs": Small(["--jobs", "15"], r"(?m)^15 made: 0 with faults; "),
     "launch": Small(["sh", "-c", "echo started"], r"^started$"),  # how it stops: tests/robustness/test_faults.py
     "manual_pages": Small(["--to", "pages", "--no-notebooks"], r"(?m)^\d\d pages in pages"),
     "march_errors": Small(["--marches", "1"], r"(?m)^exponential +0.01 +[0-9.]+ "),
