@@ -255,14 +255,6 @@ class Grids(NamedTuple):
 ALL = Grids()
 
 
-def pairs_for(dx: float, dy: float) -> int:
-    """Return how many doublings along x make points at distances dx and dy about square; negative for doublings along
-    y; 0 if the ratio exceeds LONG."""
-    if max(dx, dy) > LONG * min(dx, dy):
-        return 0
-    return round(math.log2(dy / dx))
-
-
 def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
     """Return the grids of larger cells for points at distances dx and dy.
 
@@ -272,7 +264,7 @@ def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
     """
     if max(dx, dy) > LONG * min(dx, dy):
         return Grids(0)
-    pairs = pairs_for(dx, dy)
+    pairs = round(math.log2(dy / dx))
     if reach == math.inf:
         return Grids(None, pairs)
     sizes = max(math.log2(reach / max(dx, dy)), -10.0)
@@ -285,14 +277,13 @@ class ExtendedPreconditioner:
     `known` is `w/(w + f)` of each cell; for points it is the set.
     """
 
-    def __init__(self, slab: Slab, floor: float = FLOOR, larger: Grids = ALL) -> None:
-        """Use the grids `larger` with this floor."""
+    def __init__(self, slab: Slab, larger: Grids = ALL) -> None:
         most, pairs, last = larger
         down, across = max(pairs, 0), max(-pairs, 0)
         self._levels = cell_levels(slab, pairs)[:most]
         grids = [level.coarse for level in self._levels]
         self._floors = [
-            (np.float32(floor) * lengths(slab.ny, level - down)[grid.rows], lengths(slab.nx, level - across))
+            (np.float32(FLOOR) * lengths(slab.ny, level - down)[grid.rows], lengths(slab.nx, level - across))
             for level, grid in enumerate(grids, 1)
         ]
         if self._floors and last > 1.0:

@@ -32,39 +32,27 @@ from ..physics.measures import Certificate
 from . import kernels
 from .certificate import Judge, describe_failure
 from .constraint import Box, scale_to_load
-from .preconditioner import ExtendedPreconditioner, Grids
+from .preconditioner import ALL, ExtendedPreconditioner, Grids
 from .problem import Contact, MeanPressure, Operator
 
 Set = NDArray[np.bool_]
 DIRECTIONS = 3  # the residual and the last two changes
-SQUARES, WIDE = 5, 0.5  # tuning: grids of squares and floor of `ExtendedPreconditioner`
-NARROW = Grids(4), 1.0  # tuning: the same on lines; larger cells or a smaller floor may make sets cycle there
-WITH_PAIRS = 0.3  # tuning: floor of `ExtendedPreconditioner` with pairs
-
-
-def extension_on(nx: int, ny: int, pairs: int) -> tuple[Grids, float]:
-    """Return grids and floor of `ExtendedPreconditioner` on nx x ny points, where `pairs` doublings make
-    cells square."""
-    if 1 in (nx, ny):
-        return NARROW
-    return Grids(SQUARES + abs(pairs), pairs), WITH_PAIRS if pairs else WIDE
 
 
 class Projected:
     """Projected steps on one grid. It holds DIRECTIONS maps t, their images w, the displacement, a byte per point, and
     the maps of `ExtendedPreconditioner`.
 
-    `pairs` doublings make cells square.
+    `grids` are those of the extension (`preconditioner.grids_for`).
     """
 
-    def __init__(self, judge: Judge, operator: Operator, preconditioner: Operator, pairs: int = 0) -> None:
+    def __init__(self, judge: Judge, operator: Operator, preconditioner: Operator, grids: Grids = ALL) -> None:
         self.judge, self.operator, self.preconditioner = judge, operator, preconditioner
         self.slab = slab = judge.slab
         self.t, self.w = ([slab.empty() for _ in range(DIRECTIONS)] for _ in range(2))
         self._u = slab.zeros()
         self._working: NDArray[Any] = slab.zeros(np.bool_)
-        grids, floor = extension_on(slab.nx, slab.ny, pairs)
-        self.extended = ExtendedPreconditioner(slab, floor, grids)
+        self.extended = ExtendedPreconditioner(slab, grids)
 
     def solve(self, h: Array, mean: float, p: Array, tolerance: float, patience: int) -> Contact:
         """Solve for heights h under the mean pressure `mean`; the solution overwrites the start p. A start that is 0
@@ -228,15 +216,15 @@ class FreeSteadySolver:
     those of `_Points`."""
 
     def __init__(
-        self, judge: Judge, operator: Convolution, preconditioner: Convolution, tolerance: float, pairs: int
+        self, judge: Judge, operator: Convolution, preconditioner: Convolution, tolerance: float, grids: Grids
     ) -> None:
         self._judge, self._operator, self._preconditioner = judge, operator, preconditioner
-        self._tolerance, self._pairs = tolerance, pairs
-        self._projected = Projected(judge, operator, preconditioner, pairs)
+        self._tolerance, self._grids = tolerance, grids
+        self._projected = Projected(judge, operator, preconditioner, grids)
 
     def hold_all(self) -> "_Points":
         """Allocate all maps that a solve may need."""
-        return _Points(self._judge, self._operator, self._preconditioner, self._pairs)
+        return _Points(self._judge, self._operator, self._preconditioner, self._grids)
 
     def solve(self, h: Array, mean: float, start: Array) -> Contact:
         """Solve for heights h under the mean pressure `mean`; collective. The solution overwrites the pressure `start`.
@@ -250,11 +238,11 @@ class FreeSteadySolver:
 class _Points:
     """Proximal points. They hold the symbols of `A + S`, of its inverse and of S, and three maps."""
 
-    def __init__(self, judge: Judge, operator: Convolution, preconditioner: Convolution, pairs: int) -> None:
+    def __init__(self, judge: Judge, operator: Convolution, preconditioner: Convolution, grids: Grids) -> None:
         kind = operator.dtype
         nearer, nearer_inverse = operator.mapped(_nearer, kind), preconditioner.mapped(_nearer_inverse, kind)
         self._judge, self._operator, self._pull = judge, operator, operator.mapped(_pull, np.float64)
-        self._inner = Projected(judge, nearer, nearer_inverse, pairs)
+        self._inner = Projected(judge, nearer, nearer_inverse, grids)
         self._h, self._kept, self._u = (judge.slab.empty() for _ in range(3))
         self._working: NDArray[Any] = judge.slab.zeros(np.bool_)
 

@@ -50,6 +50,7 @@ from ..physics.measures import Certificate
 from . import kernels
 from .certificate import Judge, describe_failure
 from .constraint import Box, Constraint
+from .preconditioner import ALL, Grids
 from .problem import Contact, Control, MeanPressure, Operator
 from .projected import Projected
 
@@ -345,7 +346,8 @@ class SteadySolver:
     afterwards.
 
     Parameters: `operator` A; `preconditioner` K near its inverse; `tolerance` on the certificate; `most`, a limit on
-    steps of the splitting; `pairs` of doublings that make cells square (`extension.pairs_for`).
+    steps of the splitting; `grids` of larger cells for projected steps
+    (`preconditioner.grids_for`).
     """
 
     def __init__(
@@ -355,10 +357,10 @@ class SteadySolver:
         preconditioner: Convolution,
         tolerance: float,
         most: int,
-        pairs: int = 0,
+        grids: Grids = ALL,
     ) -> None:
         self.judge, self.operator, self.preconditioner = judge, operator, preconditioner
-        self.tolerance, self.most, self.pairs = tolerance, most, pairs
+        self.tolerance, self.most, self.grids = tolerance, most, grids
 
     def hold_all(self) -> tuple[Splitting, Convolution]:
         """Allocate all maps that a solve may need: projected steps need fewer."""
@@ -370,7 +372,7 @@ class SteadySolver:
         `start`, which may be 0 everywhere."""
         (touching,) = self.judge.slab.sum(float((start > 0.0).sum()))
         if touching < LIGHT * self.judge.slab.points:
-            projected = Projected(self.judge, self.operator, self.preconditioner, self.pairs)
+            projected = Projected(self.judge, self.operator, self.preconditioner, self.grids)
             contact = projected.solve(h, mean, start, self.tolerance, PATIENCE)
             if contact.converged:
                 return contact

@@ -20,7 +20,7 @@ import numpy as np
 from ..contact import kernels, starts
 from ..contact.certificate import Judge, Lines
 from ..contact.constraint import Box
-from ..contact.preconditioner import pairs_for
+from ..contact.preconditioner import grids_for
 from ..contact.problem import Contact, reachable_certificate
 from ..contact.projected import FreeSteadySolver
 from ..contact.splitting import SteadySolver
@@ -231,11 +231,11 @@ class SteadySliding:
         lines = stiffer_lines(setup, velocity) if finest else None  # coarse grids only give starts
         judge = Judge(slab, setup.height / setup.units.height, lines)
         tolerance = max(self._tolerance, 0.0 if finest else COARSE_TOLERANCE)
-        pairs = pairs_for(setup.grid.lx / slab.nx, setup.grid.ly / slab.ny)
+        grids = grids_for(setup.grid.lx / slab.nx, setup.grid.ly / slab.ny)
         if setup.half_space.free:
-            return FreeSteadySolver(judge, *operators, tolerance, pairs), operator
+            return FreeSteadySolver(judge, *operators, tolerance, grids), operator
         most = STEPS_RATIO * setup.choices.numerics.max_iterations
-        return SteadySolver(judge, *operators, tolerance, most, pairs), operator
+        return SteadySolver(judge, *operators, tolerance, most, grids), operator
 
     def _operators(self, level: SteadyLevel, velocity: Vector) -> tuple[Convolution, Convolution]:
         """Return the operator at a velocity [m/s], and its inverse, approximate for a free body."""
