@@ -1,37 +1,28 @@
-"""The preconditioner of the contact solver.
+"""The preconditioner of the contact solver: K with residuals extended beyond the contact, and long waves of layers.
 
-Loops between points and cells of `wide` by `tall` points, each 2, or None for 1: a loop is compiled without the
-branches that a shape does not need.
-
-They take sums over cells, interpolate between cells, and apply the transposes of both. Interpolation takes 3/4 of
-the own cell of a point and 1/4 of the nearest other one.
-
-Extension of a residual beyond its set of points, and the transpose of the extension.
-
-A preconditioner K, the inverse of A without a contact set, turns a residual r on a set c into the correction `R K R
-r` (R: restrict to c). This takes r as 0 outside c, whereas the wanted correction moves the surface outside c, too.
-With an extension E of r to all points, `R E' K E R` is symmetric and positive, as K is. It is the inverse of `R A R`
-if e = E r minimizes `<e, K e>`. At any distance from c this e varies over lengths of about the distance. So does the
-mean over cells of all sizes used here. With s the sum of r over a cell, w the number of its points in c, and I the
-linear interpolation between cells of twice the length,
+A preconditioner K, the inverse of A without a contact set, turns a residual r on a set c into the correction `R K R r`
+(R: restrict to c). This takes r as 0 outside c, whereas the wanted correction moves the surface outside c, too. With an
+extension E of r to all points, `R E' K E R` is symmetric and positive, as K is. It is the inverse of `R A R` if e = E r
+minimizes `<e, K e>`. At any distance from c this e varies over lengths of about the distance. So does the mean over
+cells of all sizes used here. With s the sum of r over a cell, w the number of its points in c, and I the linear
+interpolation between cells of twice the length,
 
     e = (s + f I e_above)/(w + f),   f = FLOOR times the points of a cell,
 
 from the largest cell, above which e is 0, down to single points, with f = 0. The number of iterations then hardly
 grows with the grid. The grid is taken as periodic, also for free boxes. Maps of cells are in single precision.
 
-Grids of cells for `extension`: each cell joins two by two cells of the next finer grid, or a pair of them.
+Each cell joins two by two cells of the next finer grid, or a pair of them. Pairs come first, until points are about as
+far from each other along x as along y, as fields that are smooth over square cells are not smooth over long ones. A
+positive number of pairs joins along x, a negative one along y. The loops between points and cells take the sides of a
+cell, each 2, or None for 1, so that they are compiled without the branches that a shape does not need. Interpolation
+takes 3/4 of the own cell of a point and 1/4 of the nearest other one.
 
-Pairs come first, until points are about as far from each other along x as along y, as fields that are smooth over
-square cells are not smooth over long ones. A positive number of pairs joins along x, a negative one along y.
-
-Part of a preconditioner for pressure waves that are long compared with the thickness of a layer, within the contact.
-
-Such waves displace a layer by `u = c0 p - c2 laplace p`; a bonded incompressible layer, which flows along its base
-like a viscous film, has c0 = 0. There long waves are far stiffer than the softest wave. A preconditioner K of the
-whole box must limit their stiffness to that of the softest wave, because p vanishes outside contact, and patches of
-contact further from each other than the thickness do not interact. The missing part is the inverse of the equation
-above on the contact,
+Pressure waves that are long compared with the thickness of a layer need another part, within the contact. They displace
+a layer by `u = c0 p - c2 laplace p`; a bonded incompressible layer, which flows along its base like a viscous film, has
+c0 = 0. There long waves are far stiffer than the softest wave. A preconditioner K of the whole box must limit their
+stiffness to that of the softest wave, because p vanishes outside contact, and patches of contact further from each
+other than the thickness do not interact. The missing part is the inverse of the equation above on the contact,
 
     c0 z - c2 laplace z + c2 (1 - c)/l^2 z = r,
 
@@ -181,7 +172,7 @@ class CellLevel:
 
     @cached_property
     def _sides(self) -> tuple[int | None, int | None]:
-        """The shape of a cell as `cell_loops` takes it."""
+        """The shape of a cell as the loops take it."""
         wide, tall = self.step.shape
         return wide if wide > 1 else None, tall if tall > 1 else None
 
@@ -191,7 +182,7 @@ class CellLevel:
 
     @cached_property
     def _alone(self) -> bool:
-        """True if this rank has all rows, and no row of zeros is between the last and the first: `loops.row_of` then
+        """True if this rank has all rows, and no row of zeros is between the last and the first: `row_of` then
         finds the rows next to a map in the map itself."""
         return self.step.fine.comm.size == 1 and self.step.fine.ny % 2 == 0
 
@@ -245,7 +236,7 @@ Maps = list[NDArray[Any]]  # a map of points, followed by maps of cells on each 
 
 class Grids(NamedTuple):
     """Grids of larger cells: at most `most`, None for all; the first of them double cells along one side, `pairs` times
-    (`levels`); the floor of the last one is `last` times that of the others."""
+    (`cell_levels`); the floor of the last one is `last` times that of the others."""
 
     most: int | None = None
     pairs: int = 0

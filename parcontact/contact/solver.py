@@ -64,7 +64,7 @@ class ContactSolver:
 
     Parameters: `workspace`, the maps it works in; `height` of the surface, from its lowest to its highest point
     [unit of h]; `tolerance` on the certificate; `max_iterations`; `grids` of larger cells for the extension of
-    residuals (`extension.grids_for`); `free`, True for a box with nothing around it; `long_waves` of a layer, for
+    residuals (`preconditioner.grids_for`); `free`, True for a box with nothing around it; `long_waves` of a layer, for
     which K is not stiff enough.
     """
 

@@ -1,40 +1,33 @@
-"""Steady contact by accelerated splitting.
+"""Steady contact by accelerated splitting: a law of the interface, or an operator that is not symmetric.
 
-Anderson acceleration of an iteration `s <- s + f(s)` for a map s.
-
-With the last changes ds_j of s and df_j of the residual f,
-
-    theta = argmin |f - sum_j theta_j df_j|,    s <- s + R f - sum_j theta_j (ds_j + R df_j),
-
-R the relaxation (D. G. Anderson, J. ACM 12 (1965) 547; H. F. Walker, P. Ni, SIAM J. Numer. Anal. 49 (2011) 1715).
-Without earlier changes this is the plain iteration, relaxed. Changes are stored in single precision: s is advanced by
-the change that is stored.
-
-Contact with a law of the interface, or with an operator that is not symmetric, by accelerated splitting.
-
-Find p >= 0 with given mean P0 or given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`contact.constraint`). A is
-diagonal in Fourier space and c in real space, so that each is inverted exactly. With J_A(x) = (1 + gamma A)^-1 x
-shifted to the mean P0, or (1 + gamma A)^-1 (x + gamma d), with J_c the pressure of `Constraint.resolve`, and with a
-map s,
+Find p >= 0 with given mean P0 or given d, and `w = A p + c(p) - h - d >= 0`, `p w = 0` (`constraint`). A is diagonal in
+Fourier space and c in real space, so that each is inverted exactly. With J_A(x) = (1 + gamma A)^-1 x shifted to the
+mean P0, or (1 + gamma A)^-1 (x + gamma d), with J_c the pressure of `Constraint.resolve`, and with a map s,
 
     p = J_c(s),    y = J_A(2 p - s),    f = y - p,    s <- s + f
 
 (J. Douglas, H. H. Rachford, Trans. Amer. Math. Soc. 82 (1956) 421; P.-L. Lions, B. Mercier, SIAM J. Numer. Anal. 16
-(1979) 964). It converges for every gamma > 0 and every A with a real part >= 0, also for very large loss tangents, and
-is accelerated (`acceleration`). gamma is a multiple of pressure over displacement of the start, and over its closing as
-well if the start is near the solution: in light contact the law is softer than the body. From the start
+(1979) 964). It converges for every gamma > 0 and every A with a real part >= 0, also for very large loss tangents.
+gamma is a multiple of pressure over displacement of the start, and over its closing as well if the start is near the
+solution: in light contact the law is softer than the body. From the start
 
     s = p + gamma c(p) - gamma h where there is pressure,    s = -gamma (A p - d) elsewhere.
+
+Anderson acceleration takes the last changes ds_j of s and df_j of f into account,
+
+    theta = argmin |f - sum_j theta_j df_j|,    s <- s + R f - sum_j theta_j (ds_j + R df_j),
+
+with the relaxation R (D. G. Anderson, J. ACM 12 (1965) 547; H. F. Walker, P. Ni, SIAM J. Numer. Anal. 49 (2011) 1715).
+Without earlier changes this is the plain iteration, relaxed. Changes are stored in single precision: s is advanced by
+the change that is stored. Earlier changes are forgotten where f rises or stalls. The mean of p may be off the load by
+decades on the way; to return s to the load there, with or without earlier changes, makes solves fail.
 
 Only the certificate of an admissible pressure with the displacement `A p + c(p)` ends a solve. As it takes an
 application of A, it is made when the rms of f is small enough, judged by the last certificate over the rms of f.
 
-Contact with an operator that is not symmetric: steady sliding in the frame of the rigid surface, in periodic boxes.
-
-Find p >= 0 with mean P0 and `g = A p - h - d >= 0`, `p g = 0`. For a lossy body sliding at constant velocity, A is
-positive but not symmetric, and there is no energy to minimize. Accelerated splitting (`splitting`) solves it. In light
-contact, and from a start that is 0, projected steps (`projected`) come first as long as they help: they take fewer
-applications of A there. Only the certificate of an admissible pressure ends a solve.
+For a lossy body sliding at constant velocity, seen from the rigid surface, A is positive but not symmetric, and there
+is no energy to minimize. `SteadySolver` solves this contact in a periodic box. In light contact, and from a start that
+is 0, projected steps (`projected`) come first as long as they help: they take fewer applications of A there.
 """
 
 import math

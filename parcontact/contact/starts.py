@@ -1,40 +1,25 @@
-"""Starts of a contact solve: coarser grids, tiles, and further attempts.
+"""Starts of a contact solve, and further attempts after a failed one.
 
-Nested grids: a contact is solved on the coarsest grid first, and each solution is the start on the next
-finer grid.
+A solve without a guess starts from coarser grids: the contact is solved loosely on the coarsest grid first, and each
+solution is the start on the next finer one. The coarse pressure is the same in all fine cells of a coarse one, so that
+no point far from contact gets pressure.
 
-A dilute contact in a free box, solved on the tiles that may touch: the cost follows the contact, not the box.
-
-The contact on a coarser grid gives a pressure p on a grid of blocks, and p gives the displacement u there. A block
-can touch only if
+A dilute contact in a free box is solved on the tiles that may touch, so that the cost follows the contact, not the box.
+The contact on a coarser grid gives a pressure p on a grid of blocks, and p gives the displacement u there. A block can
+touch only if
 
     u - max(h) - d < MARGIN L,
 
-with L the length by which u varies within the contact (`certificate.Certificate`). Tiles with such blocks, with
-blocks under pressure, or with neighbours of these are stacked to one map. There `contact.ContactSolver` solves the
-same problem with operators on tiles (`physics.convolution`). These also give the displacement at all points of the
-grid, so that `contact.ContactSolver.check` can check the pressure everywhere. For tolerances below FINEST, or if the
-check fails, the operator of the whole grid checks the pressure, and the solve continues on the whole grid. Root
-solves and sends the result to all ranks.
+with L the length by which u varies within the contact (`measures.Certificate`). Tiles with such blocks, with blocks
+under pressure, or with neighbours of these are stacked to one map. There `ContactSolver` solves the same problem with
+operators on tiles (`physics.convolution`). These also give the displacement at all points of the grid, so that
+`ContactSolver.check` can check the pressure everywhere. For tolerances below FINEST, or if the check fails, the
+operator of the whole grid checks the pressure, and the solve continues on the whole grid. Root solves and sends the
+result to all ranks.
 
-A start without a guess: the contact is solved loosely on coarser grids first.
-
-The coarse pressure is the same in all fine cells of a coarse one, so that no point far from contact gets pressure.
-
-Further attempts after a failed contact solve: an operator in double precision, a cold start on nested grids, and an
-active set.
-
-A solve that succeeds neither calls nor allocates anything here. The attempts depend on the failed solve alone, so
-that all ranks make the same ones, and a repeated run repeats them.
-
-Contact by a primal-dual active set: solve for the pressure on a guessed contact, correct the guess, repeat.
-
-On a set of points contact is a linear problem, `A x = h + d` with x = 0 elsewhere, solved by preconditioned
-conjugate gradients. Then points with x < 0 leave the set and points that penetrate enter it (M. Hintermueller, K.
-Ito and K. Kunisch, SIAM J. Optim. 13 (2003) 865). A few sets are usual, but sets may cycle.
-
-The projected method (`contact`) is cheaper where it works. It changes its set in every step and never accumulates
-conjugate directions; it is slow where the preconditioner is far from an inverse, as on cells much longer than wide.
+A failed solve is repeated with an operator in double precision, from a cold start on nested grids, and by an active set
+(`solve_by_sets`). A solve that succeeds neither calls nor allocates anything for this. The attempts depend on the
+failed solve alone, so that all ranks make the same ones, and a repeated run repeats them.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -382,9 +367,16 @@ ITERATIONS_RATIO = 4  # tuning: limit on iterations of all sets, over max_iterat
 GAP_SHARE = 0.1  # tuning: largest gap on a set to which its linear problem is solved, over the tolerance
 
 
-def solve(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
-    """Solve as `ContactSolver.solve`, for a load that is not 0; collective. `iterations` of the contact counts
-    iterations of the linear problems."""
+def solve_by_sets(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
+    """Solve as `ContactSolver.solve` by a primal-dual active set, for a load that is not 0; collective.
+
+    On a set of points contact is a linear problem, `A x = h + d` with x at its bound elsewhere, solved by
+    preconditioned conjugate gradients. Then points with an x that is not admissible leave the set, and points whose
+    gap violates its condition enter it (M. Hintermueller, K. Ito and K. Kunisch, SIAM J. Optim. 13 (2003) 865). A few
+    sets are usual, but sets may cycle. `ContactSolver.solve` is cheaper where it works. It changes its set in every
+    step and never accumulates conjugate directions, and it is slow where the preconditioner is far from an inverse, as
+    on cells much longer than wide. `iterations` of the contact counts iterations of the linear problems.
+    """
     search = _Search(solver, problem, start)
     contact, iterations = solver.check(problem, start, ""), 0
     search.begin(contact)
@@ -516,4 +508,4 @@ def _attempts(
     contact = solver.solve(problem, p)
     yield "a cold start" if grids == 1 else f"a cold start on {grids} nested grids", contact
     if np.isfinite(contact.certificate.worst):
-        yield "sets of points", solve(solver, problem, p)
+        yield "sets of points", solve_by_sets(solver, problem, p)

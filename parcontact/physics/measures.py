@@ -75,7 +75,7 @@ class Certificate:
 
     at least LEAST_SHARE of the mean `<p, u>/<p>`, for contacts of one or two points, and at most the height of the
     surface. It does not depend on the size of the box. In steady sliding along lines of points, waves that do not vary
-    along the lines may have a far lower modulus, and most of the displacement (`iterate.Lines`).
+    along the lines may have a far lower modulus, and most of the displacement (`contact.certificate.Lines`).
     """
 
     complementarity: float

@@ -129,4 +129,4 @@ def test_the_approach_that_comes_of_a_load(mean: float) -> None:
 
 
 def by_sets(body: Bench, h: Map, control: MeanPressure) -> Contact:
-    return starts.solve(body.solver, body.problem(h, control), np.zeros_like(h))
+    return starts.solve_by_sets(body.solver, body.problem(h, control), np.zeros_like(h))

@@ -19,7 +19,7 @@ from ..bodies import TIGHT, Bench, Map, keep, rough, solver
 
 
 def found_by_sets(body: Bench, h: Any, control: MeanPressure | Approach, start: float = 0.0) -> Contact:
-    return starts.solve(body.solver, body.problem(h, control), np.full_like(h, start))
+    return starts.solve_by_sets(body.solver, body.problem(h, control), np.full_like(h, start))
 
 
 @pytest.mark.parametrize(("boundary", "kernel"), [("periodic", "spectral"), ("periodic", "love"), ("free", "love")])
