@@ -142,9 +142,9 @@ SENTENCES = {
         "{room:.3g} m from its centre; use a larger grid.size, a smaller load or a shorter distance"
     ),
     "slides out of the box": (
-        "the contact ends at ({x:.4g}, {y:.4g}) m with a radius of some {contact:.3g} m, and leaves the box of "
-        "{lx:g} x {ly:g} m, whose edge is {room:.3g} m from its centre; use a larger grid.size, a smaller load "
-        "or a shorter distance"
+        "a free box does not move with the surface: after {way:.3g} m of the {length:.3g} m that it slides, the "
+        "contact, with a radius of some {contact:.3g} m, reaches the edge of the box of {lx:g} x {ly:g} m and is cut "
+        "off there. Let it slide {way:.3g} m at most, use a larger grid.size, or put surface.0.center farther back"
     ),
     "images": (
         "its images in the periodic box of {lx:g} x {ly:g} m change the load at a given radius of contact by "

@@ -30,7 +30,7 @@ from .advice import Sections, more_points
 from .calculation import Grid, Output
 from .limits import count_steps
 from .materials import Elastic, PronyBranch, Zener
-from .stages import Stage
+from .stages import Stage, Swing
 from .surfaces import Cone, Flat, HeightFile, OnOneMesh, Pyramid, Rough, RoughSpectrum, Sphere, Topography, Wave
 
 STEEP = 0.5  # physics: largest rms slope that counts as small
@@ -221,19 +221,38 @@ def _room(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     modulus, found, elapsed = instant_contact_modulus(material), set(), 0.0
     for index, stage in enumerate(job.history):
         elapsed += stage.seconds
-        moving = stage.moving(stage.seconds)
-        x, y = x + stage.velocity[0] * moving, y + stage.velocity[1] * moving
         radius = _hertz(stage, sphere.radius, modulus, grid)
         if radius / sphere.radius > STEEPEST and "steep" not in found:
             found.add("steep")
             yield Doubt("large contact", f"history.{index}", {"contact": radius, "radius": sphere.radius})
-        room = min(x, grid.lx - x, y, grid.ly - y)
         radius = _hertz(stage, sphere.radius, _relaxed_contact_modulus(material, elapsed), grid)
-        if radius > room and radius > 0.0 and "room" not in found:
+        room = min(x, grid.lx - x, y, grid.ly - y)
+        way, length = _way_to_edge((x, y), stage, radius, grid.size), stage.speed * _longest_motion(stage)
+        if radius > 0.0 and (radius > room or way < length) and "room" not in found:
             found.add("room")
-            kind = "slides out of the box" if stage.speed and stage.seconds else "out of the box"
-            numbers = {"contact": radius, "lx": grid.lx, "ly": grid.ly, "x": x, "y": y, "room": max(room, 0.0)}
-            yield Doubt(kind, f"history.{index}", numbers)
+            numbers = {"contact": radius, "lx": grid.lx, "ly": grid.ly, "room": max(room, 0.0), "way": way}
+            kind = "out of the box" if radius > room else "slides out of the box"
+            yield Doubt(kind, f"history.{index}", {**numbers, "length": length})
+        moving = stage.moving(stage.seconds)
+        x, y = x + stage.velocity[0] * moving, y + stage.velocity[1] * moving
+
+
+def _longest_motion(stage: Stage) -> float:
+    """Return the time [s] in which the velocity, as a constant one, leads to the farthest position of a stage."""
+    return stage.moving(0.25 / stage.velocity.frequency if isinstance(stage.velocity, Swing) else stage.seconds)
+
+
+def _way_to_edge(start: tuple[float, float], stage: Stage, radius: float, size: tuple[float, float]) -> float:
+    """Return the distance [m] that a contact within the box can slide until it reaches the edge; inf at rest."""
+    ways = [math.inf]
+    for centre, velocity, length in zip(start, stage.velocity, size, strict=True):
+        behind, ahead = centre - radius, length - centre - radius
+        if velocity < 0.0:
+            behind, ahead = ahead, behind
+        if velocity != 0.0:
+            room = min(ahead, behind) if isinstance(stage.velocity, Swing) else ahead
+            ways.append(room * stage.speed / abs(velocity))
+    return min(ways)
 
 
 def _relaxed_contact_modulus(material: Elastic | Zener, seconds: float) -> float:

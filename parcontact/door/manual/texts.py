@@ -220,7 +220,7 @@ def _fill(text: str, width: int, first: str, hanging: str) -> list[str]:
 
 PAGES = Path(__file__).parent / "pages"
 MARK = re.compile(r"^% written here: (\w+)$", re.MULTILINE)
-FENCE = re.compile(r"^:::.*\n", re.MULTILINE)
+FENCE = re.compile(r"^:::\{toctree\}\n.*?^:::\n|^:::.*\n", re.MULTILINE | re.DOTALL)
 Writers = Mapping[str, Callable[[], str]]
 OURS: Writers = {"keys": keys, **{Path(file).stem: partial(describe_columns, table) for file, table in TABLES.items()}}
 
