@@ -83,7 +83,7 @@ class BandClock:
         return Place(number, step.time - self._starts[number])
 
     def between(self, at: Place) -> tuple[int, int, float]:
-        """Return the numbers of the steps before and after a place, and the share of the latter.
+        """Return the numbers of the steps before and after a place, and the share of the step after.
 
         Results vary linearly with the slip of a slide, and with the logarithm of the time of a rest.
         Beyond the last step of a stage they are constant; before the first one they are those of the stage before.

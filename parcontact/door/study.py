@@ -196,7 +196,7 @@ def describe_choices(job: Job) -> list[str]:
     refined = _sliding(job) if job.study and job.study.cells_per_step else []
     if stages := [stage.name for stage in job.history if stage.chooses and stage not in refined]:
         bound = f"numerics.accuracy = {job.numerics.asked.of_steps:g}"
-        lines.append(f"{', '.join(dict.fromkeys(stages))}: time steps are chosen in every case, for {bound}")
+        lines.append(f"the time steps of {', '.join(dict.fromkeys(stages))} are chosen in every case, for {bound}")
     return lines
 
 

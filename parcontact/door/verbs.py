@@ -1,13 +1,7 @@
-"""Verbs of the command line.
+"""Verbs of the command line, from options to exit code. Each imports its modules when it runs, to start quickly.
 
-The ranks of this program: which one is root, and the start of MPI for verbs that need it.
-
-Root is known from the launcher's environment variables, so verbs without MPI start at once; the other ranks then print
-nothing and exit with code 0.
-
-Apply a verb to the job, or to the chosen cases of its sweep.
-
-Verbs of the command line, from options to exit code. Each imports its modules when it runs, to start quickly.
+A verb works on the job, or on the chosen cases of its sweep. The launcher's environment variables tell which rank is
+root, so verbs without MPI start at once; the other ranks then print nothing and exit with code 0.
 """
 
 from __future__ import annotations

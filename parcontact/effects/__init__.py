@@ -1,1 +1,1 @@
-"""Effects that a job may ask for, each in a file of its own."""
+"""Effects that a job may ask for, each in a folder of its own."""

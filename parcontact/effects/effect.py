@@ -145,8 +145,8 @@ def nothing_holds(control: str, load: float) -> str:
 
 
 class ContactLaw(Protocol[Memory]):
-    """A contact law, a part of the run. Methods are collective. A law that solves by that of the constraint may have a
-    method `upon`, which gets the latter and returns the law."""
+    """A contact law, a part of the run. Methods are collective. A law that solves by the law of the constraint may
+    have a method `upon`, which takes the law of the constraint and returns the whole law."""
 
     may_shorten: bool  # True if a failed chosen step is repeated with a shorter one
 

@@ -478,7 +478,7 @@ class Timeline:
         return Span(index, stage, number, _jumps(stage, before), count, ends, time, position)
 
     def follow(self, times: Mapping[int, float]) -> "Timeline":
-        """Use the times [s] of steps that were made, by their numbers, as chosen steps."""
+        """Return this timeline with the steps that an earlier run chose: their times [s] by their numbers."""
         for index in range(len(self.history)):
             span = self.spans[index]
             if self.chosen is None or not isinstance(span.ends, ChosenEnds):

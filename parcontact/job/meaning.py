@@ -1,16 +1,10 @@
 """Warnings about the meaning of a job, before it runs.
 
-Warnings about jobs outside of the theory: a linear half space with small slopes and strains.
+* The theory is that of a linear half space with small slopes and strains, or of a layer of a given thickness.
+* Frequencies at which the surface loads the body are compared with those of its branches.
+* Memory and disk: lower bounds of what a job needs are compared with this machine.
 
-Slopes, pressures and contact radii are bounded from below, so that sound jobs get no warning.
-
-Warnings about memory and disk: lower bounds of what a job needs, compared with this machine.
-
-Frequencies at which the surface of a job loads the body.
-
-Warnings about the thickness of a layer, compared with the surface, the mesh and the material.
-
-As in `meaning`, heights and lengths are bounded from below, so that sound jobs get no warning.
+Heights, slopes, pressures and contact radii are bounded from below, so that sound jobs get no warning.
 """
 
 from __future__ import annotations

@@ -234,8 +234,9 @@ SEPARATOR = ":"  # separates the sections in the class name of an extended job, 
 
 @cache
 def extended_model(sections: tuple[str, ...]) -> type[Job]:
-    """Return the model of a job extended by sections of effects, and by the keys that one adds to stages; rules on the
-    section of another effect apply if the job has it."""
+    """Return the model of a job extended by the sections of effects, and by the keys that an effect adds to stages.
+
+    A rule on the section of another effect applies only if the job has this section."""
     effects = listing.effects_of(sections)
     fields: dict[str, Any] = {
         name: (effect.section | None, Field(default=None, description="a mapping of keys"))

@@ -170,7 +170,7 @@ class Ramp:
 
     @property
     def seconds(self) -> float:
-        """Return the duration by the normal velocity [s]; 0 without one."""
+        """Return the duration [s] of a ramp with a given normal velocity; 0 without a velocity."""
         return abs(self.end - self.start) / self.velocity if self.velocity else 0.0
 
     @property
@@ -327,7 +327,7 @@ class Stage(Part):
 
     @property
     def rolls(self) -> bool:
-        """Return True if points of the surface move otherwise than its shape."""
+        """Return True if the points of the surface move at another velocity than its shape, as in rolling."""
         return self.creep != SLIDES
 
     @property

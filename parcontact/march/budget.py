@@ -114,7 +114,7 @@ def solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 
 
 def steady_solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the same for steady sliding, whose friction is a sum of squares."""
+    """Return the errors by the solve of a state of steady sliding, whose friction is a sum of squares."""
     friction = SOLVER.value * max(observed.complementarity, ROUNDING) * mean_over_spots(run, observed)
     return ErrorPair(friction, _solver_of_area(observed))
 
@@ -144,7 +144,7 @@ def mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 
 
 def steady_mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the same for steady sliding."""
+    """Return the errors by the mesh of a state of steady sliding."""
     correction = observed.correction * mean_over_spots(run, observed)
     friction = _grow_if_identical(run) * (lost_at_edges(run, observed) + STEADY_AREA.value * correction)
     return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(STILL, run, observed))

@@ -294,8 +294,8 @@ def tolerance_before(job: Job, stage: int, relaxes: bool) -> float:
 
 
 def cells_per_step(most: float) -> float:
-    """Return the longest admissible way of a step up to `most`: 1, 2, 4 cells, or a half, a 3rd, ... 8th, 10th, ... of
-    one."""
+    """Return the longest distance of a step [cells], at most `most`, among 1, 2, 4, ... cells and 1/2, 1/3, ... 1/8,
+    1/10, ... of a cell."""
     if most >= 1.0 - SAME_LEVEL:
         return 2.0 ** math.floor(math.log2(most) + SAME_LEVEL)
     count = (1.0 - SAME_LEVEL) / most

@@ -181,7 +181,7 @@ def _travel(
 
 def choose_contact_law(scene: Scene) -> ContactLaw[Any]:
     """Return the contact law that an effect of the scene provides, or the law of its constraint. A law that solves by
-    the latter gets it by its method `upon`."""
+    the law of the constraint takes it by its method `upon`."""
     dry, law = DryLaw(scene), scene.law
     return dry if law is None else law.upon(dry) if hasattr(law, "upon") else law
 

@@ -158,7 +158,7 @@ class Scenery(Part):
 
     @classmethod
     def filled(cls, data: dict[str, Any], context: Origin | None) -> dict[str, Any]:
-        """Leave out the keys that effects add to stages."""
+        """Return the data of a job without the keys that effects add to stages."""
         stages = data.get("history")
         return {**data, "history": [_of_any_stage(stage) for stage in stages]} if isinstance(stages, list) else data
 

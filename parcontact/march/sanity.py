@@ -188,7 +188,7 @@ def _along_x(slab: Slab, heights: Array) -> tuple[float, float, float]:
 
 
 def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
-    """Return the same from row to row: the rms jump, the largest rms increment and the mean rise."""
+    """Return, for steps from row to row, the rms jump, the largest rms increment and the mean rise."""
     before = regrid.before_first(slab, heights, True)
     if slab.ny < 3:
         return 0.0, 0.0, 0.0

@@ -67,7 +67,7 @@ def legs_of(rows: int, height: int, count: int) -> list[slice]:
 
 
 def wire_points(legs: list[slice], columns: int) -> int:
-    """Return the wavenumbers in the longest leg, with `columns` in each row for other ranks."""
+    """Return the number of wavenumbers that the longest leg sends to other ranks: its rows times `columns`."""
     return max(leg.stop - leg.start for leg in legs) * columns
 
 

@@ -246,8 +246,8 @@ FEW = 8  # tuning: every rank has all cells of a grid with fewer cells than poin
 
 
 def pyramid_steps(slab: Slab, pairs: int = 0) -> list["PyramidStep"]:
-    """Return all steps from a grid to a single cell, the finest first; the first `pairs` join pairs. A grid that every
-    rank has is on a slab of one rank."""
+    """Return all steps from a grid to a single cell, the finest first. The first `pairs` steps join cells in pairs. A
+    grid of which every rank has all rows is on a slab of one rank."""
     grids, shapes = [slab], []
     for nx, ny, shape, alone in _larger(slab.nx, slab.ny, slab.comm.size, pairs):
         shapes.append(shape)
@@ -299,7 +299,7 @@ class PyramidStep:
 
     @cached_property
     def own(self) -> slice:
-        """Slice of the cells that end in points of this rank, in its map of cells."""
+        """Slice of this rank's rows of cells: those whose last row of points is on this rank."""
         part = ending_in(self.fine, self.shape[1])(self.fine.comm.rank)
         return slice(part.start - self.coarse.rows.start, part.stop - self.coarse.rows.start)
 
@@ -324,7 +324,7 @@ class PyramidStep:
         return self._row_exchange("points", self.fine, self.fine.bounds, cycle, offsets).fetch(points)
 
     def adjacent_cells(self, cells: NDArray[Any], *offsets: int) -> NDArray[Any]:
-        """Return the same for rows next to the cells that end in points of this rank."""
+        """Return the rows of cells at these `offsets` from the cells that end in points of this rank; collective."""
         if self.shape[1] == 1:
             return cells[:0]
         return self._row_exchange("cells", self.coarse, self._ending, self.coarse.ny, offsets).fetch(cells)

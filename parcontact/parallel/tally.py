@@ -85,10 +85,10 @@ class Groups:
         return self.everyone.rank == 0
 
     def agree(self, value: T) -> T:
-        """Return the value of the root, on every rank of everyone; collective."""
+        """Return the value of root on all ranks of all groups; collective."""
         return self.everyone.bcast(value)
 
     def from_all(self, value: T) -> list[T]:
-        """Return the value of the first rank of each group, on every rank of everyone; collective."""
+        """Return the value of the first rank of each group, on all ranks of all groups; collective."""
         found = self.everyone.allgather((self.number, value))
         return list(dict(reversed(found)).values())[::-1]

@@ -63,8 +63,8 @@ class BodyMemory:
     `displacement` is None if it must be computed from the pressure. `pending` is the advance of the branches over
     the last step. The next `begin` makes it, with the increment in that step and the one `before`, and puts the
     effective heights into the map `before`. This leaves the meaning of the memory unchanged, so that another step
-    may begin from it. Memories before and after a step share all maps but the displacement: the former is invalid
-    once a step has begun from the latter.
+    may begin from it. Memories before and after a step share all maps but the displacement: the memory before is
+    invalid once a step has begun from the memory after.
     """
 
     displacement: Array | None
@@ -234,7 +234,7 @@ class ZenerBody:
         return surface_of(memory)
 
     def advance_branches(self, memory: BodyMemory) -> None:
-        """Make the pending advance of the branch maps for a reader. The results of the run do not change."""
+        """Bring the branch maps to the end of the last step, for whoever reads them. Results do not change."""
         if self.slab.only_counts:
             return
         u = surface_of(memory)

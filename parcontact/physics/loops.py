@@ -279,7 +279,7 @@ def conduct(waves, known, spread, dt, sources, heats, scales, effusivity, out):
 
     `known` has rates, weights, shares of heat at depth, decays and the end of the sum; `spread` the squared
     wavenumbers times the diffusivity, and the multiplicity of columns; `sources` the spectra of rubbing and
-    pressure, each before and after the step. `out` may be one of the latter; spectra without rubbing have no row.
+    pressure, each before and after the step. `out` may be one of the `sources`; spectra without rubbing have no row.
     `heats` has the heat of both at the two ends of the step.
     """
     rates, weights, deep, fall, end = known

@@ -37,7 +37,9 @@ from .slide import SAME_INSTANT
 
 TABLE = "cycles.csv"
 LEAST_ROWS = 5  # rows of a cycle with an estimate of the error
-PAIRS = 2.0**3 - 1.0  # accuracy: errors of steps twice as long, minus those of steps, over the latter
+PAIRS = (
+    2.0**3 - 1.0
+)  # accuracy: difference between the errors of steps twice as long and of steps, over the error of steps
 NODES, WEIGHTS = (0.5 * (each + shift) for each, shift in zip(np.polynomial.legendre.leggauss(4), (1, 0), strict=True))
 # fitted to spheres in tests/summary/test_cycles.py: errors of steps over those of one harmonic; of solves, which are
 # independent of each other; and of the loss over that of the area (0.25 at most)

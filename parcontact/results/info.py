@@ -133,7 +133,10 @@ def describe_files(directory: Path) -> tuple[str, bool]:
     except (OSError, ValueError) as error:
         return f"{directory}: {hdf5.reason(error)}", False
     if not claims and not any((directory / name).exists() for name in ("measures.csv", KINDS["sweep"])):
-        raise InputError(f"{directory} has no results: it has no marker, no measures.csv and no {KINDS['sweep']}")
+        raise InputError(
+            f"{directory} has no results yet: neither a file .parcontact, nor measures.csv or {KINDS['sweep']}; a run "
+            "writes them when it begins"
+        )
     results = Results(directory)
     lines, problems = [f"{directory}: {results.title}"], list[str]()
     logs = ("run.log", tables.LOG)

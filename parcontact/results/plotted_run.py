@@ -175,7 +175,7 @@ def label_frames(run: PlottedRun, file: h5py.File) -> dict[int, str]:
 
 
 def round_digits(values: Array) -> Array:
-    """Return values that count as equal as equal numbers."""
+    """Return values rounded to DIGITS digits, so that values that differ by rounding are equal."""
     return np.array([float(f"{value:.{DIGITS}g}") for value in values])
 
 
@@ -185,7 +185,7 @@ def count_different(values: Array) -> int:
 
 
 def to_load(pressure: Array, area: float) -> tuple[Axis, Array]:
-    """Return the load: the force on the box of a free scene of area `box` [m^2], else the mean pressure."""
+    """Return the load: the force on the box of a free scene of `area` [m^2], else the mean pressure."""
     return (Axis("force", "N"), pressure * area) if area else (Axis("pressure", "Pa"), pressure)
 
 

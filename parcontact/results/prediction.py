@@ -237,7 +237,10 @@ def _refuse_unknown(job: Job) -> None:
 
 def _refuse_free(job: Job) -> None:
     if not all(job.grid.cyclic):
-        raise InputError("grid.boundary: Persson's theory is for periodic surfaces, and this box is free")
+        raise InputError(
+            "grid.boundary: Persson's theory is for periodic surfaces, and this box is free; for a sphere compare with "
+            "Hertz or Lee and Radok (page settings of the manual, An indenter)"
+        )
 
 
 # -- the waves --------------------------------------------------------------------------------------------------------

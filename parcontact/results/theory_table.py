@@ -106,7 +106,7 @@ class ComparedResult(NamedTuple):
 
 
 def compare_with_theory(directory: Path, history: Sequence[Stage], cell: float) -> list[ComparedResult]:
-    """Return results of theory.csv and of measures.csv in a directory, none without the former; `cell` is the spacing
+    """Return results of theory.csv and of measures.csv in a directory, none without theory.csv. `cell` is the spacing
     of the grid along x [m].
 
     Results are mu_max, mu_dyn and the mean contact area of the slide (`slide.measure_slide`), for the run the corrected

@@ -114,8 +114,8 @@ class Compound:
         if self.found and free:
             yield (
                 f"free vertical factors b_T would join the sweeps with a misfit of {per_cent(free.misfit)}, not "
-                f"{per_cent(self.found.misfit)}, and the shift would be {free.shift}: moduli do not go with density "
-                f"times temperature, or the law of the shift is wrong; compare --vertical free{also}"
+                f"{per_cent(self.found.misfit)}, and the shift would be {free.shift}: moduli are not proportional to "
+                f"density times temperature, or the law of the shift is wrong; compare --vertical free{also}"
             )
 
     def _gaps(self) -> Iterator[str]:
@@ -242,7 +242,9 @@ def _refuse_misfit(path: Path, best: Any, data: Any) -> None:
 
 def _percents(errors: tuple[float, float, float]) -> str:
     inside, low, high = (per_cent(error) if error < UNKNOWN else "unknown" for error in errors)
-    return f"{inside} (rms) more than half a decade inside this band, {low} at its lower end and {high}"
+    return (
+        f"{inside} in the inner part of this band, half a decade from its ends (rms); {low} at its lower end and {high}"
+    )
 
 
 def _shift_section(shift: Any) -> dict[str, Any]:

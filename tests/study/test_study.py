@@ -382,7 +382,7 @@ def test_a_ladder_takes_the_place_of_chosen_steps(path: Path) -> None:
     assert [case.steps for case in found.combine()] == ["4 cells per step", "2 cells per step", "1 cell per step"]
     assert [Timeline.from_job(one).spans[2].count for one in jobs] == [2, 4, 8]
     assert all(one.history[0].chooses for one in jobs)
-    assert describe_choices(job) == ["stage 1: time steps are chosen in every case, for numerics.accuracy = 0.01"]
+    assert describe_choices(job) == ["the time steps of stage 1 are chosen in every case, for numerics.accuracy = 0.01"]
 
 
 def test_steps_without_a_ladder_are_chosen_in_every_case(path: Path) -> None:
@@ -391,7 +391,7 @@ def test_steps_without_a_ladder_are_chosen_in_every_case(path: Path) -> None:
     cases = found.combine()
     assert [(case.mesh, case.steps) for case in cases] == [(32, "auto steps"), (64, "auto steps")]
     assert all(load_job(path, overrides(job, found.own, case)).history[2].chooses for case in cases)
-    assert "time steps are chosen in every case" in describe_choices(job)[0]
+    assert "are chosen in every case" in describe_choices(job)[0]
     assert found.shared == 0.01
 
 

@@ -1,18 +1,12 @@
-"""The manual in a terminal.
-
-Pages of the manual as text, with the parts that the program writes into them.
+"""Pages of the manual as text for a terminal, with the parts that the program writes into them.
 
 A line `% written here: NAME` in a page is replaced by text that the program makes, so that it is always up to date: the
 keys of a job (`reference.keys`), the columns of tables (`columns.TABLES`), and texts of the caller, such as the options
 of the verbs.
 
-Text of the manual's page on Python, from the docstrings of functions and classes, to be read in a terminal.
-
-The web site has it from Sphinx, by the same directives: `.. autoclass:: NAME`, `:members:`, `.. autofunction:: NAME`.
-
-Reference of every key of a job: generated from the types, each with its meaning and an example.
-
-Text of the manual for a terminal: paragraphs, lists and tables within its width, code as it is.
+The page on Python is made from docstrings, by the directives by which Sphinx makes the page of the web site:
+`.. autoclass:: NAME`, `:members:`, `.. autofunction:: NAME`. The reference of the keys of a job is made from the types.
+Paragraphs, lists and tables fit the width of the terminal; code stays as it is.
 """
 
 from __future__ import annotations

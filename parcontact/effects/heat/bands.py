@@ -70,7 +70,8 @@ class Warming:
 
 
 def warming_of(setup: Setup, body: Conductor, time: float, velocity: Vector, m: Array) -> Warming:
-    """Return S_j of a band that slides at `velocity` [m/s], after sliding for a `time` [s]."""
+    """Return the warming S_j(m) by the waves of pressure of a band, after it has slid at `velocity` [m/s] for a
+    `time` [s]."""
     fft, size = setup.fft, setup.grid.size
     q = np.hypot(*wavenumbers(fft, size))
     along_x, along_y = travelling_wavenumbers(fft, size)

@@ -274,8 +274,8 @@ class ThermalColumns(Effect[ThermalMemory]):
         return Heating(rubbed, pressed), replace(memory, force=force, area=measures.contact_area)
 
     def values(self, memory: ThermalMemory) -> Sequence[float]:
-        """Return the flash temperature, the highest rise, and the relative error of the former, ERROR times that of
-        friction; NaN if unknown."""
+        """Return the flash temperature, the highest rise, and the relative error of the flash temperature, which
+        is ERROR times the error of friction; NaN if unknown."""
         known = memory.flash != 0.0 and math.isfinite(memory.error)
         return memory.flash, memory.highest, ERROR * memory.error if known else math.nan
 

@@ -38,7 +38,8 @@ def chart(
     dotted: Mapping[str, Array] = MappingProxyType({}),
 ) -> Panel:
     """Draw conductivities K [m^3], by their names, over an axis, all of shape (n,), with their critical constrictions
-    [m]; K is 0 where contact closes, and NaN where it is not known. Others are `dotted`, in the same colours."""
+    [m]; K is 0 where contact closes, and NaN where it is not known. The conductivities in `dotted` are drawn as
+    dotted lines in the same colours."""
     lines, thin = list[Line](), list[Line]()
     for number, (name, flow) in enumerate(flows.items()):
         known = np.isfinite(flow)

@@ -115,7 +115,7 @@ def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
     points that slip, along t.
 
     Return sums of |t|, of |P(t + kappa w)| and of `|P(t + kappa w) - t|`, with P(t) the traction shortened to its
-    bound; of the components of the latter; of both components of w over points that stick, and their number.
+    bound; of the components of `P(t + kappa w) - t`; of both components of w over points that stick, and their number.
     """
     size, moved, residual, along_x, along_y = 0.0, 0.0, 0.0, 0.0, 0.0
     w_sticks_x, w_sticks_y, count = 0.0, 0.0, 0.0
