@@ -230,17 +230,15 @@ def interpolate_back(levels: list[CellLevel], known: list[Map], maps: list[Map])
 
 FLOOR = 0.3  # tuning: weight of the larger cell, as a share of the points of a cell
 LONG = 16.0  # tuning: largest ratio of distances of points for which larger cells are used
-FADING = 2.7  # tuning: power with which the floor of cells longer than the reach of a layer grows
 Maps = list[NDArray[Any]]  # a map of points, followed by maps of cells on each larger grid
 
 
 class Grids(NamedTuple):
     """Grids of larger cells: at most `most`, None for all; the first of them double cells along one side, `pairs` times
-    (`cell_levels`); the floor of the last one is `last` times that of the others."""
+    (`cell_levels`)."""
 
     most: int | None = None
     pairs: int = 0
-    last: float = 1.0
 
 
 ALL = Grids()
@@ -250,16 +248,15 @@ def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
     """Return the grids of larger cells for points at distances dx and dy.
 
     Where points are closer along one direction, cells are doubled along it first, until they are about square.
-    Points further away than `reach` do not act on each other: square cells have at most about this length. There are
-    at least two sizes of these; if the larger one exceeds the reach, its floor is raised.
+    Points further away than `reach` do not act on each other: square cells have at most about this length, or twice
+    that of points.
     """
     if max(dx, dy) > LONG * min(dx, dy):
         return Grids(0)
     pairs = round(math.log2(dy / dx))
     if reach == math.inf:
         return Grids(None, pairs)
-    sizes = max(math.log2(reach / max(dx, dy)), -10.0)
-    return Grids(abs(pairs) + max(round(sizes), 2), pairs, max(2.0 ** (FADING * (1.5 - sizes)), 1.0))
+    return Grids(abs(pairs) + max(round(math.log2(reach / max(dx, dy))), 1), pairs)
 
 
 class ExtendedPreconditioner:
@@ -269,7 +266,7 @@ class ExtendedPreconditioner:
     """
 
     def __init__(self, slab: Slab, larger: Grids = ALL) -> None:
-        most, pairs, last = larger
+        most, pairs = larger
         down, across = max(pairs, 0), max(-pairs, 0)
         self._levels = cell_levels(slab, pairs)[:most]
         grids = [level.coarse for level in self._levels]
@@ -277,9 +274,6 @@ class ExtendedPreconditioner:
             (np.float32(FLOOR) * lengths(slab.ny, level - down)[grid.rows], lengths(slab.nx, level - across))
             for level, grid in enumerate(grids, 1)
         ]
-        if self._floors and last > 1.0:
-            rows, columns = self._floors[-1]
-            self._floors[-1] = np.float32(last) * rows, columns
         self._known, self._cells = ([grid.empty(np.float32) for grid in grids] for _ in range(2))
 
     def apply(self, preconditioner: Operator, working: NDArray[Any], r: Array) -> None:

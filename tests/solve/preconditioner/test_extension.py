@@ -115,27 +115,11 @@ def test_brings_back_by_the_transpose(ny: int, nx: int, pairs: int, seed: int) -
     assert abs(left - right) <= SINGLE * size
 
 
-@pytest.mark.parametrize(("last", "equal"), [(1.0, False), (1e9, True)])
-def test_largest_cells_of_a_high_floor_count_for_nothing(last: float, equal: bool) -> None:
-    """To single precision: K is given what it is given without them."""
-    random, slab = np.random.default_rng(2), Slab.alone(16, 16)
-    c = random.random((16, 16)) < 0.2
-    r = np.where(c, random.normal(size=(16, 16)), 0.0)
-    given_to_k = []
-    for larger in (Grids(2, 0, last), Grids(1)):
-        inverse, z = Doubling(), r.copy()
-        ExtendedPreconditioner(slab, larger=larger).apply(inverse, c, z)
-        given_to_k.append(inverse.given)
-    difference = np.abs(given_to_k[0] - given_to_k[1]).max()
-    assert (difference <= SINGLE * np.abs(r).max()) == equal
-
-
 def test_cells_are_no_longer_than_the_reach() -> None:
     """Three doublings to eight points; two of them along x where points are four times closer, to sixteen."""
-    assert grids_for(1.0, 1.0, 8.0) == Grids(3, 0, 1.0)
-    assert grids_for(1.0, 4.0, 16.0) == Grids(4, 2, 1.0)
-    assert grids_for(1.0, 1.0, 2.0)[:2] == (2, 0)
-    assert grids_for(1.0, 1.0, 2.0).last > 1.0
+    assert grids_for(1.0, 1.0, 8.0) == Grids(3, 0)
+    assert grids_for(1.0, 4.0, 16.0) == Grids(4, 2)
+    assert grids_for(1.0, 1.0, 0.1) == Grids(1, 0)
     assert grids_for(1.0, 17.0, 8.0) == Grids(0)
 
 
