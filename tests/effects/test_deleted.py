@@ -1,7 +1,7 @@
-"""A capability is a folder: a copy of the program without it runs jobs of others, and refuses its own keys."""
+"""A capability is a folder: the program without it runs jobs of others, and refuses its own keys."""
 
+import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +13,8 @@ from conftest import WORLD
 from csv_rows import rows
 
 import parcontact
-from parcontact import __main__
+from parcontact import __main__, capabilities
+from parcontact import job as jobs
 
 pytestmark = pytest.mark.skipif(WORLD.size > 1, reason="for one process")
 
@@ -24,7 +25,7 @@ JOB: dict[str, Any] = {
     "material": {"model": "zener", "modulus_inf": 1e6, "branches": [{"modulus": 1e6, "relaxation_time": 1e-3}]},
     "history": [{"pressure": 1e5, "velocity": 0.2, "distance": 1e-4, "cells_per_step": 1}],
     "steady": {"velocities": [0.2], "pressures": [1e5]},
-    "output": {"fields": ["pressure", "gap"], "directory": "out"},
+    "output": {"fields": ["gap"], "every": 100, "directory": "out"},
 }
 KEYS: dict[str, tuple[dict[str, Any], str]] = {  # folder: what its section is refused with
     "leakage": ({"leakage": {}}, "leakage is not a known key"),
@@ -35,46 +36,46 @@ KEYS: dict[str, tuple[dict[str, Any], str]] = {  # folder: what its section is r
     "adhesion": ({"adhesion": {"work": 0.05}}, "adhesion is not a known key"),
     "softening": ({"softening": {"table": [[1e-3, 1.0, 1.0], [1.0, 0.5, 0.5]]}}, "softening is not a known key"),
 }
+LACKING = {"interface": ("steady",), "softening": ("history",), "adhesion": ("steady",)}  # what a section excludes
 OF_STEADY_STATES = ("heat", "softening", "counterbody")
 CHECKED = ("time", "friction", "contact_area", "mean_gap", "max_pressure", "operator_calls", "error_friction")
 
 
-def test_deleted_folders(tmp_path: Path) -> None:
+def test_without_each_folder(tmp_path: Path) -> None:
     """Numbers are the same to the last digit; its keys are refused; pictures, reports and descriptions are made."""
-    copy = tmp_path / "copy" / HOUSE.name
-    shutil.copytree(HOUSE, copy, ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
     assert __main__.main([str(tmp_path / "job.yaml"), "--quiet", "--out", str(tmp_path / "whole")]) == 0
-    for folder in KEYS:  # in one copy, whose loops are compiled once
-        shutil.move(copy / "effects" / folder, tmp_path / folder)
-        use_without(folder, tmp_path, copy.parent)
-        shutil.move(tmp_path / folder, copy / "effects" / folder)
+    commands = {}
+    for folder, (keys, _) in KEYS.items():
+        (tmp_path / f"{folder}.yaml").write_text(yaml.safe_dump({**JOB, **keys}))
+        commands[folder] = [
+            ["check", f"{folder}.yaml"],
+            ["job.yaml", "--quiet", "--out", folder],
+            ["report", folder],
+            ["info", folder],
+            *([["steady", "job.yaml", "--quiet", "--out", f"{folder}-curve"]] if folder in OF_STEADY_STATES else []),
+            ["plan", "job.yaml", "--seconds", "0.1"],
+        ]
+    (tmp_path / "plan.json").write_text(json.dumps(commands))
+    environment = {**os.environ, "PYTHONPATH": str(HOUSE.parent), "MPLBACKEND": "agg"}
+    words = [sys.executable, str(Path(__file__).with_name("hiding.py")), "plan.json"]
+    done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    whole = numbers_of(tmp_path / "whole")
+    for folder, ((code, said), *others) in json.loads(done.stdout).items():
+        assert (code, KEYS[folder][1] in said) == (2, True), (folder, said)
+        for words, (code, said) in zip(commands[folder][1:], others, strict=True):
+            assert (code, "Traceback" in said) == (0, False), (folder, words, said)
+        assert numbers_of(tmp_path / folder) == whole, folder
 
 
-def use_without(folder: str, tmp_path: Path, copy: Path) -> None:
-    """Do what a user does with the copy of the program that lacks a folder."""
-    environment = {**os.environ, "PYTHONPATH": str(copy), "MPLBACKEND": "agg"}
+def test_every_folder_is_tried() -> None:
+    """The sections above belong to all folders, and keys of a program with them."""
+    assert sorted(KEYS) == sorted(each.__name__.rpartition(".")[2] for each in capabilities.folders())
+    for keys, _ in KEYS.values():
+        data = {name: part for name, part in JOB.items() if name not in LACKING.get(next(iter(keys)), ())}
+        assert jobs.load({**data, **keys}).section(next(iter(keys))) is not None
 
-    def program(*words: str) -> tuple[int, str]:
-        command = [sys.executable, "-m", "parcontact", *words]
-        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
-        return done.returncode, done.stdout + done.stderr
 
-    keys, refusal = KEYS[folder]
-    shutil.rmtree(tmp_path / "out", ignore_errors=True)
-    (tmp_path / "other.yaml").write_text(yaml.safe_dump({**JOB, **keys}))
-    for words in (
-        ("job.yaml", "--quiet"),
-        *([("steady", "job.yaml", "--quiet")] if folder in OF_STEADY_STATES else []),
-        ("report", "out"),
-        ("info", "out"),
-        ("plan", "job.yaml", "--seconds", "0.2"),
-    ):
-        code, said = program(*words)
-        assert code == 0, (folder, said)
-        assert "Traceback" not in said, (folder, said)
-    code, said = program("check", "other.yaml")
-    assert code == 2, (folder, said)
-    assert refusal in said, folder
-    without, whole = (rows(tmp_path / name / "measures.csv") for name in ("out", "whole"))
-    assert [[row[name] for name in CHECKED] for row in without] == [[row[name] for name in CHECKED] for row in whole]
+def numbers_of(directory: Path) -> list[list[str]]:
+    return [[row[name] for name in CHECKED] for row in rows(directory / "measures.csv")]
