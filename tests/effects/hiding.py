@@ -10,7 +10,6 @@ import io
 import json
 import os
 import pkgutil
-import shutil
 import sys
 import traceback
 from collections.abc import Iterator, Sequence
@@ -47,8 +46,9 @@ def hide(folder: str) -> None:
 
 
 def use(folder: str, commands: Sequence[Sequence[str]]) -> Iterator[tuple[int, str]]:
-    """Yield the exit code and all output of each command of the program without a folder."""
-    hide(folder)
+    """Yield the exit code and all output of each command of the program without a folder, with all if it is ''."""
+    if folder:
+        hide(folder)
     main = importlib.import_module("parcontact.__main__").main
     for words in commands:
         said = io.StringIO()
@@ -68,7 +68,6 @@ def main() -> None:
     for name in OTHERS:
         importlib.import_module(name)
     for folder, commands in json.loads(Path(sys.argv[1]).read_text()).items():
-        shutil.rmtree(folder, ignore_errors=True)
         reader, writer = os.pipe()
         if os.fork() == 0:
             with os.fdopen(writer, "w") as out:
