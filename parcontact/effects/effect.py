@@ -347,6 +347,11 @@ class Effect(Protocol[Memory]):
         yield from ()
 
     @staticmethod
+    def doubt_contact(job: Any, measures: Measures, where: str) -> Iterator[Doubt]:
+        """Yield warnings about the contact of a step, at a place in words."""
+        yield from ()
+
+    @staticmethod
     def ended(job: Any, saved: Saved) -> Detached | None:
         """Return the end of the run in the entries of its law in a checkpoint; None if the run goes on."""
         return None

@@ -47,20 +47,6 @@ SOLVER = Fit("friction: times the complementarity over N^(1/4)", 1.1, 1.0, SOLVE
 SOLVER_AREA = Fit("area: times a power of the complementarity", 0.1, 0.7, SOLVES, "1, 0.14 to 8, of single steps")
 PENETRATING = Fit("area: times the points that penetrate without pressure", 0.8, 1.0, SOLVES, "as SOLVER_AREA")
 NOISE = Fit("tangential force without friction: times slope and complementarity", 0.4, 1.0, EARLIER, "1.2 to 14")
-ROLLING = Fit(
-    "tractions in rolling: times the shares of the contact that enter in a step and that stick",
-    2.0,
-    1.0,
-    "tests/effects/stick/test_rolling.py",
-    "0.7 to 30 for cylinders, by where edges lie in a cell; 10 for a sphere",
-)
-STICKING = Fit(
-    "tractions by a shear strength: times the excess of the counted area, the share that sticks, and t over its bound",
-    3.0,
-    1.0,
-    "tests/effects/stick/test_effect.py",
-    "0.7 to 4 in two rough contacts, where t exceeds a quarter of its bound",
-)
 PASSING = Fit(
     "quadratic step: times the cube of the way over the radius of spots",
     0.4,

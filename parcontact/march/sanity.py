@@ -4,8 +4,9 @@ Warnings that follow from a job alone are in `job/meaning.py`. Sums over all poi
 agree."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -206,22 +207,22 @@ def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
 
 @dataclass
 class ContactWatch:
-    """Checks of the contact of each step; each kind of warning is given once. `sticks` is True for a periodic box whose
-    contact may stick; `mesh` has the points of the grid."""
+    """Checks of the contact of each step; each kind of warning is given once. `asked` are those of effects, of measures
+    and a place; `mesh` has the points of the grid."""
 
     strict: bool
     timeline: Timeline
     seen: set[str] = field(default_factory=set)
     more: str = "more grid.points"
-    sticks: bool = False
+    asked: Sequence[Callable[[Measures, str], Iterator[Doubt]]] = ()
     mesh: RunProperties = field(default_factory=lambda: RunProperties(1))
 
     @classmethod
     def of(cls, job: Job, timeline: Timeline) -> "ContactWatch":
         """Return the checks of a job."""
-        sticks = job.sheared_first and all(job.grid.cyclic)
+        asked = [partial(doubts, job) for doubts in job.asked("doubt_contact")]
         mesh = properties_of(job, None)
-        return cls(job.numerics.strict, timeline, more=more_points(job.grid), sticks=sticks, mesh=mesh)
+        return cls(job.numerics.strict, timeline, more=more_points(job.grid), asked=asked, mesh=mesh)
 
     def check_step(self, step: int, measures: Measures) -> list[Doubt]:
         """Return warnings about a step; raises RunError if these are errors."""
@@ -231,8 +232,7 @@ class ContactWatch:
     def check_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
         """Return warnings about a contact, about its cells if it is `final`; raises RunError if these are errors."""
         found = [*doubt_edge(measures, where), *(doubt_cells(measures, self.mesh, where, self.more) if final else ())]
-        if self.sticks and measures.contact_area == 1.0:
-            found.append(Doubt("whole box sticks", "", {"where": where}))
+        found += [doubt for doubts in self.asked for doubt in doubts(measures, where)]
         new = [doubt for doubt in found if doubt.kind not in self.seen]
         self.seen |= {doubt.kind for doubt in new}
         if new and self.strict:

@@ -8,12 +8,14 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from ... import capabilities
+from ...doubts import Doubt
 from ...job import limits
 from ...job.parts import Part, Rule
 from ...job.quantities import Flag, Positive
 from ...job.surfaces import Rough, RoughSpectrum, Topography
 from ...job.yaml_text import Fault
 from ...physics.entries import Memory
+from ...physics.measures import Measures
 from ...physics.motion import InterfaceFriction
 from ..effect import Decision, Effect
 from ..relaxation import time_factor_of
@@ -156,6 +158,12 @@ class InterfaceEffect(Effect[Memory]):
     @staticmethod
     def sheared_first(job: Any) -> bool:
         return bool(job.section("interface").stick)
+
+    @staticmethod
+    def doubt_contact(job: Any, measures: Measures, where: str) -> Iterator[Doubt]:
+        """Yield a warning about a periodic box that is full of a contact that sticks."""
+        if job.section("interface").stick and all(job.grid.cyclic) and measures.contact_area == 1.0:
+            yield Doubt("whole box sticks", "", {"where": where})
 
     @staticmethod
     def decide(job: Any) -> Decision:

@@ -48,7 +48,7 @@ import numpy as np
 
 from ...columns import added_by
 from ...contact.preconditioner import grids_for
-from ...march.constants import ROLLING, STICKING
+from ...march.constants import Fit
 from ...parallel.slab import Array
 from ...physics import loops
 from ...physics.body import BodyMemory, MovedHeights, surface_of
@@ -63,6 +63,20 @@ from .solver import ShearOperator, TangentialSolver, TractionProblem, components
 
 UNIFORM = 1e-12  # rounding: share of the square of a pressure below which its waves are rounding
 LEAST_BOUND = 1e-12  # rounding: bound of tractions, in the run's units, that displacements hardly resolve: taken as 0
+ROLLING = Fit(
+    "tractions in rolling: times the shares of the contact that enter in a step and that stick",
+    2.0,
+    1.0,
+    "tests/effects/stick/test_rolling.py",
+    "0.7 to 30 for cylinders, by where edges lie in a cell; 10 for a sphere",
+)
+STICKING = Fit(
+    "tractions by a shear strength: times the excess of the counted area, the share that sticks, and t over its bound",
+    3.0,
+    1.0,
+    "tests/effects/stick/test_effect.py",
+    "0.7 to 4 in two rough contacts, where t exceeds a quarter of its bound",
+)
 
 
 class BoundedTraction(NamedTuple):
