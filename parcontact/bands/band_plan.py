@@ -45,9 +45,9 @@ def _plan_history(job: Job, slab: Slab) -> Iterator[str]:
     road.try_march()
     each = slab.agree((time.process_time() - began) / steps[-1])
     for of_band in tasks:
-        number = of_band[0].band
+        number, count = of_band[0].band, len(of_band)
         long, short = road.cut.wavelengths(number)
-        yield f"band from {long:.3g} to {short:.3g} m: {len(of_band)} marches of {steps[number]} steps"
+        yield f"band from {long:.3g} to {short:.3g} m: {count} march{'es' * (count > 1)} of {steps[number]} steps"
     rounds = sum(-(-len(of_band) // slab.comm.size) * steps[of_band[0].band] for of_band in tasks)
     ranks = f"{slab.comm.size} rank{'s' * (slab.comm.size > 1)}"
     yield f"parcontact: {sum(map(len, tasks))} marches, {each * 1e3:.3g} ms a step; on {ranks}: {rounds * each:.3g} s"

@@ -118,7 +118,8 @@ class RoadHistory(RoadSliding):
             f"slides are marched for {SETTLED:g} of the longest waves and are steady then: branches slower than "
             f"{left:.3g} s keep the imprint of what was before"
         )
-        return [*super().notes(), *([said] if 0.0 < left < slowest else [])]
+        elastic = "an elastic body has no friction: what rows have is that of the mesh, and has no stated error"
+        return [*super().notes(), *([said] if 0.0 < left < slowest else []), *([] if self.loses else [elastic])]
 
     def keep_in(self, directory: Path) -> None:
         """Store marches in a file of this directory until `forget` is called; raises RunError."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..columns import BANDS, choose_columns, names_of
 from ..doubts import Doubt
-from ..effects.relaxation import temperature_of
+from ..effects.relaxation import relaxation_of, temperature_of
 from ..errors import RunError, UnsolvedError
 from ..job import Job
 from ..job.listing import answers
@@ -323,7 +323,13 @@ class RoadSliding:
         ]
         own = self._interface_share(outcome, friction)
         with_interface = parts[0]._replace(method=parts[0].method + own * parts[1].method)
-        return ErrorBudget(with_interface if friction > 0.0 else None, parts[1])
+        rubs = self.loses or own > 0.0
+        return ErrorBudget(with_interface if friction > 0.0 and rubs else None, parts[1])
+
+    @property
+    def loses(self) -> bool:
+        """True for a material with losses, without which friction of the waves is that of the mesh alone."""
+        return len(relaxation_of(self.job.material)[2]) > 0
 
     def _interface_share(self, outcome: BandOutcome, friction: float) -> float:
         return 1.0 - outcome.friction / friction if friction > 0.0 else 0.0

@@ -96,6 +96,11 @@ def _look(directory: Directory, job: Job, plain: dict[str, Any], afresh: bool) -
         if different := tables.list_differences(tables.differences(claim.job, plain, SAME)):
             raise InputError(f"{directory.path} has a run of another job: {different}; {ADVICE}")
         if claim.finished is None or claim.job.get("history") != plain["history"]:
+            if claim.finished and not reached(sum(stage.seconds for stage in job.history), claim.finished[1]):
+                raise InputError(
+                    f"{directory.path} has the results up to t = {claim.finished[1]:g} s, which those of a shorter "
+                    f"history would replace; {ADVICE}"
+                )
             if claim.finished and not _continues(claim.job["history"], plain["history"]):
                 different = tables.list_differences(tables.differences(claim.job, plain, ["history"]))
                 raise InputError(f"{directory.path} has the results of another history: {different}; {ADVICE}")
@@ -121,15 +126,17 @@ class _Run:
         self.road, self.directory, self.console, self.options = road, directory, console, options
         self.slab, self.job = road.slab, road.job
         each = [len(tasks) for tasks in road.tasks()]
-        self._ends, self._made, self._calls = np.cumsum(each), 0, 0
+        self._ends, self._made = np.cumsum(each).tolist(), 0
         self._bar = Bar(sum(each), "marches of bands", "march", self.slab.root and not options.quiet)
         self._began = time.monotonic()
 
     def go(self) -> int:
         """Make all marches, then write the results; return the exit code."""
+        road = self.road
         ranks = "1 rank" if self.slab.comm.size == 1 else f"{self.slab.comm.size} ranks"
         self._say(
-            f"{self.job.title or self.job.path.stem}: {self._ends[-1]} marches of {len(self._ends)} bands on {ranks}"
+            f"{self.job.title or self.job.path.stem}: {self._ends[-1]} march{'es' * (self._ends[-1] > 1)} of "
+            f"{road.cut.count} band{'s' * (road.cut.count > 1)} on {ranks}"
         )
         for text in self.road.notes():
             self._say(text)
