@@ -156,20 +156,20 @@ def cut_back(path: Path, slab: Slab, step: int) -> str:
 
 
 class SavedFields:
-    """The maps and instants in a field file."""
+    """The maps and instants in a field file; raises InputError if their numbers differ."""
 
     def __init__(self, file: h5py.File) -> None:
         self.names = tuple(name for name in UNITS if name in file)
         self.steps: tuple[int, ...] = tuple(file["step"][...].tolist())
         self.times: NDArray[np.float64] = file["t"][...]
+        self.saved: list[int] = np.flatnonzero(~np.isnan(self.times)).tolist()
         for name in self.names:
             if file[name].shape != (len(self.steps), len(file["y"]), len(file["x"])):
                 raise ValueError(f"{name} has shape {file[name].shape}")
 
     def reached(self, step: int) -> list[int]:
-        """Return the indices of saved instants up to a step."""
-        pairs = zip(self.steps, self.times, strict=True)
-        return [number for number, time in pairs if number <= step and not np.isnan(time)]
+        """Return the steps up to a step that have saved maps."""
+        return [self.steps[index] for index in self.saved if self.steps[index] <= step]
 
 
 def _found(path: Path, slab: Slab) -> tuple[SavedFields | None, str]:

@@ -1,21 +1,12 @@
-"""Pictures of curves, bands and sweeps.
+"""Panels of friction curves, of bands, and of sweeps.
 
-Pictures of a friction curve in bands: friction of each band over velocity, area over magnification, and what
-capabilities have by band (`BAND_PANELS` of their pictures: keys and axes of columns); and of a history in bands over
-the slip of each slide.
+A curve (steady.csv) is drawn over velocity, or over pressure if only that varies; several temperatures are separate
+lines, which a_T v puts on one master curve. Bands have their friction over velocity, and over the slip of each slide of
+a history, their area over magnification, and what capabilities have by band. Persson's theory is drawn if its table
+exists, and steady sliding with a history if steady.csv does.
 
-Persson's theory for the same spectrum is drawn if `bands_theory.csv` exists, or `theory.csv` for a history. Its slides
-end at the friction of steady sliding, if `steady.csv` exists.
-
-Charts of friction curves (steady.csv) over velocity, or over pressure if only that varies.
-
-Several temperatures are separate lines; friction over a_T v shows them on one master curve.
-
-Pictures of the results of a sweep: friction and contact area over the swept key, with theory if available; sweeps of
-friction curves over velocity, or over another quantity that varies within curves.
-
-Points are cases, lines their means over seeds. Each value of another key has its own line: values of the first such key
-have colours, values of further keys dashes.
+Points of a sweep are cases, lines their means over seeds. Each value of another key has its own line: values of the
+first such key have colours, values of further keys dashes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,7 +20,7 @@ import numpy as np
 from .. import printed
 from ..columns import SWEEP, names_of
 from ..errors import InputError
-from ..job import load
+from ..job import Stage, load
 from ..job.listing import answers, unit_of_path
 from ..job.reading import STEADY_RESOLVED
 from ..parallel.slab import Array
@@ -78,66 +69,54 @@ def chart_bands(directory: Path) -> list[Panel]:
 def chart_slips(run: PlottedRun) -> list[Panel]:
     """Return panels of a history in bands over the slip since the start of each slide: friction and area, and friction
     by band in the last slide; none without a slide."""
-    slides = [number for number, stage in enumerate(run.job.history) if stage.slides and stage.seconds]
+    stages = run.job.history
+    ways = np.array([stage.seconds * stage.speed for stage in stages])
+    starts = np.cumsum(ways) - ways
+    slides = [number for number, stage in enumerate(stages) if stage.slides and stage.seconds]
     if not slides or "distance" not in run.read(BANDS):
         return []
-    x, starts = Axis("slip of the stage", "m"), _starts(run)
-    friction, area = list[Line](), list[Line]()
+    x, friction, area = Axis("slip of the stage", "m"), list[Line](), list[Line]()
     for count, number in enumerate(slides):
-        rows, look, name = run.rows_of_stages[number], style.line(count), run.job.history[number].name
-        rows = [row for row in rows if run.columns["distance"][row] > starts[number]]
+        rows = [row for row in run.rows_of_stages[number] if run.columns["distance"][row] > starts[number]]
         slip = run.columns["distance"][rows] - starts[number]
-        name = name if len(slides) > 1 else ""
-        friction.append(Line(name, slip, run.columns["friction"][rows], look))
-        area.append(Line(name, slip, run.columns["contact_area_corrected"][rows], look))
-        others = [*_theory_of(run, starts[number], slip), *_steady_of(run, number, slip)]
-        friction += [line for line, _ in others]
-        area += [line for _, line in others]
+        own = slip, *(run.columns[name][rows] for name in ("friction", CORRECTED))
+        name = stages[number].name if len(slides) > 1 else ""
+        others = *_theory_of(run, starts[number], slip), *_steady_of(run, stages[number], slip)
+        for label, look, (at, *values) in ((name, style.line(count), own), *others):
+            friction.append(Line(label, at, values[0], look))
+            area.append(Line(label, at, values[1], look))
     there = ((OVER_TIME, ENTRY), (STEADY, STEADY_ENTRY))
     entries = [entry for name, entry in there if run.has(name)]
-    stages = run.read(BANDS).arrays()
-    start, end = starts[slides[-1]], starts[slides[-1]] + _way(run, slides[-1])
-    kept = (stages["distance"] > start) & (stages["distance"] <= end * (1.0 + SAME))
-    own = {name: values[kept] for name, values in stages.items()}
-    own["slip"] = own["distance"] - start
+    bands = run.read(BANDS).arrays()
+    last = bands["distance"] - starts[slides[-1]]
+    kept = (last > 0.0) & (last <= ways[slides[-1]] + SAME * bands["distance"])
     return [
         Panel("bands slip", x, Axis("friction coefficient"), [*friction, *entries], log_x=True),
         Panel("bands slip area", x, Axis(FRACTION), [*area, *entries], log_x=True),
-        _stacked(own, "slip", x),
+        _stacked({name: values[kept] for name, values in (bands | {"slip": last}).items()}, "slip", x),
     ]
 
 
-def _way(run: PlottedRun, number: int) -> float:
-    stage = run.job.history[number]
-    return stage.seconds * stage.speed
+Curve = tuple[str, dict[str, Any], tuple[Array, ...]]  # name, look, and slip, friction and area
 
 
-def _starts(run: PlottedRun) -> Array:
-    """Return the distance slid before each stage [m]."""
-    return np.cumsum([0.0, *(_way(run, number) for number in range(len(run.job.history)))])
-
-
-def _theory_of(run: PlottedRun, start: float, slip: Array) -> Iterator[tuple[Line, Line]]:
+def _theory_of(run: PlottedRun, start: float, slip: Array) -> Iterator[Curve]:
     """Yield friction and area of the theory over the slip of a stage."""
-    if not run.has(OVER_TIME):
-        return
-    theory = run.read(OVER_TIME).arrays(("distance", "friction", "contact_area"))
-    there = theory["distance"] - start
-    rows = (there >= slip[0]) & (there <= slip[-1])
-    of = lambda name: Line("", there[rows], theory[name][rows], THEORY_LOOK)  # noqa: E731
-    yield of("friction"), of("contact_area")
+    if run.has(OVER_TIME):
+        theory = run.read(OVER_TIME).arrays(("distance", "friction", "contact_area"))
+        there = theory["distance"] - start
+        rows = (there >= slip[0]) & (there <= slip[-1])
+        yield "", THEORY_LOOK, (there[rows], theory["friction"][rows], theory["contact_area"][rows])
 
 
-def _steady_of(run: PlottedRun, number: int, slip: Array) -> Iterator[tuple[Line, Line]]:
-    """Yield lines at friction and area of steady sliding at the velocity of a stage, over the last decade."""
-    if not run.has(STEADY):
-        return
-    stage, names = run.job.history[number], ("velocity", "pressure", "friction", "contact_area_corrected")
-    curve = run.read(STEADY).arrays(names)
-    same = np.isclose(curve["velocity"], stage.speed) & np.isclose(curve["pressure"], stage.load.start)
-    for row in np.flatnonzero(same)[:1]:
+def _steady_of(run: PlottedRun, stage: Stage, slip: Array) -> Iterator[Curve]:
+    """Yield friction and area of steady sliding at the velocity of a stage, over the last decade."""
+    if run.has(STEADY):
+        curve = run.read(STEADY).arrays(("velocity", "pressure", "friction", CORRECTED))
+        same = np.isclose(curve["velocity"], stage.speed) & np.isclose(curve["pressure"], stage.load.start)
         ends = np.array([max(slip[0], slip[-1] / 10.0), slip[-1]])
-        yield tuple(Line("", ends, np.full(2, curve[name][row]), STEADY_LOOK) for name in names[2:])  # type: ignore[misc]
+        for row in np.flatnonzero(same)[:1]:
+            yield "", STEADY_LOOK, (ends, *(np.full(2, curve[name][row]) for name in ("friction", CORRECTED)))
 
 
 def _describe_first(columns: dict[str, Array]) -> str:

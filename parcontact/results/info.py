@@ -88,7 +88,7 @@ def _checkpoint(path: Path) -> tuple[str, bool]:
 
 def _fields(path: Path, file: h5py.File) -> tuple[str, bool]:
     layout = fields.SavedFields(file)
-    saved = [index for index, time in enumerate(layout.times) if not np.isnan(time)]
+    saved = layout.saved
     lines = [f"{path}: {', '.join(layout.names)} on {len(file['x'])} x {len(file['y'])} points"]
     lines += [*_runs(read_chain(file)), *_budget(read_budget(file))]
     lines.append(f"  {len(saved)} of {len(layout.steps)} instants saved")
@@ -232,8 +232,7 @@ def _marches(found: Results) -> Iterator[str]:
 def _saved_maps(found: Results) -> Iterator[str]:
     with found.open_maps() as file:
         layout = fields.SavedFields(file)
-    saved = np.isfinite(layout.times).sum()
-    yield f"  fields: {', '.join(layout.names)} at {saved} of {layout.times.size} instants"
+    yield f"  fields: {', '.join(layout.names)} at {len(layout.saved)} of {layout.times.size} instants"
 
 
 def _sweep(found: Results) -> Iterator[str]:

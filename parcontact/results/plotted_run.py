@@ -5,11 +5,10 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import printed
 from ..errors import InputError
-from ..files.fields import UNITS
+from ..files.fields import SavedFields
 from ..files.hdf5 import MEND
 from ..job import Job
 from ..job.history import Timeline
@@ -120,7 +119,7 @@ class PlottedRun(Results):
         return self.timeline[step].position if 1 <= step <= len(self.timeline) else (0.0, 0.0)
 
 
-class Fields:
+class Fields(SavedFields):
     """The saved maps of a run: `shown` are the instants to draw, `chosen` is the one whose maps are drawn (default: the
     last).
 
@@ -128,15 +127,11 @@ class Fields:
     """
 
     def __init__(self, file: h5py.File, at: str = "", until: int | None = None) -> None:
-        self.file = file
-        self.steps: NDArray[np.int64] = file["step"][...]
-        self.x, self.y = file["x"][...], file["y"][...]
-        self.times: Array = file["t"][...]
-        lengths = self.times.shape, self.y.shape, self.x.shape
-        maps = [file[name] for name in UNITS if name in file]
-        if self.steps.shape != lengths[0] or any(one.shape != sum(lengths, ()) for one in maps):
-            raise InputError(f"{file.filename} is damaged: the numbers of its maps and coordinates differ; {MEND}")
-        self.saved = np.flatnonzero(~np.isnan(self.times)).tolist()
+        try:
+            super().__init__(file)
+        except ValueError as error:
+            raise InputError(f"{file.filename} is damaged: {error}; {MEND}") from error
+        self.file, self.x, self.y = file, file["x"][...], file["y"][...]
         self.shown = [self._index(at)] if at else self.saved
         before = [k for k in self.shown if until is None or self.steps[k] <= until]
         self.chosen = (before or self.shown or [-1])[-1]
@@ -150,7 +145,7 @@ class Fields:
         """Return the index of the instant `at`; raises InputError if no map is saved then."""
         if not self.saved:
             raise InputError(f"--at {at}: no map is saved yet")
-        steps, times = self.steps[self.saved], self.times[self.saved]
+        steps, times = np.array(self.steps)[self.saved], self.times[self.saved]
         if not at.isdecimal() and not times[0] <= float(at) <= times[-1]:
             raise InputError(f"--at {at}: maps are saved from {times[0]:g} to {times[-1]:g} s")
         order = np.argsort(np.abs(steps - int(at) if at.isdecimal() else times - float(at)), kind="stable")

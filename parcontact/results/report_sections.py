@@ -35,7 +35,6 @@ from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics import surface_statistics
 from ..physics.prony import complex_modulus
-from ..printed import with_error
 from . import band_charts, cycles, histories, maps, plots, slide, style, surface_summary, theory_table
 from .curve_tables import (
     RC,
@@ -51,7 +50,6 @@ from .curve_tables import (
 from .panels import Axis, Line, Panel, Shade
 from .plotted_run import Fields, PlottedRun, choose_evenly, label_frames, to_load
 from .results import MAPS, STATES, Results, read_cases
-from .surface_summary import NOT_SELF_AFFINE
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement and over time"}
 INTERFACE = ("friction_viscous", "friction_interface")
@@ -274,7 +272,10 @@ def road_section(job: Job) -> ReportSection:
     if not found.rms_height:
         return ReportSection("Surface", [*sentences, "The surface is flat."], [shapes])
     waves = any(not isinstance(part, Indenter) for part in job.surface)
-    tables = [shapes, *([_tabulate(found, "on the grid of the job")] if waves else [])]
+    tables = [
+        shapes,
+        *([ReportTable(("on the grid of the job", "value"), surface_summary.list_statistics(found))] if waves else []),
+    ]
     return ReportSection("Surface", sentences, tables, _draw(surface_summary.Sketch(heights, job.grid.size, found)))
 
 
@@ -293,20 +294,8 @@ def _describe_bands(job: Job, shapes: ReportTable) -> ReportSection:
     heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
     found = surface_statistics.surface_statistics(heights, setup.grid.size)
     pictures = _draw(surface_summary.Sketch(heights, setup.grid.size, found), ", coarsest band")
-    tables = [shapes, bands, _tabulate(found, "of the coarsest band")]
+    tables = [shapes, bands, ReportTable(("of the coarsest band", "value"), surface_summary.list_statistics(found))]
     return ReportSection("Surface", [f"{text}." for text in describe_cut(cut, job)], tables, pictures)
-
-
-def _tabulate(found: surface_statistics.Statistics, where: str) -> ReportTable:
-    hurst = NOT_SELF_AFFINE if np.isnan(found.hurst) else with_error(found.hurst, found.hurst_error)
-    rows = [
-        ("rms height", printed.quantity(found.rms_height, "m", 4)),
-        ("rms slope", f"{found.rms_slope:.4g}"),
-        ("rms curvature", f"{found.rms_curvature:.4g} 1/m"),
-        ("Nayak's parameter", f"{found.nayak:.4g}"),
-        ("Hurst exponent", hurst),
-    ]
-    return ReportTable((where, "value"), rows)
 
 
 def _draw(sketch: surface_summary.Sketch, of: str = "") -> list[Picture]:

@@ -284,7 +284,7 @@ class Results:
         try:
             with h5py.File(path, "r") as file:
                 layout = fields.SavedFields(file)
-                saved = np.flatnonzero(~np.isnan(layout.times))
+                saved = np.array(layout.saved, dtype=int)
                 places = {name: (name, file[name][...], {"units": "m"}) for name in ("y", "x")}
                 steps = ("t", file["step"][...][saved], {"units": "1"})
                 found = {name: SavedMap(path, name, file[name].shape, file[name].dtype, saved) for name in layout.names}

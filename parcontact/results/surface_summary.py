@@ -6,7 +6,7 @@ Picture of a rigid surface: its map, the distribution of its heights, and its sp
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -140,15 +140,24 @@ def describe_surface(
     except OSError as error:
         raise InputError(f"{picture} cannot be written: {hdf5.reason(error)}") from error
     yield from (*lines, *remarks)
-    yield f"rms height     {quantity(found.rms_height, 'm', 4)}"
-    yield f"rms slope      {found.rms_slope:.4g}"
-    yield f"rms curvature  {found.rms_curvature:.4g} 1/m"
-    yield f"Nayak          {found.nayak:.4g}"
+    own = measured or found  # a measured map at its own points, which no mirror has made twice as long
+    *heights_and_slopes, (name, hurst) = list_statistics(replace(found, hurst=own.hurst, hurst_error=own.hurst_error))
+    yield from (f"{one:15}{text}" for one, text in heights_and_slopes)
     longest, two_cells = max(job.grid.size), 2.0 * max(job.grid.dx, job.grid.dy)
     yield f"spectrum       waves of {quantity(longest, 'm', 4)} to {quantity(two_cells, 'm', 4)}"
-    own = measured or found  # a measured map at its own points, which no mirror has made twice as long
-    yield f"Hurst          {with_error(own.hurst, own.hurst_error) if own.hurst == own.hurst else NOT_SELF_AFFINE}"
+    yield f"{name:15}{hurst}"
     if shortest is not None:
         cells = shortest / max(length / n for length, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1)
         yield f"shortest wave  {quantity(shortest, 'm', 4)}, {cells:.3g} cells"
     yield f"picture: {picture}"
+
+
+def list_statistics(found: Statistics) -> list[tuple[str, str]]:
+    """Return the names and values of statistics of a surface as text."""
+    return [
+        ("rms height", quantity(found.rms_height, "m", 4)),
+        ("rms slope", f"{found.rms_slope:.4g}"),
+        ("rms curvature", f"{found.rms_curvature:.4g} 1/m"),
+        ("Nayak", f"{found.nayak:.4g}"),
+        ("Hurst", NOT_SELF_AFFINE if np.isnan(found.hurst) else with_error(found.hurst, found.hurst_error)),
+    ]
