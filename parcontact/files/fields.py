@@ -156,15 +156,16 @@ def cut_back(path: Path, slab: Slab, step: int) -> str:
 
 
 class SavedFields:
-    """The maps and instants in a field file; raises InputError if their numbers differ."""
+    """The maps and instants in a field file; raises ValueError if their numbers differ."""
 
     def __init__(self, file: h5py.File) -> None:
         self.names = tuple(name for name in UNITS if name in file)
         self.steps: tuple[int, ...] = tuple(file["step"][...].tolist())
         self.times: NDArray[np.float64] = file["t"][...]
         self.saved: list[int] = np.flatnonzero(~np.isnan(self.times)).tolist()
-        for name in self.names:
-            if file[name].shape != (len(self.steps), len(file["y"]), len(file["x"])):
+        instants, places = (len(self.steps),), (len(file["y"]), len(file["x"]))
+        for name, shape in {"t": instants, **dict.fromkeys(self.names, instants + places)}.items():
+            if file[name].shape != shape:
                 raise ValueError(f"{name} has shape {file[name].shape}")
 
     def reached(self, step: int) -> list[int]:

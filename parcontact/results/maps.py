@@ -54,7 +54,7 @@ def _choose_instants(run: PlottedRun, fields: Fields) -> tuple[list[tuple[int, s
     """Return some evenly spaced saved instants with their labels, and the load for the title if it is the same at
     all."""
     indices = sorted({fields.shown[int(k)] for k in np.linspace(0, len(fields.shown) - 1, INSTANTS)})
-    instants = [(index, int(fields.steps[index]), float(fields.times[index])) for index in indices]
+    instants = [(index, *fields.when(index)) for index in indices]
     loads = {run.pressed(step) for _, step, _ in instants}
     same_load = run.lasts and len(loads) == 1
     names = []
@@ -95,7 +95,7 @@ def traction_panels(run: PlottedRun, fields: Fields) -> Iterator[Panel]:
     if traction is None or pressure is None:
         return
     t, p = (field[0] if lies else field[:, 0] for field in (traction, pressure))
-    instant = run.instant(int(fields.steps[fields.chosen]), float(fields.times[fields.chosen]))
+    instant = run.instant(*fields.when(fields.chosen))
     bound, touched = run.job.section("interface").coefficient, place[p > 0.0]
     lines = [Line("traction", place, t, {"color": style.BLUE})]
     for sign, name in ((1, "bound"), (-1, "")) if bound is not None else ():
@@ -112,7 +112,7 @@ def _make_profile(run: PlottedRun, fields: Fields, shape: Sphere | Cylinder) -> 
     chosen, load = _choose_instants(run, fields)
     curves: list[Curve] = []
     for index, name in chosen:
-        moved = run.moved(int(fields.steps[index]))
+        moved = run.moved(fields.steps[index])
         x, y, field = fields.x - centre[0] - moved[0], fields.y - centre[1] - moved[1], fields.file["pressure"][index]
         line = field[:, np.argmin(np.abs(x))] if across else field[np.argmin(np.abs(y))]
         curves.append((name, y if across else x, line))
@@ -200,7 +200,7 @@ def _panels(run: PlottedRun, fields: Fields) -> Iterator[Panel]:
         found["traction"], found["slip"] = stick_maps(np.hypot(x, y), pressure, run.job)
     if found["gap"] is not None:
         del found["displacement"]  # displacement and gap show the same
-    instant = run.instant(int(fields.steps[fields.chosen]), float(fields.times[fields.chosen]))
+    instant = run.instant(*fields.when(fields.chosen))
     for name, values in found.items():
         if values is not None:
             yield _panel(fields, name, mask(name, values, pressure, run.job), instant, _find_window(pressure))

@@ -136,6 +136,10 @@ class Fields(SavedFields):
         before = [k for k in self.shown if until is None or self.steps[k] <= until]
         self.chosen = (before or self.shown or [-1])[-1]
 
+    def when(self, index: int) -> tuple[int, float]:
+        """Return step and time [s] of a saved instant."""
+        return self.steps[index], float(self.times[index])
+
     def read(self, name: str) -> Array | None:
         """Return the named map at the chosen instant, or None."""
         field = self.file[name][self.chosen] if name in self.file and self.shown else None
@@ -165,8 +169,7 @@ def choose_evenly(labels: dict[int, str], most: int) -> dict[int, str]:
 def label_frames(run: PlottedRun, file: h5py.File) -> dict[int, str]:
     """Return time and load of each map of a run as text, by its index."""
     fields = Fields(file)
-    saved = ((k, int(fields.steps[k]), float(fields.times[k])) for k in fields.saved)
-    return {k: f"{run.instant(step, time)} (step {step})".lstrip() for k, step, time in saved}
+    return {k: f"{run.instant(*fields.when(k))} (step {fields.steps[k]})".lstrip() for k in fields.saved}
 
 
 def round_digits(values: Array) -> Array:

@@ -49,7 +49,7 @@ from .curve_tables import (
 )
 from .panels import Axis, Line, Panel, Shade
 from .plotted_run import Fields, PlottedRun, choose_evenly, label_frames, to_load
-from .results import MAPS, STATES, Results, read_cases
+from .results import MAPS, PLACES, STATES, Results, read_cases
 
 STUDY_PICTURES = {"convergence.png": "errors over refinement and over time"}
 INTERFACE = ("friction_viscous", "friction_interface")
@@ -61,7 +61,6 @@ POINTS = (
     *("velocity", "temperature", "pressure", "friction", "error_friction", *INTERFACE),
     *("contact_area_corrected", "error_area", "mean_gap", "max_pressure"),
 )
-PLACE = {"velocity": "m/s", "pressure": "Pa", "temperature": "°C"}  # coordinates of a point of a curve in bands
 DIGITS = 5
 MOST_ROWS = 200  # most rows of a table
 MOST_MAPS = 24  # most pictures of one map
@@ -106,8 +105,7 @@ def describe_curve(directory: Path) -> ReportSection:
     curve = Results(directory, "curve")
     columns = curve.table
     names = [name for name in POINTS if name in columns]
-    units_of = columns.units | dict.fromkeys(slide.ERRORS, "relative")
-    head = [f"{_to_words(name)} [{units_of[name]}]" if units_of[name] else _to_words(name) for name in names]
+    head = [_to_words(_add_unit(name)) for name in names]
     table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
     pictures = [draw_panel(chart) for chart in band_charts.chart_steady(directory)]
     states = partial(_label_states, curve.free_area)
@@ -126,11 +124,9 @@ def describe_friction(directory: Path) -> ReportSection:
 
 def _list_main_bands(curve: Results) -> list[ReportTable]:
     """Return a table of the band with most friction at each point of a curve in bands."""
-    if not (columns := curve.read("bands.csv")):
+    if "velocity" not in (columns := curve.read("bands.csv")):  # none, or one of a history
         return []
-    if "velocity" not in columns:  # of a history
-        return []
-    names = [name for name in PLACE if any(value == value for value in columns[name])]
+    names = [name for name in PLACES if any(value == value for value in columns[name])]
     points: dict[tuple[str, ...], list[int]] = {}
     for row in range(len(columns["velocity"])):
         points.setdefault(tuple(format_cell(columns[name][row]) for name in names), []).append(row)
@@ -141,8 +137,7 @@ def _list_main_bands(curve: Results) -> list[ReportTable]:
         waves = " to ".join(printed.quantity(columns[f"{end}_wavelength"][most], "m") for end in ("long", "short"))
         share = f"{100 * max(friction) / sum(friction):.0f} %" if sum(friction) > 0.0 else "–"
         found.append((*place, waves, share))
-    head = [f"{_to_words(name)} [{unit}]" for name, unit in PLACE.items() if name in names]
-    table = _shorten([*head, "waves", "share of friction"], found)
+    table = _shorten([*map(_add_unit, names), "waves", "share of friction"], found)
     captions = filter(None, ["the band with most of the friction", table.caption])
     return [replace(table, caption="; ".join(captions))]
 
@@ -160,8 +155,8 @@ def describe_sweep(directory: Path) -> ReportSection:
 
 
 def _add_unit(name: str) -> str:
-    """Return the name of a column of a sweep, or a key of its job, with its unit: `pull_off [N]`, `history.0.velocity
-    [m/s]`."""
+    """Return the name of a column of a curve or a sweep, or a key of a job, with its unit: `pull_off [N]`,
+    `history.0.velocity [m/s]`."""
     known = {column.name: column.unit for column in (*SWEEP, *STEADY)} | dict.fromkeys(slide.ERRORS, "relative")
     unit = known.get(name) or listing.unit_of_path(name)
     return f"{name} [{unit}]" if unit else name

@@ -257,7 +257,7 @@ class Gaps:
         with self.results.open_maps() as file:
             gap, pressure = file["gap"][index], file["pressure"][index]
         if gap.shape != pressure.shape or not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
-            step = int(self.fields.steps[index])
+            step = self.fields.steps[index]
             raise InputError(f"{self.directory / 'fields.h5'}: the maps after step {step} are incomplete or not finite")
         return np.where(touching_of(self.job, pressure, gap), 0.0, np.maximum(gap, 0.0))
 
@@ -316,7 +316,7 @@ class Gaps:
 
     def _measured(self, index: int, name: str) -> float:
         """Return a value of measures.csv at a saved instant, NaN if it has none."""
-        rows = np.flatnonzero(self.columns["step"] == self.fields.steps[index])
+        rows = np.flatnonzero(np.asarray(self.columns["step"]) == self.fields.steps[index])
         return float(self.columns[name][rows[-1]]) if rows.size else np.nan
 
     def load(self, index: int) -> float:
@@ -382,7 +382,7 @@ def write_leakage(
     table, picture = (directory / f"{name}.{kind}" for kind in ("csv", "png"))
     columns = choose_columns(LEAK, when={"--fluid"} | ({"--load total"} if total else set()) if drop else ())
     files.replace_file(table, to_csv(names_of(columns), (values_of(columns, row) for row in rows)))
-    instant = PlottedRun(directory).instant(int(gaps.fields.steps[drawn]), float(gaps.fields.times[drawn]))
+    instant = PlottedRun(directory).instant(*gaps.fields.when(drawn))
     flows = leaks[drawn].leak.along_x, leaks[drawn].leak.along_y
     pictures.draw_leakage(picture, gaps.size, gaps.read(drawn), flows, maps, instant, rows, over)
     yield f"leakage at {len(rows)} {'instant' if len(rows) == 1 else 'instants'}: {table}"
@@ -488,7 +488,7 @@ def _describe_fluid(gaps: Gaps, last: LeakInstant, solved: SolvedLeak) -> Iterat
 def _describe_missing(gaps: Gaps, at: str) -> Iterator[str]:
     """Yield a sentence on stages at whose end no gap is saved."""
     run = PlottedRun(gaps.directory)
-    saved = set(gaps.fields.steps[gaps.shown].tolist())
+    saved = {gaps.fields.steps[index] for index in gaps.shown}
     ends = {index: int(run.columns["step"][rows[-1]]) for index, rows in run.rows_of_stages.items()}
     names = [run.job.history[index].name for index, step in ends.items() if step not in saved]
     if names and not at:
