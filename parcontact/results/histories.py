@@ -13,11 +13,12 @@ from ..job.listing import answers
 from ..parallel.slab import Array
 from . import style
 from .cycles import friction_along, way_along
-from .panels import Axis, ColumnPanel, Line, Panel, offered
+from .panels import Axis, ColumnPanel, Line, Panel, Shade, offered
 from .plotted_run import PlottedRun
 
 EARLY = 0.05  # half of the rows within this share of the time make a linear axis useless
 FEW_ROWS = 8
+STAGE_WHITE = 0.87  # share of white in the shade of a stage
 LENGTHS = (
     ColumnPanel("approach", Axis("approach", UNITS["approach"]), {"": "approach"}),
     ColumnPanel("gap", Axis("mean gap", UNITS["mean_gap"]), {"": "mean_gap"}),
@@ -37,13 +38,13 @@ VISCOUS = "friction_viscous"  # friction of the body; in tables of runs with an 
 
 @dataclass(frozen=True)
 class Abscissa:
-    """The horizontal axis: SI values of all or some rows, stages, and whether rows have marks. `loop`: values return,
-    as loads and approaches do."""
+    """The horizontal axis: SI values of all or some rows, shades of stages, and whether rows have marks. `loop`: values
+    return, as loads and approaches do."""
 
     axis: Axis
     values: Array
     rows: NDArray[np.intp] | None = None
-    stages: Sequence[tuple[str, float, float]] = ()
+    shades: Sequence[Shade] = ()
     marked: bool = False
     loop: bool = False
 
@@ -62,7 +63,7 @@ def chart_histories(run: PlottedRun, over: str = "") -> list[Panel]:
         return []
     along = _choose_abscissa(run, over)
     log = along.axis.unit == "s" and _steps_grow(along.values)
-    found = [replace(chart, stages=along.stages, log_x=log) for chart in _find_panels(run, along)]
+    found = [replace(panel, shades=along.shades, log_x=log) for panel in _find_panels(run, along)]
     if along.marked or along.loop:
         return found
     first, *others = (_add_theory(chart, run) for chart in found)
@@ -192,10 +193,19 @@ def _choose_abscissa(run: PlottedRun, over: str) -> Abscissa:
         raise InputError(f"{run.path}: nothing can be drawn over {constant}")
     if over == "approach":
         return Abscissa(axis, values, loop=True)
-    stages = []
-    for number, rows in run.rows_of_stages.items():
-        stages.append((run.job.history[number].name, float(values[max(rows[0] - 1, 0)]), float(values[rows[-1]])))
-    return Abscissa(axis, values, stages=stages)
+    stages = [
+        (run.job.history[number].name, float(values[max(rows[0] - 1, 0)]), float(values[rows[-1]]))
+        for number, rows in run.rows_of_stages.items()
+    ]
+    return Abscissa(axis, values, shades=_shade([stage for stage in stages if stage[1] < stage[2]]))
+
+
+def _shade(stages: Sequence[tuple[str, float, float]]) -> list[Shade]:
+    """Return the shades of several stages with their starts and ends, each name in its colour."""
+    names = list(dict.fromkeys(name for name, _, _ in stages))
+    colors = dict(zip(names, style.sequence(len(names)), strict=True))
+    shades = [Shade(*stage, color=style.mix(colors[stage[0]], STAGE_WHITE)) for stage in stages]
+    return shades if len(stages) > 1 else []
 
 
 def _choose_velocity(run: PlottedRun) -> Abscissa:

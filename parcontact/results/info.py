@@ -168,10 +168,16 @@ def _run(found: Results) -> Iterator[str]:
     last = [f"{name} {quantity(columns[name][-1], unit, 4)}" for name, unit in names.items()]
     yield f"  last row: {', '.join(last)}"
     yield f"  wall time of its steps: {math.fsum(columns['seconds']):.3g} s"
-    if job is not None:
-        yield from (f"  {text}" for text in slide.describe_slide(job.history, job.initial, job.grid.dx, columns))
-        yield from (f"  {text}" for text in cycles.describe_cycles(job, columns))
-    yield from (f"  {text}" for sentences in answers("results", "sentences") for text in sentences(run))
+    yield from (f"  {text}" for text in describe_run_in_words(run))
+
+
+def describe_run_in_words(run: Results) -> Iterator[str]:
+    """Yield sentences on the slide, the cycles and the capabilities of a run."""
+    if (job := run.job) is not None:
+        yield from slide.describe_slide(job.history, job.initial, job.grid.dx, run.table)
+        yield from cycles.describe_cycles(job, run.table)
+    for sentences in answers("results", "sentences"):
+        yield from sentences(run)
 
 
 def _slides(job: Job | None) -> bool:

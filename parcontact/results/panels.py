@@ -22,14 +22,12 @@ from . import style
 
 SPIKE_SHARE = 0.02  # first part of the abscissa, whose spikes do not set the limits
 SPIKE_HEIGHT = 1.5  # least height of a spike over the highest other value
-STAGE_WHITE = 0.87  # share of white in the shade of a stage
 MOST_EDGES = 7  # most labels of the bar of colours of bands
 HEADROOM, PEAK_ROOM = 1.08, 1.25  # upper limit over the highest value, without and with its name in the legend
 BAR_SHARE = 0.8  # width of a bar over the distance of bars, in the logarithm
 LEAST = 0.99  # largest downward error bar over the value
 ZERO_ROW = 0.05  # height of the row of marks at 0, over the height of the panel
 SAME = 1e-9  # rounding: relative difference of equal values on a logarithmic axis
-SHADE = 0.8  # share of white in the shade of a range
 COARSEST = 800  # most points of a drawn map along a side
 COLOR_BAR = 0.9  # height of a bar of colours over that of its map
 TICKS = 5  # most intervals of ticks of a bar of colours
@@ -72,12 +70,13 @@ def offered(name: str) -> list[ColumnPanel]:
 
 @dataclass(frozen=True)
 class Shade:
-    """A shaded range of an axis, x or y, with its name in the legend."""
+    """A shaded range of an axis, x or y, with its name in the legend. All but the first begin at a dotted line."""
 
     name: str
     low: float
     high: float
     axis: str = "x"
+    color: str = style.mix(style.GREY, 0.8)
 
 
 @dataclass(frozen=True)
@@ -102,10 +101,10 @@ class Colors:
 class Panel:
     """A panel, chosen by its `key`: `series` over `x`, on a map of `colors` if there is one.
 
-    `spikes`: a spike at the beginning may be cut off. `stages`: names, starts and ends over `x`.
+    `spikes`: a spike at the beginning may be cut off.
     `peak`: the legend names the highest point. `zeros`: label of values of 0 on a logarithmic axis. `edges` [m] are the
     longest and shortest waves of the bands of stacked bars, from the longest on, for a bar of colours. `x_range` and
-    `y_range` are limits of the axes, `right` is a second vertical axis with its lines.
+    `y_range` are limits of the axes.
     """
 
     key: str
@@ -116,7 +115,6 @@ class Panel:
     bottom: bool = True
     spikes: bool = False
     peak: bool = False
-    stages: Sequence[tuple[str, float, float]] = ()
     shades: Sequence[Shade] = ()
     log_x: bool = False
     log_y: bool = False
@@ -125,7 +123,6 @@ class Panel:
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
     colors: Colors | None = None
-    right: tuple[Axis, Sequence[Line]] | None = None
 
 
 def draw(panel: Panel, axes: Axes, log: Sequence[str] = ()) -> None:
@@ -149,10 +146,7 @@ def draw(panel: Panel, axes: Axes, log: Sequence[str] = ()) -> None:
         _mark_zeros(axes, panel)
     if panel.colors is None:
         _set_scales(axes, panel, series, log_x, log_y)
-    _mark_stages(axes, panel.stages)
     _draw_shades(axes, panel.shades)
-    if panel.right is not None:
-        _draw_right(axes, *panel.right)
     axes.set_title(panel.title)
 
 
@@ -181,18 +175,13 @@ def _set_scales(axes: Axes, panel: Panel, series: Sequence[Line], log_x: bool, l
 
 
 def _draw_shades(axes: Axes, shades: Sequence[Shade]) -> None:
-    for one in shades:
+    limits = axes.get_xlim()
+    for number, one in enumerate(shades):
         fill = axes.axvspan if one.axis == "x" else axes.axhspan
-        fill(one.low, one.high, color=style.mix(style.GREY, SHADE), lw=0, zorder=0, label=one.name or None)
-
-
-def _draw_right(axes: Axes, of: Axis, series: Sequence[Line]) -> None:
-    """Draw lines over a second vertical axis, which begins at 0."""
-    right = axes.twinx()
-    _draw_lines(right, series)
-    right.set_ylim(bottom=0.0)
-    right.grid(False)
-    style.label(right.yaxis, of.name, of.unit)
+        fill(one.low, one.high, color=one.color, lw=0, zorder=-1, label=one.name or None)
+        if number:
+            axes.axvline(one.low, color=style.GREY, lw=0.8, ls=":", zorder=0)
+    axes.set_xlim(limits)
 
 
 def show_colors(axes: Axes, one: Colors) -> AxesImage:
@@ -343,19 +332,6 @@ def _name_peak(axes: Axes, one: Line, unit: str) -> None:
     if 0 < at < height.size - 1 and height[at] > 1.02 * height[-1]:
         label = f"{one.y[at]:.3g} at {printed.quantity(one.x[at], unit)}"
         axes.plot(one.x[at], one.y[at], "o", color=style.RED, label=label, scalex=False, scaley=False)
-
-
-def _mark_stages(axes: Axes, stages: Sequence[tuple[str, float, float]]) -> None:
-    """Shade several stages, each name in its colour, and mark their starts."""
-    shown = [stage for stage in stages if stage[1] < stage[2]]
-    names = list(dict.fromkeys(name for name, _, _ in shown))
-    shades = dict(zip(names, style.sequence(len(names)), strict=True))
-    limits = axes.get_xlim()
-    for number, (name, start, end) in enumerate(shown if len(shown) > 1 else ()):
-        axes.axvspan(start, end, color=style.mix(shades[name], STAGE_WHITE), lw=0, zorder=-1, label=name or None)
-        if number:
-            axes.axvline(start, color=style.GREY, lw=0.8, ls=":", zorder=0)
-    axes.set_xlim(limits)
 
 
 def picture(

@@ -211,11 +211,6 @@ def _name_value(key: str, value: Any) -> str:
     return f"{key} {shown}"
 
 
-def hide_stages(panel: Panel) -> Panel:
-    """Return a panel whose stages keep their colours, but have names that Matplotlib leaves out of legends."""
-    return replace(panel, stages=[(f"_{name}", start, end) for name, start, end in panel.stages])
-
-
 def compare(runs: Sequence[tuple[str, Sequence[Panel]]], least: int = 1) -> list[Panel]:
     """Return the charts that at least `least` of several runs have. The colour is the run; the lines of each run have
     marks, and bands are shares of its bar. If no run has several lines in a chart, each has its own dashes."""
@@ -232,7 +227,7 @@ def compare(runs: Sequence[tuple[str, Sequence[Panel]]], least: int = 1) -> list
 def _join(group: Sequence[tuple[int, Panel]], series: Sequence[Line]) -> Panel:
     charts = [chart for _, chart in group]
     spikes, log_x = (all(getattr(chart, name) for chart in charts) for name in ("spikes", "log_x"))
-    return replace(charts[0], series=series, stages=(), peak=False, spikes=spikes, log_x=log_x, edges=())
+    return replace(charts[0], series=series, shades=(), peak=False, spikes=spikes, log_x=log_x, edges=())
 
 
 def _merge_lonely(group: Sequence[tuple[int, Panel]], names: Sequence[str]) -> list[Line]:

@@ -35,7 +35,7 @@ from ..parallel.fft import FFT
 from ..parallel.slab import Slab
 from ..physics import surface_statistics
 from ..physics.prony import complex_modulus
-from . import band_charts, cycles, histories, maps, plots, slide, style, surface_summary, theory_table
+from . import band_charts, histories, info, maps, slide, style, surface_summary, theory_table
 from .curve_tables import (
     RC,
     Browser,
@@ -81,15 +81,13 @@ def describe_run(directory: Path) -> ReportSection:
     ]
     numbers = ReportTable(("measure", "last", "smallest", "largest", "unit"), rows)
     sentences = [
-        *slide.describe_slide(run.job.history, run.job.initial, run.job.grid.dx, columns),
-        *cycles.describe_cycles(run.job, columns),
-        *(text for sentences in answers("results", "sentences") for text in sentences(run)),
+        *info.describe_run_in_words(run),
         *theory_table.describe_theory(directory, run.job.history, run.job.grid.dx),
         theory_table.describe_settings(directory),
     ]
     found = histories.chart_histories(run)
-    pictures = [draw_panel(chart) for chart in (*found[:1], *map(plots.hide_stages, found[1:]))]
-    pictures += _more_pictures(directory)
+    unnamed = [replace(one, shades=[replace(shade, name="") for shade in one.shades]) for one in found[1:]]
+    pictures = [*map(draw_panel, [*found[:1], *unnamed]), *_more_pictures(directory)]
     return ReportSection("Results of the run", list(filter(None, sentences)), [numbers], pictures, browse_run(run))
 
 
@@ -299,7 +297,7 @@ def _draw(sketch: surface_summary.Sketch, of: str = "") -> list[Picture]:
 
 DECADES = 1.5  # range of a picture beyond the relaxation times [decades]
 MODULI_POINTS = 400  # number of points of a line
-CAPTION = "moduli and loss tangent over frequency, at the temperature of the job"
+CAPTION = "{} over frequency, at the temperature of the job"
 
 
 def material_section(job: Job) -> ReportSection:
@@ -326,7 +324,11 @@ def material_section(job: Job) -> ReportSection:
     tables.append(ReportTable(("relaxation time", "modulus"), listed, "G(t) = G_inf + sum of modulus exp(-t/time)"))
     if (excited := _list_bands(job)).rows:
         tables.append(excited)
-    return ReportSection("Material", tables=tables, pictures=[draw_panel(_moduli_over_frequency(job), CAPTION)])
+    return ReportSection(
+        "Material",
+        tables=tables,
+        pictures=[draw_panel(panel, CAPTION.format(panel.y.name)) for panel in _over_frequency(job)],
+    )
 
 
 def _describe_temperature(job: Job) -> Iterator[tuple[str, str]]:
@@ -362,9 +364,9 @@ def _write_band(band: tuple[float, float]) -> str:
     return f"{printed.quantity(band[0], 'Hz')} to {printed.quantity(band[1], 'Hz')}"
 
 
-def _moduli_over_frequency(job: Job) -> Panel:
-    """Return the panel of storage and loss modulus over frequency, and of the loss tangent, at all relaxation times and
-    frequencies that the job excites."""
+def _over_frequency(job: Job) -> list[Panel]:
+    """Return the panels of storage and loss modulus, and of the loss tangent, at all relaxation times and frequencies
+    that the job excites."""
     series, band = relaxation_of(job.material), excited_band(job)
     natural = np.log10(1.0 / (2 * math.pi * series.relaxation_times))
     seen = [natural.min() - DECADES, natural.max() + DECADES, *map(math.log10, band or ())]
@@ -372,7 +374,9 @@ def _moduli_over_frequency(job: Job) -> Panel:
     omega = 2 * math.pi * frequency
     value = np.asarray(complex_modulus(omega, series.modulus_inf, series.moduli, series.relaxation_times))
     moduli = [Line("G' storage", frequency, value.real), Line("G'' loss", frequency, value.imag, style.line(1))]
-    tangent = [Line("tan δ", frequency, value.imag / value.real, style.line(2))]
     shades = [Shade("excited by the job", *band)] if band else []
-    axes = Axis("frequency", "Hz"), Axis("shear modulus", "Pa")
-    return Panel("moduli", *axes, moduli, shades=shades, log_x=True, log_y=True, right=(Axis("tan δ"), tangent))
+    x, tangent = Axis("frequency", "Hz"), [Line("", frequency, value.imag / value.real)]
+    return [
+        Panel("moduli", x, Axis("shear modulus", "Pa"), moduli, shades=shades, log_x=True, log_y=True),
+        Panel("tangent", x, Axis("loss tangent tan δ"), tangent, shades=shades, log_x=True),
+    ]

@@ -212,14 +212,9 @@ def place_legends(rows: Sequence[Sequence[Axes]]) -> list[float]:
 
 
 def _find_entries(axes: Axes) -> dict[str, Artist]:
-    """Return the entries of the legend of a panel, also those of a second vertical axis."""
-    pairs = (zip(*one.get_legend_handles_labels(), strict=True) for one in _on_the_same_place(axes))
-    return {name: handle for each in pairs for handle, name in each}
-
-
-def _on_the_same_place(axes: Axes) -> list[Axes]:
-    """Return the axes of a panel: one, or two if it has a second vertical axis."""
-    return [one for one in axes.figure.axes if one.get_subplotspec() == axes.get_subplotspec()]
+    """Return the entries of the legend of a panel."""
+    handles, names = axes.get_legend_handles_labels()
+    return dict(zip(names, handles, strict=True))
 
 
 def _find_look(handle: Any) -> tuple[str, ...]:
@@ -237,8 +232,7 @@ def _width(figure: Figure | SubFigure) -> float:
 def _add_legend(axes: Axes, entries: dict[str, Artist]) -> float:
     """Add the legend of a panel, and return the height that it needs below the panel [inch]."""
     width = _width(axes.figure) / panels_per_row(axes)
-    few = len(entries) <= FEW_ENTRIES[width > NARROW] and len(_on_the_same_place(axes)) == 1
-    if few and ROOM + LETTER * max(map(len, entries)) < INSIDE * width:
+    if len(entries) <= FEW_ENTRIES[width > NARROW] and ROOM + LETTER * max(map(len, entries)) < INSIDE * width:
         axes.legend(entries.values(), entries)
         return 0.0
     under = axes.transAxes + ScaledTranslation(0.0, -UNDER_AXES, axes.figure.dpi_scale_trans)
