@@ -44,7 +44,7 @@ SAME = 1e-9  # rounding: of distances
 ENTRY = Line("theory", np.zeros(0), np.zeros(0), THEORY_LOOK)  # in legends
 
 
-def chart_bands(directory: Path) -> list[Panel]:
+def panels_of_bands(directory: Path) -> list[Panel]:
     """Return panels of a table of bands of a curve, for its first pressure and temperature."""
     curve = Results(directory, "curve")
     if "velocity" not in curve.read(BANDS):
@@ -62,11 +62,11 @@ def chart_bands(directory: Path) -> list[Panel]:
         if name in columns and np.isfinite(columns[name]).any():
             found.append(_over_bands(one.key, columns, None, name, one.y))
     if at := _describe_first(whole):
-        found = [replace(chart, y=replace(chart.y, name=f"{chart.y.name}\nat {at}")) for chart in found]
+        found = [replace(panel, y=replace(panel.y, name=f"{panel.y.name}\nat {at}")) for panel in found]
     return found
 
 
-def chart_slips(run: PlottedRun) -> list[Panel]:
+def panels_of_slips(run: PlottedRun) -> list[Panel]:
     """Return panels of a history in bands over the slip since the start of each slide: friction and area, and friction
     by band in the last slide; none without a slide."""
     stages = run.job.history
@@ -138,7 +138,7 @@ def _choose(columns: dict[str, Array]) -> dict[str, Array]:
 
 
 def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Panel:
-    """Return a chart of the friction of each band over velocity, with the theory's sum as a line."""
+    """Return a panel of the friction of each band over velocity, with the theory's sum as a line."""
     found = _stacked(columns, "velocity", Axis("sliding velocity", "m/s"))
     if theory is None:
         return found
@@ -148,7 +148,7 @@ def _friction(columns: dict[str, Array], theory: dict[str, Array] | None) -> Pan
 
 
 def _stacked(columns: dict[str, Array], over: str, x: Axis) -> Panel:
-    """Return a chart of the friction of each band over a column, stacked from the coarsest."""
+    """Return a panel of the friction of each band over a column, stacked from the coarsest."""
     series, bands, edges = list[Line](), np.unique(columns["band"]), list[float]()
     for band, color in zip(bands, style.sequence(bands.size), strict=True):
         rows = np.flatnonzero(columns["band"] == band)
@@ -186,7 +186,7 @@ EMPTY = np.zeros(0)
 THIN = {"theory": ":", "without feedback": "--"}  # dashes of thin lines, drawn in addition to the simulation
 
 
-def chart_steady(directory: Path, over: str = "") -> list[Panel]:
+def panels_of_curve(directory: Path, over: str = "") -> list[Panel]:
     """Return panels of a table of steady states; none without states, or if `over` is not possible."""
     curve = Results(directory, "curve")
     columns, area = curve.table.arrays(NEEDED), curve.free_area
@@ -229,8 +229,8 @@ def chart_steady(directory: Path, over: str = "") -> list[Panel]:
         found.append(Panel(key, axes[along], axes[name], series, log_x=True))
     with suppress(InputError):  # files of the job no longer exist
         job = load(directory / STEADY_RESOLVED)
-        found += [chart for panels_of in answers("pictures", "curve_panels") for chart in panels_of(job, columns)]
-    return found + (chart_bands(directory) if x == "velocity" else [])
+        found += [panel for panels_of in answers("pictures", "curve_panels") for panel in panels_of(job, columns)]
+    return found + (panels_of_bands(directory) if x == "velocity" else [])
 
 
 def steady_title(directory: Path) -> str:
@@ -307,7 +307,7 @@ def all_panels() -> Panels:
     return tuple(sorted(found, key=lambda panel: place(next(iter(panel.columns.values())))))
 
 
-def chart_sweep(directory: Path) -> list[Panel]:
+def panels_of_sweep(directory: Path) -> list[Panel]:
     """Return panels of a sweep; none without results, or without a swept key of numbers."""
     table = Results(directory, "sweep").points
     rows, panels = read_cases(table), all_panels()

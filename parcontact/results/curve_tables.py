@@ -29,7 +29,7 @@ from . import style
 from .panels import Panel, draw
 from .results import Results
 
-SIZE = (4.2, 2.9)  # size of a chart, half the width of a laptop's screen [inch]
+SIZE = (4.2, 2.9)  # size of a panel, half the width of a laptop's screen [inch]
 RC = {**style.RC, "svg.fonttype": "path"}  # letters as shapes, independent of fonts
 
 Picture = tuple[str, str]  # data URI, and caption

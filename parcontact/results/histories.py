@@ -1,4 +1,4 @@
-"""Charts of a run over time, distance, velocity, load or approach."""
+"""Panels of a run over time, distance, velocity, load or approach."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -57,7 +57,7 @@ class Abscissa:
         return [Line(name, self.values, values[rows], look) for (name, values), look in drawn]
 
 
-def chart_histories(run: PlottedRun, over: str = "") -> list[Panel]:
+def panels_of_run(run: PlottedRun, over: str = "") -> list[Panel]:
     """Return panels of the measures of a run; none for a single solve. Raises InputError if nothing can be drawn."""
     if not run.curves:
         return []
@@ -66,15 +66,15 @@ def chart_histories(run: PlottedRun, over: str = "") -> list[Panel]:
     found = [replace(panel, shades=along.shades, log_x=log) for panel in _find_panels(run, along)]
     if along.marked or along.loop:
         return found
-    first, *others = (_add_theory(chart, run) for chart in found)
-    return [first, *_chart_cycles(run), *others]
+    first, *others = (_add_theory(panel, run) for panel in found)
+    return [first, *_panels_of_cycles(run), *others]
 
 
-def _chart_cycles(run: PlottedRun) -> list[Panel]:
+def _panels_of_cycles(run: PlottedRun) -> list[Panel]:
     """Return the loops of oscillations, or friction over displacement of a surface that sticks and is moved to and fro
     along x."""
     if any(stage.frequency for stage in run.job.history):
-        return list(_chart_loops(run))
+        return list(_panels_of_loops(run))
     if not (run.backwards and "stick_area" in run.columns):
         return []
     ways = np.diff(run.columns["distance"], prepend=0.0)
@@ -84,7 +84,7 @@ def _chart_cycles(run: PlottedRun) -> list[Panel]:
     return [Panel("friction", Axis("displacement along x", "m"), Axis("friction coefficient\nalong x"), [line])]
 
 
-def _chart_loops(run: PlottedRun) -> Iterator[Panel]:
+def _panels_of_loops(run: PlottedRun) -> Iterator[Panel]:
     """Yield panels of load over approach, and of friction over displacement, with a line for each stage that
     oscillates."""
     loads, frictions = list[Line](), list[Line]()
@@ -119,19 +119,19 @@ def _steps_grow(times: Array) -> bool:
     return later.size > FEW_ROWS and bool(max(np.median(later), later[0]) < EARLY * later[-1])
 
 
-def _add_theory(chart: Panel, run: PlottedRun) -> Panel:
+def _add_theory(panel: Panel, run: PlottedRun) -> Panel:
     """Add the lines of theory.csv to friction and contact area, if it is in the directory of the run."""
-    column = {"friction": "friction", "area": "contact_area"}.get(chart.key)
+    column = {"friction": "friction", "area": "contact_area"}.get(panel.key)
     table = run.path / "theory.csv"
     if column is None or run.backwards or not table.is_file():
-        return chart
+        return panel
     theory = run.read(table.name).arrays()
-    over = "distance" if chart.x.unit == "m" else "time"
-    (own,) = chart.series
+    over = "distance" if panel.x.unit == "m" else "time"
+    (own,) = panel.series
     lines = [replace(own, name="simulation"), Line("theory", theory[over], theory[column], style.line(1))]
-    if chart.key == "friction" and VISCOUS in run.columns:  # the theory excludes interface friction
+    if panel.key == "friction" and VISCOUS in run.columns:  # the theory excludes interface friction
         lines.append(Line("without interface", own.x, run.columns[VISCOUS], style.line(2)))
-    return replace(chart, series=lines)
+    return replace(panel, series=lines)
 
 
 def _find_panels(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:

@@ -1,4 +1,4 @@
-"""Pictures of runs, also unfinished ones, and of friction curves: charts, and maps of one instant.
+"""Pictures of runs, also unfinished ones, and of friction curves: panels, and maps of one instant.
 
 The job determines the panels: friction if the surface slides, energies if they were requested, curves over the load if
 all stages are single solves, pressures along a line with Hertz's for a sphere."""
@@ -60,8 +60,8 @@ class PlotOptions:
         return not self.panels or key in self.panels
 
     def choose(self, found: Sequence[Panel]) -> list[Panel]:
-        """Return the requested charts in the requested order."""
-        return [chart for name in self.panels for chart in found if chart.key == name] if self.panels else list(found)
+        """Return the requested panels in the requested order."""
+        return [panel for name in self.panels for panel in found if panel.key == name] if self.panels else list(found)
 
 
 def group(found: Sequence[Panel]) -> list[list[Panel]]:
@@ -91,7 +91,7 @@ def draw_steady(table: Path) -> Path:
     """Draw steady.csv into its directory; returns the path of the picture."""
     with style.drawing():
         title = "\n".join([band_charts.steady_title(table.parent), *_name_missing(table.parent)])
-        return _save(picture(title, group(band_charts.chart_steady(table.parent))), table.with_suffix(""))
+        return _save(picture(title, group(band_charts.panels_of_curve(table.parent))), table.with_suffix(""))
 
 
 def _name_missing(directory: Path) -> list[str]:
@@ -119,20 +119,20 @@ def _draw_directory(directory: Path, options: PlotOptions) -> Figure:
         run = PlottedRun(directory)
         found = run.job.title or directory.absolute().name
         titles.append(found if run.curves else f"{found}\n{histories.describe_solve(run)}")
-        groups.append(options.choose(histories.chart_histories(run, options.over)))
+        groups.append(options.choose(histories.panels_of_run(run, options.over)))
         if not options.panels:
-            groups.append(band_charts.chart_slips(run))
+            groups.append(band_charts.panels_of_slips(run))
     elif options.at:
         raise InputError(f"--at {options.at}: {directory} has no run, and therefore no maps")
     if has_curve and options.wants("steady"):
         titles.append(band_charts.steady_title(directory))
-        groups += group(band_charts.chart_steady(directory, options.over))
+        groups += group(band_charts.panels_of_curve(directory, options.over))
     if has_run and options.wants("maps"):
         found_maps, fields = maps.map_panels(run, options.at or "")
         groups += found_maps
     if has_sweep:
         titles.append(getattr(Results(directory, "sweep").job, "title", "") or directory.absolute().name)
-        groups.append(options.choose(band_charts.chart_sweep(directory)))
+        groups.append(options.choose(band_charts.panels_of_sweep(directory)))
     if not (has_run or has_curve or has_sweep):
         if not directory.exists():
             raise InputError(f"{directory} is not a directory")
@@ -159,25 +159,25 @@ def _suggest(path: Path) -> str:
 def _draw_comparison(directories: Sequence[Path], options: PlotOptions) -> Figure:
     """Draw the lines of all directories in one picture."""
     for directory in directories:
-        if not _find_charts(directory, options):
+        if not _find_panels(directory, options):
             raise InputError(f"{directory} has nothing to compare")
     lost = zip(name_directories(directories), (Results(one).lost for one in directories), strict=True)
     title = "\n".join(dict.fromkeys(f"{name}: {text}" for name, text in lost if text))
-    return picture(title, group(compare_charts(directories, options)), log=options.log)
+    return picture(title, group(compare_panels(directories, options)), log=options.log)
 
 
-def compare_charts(directories: Sequence[Path], options: PlotOptions = PlotOptions(), least: int = 1) -> list[Panel]:
-    """Return the charts that at least `least` directories have, with the lines of all."""
-    found = [_find_charts(directory, options) for directory in directories]
+def compare_panels(directories: Sequence[Path], options: PlotOptions = PlotOptions(), least: int = 1) -> list[Panel]:
+    """Return the panels that at least `least` directories have, with the lines of all."""
+    found = [_find_panels(directory, options) for directory in directories]
     return compare([each for each in zip(name_directories(directories), found, strict=True) if each[1]], least)
 
 
-def _find_charts(directory: Path, options: PlotOptions) -> list[Panel]:
+def _find_panels(directory: Path, options: PlotOptions) -> list[Panel]:
     found: list[Panel] = []
     if (directory / KINDS["run"]).is_file():
-        found += options.choose(histories.chart_histories(PlottedRun(directory), options.over))
+        found += options.choose(histories.panels_of_run(PlottedRun(directory), options.over))
     if (directory / KINDS["curve"]).is_file() and options.wants("steady"):
-        found += band_charts.chart_steady(directory, options.over)
+        found += band_charts.panels_of_curve(directory, options.over)
     return found
 
 
@@ -212,27 +212,27 @@ def _name_value(key: str, value: Any) -> str:
 
 
 def compare(runs: Sequence[tuple[str, Sequence[Panel]]], least: int = 1) -> list[Panel]:
-    """Return the charts that at least `least` of several runs have. The colour is the run; the lines of each run have
-    marks, and bands are shares of its bar. If no run has several lines in a chart, each has its own dashes."""
+    """Return the panels that at least `least` of several runs have. The colour is the run; the lines of each run have
+    marks, and bands are shares of its bar. If no run has several lines in a panel, each has its own dashes."""
     found: dict[tuple[str, Axis, Axis], list[tuple[int, Panel]]] = {}
-    for number, (_, charts) in enumerate(runs):
-        for chart in charts:
-            found.setdefault((chart.key, chart.x, chart.y), []).append((number, chart))
+    for number, (_, panels) in enumerate(runs):
+        for panel in panels:
+            found.setdefault((panel.key, panel.x, panel.y), []).append((number, panel))
     names = [name for name, _ in runs]
-    lonely = all(len(chart.series) == 1 for group in found.values() for _, chart in group)
+    lonely = all(len(panel.series) == 1 for group in found.values() for _, panel in group)
     merge = _merge_lonely if lonely else _merge
     return [_join(group, merge(group, names)) for group in found.values() if len(group) >= least]
 
 
 def _join(group: Sequence[tuple[int, Panel]], series: Sequence[Line]) -> Panel:
-    charts = [chart for _, chart in group]
-    spikes, log_x = (all(getattr(chart, name) for chart in charts) for name in ("spikes", "log_x"))
-    return replace(charts[0], series=series, shades=(), peak=False, spikes=spikes, log_x=log_x, edges=())
+    panels = [panel for _, panel in group]
+    spikes, log_x = (all(getattr(panel, name) for panel in panels) for name in ("spikes", "log_x"))
+    return replace(panels[0], series=series, shades=(), peak=False, spikes=spikes, log_x=log_x, edges=())
 
 
 def _merge_lonely(group: Sequence[tuple[int, Panel]], names: Sequence[str]) -> list[Line]:
     """Return the only line of each run, with the colour and the dashes of the run."""
-    lines = ((number, chart.series[0]) for number, chart in group)
+    lines = ((number, panel.series[0]) for number, panel in group)
     return [
         replace(
             one, name=", ".join(filter(None, (names[number], one.name))), look=one.look | style.line(number, len(names))
@@ -242,18 +242,18 @@ def _merge_lonely(group: Sequence[tuple[int, Panel]], names: Sequence[str]) -> l
 
 
 def _merge(group: Sequence[tuple[int, Panel]], names: Sequence[str]) -> list[Line]:
-    """Return all lines of the runs in a chart, and entries of the legend for the runs and for the names of lines."""
+    """Return all lines of the runs in a panel, and entries of the legend for the runs and for the names of lines."""
     colors, empty = style.colors(len(names)), np.zeros(0)
-    whole = [one for _, chart in group for one in chart.series]
+    whole = [one for _, panel in group for one in panel.series]
     marked = dict.fromkeys(one.name for one in whole if one.name and one.x.size and one.stack is None)
     marks = dict(zip(marked, itertools.cycle(MARKERS), strict=False)) if len(marked) > 1 else {}
     entries = [Line(names[number], empty, empty, {"color": colors[number]}) for number, _ in group]
     for name, mark in marks.items():
         entries.append(Line(name, empty, empty, {"color": style.GREY, "marker": mark, "linestyle": "none"}))
     entries += {one.name: one for one in whole if not one.x.size}.values()
-    for number, chart in group:
-        bars = sum(one.stack is not None for one in chart.series)
-        for k, one in enumerate(chart.series):
+    for number, panel in group:
+        bars = sum(one.stack is not None for one in panel.series)
+        for k, one in enumerate(panel.series):
             look = one.look | {"color": colors[number]}
             if one.stack is not None:
                 look["color"] = style.mix(colors[number], PALEST * (1.0 - (k + 1) / bars))

@@ -85,7 +85,7 @@ def describe_run(directory: Path) -> ReportSection:
         *theory_table.describe_theory(directory, run.job.history, run.job.grid.dx),
         theory_table.describe_settings(directory),
     ]
-    found = histories.chart_histories(run)
+    found = histories.panels_of_run(run)
     unnamed = [replace(one, shades=[replace(shade, name="") for shade in one.shades]) for one in found[1:]]
     pictures = [*map(draw_panel, [*found[:1], *unnamed]), *_more_pictures(directory)]
     return ReportSection("Results of the run", list(filter(None, sentences)), [numbers], pictures, browse_run(run))
@@ -105,7 +105,7 @@ def describe_curve(directory: Path) -> ReportSection:
     names = [name for name in POINTS if name in columns]
     head = [_to_words(_add_unit(name)) for name in names]
     table = _shorten(head, list(zip(*(columns[name] for name in names), strict=True)))
-    pictures = [draw_panel(chart) for chart in band_charts.chart_steady(directory)]
+    pictures = [draw_panel(panel) for panel in band_charts.panels_of_curve(directory)]
     states = partial(_label_states, curve.free_area)
     browsers = _browse_file(curve, STATES, states, curve.job) if curve.job else []
     return ReportSection("Friction curve", (), [table, *_list_main_bands(curve)], pictures, browsers)
@@ -148,7 +148,7 @@ def describe_sweep(directory: Path) -> ReportSection:
     settings, failed = theory_table.describe_settings(directory), sweep.failed_cases(MOST_ROWS)
     sentences = list(filter(None, [settings, *failed]))
     return ReportSection(
-        "Sweep", sentences, [table], [draw_panel(chart) for chart in band_charts.chart_sweep(directory)]
+        "Sweep", sentences, [table], [draw_panel(panel) for panel in band_charts.panels_of_sweep(directory)]
     )
 
 

@@ -56,7 +56,7 @@ def test_sentences_headlines_and_panels(main: Main, job: Path) -> None:
     assert re.search(r"^  the tread is worn by \S+ m$", said, re.MULTILINE)
     assert main("report", "out")[0] == 0
     assert "the tread is worn; " in (job.parent / "out" / "report.html").read_text()
-    assert "wear" in [chart.key for chart in histories.chart_histories(PlottedRun(job.parent / "out"))]
+    assert "wear" in [chart.key for chart in histories.panels_of_run(PlottedRun(job.parent / "out"))]
     assert main("plot", "out", "--panels", "wear")[0] == 0
 
 

@@ -27,7 +27,7 @@ def table(directory: Path, heat: str = "5.0") -> None:
 def test_bars_add_up(tmp_path: Path) -> None:
     """Of the first pressure, sorted by speed: 0.1 at the bottom and 0.2 above, with one width in the logarithm."""
     table(tmp_path)
-    (bars, area, heat) = band_charts.chart_bands(tmp_path)
+    (bars, area, heat) = band_charts.panels_of_bands(tmp_path)
     axes = Figure().add_subplot()
     draw(bars, axes)
     boxes = [patch for patch in axes.patches if isinstance(patch, Rectangle)]
@@ -44,6 +44,6 @@ def test_bars_add_up(tmp_path: Path) -> None:
 
 def test_no_heat_no_temperatures(tmp_path: Path) -> None:
     table(tmp_path, heat="")
-    assert [chart.key for chart in band_charts.chart_bands(tmp_path)] == ["bands", "bands area"]
+    assert [chart.key for chart in band_charts.panels_of_bands(tmp_path)] == ["bands", "bands area"]
     (tmp_path / "bands.csv").unlink()
-    assert band_charts.chart_bands(tmp_path) == []
+    assert band_charts.panels_of_bands(tmp_path) == []

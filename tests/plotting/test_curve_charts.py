@@ -70,6 +70,6 @@ def test_errors_and_the_corrected_area(tmp_path: Path, drawn: list[Figure]) -> N
 def test_a_table_without_errors(tmp_path: Path) -> None:
     """Older tables have none, and no corrected area: the counted one is drawn."""
     (tmp_path / "steady.csv").write_text("velocity,pressure,friction,contact_area\n1.0,1e3,0.1,0.2\n")
-    friction, area = band_charts.chart_steady(tmp_path)
+    friction, area = band_charts.panels_of_curve(tmp_path)
     assert area.series[0].y.tolist() == [0.2]
     assert friction.series[0].error is None

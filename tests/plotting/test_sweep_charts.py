@@ -41,7 +41,7 @@ def names_of(chart: Panel) -> list[str]:
 def test_means_over_seeds_with_cases_and_theory(tmp_path: Path) -> None:
     """Cases that are not done yet are left out; keys that move together are one."""
     rows = [case(1.0, 1, 3.0), case(1.0, 2, 5.0), case(20.0, 1, 7.0, theory=0.7), case(20.0, 2, "", theory=0.7)]
-    friction, area = band_charts.chart_sweep(saved(tmp_path, *rows))
+    friction, area = band_charts.panels_of_sweep(saved(tmp_path, *rows))
     assert (friction.key, friction.x.name, friction.x.unit, friction.log_x) == ("friction", "velocity", "m/s", True)
     highest, cases, theory, *_ = lines_of(friction)
     assert highest.y.tolist() == [4.0, 7.0]
@@ -54,7 +54,7 @@ def test_means_over_seeds_with_cases_and_theory(tmp_path: Path) -> None:
 
 def test_a_second_key_tells_lines_apart(tmp_path: Path) -> None:
     rows = [case(v, 1, 10 * v + size, size) for v in (1.0, 2.0) for size in (1e-3, 2e-3)]
-    friction, _ = band_charts.chart_sweep(saved(tmp_path, *rows))
+    friction, _ = band_charts.panels_of_sweep(saved(tmp_path, *rows))
     colors = {one.name: one.look["color"] for one in friction.series if one.name.startswith("size")}
     found = {one.look["color"]: one.y.tolist() for one in lines_of(friction) if one.look.get("marker") == "o"}
     assert found == {colors["size 1 mm"]: [10.001, 20.001], colors["size 2 mm"]: [10.002, 20.002]}
@@ -72,7 +72,7 @@ def test_every_value_of_every_other_key_has_a_line(tmp_path: Path) -> None:
         for seed in (1, 3)
         for size in SIZES[:2]
     ]
-    friction, _ = band_charts.chart_sweep(saved(tmp_path, *rows, head=head))
+    friction, _ = band_charts.panels_of_sweep(saved(tmp_path, *rows, head=head))
     looks = {one.name: one.look for one in friction.series if one.name}
     found = {
         (one.look["color"], one.look["linestyle"]): one.y.tolist()
@@ -94,7 +94,7 @@ def test_bars_of_errors(tmp_path: Path) -> None:
     rows = [(0, v, "done", "", 0.2, 0.0, 1e-3 * v, 1e-4, 0.05) for v in (1.0, 2.0)]
     shares = {
         chart.key: [one.error.tolist() for one in chart.series if one.error is not None]
-        for chart in band_charts.chart_sweep(saved(tmp_path, *rows, head=head))
+        for chart in band_charts.panels_of_sweep(saved(tmp_path, *rows, head=head))
     }
     assert shares["friction"] == [pytest.approx([0.25, 0.25])]
     assert shares["pull-off"] == [pytest.approx([0.1, 0.05])]
@@ -106,7 +106,7 @@ def test_what_a_sweep_with_adhesion_is_about(tmp_path: Path) -> None:
     rows = [(0, v, "done", "", "", 0.0, 1e-3 * v, 2e-9 * v, 3e-18, 4e-18) for v in (1.0, 2.0)]
     found = {
         chart.key: list(zip(names_of(chart), (one.y.tolist() for one in lines_of(chart)), strict=True))
-        for chart in band_charts.chart_sweep(saved(tmp_path, *rows, head=head))
+        for chart in band_charts.panels_of_sweep(saved(tmp_path, *rows, head=head))
     }
     assert found == {
         "pull-off": [("pull-off", [1e-3, 2e-3])],
@@ -117,7 +117,7 @@ def test_what_a_sweep_with_adhesion_is_about(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rows", [[], [case(1.0, 1, 3.0), case(1.0, 2, 3.0)], [case(1.0, 1, ""), case(2.0, 1, "")]])
 def test_nothing_to_draw(tmp_path: Path, rows: list[tuple[Any, ...]]) -> None:
-    found = band_charts.chart_sweep(saved(tmp_path, *rows))
+    found = band_charts.panels_of_sweep(saved(tmp_path, *rows))
     assert [chart.key for chart in found] in ([], ["friction", "area"])
     assert all(np.isfinite(one.y).all() for chart in found for one in chart.series)
 

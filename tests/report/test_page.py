@@ -99,7 +99,7 @@ def test_run(tmp_path: Path) -> None:
     assert found.headings == ["Results of the run", *COMMON]
     assert "&lt;b&gt;Rubber&lt;/b&gt; &amp; road" in found.text
     saved = 3  # the initial state, and steps 8 and 16
-    assert len(found.pictures) == 4 + 4 + 1 + 2 * saved
+    assert len(found.pictures) == 4 + 4 + 2 + 2 * saved
     assert found.seen["input"] == 2
     assert found.downloads == {"measures.csv": (out / "measures.csv").read_bytes()}
     for stated in ("relaxation_time: 1.0e-3", "<td>2 MPa</td>", "<td>1 ms</td>", "operator calls"):

@@ -79,7 +79,7 @@ def test_points_of_curves_and_their_means_over_seeds(tmp_path: Path, monkeypatch
     assert [float(row["friction_mean"]) for row in means] == pytest.approx([0.3, 0.15], rel=1e-12)
     assert float(means[0]["friction_std"]) == pytest.approx(0.07**0.5, rel=1e-12)
     assert not Path("out/job/sweep_mean.csv").exists()
-    chart, _ = band_charts.chart_sweep(Path("out/job"))
+    chart, _ = band_charts.panels_of_sweep(Path("out/job"))
     mean, each = (one for one in chart.series if one.x.size)  # the others are entries of the legend
     assert (chart.x.name, mean.x.tolist(), each.x.size) == ("velocity", [0.1, 1.0], 6)
     assert mean.y.tolist() == pytest.approx([0.3, 0.15], rel=1e-12)
@@ -135,7 +135,7 @@ def test_lines_of_curves_differ_in_all_that_is_no_sample(tmp_path: Path, monkeyp
         text = "\n".join(["velocity,pressure,friction,contact_area", *rows, ""])
         (case.job.output.directory / "steady.csv").write_text(text)
     sweep_table.write_sweep_tables(Path("out/job"), cases)
-    series = band_charts.chart_sweep(Path("out/job"))[0].series
+    series = band_charts.panels_of_sweep(Path("out/job"))[0].series
     dashes = {one.name: one.look["linestyle"] for one in series if one.name.startswith("modulus inf")}
     colors = {one.name: one.look["color"] for one in series if one.name.endswith("kPa") and one.name not in dashes}
     found = {

@@ -1,6 +1,6 @@
 """Picture of leakage: the flow through the gap, and conductivity over load or time.
 
-Chart of the conductivity of a gap over pressure or time, with marks where contact closes, or where the constriction
+Panel of the conductivity of a gap over pressure or time, with marks where contact closes, or where the constriction
 is too narrow for continuum flow.
 """
 
@@ -29,7 +29,7 @@ def is_thin(constriction: Any) -> Any:
     return (constriction > 0.0) & (constriction < CONTINUUM)
 
 
-def chart(
+def conductivity_panel(
     over: Axis,
     at: Array,
     flows: Mapping[str, Array],
@@ -67,7 +67,7 @@ LONG = 100.0  # ratio of times above which their axis is logarithmic
 
 
 def panels(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
-    """Yield the chart of conductivities of a run over an axis, if the gap is open at any time, and that of the leak
+    """Yield the panel of conductivities of a run over an axis, if the gap is open at any time, and that of the leak
     over the pressure of a fluid that carries a part of the load."""
     columns = run.columns
     names = {name: label for name, label in FLOWS.items() if name in columns}
@@ -75,13 +75,13 @@ def panels(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
         rows = slice(None) if along.rows is None else along.rows
         flows = {label: columns[name][rows] for name, label in names.items()}
         narrowest = dict.fromkeys(flows, columns["constriction"][rows])
-        yield chart(along.axis, along.values, flows, narrowest)
+        yield conductivity_panel(along.axis, along.values, flows, narrowest)
         if "fluid_pressure" in columns:
             yield from _leak_over_pressure(run)
 
 
 def _leak_over_pressure(run: PlottedRun) -> Iterator[Panel]:
-    """Yield the chart of the leak over the high pressure of the fluid if it changes, under the last load; dotted is
+    """Yield the panel of the leak over the high pressure of the fluid if it changes, under the last load; dotted is
     that of a contact which carries all of this load, where the run has a row of it."""
     section, columns = run.job.section("leakage"), run.columns
     load = columns["pressure"][-1]
@@ -116,14 +116,14 @@ def draw_leakage(
 
     circled = ", constriction circled" * any(flow.percolates for flow in flows)
     title = f"flow through the gap, {instant}\ncontact black{circled}"
-    curve = [chart_of(rows, over)] if any(row.constriction > 0.0 for row in rows[1:]) else []
+    curve = [panel_of(rows, over)] if any(row.constriction > 0.0 for row in rows[1:]) else []
     maps = [_flow_map(axis, size, gap, flow, flux) for axis, flow, flux in zip("xy", flows, fluxes, strict=True)]
     with style.drawing():
         return style.save_figure(picture(title, [maps, curve] if curve else [maps]), path)
 
 
-def chart_of(rows: Sequence[Any], over: str) -> Panel:
-    """Return the chart of K `over` pressure or time (default: time if a pressure occurs more than once).
+def panel_of(rows: Sequence[Any], over: str) -> Panel:
+    """Return the panel of K `over` pressure or time (default: time if a pressure occurs more than once).
 
     Over pressure, the last of consecutive instants at one pressure is drawn.
     """
@@ -140,7 +140,7 @@ def chart_of(rows: Sequence[Any], over: str) -> Panel:
     flows = {name: parts[:, k, 1] for k, name in enumerate(flows)} if parts.size else flows
     later = at[at > 0.0]
     log_x = over == "time" and later.size > 0 and bool(later.max() > LONG * later.min())
-    return chart(Axis(over, UNITS[over]), at, flows, narrowest, log_x, dotted)
+    return conductivity_panel(Axis(over, UNITS[over]), at, flows, narrowest, log_x, dotted)
 
 
 def _flow_map(axis: str, size: tuple[float, float], gap: FloatMap, flow: Flow, flux: FloatMap) -> Panel:

@@ -15,7 +15,7 @@ NAMES = ("G' storage", "G'' loss")
 
 
 def curve_panels(job: Any, columns: Mapping[str, Array]) -> Iterator[Panel]:
-    """Yield the chart of the factors of both moduli over strain, with marks at the strains in columns of a friction
+    """Yield the panel of the factors of both moduli over strain, with marks at the strains in columns of a friction
     curve, for jobs with softening."""
     section = job.section("softening")
     if section is None:

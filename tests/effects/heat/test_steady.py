@@ -110,7 +110,7 @@ def test_table_theory_and_picture(tmp_path: Path, main: Main, run_parcontact: Ru
     assert parts == pytest.approx(found["friction_x"], rel=1e-12)
     share = np.array(found["contact_area_corrected"]) * 1.0e4 / 2.0e5
     assert found["friction_interface"] == pytest.approx(share, rel=1e-6)  # the pressure is met to the tolerance
-    friction, area, master = band_charts.chart_steady(tmp_path / "out")
+    friction, area, master = band_charts.panels_of_curve(tmp_path / "out")
     lines = ["-5 °C", "20 °C", "60 °C"]
     for chart in (friction, area):  # "theory" is an entry of the legend without a line
         assert [one.name for one in chart.series] == [*lines, "theory", "", "", ""]

@@ -23,7 +23,7 @@ def test_closed_instants_and_narrow_constrictions() -> None:
     9 nm."""
     at, flow = np.array([1.0, 2.0, 3.0, 4.0]), np.array([1e-20, 1e-24, 0.0, np.nan])
     narrowest = np.array([1e-6, 9e-9, 0.0, np.nan])
-    chart = pictures.chart(Axis("time", "s"), at, {"along x": flow}, {"along x": narrowest})
+    chart = pictures.conductivity_panel(Axis("time", "s"), at, {"along x": flow}, {"along x": narrowest})
     shown = drawn(chart)
     assert shown["closed"].tolist() == [3.0]
     assert shown["constriction under 10 nm"].tolist() == [2.0]
@@ -49,7 +49,7 @@ HOLDS = [row(1.0, 1e5, 4e-20), row(2.0, 1e5 * (1.0 + 1e-12), 3e-20), row(3.0, 2e
     ],
 )
 def test_what_k_is_drawn_over(rows: list[LeakInstant], over: str, name: str, expected: list[float]) -> None:
-    chart = pictures.chart_of(rows, over)
+    chart = pictures.panel_of(rows, over)
     assert chart.x.name == name
     assert chart.series[0].x == pytest.approx(expected, rel=1e-9)
     assert len(chart.series[0].y) == len(expected)

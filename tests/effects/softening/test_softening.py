@@ -212,7 +212,7 @@ def test_pictures(tmp_path: Path) -> None:
         f"{head}{more}\n1,1e5,,0.1,1,0.06,0,1e-3,1e-4\n1,1e5,,0.1,1,0.08,1,1e-4,1e-5\n"
         "2,1e5,,0.1,1,,0,1e-3,1e-4\n2,1e5,,0.1,1,,1,1e-4,1e-5\n"
     )
-    *_, moduli, _, _, strains = band_charts.chart_steady(tmp_path)
+    *_, moduli, _, _, strains = band_charts.panels_of_curve(tmp_path)
     storage, at, loss, _ = moduli.series
     assert_allclose(np.interp(TABLE[100][0], storage.x, storage.y), TABLE[100][1], rtol=0.02)
     assert_allclose(np.interp(TABLE[100][0], loss.x, loss.y), TABLE[100][2], rtol=0.02)
@@ -223,7 +223,7 @@ def test_pictures(tmp_path: Path) -> None:
         [0.08, 0.06],
     )
     (tmp_path / "steady.resolved.yaml").write_text(data.replace("softening:", "hardening:"))  # not of this version
-    assert "steady softening" not in [chart.key for chart in band_charts.chart_steady(tmp_path)]
+    assert "steady softening" not in [chart.key for chart in band_charts.panels_of_curve(tmp_path)]
 
 
 def test_the_theory_is_refused() -> None:
