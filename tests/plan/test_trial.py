@@ -148,12 +148,12 @@ def test_steady_states_are_tried_as_they_are_solved(comm: MPI.Intracomm) -> None
 
 def test_a_stage_that_chooses_its_steps_ends_with_a_long_one(comm: MPI.Intracomm) -> None:
     """Each stage but the last ends after a few steps, and those of the next begin there."""
-    slide = {"pressure": 1e4, "velocity": 0.1, "distance": 2.5e-4}
-    march = steady.first(
-        job(material=TWO, history=[{"pressure": 1e4, "duration": 1e-2}, slide]), memory.TimedSlab(comm, 48, 40)
-    )
-    march.scene.slab.end = math.inf
+    slab, slide = memory.TimedSlab(comm, 48, 40), {"pressure": 1e4, "velocity": 0.1, "distance": 2.5e-4}
+    slab.end = math.inf
+    march = steady.first(job(material=TWO, history=[{"pressure": 1e4, "duration": 1e-2}, slide]), slab)
     press, _ = memory._try(march, 0.0)
-    first, second = (span.ends.made for span in march.timeline().spans)
+    ends = march.timeline().chosen
+    assert ends is not None
+    first, second = ends.ends.values()
     assert press.tried == FEWEST == len(first) < press.steps  # a jump, and the long step in place of it
     assert (first[-1], len(second)) == (pytest.approx(1e-2), FEWEST)

@@ -490,10 +490,10 @@ def test_errors_of_a_coarse_mesh_while_spots_stick() -> None:
 
 def test_a_sphere_sheared_in_many_steps() -> None:
     """In 200 steps to 0.98 of the way at which it slides, at an accuracy of 10 %, a sphere has the force of the theory
-    to 1e-3: what tractions lack of their bounds is made up for in later steps."""
+    to 2e-3, a fiftieth of that: what tractions lack of their bounds is made up for in later steps."""
     stops = [0.98 * mindlin(1.0) * (step + 1) / 200 for step in range(200)]
     row = marched(sphere(stops, 32, across=2.4, numerics={"accuracy": 0.1}))[1][-1]
-    assert -row.measures.force_x / (MU * FORCE) == pytest.approx(1.0 - 0.02**1.5, rel=1e-3)
+    assert -row.measures.force_x / (MU * FORCE) == pytest.approx(1.0 - 0.02**1.5, rel=2e-3)
 
 
 def test_chosen_steps_of_a_box_in_full_contact() -> None:
