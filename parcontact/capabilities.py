@@ -1,7 +1,7 @@
 """Capabilities: what a folder of `effects/` adds to the program. A folder that is deleted takes its capability with it.
 
 A folder may have `SECTION`, the section of a job that asks for it, and `EFFECT`, its class in `effect.py`;
-columns and sentences stand there, too (`stated`). Other rooms
+columns stand there, too (`stated`). Other rooms
 find what its further modules offer by `offers`, and so name no capability. `GIVES` and `USES` name what an effect finds
 in a step for others, and what it needs of others: effects that give something follow a step before those that use it.
 With `MATERIAL = True` the section is a material, which may include a file. `CHANGES_STEPS` names the keys that change
@@ -54,7 +54,7 @@ def _modules(name: str) -> tuple[ModuleType, ...]:
 
 
 def stated(name: str) -> list[Any]:
-    """Return what the folders themselves state under a name: columns and sentences, which are there at once."""
+    """Return what the folders themselves state under a name: columns and the like, which are there at once."""
     return [getattr(each, name) for each in folders() if hasattr(each, name)]
 
 

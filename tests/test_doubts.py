@@ -1,58 +1,45 @@
 """Warnings are data, and each kind of them has one sentence."""
 
-import ast
 import math
 import pickle
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import parcontact
-from parcontact.doubts import SENTENCES, Doubt
 from parcontact.job import Job, meaning
+from parcontact.march.map_sentences import WARN_FLAT_MAP
+from parcontact.march.sanity import WARN_CELLS, WARN_SEAM
 from parcontact.printed import rounded_down, rounded_up
 
 HOUSE = Path(parcontact.__file__).parent
 
 
-def made() -> Iterator[str]:
-    """The kinds of all doubts that the program makes, as its source names them."""
+def test_kinds_have_names_of_their_own_and_are_called() -> None:
+    """Each kind is next to its test: the module that makes it calls it, too."""
+    names, calls = list[str](), 0
     for path in HOUSE.rglob("*.py"):
-        for scope in ast.walk(ast.parse(path.read_text())):
-            if isinstance(scope, ast.FunctionDef):
-                yield from _kinds(scope)
-
-
-def _kinds(scope: ast.FunctionDef) -> Iterator[str]:
-    """The texts that a function gives to `Doubt` first, also those of a variable `kind`."""
-    calls = [node for node in ast.walk(scope) if isinstance(node, ast.Call)]
-    first = [call.args[0] for call in calls if ast.unparse(call.func) == "Doubt"]
-    named = {ast.unparse(each) for each in first if isinstance(each, ast.Name)}
-    values = [
-        node.value for node in ast.walk(scope) if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) in named
-    ]
-    for value in (*first, *values):
-        for each in (value.body, value.orelse) if isinstance(value, ast.IfExp) else (value,):
-            if isinstance(each, ast.Constant):
-                yield str(each.value)
-
-
-def test_each_kind_has_a_sentence_and_each_sentence_a_kind() -> None:
-    assert set(made()) == SENTENCES.keys()
+        text = path.read_text()
+        made = re.findall(r'^(\w+) = Kind\(\s*"([^"]+)"', text, re.MULTILINE)
+        names += [name for _, name in made]
+        calls += len(made)
+        for constant, _ in made:
+            assert len(re.findall(rf"\b{constant}\b", text)) > 1 or constant == "SAID", constant
+    assert calls > 50
+    assert len(set(names)) == len(names)
 
 
 def test_numbers_in_sentences() -> None:
     """Shares in per cent, lengths with units, and how many times, also beyond all numbers."""
     contact = {"where": "step 3", "excess": 0.2031, "most": 0.15, "more": "128 points"}
-    assert "about 20 % too large (limit: 15 %" in str(Doubt("cells", "", contact))
-    text = str(Doubt("flat map", "surface", {"file": "a.npy", "lx": 1.23456e-3, "ly": 0.5, "span": 2.3456e-6}))
+    assert "about 20 % too large (limit: 15 %" in str(WARN_CELLS("", contact))
+    text = str(WARN_FLAT_MAP("surface", {"file": "a.npy", "lx": 1.23456e-3, "ly": 0.5, "span": 2.3456e-6}))
     assert text.startswith("surface: a.npy: the map is 1.235 mm x 500 mm, and its heights differ by 2.35 µm only")
     seam = {"axis": "x", "jump": 1e-6, "times": 3.14159, "tilt": 0.0}
-    assert "3.14 times the largest step" in str(Doubt("seam", "surface", seam))
-    assert "far above the largest step" in str(Doubt("seam", "surface", {**seam, "times": float("inf")}))
+    assert "3.14 times the largest step" in str(WARN_SEAM("surface", seam))
+    assert "far above the largest step" in str(WARN_SEAM("surface", {**seam, "times": float("inf")}))
 
 
 def test_who_follows_rounded_advice_keeps_the_limit() -> None:

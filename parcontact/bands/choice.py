@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import job as jobs
-from ..doubts import Doubt
+from ..doubts import Doubt, Kind
 from ..errors import InputError
 from ..job import Grid, Job, Topography, map_files, measured_maps
 from ..job.advice import fast_length
@@ -132,6 +132,19 @@ ROUNDED = 1.01  # rounding: rms slope over USUAL, up to which a spectrum has bee
 STRAIN = math.exp(-1.0)  # physics: rms strain over rms slope, at the depth 1/q where the strain of a wave is largest
 
 
+WARN_STEEP_WAVES_CUT_OFF = Kind(
+    "steep waves, cut-off",
+    "its rms slope is {slope:.3g} (rms strain {strain:.2g}); linear theory assumes small slopes, and waves shorter "
+    "than {steep:.3g} m exceed a slope of {most:g}. Waves shorter than {usual:.3g} m are usually left out: give "
+    "bands.cutoff_slope: {cutoff:g}",
+)
+WARN_STEEP_WAVES = Kind(
+    "steep waves",
+    "its rms slope is {slope:.3g} (rms strain {strain:.2g}); linear theory assumes small slopes, and waves shorter "
+    "than {steep:.3g} m exceed a slope of {most:g}",
+)
+
+
 def doubt_steep_waves(spectrum: WaveSpectrum) -> Iterator[Doubt]:
     """Yield a warning if the surface is too steep for linear theory, with the usual cut-off."""
     slope = math.sqrt(spectrum.moment(*spectrum.ends, 2))
@@ -140,9 +153,9 @@ def doubt_steep_waves(spectrum: WaveSpectrum) -> Iterator[Doubt]:
     steep, usual = spectrum.steep_beyond(STEEP), spectrum.steep_beyond(USUAL)
     numbers = {"slope": slope, "strain": STRAIN * slope, "steep": steep, "most": STEEP}
     if usual and slope > ROUNDED * USUAL:
-        yield Doubt("steep waves, cut-off", "surface", {**numbers, "usual": usual, "cutoff": USUAL})
+        yield WARN_STEEP_WAVES_CUT_OFF("surface", {**numbers, "usual": usual, "cutoff": USUAL})
     else:
-        yield Doubt("steep waves", "surface", numbers)
+        yield WARN_STEEP_WAVES("surface", numbers)
 
 
 FEWEST_WAVES = 4  # accuracy: least number of shortest waves along a map
@@ -158,6 +171,13 @@ class MapBand:
     rms_slope: float
     notes: tuple[str, ...]
     doubts: tuple[Doubt, ...]
+
+
+WARN_NO_WAVES_OF_THE_MAP = Kind(
+    "no waves of the map",
+    "the spectrum begins at {longest!M}, and only longer waves are taken from the map, which is {side!M} long and "
+    "has hardly any; give the spectrum a long_wavelength of about {seam:.2g} m ({points} points of the map)",
+)
 
 
 def band_of_map(job: Job, shortest: float, cells: float) -> MapBand | None:
@@ -178,7 +198,7 @@ def band_of_map(job: Job, shortest: float, cells: float) -> MapBand | None:
     if shortest > max(size) / FEWEST_WAVES:
         cells = max(length / n for length, n in zip(whole.size, whole.heights.shape[::-1], strict=True))
         seam = {"longest": shortest, "side": max(size), "points": RESOLVED, "seam": RESOLVED * cells}
-        doubts.append(Doubt("no waves of the map", "surface", seam))
+        doubts.append(WARN_NO_WAVES_OF_THE_MAP("surface", seam))
     waves = np.fft.fft2(found.heights) / found.heights.size
     qy, qx = (2.0 * np.pi * np.fft.fftfreq(n, length / n) for n, length in zip((ny, nx), size[::-1], strict=True))
     slope = math.sqrt(float(np.sum(np.abs(waves) ** 2 * (qx[None, :] ** 2 + qy[:, None] ** 2))))

@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..bands.road_sliding import make_states
 from ..columns import STEADY
-from ..doubts import Doubt, ParcontactWarning
+from ..doubts import Doubt, Kind, ParcontactWarning
 from ..effects.relaxation import relaxation_of
 from ..errors import InputError, JobError, RunError
 from ..files import wisdom
@@ -238,6 +238,9 @@ class Curve:
     failures: tuple[str, ...] = ()
 
 
+WARN_UNSOLVED_POINT = Kind("unsolved point", "{where}")
+
+
 def steady(
     job: Given,
     velocities: Values = None,
@@ -282,7 +285,7 @@ def steady(
             point = sliding.solve(wanted.velocity(at.speed), at.pressure)
         except RunError as error:
             failures.append(str(error))
-            doubts.append(Doubt("unsolved point", "", {"where": str(error)}))
+            doubts.append(WARN_UNSOLVED_POINT("", {"where": str(error)}))
         sliding.forget()
         points.append(point)
         doubts += contacts.check_point(point.measures, str(at)) if point else []

@@ -352,6 +352,11 @@ class Effect(Protocol[Memory]):
         yield from ()
 
     @staticmethod
+    def doubt_cases(jobs: Sequence[Any]) -> Iterator[Doubt]:
+        """Yield warnings about the differences between the jobs of a sweep."""
+        yield from ()
+
+    @staticmethod
     def ended(job: Any, saved: Saved) -> Detached | None:
         """Return the end of the run in the entries of its law in a checkpoint; None if the run goes on."""
         return None

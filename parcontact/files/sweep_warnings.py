@@ -1,7 +1,7 @@
 """Warnings of the cases of a sweep: each subject is shown once, with its cases."""
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from ..doubts import Doubt
 from ..job import Case, Job
@@ -53,18 +53,9 @@ def sentences_of(cases: Sequence[Case], doubts: Callable[[Job], Iterable[Doubt]]
         noted.begin(case.number)
         for doubt in doubts(case.job):
             noted.shows(doubt)
-    return [*noted.summary([noted.kinds]), *map(str, _doubt_ranges(cases))]
-
-
-def _doubt_ranges(cases: Sequence[Case]) -> Iterator[Doubt]:
-    """Yield a warning about cases for which an effect chooses different lengths by the mesh."""
-    found: dict[str, set[float]] = {}
-    for case in cases:
-        for key, value in (pair for asked in case.job.asked("chosen_values") for pair in asked(case.job).items()):
-            found.setdefault(key, set()).add(value)
-    for key, values in found.items():
-        if len(values) > 1:
-            yield Doubt("range follows cells", key, {"least": min(values), "most": max(values)})
+    jobs = [case.job for case in cases]
+    between = dict.fromkeys(asked for job in jobs for asked in job.asked("doubt_cases"))
+    return [*noted.summary([noted.kinds]), *(str(doubt) for asked in between for doubt in asked(jobs))]
 
 
 def warn_once(cases: Sequence[Case]) -> list[Doubt]:

@@ -26,10 +26,11 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import Any, NamedTuple, Protocol
 
-from ..doubts import Doubt
+from ..doubts import Doubt, Kind
 from ..printed import per_cent
 from .calculation import Accuracy, Body, Grid, Numerics, Output
 from .materials import AnyMaterial
+from .parts import Origin
 from .stages import AUTO, GeometricStep, Initial, Stage, Steady
 from .surfaces import Rough
 
@@ -46,6 +47,14 @@ class Sections(Protocol):
     output: Output
     steady: Steady | None
     body: Body | None
+
+    @property
+    def origin(self) -> Origin:
+        """Return the origin of the job."""
+
+    @property
+    def directions(self) -> list[Vector]:
+        """Return the different sliding directions (unit vectors)."""
 
     @property
     def sheared_first(self) -> bool:
@@ -234,16 +243,15 @@ LITTLE = 0.05  # tuning: relative lack of points that gets no warning
 SEED_FRICTION, SEED_AREA = 0.24, 0.17  # accuracy
 
 
-def doubts_of_resolution(job: Sections, directions: Sequence[Vector] = (), chosen: bool = False) -> Iterator[Doubt]:
-    """Yield warnings in the order of the sections; the surface slides along `directions` (unit vectors). The cells of a
-    mesh that was `chosen` for the job are not checked."""
+def doubts_of_resolution(job: Sections) -> Iterator[Doubt]:
+    """Yield warnings in the order of the sections. The cells of a mesh that was chosen for the job are not checked."""
     grid, surface, numerics = job.grid, job.surface, job.numerics
     for index, shape in enumerate(surface):
         if isinstance(shape, Rough) and max(grid.points) > 1:
             yield from _long_waves(index, shape, grid)
             yield from doubt_size(index, shape, grid)
-            if not chosen:
-                yield from _short_waves(index, shape, grid, numerics.asked, directions)
+            if not job.origin.mesh:
+                yield from _short_waves(index, shape, grid, numerics.asked, job.directions)
     short = min((shape.short_wavelength for shape in surface if isinstance(shape, Rough)), default=None)
     times = [branch.relaxation_time for branch in job.material.fitted.branches]
     shortest = min((time for time in times if 0 < time < math.inf), default=math.inf)
@@ -257,12 +265,25 @@ def _directions(grid: Grid) -> list[tuple[str, float, float]]:
     return [(name, length, cell) for name, length, cell, points in found if points > 1]
 
 
+WARN_FEW_LONG_WAVES = Kind(
+    "few long waves",
+    "only {waves:.3g} of the longest waves fit into the box along {axis}; a representative surface needs at least "
+    "{least}: use a grid.size of {size!u} m or a long_wavelength of {wave!d} m",
+)
+
+
 def _long_waves(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
     name, length, _ = min(_directions(grid), key=lambda direction: direction[1])
     if length < LONG_WAVES * shape.long_wavelength * (1 - SAME_LENGTH):
         enough = {"size": LONG_WAVES * shape.long_wavelength, "wave": length / LONG_WAVES}
         numbers = {"waves": length / shape.long_wavelength, "axis": name, "least": LONG_WAVES, **enough}
-        yield Doubt("few long waves", f"surface.{index}", numbers)
+        yield WARN_FEW_LONG_WAVES(f"surface.{index}", numbers)
+
+
+WARN_LARGE_BOX = Kind(
+    "large box",
+    "a side of {length:g} m, {times:.4g} times {key}, {wave:g} m; is it in m? {length:g} mm would be {in_milli:g}",
+)
 
 
 def doubt_size(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
@@ -271,14 +292,30 @@ def doubt_size(index: int, shape: Rough, grid: Grid) -> Iterator[Doubt]:
     if length > MOST_LONG_WAVES * shape.long_wavelength:
         of_wave = {"wave": shape.long_wavelength, "times": length / shape.long_wavelength}
         numbers = {"length": length, "in_milli": length / 1000, "key": f"surface.{index}.long_wavelength", **of_wave}
-        yield Doubt("large box", "grid.size", numbers)
+        yield WARN_LARGE_BOX("grid.size", numbers)
+
+
+WARN_FEW_CELLS = Kind(
+    "few cells",
+    "only {cells:.3g} cells per shortest wave along {axis}; {reason} needs {needed:.3g}: use {points} points "
+    "({memory:.2g} times the memory{time}) or a short_wavelength of {wave:.4g} m",
+)
 
 
 def _short_waves(
     index: int, shape: Rough, grid: Grid, asked: Accuracy, directions: Sequence[Vector]
 ) -> Iterator[Doubt]:
     for numbers in _few_cells(shape.short_wavelength, grid, asked, directions):
-        yield Doubt("few cells", f"surface.{index}", numbers)
+        yield WARN_FEW_CELLS(f"surface.{index}", numbers)
+
+
+WARN_FEW_CELLS_OF_A_MAP = Kind(
+    "few cells of a map",
+    "only {cells:.3g} cells per shortest wave along {axis} ({known:.3g} m, by the spectrum of the "
+    "heights{spikes}); {reason} needs {needed:.3g}: use {points} points ({memory:.2g} times the memory{time}), to "
+    "which a topography is interpolated (resample an array yourself), or heights without waves shorter than "
+    "{wave:.4g} m",
+)
 
 
 def doubt_measured_waves(
@@ -288,7 +325,7 @@ def doubt_measured_waves(
     `spiky` surface may shorten it."""
     spikes = ", which has outliers" if spiky else ""
     for numbers in _few_cells(wave, grid, asked, directions):
-        yield Doubt("few cells of a map", "surface", {**numbers, "known": wave, "spikes": spikes})
+        yield WARN_FEW_CELLS_OF_A_MAP("surface", {**numbers, "known": wave, "spikes": spikes})
 
 
 def _few_cells(wave: float, grid: Grid, asked: Accuracy, directions: Sequence[Vector]) -> Iterator[dict[str, object]]:
@@ -328,18 +365,33 @@ def longest_step(stage: Stage, grid: Grid) -> float:
     return min(stage.seconds, step or 0.0)
 
 
+WARN_SLIDES_IN_NO_TIME = Kind(
+    "slides in no time", "a stage without duration or distance does not slide; its velocity has no effect"
+)
+WARN_LONG_STEPS = Kind(
+    "long steps",
+    "time steps of up to {step:.3g} s exceed the shortest relaxation time, {shortest:.3g} s, which backward-euler "
+    "must resolve; use shorter steps or integrator: exponential",
+)
+WARN_SKIPPED_WAVES = Kind(
+    "skipped waves",
+    "the surface slides {slid:.3g} m in one step, {share:.2g} of its shortest wave; use time steps of at most "
+    "{step!d} s (cells_per_step of at most {cells!d})",
+)
+
+
 def _steps(index: int, stage: Stage, grid: Grid, resolved: float, short: float | None) -> Iterator[Doubt]:
     """Yield warnings about steps longer than the time `resolved` [s], or too long for the shortest wave `short` [m]."""
     step = longest_step(stage, grid)
     slid = step * stage.speed
     if stage.speed and not stage.seconds:
-        yield Doubt("slides in no time", f"history.{index}")
+        yield WARN_SLIDES_IN_NO_TIME(f"history.{index}")
     if step > resolved * (1 + SAME_LENGTH):
-        yield Doubt("long steps", f"history.{index}", {"step": step, "shortest": resolved})
+        yield WARN_LONG_STEPS(f"history.{index}", {"step": step, "shortest": resolved})
     if short is not None and slid > short / STEPS_PER_WAVE * (1 + SAME_LENGTH):
         enough = short / STEPS_PER_WAVE / stage.speed
         numbers = {"slid": slid, "share": slid / short, "step": enough, "cells": enough / one_cell(stage, grid)}
-        yield Doubt("skipped waves", f"history.{index}", numbers)
+        yield WARN_SKIPPED_WAVES(f"history.{index}", numbers)
 
 
 def describe_sample(grid: Grid, surface: tuple[Any, ...], slides: bool) -> str:

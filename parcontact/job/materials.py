@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, PlainValidator, PrivateAttr, ValidationInfo, model_validator
 
-from ..doubts import Doubt
+from ..doubts import SAID, Doubt
 from ..errors import InputError
 from ..rubber import compound
 from ..rubber.shift import log_vertical
@@ -279,7 +279,7 @@ class Dma(Part):
         made = Zener.model_validate(found.material())
         if faults := list(shifted(made.shift, self.temperature)):
             refuse(*faults)
-        self._doubts = tuple(Doubt("said", "material.path", {"text": text}) for text in found.doubts())
+        self._doubts = tuple(SAID("material.path", {"text": text}) for text in found.doubts())
         self._fitted = made.model_copy(update={"temperature": self.temperature, "hardness": self.hardness})
 
     @property

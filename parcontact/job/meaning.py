@@ -1,10 +1,8 @@
-"""Warnings about the meaning of a job, before it runs.
+"""Warnings about a job, before it runs.
 
-* The theory is that of a linear half space with small slopes and strains, or of a layer of a given thickness.
-* Frequencies at which the surface loads the body are compared with those of its branches.
-* Memory and disk: lower bounds of what a job needs are compared with this machine.
-
-Heights, slopes, pressures and contact radii are bounded from below, so that sound jobs get no warning.
+They are about jobs outside of the theory, a linear half space with small slopes and strains; about memory and disk,
+of which lower bounds are compared with this machine; and about the thickness of a layer, compared with the surface, the
+mesh and the material. Slopes, heights, pressures and radii are bounded from below, so that sound jobs get no warning.
 """
 
 from __future__ import annotations
@@ -17,15 +15,27 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from ..doubts import Doubt
+from ..doubts import Doubt, Kind
 from ..rubber.shift import doubt_kelvin
 from . import limits
-from .advice import Sections, more_points
-from .calculation import Grid, Output
+from .advice import Sections, doubts_of_resolution, more_points
+from .calculation import Grid
 from .limits import count_steps
 from .materials import Elastic, PronyBranch, Zener
 from .stages import Stage, Swing
-from .surfaces import Cone, Flat, HeightFile, OnOneMesh, Pyramid, Rough, RoughSpectrum, Sphere, Topography, Wave
+from .surfaces import (
+    Cone,
+    Flat,
+    HeightFile,
+    OnOneMesh,
+    Pyramid,
+    Rough,
+    RoughSpectrum,
+    Sphere,
+    Topography,
+    Wave,
+    wave_numbers,
+)
 
 STEEP = 0.5  # physics: largest rms slope that counts as small
 STEEPEST = 1.0  # physics: radius of contact over radius of the sphere, up to which slopes are small
@@ -41,22 +51,17 @@ SAME = 1e-9  # rounding: relative difference below which distances are the same
 BEYOND = 100.0  # physics: frequency over the frequency of every branch, above which nothing relaxes
 
 
-def doubts_of_scene(job: Sections) -> Iterator[Doubt]:
-    """Yield warnings in the order of the sections."""
-    material = job.material.fitted
-    yield from _slopes(job.grid, job.surface)
-    yield from doubt_moduli(material)
-    yield from _pressures(job, material)
-    yield from _instants(job, material)
-    yield from _band(job, material)
-    yield from _imprints(job, material)
-    yield from _room(job, material) if not any(job.grid.cyclic) else neighbours(job, material)
+WARN_STEEP = Kind(
+    "steep",
+    "its rms slope is {slope:.3g}; the theory assumes small slopes, up to {most:g}. Are heights and lengths in "
+    "m?{needed}",
+)
 
 
 def doubt_slope(slope: float, surface: tuple[Any, ...]) -> Iterator[Doubt]:
     """Yield a warning about an rms slope above STEEP, with the keys that heights of files may lack."""
     if slope > STEEP:
-        yield Doubt("steep", "surface", {"slope": slope, "most": STEEP, "needed": _needed(surface)})
+        yield WARN_STEEP("surface", {"slope": slope, "most": STEEP, "needed": _needed(surface)})
 
 
 def _needed(surface: tuple[Any, ...]) -> str:
@@ -78,8 +83,9 @@ def says_all(surface: tuple[Any, ...]) -> bool:
     return not any(isinstance(shape, READ) or getattr(shape, "rms_slope", 0.0) is None for shape in surface)
 
 
-def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Doubt]:
+def _slopes(job: Sections) -> Iterator[Doubt]:
     """Yield a warning about the rms slope if it follows from the job."""
+    grid, surface = job.grid, job.surface
     if not says_all(surface):
         return
     square = 0.0
@@ -94,16 +100,27 @@ def _slopes(grid: Grid, surface: tuple[Any, ...]) -> Iterator[Doubt]:
     yield from doubt_slope(math.sqrt(square), surface)
 
 
-def doubt_moduli(material: Elastic | Zener) -> Iterator[Doubt]:
+WARN_SOFT = Kind(
+    "soft",
+    "its instantaneous shear modulus is {modulus:.3g} Pa, below {least:g} Pa and as soft as a gel. Moduli are in "
+    "Pa: {modulus:.3g} MPa would be {in_mega:.3g}",
+)
+WARN_HARD = Kind(
+    "hard",
+    "its instantaneous shear modulus is {modulus:.3g} Pa, above {most:g} Pa and harder than diamond; moduli are in Pa",
+)
+
+
+def _moduli(job: Sections) -> Iterator[Doubt]:
     """Yield a warning about an instantaneous modulus that no solid has."""
-    modulus = material.instant_modulus
+    modulus = job.material.fitted.instant_modulus
     if modulus < SOFTEST:
-        yield Doubt("soft", "material", {"modulus": modulus, "least": SOFTEST, "in_mega": 1e6 * modulus})
+        yield WARN_SOFT("material", {"modulus": modulus, "least": SOFTEST, "in_mega": 1e6 * modulus})
     elif modulus > HARDEST:
-        yield Doubt("hard", "material", {"modulus": modulus, "most": HARDEST})
+        yield WARN_HARD("material", {"modulus": modulus, "most": HARDEST})
 
 
-def doubt_temperatures(job: Sections) -> Iterator[Doubt]:
+def _temperatures(job: Sections) -> Iterator[Doubt]:
     """Yield a warning for each key with a temperature that may be in kelvin."""
     material, steady = job.material.given, job.steady
     shift = getattr(material, "shift", None)
@@ -126,7 +143,20 @@ def _mean(stage: Stage, load: float, grid: Grid) -> float:
     return load / (grid.lx * grid.ly) if stage.control == "force" else load
 
 
-def _pressures(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+WARN_STRAIN_IN_TIME = Kind(
+    "strain in time",
+    "a mean pressure of {pressure:.3g} Pa, held for {seconds:.3g} s, exceeds 2 G/(1 - nu) = {modulus:.3g} Pa of "
+    "the relaxed body, where strains are far beyond linear theory; are pressures and moduli both in Pa?",
+)
+WARN_STRAIN_AT_ONCE = Kind(
+    "strain at once",
+    "a mean pressure of {pressure:.3g} Pa exceeds 2 G/(1 - nu) = {modulus:.3g} Pa, where strains are far beyond "
+    "linear theory; are pressures and moduli both in Pa?",
+)
+
+
+def _pressures(job: Sections) -> Iterator[Doubt]:
+    material = job.material.fitted
     loads = [("initial.pressure", job.initial.pressure or 0.0, 0.0)]
     loads.append(("steady.pressures", max((job.steady.pressures if job.steady else None) or (0.0,)), 0.0))
     least, held = 0.0, 0.0
@@ -137,9 +167,16 @@ def _pressures(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     found = [(pressure / modulus_after(material, seconds), key, pressure, seconds) for key, pressure, seconds in loads]
     strain, key, pressure, seconds = max(found)
     if strain > STRAIN:
-        kind = "strain in time" if seconds else "strain at once"
-        yield Doubt(kind, key, {"pressure": pressure, "modulus": pressure / strain, "seconds": seconds})
+        kind = WARN_STRAIN_IN_TIME if seconds else WARN_STRAIN_AT_ONCE
+        yield kind(key, {"pressure": pressure, "modulus": pressure / strain, "seconds": seconds})
     yield from _light(job, material, *max((pressure, key) for key, pressure, _ in loads))
+
+
+WARN_LIGHT = Kind(
+    "light",
+    "under the largest load, {pressure:.3g} Pa, only {touching:.2g} points of the grid would touch, less than 1; "
+    "use a larger load. Pressures are in Pa: {pressure:.3g} MPa is {in_mega:.3g}",
+)
 
 
 def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) -> Iterator[Doubt]:
@@ -151,7 +188,7 @@ def _light(job: Sections, material: Elastic | Zener, pressure: float, key: str) 
     known = not pulled and pressure > 0.0 and 0.0 < stiffness < math.inf
     touching = math.erf(math.sqrt(2.0) * pressure / stiffness) * math.prod(job.grid.points) if known else 1.0
     if touching < 1.0:
-        yield Doubt("light", key, {"pressure": pressure, "touching": touching, "in_mega": 1e6 * pressure})
+        yield WARN_LIGHT(key, {"pressure": pressure, "touching": touching, "in_mega": 1e6 * pressure})
 
 
 def modulus_after(material: Elastic | Zener, seconds: float) -> float:
@@ -171,20 +208,37 @@ def modulus_after(material: Elastic | Zener, seconds: float) -> float:
 # -- relaxation -------------------------------------------------------------------------------------------------------
 
 
-def _instants(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+WARN_AT_AN_INSTANT = Kind(
+    "at an instant",
+    "its {stages} stages have no duration, so the rubber keeps its instantaneous shear modulus of {modulus:.3g} "
+    "Pa; give them a duration [s] to let it relax to {relaxed:.3g} Pa",
+)
+
+
+def _instants(job: Sections) -> Iterator[Doubt]:
     """Yield a warning if a relaxing body has several stages and none has a duration."""
+    material = job.material.fitted
     timeless = len(job.history) > 1 and not any(stage.seconds for stage in job.history)
     if timeless and material.instant_modulus > material.long_modulus and job.initial.state == "virgin":
         moduli = {"modulus": material.instant_modulus, "relaxed": material.long_modulus}
-        yield Doubt("at an instant", "history", {"stages": len(job.history), **moduli})
+        yield WARN_AT_AN_INSTANT("history", {"stages": len(job.history), **moduli})
 
 
-def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+WARN_ELASTIC = Kind(
+    "elastic",
+    "sliding excites {low:.3g} to {high:.3g} rad/s, all more than {times:g} times {how} than the branches, which "
+    "relax at {slow:.3g} to {fast:.3g} rad/s: the body is elastic with its {modulus} modulus; are velocities in "
+    "m/s, lengths in m and relaxation times in s?",
+)
+
+
+def _band(job: Sections) -> Iterator[Doubt]:
     """Yield a warning if the angular frequencies q v of the sliding waves are far from all 1/relaxation time.
 
     An effect may shear a contact before it slides, within far less than a wave. Then its highest frequency is not
     known, and slow sliding gives no warning.
     """
+    material = job.material.fitted
     branches = [one for one in material.branches if isinstance(one, PronyBranch) or one.G0 > 0.0]
     times = [branch.relaxation_time for branch in branches if 0.0 < branch.relaxation_time < math.inf]
     rough = [shape for shape in job.surface if isinstance(shape, Rough)]
@@ -199,17 +253,37 @@ def _band(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
     if (high * BEYOND < slow and not job.sheared_first) or low > fast * BEYOND:
         how, modulus = ("slower", "long-term") if high < slow else ("faster", "instantaneous")
         rates = {"low": low, "high": high, "slow": slow, "fast": fast}
-        yield Doubt("elastic", "material", {**rates, "times": BEYOND, "how": how, "modulus": modulus})
+        yield WARN_ELASTIC("material", {**rates, "times": BEYOND, "how": how, "modulus": modulus})
 
 
 # -- isolated contacts ------------------------------------------------------------------------------------------------
 
 
-def _room(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+WARN_LARGE_CONTACT = Kind(
+    "large contact",
+    "the contact would have a radius of {contact:.3g} m or more, above the radius of the sphere, {radius:g} m; the "
+    "theory assumes small slopes: use a smaller load",
+)
+WARN_SLIDES_OUT_OF_THE_BOX = Kind(
+    "slides out of the box",
+    "a free box does not move with the surface: after {way:.3g} m of the {length:.3g} m that it slides, the "
+    "contact, with a radius of some {contact:.3g} m, reaches the edge of the box of {lx:g} x {ly:g} m and is cut "
+    "off there. Let it slide {way:.3g} m at most, use a larger grid.size, or put surface.0.center farther back",
+)
+WARN_OUT_OF_THE_BOX = Kind(
+    "out of the box",
+    "the contact has a radius of some {contact:.3g} m and leaves the box of {lx:g} x {ly:g} m, whose edge is "
+    "{room:.3g} m from its centre; use a larger grid.size, a smaller load or a shorter distance",
+)
+
+
+def _room(job: Sections) -> Iterator[Doubt]:
     """Yield warnings if the least contact of a single sphere is too large for its radius, or the relaxed one leaves the
     box."""
+    material = job.material.fitted
     grid, sphere = job.grid, job.surface[0]
-    if len(job.surface) != 1 or not isinstance(sphere, Sphere) or min(grid.points) == 1:
+    single = len(job.surface) == 1 and isinstance(sphere, Sphere) and min(grid.points) > 1
+    if not single or any(grid.cyclic):
         return
     x, y = sphere.center or (grid.lx / 2, grid.ly / 2)
     modulus, found, elapsed = instant_contact_modulus(material), set(), 0.0
@@ -218,15 +292,15 @@ def _room(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
         radius = _hertz(stage, sphere.radius, modulus, grid)
         if radius / sphere.radius > STEEPEST and "steep" not in found:
             found.add("steep")
-            yield Doubt("large contact", f"history.{index}", {"contact": radius, "radius": sphere.radius})
+            yield WARN_LARGE_CONTACT(f"history.{index}", {"contact": radius, "radius": sphere.radius})
         radius = _hertz(stage, sphere.radius, _relaxed_contact_modulus(material, elapsed), grid)
         room = min(x, grid.lx - x, y, grid.ly - y)
         way, length = _way_to_edge((x, y), stage, radius, grid.size), stage.speed * _longest_motion(stage)
         if radius > 0.0 and (radius > room or way < length) and "room" not in found:
             found.add("room")
             numbers = {"contact": radius, "lx": grid.lx, "ly": grid.ly, "room": max(room, 0.0), "way": way}
-            kind = "out of the box" if radius > room else "slides out of the box"
-            yield Doubt(kind, f"history.{index}", {**numbers, "length": length})
+            kind = WARN_OUT_OF_THE_BOX if radius > room else WARN_SLIDES_OUT_OF_THE_BOX
+            yield kind(f"history.{index}", {**numbers, "length": length})
         moving = stage.moving(stage.seconds)
         x, y = x + stage.velocity[0] * moving, y + stage.velocity[1] * moving
 
@@ -273,12 +347,19 @@ def _final(stage: Stage) -> float:
     return stage.load.highest if stage.frequency else stage.load.end
 
 
-def neighbours(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+def neighbours(job: Sections) -> Iterator[Doubt]:
     """Yield a warning if images change the load of a single sphere in a periodic box."""
-    modulus = instant_contact_modulus(material)
+    modulus = instant_contact_modulus(job.material.fitted)
     return acting_neighbours(
         job, lambda radius: max((_hertz(stage, radius, modulus, job.grid) for stage in job.history), default=0.0)
     )
+
+
+WARN_IMAGES = Kind(
+    "images",
+    "its images in the periodic box of {lx:g} x {ly:g} m change the load at a given radius of contact by "
+    "{change!p} or more (limit: {most!p}); use a grid.size {times!u} times as large, or boundary: free",
+)
 
 
 def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Iterator[Doubt]:
@@ -297,20 +378,26 @@ def acting_neighbours(job: Sections, contact: Callable[[float], float]) -> Itera
     change = 2.0 * contact(sphere.radius) ** 3 * images / (3.0 * math.pi)
     if change > ALONE:
         times = (change / ALONE) ** (1.0 / 3.0)
-        yield Doubt(
-            "images", "surface.0", {"lx": grid.lx, "ly": grid.ly, "change": change, "most": ALONE, "times": times}
-        )
+        yield WARN_IMAGES("surface.0", {"lx": grid.lx, "ly": grid.ly, "change": change, "most": ALONE, "times": times})
 
 
 # -- slides over their own imprint ------------------------------------------------------------------------------------
 
 
-def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
+WARN_IMPRINT = Kind(
+    "imprint",
+    "after {way:.3g} m of its {length:.3g} m the surface has crossed the periodic box, returns to within "
+    "{near:.3g} m of its start, and slides over its own imprint, which the body remembers for {memory:.3g} s. "
+    "Beyond this distance friction and mu_dyn depend on the box; use a shorter distance or a larger grid.size",
+)
+
+
+def _imprints(job: Sections) -> Iterator[Doubt]:
     """Yield a warning for each slide (consecutive stages of one velocity) that meets the imprint of its own beginning.
 
     Surfaces of waves only are periodic by intention. A slide that begins in its steady state meets no other imprint.
     """
-    grid, initial = job.grid, job.initial
+    grid, initial, material = job.grid, job.initial, job.material.fitted
     times = [branch.relaxation_time for branch in material.branches if branch.relaxation_time < math.inf]
     if not all(grid.cyclic) or not times or all(isinstance(shape, Wave) for shape in job.surface):
         return
@@ -327,7 +414,7 @@ def _imprints(job: Sections, material: Elastic | Zener) -> Iterator[Doubt]:
         start = _round_trip(grid, velocity, seconds + near / speed, near) - near
         if speed * seconds > start * (1.0 + SAME) and memory > REMEMBERS * start / speed:
             numbers = {"way": start, "length": speed * seconds, "near": near, "memory": memory}
-            yield Doubt("imprint", f"history.{index}", numbers)
+            yield WARN_IMPRINT(f"history.{index}", numbers)
 
 
 def _round_trip(grid: Grid, velocity: tuple[float, float], most: float, near: float) -> float:
@@ -345,12 +432,18 @@ def _round_trip(grid: Grid, velocity: tuple[float, float], most: float, near: fl
 
 
 MAPS, MAPS_FREE = 9.0, 18.0  # tuning: least memory of a periodic and of a free run [8 bytes per point]
-MOST_INSTANTS = 10**6  # tuning: most saved instants in one file, which reserves space for all of them
 GIGA = 1e9
 CGROUP = Path("/sys/fs/cgroup/memory.max")
 
 
-def doubts_of_size(job: Sections) -> Iterator[Doubt]:
+WARN_DISK = Kind(
+    "disk",
+    "{instants:.4g} instants need {needed:.3g} GB, but {directory} has {free:.3g} GB left; use an output.every "
+    "above {every}, or fewer fields",
+)
+
+
+def _size(job: Sections) -> Iterator[Doubt]:
     """Yield warnings about memory and disk."""
     grid, output = job.grid, job.output
     yield from doubt_memory(grid)
@@ -360,7 +453,14 @@ def doubts_of_size(job: Sections) -> Iterator[Doubt]:
         needed, free = float(saved) * len(output.maps) * grid.nx * grid.ny * 8, _free(output.directory)
         if needed > free:
             disk = {"needed": needed / GIGA, "free": free / GIGA, "directory": str(output.directory)}
-            yield Doubt("disk", "output.fields", {"instants": saved, "every": output.every, **disk})
+            yield WARN_DISK("output.fields", {"instants": saved, "every": output.every, **disk})
+
+
+WARN_MEMORY = Kind(
+    "memory",
+    "{nx} x {ny} points need at least {needed:.3g} GB of memory on all ranks together, but {machines} {has:.3g} "
+    "GB; use fewer points, or {count} such machines",
+)
 
 
 def doubt_memory(grid: Grid) -> Iterator[Doubt]:
@@ -370,19 +470,7 @@ def doubt_memory(grid: Grid) -> Iterator[Doubt]:
     if needed > each * count:
         have = "this machine has" if count == 1 else f"{count} such machines have"
         numbers = {"nx": grid.nx, "ny": grid.ny, "needed": needed / GIGA, "has": each * count / GIGA}
-        yield Doubt("memory", "grid.points", {**numbers, "machines": have, "count": int(needed / each) + 1})
-
-
-def beyond_file(count: int, output: Output) -> str:
-    """Return a message if a run of `count` steps saves more than MOST_INSTANTS instants of fields, or ''."""
-    saved = -(-count // output.every)
-    if not output.fields or saved <= MOST_INSTANTS:
-        return ""
-    least = -(-count // MOST_INSTANTS)
-    return (
-        f"output.every: {saved:.4g} instants of fields would be saved, but a file holds at most {MOST_INSTANTS}; use "
-        f"every: {least} or more"
-    )
+        yield WARN_MEMORY("grid.points", {**numbers, "machines": have, "count": int(needed / each) + 1})
 
 
 def machines() -> int:
@@ -430,29 +518,25 @@ def excited_band(job: Sections) -> tuple[float, float] | None:
     return (min(turns), max(turns)) if turns else None
 
 
-def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
-    """Return the wavenumbers [rad/m] of a shape, or the lowest and the highest one; none for a flat surface. Round
-    shapes and files may have every wave from the box to two cells."""
-    longest = 2.0 * math.pi / max(grid.size)
-    cells = [cell for cell, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1]
-    if isinstance(shape, Flat):
-        return ()
-    if isinstance(shape, Wave):
-        waves = [2.0 * math.pi * n / length for n, length in zip(shape.waves, grid.size, strict=True)]
-        return (math.hypot(*waves),) if any(waves) else ()
-    if isinstance(shape, Rough):
-        ratio = shape.anisotropy.ratio if shape.anisotropy else 1.0
-        return max(2.0 * math.pi / (ratio * shape.long_wavelength), longest), 2.0 * math.pi / shape.short_wavelength
-    return longest, max(math.pi / min(cells, default=math.inf), longest)
-
-
 THICKEST = 1 / 3  # physics: limit of small strains for the indentation over the thickness of a layer
 FEWEST_CELLS = 2.0  # accuracy: least cells in a thickness, the length over which pressure falls at the edge of contact
 LONGEST = 100.0  # physics: wavelength over thickness above which the compressibility of rubber matters
 NEARLY = 1e-4  # physics: distance of Poisson's ratio from 1/2 below which a body counts as incompressible
 
 
-def doubts_of_layer(job: Sections) -> Iterator[Doubt]:
+WARN_THIN = Kind(
+    "thin",
+    "{thickness:g} m is thinner than {least:g} cells of {cell:.3g} m, so edges of contacts are not resolved; use "
+    "{more}, or a smaller grid.size",
+)
+WARN_INCOMPRESSIBLE = Kind(
+    "incompressible",
+    "waves of {wave:.3g} m are more than {times:g} times as long as the layer is thick ({thickness:g} m); rubber "
+    "yields to them by its compressibility, which a Poisson's ratio of {poisson:g} excludes: use 0.4995",
+)
+
+
+def _layer(job: Sections) -> Iterator[Doubt]:
     """Yield warnings about the `body` section of a job, if it has one."""
     grid, surface, body, poisson = job.grid, job.surface, job.body, job.material.poisson
     if body is None:
@@ -461,19 +545,33 @@ def doubts_of_layer(job: Sections) -> Iterator[Doubt]:
     smooth = all(isinstance(shape, Wave | Flat) for shape in surface)
     if body.thickness < FEWEST_CELLS * cell and grid.boundary == "periodic" and not smooth:
         numbers = {"thickness": body.thickness, "least": FEWEST_CELLS, "cell": cell, "more": more_points(grid)}
-        yield Doubt("thin", "body.thickness", numbers)
+        yield WARN_THIN("body.thickness", numbers)
     yield from doubt_height(2.0 * _rms_height(grid, surface), body.thickness)
     yield from _indented(surface, body.thickness, job.history)
     longest = max(_wavelengths(grid, surface), default=0.0)
     if longest > LONGEST * body.thickness and poisson > 0.5 - NEARLY and body.base == "bonded":
         numbers = {"wave": longest, "times": LONGEST, "thickness": body.thickness, "poisson": poisson}
-        yield Doubt("incompressible", "material.poisson", numbers)
+        yield WARN_INCOMPRESSIBLE("material.poisson", numbers)
+
+
+WARN_HIGH_FOR_A_LAYER = Kind(
+    "high for a layer",
+    "the surface is {height:.3g} m high or more, above a third of the layer ({thickness:g} m), so strains are not "
+    "small; use a thicker layer, or a lower surface",
+)
 
 
 def doubt_height(height: float, thickness: float) -> Iterator[Doubt]:
     """Yield a warning if a surface of this height [m] is too high for a layer of this thickness [m]."""
     if height > THICKEST * thickness:
-        yield Doubt("high for a layer", "body.thickness", {"height": height, "thickness": thickness})
+        yield WARN_HIGH_FOR_A_LAYER("body.thickness", {"height": height, "thickness": thickness})
+
+
+WARN_DEEP_FOR_A_LAYER = Kind(
+    "deep for a layer",
+    "{approach:.3g} m is more than a third of the layer ({thickness:g} m), so strains are not small; use a smaller "
+    "approach, or a thicker layer",
+)
 
 
 def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, ...]) -> Iterator[Doubt]:
@@ -484,7 +582,7 @@ def _indented(surface: tuple[Any, ...], thickness: float, history: tuple[Stage, 
     deepest, index = max(approaches, default=(0.0, 0))
     if deepest > THICKEST * thickness:
         numbers = {"approach": deepest, "thickness": thickness}
-        yield Doubt("deep for a layer", f"history.{index}.approach", numbers)
+        yield WARN_DEEP_FOR_A_LAYER(f"history.{index}.approach", numbers)
 
 
 def _rms_height(grid: Grid, surface: tuple[Any, ...]) -> float:
@@ -505,3 +603,11 @@ def _wavelengths(grid: Grid, surface: tuple[Any, ...]) -> Iterator[float]:
             yield 1.0 / math.hypot(shape.waves[0] / grid.lx, shape.waves[1] / grid.ly)
         elif isinstance(shape, Rough):
             yield shape.long_wavelength
+
+
+# tests of a job, in the order of their warnings
+IN_BANDS = _temperatures, _moduli
+ON_A_GRID = (
+    *(_temperatures, doubts_of_resolution, _slopes, _moduli, _pressures, _instants, _band, _imprints),
+    *(_room, neighbours, _layer, _size),
+)

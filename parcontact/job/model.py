@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import Field, PrivateAttr, ValidationInfo, create_model, model_validator
 
-from ..doubts import Doubt
+from ..doubts import SAID, Doubt
 from . import advice, limits, listing, meaning, surfaces
 from .calculation import BAND_RULES, Body, Checkpoint, Grid, Numerics, Output, SomeBands, Study
 from .materials import Dma, Material, Zener, describe_temperature, heated
@@ -144,20 +144,11 @@ class Job(Part):
         """Return all warnings about the job; they are errors with `numerics.strict`."""
         given = self.material.given
         of_fit = given.doubts if isinstance(given, Dma) else ()
-        of_material = (*of_fit, *meaning.doubt_temperatures(self))
-        of_effects = [
-            each if isinstance(each, Doubt) else Doubt("said", "", {"text": str(each)}) for each in self._said("doubts")
-        ]
-        if self.bands is not None:
-            return (*of_material, *meaning.doubt_moduli(self.material.fitted), *of_effects)
-        return (
-            *of_material,
-            *advice.doubts_of_resolution(self, self.directions, chosen=bool(self._origin.mesh)),
-            *meaning.doubts_of_scene(self),
-            *meaning.doubts_of_layer(self),
-            *meaning.doubts_of_size(self),
-            *of_effects,
+        tests = meaning.ON_A_GRID if self.bands is None else meaning.IN_BANDS
+        of_effects = (
+            each if isinstance(each, Doubt) else SAID("", {"text": str(each)}) for each in self._said("doubts")
         )
+        return (*of_fit, *(doubt for test in tests for doubt in test(self)), *of_effects)
 
     @property
     def facts(self) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, ValidationInfo, WithJsonSchema
 
+from .calculation import Grid
 from .parts import Part, Rule, chosen, existing_file
 from .quantities import LARGEST, SMALLEST, Flag, Number, Positive, Real, Seed, Whole, both
 from .yaml_text import Fault, is_array, quote, refuse
@@ -350,3 +351,19 @@ def _shape(data: Any, info: ValidationInfo) -> Any:
 
 AnyShape = Rough | RoughSpectrum | Indenter | Wave | HeightFile | HeightArray | Topography | Flat
 Shape = Annotated[AnyShape, PlainValidator(_shape, json_schema_input_type=AnyShape)]
+
+
+def wave_numbers(shape: Any, grid: Grid) -> tuple[float, ...]:
+    """Return the wavenumbers [rad/m] of a shape, or the lowest and the highest one; none for a flat surface. Round
+    shapes and files may have every wave from the box to two cells."""
+    longest = 2.0 * math.pi / max(grid.size)
+    cells = [cell for cell, n in zip((grid.dx, grid.dy), grid.points, strict=True) if n > 1]
+    if isinstance(shape, Flat):
+        return ()
+    if isinstance(shape, Wave):
+        waves = [2.0 * math.pi * n / length for n, length in zip(shape.waves, grid.size, strict=True)]
+        return (math.hypot(*waves),) if any(waves) else ()
+    if isinstance(shape, Rough):
+        ratio = shape.anisotropy.ratio if shape.anisotropy else 1.0
+        return max(2.0 * math.pi / (ratio * shape.long_wavelength), longest), 2.0 * math.pi / shape.short_wavelength
+    return longest, max(math.pi / min(cells, default=math.inf), longest)

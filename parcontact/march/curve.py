@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Protocol
 
 from .. import streams
 from ..columns import STEADY, STEADY_WAVES, cells, choose_columns, names_of
-from ..doubts import Doubt
+from ..doubts import Doubt, Kind
 from ..errors import InputError, RunError, UnsolvedError
 from ..files import files, hdf5, tables, wisdom
 from ..files.directory import ADVICE, Directory
@@ -204,6 +204,9 @@ class CurveTable:
             self._further.close()
 
 
+WARN_INACCURATE_POINTS = Kind("inaccurate points", "estimated error of {of} {where}")
+
+
 def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[Doubt]:
     """Yield warnings about friction and the corrected area of points whose error exceeds the accuracy of the job, also
     of `earlier` ones, for which the parts of the error are not known."""
@@ -221,12 +224,12 @@ def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[Earlier
             _, point, parts = max(missed, key=lambda one: one[0])
             place = Wanted(point.speed, point.pressure, point.temperature)
             text = f"{describe(parts, name)}, at {place}{advice(parts, accuracy, chosen)}"
-            yield Doubt("inaccurate points", "", {"of": name, "where": f"{many}: up to {text}"})
+            yield WARN_INACCURATE_POINTS("", {"of": name, "where": f"{many}: up to {text}"})
         elif before:
             error, place = max(before, key=lambda one: one[0])
             asked = f"more than the {100 * accuracy:g} % that numerics.accuracy asks for"
             where = f"{many}: up to {per_cent(error, 3)}, at {place}; {asked}"
-            yield Doubt("inaccurate points", "", {"of": name, "where": where})
+            yield WARN_INACCURATE_POINTS("", {"of": name, "where": where})
 
 
 def _percent(share: float) -> str:

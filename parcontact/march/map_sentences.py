@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..doubts import Doubt
+from ..doubts import Doubt, Kind
 from ..job import Topography, measured_maps
 from ..job.map_files import Map
 from ..job.measured_maps import Prepared
@@ -41,6 +41,21 @@ def describe_line(part: Topography, line: Map) -> str:
     )
 
 
+WARN_LARGE_MAP = Kind("large map", "{file}: the map is {lx:.4g} x {ly:.4g} m; are lengths in m?")
+WARN_NEAR_POINTS = Kind(
+    "near points", "{file}: the spacing of points is {dx!m}, less than the size of atoms; is the unit right?"
+)
+WARN_FLAT_MAP = Kind(
+    "flat map",
+    "{file}: the map is {lx!m} x {ly!m}, and its heights differ by {span!M} only; do heights and lengths have the "
+    "right units?",
+)
+WARN_OBLONG_POINTS = Kind(
+    "oblong points",
+    "{file}: the spacing of points is {dx!m} along x and {dy!m} along y; is the order of x and y right?",
+)
+
+
 def doubt_sizes(prepared: Prepared) -> Iterator[Doubt]:
     """Yield warnings about the size of a map whose units may be confused."""
     found, name = prepared.whole, prepared.part.path.name
@@ -48,13 +63,21 @@ def doubt_sizes(prepared: Prepared) -> Iterator[Doubt]:
     dx, dy = lx / nx, ly / ny
     span = float(np.nanmax(found.heights) - np.nanmin(found.heights))
     if max(lx, ly) > LARGEST:
-        yield Doubt("large map", "surface", {"file": name, "lx": lx, "ly": ly})
+        yield WARN_LARGE_MAP("surface", {"file": name, "lx": lx, "ly": ly})
     if max(dx, dy) < SMALLEST:
-        yield Doubt("near points", "surface", {"file": name, "dx": dx})
+        yield WARN_NEAR_POINTS("surface", {"file": name, "dx": dx})
     if 0.0 < span < FLATTEST * min(lx, ly):
-        yield Doubt("flat map", "surface", {"file": name, "lx": lx, "ly": ly, "span": span})
+        yield WARN_FLAT_MAP("surface", {"file": name, "lx": lx, "ly": ly, "span": span})
     if max(dx, dy) > OBLONG * min(dx, dy):
-        yield Doubt("oblong points", "surface", {"file": name, "dx": dx, "dy": dy})
+        yield WARN_OBLONG_POINTS("surface", {"file": name, "dx": dx, "dy": dy})
+
+
+WARN_OUTLIERS = Kind(
+    "outliers",
+    "{count} points of the map differ from their neighbours by more than {deviations:g} times the median "
+    "deviation{repeated}. Its rms slope is {slope:.3g} with them and {without:.3g} without, and they carry load; "
+    "if they are no part of the surface, give outliers: clip{nodata}",
+)
 
 
 def doubt_outliers(prepared: Prepared) -> Iterator[Doubt]:
@@ -77,4 +100,4 @@ def doubt_outliers(prepared: Prepared) -> Iterator[Doubt]:
         "slope": slope,
         "without": without,
     }
-    yield Doubt("outliers", "surface", {**numbers, "repeated": repeated})
+    yield WARN_OUTLIERS("surface", {**numbers, "repeated": repeated})

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from ..doubts import Doubt
+from ..doubts import Doubt, Kind
 from ..effects.relaxation import time_factor_of
 from ..job import Job, Zener
 from ..job.meaning import excited_band
@@ -42,6 +42,16 @@ def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedB
     return [ExcitedBand(value, time_factor_of(job.at_temperature(value).material), band) for value in degrees]
 
 
+WARN_TEMPERATURES = Kind(
+    "temperatures", "{degrees} C is outside of the measured {low:g} to {high:g} C: the shift is an extrapolation there"
+)
+WARN_FREQUENCIES = Kind(
+    "frequencies",
+    "the job excites {low:.3g} to {high:.3g} Hz, reduced to the reference temperature, {decades:.1f} decades "
+    "{side} the measured {first:.3g} to {last:.3g} Hz: moduli are an extrapolation there",
+)
+
+
 def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
     """Yield warnings about frequencies and temperatures at which the material was not measured. `temperatures` [deg C]
     belong to a friction curve; without them the temperature of the material counts."""
@@ -54,7 +64,7 @@ def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
         low, high = body.temperatures
         if beyond := [value for value in degrees if not low <= value <= high]:
             degrees_text = ", ".join(f"{value:g}" for value in beyond)
-            yield Doubt("temperatures", "material", {"degrees": degrees_text, "low": low, "high": high})
+            yield WARN_TEMPERATURES("material", {"degrees": degrees_text, "low": low, "high": high})
     found = excited_bands(job, temperatures)
     if body.band is None or not found:
         return
@@ -62,7 +72,7 @@ def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
     for decades, side in ((math.log10(body.band[0] / low), "below"), (math.log10(high / body.band[1]), "above")):
         if decades > NEAR:
             measured = {"decades": decades, "side": side, "first": body.band[0], "last": body.band[1]}
-            yield Doubt("frequencies", "material", {"low": low, "high": high, **measured})
+            yield WARN_FREQUENCIES("material", {"low": low, "high": high, **measured})
 
 
 def _body(job: Job) -> Zener | None:

@@ -10,9 +10,9 @@ from functools import partial
 
 import numpy as np
 
-from ..doubts import Doubt
+from ..doubts import Doubt, Kind
 from ..errors import InputError, JobError, RunError
-from ..job import Job, OnOneMesh, advice, meaning
+from ..job import Job, OnOneMesh, Output, advice, meaning
 from ..job.advice import more_points
 from ..job.history import Timeline
 from ..job.limits import MOST_STEPS
@@ -28,6 +28,7 @@ from .time_error import RunProperties, StepObservation, properties_of, resolves
 SEAM = 2.0  # accuracy: least jump across the edge, over the largest increment inside, for a warning
 FEW_CELLS = 0.15  # accuracy: least excess of the counted area, as a share of it, for a warning
 FEW_POINTS = 2**22  # tuning: largest number of points whose heights are computed for a check; this takes seconds
+MOST_INSTANTS = 10**6  # tuning: most saved instants in one file, which reserves space for all of them
 STRICT = "an error with numerics.strict"
 BINS = 12  # accuracy: bins of wavenumbers in an octave
 LEAST = 1e-6  # accuracy: share of the mean square slope below which a bin has no waves
@@ -40,9 +41,21 @@ def refuse_impossible(job: Job, timeline: Timeline) -> None:
     count = timeline.count
     endless = f"the history would have {count:.3g} steps; it has at most {MOST_STEPS:.0e}" if count > MOST_STEPS else ""
     refuse_memory(job)
-    for text in (meaning.beyond_file(count, job.output), endless):
+    for text in (_beyond_file(count, job.output), endless):
         if text:
             raise InputError(text)
+
+
+def _beyond_file(count: int, output: Output) -> str:
+    """Return a message if a run of `count` steps saves more than MOST_INSTANTS instants of fields, or ''."""
+    saved = -(-count // output.every)
+    if not output.fields or saved <= MOST_INSTANTS:
+        return ""
+    least = -(-count // MOST_INSTANTS)
+    return (
+        f"output.every: {saved:.4g} instants of fields would be saved, but a file holds at most {MOST_INSTANTS}; use "
+        f"every: {least} or more"
+    )
 
 
 def refuse_memory(job: Job) -> None:
@@ -163,6 +176,20 @@ def refuse_approaches(setup: Setup) -> None:
 # -- the edge of a periodic box ---------------------------------------------------------------------------------------
 
 
+WARN_TILT = Kind(
+    "tilt",
+    "the heights at the two ends along {axis} of the periodic box differ by {jump:.3g} m (rms), {times!t} the "
+    "largest step between neighbours inside. Such a step adds friction; the surface is tilted by {tilt:.3g}: "
+    "subtract its mean plane",
+)
+WARN_SEAM = Kind(
+    "seam",
+    "the heights at the two ends along {axis} of the periodic box differ by {jump:.3g} m (rms), {times!t} the "
+    "largest step between neighbours inside. Such a step adds friction; cut the map where its ends fit, or let "
+    "heights fade to their mean towards the edges",
+)
+
+
 def _seams(setup: Setup, heights: Array) -> Iterator[Doubt]:
     """Yield warnings if opposite edges of a periodic box do not fit together."""
     unit, grid = setup.units.height, setup.grid
@@ -172,9 +199,9 @@ def _seams(setup: Setup, heights: Array) -> Iterator[Doubt]:
     ):
         if jump <= SEAM * inside:
             continue
-        kind = "tilt" if math.sqrt(max(jump**2 - rise**2, 0.0)) <= SEAM * inside else "seam"
+        kind = WARN_TILT if math.sqrt(max(jump**2 - rise**2, 0.0)) <= SEAM * inside else WARN_SEAM
         times, tilt = jump / inside if inside else math.inf, abs(rise) / length * unit
-        yield Doubt(kind, "surface", {"axis": name, "jump": jump * unit, "times": times, "tilt": tilt})
+        yield kind("surface", {"axis": name, "jump": jump * unit, "times": times, "tilt": tilt})
 
 
 def _along_x(slab: Slab, heights: Array) -> tuple[float, float, float]:
@@ -207,22 +234,22 @@ def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
 
 @dataclass
 class ContactWatch:
-    """Checks of the contact of each step; each kind of warning is given once. `asked` are those of effects, of measures
-    and a place; `mesh` has the points of the grid."""
+    """Checks of the contact of each step; each kind of warning is given once. `further` are checks of effects; `mesh`
+    has the points of the grid."""
 
     strict: bool
     timeline: Timeline
     seen: set[str] = field(default_factory=set)
     more: str = "more grid.points"
-    asked: Sequence[Callable[[Measures, str], Iterator[Doubt]]] = ()
+    further: Sequence[Callable[[Measures, str], Iterator[Doubt]]] = ()
     mesh: RunProperties = field(default_factory=lambda: RunProperties(1))
 
     @classmethod
     def of(cls, job: Job, timeline: Timeline) -> "ContactWatch":
         """Return the checks of a job."""
-        asked = [partial(doubts, job) for doubts in job.asked("doubt_contact")]
+        further = [partial(asked, job) for asked in job.asked("doubt_contact")]
         mesh = properties_of(job, None)
-        return cls(job.numerics.strict, timeline, more=more_points(job.grid), asked=asked, mesh=mesh)
+        return cls(job.numerics.strict, timeline, more=more_points(job.grid), further=further, mesh=mesh)
 
     def check_step(self, step: int, measures: Measures) -> list[Doubt]:
         """Return warnings about a step; raises RunError if these are errors."""
@@ -232,7 +259,7 @@ class ContactWatch:
     def check_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
         """Return warnings about a contact, about its cells if it is `final`; raises RunError if these are errors."""
         found = [*doubt_edge(measures, where), *(doubt_cells(measures, self.mesh, where, self.more) if final else ())]
-        found += [doubt for doubts in self.asked for doubt in doubts(measures, where)]
+        found += [doubt for ask in self.further for doubt in ask(measures, where)]
         new = [doubt for doubt in found if doubt.kind not in self.seen]
         self.seen |= {doubt.kind for doubt in new}
         if new and self.strict:
@@ -240,10 +267,29 @@ class ContactWatch:
         return new
 
 
+WARN_EDGE = Kind(
+    "edge",
+    "{where}: the contact reaches the edge of the box and is cut off there, so its results are wrong; use a "
+    "larger grid.size, a smaller load or a shorter distance",
+)
+
+
 def doubt_edge(measures: Measures, where: str) -> Iterator[Doubt]:
     """Yield a warning about a contact that reaches the edge of its box."""
     if measures.at_edge:
-        yield Doubt("edge", "", {"where": where})
+        yield WARN_EDGE("", {"where": where})
+
+
+WARN_BELOW_A_CELL = Kind(
+    "below a cell",
+    "{where}: spots of contact may be smaller than a cell, so that their area and friction are not known and no "
+    "error is stated; use {more}, a smaller grid.size or a larger load",
+)
+WARN_CELLS = Kind(
+    "cells",
+    "{where}: spots of contact are only a few cells wide: contact_area is about {excess!p} too large (limit: "
+    "{most!p}); use {more}, a smaller grid.size or a larger load",
+)
 
 
 def doubt_cells(measures: Measures, mesh: RunProperties, where: str, more: str) -> Iterator[Doubt]:
@@ -251,8 +297,8 @@ def doubt_cells(measures: Measures, mesh: RunProperties, where: str, more: str) 
     refine them."""
     area, corrected = measures.contact_area, measures.contact_area_corrected
     if not resolves(mesh, StepObservation(0.0, 0.0, area, corrected, spared=measures.spared)):
-        yield Doubt("below a cell", "", {"where": where, "more": more})
+        yield WARN_BELOW_A_CELL("", {"where": where, "more": more})
         return
     excess = 1.0 - measures.contact_area_corrected / area if area > 0.0 else 0.0
     if excess > FEW_CELLS:
-        yield Doubt("cells", "", {"where": where, "excess": excess, "most": FEW_CELLS, "more": more})
+        yield WARN_CELLS("", {"where": where, "excess": excess, "most": FEW_CELLS, "more": more})

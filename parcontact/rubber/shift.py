@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..columns import TEMPERATURES
-from ..doubts import Doubt
+from ..doubts import Doubt, Kind
 from ..errors import InputError
 from ..text_tables import read_named_columns
 
@@ -130,11 +130,18 @@ def log_vertical(shift: Shift, temperature: float) -> float:
     return 0.0 if shift.vertical is None else shift.vertical.log_factor(temperature)
 
 
+WARN_KELVIN = Kind(
+    "kelvin",
+    "{degrees:g} C is hotter than rubber endures (limit: {most:g} C). Temperatures are in deg C: if this is in "
+    "kelvin, give {celsius:g}",
+)
+
+
 def doubt_kelvin(place: str, temperatures: Iterable[float | None]) -> Iterator[Doubt]:
     """Yield a warning if the highest of some temperatures [deg C] is hotter than rubber endures."""
     highest = max((value for value in temperatures if value is not None), default=0.0)
     if highest > HOTTEST:
-        yield Doubt("kelvin", place, {"degrees": highest, "most": HOTTEST, "celsius": round(highest - ZERO, 6)})
+        yield WARN_KELVIN(place, {"degrees": highest, "most": HOTTEST, "celsius": round(highest - ZERO, 6)})
 
 
 def read_shift(text: str, reference: float | None) -> str | Shift:

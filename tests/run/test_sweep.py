@@ -20,11 +20,11 @@ from sweeping import JOB, table
 
 from parcontact.__main__ import main
 from parcontact.door import memory
-from parcontact.doubts import Doubt
 from parcontact.errors import InputError, RunError
 from parcontact.files import directory, files, run, sweep, tables
 from parcontact.files.tables import StopFile
 from parcontact.job import Case, Job, load_cases
+from parcontact.march.sanity import WARN_CELLS, WARN_EDGE
 from parcontact.parallel.root import Signals
 from parcontact.parallel.slab import Slab
 from parcontact.parallel.tally import Groups
@@ -203,7 +203,7 @@ def test_groups_of_ranks_take_cases_by_turns(
         begun.append(number)
         assert slab.comm.size == sum(rank * groups.count // world.size == groups.number for rank in range(world.size))
         where = {**CELLS, "where": f"step {number}"}
-        shown = [shows(Doubt(kind, "", where)) for kind in ("edge", "edge", *["cells"] * (number == 5))]
+        shown = [shows(kind("", where)) for kind in (WARN_EDGE, WARN_EDGE, *[WARN_CELLS] * (number == 5))]
         assert any(shown) == (groups.count == 1 and number in (0, 5))
         if number == 3:
             raise RunError("it fell over")
@@ -215,7 +215,7 @@ def test_groups_of_ranks_take_cases_by_turns(
     stated = "".join(world.allgather(said.err)).splitlines()
     assert "parcontact: case 3: it fell over" in stated
     assert sum("the edge of the box" in line and line.endswith(" (cases 0-5)") for line in stated) == 1
-    rare = f"warning: {Doubt('cells', '', {**CELLS, 'where': 'step 5'})} (case 5)"
+    rare = f"warning: {WARN_CELLS('', {**CELLS, 'where': 'step 5'})} (case 5)"
     assert (rare in stated) == (groups.count > 1)  # else it was shown at once
     assert ("case 4: done\n" in "".join(world.allgather(said.out))) == (groups.count > 1)
     if world.rank == 0:

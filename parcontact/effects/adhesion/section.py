@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
 
-from ...doubts import Doubt
+from ...doubts import Doubt, Kind
 from ...job import meaning
 from ...job.advice import more_points
 from ...job.calculation import Grid
@@ -72,23 +72,64 @@ SMALL = 0.01  # accuracy: least share of a force that is warned of
 PULL_OFF = 1.5 * math.pi  # physics: least pull-off force over w R, of elastic bodies with a short range
 
 
+WARN_WORK = Kind(
+    "work",
+    "adhesion.work is {work:g} J/m^2 and the range {range:.3g} m: dry surfaces have a work of adhesion of at most "
+    "{most:g} J/m^2, rubber about 0.05; the material adds what the body dissipates",
+)
+WARN_STRAINED_EDGES = Kind(
+    "strained edges",
+    "strains at the edges of contact are about work/(E* range) = {strain:.2g}; the theory assumes small strains, "
+    "up to {most:g}. adhesion.work is {work:g} J/m^2 and the range {range:.3g} m; use a longer range or a smaller "
+    "work",
+)
+WARN_LONG_RANGE = Kind(
+    "long range",
+    "adhesion.work is {work:g} J/m^2 and the range {range:.3g} m, more than {most:g} of the box: points then also "
+    "attract points that are not opposite, which the law neglects; use {remedy}",
+)
+
+
 def doubts_of_adhesion(job: Any, law: AdhesionLaw, modulus: float, cell: float) -> Iterator[Doubt]:
     """Yield warnings about an implausible work or range, or one outside the model, with E* of the relaxed body [Pa] and
     the side of a cell [m]."""
     given = {"work": law.work, "range": law.range}
     if law.work > MOST_WORK:
-        yield Doubt("work", "adhesion", {**given, "most": MOST_WORK})
+        yield WARN_WORK("adhesion", {**given, "most": MOST_WORK})
     elif modulus and (strain := law.strength / modulus) > MOST_STRAIN:
-        yield Doubt("strained edges", "adhesion", {**given, "strain": strain, "most": MOST_STRAIN})
+        yield WARN_STRAINED_EDGES("adhesion", {**given, "strain": strain, "most": MOST_STRAIN})
     sides = [size for size, n in zip(job.grid.size, job.grid.points, strict=True) if n > 1] or list(job.grid.size)
     if law.range > MOST_RANGE * min(sides):
-        yield Doubt("long range", "adhesion", {**given, "most": MOST_RANGE, "remedy": _shorten(job)})
+        yield WARN_LONG_RANGE("adhesion", {**given, "most": MOST_RANGE, "remedy": _shorten(job)})
     for index, shape in enumerate(job.surface):
         if isinstance(shape, Sphere):
             yield from _sphere(f"surface.{index}", shape, job.grid, law, cell)
-    if modulus > 0.0 and not list(meaning.neighbours(job, job.material.fitted)):
+    if modulus > 0.0 and not list(meaning.neighbours(job)):
         contact = (0.75 * PULL_OFF * law.work / modulus) ** (1.0 / 3.0)  # of Hertz under the pull-off, over R^(2/3)
         yield from meaning.acting_neighbours(job, lambda radius: contact * radius ** (2.0 / 3.0))
+
+
+WARN_COARSE_TIP = Kind(
+    "coarse tip",
+    "a cell, {cell:.3g} m, is {ratio:.2g} times sqrt(radius range), the radius within which {sphere} is attracted; "
+    "at {most:g} times the sum over points is wrong by 3 %; use cells of {fine!d} m, or a range of {enough!u} m",
+)
+WARN_SMALL_SPHERE = Kind(
+    "small sphere",
+    "it attracts out to sqrt(2 radius range), more than its radius, {radius:g} m; the theory assumes small slopes: "
+    "use an adhesion.range of at most {most!d} m",
+)
+WARN_CUT_ATTRACTION = Kind(
+    "cut attraction",
+    "{share!p} of its attraction over an adhesion.range of {range:.3g} m comes from beyond {room:.3g} m, where "
+    "the box ends (limit: {most!p}); use a range of at most {shorter!d} m, or {more!u} m of room around the "
+    "sphere",
+)
+WARN_ATTRACTION_AT_AN_EDGE = Kind(
+    "attraction at an edge",
+    "{share!p} of its attraction over an adhesion.range of {range:.3g} m comes from beyond {room:.3g} m, where "
+    "the box ends (limit: {most!p}); use {more!u} m of room around the sphere",
+)
 
 
 def _sphere(name: str, sphere: Sphere, grid: Grid, law: AdhesionLaw, cell: float) -> Iterator[Doubt]:
@@ -96,9 +137,9 @@ def _sphere(name: str, sphere: Sphere, grid: Grid, law: AdhesionLaw, cell: float
     radius, ring = sphere.radius, math.sqrt(sphere.radius * law.range)
     if cell > MOST_RING * ring:
         remedies = {"most": MOST_RING, "fine": MOST_RING * ring, "enough": cell**2 / MOST_RING**2 / radius}
-        yield Doubt("coarse tip", "adhesion", {"cell": cell, "ratio": cell / ring, "sphere": name, **remedies})
+        yield WARN_COARSE_TIP("adhesion", {"cell": cell, "ratio": cell / ring, "sphere": name, **remedies})
     if law.range > radius / 2.0:
-        yield Doubt("small sphere", name, {"radius": radius, "most": radius / 2.0})
+        yield WARN_SMALL_SPHERE(name, {"radius": radius, "most": radius / 2.0})
     if min(grid.points) == 1:
         return
     x, y = sphere.center or (grid.lx / 2.0, grid.ly / 2.0)
@@ -110,13 +151,20 @@ def _sphere(name: str, sphere: Sphere, grid: Grid, law: AdhesionLaw, cell: float
         enough = -math.log(SMALL) if exponential else 1.0
         remedies = {"shorter": law.range * edge / enough, "more": math.sqrt(2.0 * enough) * ring}
         numbers = {"share": share, "range": law.range, "room": room, "most": SMALL, **remedies}
-        yield Doubt("cut attraction" if edge else "attraction at an edge", name, numbers)
+        yield (WARN_CUT_ATTRACTION if edge else WARN_ATTRACTION_AT_AN_EDGE)(name, numbers)
+
+
+WARN_RANGE_BEYOND_HEIGHTS = Kind(
+    "range beyond heights",
+    "the range, {range:.3g} m, is more than the {span:.3g} m from the lowest to the highest point of the surface, "
+    "so the attraction is nearly uniform and adhesion acts as a pressure of work/range; use {remedy}",
+)
 
 
 def doubt_range(job: Any, law: AdhesionLaw, span: float) -> Iterator[Doubt]:
     """Yield a warning about a range above the height of a rough surface, from its lowest to its highest point [m]."""
     if law.range > span > 0.0:
-        yield Doubt("range beyond heights", "adhesion", {"range": law.range, "span": span, "remedy": _shorten(job)})
+        yield WARN_RANGE_BEYOND_HEIGHTS("adhesion", {"range": law.range, "span": span, "remedy": _shorten(job)})
 
 
 def _shorten(job: Any) -> str:

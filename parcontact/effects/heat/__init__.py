@@ -1,8 +1,6 @@
 """Heat of sliding: temperatures of the rubber below the contact.
 
 Columns of heat.
-
-Sentences of the warnings about heat (`doubts.Doubt`).
 """
 
 import math
@@ -87,15 +85,3 @@ FIELDS: Table = (
     Column("temperature", "K", "rise of the temperature of the body's surface (with `thermal`, {doc}`heat`)"),
 )
 FIELDS_NEED = {"temperature": "a thermal section"}  # what the maps need
-
-
-SENTENCES = {
-    "decomposes": (
-        "flash temperatures of {count} of {points} points are above {most:g} K, up to {rise:.3g} K at {speed:g} m/s: "
-        "rubber decomposes there; take a smaller thermal.distance, velocity or pressure"
-    ),
-    "flash temperatures": (
-        "with its flash temperature the rubber is beyond the {low:g} to {high:g} C of its measurement at {count} of "
-        "{points} points, up to {hottest:.3g} C at {speed:g} m/s: the shift is an extrapolation there"
-    ),
-}

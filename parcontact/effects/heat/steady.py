@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...contact.constraint import Box, Mask
-from ...doubts import Doubt
+from ...doubts import Doubt, Kind
 from ...errors import InputError, UnsolvedError
 from ...job import Job, Zener
 from ...march.point import Point
@@ -179,6 +179,13 @@ def beyond_shift(speed: float, pressure: float, temperature: float, most: float,
     )
 
 
+WARN_DECOMPOSES = Kind(
+    "decomposes",
+    "flash temperatures of {count} of {points} points are above {most:g} K, up to {rise:.3g} K at {speed:g} m/s: "
+    "rubber decomposes there; take a smaller thermal.distance, velocity or pressure",
+)
+
+
 def describe_hot(points: Sequence[Point]) -> Iterator[Doubt]:
     """Yield a warning if rubber, in bands that of the hottest one, would be so hot that it decomposes."""
     known = ((point.effects.get("thermal"), point.speed) for point in points)
@@ -186,7 +193,14 @@ def describe_hot(points: Sequence[Point]) -> Iterator[Doubt]:
     if hot:
         rise, speed = max(hot)
         facts = {"count": len(hot), "points": len(points), "most": HOTTEST, "rise": rise, "speed": speed}
-        yield Doubt("decomposes", "", facts)
+        yield WARN_DECOMPOSES("", facts)
+
+
+WARN_FLASH_TEMPERATURES = Kind(
+    "flash temperatures",
+    "with its flash temperature the rubber is beyond the {low:g} to {high:g} C of its measurement at {count} of "
+    "{points} points, up to {hottest:.3g} C at {speed:g} m/s: the shift is an extrapolation there",
+)
 
 
 def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[Doubt]:
@@ -204,7 +218,7 @@ def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[Doubt]:
     if beyond := [one for one in warm if not low <= one[0] <= high]:
         hottest, speed = max(beyond)
         facts = {"low": low, "high": high, "count": len(beyond), "points": len(points)}
-        yield Doubt("flash temperatures", "material", {**facts, "hottest": hottest, "speed": speed})
+        yield WARN_FLASH_TEMPERATURES("material", {**facts, "hottest": hottest, "speed": speed})
 
 
 def doubts_of_points(points: Sequence[Point], job: Job) -> Iterator[Doubt]:

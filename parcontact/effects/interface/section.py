@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from ... import capabilities
-from ...doubts import Doubt
+from ...doubts import Doubt, Kind
 from ...job import limits
 from ...job.parts import Part, Rule
 from ...job.quantities import Flag, Positive
@@ -135,6 +135,13 @@ class Interface(Part):
         return InterfaceFriction(self.shear_stress, self.velocity, self.width or 1.0, time_factor_of(material))
 
 
+WARN_WHOLE_BOX_STICKS = Kind(
+    "whole box sticks",
+    "{where}: all of the periodic box is in contact, where no traction moves the mean of its surface: friction of "
+    "the first steps that stick may be too small; use grid.boundary: free, a smaller load or rougher heights",
+)
+
+
 class InterfaceEffect(Effect[Memory]):
     """An effect of the section."""
 
@@ -163,7 +170,7 @@ class InterfaceEffect(Effect[Memory]):
     def doubt_contact(job: Any, measures: Measures, where: str) -> Iterator[Doubt]:
         """Yield a warning about a periodic box that is full of a contact that sticks."""
         if job.section("interface").stick and all(job.grid.cyclic) and measures.contact_area == 1.0:
-            yield Doubt("whole box sticks", "", {"where": where})
+            yield WARN_WHOLE_BOX_STICKS("", {"where": where})
 
     @staticmethod
     def decide(job: Any) -> Decision:

@@ -34,7 +34,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...doubts import Doubt
+from ...doubts import Doubt, Kind
 from ...errors import RunError
 from ...march.point import Point, count_octaves, in_rounds
 from ...march.scene import Setup
@@ -251,6 +251,13 @@ def loops(setup: Setup) -> Iterator[StrainLoop]:
         yield StrainLoop(setup)
 
 
+WARN_STRAINS_BEYOND_THE_SWEEP = Kind(
+    "strains beyond the sweep",
+    "the strain is {strain:.2g} at {speed:g} m/s, beyond the {low:.3g} to {high:.3g} of the sweep at {count} of "
+    "{points} points: factors of its ends are used there; measure a wider range of strains",
+)
+
+
 def doubts_of_points(points: Sequence[Point], job: Any) -> Iterator[Doubt]:
     """Yield a warning if strains of a curve are outside of the table."""
     section = job.section("softening")
@@ -260,7 +267,7 @@ def doubts_of_points(points: Sequence[Point], job: Any) -> Iterator[Doubt]:
         low, high = section.made.strain[0], section.made.strain[-1]
         strain, speed = max(beyond, key=lambda each: abs(math.log(each[0] / math.sqrt(low * high))))
         facts = {"strain": strain, "speed": speed, "low": low, "high": high}
-        yield Doubt("strains beyond the sweep", "softening", {**facts, "count": len(beyond), "points": len(points)})
+        yield WARN_STRAINS_BEYOND_THE_SWEEP("softening", {**facts, "count": len(beyond), "points": len(points)})
 
 
 BINS = 12  # accuracy: bins of wavenumbers in a band

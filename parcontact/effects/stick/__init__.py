@@ -1,8 +1,6 @@
 """Stick and slip: points of the contact stick until the traction reaches its bound.
 
 Columns of stick and slip.
-
-Sentences of the warnings about stick and slip (`doubts.Doubt`).
 """
 
 from ...column import Column, Table
@@ -29,11 +27,3 @@ FIELDS: Table = (
 )
 FIELDS_NEED = {"traction": "interface: {stick: true}"}  # what the map needs
 VECTORS = ("traction",)  # maps with two components
-
-
-SENTENCES = {
-    "whole box sticks": (
-        "{where}: all of the periodic box is in contact, where no traction moves the mean of its surface: friction of "
-        "the first steps that stick may be too small; use grid.boundary: free, a smaller load or rougher heights"
-    )
-}
