@@ -27,7 +27,7 @@ from ..capabilities import stated
 from ..errors import InputError
 from ..rubber.shift import WLF, Arrhenius, Density, Factors, log_vertical
 from ..rubber.shift import Shift as Law
-from .parts import Instead, Origin, Part, Rule, chosen
+from .parts import Instead, Origin, Part, Rule, chosen, rules_of
 from .quantities import (
     AUTO_POINTS,
     FROM_SURFACE,
@@ -234,7 +234,7 @@ class Output(Part):
     branch_dissipation: Flag = False
 
     foreign = MappingProxyType({"mesh_check": Instead(MEASURE_MESH)})
-    rules = (Rule(("branch_dissipation", "energy"), _needs_energy), _different("fields"))
+    rules = (*rules_of(_needs_energy), _different("fields"))
 
     @property
     def maps(self) -> tuple[str, ...]:
@@ -380,7 +380,7 @@ def _over_time(bands: Any, history: Any, initial: Any, output: Any) -> Iterator[
 
 
 BAND_RULES = (
-    Rule(("bands", "history", "initial", "output"), _over_time),
+    *rules_of(_over_time),
     _without("body", "a layer changes the coarsest waves only; give it a grid"),
     _without("study", "a study refines one grid"),
 )
@@ -446,7 +446,7 @@ class ShiftLaw(Part):
     reference: Celsius
     vertical: VerticalLaw | None = Field(default=None, description="a mapping with law: density | factors")
 
-    rules: ClassVar[tuple[Rule, ...]] = (Rule(("vertical", "reference"), _reaches),)
+    rules: ClassVar[tuple[Rule, ...]] = rules_of(_reaches)
 
     @property
     def made(self) -> Law:

@@ -13,7 +13,7 @@ from ..printed import rounded_up
 from .advice import SAME_LENGTH, doubt_size, has_wave, one_cell
 from .calculation import FIELDS_NEED, Body, Grid, Numerics, Output, Study
 from .materials import AnyMaterial, heated
-from .parts import Rule
+from .parts import Rule, rules_of
 from .stages import AUTO, FORCE, PRESSURE, GeometricStep, Initial, Oscillation, Stage, Steady
 from .surfaces import SAME_CELL, Flat, HeightArray, OnOneMesh, Rough, RoughSpectrum, Topography
 from .yaml_text import Fault
@@ -327,3 +327,28 @@ def estimate_steps(stage: Stage, seconds: float, first: float) -> float:
     count = seconds / first if first else math.inf
     growth = stage.time_step.growth if isinstance(stage.time_step, GeometricStep) else 1.0
     return count if growth == 1.0 else min(count, math.log1p(count * (growth - 1.0)) / math.log(growth))
+
+
+RULES = rules_of(
+    kernel_fits,
+    layer_is_resolved,
+    layer_is_in_proportion,
+    no_wake_in_a_layer,
+    half_space_at_rest,
+    waves_are_independent,
+    some_shape,
+    waves_fit,
+    arrays_fit,
+    some_history,
+    some_load,
+    loads_press,
+    steady_bodies_do_not_flow,
+    energies_count_from_rest,
+    energies_are_of_steps,
+    loads_are_borne,
+    temperatures_are_reached,
+    steps_can_be_made,
+    no_rolling,
+    bands_fit,
+    study_fits,
+)

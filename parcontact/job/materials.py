@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..rubber import compound
 from ..rubber.shift import log_vertical
 from .calculation import Celsius, Shift, shifted
-from .parts import Instead, Part, Rule, chosen, existing_file
+from .parts import Instead, Part, Rule, chosen, existing_file, rules_of
 from .quantities import NonNegative, Number, Positive
 from .yaml_text import Fault, quote, refuse
 
@@ -196,11 +196,7 @@ class Zener(Part):
     hardness: Hardness = None
 
     foreign = dict.fromkeys(YOUNG, Instead(BY_THREE.format("each of modulus_inf and branches")))
-    rules = (
-        Rule(("modulus_0", "modulus_inf", "branches"), _fractions),
-        Rule(("modulus_0", "modulus_inf", "branches"), _stiff),
-        Rule(("shift", "temperature"), shifted),
-    )
+    rules = (*rules_of(_fractions, _stiff), Rule(("shift", "temperature"), shifted))
 
     @model_validator(mode="wrap")
     @classmethod

@@ -48,31 +48,7 @@ class Job(Part):
     _origin: Origin = PrivateAttr(default=Origin())
 
     foreign = OF_A_SECTION
-    rules = (
-        Rule(("grid", "numerics"), limits.kernel_fits),
-        Rule(("grid", "body"), limits.layer_is_resolved),
-        Rule(("grid", "body"), limits.layer_is_in_proportion),
-        Rule(("grid", "body", "initial", "steady"), limits.no_wake_in_a_layer),
-        Rule(("grid", "body", "initial", "steady"), limits.half_space_at_rest),
-        Rule(("grid", "steady"), limits.waves_are_independent),
-        Rule(("surface",), limits.some_shape),
-        Rule(("grid", "surface", "bands"), limits.waves_fit),
-        Rule(("grid", "surface"), limits.arrays_fit),
-        Rule(("history", "steady"), limits.some_history),
-        Rule(("history", "initial"), limits.some_load),
-        Rule(("history",), limits.loads_press),
-        Rule(("grid", "material", "body", "initial", "steady"), limits.steady_bodies_do_not_flow),
-        Rule(("initial", "output"), limits.energies_count_from_rest),
-        Rule(("history", "output"), limits.energies_are_of_steps),
-        Rule(("grid", "material", "history", "initial", "steady"), limits.loads_are_borne),
-        Rule(("material", "steady"), limits.temperatures_are_reached),
-        Rule(("grid", "history"), limits.steps_can_be_made),
-        *(Rule(("output",), check) for check in limits.no_field.values()),
-        Rule(("history",), limits.no_rolling),
-        Rule(("bands", "surface", "steady", "output"), limits.bands_fit),
-        Rule(("study", "grid", "surface", "history"), limits.study_fits),
-        *BAND_RULES,
-    )
+    rules = (*limits.RULES, *(Rule(("output",), check) for check in limits.no_field.values()), *BAND_RULES)
     at_most_one = (("grid", "bands"),)
 
     @classmethod

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
+from inspect import signature
 from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin
@@ -61,6 +62,11 @@ class Rule(NamedTuple):
 
     needs: tuple[str, ...]
     check: Callable[..., Iterator[Fault]]
+
+
+def rules_of(*checks: Callable[..., Iterator[Fault]]) -> tuple[Rule, ...]:
+    """Return the rules of checks whose parameters are named as the fields that they need."""
+    return tuple(Rule(tuple(signature(check).parameters), check) for check in checks)
 
 
 class Instead(NamedTuple):

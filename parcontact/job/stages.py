@@ -22,7 +22,7 @@ from pydantic import (
 )
 
 from .calculation import Celsius
-from .parts import Instead, Origin, Part, Rule
+from .parts import Instead, Origin, Part, Rule, rules_of
 from .quantities import Count, Flag, Positive, Real, Vector, along_x, listed, log_range
 from .yaml_text import Fault, quote, refuse
 
@@ -391,7 +391,7 @@ class Initial(Part):
     velocity: Velocity = (0.0, 0.0)
     pressure: Positive | None = Field(default=None, description="a positive pressure [Pa]")
 
-    rules = (Rule(("state", "velocity", "pressure"), _steady_start),)
+    rules = rules_of(_steady_start)
 
 
 def expand_range(value: Any) -> Any:
@@ -425,7 +425,7 @@ class Steady(Part):
     direction: tuple[Real, Real] = Field(default=(1.0, 0.0), description="a direction [x, y] [-]")
     waves: Flag = False
 
-    rules = (Rule(("direction",), _directed),)
+    rules = rules_of(_directed)
 
     @property
     def unit_direction(self) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from ...columns import added_by
 from ...contact.constraint import Mask
 from ...doubts import Doubt, Kind
 from ...job import limits
-from ...job.parts import Part, Rule
+from ...job.parts import Part, Rule, rules_of
 from ...job.surfaces import Sphere, Wave
 from ...job.yaml_text import Fault
 from ...parallel.slab import Array
@@ -140,12 +140,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     section: ClassVar[type[Part]] = Adhesion
     columns: ClassVar[tuple[str, ...]] = added_by("adhesion")
-    rules: ClassVar[tuple[Rule, ...]] = (
-        Rule(("adhesion", "material"), _bodies),
-        Rule(("adhesion", "grid", "material", "bands"), _zone_is_resolved),
-        Rule(("adhesion", "bands"), _no_bands),
-        Rule(("adhesion", "grid"), _no_strip),
-    )
+    rules: ClassVar[tuple[Rule, ...]] = rules_of(_bodies, _zone_is_resolved, _no_bands, _no_strip)
     lifts: ClassVar[tuple[Any, ...]] = (limits.loads_press, limits.some_load)
     forbids: ClassVar[Mapping[str, str]] = {
         EXTRAPOLATION: "contacts with adhesion start from the last gaps",

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...job.materials import Dma, describe_temperature
 from ...job.meaning import excited_band
-from ...job.parts import Part, Rule
+from ...job.parts import Part, Rule, rules_of
 from ...job.surfaces import Rough
 from ...job.yaml_text import Fault
 from ...physics.prony import complex_modulus
@@ -85,14 +85,7 @@ class CounterbodyThatDeforms(Effect[None]):
     in_curves: ClassVar[bool] = True
     in_bands_over_time: ClassVar[bool] = True
     columns: ClassVar[tuple[str, ...]] = ()
-    rules: ClassVar[tuple[Rule, ...]] = (
-        Rule(("counterbody", "history", "initial", "steady"), _slides),
-        Rule(("counterbody", "body"), _lies_on),
-        Rule(("counterbody", "material", "interface"), _sticks),
-        Rule(("counterbody", "thermal"), _no_heat),
-        Rule(("counterbody", "softening"), _no_softening),
-        Rule(("counterbody",), _does_not_yield),
-    )
+    rules: ClassVar[tuple[Rule, ...]] = rules_of(_slides, _lies_on, _sticks, _no_heat, _no_softening, _does_not_yield)
 
     @staticmethod
     def changed_material(job: Any) -> Any:

@@ -16,7 +16,7 @@ from ...errors import InputError, RunError
 from ...job import Grid, limits
 from ...job.history import Timeline
 from ...job.listing import effects_of
-from ...job.parts import Part, Rule
+from ...job.parts import Part, Rule, rules_of
 from ...job.quantities import Positive
 from ...job.yaml_text import Fault
 from ...parallel import fft
@@ -161,12 +161,7 @@ class ThermalColumns(Effect[ThermalMemory]):
     columns: ClassVar[tuple[str, ...]] = added_by("thermal")
     in_curves: ClassVar[bool] = True
     fields: ClassVar[tuple[str, ...]] = ("temperature",)
-    rules: ClassVar[tuple[Rule, ...]] = (
-        Rule(("thermal", "material"), _shifts),
-        Rule(("thermal", "initial"), _no_warm_start),
-        Rule(("thermal", "history", "grid", "bands"), _in_curves),
-        Rule(("thermal", "grid"), _no_strip_of_heat),
-    )
+    rules: ClassVar[tuple[Rule, ...]] = rules_of(_shifts, _no_warm_start, _in_curves, _no_strip_of_heat)
     lifts: ClassVar[tuple[Any, ...]] = (limits.no_field["temperature"],)
 
     @staticmethod

@@ -10,7 +10,7 @@ from pydantic import Field
 from ... import capabilities
 from ...doubts import Doubt, Kind
 from ...job import limits
-from ...job.parts import Part, Rule
+from ...job.parts import Part, Rule, rules_of
 from ...job.quantities import Flag, Positive
 from ...job.surfaces import Rough, RoughSpectrum, Topography
 from ...job.yaml_text import Fault
@@ -122,11 +122,7 @@ class Interface(Part):
     stick: Flag = False
 
     one_of = (("shear_stress", "coefficient"),)
-    rules = (
-        Rule(("stick", "coefficient"), _needs_its_folder),
-        Rule(("velocity", "width"), _whole_bell),
-        Rule(("coefficient", "velocity", "stick"), _coefficient),
-    )
+    rules = rules_of(_needs_its_folder, _whole_bell, _coefficient)
 
     def friction(self, material: Any) -> InterfaceFriction | None:
         """Return the shear stress, shifted to the temperature of a material; None with a coefficient."""
@@ -148,13 +144,8 @@ class InterfaceEffect(Effect[Memory]):
     section: ClassVar[type[Part]] = Interface
     in_curves: ClassVar[bool] = True
     in_bands_over_time: ClassVar[bool] = True
-    rules: ClassVar[tuple[Rule, ...]] = (
-        Rule(("interface", "material"), _incompressible),
-        Rule(("interface", "grid", "body", "initial", "steady"), _sticks),
-        Rule(("interface", "history", "surface"), _rolls),
-        Rule(("interface", "bands", "history"), _in_bands),
-        Rule(("interface", "adhesion"), _no_adhesion),
-        Rule(("interface", "output"), _has_tractions),
+    rules: ClassVar[tuple[Rule, ...]] = rules_of(
+        _incompressible, _sticks, _rolls, _in_bands, _no_adhesion, _has_tractions
     )
     lifts: ClassVar[tuple[Any, ...]] = (*OF_TRACTIONS, limits.no_rolling)
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field, PlainValidator, TypeAdapter, ValidationInfo
 
 from ...job import limits
-from ...job.parts import Part, Rule
+from ...job.parts import Part, Rule, rules_of
 from ...job.quantities import Count, NonNegative, Positive
 from ...job.stages import Ramp, Stage
 from ...job.yaml_text import Fault, quote, refuse
@@ -106,7 +106,7 @@ class Leakage(Part):
         Rule(("load", "pressures"), lambda load, given: _only_total(load, pressures=given)),
         Rule(("load", "ambient"), lambda load, given: _only_total(load, ambient=given)),
         Rule(("load", "fluid"), lambda load, given: _only_total(load, fluid=given)),
-        Rule(("load", "every", "pressures"), _whole),
+        *rules_of(_whole),
     )
 
     def left_out(self) -> tuple[str, ...]:
@@ -207,11 +207,6 @@ def _has_map(leakage: Leakage | None, output: Any) -> Iterator[Fault]:
 
 
 RULES = (
-    Rule(("leakage", "history"), _needs_steps),
-    Rule(("leakage", "history"), _stages),
-    Rule(("leakage", "grid"), _no_free_box),
-    Rule(("leakage", "output"), _has_map),
-    Rule(("leakage", "material", "numerics"), _refused),
-    Rule(("leakage", "initial", "steady"), _no_steady),
+    *rules_of(_needs_steps, _stages, _no_free_box, _has_map, _refused, _no_steady),
     *map(_excludes, ("adhesion", "interface", "thermal")),
 )

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import AfterValidator, Field, PrivateAttr
 
 from ...errors import InputError
-from ...job.parts import Part, Rule, existing_file
+from ...job.parts import Part, Rule, existing_file, rules_of
 from ...job.quantities import Positive
 from ...job.yaml_text import Fault, refuse
 from .strain_table import StrainTable, read_sweep
@@ -47,7 +47,7 @@ class Softening(Part):
     reference_strain: Positive | None = Field(default=None, description="a positive strain [-] of the sweep")
 
     one_of = (("table", "path"),)
-    rules = (Rule(("table",), _rising), Rule(("path", "reference_strain"), _of_a_file))
+    rules = (*rules_of(_rising), Rule(("path", "reference_strain"), _of_a_file))
 
     _made: tuple[StrainTable, str] = PrivateAttr()
 
@@ -113,8 +113,4 @@ def of_rubber(softening: Softening | None, material: Any) -> Iterator[Fault]:
         yield Fault(f"{sentence}, got {material.poisson:g}", ("material", "poisson"))
 
 
-RULES = (
-    Rule(("softening", "history", "initial"), only_in_steady_sliding),
-    Rule(("softening", "grid", "body"), on_a_periodic_half_space),
-    Rule(("softening", "material"), of_rubber),
-)
+RULES = rules_of(only_in_steady_sliding, on_a_periodic_half_space, of_rubber)
