@@ -35,7 +35,7 @@ from ..files import wisdom
 from ..job import Job
 from ..job.history import MadeStep, Timeline
 from ..job.listing import plain_data
-from ..job.meaning import machines
+from ..job.machine import machines
 from ..march import scene, steady
 from ..march.choices import choices
 from ..march.controller import tolerance_before

@@ -1,18 +1,15 @@
 """Warnings about a job, before it runs.
 
-They are about jobs outside of the theory, a linear half space with small slopes and strains; about memory and disk,
-of which lower bounds are compared with this machine; and about the thickness of a layer, compared with the surface, the
-mesh and the material. Slopes, heights, pressures and radii are bounded from below, so that sound jobs get no warning.
+They are about jobs outside of the theory, a linear half space with small slopes and strains, and about the thickness of
+a layer, compared with the surface, the mesh and the material. Slopes, heights, pressures and radii are bounded from
+below, so that sound jobs get no warning.
 """
 
 from __future__ import annotations
 
 import math
-import os
-import shutil
 from collections.abc import Callable, Iterator
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 from ..doubts import Doubt, Kind
@@ -20,7 +17,7 @@ from ..rubber.shift import doubt_kelvin
 from . import limits
 from .advice import Sections, doubts_of_resolution, more_points
 from .calculation import Grid
-from .limits import count_steps
+from .machine import doubt_needs
 from .materials import Elastic, PronyBranch, Zener
 from .stages import Stage, Swing
 from .surfaces import (
@@ -431,78 +428,6 @@ def _round_trip(grid: Grid, velocity: tuple[float, float], most: float, near: fl
     return math.inf
 
 
-MAPS, MAPS_FREE = 9.0, 18.0  # tuning: least memory of a periodic and of a free run [8 bytes per point]
-GIGA = 1e9
-CGROUP = Path("/sys/fs/cgroup/memory.max")
-
-
-WARN_DISK = Kind(
-    "disk",
-    "{instants:.4g} instants need {needed:.3g} GB, but {directory} has {free:.3g} GB left; use an output.every "
-    "above {every}, or fewer fields",
-)
-
-
-def _size(job: Sections) -> Iterator[Doubt]:
-    """Yield warnings about memory and disk."""
-    grid, output = job.grid, job.output
-    yield from doubt_memory(grid)
-    if output.fields:
-        count = count_steps(grid, job.history)
-        saved = -(-count // output.every)
-        needed, free = float(saved) * len(output.maps) * grid.nx * grid.ny * 8, _free(output.directory)
-        if needed > free:
-            disk = {"needed": needed / GIGA, "free": free / GIGA, "directory": str(output.directory)}
-            yield WARN_DISK("output.fields", {"instants": saved, "every": output.every, **disk})
-
-
-WARN_MEMORY = Kind(
-    "memory",
-    "{nx} x {ny} points need at least {needed:.3g} GB of memory on all ranks together, but {machines} {has:.3g} "
-    "GB; use fewer points, or {count} such machines",
-)
-
-
-def doubt_memory(grid: Grid) -> Iterator[Doubt]:
-    """Yield a warning if the grid cannot fit into the memory of the machines."""
-    needed = (MAPS if all(grid.cyclic) else MAPS_FREE) * 8.0 * grid.nx * grid.ny
-    each, count = _memory(), machines()
-    if needed > each * count:
-        have = "this machine has" if count == 1 else f"{count} such machines have"
-        numbers = {"nx": grid.nx, "ny": grid.ny, "needed": needed / GIGA, "has": each * count / GIGA}
-        yield WARN_MEMORY("grid.points", {**numbers, "machines": have, "count": int(needed / each) + 1})
-
-
-def machines() -> int:
-    """Return the number of machines of this program, from the environment variables of its launcher."""
-
-    def number(name: str) -> int:
-        text = os.environ.get(name, "")
-        return int(text) if text.isdecimal() else 0
-
-    ranks, here = number("OMPI_COMM_WORLD_SIZE"), number("OMPI_COMM_WORLD_LOCAL_SIZE")
-    return max(1, number("SLURM_JOB_NUM_NODES"), -(-ranks // here) if here else 1)
-
-
-def _memory() -> float:
-    """Return the memory of this machine, or the limit of this program's control group [bytes]."""
-    whole = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    try:
-        return min(whole, float(CGROUP.read_text()))
-    except (OSError, ValueError):  # no such limit
-        return whole
-
-
-def _free(directory: Path) -> float:
-    """Return the free disk space [bytes] of the directory, or of its nearest existing parent."""
-    for place in (directory.absolute(), *directory.absolute().parents):
-        try:
-            return float(shutil.disk_usage(place).free)
-        except OSError:
-            continue
-    return float("inf")
-
-
 def excited_band(job: Sections) -> tuple[float, float] | None:
     """Return the range of frequencies [Hz] at which the waves of a job's surface load a point of the body, over all
     stages and steady velocities; None if the surface does not move and no load oscillates."""
@@ -609,5 +534,5 @@ def _wavelengths(grid: Grid, surface: tuple[Any, ...]) -> Iterator[float]:
 IN_BANDS = _temperatures, _moduli
 ON_A_GRID = (
     *(_temperatures, doubts_of_resolution, _slopes, _moduli, _pressures, _instants, _band, _imprints),
-    *(_room, neighbours, _layer, _size),
+    *(_room, neighbours, _layer, doubt_needs),
 )
