@@ -212,8 +212,8 @@ OTHERS = {
         "'backward_euler'; did you mean backward-euler?"
     ),
     "output: {fields: [gap, presure]}": (
-        "5:24: output.fields.1 must be pressure | displacement | gap | height | temperature | traction | "
-        "fluid_pressure, got 'presure'; "
+        "5:24: output.fields.1 must be pressure | displacement | gap | height | fluid_pressure | traction | "
+        "temperature, got 'presure'; "
         "did you mean pressure?"
     ),
     "output: {fields: [gap, gap]}": "5:24: output.fields.1 repeats gap",

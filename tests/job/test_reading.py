@@ -78,8 +78,8 @@ def test_every_mistake_in_order(tmp_path: Path) -> None:
         "job.yaml:19:65: history.2.cells_per_step needs a velocity [m/s] that is not zero",
         "job.yaml:21:14: numerics.tolerance must be a tolerance [-] above 0 and below 1, got 2",
         "job.yaml:22:3: numerics.tolerance is given twice, first in line 21",
-        "job.yaml:23:19: output.fields.0 must be pressure | displacement | gap | height | temperature | traction | "
-        "fluid_pressure, got "
+        "job.yaml:23:19: output.fields.0 must be pressure | displacement | gap | height | fluid_pressure | traction | "
+        "temperature, got "
         "'gaps'; did you mean gap?",
         "job.yaml:23:46: output.branch_dissipation needs energy: true",
         "--set history.9.name=x: history is a list with entries history.0 to history.2, and has no 9",
