@@ -38,7 +38,7 @@ from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
 from ..physics import prony
 from ..physics.prony import Integrator
-from ..theory import full_contact, lee_radok, persson, persson_rings, westergaard
+from ..theory import full_contact, hertz, persson, westergaard
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -355,7 +355,7 @@ def closed_by_load(bench: Bench) -> None:
     stage = {"pressure": 1e6, "velocity": velocity, "distance": 5 * WAVELENGTH, "cells_per_step": 1}
     _, rows = bench.march(wave([stage], points=(points, points), surface=surface, initial=start))
     x, y, share = np.array(WAVES).T
-    rings = persson_rings.rings_of_surface(full_contact.Waves((share * HEIGHT).astype(complex), K * x, K * y))
+    rings = persson.rings_of_surface(full_contact.Waves((share * HEIGHT).astype(complex), K * x, K * y))
     omega = rings.waves.kx * velocity
     exact = prony.complex_modulus(omega, *PRONY)
     discrete = prony.discrete_modulus(omega, WAVELENGTH / points / velocity, *PRONY)
@@ -377,9 +377,9 @@ def retraction(bench: Bench) -> None:
     _, rows = bench.march(sphere(history, size=2e-3, numerics={"tolerance": 1e-6}))
     t = np.array([row.time for row in rows])
     force = np.array([row.measures.pressure for row in rows]) * 2e-3**2
-    exact = lee_radok.triangle_force(t, depth, rise, RADIUS, *PRONY)
+    exact = hertz.triangle_force(t, depth, rise, RADIUS, *PRONY)
     bench.expect_all("force", force, exact, 1e-2)
-    lift_off = lee_radok.triangle_lift_off_time(rise, *PRONY)
+    lift_off = hertz.triangle_lift_off_time(rise, *PRONY)
     bench.expect("lift-off", t[np.flatnonzero(force)[-1]], lift_off, rise / steps / lift_off)
     bench.expect("force after", force[t > lift_off].max(), 0.0, 0.0)
     bench.expect("area after", max(row.measures.contact_area for row in rows if row.time > lift_off), 0.0, 0.0)

@@ -26,9 +26,8 @@ from ..parallel.slab import Slab
 from ..physics.halfspace import Layer
 from ..physics.prony import Prony, complex_modulus
 from ..physics.roughness import EDGE, Roughness
-from ..theory import full_contact, persson, persson_rings
-from ..theory.persson_history import Memory, SlidingLeg, follow
-from ..theory.persson_rings import Rings
+from ..theory import full_contact, persson
+from ..theory.persson import Memory, Rings, SlidingLeg, follow
 from . import theory_table
 from .theory_table import TheorySettings
 
@@ -250,7 +249,7 @@ def _lattice(job: Job, slab: Slab) -> Rings:
     setup = scene.set_up(job, slab)
     heights = setup.units.height * setup.surface.heights((0.0, 0.0), slab.empty())
     try:
-        return persson_rings.rings_of_surface(full_contact.waves(heights, *job.grid.size))
+        return persson.rings_of_surface(full_contact.waves(heights, *job.grid.size))
     except ValueError as error:
         raise InputError(f"surface: {error}") from None
 
@@ -268,7 +267,7 @@ def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
     if job.bands is not None:
         spectrum = cut_bands(job).spectrum.without_shorter(shortest)
         phi = lambda k: np.asarray(spectrum.phi(k), float)  # noqa: E731
-        return persson_rings.rings_of_spectrum(phi, *spectrum.ends, slide, spectrum.kinks)
+        return persson.rings_of_spectrum(phi, *spectrum.ends, slide, spectrum.kinks)
     part = _only_rough(job)
     if part is None:
         raise InputError(ONE_ROUGH)
@@ -278,7 +277,7 @@ def _continuum(job: Job, slide: float, shortest: float = 0.0) -> Rings:
     k_long, k_rolloff, k_short = (2 * np.pi / x for x in (longest, part.rolloff_wavelength, part.short_wavelength))
     shape = Roughness(part.hurst, part.long_wavelength, part.rolloff_wavelength, part.short_wavelength)
     limits = (k_long, k_short, slide, (k_rolloff,))
-    unit = persson_rings.rings_of_spectrum(lambda k: np.asarray(shape.density(k), float), *limits)
+    unit = persson.rings_of_spectrum(lambda k: np.asarray(shape.density(k), float), *limits)
     amplitude, kx, ky = unit.waves
     power = np.abs(amplitude) ** 2 / 2
     if part.rms_slope is not None:
@@ -300,7 +299,7 @@ def rings_of_measured(job: Job, part: jobs.RoughSpectrum, slide: float) -> Rings
     if ends[0] >= EDGE * ends[1]:
         raise InputError("surface: the theory needs waves that fit the box and the grid, the spectrum has none")
     kinks = found.q[(found.q > ends[0]) & (found.q < ends[1])].tolist()
-    return persson_rings.rings_of_spectrum(lambda k: np.asarray(found(k), float), *ends, slide, kinks)
+    return persson.rings_of_spectrum(lambda k: np.asarray(found(k), float), *ends, slide, kinks)
 
 
 def _longest_slide(timeline: Timeline) -> float:

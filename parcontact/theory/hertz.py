@@ -1,12 +1,28 @@
-"""A rigid sphere pressed into an elastic half-space (Hertz).
+"""A rigid sphere pressed into a half-space: elastic (Hertz), or viscoelastic (Lee and Radok; Ting).
 
     a^3 = 3 W R / (4 E*),   d = a^2/R,   p(r) = (2 E*/(pi R)) sqrt(a^2 - r^2),   E* = 2 G/(1 - nu)
 
 with contact radius a, force W, radius of the sphere R, approach d, pressure p, shear modulus G and Poisson ratio nu.
-Source: K. L. Johnson, Contact Mechanics (1985), section 4.2. Arguments are in SI units and broadcast."""
+Source: K. L. Johnson, Contact Mechanics (1985), section 4.2. Arguments are in SI units and broadcast.
+
+On a viscoelastic half-space, without sliding, the elastic solution holds while the contact grows, with its products
+replaced by history integrals (J creep compliance, G relaxation function):
+
+    a^2 = R d,   a^3(t) = (3 R/16) int J(t-s) dW(s),   W(t) = (16/(3 R)) int G(t-s) d a^3(s),
+    p(r, t) = (8/(pi R)) int G(t-s) d sqrt(a^2(s) - r^2)_+
+
+While it shrinks, its radius at the time t is that at the earlier time t1(t), given by int_{t1}^t G(t-s) d'(s) ds =
+0, and the integral for W ends at t1; contact is lost when t1 = 0.
+
+Source: E. H. Lee, J. R. M. Radok, J. Appl. Mech. 27 (1960) 438; T. C. T. Ting, J. Appl. Mech. 33 (1966) 845. The
+body is incompressible and at rest before t = 0. Arguments are in SI units; only times and distances may be arrays."""
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+from scipy.special import hyp1f1
 
+from ..physics.prony import Moduli, normal_form, relaxation_integral
 from .full_contact import Array, Values
 
 
@@ -53,3 +69,47 @@ def displacement(r: Values, force: Values, radius: Values, shear_modulus: Values
     ratio = np.divide(a, outer, out=np.ones(np.broadcast(a, outer).shape), where=outer > 0)
     tail = ((2 * a**2 - outer**2) * np.arcsin(ratio) + a * np.sqrt(outer**2 - a**2)) / np.pi
     return np.asarray(np.where(r < a, a**2 - r**2 / 2, tail) / radius)
+
+
+# an approach that rises evenly to `peak_approach` in `rise_time` and falls back as fast
+
+
+def triangle_force(t: ArrayLike, peak_approach: float, rise_time: float, radius: float, *material: *Moduli) -> Array:
+    """Return W(t) [N] at times t >= 0 [s], any shape; 0 after lift-off.
+
+    W = 8 sqrt(R) (peak_approach/rise_time)^(3/2) int_0^{t1} G(t-s) sqrt(s) ds, where every term of the Prony series
+    gives (2/3) t1^(3/2) exp(-(t - t1)/tau) M(1, 5/2, -t1/tau) with Kummer's function M.
+    """
+    spring, terms, times = normal_form(*material)
+    earlier = _time_of_equal_radius(t, rise_time, spring, terms, times)
+    since = np.asarray(t, float) - earlier
+    memory = np.exp(-since[..., None] / times) * hyp1f1(1.0, 2.5, -earlier[..., None] / times)
+    stiffness = 16 / 3 * np.sqrt(radius) * (peak_approach / rise_time) ** 1.5
+    return np.asarray(stiffness * earlier**1.5 * (spring + memory @ terms))
+
+
+def triangle_lift_off_time(rise_time: float, *material: *Moduli) -> float:
+    """Return the time at which contact is lost [s]: int_0^t G = 2 int_0^{t - rise_time} G, for any sphere and depth."""
+    series = normal_form(*material)
+
+    def excess(t: float) -> float:
+        return float(relaxation_integral(t, *series) - 2 * relaxation_integral(t - rise_time, *series))
+
+    # an elastic body lets go at 2 rise_time exactly, where rounding must not hide the change of sign
+    return float(brentq(excess, rise_time, 2 * rise_time * (1 + 1e-12), xtol=1e-15 * rise_time))
+
+
+def _time_of_equal_radius(t: ArrayLike, rise_time: float, *material: *Moduli) -> Array:
+    """Return the time during the rise at which the contact was as large as at t; 0 after lift-off. After the rise it is
+    t minus the age x that solves int_0^x G = 2 int_0^{t - rise_time} G."""
+    series = normal_form(*material)
+    lift_off = triangle_lift_off_time(rise_time, *series)
+
+    def earlier(t: float) -> float:
+        if t <= rise_time or t >= lift_off:
+            return t if t <= rise_time else 0.0
+        target = 2 * relaxation_integral(t - rise_time, *series)
+        age = brentq(lambda x: relaxation_integral(x, *series) - target, t - rise_time, t, xtol=1e-15 * rise_time)
+        return t - float(age)
+
+    return np.asarray(np.vectorize(earlier, otypes=[float])(t))

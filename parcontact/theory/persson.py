@@ -19,17 +19,152 @@ no formula of the theory. The steady form above is the published one; with time,
 taken at the present time. A theory with P inside the integral over the past would differ in transients of partial
 contact only.
 
-Integrals are sums over waves in `persson_rings.Rings`; `modulus` (M, Pa) has one entry per wave on its last axis, and
-`mean_pressure` (p0, Pa) the shape of the axes before; SI units."""
+Integrals are sums over waves in `Rings`; `modulus` (M, Pa) has one entry per wave on its last axis, and
+`mean_pressure` (p0, Pa) the shape of the axes before; SI units.
+
+Rings hold waves of equal wavenumber, of a spectrum or of a given surface. An isotropic spectrum is integrated by
+Gauss's rule on panels of x, with k = smallest (largest/smallest)^(x^2): the share in contact falls like the root of
+log(k/smallest) at small areas, which is smooth in x. Partial sums within a ring follow from the polynomial through the
+points of its panel, so that sums and partial sums have the same errors.
+
+Histories have piecewise constant velocities: rest, starts, stops, reversals, changes of load. In the transfer modulus
+M of a wave (see `full_contact`) every term of the relaxation function has a memory m_j of how the wave has passed a
+point of the body. At constant omega = q . v, from a memory m_j(0) at t = 0 on,
+
+    M(t) = G_inf + sum_j G_j m_j(t)
+    m_j(t) = b_j + (m_j(0) - b_j) exp(-t/tau_j - i omega t),    b_j = i omega tau_j/(1 + i omega tau_j)
+
+exactly, for any t. A body at first contact has m_j = 1 (its instantaneous modulus), one in steady sliding has m_j =
+b_j. Contact area and friction follow from M and the load at each instant.
+
+Assumption: from first contact on the wave in full contact follows the surface, and a load p0(t) that changes or
+vanishes only changes the share in contact.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import erf
 
+from ..physics.prony import Prony, normal_form
 from . import full_contact
-from .full_contact import Array, ComplexValues, Values
-from .persson_rings import Rings
+from .full_contact import Array, ComplexArray, ComplexValues, Values, Waves
 
 GAMMA = 0.45  # physics: the empirical factor of the paper
+EQUAL = 1e-9  # accuracy: difference of equal wavenumbers over the largest
+PANEL_POINTS = 10  # accuracy: points of Gauss's rule
+HALVINGS = 14  # accuracy: halvings of panels towards the longest wave
+PANEL_LOGARITHM = 1.0  # accuracy: largest logarithm of the ratio of wavenumbers at the ends of a panel
+PANEL_PHASE = 12.0  # accuracy: largest difference of phases at the ends of a panel [rad]
+MAX_PHASE = 400.0  # accuracy: largest phase of the shortest wave [rad]; the error of sums is 4e-5
+QUADRANT_ANGLES = 24  # accuracy: number of angles without phases
+ANGLES_STEP = 8  # accuracy: step in the number of angles
+CHUNK = 1_000_000  # tuning: transfer moduli per chunk, of 16 bytes; about ten arrays of this size are needed
+
+
+@dataclass(frozen=True)
+class Rings:
+    """Waves by rings, from the longest on; `starts` is the first wave of each ring.
+
+    `share`, shape (n, n), has for each ring of a panel of n the share of each ring of the panel that lies within it.
+    `stiffness` is that of the body over that of a half space for each wave, as of a layer.
+    """
+
+    waves: Waves
+    starts: NDArray[np.intp]
+    share: Array
+    stiffness: NDArray[np.floating] | float = 1.0
+
+    def scaled(self, factor: float) -> "Rings":
+        """Return the surface with heights multiplied by a factor."""
+        amplitude, kx, ky = self.waves
+        return replace(self, waves=Waves(factor * amplitude, kx, ky))
+
+    def sums(self, values: Array) -> Array:
+        """Return values of waves, shape (..., waves), summed over each ring: shape (..., rings)."""
+        return np.asarray(np.add.reduceat(values, self.starts, axis=-1))
+
+    def within(self, own: Array) -> Array:
+        """Return sums up to the k of each ring, from the sums of the rings; both of shape (..., rings)."""
+        panels = own.reshape(*own.shape[:-1], -1, len(self.share))
+        totals = panels.sum(axis=-1)
+        before = np.cumsum(totals, axis=-1) - totals
+        return np.asarray((before[..., None] + panels @ self.share.T).reshape(own.shape))
+
+
+def rings_of_surface(waves: Waves) -> Rings:
+    """Return the rings of given waves (`full_contact.waves`). Half of the sum of a ring counts as within it."""
+    k = np.hypot(waves.kx, waves.ky)
+    order = np.argsort(k)
+    starts = np.flatnonzero(np.diff(k[order], prepend=-np.inf) > EQUAL * k.max(initial=0.0))
+    amplitude, kx, ky = waves
+    return Rings(Waves(amplitude[order], kx[order], ky[order]), starts, np.array([[0.5]]))
+
+
+def rings_of_spectrum(
+    spectrum: Callable[[Array], Array],
+    smallest: float,
+    largest: float,
+    distance: float = 0.0,
+    kinks: Sequence[float] = (),
+    refinement: int = 1,
+) -> Rings:
+    """Return waves that represent an isotropic spectrum Phi(k) [m^4] between two wavenumbers [rad/m].
+
+    `distance` [m] is the largest displacement that the body remembers: neighbouring waves of the sums must stay in
+    phase, up to MAX_PHASE. `kinks` [rad/m] are wavenumbers where Phi is not smooth. Panels and angles are divided by
+    `refinement`, to test the error of the sums.
+    """
+    logarithm = np.log(largest / smallest)
+    nodes, weights = np.polynomial.legendre.leggauss(PANEL_POINTS)
+    distance = min(distance, MAX_PHASE / largest)
+    edges = _edges(smallest, logarithm, distance, kinks, refinement)
+    half = np.diff(edges)[:, None] / 2
+    x = (edges[:-1, None] + half * (1 + nodes)).ravel()
+    k = smallest * np.exp(logarithm * x**2)
+    areas = 2 * x * logarithm * k**2 * (half * weights).ravel()  # k dk
+    angles = refinement * QUADRANT_ANGLES + ANGLES_STEP * np.ceil(k * distance / 2 / ANGLES_STEP).astype(int)
+    parts = [_ring(*ring) for ring in zip(k, areas, angles, strict=True)]
+    kx, ky, area = (np.concatenate(part) for part in zip(*parts, strict=True))
+    amplitude = np.sqrt(spectrum(np.hypot(kx, ky)) * area) / np.pi  # |A|^2/2: mean square of a wave and its opposite
+    starts = np.cumsum([0, *(part[0].size for part in parts[:-1])])
+    return Rings(Waves(amplitude.astype(complex), kx, ky), starts, _partial_shares(nodes, weights))
+
+
+def _edges(smallest: float, logarithm: float, distance: float, kinks: Sequence[float], refinement: int) -> Array:
+    """Return the ends of panels in x: halving towards 0, at the kinks, and as close as phases and powers of
+    k require."""
+    inner = [np.sqrt(np.log(kink / smallest) / logarithm) for kink in kinks if 0 < np.log(kink / smallest) < logarithm]
+    coarse = np.unique([0.0, *(0.5 ** np.arange(HALVINGS)), *inner])
+    phase = np.diff(distance * smallest * np.exp(logarithm * coarse**2)) / PANEL_PHASE
+    powers = np.diff(logarithm * coarse**2) / PANEL_LOGARITHM
+    counts = refinement * np.maximum(1, np.ceil(np.maximum(phase, powers))).astype(int)
+    panels = zip(coarse, coarse[1:], counts, strict=False)
+    return np.concatenate([*(np.linspace(a, b, count, endpoint=False) for a, b, count in panels), [1.0]])
+
+
+def _ring(k: float, area: float, angles: int) -> tuple[Array, Array, Array]:
+    """Return kx, ky and the area in the plane of wave vectors of each wave of a ring: Gauss points of two quadrants."""
+    cosines, sines, weights = _two_quadrants(angles)
+    return k * cosines, k * sines, area * weights
+
+
+@cache
+def _two_quadrants(count: int) -> tuple[Array, Array, Array]:
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    angle = np.pi / 4 * np.concatenate([nodes - 1, nodes + 1])
+    return np.cos(angle), np.sin(angle), np.pi / 4 * np.tile(weights, 2)
+
+
+def _partial_shares(nodes: Array, weights: Array) -> Array:
+    """Return weights of the integrals over a panel from its start to each of its points; shape (points, points)."""
+    legendre = np.polynomial.legendre
+    coefficients = np.linalg.inv(legendre.legvander(nodes, nodes.size - 1))  # of the polynomials that are 1 at a point
+    return np.asarray(legendre.legval(nodes, legendre.legint(coefficients, lbnd=-1)).T / weights)
 
 
 def contact_share(mean_pressure: Values, rings: Rings, modulus: ComplexValues) -> Array:
@@ -70,3 +205,76 @@ def _share(mean_pressure: Values, variance: Array) -> Array:
     rough = (variance > 0) | (pressure <= 0)
     ratio = np.divide(pressure, np.sqrt(2 * variance), out=np.where(rough, 0.0, np.inf), where=variance > 0)
     return np.asarray(erf(ratio))
+
+
+class SlidingLeg(NamedTuple):
+    """A stretch at constant velocity [m/s]: its duration [s], instants since its start [s], and p0 at these [Pa]."""
+
+    velocity: tuple[float, float]
+    duration: float
+    instants: Array
+    pressures: Array
+
+
+class TheoryOutcome(NamedTuple):
+    """<p grad h> [Pa], shape (instants, 2), and A/A0 at each instant."""
+
+    traction: Array
+    contact_area: Array
+
+    def friction(self, pressures: Array) -> Array:
+        """Return the tangential over the normal force, not negative; 0 without load."""
+        size = np.hypot(*self.traction.T)
+        return np.divide(size, pressures, out=np.zeros_like(size), where=pressures > 0)
+
+
+class Memory:
+    """Memory m_j of each wave in the body: shape (waves, terms)."""
+
+    def __init__(self, rings: Rings, material: Prony) -> None:
+        """Start with the memory of a body at first contact."""
+        self.rings = rings
+        self.spring, self.terms, self.times = normal_form(*material)
+        self.shares = np.ones((rings.waves.kx.size, self.times.size), complex)
+
+    def slide_for_ever(self, velocity: tuple[float, float]) -> None:
+        """Set the memory of steady sliding."""
+        self.shares = self._steady(self._frequency(velocity))
+
+    def moduli(self, velocity: tuple[float, float], instants: Array) -> ComplexArray:
+        """Return M [Pa] at instants [s] of sliding at a velocity: shape (instants, waves)."""
+        omega = self._frequency(velocity)
+        steady = self._steady(omega)
+        fading = np.exp(-instants[:, None] / self.times) @ (self.terms * (self.shares - steady)).T
+        if np.any(omega):
+            fading *= np.exp(-1j * instants[:, None] * omega)
+        return np.asarray(self.spring + steady @ self.terms + fading)
+
+    def slide(self, velocity: tuple[float, float], duration: float) -> None:
+        """Advance by sliding for a duration [s]."""
+        omega = self._frequency(velocity)[:, None]
+        steady = self._steady(omega[:, 0])
+        self.shares = steady + (self.shares - steady) * np.exp(-duration / self.times - 1j * duration * omega)
+
+    def _frequency(self, velocity: tuple[float, float]) -> Array:
+        return full_contact.frequency(self.rings.waves.kx, self.rings.waves.ky, *velocity)
+
+    def _steady(self, omega: Array) -> ComplexArray:
+        phase = 1j * omega[:, None] * self.times
+        return np.asarray(phase / (1 + phase))
+
+
+def follow(memory: Memory, legs: Iterable[SlidingLeg], gamma: float = GAMMA) -> Iterator[TheoryOutcome]:
+    """Yield the outcome of each leg, one after the other; `memory` is advanced."""
+    for leg in legs:
+        count = max(1, CHUNK // max(1, len(memory.shares)))
+        starts = range(0, max(1, leg.instants.size), count)
+        parts = [_observe(memory, leg, slice(start, start + count), gamma) for start in starts]
+        yield TheoryOutcome(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+        memory.slide(leg.velocity, leg.duration)
+
+
+def _observe(memory: Memory, leg: SlidingLeg, chosen: slice, gamma: float) -> TheoryOutcome:
+    modulus, pressures = memory.moduli(leg.velocity, leg.instants[chosen]), leg.pressures[chosen]
+    force = traction(pressures, memory.rings, modulus, gamma)
+    return TheoryOutcome(force, contact_area(pressures, memory.rings, modulus))

@@ -1,6 +1,6 @@
 """Closed forms that only tests use: what follows a step of load, approach or velocity, and time steps of a code.
 
-The equations and their sources are those of `lee_radok`, `full_contact` and `westergaard` of `parcontact.theory`.
+The equations and their sources are those of `hertz`, `full_contact` and `westergaard` of `parcontact.theory`.
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ from parcontact.theory.full_contact import (
     pressure_amplitude,
     traction,
 )
-from parcontact.theory.lee_radok import _time_of_equal_radius
+from parcontact.theory.hertz import _time_of_equal_radius
 from parcontact.theory.westergaard import _fraction
 
 from .quadrature import graded_rule

@@ -23,7 +23,7 @@ from parcontact.parallel.fft import FFT
 from parcontact.parallel.slab import Array, Slab
 from parcontact.physics import surface_statistics
 from parcontact.results import prediction
-from parcontact.theory import persson_rings
+from parcontact.theory import persson
 
 from . import truth
 
@@ -213,7 +213,7 @@ def test_theory_of_a_measured_spectrum(tmp_path: Path) -> None:
         assert own.sum() == pytest.approx(
             np.trapezoid(2 * np.pi * q**2 * weight * density, np.log(q)), rel=1e-3, abs=0.0
         )
-    assert isinstance(rings, persson_rings.Rings)
+    assert isinstance(rings, persson.Rings)
 
 
 MISTAKES = [

@@ -14,7 +14,7 @@ from sliding import TYRE
 from parcontact.march.loop import March
 from parcontact.physics.body import BodyMemory, ZenerBody, surface_of
 from parcontact.physics.energy import ElasticPressure, ZenerEnergy
-from parcontact.theory import lee_radok
+from parcontact.theory import hertz
 
 Json = dict[str, Any]
 FORCE, RADIUS = 0.15, 1e-2  # N, m
@@ -91,9 +91,9 @@ def test_retraction(rise: float) -> None:
     ]
     march, rows = marched(sphere(128, 2e-3, history, tolerance=1e-6))
     t, found = column(rows, "time"), force(march, column(rows, "pressure"))
-    exact = lee_radok.triangle_force(t, depth, rise, RADIUS, *PRONY)
+    exact = hertz.triangle_force(t, depth, rise, RADIUS, *PRONY)
     assert_allclose(found, exact, rtol=0, atol=1e-4 * exact.max())
-    lift_off = lee_radok.triangle_lift_off_time(rise, *PRONY)
+    lift_off = hertz.triangle_lift_off_time(rise, *PRONY)
     assert t[np.flatnonzero(found)[-1]] == pytest.approx(lift_off, abs=rise / steps)
     assert found.min() == 0.0
     assert np.all(found[t > lift_off] == 0.0)

@@ -10,7 +10,7 @@ from rubbers import TWELVE_DECADES, ZENER, relaxation
 from scipy.integrate import quad
 
 from parcontact.physics.prony import Prony
-from parcontact.theory import hertz, lee_radok
+from parcontact.theory import hertz
 
 FORCE, RADIUS, CREEP_TIME = 0.15, 1e-2, 1e-2
 ELASTIC = Prony(2e6, np.array([]), np.array([]))
@@ -21,7 +21,7 @@ ELASTIC = Prony(2e6, np.array([]), np.array([]))
 def test_triangle_by_quadrature(material: Prony, rise_time: float) -> None:
     """The condition on the earlier time and the integral for the force, with a^2 = R d on the way up."""
     case = (50e-6, rise_time, RADIUS, *material)
-    lift_off = lee_radok.triangle_lift_off_time(rise_time, *material)
+    lift_off = hertz.triangle_lift_off_time(rise_time, *material)
     for t in (0.3 * rise_time, 0.5 * (rise_time + lift_off), 0.1 * rise_time + 0.9 * lift_off):
         earlier = float(step_responses.triangle_contact_radius(t, *case)) ** 2 / RADIUS / 50e-6 * rise_time
         if t > rise_time:
@@ -29,7 +29,7 @@ def test_triangle_by_quadrature(material: Prony, rise_time: float) -> None:
             assert_allclose(up, down, rtol=1e-9)
         rate = 8 / RADIUS * (RADIUS * 50e-6 / rise_time) ** 1.5
         force = rate * history(material, t, 0, earlier, 0.5)
-        assert_allclose(lee_radok.triangle_force(t, *case), force, rtol=1e-7)  # of the rule at the square root
+        assert_allclose(hertz.triangle_force(t, *case), force, rtol=1e-7)  # of the rule at the square root
 
 
 def history(material: Prony, t: float, start: float, end: float, power: float) -> float:
@@ -46,9 +46,9 @@ def history(material: Prony, t: float, start: float, end: float, power: float) -
 def test_triangle_ends_at_lift_off() -> None:
     """Contact is lost below the original surface; from then on there is no force, and never a negative one."""
     case = (50e-6, 1e-3, RADIUS, *ZENER)
-    time = lee_radok.triangle_lift_off_time(1e-3, *ZENER)
+    time = hertz.triangle_lift_off_time(1e-3, *ZENER)
     t = np.linspace(0, 3e-3, 301)
-    forces, radii = lee_radok.triangle_force(t, *case), step_responses.triangle_contact_radius(t, *case)
+    forces, radii = hertz.triangle_force(t, *case), step_responses.triangle_contact_radius(t, *case)
     assert np.all(forces >= 0)
     assert np.all((forces > 0) == ((t > 0) & (t < time)))
     assert np.all((radii > 0) == ((t > 0) & (t < time)))
@@ -60,8 +60,8 @@ def test_elastic_body_is_hertz() -> None:
     assert_allclose(radii, hertz.contact_radius(FORCE, RADIUS, 2e6), rtol=1e-14)
     pressures = step_responses.load_step_pressure(r, t[:, None], FORCE, RADIUS, *ELASTIC)
     assert_allclose(pressures, np.tile(hertz.pressure(r, FORCE, RADIUS, 2e6), (3, 1)), rtol=1e-12)
-    assert_allclose(lee_radok.triangle_lift_off_time(1e-3, *ELASTIC), 2e-3, rtol=1e-11)
+    assert_allclose(hertz.triangle_lift_off_time(1e-3, *ELASTIC), 2e-3, rtol=1e-11)
     t = np.array([0.5e-3, 1e-3, 1.5e-3])
     depths = 50e-6 * np.array([0.5, 1, 0.5])
-    forces = lee_radok.triangle_force(t, 50e-6, 1e-3, RADIUS, *ELASTIC)
+    forces = hertz.triangle_force(t, 50e-6, 1e-3, RADIUS, *ELASTIC)
     assert_allclose(forces, hertz.force(depths, RADIUS, 2e6), rtol=1e-9)

@@ -9,8 +9,15 @@ from scipy.special import erf
 
 from parcontact.theory import full_contact, persson
 from parcontact.theory.full_contact import Waves
-from parcontact.theory.persson_history import Memory, SlidingLeg, TheoryOutcome, follow
-from parcontact.theory.persson_rings import Rings, rings_of_spectrum, rings_of_surface
+from parcontact.theory.persson import (
+    Memory,
+    Rings,
+    SlidingLeg,
+    TheoryOutcome,
+    follow,
+    rings_of_spectrum,
+    rings_of_surface,
+)
 
 K_LONG, K_SHORT, SLOPE = 2 * np.pi * 4 / 1e-3, 2 * np.pi * 128 / 1e-3, 0.02  # rad/m, rad/m, root mean square
 PRESSURE = 0.1e6  # Pa
