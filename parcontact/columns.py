@@ -1,8 +1,7 @@
-"""Columns of all tables: those that are written, and those that are read.
+"""Columns of all tables that are written (name, SI unit, meaning, value in a row), and their files.
 
-Names of columns in tables of moduli, shift factors, spectra and heights, and how headers spell them.
-
-Columns of all tables (name, SI unit, meaning, value in a row), and writing of tables as csv.
+Here are also the names of columns in tables of moduli, shift factors, spectra and heights that users give, and how
+headers spell them.
 
 Tables are the csv files, the rows of a run in Python, and the maps in `fields.h5`. The lists of columns on the manual's
 page `outputs` are generated from here. A column with `when` exists only if the job has that section or option.

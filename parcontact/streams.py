@@ -1,8 +1,7 @@
 """Output that never fails, and bars of progress.
 
-Output streams that never fail: printing must not end the program.
-
-Progress bars with the time left, on terminals only.
+* Output streams that never fail: printing must not end the program.
+* Progress bars with the time left, on terminals only.
 """
 
 import io

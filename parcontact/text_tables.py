@@ -1,6 +1,6 @@
-"""Tables of numbers and arrays that users give.
+"""Tables of numbers and arrays that users give, as instruments and laboratories write them.
 
-Read tables of numbers as instruments and laboratories write them, with one list of names for all columns.
+One list has the names of all columns.
 
 Numbers are separated by semicolons, tabs, commas or blanks, with decimal points, or with decimal commas between
 semicolons, tabs or blanks. A mark at the end of every row, or at its beginning, is no cell. Words such as No Data,

@@ -1,8 +1,6 @@
-"""Arguments of the command line.
+"""Arguments of the command line: one table of verbs with their options.
 
-Arguments of the command line: one table of verbs with their options.
-
-Conversion of the text of an option to its value; raises argparse.ArgumentTypeError with what was expected.
+The text of an option is converted to its value here; an error says what was expected.
 """
 
 from __future__ import annotations

@@ -1,12 +1,9 @@
 """`parcontact doctor`: checks of an installation.
 
-Checks of the machine: ranks, libraries, speed, and files that a run writes and reads.
-
-A bench for checks: it runs small jobs and compares results with exact values.
-
-Checks of an installation against exact solutions, and the table of results.
-
-Small jobs for checks, as mappings.
+* Checks of the machine: ranks, libraries, speed, and files that a run writes and reads.
+* A bench for checks: it runs small jobs and compares results with exact values.
+* Checks of an installation against exact solutions, and the table of results.
+* Small jobs for checks, as mappings.
 """
 
 import math

@@ -1,11 +1,9 @@
-"""`parcontact plan`: what a job will do, and what it will cost.
+"""`parcontact plan`: what a job will do, and what it will cost, as text.
 
-Plans of jobs: effects, memory per rank, and steps and times by a trial.
+A plan has the effects of a job, the memory of a rank, and steps and times by a trial.
 
 The first case of a sweep is planned in full. The last case and one between are tried. The times of the others follow
 from the nearest tried case in proportion to their work, which is steps (or steady states) times N log N.
-
-The text of a plan.
 """
 
 import math

@@ -1,14 +1,10 @@
 """The public Python interface without `Simulation`: curves, results, surfaces and materials.
 
-Steady sliding from Python: friction curves.
-
-Jobs given in Python as a file or a mapping: read on root, and sent to all ranks.
-
-Results of a directory, for notebooks and scripts.
-
-Surfaces and materials without a simulation.
-
-Advice in errors for Python users: arguments and keys instead of options of the command line.
+* Steady sliding from Python: friction curves.
+* Jobs given in Python as a file or a mapping: read on root, and sent to all ranks.
+* Results of a directory, for notebooks and scripts.
+* Surfaces and materials without a simulation.
+* Advice in errors for Python users: arguments and keys instead of options of the command line.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """The public class `Simulation`.
 
-Running a job in this process, step by step, with access to its fields and state.
-
-Measures of a step, by the names of columns of measures.csv.
+* Running a job in this process, step by step, with access to its fields and state.
+* Measures of a step, by the names of columns of measures.csv.
 """
 
 from __future__ import annotations

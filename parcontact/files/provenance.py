@@ -1,8 +1,7 @@
 """Provenance of files, and the header of a log.
 
-Provenance in HDF5 files: the runs that made a file, and the references to cite.
-
-The beginning of run.log: facts about the machine and the program, for diagnosis.
+* Provenance in HDF5 files: the runs that made a file, and the references to cite.
+* The beginning of run.log: facts about the machine and the program, for diagnosis.
 """
 
 import json

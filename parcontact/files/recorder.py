@@ -1,10 +1,8 @@
 """Rows and maps of a run while it goes on, in files and in a terminal.
 
-measures.csv: a row per step and one for the initial state, written by root; its columns and units.
-
-The console and run.log: one line per step, messages and warnings on root, a progress bar on a terminal.
-
-The growing files of a run: run.log, measures.csv and fields.h5, begun or continued.
+* measures.csv: a row per step and one for the initial state, written by root; its columns and units.
+* The console and run.log: one line per step, messages and warnings on root, a progress bar on a terminal.
+* The growing files of a run: run.log, measures.csv and fields.h5, begun or continued.
 """
 
 import math

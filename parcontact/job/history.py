@@ -1,15 +1,10 @@
 """The history of a job as steps, given or chosen.
 
-Stages that choose their own time steps: bounds, chosen steps, and an estimate of the steps to come.
-
-The next step is decided after the one before has been made (`march.controller`). Chosen steps are stored, so that
-steps have numbers and a run can restart. Steps to come are estimated as a ladder: they double from the shortest to
-the longest that is allowed and then stay constant.
-
-Steps of a stage that follow from the job alone: of constant length, or growing by a constant factor.
-
-The instants of a history. Every step follows from the job and its number, so that a restart needs only
-this number.
+Given steps have a constant length or grow by a constant factor: they follow from the job and their number, so that a
+restart needs only this number. Stages may choose their own steps, within bounds: the next step is decided after the one
+before has been made (`march.controller`). Chosen steps are stored, so that steps have numbers and a run can restart.
+Steps to come are estimated as a ladder: they double from the shortest to the longest that is allowed and then stay
+constant.
 """
 
 import math

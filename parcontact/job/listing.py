@@ -1,8 +1,5 @@
-"""All sections of a job, those of capabilities included.
-
-A resolved job as plain data: for YAML, for comparison with other jobs, and as a table with units.
-
-Sections that effects add to a job.
+"""All sections of a job, also those that effects add, and the resolved job as plain data: for YAML, for comparison with
+other jobs, and as a table with units.
 
 An effect of this package is found by its folder (`capabilities`). One of another package is registered under the name
 of its section by an entry point that names its class (`effects.effect`):

@@ -1,8 +1,4 @@
-"""Changes of a job: `--set`, includes and sweeps.
-
-The data of one job from a YAML file: applies overrides and reads included materials.
-
-The `sweep` section: many cases of one job.
+"""Changes of a job: overrides (`--set`), included materials, and the cases of a `sweep`.
 
 A sweep is a list of mappings from keys of the job to lists of values. Keys within one mapping change together; cases
 are all combinations of the mappings, numbered from 0, with the last mapping changing fastest.

@@ -1,6 +1,4 @@
-"""Choices that follow from a job alone.
-
-Choices that follow from a job alone, each made once: which effects are on, why, and what they need.
+"""Choices that follow from a job alone, each made once: which effects are on, why, and what they need.
 
 `scene.py` makes what is decided here, and `parcontact plan` prints it; rooms below do not see the job. An effect
 that is off allocates nothing, calls nothing and writes nothing.

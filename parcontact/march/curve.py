@@ -1,9 +1,8 @@
 """Friction curves.
 
-Friction curves: steady sliding solved directly at many velocities and pressures, written to steady.csv and a
-picture.
-
-steady.csv and steady_waves.csv: a line for each point of a friction curve, and messages about it; on root.
+* Friction curves: steady sliding solved directly at many velocities and pressures, written to steady.csv and a
+  picture.
+* steady.csv and steady_waves.csv: a line for each point of a friction curve, and messages about it; on root.
 """
 
 import math

@@ -1,10 +1,8 @@
 """The objects of a calculation, made from a job.
 
-Makes the bodies, solvers, energies, probes and effects of steps from a job, as `choices.py` decides.
-
-Steady sliding takes the setup from here and has its own solver.
-
-The parts of a calculation on a job: its choices, the rigid surface, the body and the solver.
+* Makes the bodies, solvers, energies, probes and effects of steps from a job, as `choices.py` decides.
+* Steady sliding takes the setup from here and has its own solver.
+* The parts of a calculation on a job: its choices, the rigid surface, the body and the solver.
 """
 
 import math

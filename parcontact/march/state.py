@@ -1,8 +1,7 @@
 """The state of a run, and the errors of a step.
 
-The state of a run: all that one step passes to the next. A checkpoint is one loop over its parts.
-
-Error budget of a step, from the step and from properties of the run.
+* The state of a run: all that one step passes to the next. A checkpoint is one loop over its parts.
+* Error budget of a step, from the step and from properties of the run.
 """
 
 import math

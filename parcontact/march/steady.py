@@ -1,8 +1,7 @@
 """Steady sliding, solved directly.
 
-Steady sliding of a job's surface, solved directly: points of a friction curve, and starts of marches.
-
-Start of a march from steady sliding: contact, displacement and branches of a surface that has always slid.
+* Steady sliding of a job's surface, solved directly: points of a friction curve, and starts of marches.
+* Start of a march from steady sliding: contact, displacement and branches of a surface that has always slid.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Decisions of root, and signals to all ranks.
 
-Work of root alone, whose result or exception every rank receives.
-
-Signals to stop or save, stored until all ranks have agreed.
+* Work of root alone, whose result or exception every rank receives.
+* Signals to stop or save, stored until all ranks have agreed.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Counts of operations, and groups of ranks.
 
-Counts of operations and allocations of a run; they do not depend on the load of the machine.
-
-Groups of ranks that work at the same time on different tasks.
+* Counts of operations and allocations of a run; they do not depend on the load of the machine.
+* Groups of ranks that work at the same time on different tasks.
 """
 
 import weakref

@@ -1,8 +1,7 @@
 """Measures and certificate of one instant.
 
-Measures of one instant of a contact. This module imports no other, so that tables are read quickly.
-
-Errors of a solved contact. This module imports no other, so that tables are read quickly.
+* Measures of one instant of a contact. This module imports no other, so that tables are read quickly.
+* Errors of a solved contact. This module imports no other, so that tables are read quickly.
 """
 
 import math

@@ -1,9 +1,8 @@
 """Parts of a report, and the tables of curves at its top.
 
-Parts of a report: texts, tables, pictures, browsers of maps and data, all stored in the page.
-
-Tables of friction curves for reports: friction over speed and temperature under each pressure, of one curve or of
-several side by side, and the lengths, frequencies and moduli that matter.
+* Parts of a report: texts, tables, pictures, browsers of maps and data, all stored in the page.
+* Tables of friction curves for reports: friction over speed and temperature under each pressure, of one curve or of
+  several side by side, and the lengths, frequencies and moduli that matter.
 """
 
 import base64

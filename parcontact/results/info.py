@@ -1,10 +1,8 @@
 """Texts about results: `parcontact info`, headlines and citations.
 
-Descriptions of files of a run and of output directories, with checks for damage.
-
-The headline of a report: a sentence with the main results of a job and their errors.
-
-References to cite for a run: this program, and the references of its job (`files.provenance`).
+* Descriptions of files of a run and of output directories, with checks for damage.
+* The headline of a report: a sentence with the main results of a job and their errors.
+* References to cite for a run: this program, and the references of its job (`files.provenance`).
 """
 
 import json

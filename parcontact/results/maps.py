@@ -1,10 +1,8 @@
 """Pictures of maps: panels, movies and lines.
 
-Maps of saved instants: panels of one instant, and frames of all for movies and reports.
-
-Movies of a map over its saved instants: a GIF, and an MP4 if `ffmpeg` is on the path.
-
-Charts of pressure, and of traction, along a line: of a narrow map, or through the axis of a sphere or cylinder.
+* Maps of saved instants: panels of one instant, and frames of all for movies and reports.
+* Movies of a map over its saved instants: a GIF, and an MP4 if `ffmpeg` is on the path.
+* Charts of pressure, and of traction, along a line: of a narrow map, or through the axis of a sphere or cylinder.
 """
 
 import io

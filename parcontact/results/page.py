@@ -1,12 +1,9 @@
 """`parcontact report`: the page and its chapters.
 
-The HTML page of a report, which loads no other files.
-
-Chapters of a report, one per output directory with a run, a friction curve, a sweep or a study.
-
-Contents of run.log and steady.log: warnings, estimated errors, counts, and the machine.
-
-Sections on errors and costs, program, machine and runs, and references to cite.
+* The HTML page of a report, which loads no other files.
+* Chapters of a report, one per output directory with a run, a friction curve, a sweep or a study.
+* Contents of run.log and steady.log: warnings, estimated errors, counts, and the machine.
+* Sections on errors and costs, program, machine and runs, and references to cite.
 """
 
 import json

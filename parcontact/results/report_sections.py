@@ -1,10 +1,8 @@
 """Sections of a report.
 
-Sections on results of a run, a friction curve, a sweep or a study, with browsers of their maps.
-
-The section on the rigid surface of a job.
-
-The section on the material: moduli, branches, temperature shift, and the excited frequencies.
+* Sections on results of a run, a friction curve, a sweep or a study, with browsers of their maps.
+* The section on the rigid surface of a job.
+* The section on the material: moduli, branches, temperature shift, and the excited frequencies.
 """
 
 import io

@@ -1,8 +1,7 @@
 """Style and units of pictures.
 
-Style of all pictures: readable at a width of 8 cm, in colours for colour-blind readers.
-
-Units of axes with the prefix that suits their numbers: 1.04 kPa, not 0.00104167 MPa.
+* Style of all pictures: readable at a width of 8 cm, in colours for colour-blind readers.
+* Units of axes with the prefix that suits their numbers: 1.04 kPa, not 0.00104167 MPa.
 """
 
 import math

@@ -1,8 +1,7 @@
 """`parcontact surface`: sentences and picture of a rigid surface.
 
-Sentences and picture of the rigid surface of a job, for `parcontact surface`.
-
-Picture of a rigid surface: its map, the distribution of its heights, and its spectra with the limits of the grid.
+* Sentences and picture of the rigid surface of a job, for `parcontact surface`.
+* Picture of a rigid surface: its map, the distribution of its heights, and its spectra with the limits of the grid.
 """
 
 from collections.abc import Iterator

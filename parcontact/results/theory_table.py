@@ -1,8 +1,7 @@
 """Persson's theory next to a run.
 
-Comparison of a run with Persson's theory: highest and dynamic friction and contact area.
-
-theory.yaml: the settings of the predictions in theory.csv.
+* Comparison of a run with Persson's theory: highest and dynamic friction and contact area.
+* theory.yaml: the settings of the predictions in theory.csv.
 """
 
 import math

@@ -1,6 +1,4 @@
-"""Tables of measured moduli, and their checks.
-
-Tables of measured moduli, converted to SI units, or refused in one sentence with file and line.
+"""Tables of measured moduli, converted to SI units, or refused in one sentence with file and line.
 
 Headers, units and numbers are read by `text_tables`: two header rows, as in pyvisco's files, or units in brackets or
 behind a slash. The columns are:
@@ -15,7 +13,7 @@ shear, with a warning. Missing moduli follow from tan delta or the phase angle. 
 ignored. Rows of one temperature are one set; without T all rows are one set,
 and rows of one frequency at many temperatures are one set each.
 
-Checks that a table can be of a measured rubber; wrong units are refused before a fit.
+Checks refuse tables that cannot be of a measured rubber, and wrong units, before a fit.
 """
 
 import math

@@ -1,9 +1,8 @@
 """Factors of the moduli of filled rubber over the amplitude of the shear strain.
 
-The softened body is equivalent linear, `G*(omega, gamma) = f(gamma) G'(omega) + i g(gamma) G''(omega)`: f and g come
-from a sweep of the strain and depend on gamma alone.
-
-Files of strain sweeps: factors of both moduli, or moduli, over the amplitude of the strain.
+* The softened body is equivalent linear, `G*(omega, gamma) = f(gamma) G'(omega) + i g(gamma) G''(omega)`: f and g
+  come from a sweep of the strain and depend on gamma alone.
+* Files of strain sweeps: factors of both moduli, or moduli, over the amplitude of the strain.
 """
 
 from collections.abc import Callable
