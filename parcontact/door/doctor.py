@@ -33,7 +33,7 @@ from ..march import steady
 from ..march.loop import March
 from ..parallel.root import on_root
 from ..parallel.slab import Array, Slab
-from ..physics import prony
+from ..physics import loops, prony
 from ..physics.prony import Integrator
 from ..theory import full_contact, hertz, persson, westergaard
 
@@ -243,6 +243,9 @@ def prepare_loops(comm: "MPI.Intracomm") -> str:
     for adhesion in ({}, sticking):
         Bench(comm).march(crossed([touch], **adhesion, output=energy, numerics=rough["numerics"]))
         Bench(comm).march(sphere([touch], **adhesion, output=energy, numerics=rough["numerics"]))
+    direction = np.zeros((1, 1), np.float32)
+    for image in (direction, direction.astype(np.float64)):  # of exact steps, which few solves need
+        loops.dot(direction, image)
     for compile_loops in capabilities.offers("effect", "compile_loops"):
         compile_loops()
     place = errors.directory("compiled")

@@ -297,7 +297,7 @@ def test_what_a_retry_leaves_unconverged_is_not_accepted(monkeypatch: pytest.Mon
     }
     march = begun(data | {"numerics": {"accept_unconverged": True}})
     monkeypatch.setattr(ContactSolver, "solve", refuse)
-    monkeypatch.setattr(starts, "solve", lambda *_: made[-1])
+    monkeypatch.setattr(starts, "solve_by_sets", lambda *_: made[-1])
     with pytest.raises(StepError, match="is refused"):
         run_steps(march, [])
 
