@@ -105,6 +105,19 @@ def test_a_slide_comes_to_the_steady_band() -> None:
     assert max(row.certificate.worst for row in rows) <= 1e-3
 
 
+def test_calls_where_the_law_is_softer_than_the_body() -> None:
+    """In light contact a step takes 16 applications of the operator on average; 36 if the splitting begins as if there
+    was no closing."""
+    *_, law = finer(job := in_bands(2, 64, ZENER, 1e-3), 1.0, 2e3)
+    history = [
+        {"pressure": 2e3, "duration": 1e-3, "time_step": 5e-4},
+        {"pressure": 2e3, "velocity": 1.0, "distance": LONG / 4, "cells_per_step": 0.5},
+    ]
+    _, rows = march_with(law, heights_of(job), material=ZENER, history=history, numerics={"tolerance": 1e-3})
+    assert rows[-1].measures.contact_area < 0.1
+    assert np.mean([row.operator_calls for row in rows[3:]]) < 20
+
+
 @pytest.mark.mpi(2)
 def test_hard_walls_are_the_usual_law(comm: MPI.Intracomm) -> None:
     """Without a closing, on any number of ranks: to the tolerance, 1e-7, times the steps."""

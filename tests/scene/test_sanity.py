@@ -331,8 +331,15 @@ def test_a_contact_that_creeps_out_of_its_box() -> None:
 
 def test_a_contact_that_swings_out_of_its_box() -> None:
     """A velocity V cos(2 pi f t) moves the contact by V/(2 pi f) to each side, and back by the end of the stage."""
-    sphere, grid = {"shape": "sphere", "radius": 8e-3}, {"points": 16, "size": 1.2e-2, "boundary": "free"}
-    for way, leaves in ((2e-3, False), (8e-3, True)):
+    grid = {"points": 16, "size": 1.2e-2, "boundary": "free"}
+    for way, y, leaves in (
+        (2e-3, 6e-3, False),
+        (8e-3, 6e-3, True),
+        (2e-3, 9e-3, False),
+        (4e-3, 9e-3, True),
+        (4e-3, 3e-3, True),
+    ):
+        sphere = {"shape": "sphere", "radius": 8e-3, "center": [6e-3, y]}
         swing = {"force": 1e-3, "velocity": {"amplitude": [0.0, 2 * np.pi * way], "frequency": 1.0}, "cycles": 1}
         said = " ".join(map(str, job_of(sphere, [swing], grid=grid).doubts))
         assert (f"of the {way:.3g} m that it slides" in said) == leaves, said

@@ -130,3 +130,7 @@ def test_the_approach_that_comes_of_a_load(mean: float) -> None:
 
 def by_sets(body: Bench, h: Map, control: MeanPressure) -> Contact:
     return starts.solve_by_sets(body.solver, body.problem(h, control), np.zeros_like(h))
+
+
+def test_bounds_in_other_units() -> None:
+    assert Box(2.0, 6.0).in_units(pressure=4.0, length=3.0) == Box(0.5, 1.5)

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Main, RunParcontact
+from numpy.testing import assert_allclose
 from scipy.special import lambertw
 
 from parcontact import job as jobs
+from parcontact.effects.heat.bands import rises_of
 from parcontact.effects.heat.solver import Flash
 from parcontact.effects.heat.steady import Feedback
 from parcontact.errors import InputError, JobError, RunError
@@ -196,3 +198,17 @@ def test_tables_of_a_shift_end() -> None:
     vertical = Factors((0.0, 50.0), (0.0, 0.1), 20.0)
     assert highest_temperature(Factors((0.0, 60.0), (1.0, -1.0), 20.0, vertical)) == 50.0
     assert highest_temperature(WLF(8.86, 101.6, 20.0)) == np.inf
+
+
+def test_bands_warm_each_other_equally() -> None:
+    """Heat of band i warms band k as the same heat of band k warms band i (reciprocity of conduction), heat of the
+    interface warms all as that of a finest band on the surface, and waves of finer bands do not warm a coarser one."""
+    draw = np.random.default_rng(5).random
+    weights, uniform, shares, warmings = draw(7), draw(7), [*draw((2, 7)), np.ones(7)], draw((3, 7))
+    given = weights, uniform, shares, warmings
+    rises = np.array([rises_of(*given, heats, 0.0) for heats in np.eye(3).tolist()])
+    assert_allclose(rises, rises.T, rtol=1e-13)
+    assert_allclose(rises_of(*given, [0.0, 0.0, 0.0], 1.0), rises[2], rtol=1e-13)
+    assert_allclose(
+        rises[0], [np.sum(weights * shares[0] * one * (uniform + warmings[0])) for one in shares], rtol=1e-13
+    )
