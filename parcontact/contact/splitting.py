@@ -163,7 +163,6 @@ def _advance(s, f, ds, df, theta, last):
 
 
 GAMMA = 4.0  # tuning: gamma over the ratio of the spreads of pressure and displacement of the start
-SOFTENED = 2.0  # tuning: the same with the closing in the displacement, from a start near the solution
 MAX_LEVELS = 20  # accuracy: limit on steps to the level of a start with the load; about five are usual
 LEVEL_EXCESS = 1.1  # tuning: load of that start over the given one at which the level is left
 SLOW, FALL, LARGER = 500, 0.3, 16.0  # tuning: steps in which the rms of f must fall by a factor, or gamma is raised
@@ -258,13 +257,12 @@ class Splitting:
             p *= mean * slab.points / (load or math.nan)
         return cold
 
-    def _gamma(self, p: Array, whole: Array) -> float:
-        """Return gamma for a start p with a displacement, which has the closing if it is another map than y; 1 if one
-        of them is uniform, where any gamma does."""
-        maps, share = (p, whole), GAMMA if whole is self._y else SOFTENED
+    def _gamma(self, p: Array, u: Array) -> float:
+        """Return gamma for a start p with the displacement u; 1 if one of them is uniform, where any gamma does."""
+        maps = p, u
         sums = self.slab.sum(*(float(each.sum()) for each in maps), *(float(np.vdot(each, each)) for each in maps))
         p_square, u_square = (sums[2 + k] - sums[k] ** 2 / self.slab.points for k in (0, 1))
-        return share * math.sqrt(p_square / u_square) if p_square > 0.0 and u_square > 0.0 else 1.0
+        return GAMMA * math.sqrt(p_square / u_square) if p_square > 0.0 and u_square > 0.0 else 1.0
 
     def _loads(self, given: "_Given", p: Array) -> bool:
         """Scale a pressure to a given mean, or return False if it has no load; collective."""
