@@ -123,8 +123,9 @@ Means = Mapping[str, Callable[[Any], Array]]  # weights of rungs in the mean of 
 
 
 class Probe(Protocol):
-    """What an effect measures in each contact of a band; modules `bands` of capabilities offer `probes` of a job and
-    its bands (`choice.Cut`). Methods are local."""
+    """Probe by which an effect measures each contact of a band. Its methods are local.
+
+    A module `bands` of a capability has a function `probes` of a job and its bands (`choice.Cut`)."""
 
     means: ClassVar[Means]
 

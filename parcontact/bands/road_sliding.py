@@ -69,8 +69,10 @@ class BandOutcome:
 
 
 class BandLoop(Protocol):
-    """What an effect changes in bands, and finds in them; modules `bands` of capabilities offer `loops` of a job and of
-    its bands (`choice.Cut`). All loops that `move` share the rounds of one fixed point; methods are collective."""
+    """Loop by which an effect changes bands and finds its results in them. Its methods are collective.
+
+    A module `bands` of a capability has a function `loops` of a job and its bands (`choice.Cut`). All loops that
+    `move` share the rounds of one fixed point."""
 
     moves: bool  # False if the effect only finds something in a state
     words: tuple[str, str]  # what it changes, and what to try if that does not settle

@@ -72,7 +72,7 @@ class Box:
         return float(_resolve_bounds(s, h, gamma, self.lowest, self.highest, p, reflected))
 
     def add_closing(self, u: Array, p: Array) -> Array:
-        """Return u."""
+        """Return u: bounds have no closing."""
         return u
 
     def in_units(self, pressure: float, length: float) -> "Box":

@@ -29,7 +29,8 @@ def is_map(path: Path) -> bool:
 
 
 def load_map(path: Path, overrides: Sequence[str]) -> Job:
-    """Return a job of a whole map on its own points, with the overrides. Raises InputError."""
+    """Return a job whose surface is a whole measured map, on the points of the map, changed by the overrides. Raises
+    InputError."""
     try:
         return mesh.load(_job_of(str(path)), overrides)
     except InputError as error:

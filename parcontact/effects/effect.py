@@ -76,10 +76,14 @@ class PreviousContacts:
 class SolvedContact(Generic[Remembered]):
     """The contact of a step, the memory of the law after it, and a map that is not 0 where the surfaces touch.
 
-    `numbers` are further results of the law, by name; `pull` is the force of all tension [N]. Loads up to
-    `least_load` [N] are errors of the solver. `end`: the contact is in `equilibrium`; or `detached`; or it was
-    `opened` after detachment, as the run continues with the surfaces far from each other, and then stays `open`.
-    `snapped`: it passed through states without equilibrium. `remark` is a sentence for run.log, or ''.
+    `numbers`: further results of the law, by name. `pull`: force of all tension [N]. `least_load`: load [N] up to
+    which a load is an error of the solver. `snapped`: the contact passed through states without equilibrium. `remark`:
+    a sentence for run.log, or ''. `end` is one of
+
+    * "equilibrium";
+    * "detached": no equilibrium was left;
+    * "opened": the run continues with the surfaces far from each other;
+    * "open": in the steps after that.
     """
 
     contact: Contact
@@ -145,8 +149,10 @@ def nothing_holds(control: str, load: float) -> str:
 
 
 class ContactLaw(Protocol[Memory]):
-    """A contact law, a part of the run. Methods are collective. A law that solves by the law of the constraint may
-    have a method `upon`, which takes the law of the constraint and returns the whole law."""
+    """A contact law, a part of the run. Methods are collective.
+
+    A law that builds on the usual contact, the bounds of pressure alone, may have a method `upon`. It takes the usual
+    law and returns the whole one."""
 
     may_shorten: bool  # True if a failed chosen step is repeated with a shorter one
 

@@ -83,8 +83,8 @@ class Watch:
     _steps: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))
 
     def decide(self, step: int, began: bool, problem: str = "") -> Verdict:
-        """Return the decision after a step; collective. `began`: this run has made a step; `problem`: a failure on
-        root."""
+        """Return whether the run stops or saves after a step; collective. `began`: this run has made a step.
+        `problem`: a failure on root."""
         now = time.monotonic()
         if began:
             self._steps.append(now - self._last)

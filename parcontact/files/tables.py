@@ -360,7 +360,8 @@ class StopFile:
         return self.own.exists() or _touched(self.path) not in (0, self.before)
 
     def ask_own(self) -> None:
-        """Stop the other ranks of this program; if the file cannot be written, they end with their cases."""
+        """Stop the other ranks of this program by the file `own`. Ranks end after their present cases if it cannot be
+        written."""
         with suppress(OSError):
             self.own.touch()
 

@@ -188,8 +188,8 @@ def effects_of(sections: Iterable[str]) -> dict[str, Any]:
 
 
 def answers(module: str, name: str) -> list[Any]:
-    """Return what capabilities offer under a name: those of this package in modules of one name, others in their
-    classes."""
+    """Return the object called `name` of each capability that has one: of this package in its module `module`, of
+    another package in the class of its effect."""
     others = (section for section in _registered() if not is_ours(section) and not why_unusable(section))
     found = [(section, getattr(_load(section), name)) for section in others if hasattr(_load(section), name)]
     return [*capabilities.offers(module, name), *(_named(*each) for each in found)]

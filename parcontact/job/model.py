@@ -170,7 +170,7 @@ class Job(Part):
         return getattr(self, name, None)
 
     def asked(self, name: str) -> list[Any]:
-        """Return what the effects whose sections are given have under a name (`effects.effect.Effect`)."""
+        """Return the attribute `name` of each effect whose section the job has (`effects.effect.Effect`)."""
         found = listing.effects_of(self._added_sections()).values()
         return [getattr(effect, name) for effect in found if hasattr(effect, name)]
 

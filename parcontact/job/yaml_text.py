@@ -277,7 +277,8 @@ def _remedy(problem: str) -> str:
 
 
 def parse(text: str | bytes, origin: str, whole: Place | None = None) -> Source:
-    """Return YAML text as a `Source`; `origin` is its name in places, unless `whole` is the place of all values."""
+    """Return YAML text as a `Source`. Messages name the place of a value by `origin`, line and column; if `whole` is
+    given, it is the place of all values."""
     start = whole or Place(origin, 1, 1)
     source = Source(UNREADABLE, start)
     reader = _Reader(source, origin, whole)

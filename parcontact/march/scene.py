@@ -204,13 +204,15 @@ class Scene:
         return (displacement - self.heights(position) - approach) * self.units.height
 
     def constraint(self, alpha: float, most: float = math.inf) -> Box:
-        """Return the constraint on p in a step of modulus alpha, in which the pressure is `alpha p`, at most `most`."""
+        """Return the bounds of p in a step of modulus alpha, in which the pressure is `alpha p`. An upper bound of
+        `most` or more is left out."""
         return effect.constraint_of(self.job, alpha * self.units.pressure, most)
 
 
 def set_up(job: Job, slab: Slab, until: float = 0.0, measured: bool = True) -> Setup:
     """Return the setup of a job for a march to the end of its history or, if later, to `until` [s]; collective. Raises
-    InputError for files that do not fit. Transforms are `measured` (`parallel.fft.FFT`)."""
+    InputError for files that do not fit. If `measured`, the fastest transforms are chosen by
+    trials (`parallel.fft.FFT`)."""
     chosen, fft = choices(job, until), FFT(slab, measured=measured)
     surface, remarks = make_surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None

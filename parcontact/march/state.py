@@ -41,10 +41,10 @@ NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
 class StepErrors:
     """Errors of a step.
 
-    `budget` is None if nothing touches. `step` is the error of the step's length alone, which decides about chosen
-    steps. `friction` is the friction of the body, infinite after a jump; its change in the next step is an error
-    source. `lasting` is the budget without the temporary error of rising friction; it sets the tolerance of the next
-    solves.
+    `budget`: errors of friction and area by their sources; None if nothing touches. `step`: the error by the length of
+    the step alone, which decides about chosen steps. `friction`: friction of the body, infinite after a jump; its
+    change in the next step is a source of error. `lasting`: the budget without the error that is there only while
+    friction rises; it sets the tolerance of the next solves.
     """
 
     budget: ErrorBudget | None

@@ -260,9 +260,10 @@ def judge_state(
 
 
 def stiffer_lines(setup: Setup, velocity: Vector) -> Lines | None:
-    """Return the lines along a velocity [m/s], with |G| of the longest wave along them over the modulus G_inf of waves
-    that do not vary along them; None for an elastic body, on a line of points, in a free box, and for oblique
-    velocities."""
+    """Return the lines along a velocity [m/s] and how much stiffer waves along them are: |G| of the longest one,
+    divided by G_inf, the modulus of waves that do not vary along them.
+
+    Return None for an elastic body, a line of points, a free box, and an oblique velocity."""
     grid = setup.grid
     if setup.half_space.free or 1 in (grid.nx, grid.ny) or np.count_nonzero(velocity) != 1:
         return None

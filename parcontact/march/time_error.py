@@ -78,11 +78,16 @@ Vector = tuple[float, float]
 class RunProperties:
     """Properties of a run that are known before it starts.
 
-    `points` of the grid; `cell`: its sides [m]; `cells_per_wave`: longer sides of a cell per shortest wave of a
-    rough surface, or None; `measured`: the surface has a map, which may lack waves on a coarse grid;
-    `edges_follow_grid`: edges of contact follow it; `identical_contacts`: as those of waves; `free`: the box is
-    free; `prony`: relaxation function, None for an elastic body; `folded`: bound on the error of folded branches;
-    `exponential`: the integrator is exponential.
+    * `points`: number of points of the grid;
+    * `cell`: sides of a cell [m];
+    * `cells_per_wave`: shortest wavelength of a rough surface, divided by the longer side of a cell; or None;
+    * `measured`: the surface has a map, which may lack waves on a coarse grid;
+    * `edges_follow_grid`: edges of contact are parallel to lines of the grid;
+    * `identical_contacts`: all contacts are the same, as those of a single wave;
+    * `free`: the box is free;
+    * `prony`: relaxation function; None for an elastic body;
+    * `folded`: bound on the error of folded branches;
+    * `exponential`: the integrator is exponential.
     """
 
     points: int

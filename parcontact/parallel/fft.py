@@ -398,7 +398,8 @@ def _multiply(spectrum: NDArray[np.complexfloating], symbol: NDArray[np.inexact]
 
 
 def edges(nx: int) -> int:
-    """Return the number of columns of imaginary parts that do not fit into the map of a spectrum."""
+    """Return the number of columns of a spectrum whose imaginary parts have no place in a map of nx columns: the first
+    one, and that of Nyquist."""
     return 1 + (nx % 2 == 0)
 
 

@@ -39,8 +39,9 @@ class Part(NamedTuple):
 class RowExchange:
     """Plan of an exchange in which this rank gets `count` rows of a map; rows that no rank has are zeros.
 
-    `leaving` are rows of this rank for each rank that wants some, `coming` the places of those that it gets; both are
-    in the order of ranks, and include this rank. A map that every rank has is on a slab of one rank.
+    `leaving` has the rows that this rank sends to each rank, `coming` the places of the rows that it gets from each
+    rank. Both are in the order of ranks, and include this rank. A map of which every rank has all rows is on a slab of
+    one rank.
     """
 
     def __init__(self, slab: Slab, count: int, leaving: list[Part], coming: list[Part], whole: bool) -> None:

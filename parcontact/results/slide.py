@@ -156,7 +156,8 @@ def _highest(columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], cel
 def mean_of_slide(
     columns: Mapping[str, Sequence[float]], rows: NDArray[np.intp], name: str, error: str
 ) -> tuple[float, float]:
-    """Return the mean of a column over the last three quarters, and the mean of its known errors."""
+    """Return the mean of a column over the last three quarters of a slide, and the mean of its errors, 0 where they are
+    not known."""
     distance, values = (np.asarray(columns[key], float)[rows] for key in ("distance", name))
     within = np.abs(values) * np.nan_to_num(np.asarray(columns.get(error, np.zeros(len(columns[name]))), float)[rows])
     return mean_over_end(distance, values), mean_over_end(distance, within)

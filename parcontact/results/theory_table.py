@@ -84,7 +84,8 @@ def shared(directories: Iterable[Path]) -> TheorySettings | None:
 
 
 def describe_settings(directory: Path) -> str:
-    """Return a sentence about the theory in a directory, or in the cases of a sweep there; '' if there is none."""
+    """Return a sentence on the settings of Persson's theory in a directory, or in the cases of a sweep there; '' if
+    there is no theory."""
     try:
         settings = shared([directory, *directory.glob("cases/*")])
     except InputError as error:

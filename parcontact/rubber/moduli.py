@@ -8,10 +8,10 @@ behind a slash. The columns are:
 * `tan_del`; |E*| and |G*|, absolute values, and delta, the phase angle (deg, rad);
 * D(t) and J(t), creep compliances in tension and shear (1/MPa, ...).
 
-A modulus named by words alone is Young's. With rates in rad/s, as from rheometers, and for compliances, it is taken as
-shear, with a warning. Missing moduli follow from tan delta or the phase angle. Columns with other names are
-ignored. Rows of one temperature are one set; without T all rows are one set,
-and rows of one frequency at many temperatures are one set each.
+A modulus named by words alone is taken as Young's. If rates are in rad/s, as from rheometers, it is taken as the shear
+modulus, with a warning; so is a compliance. Missing moduli follow from tan delta or the phase angle.
+Columns with other names are ignored. Rows of one temperature are one set; without T all rows are one set, and rows of
+one frequency at many temperatures are one set each.
 
 Checks refuse tables that cannot be of a measured rubber, and wrong units, before a fit.
 """

@@ -102,8 +102,10 @@ class PronySeries:
 
 
 def kernel(at: Array, kind: Kind, times: Array) -> Array:
-    """Return the contribution of each unit weight of a spectrum to the data, shape (data, weights): weights of the
-    times, followed by the spring, or for creep by the instantaneous compliance and the fluidity."""
+    """Return what a weight of 1 contributes to each value of the data, shape (data, weights).
+
+    First are the weights of the times. Then follows the weight of the spring; for creep those of the instantaneous
+    compliance and of the fluidity."""
     if kind == "frequency":
         found = complex_kernel(at, kind, times)
         return np.vstack([found.real, found.imag])

@@ -44,7 +44,8 @@ def probes(job: Job, cut: Cut) -> Iterator[StrainProbe]:
 
 
 class StrainsOfBands:
-    """Strains of bands, which change by a power mean; the next state starts from those of the last."""
+    """Strains of bands. A round replaces each by a power mean of the old one and the one found. The first round of a
+    state takes the strains of the last state."""
 
     moves = True
     words: ClassVar[tuple[str, str]] = ("strains", "")

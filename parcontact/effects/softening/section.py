@@ -64,7 +64,7 @@ class Softening(Part):
 
     @property
     def made(self) -> StrainTable:
-        """Return the factors over the strain."""
+        """Table of the factors of the moduli as functions of the strain."""
         return self._made[0]
 
     @property

@@ -33,7 +33,7 @@ class StrainTable:
     loss: tuple[float, ...]
 
     def factors(self, strain: Array | float) -> tuple[Array, Array]:
-        """Return f and g at strains above 0, any shape."""
+        """Return the factors f of the storage modulus and g of the loss modulus at strains above 0, any shape."""
         place = np.log(strain)
         known = np.log(self.strain)
         return np.interp(place, known, self.storage), np.interp(place, known, self.loss)
@@ -74,7 +74,7 @@ class Softened:
         return bool(np.array_equal(own, others))
 
     def factors(self, q: Array) -> tuple[Array, Array]:
-        """Return f and g of waves with these wavenumbers."""
+        """Return the factors of both moduli for waves with the wavenumbers q."""
         f, g = self.table.factors(np.array(self.strains))
         octave = self.octave(q)
         return f[octave], g[octave]
