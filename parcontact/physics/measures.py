@@ -1,7 +1,5 @@
-"""Measures and certificate of one instant.
-
-* Measures of one instant of a contact. This module imports no other, so that tables are read quickly.
-* Errors of a solved contact. This module imports no other, so that tables are read quickly.
+"""Measures of one instant of a contact, and the certificate of a solve. This module imports no other of the package, so
+that tables are read quickly.
 """
 
 import math
