@@ -1,4 +1,4 @@
-"""Certificates of pressures: sums over an iterate, the length that gaps are compared with, and the errors."""
+"""Error measures of a contact pressure: sums over p and gaps, their reference length, and the certificate."""
 
 import math
 from dataclasses import dataclass, replace
@@ -18,23 +18,22 @@ LEAST_HEIGHT = 1e-9  # accuracy: the same, over the height of the surface, where
 
 @dataclass(frozen=True)
 class Lines:
-    """Lines of points along the sliding, of a body that is stiffer for waves along them.
+    """Grid lines along the sliding direction, for a body that is stiffer for waves along these lines.
 
-    `axis` of an array of rows along the lines; `contrast` c: modulus of waves along them over that of waves that do
-    not vary along them. An error of the gap that varies along the lines causes c times the pressure. So the lengths of
-    displacements that vary along the lines, and 1/c of the others, add up to the length of the certificate: a share s
-    of the length for one modulus,
+    `axis` is the axis of an array of rows that the lines follow. `contrast` c is the modulus of waves along the lines
+    over the modulus of other waves. A gap error that varies along the lines causes c times the pressure. The reference
+    length of the certificate is therefore reduced to the share s of its value for one modulus,
 
-        s^2 = v + (1 - v)/c^2,
+        s^2 = v + (1 - v)/c^2.
 
-    with v the share of the variance of u that remains with the mean of each line subtracted, weighted by the pressure.
+    Here v is the pressure-weighted variance of u after the mean of each line is subtracted, over the variance before.
     """
 
     axis: int
     contrast: float
 
     def share_of_length(self, slab: Slab, p: Array, u: Array, iterate: "Iterate") -> float:
-        """Return s for the image u of p and their sums; collective."""
+        """Return the factor s of the class for the pressure p, its displacement u and their sums; collective."""
         loads, moments = p.sum(axis=self.axis), np.einsum("ij,ij->i" if self.axis else "ij,ij->j", p, u)
         if not self.axis:  # lines cross the rows of all ranks
             loads, moments = np.split(np.array(slab.sum(*loads, *moments)), 2)
@@ -47,11 +46,11 @@ class Lines:
 
 @dataclass(frozen=True)
 class Iterate:
-    """Sums over an iterate at the approach d: of p, of p g, `energy = <p, A p>/2`, of `p (A p)^2`, and of p and p g
+    """Sums of p, p g, and `p (A p)^2` over all points at the approach d, `energy = <p, A p>/2`, and sums of p and p g
     over free points.
 
-    If no point is free, `between` holds the lowest and the highest approach at which no pressure changes; the first
-    is larger than the second if there is none.
+    If no point is free, `between` holds the lowest and the highest approach at which no pressure changes. If there is
+    no such approach, the first number exceeds the second.
     """
 
     d: float
@@ -65,14 +64,14 @@ class Iterate:
 
     @property
     def f(self) -> float:
-        """`<p, A p>/2 - <p, h + d>`, by `h + d = A p - g`, which avoids large numbers where h has a large offset."""
+        """Return `<p, A p>/2 - <p, h + d>`, computed from gaps: a large offset of h then does not cost digits."""
         return self.gaps - self.energy
 
     def settled(self) -> "Iterate":
         """Return the iterate at the approach d for which `<p, g> = 0` over free points, to rounding.
 
-        If none is free, d is the mean of `between`, or that for all points if all pressures are at one bound.
-        Without pressure d does not change.
+        If no point is free, d is the mean of `between`; if all pressures are at one bound, `<p, g> = 0` over all
+        points. Without pressure d does not change.
         """
         if self.between is not None:
             d = 0.5 * sum(self.between)
@@ -84,7 +83,9 @@ class Iterate:
         return replace(self, d=d, gaps=gaps, free_gaps=rest)
 
     def length(self, height: float) -> float:
-        """Return the length that gaps are compared with (`Certificate`), between LEAST_HEIGHT and 1 times `height`."""
+        """Return the length that gaps are divided by in `Certificate`; at least LEAST_HEIGHT times and at most
+        `height`.
+        """
         least = LEAST_HEIGHT * height
         if self.load <= 0.0:
             return least
@@ -104,10 +105,11 @@ def certify(
     height: float,
     working: NDArray[np.bool_],
 ) -> tuple[float, float, Certificate]:
-    """Mark the working set of a pressure p with the image u. Return its size, its sum of gaps, and the certificate;
+    """Mark the points that the solver changes, and return their number, their sum of gaps, and the certificate of p;
     collective.
 
-    `mean` is the prescribed mean pressure, None with a given approach; `height` is the height of the surface.
+    u is the displacement under p, and `working` the map to mark. `mean` is the prescribed mean pressure, None if the
+    approach is given; `height` is the height of the surface.
     """
     *sums, deepest = kernels.mark_working_set(p, u, h, iterate.d, box.lowest, box.highest, working)
     wrong, members, excess, held, deepest = slab.reduce(sums, [deepest])
@@ -119,7 +121,7 @@ def certify(
 
 
 def form_iterate(slab: Slab, box: Box, p: Array, u: Array, h: Array, d: float) -> Iterate:
-    """Return the sums over a pressure p and its image u at the approach d; collective."""
+    """Return the sums of `Iterate` for a pressure p and its displacement u at the approach d; collective."""
     sums = kernels.contact_sums(p, u, h, d, box.lowest, box.highest)
     load, work, gaps, squares, free_load, free_gaps = slab.sum(*sums)
     between = _approaches(slab, box, p, u, h) if free_load <= 0.0 < load else None
@@ -138,8 +140,9 @@ def _approaches(slab: Slab, box: Box, p: Array, u: Array, h: Array) -> tuple[flo
 
 @dataclass(frozen=True)
 class Judge:
-    """Certifies pressures on one grid: `height` of the surface; `lines` along which the body is stiffer, if gaps are to
-    be certified for them."""
+    """Certifies pressures on one grid. `height` is the height of the surface; `lines` are given for a body that is
+    stiffer along them, None otherwise.
+    """
 
     slab: Slab
     height: float
@@ -148,8 +151,9 @@ class Judge:
     def certify(
         self, p: Array, u: Array, h: Array, control: Control, working: NDArray[np.bool_]
     ) -> tuple[float, Certificate]:
-        """Mark the working set of an admissible pressure with the displacement u. Return its approach and
-        certificate; collective."""
+        """Mark the points that a solver changes under an admissible pressure p with displacement u. Return the approach
+        and the certificate of p; collective.
+        """
         slab, given = self.slab, isinstance(control, Approach)
         iterate = form_iterate(slab, Box(), p, u, h, control.value if given else 0.0)
         iterate, mean = (iterate, None) if given else (iterate.settled(), control.value)
@@ -160,6 +164,6 @@ class Judge:
 
 
 def describe_failure(reason: str, certificate: Certificate, tolerance: float) -> str:
-    """Return the reason why a solve was given up, with its residual; empty if it met the tolerance."""
+    """Return a sentence with the reason and the residual of a failed solve; '' if the tolerance is met."""
     worst = certificate.worst
     return "" if worst <= tolerance else f"{reason}: the residual is {worst:.3g} where {tolerance:.3g} was asked for"

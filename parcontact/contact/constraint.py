@@ -11,7 +11,7 @@ mean pressure must be between the bounds. Points with a pressure between the bou
 approach, and they are scaled to the load.
 
 `InterfaceLaw` lets the mean planes of two surfaces approach under a pressure, as roughness finer than the grid is
-squeezed. Its closing c(p) rises with p, so that the problem is monotone and has one solution:
+squeezed. This approach, the closing c(p), rises with p, so that the problem is monotone and has one solution:
 
     p >= 0,    w = A p + c(p) - h - d >= 0,    p w = 0.
 
@@ -36,17 +36,18 @@ class Constraint(Protocol):
     """Conditions on pressure p and gap at each point. Maps have the shape (rows of this rank, nx)."""
 
     def touches(self, p: Array) -> Mask:
-        """Return a map that is not 0 where the surfaces touch under an admissible pressure; it may be p itself."""
+        """Return a map that is not 0 where the surfaces touch under an admissible pressure; the map may be p itself."""
 
     def project(self, p: Array) -> None:
         """Replace p by the nearest admissible pressure."""
 
     def resolve(self, s: Array, h: Array, gamma: float, p: Array, reflected: Array) -> float:
-        """Put the solution of `p + gamma c(p) = s + gamma h`, or the bound that it would cross, into p, and `2 p - s`
-        into `reflected`. Return the sum of the latter."""
+        """Solve `p + gamma c(p) = s + gamma h` at each point and limit p to its bounds; put `2 p - s` into `reflected`.
+        Return the sum of `reflected` on this rank.
+        """
 
     def add_closing(self, u: Array, p: Array) -> Array:
-        """Return `u + c(p)`; it is u itself if there is no closing."""
+        """Return `u + c(p)`; the map u itself if there is no closing."""
 
     def in_units(self, pressure: float, length: float) -> "Constraint":
         """Return the constraint in the given units of pressure and length."""
@@ -60,7 +61,7 @@ class Box:
     highest: float = math.inf
 
     def touches(self, p: Array) -> Mask:
-        """Return a map that is not 0 where p is above its lowest value, also where points have yielded."""
+        """Return a map that is not 0 where p is above its lower bound, which includes points that yield."""
         return p if self.lowest == 0.0 else p > self.lowest
 
     def project(self, p: Array) -> None:
@@ -68,7 +69,8 @@ class Box:
         np.clip(p, self.lowest, self.highest, out=p)
 
     def resolve(self, s: Array, h: Array, gamma: float, p: Array, reflected: Array) -> float:
-        """See `Constraint.resolve`; p is `s + gamma h`, limited to the bounds."""
+        """Put `s + gamma h`, limited to the bounds, into p, and `2 p - s` into `reflected`; see `Constraint.resolve`.
+        """
         return float(_resolve_bounds(s, h, gamma, self.lowest, self.highest, p, reflected))
 
     def add_closing(self, u: Array, p: Array) -> Array:
@@ -88,8 +90,8 @@ SNAP = 1e-12  # accuracy: pressures within this share of the range of a bound ar
 def scale_to_load(slab: Slab, box: Box, p: Array, load: float, total: float) -> None:
     """Scale an admissible p from the sum `load` to the sum `total`; collective.
 
-    Pressures below the highest one are scaled, measured from the lowest one. If these cannot carry the load, all
-    pressures are mixed with a bound. A p that is at its lowest value everywhere is replaced by a uniform pressure.
+    Differences to the lower bound are scaled at points below the upper bound. If these points cannot carry the load, p
+    is replaced by a weighted mean of p and a bound. If p is at its lower bound everywhere, it becomes uniform.
     """
     even, span = box.lowest * slab.points, box.highest - box.lowest
     if load <= even * (1.0 + slab.points * np.finfo(np.float64).eps):
@@ -167,10 +169,9 @@ STEPS = 6  # accuracy: linear pieces in each interval of a table, equal in the l
 
 @dataclass(frozen=True)
 class InterfaceLaw:
-    """Piecewise linear closing c(p) with `c(0) = 0`: `pressures` rise from 0, and `closings` do not fall. Both have any
-    unit.
+    """Closing c(p) of an interface, piecewise linear with c(0) = 0, and constant beyond the last point.
 
-    Beyond the last point c is constant.
+    `pressures`, shape (n,), rise from 0, and `closings`, of the same shape, do not fall. Units are those of the caller.
     """
 
     pressures: Array
@@ -181,8 +182,8 @@ class InterfaceLaw:
         """Return the law through the points of a table, shape (n,), n >= 2, of rising positive pressures.
 
         Between the points c is a monotone cubic in log p (F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5
-        (1984) 300); below the first it is linear in p with the same slope, and c(0) = 0. Raises InputError for a
-        table that does not rise.
+        (1984) 300). Below the first point c is linear in p with the slope at this point, and c(0) = 0. Raises
+        InputError for a table that does not rise.
         """
         if len(pressures) < 2 or pressures[0] <= 0.0 or np.any(np.diff(pressures) <= 0.0):
             raise InputError("an interface law needs two positive pressures or more, which rise")
@@ -203,7 +204,7 @@ class InterfaceLaw:
         return InterfaceLaw(self.pressures / pressure, self.closings / length)
 
     def closing(self, p: Array) -> Array:
-        """Return c(p), of the shape of p."""
+        """Return the closing c(p), an array of the shape of p."""
         found, pressed = np.zeros(p.shape), p > 0.0
         found[pressed] = np.interp(p[pressed], self.pressures, self.closings)
         return found
@@ -221,7 +222,7 @@ class InterfaceLaw:
         np.maximum(p, 0.0, out=p)
 
     def resolve(self, s: Array, h: Array, gamma: float, p: Array, reflected: Array) -> float:
-        """See `Constraint.resolve`."""
+        """Solve `p + gamma c(p) = s + gamma h` for p >= 0 at each point; see `Constraint.resolve`."""
         sums = self.pressures + gamma * self.closings
         return float(_resolve_closing(s, h, gamma, self.pressures, sums, p, reflected))
 

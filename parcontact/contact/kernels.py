@@ -10,8 +10,9 @@ from ..compiled import loop
 
 @loop
 def contact_sums(p, u, h, d, lowest, highest):
-    """Return, with `g = u - h - d`, the sums of p, p u, p g and p u^2, and those of `p - lowest` and `(p - lowest) g`
-    over points below `highest`."""
+    """Return the sums of p, p u, p g and p u^2 over all points, with `g = u - h - d`, then the sums of `p - lowest` and
+    `(p - lowest) g` over points with p below `highest`.
+    """
     load, work, gaps, squares, free_load, free_gaps = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(p.shape[0]):
         row_load, row_work, row_gaps, row_squares, row_free_load, row_free_gaps = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -35,11 +36,12 @@ def contact_sums(p, u, h, d, lowest, highest):
 
 @loop
 def mark_working_set(p, u, h, d, lowest, highest, working):
-    """Mark points above `lowest` and points that penetrate, but no points at `highest` with `g = u - h - d <= 0`, which
-    are held. Return the sum of `(p - lowest) |g|` over points that are not held; the number of marked points and their
-    sum of g; the number of points held; and the largest -g of points below `highest`.
+    """Mark in `working` the points with p above `lowest` and the points that penetrate (g < 0), with `g = u - h - d`.
+    Points at `highest` with g <= 0 are held: they are not marked. Return five numbers: the sum of `(p - lowest) |g|`
+    over points that are not held, the number of marked points and their sum of g, the number of held points, and the
+    largest -g of points below `highest`.
 
-    The lowest gap is kept for each column: a single running minimum would not be vectorized.
+    The lowest gap is stored for each column: a single running minimum would not be vectorized.
     """
     wrong, count, gaps, held = 0.0, 0.0, 0.0, 0.0
     least, deepest = np.empty(p.shape[1]), -np.inf
@@ -70,8 +72,8 @@ def mark_working_set(p, u, h, d, lowest, highest, working):
 
 @loop
 def advance(p_old, t, step, lowest, highest, p):
-    """Put `p_old - step t`, limited to the bounds, into p. Return the sums of p and of the magnitude of what limiting
-    has changed."""
+    """Put `p_old - step t`, limited to the bounds, into p. Return the sum of p and the sum of |change by the limits|.
+    """
     load, cut = 0.0, 0.0
     for j in range(p.shape[0]):
         row_load, row_cut = 0.0, 0.0
@@ -89,7 +91,7 @@ def advance(p_old, t, step, lowest, highest, p):
 
 @loop
 def gap_residual(working, u, h, d, r):
-    """Put `u - h - d` on the working set and 0 elsewhere into r."""
+    """Put the gap `u - h - d` on the working set, and 0 elsewhere, into r."""
     for j in range(r.shape[0]):
         for i in range(r.shape[1]):
             r[j, i] = u[j, i] - h[j, i] - d if working[j, i] else 0.0
@@ -97,8 +99,9 @@ def gap_residual(working, u, h, d, r):
 
 @loop
 def step_products(working, u, h, d, u_old, z, t):
-    """Return sums over the working set of z, t, c, r z, c z and r t, with `r = u - h - d` in the precision of z and `c
-    = u - u_old`."""
+    """Return the sums over the working set of z, t, c, r z, c z and r t, where `c = u - u_old` and `r = u - h - d`,
+    rounded to the precision of z.
+    """
     sum_z, sum_t, sum_change, r_z, change_z, r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(z.shape[0]):
         row_z, row_t, row_change, row_r_z, row_change_z, row_r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

@@ -2,10 +2,10 @@
 
 A preconditioner K, the inverse of A without a contact set, turns a residual r on a set c into the correction `R K R r`
 (R: restrict to c). This takes r as 0 outside c, whereas the wanted correction moves the surface outside c, too. With an
-extension E of r to all points, `R E' K E R` is symmetric and positive, as K is. It is the inverse of `R A R` if e = E r
-minimizes `<e, K e>`. At any distance from c this e varies over lengths of about the distance. So does the mean over
-cells of all sizes used here. With s the sum of r over a cell, w the number of its points in c, and I the linear
-interpolation between cells of twice the length,
+extension E of r to all points, `R E' K E R` is symmetric and positive, as K is. This operator is the inverse of `R A R`
+if e = E r minimizes `<e, K e>`. At a distance from c this e varies over lengths of about the distance, and so do the
+means over cells of all sizes that are used here. With s the sum of r over a cell, w the number of its points in c, and
+I the linear interpolation between cells of twice the length,
 
     e = (s + f I e_above)/(w + f),   f = FLOOR times the points of a cell,
 
@@ -49,8 +49,9 @@ from .problem import Operator
 
 @loop
 def row_of(own, neighbours, j):
-    """Return row j, counted from the first of `own`; `neighbours` holds rows below `own` first and rows
-    above it last."""
+    """Return row j of a map whose rows `own` are on this rank. `neighbours` holds the rows below row 0 first and the
+    rows above the last row last.
+    """
     if j < 0:
         return neighbours[neighbours.shape[0] + j]
     return own[j] if j < own.shape[0] else neighbours[j - own.shape[0]]
@@ -58,7 +59,7 @@ def row_of(own, neighbours, j):
 
 @loop
 def add_up(points, neighbours, above, wide, tall, cells):
-    """Put the sums over cells into `cells`."""
+    """Put the sums of `points` over the points of each cell into `cells`."""
     height = 1 if tall is None else 2
     second = np.float32(height - 1)
     pairs = points.shape[1] // 2
@@ -80,7 +81,7 @@ def add_up(points, neighbours, above, wide, tall, cells):
 
 @loop
 def add_up_back(cells, neighbours, above, wide, tall, points):
-    """Add the value of each cell to its points."""
+    """Add the value of each cell in `cells` to its points; the transpose of `add_up`."""
     pairs, height = points.shape[1] // 2, 1 if tall is None else 2
     for j in range(points.shape[0]):
         cell, out = row_of(cells, neighbours, (j + above) // height), points[j]
@@ -97,7 +98,7 @@ def add_up_back(cells, neighbours, above, wide, tall, points):
 
 @loop
 def interpolate_cells(cells, neighbours, above, wide, tall, known, points):
-    """Add to each point `1 - known` times the interpolation between cells."""
+    """Add `1 - known` times the linear interpolation between `cells` to each point of `points`."""
     pairs, columns = points.shape[1] // 2, cells.shape[1]
     line = np.empty(columns + 2, np.float32)
     for j in range(points.shape[0]):
@@ -127,7 +128,7 @@ def interpolate_cells(cells, neighbours, above, wide, tall, known, points):
 
 @loop
 def gather_cells(known, known_neighbours, points, neighbours, above, wide, tall, cells):
-    """Add up `1 - known` times the values of points in cells, by the weights of the interpolation."""
+    """Add `1 - known` times the values in `points` to `cells`, by the weights of the interpolation."""
     count, columns = points.shape[1], cells.shape[1]
     width, height = columns if wide is None else 2 * columns, 1 if tall is None else 2
     line = np.empty(width + 2, np.float32)
@@ -164,8 +165,8 @@ Map = NDArray[Any]
 class CellLevel:
     """Sums over cells, interpolation between them, and the transposes of both, for one step of `pyramid`.
 
-    Maps hold the rows of this rank. `known` marks points that interpolation leaves unchanged. All but `add_up` add
-    to their last map. Collective.
+    Maps hold the rows of this rank. `known` marks points that interpolation leaves unchanged. All methods except
+    `add_up` add their result to their last argument. Collective.
     """
 
     step: regrid.PyramidStep
@@ -212,12 +213,16 @@ class CellLevel:
 
 
 def cell_levels(slab: Slab, pairs: int = 0) -> list[CellLevel]:
-    """Return all levels of a grid up to a single cell, the finest first; the first `pairs` levels join pairs."""
+    """Return the steps from a grid to coarser ones up to a single cell, the finest first. The first `pairs` steps join
+    pairs of cells, all others two by two.
+    """
     return [CellLevel(step) for step in regrid.pyramid_steps(slab, pairs)]
 
 
 def interpolate(levels: list[CellLevel], known: list[Map], maps: list[Map]) -> None:
-    """Interpolate from the largest cells down to points, adding each grid to the next finer one; collective."""
+    """Interpolate from the largest cells down to points, and add the result of each grid to the next finer one;
+    collective.
+    """
     for k, level in reversed(list(enumerate(levels))):
         level.interpolate(maps[k + 1], known[k], maps[k])
 
@@ -234,8 +239,9 @@ Maps = list[NDArray[Any]]  # a map of points, followed by maps of cells on each 
 
 
 class Grids(NamedTuple):
-    """Grids of larger cells: at most `most`, None for all; the first of them double cells along one side, `pairs` times
-    (`cell_levels`)."""
+    """Coarser grids for a preconditioner: at most `most`, or all if it is None. The first `pairs` of them double cells
+    along one side only (`cell_levels`).
+    """
 
     most: int | None = None
     pairs: int = 0
@@ -245,11 +251,10 @@ ALL = Grids()
 
 
 def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
-    """Return the grids of larger cells for points at distances dx and dy.
+    """Return the coarser grids to use for points at the distances dx and dy.
 
-    Where points are closer along one direction, cells are doubled along it first, until they are about square.
-    Points further away than `reach` do not act on each other: square cells have at most about this length, or twice
-    that of points.
+    If dx and dy differ, cells are first doubled along the shorter side until they are about square. Points further
+    apart than `reach` do not interact: cells are not enlarged beyond this length, or twice the point distance.
     """
     if max(dx, dy) > LONG * min(dx, dy):
         return Grids(0)
@@ -260,9 +265,10 @@ def grids_for(dx: float, dy: float, reach: float = math.inf) -> Grids:
 
 
 class ExtendedPreconditioner:
-    """K on a set with the extension E. It holds two maps in single precision on each grid of larger cells.
+    """Preconditioner K on a set of points, with residuals extended by E. It holds two maps in single precision on each
+    coarser grid.
 
-    `known` is `w/(w + f)` of each cell; for points it is the set.
+    `known` is `w/(w + f)` of each cell; on the finest grid it marks the set.
     """
 
     def __init__(self, slab: Slab, larger: Grids = ALL) -> None:
@@ -308,7 +314,9 @@ class ExtendedPreconditioner:
 
 
 def lengths(points: int, level: int) -> NDArray[np.float32]:
-    """Return the number of points of each cell along one direction; the last cell may have fewer."""
+    """Return the number of grid points in each cell of a level along one direction with `points` points; the last cell
+    may have fewer.
+    """
     length = 1 << max(level, 0)
     return np.diff(np.minimum(np.arange(0, points + length, length), points)).astype(np.float32)
 

@@ -18,7 +18,7 @@ from .constraint import Box
 
 
 class Operator(Protocol):
-    """Linear map of fields; `out` may be `field`. Applying it is collective."""
+    """Linear operator on maps. `out` may be the map `field` itself. Applying it is collective."""
 
     def apply(self, field: Array, out: Array) -> Array: ...
 
@@ -38,7 +38,7 @@ class MeanPressure:
 
     @property
     def mean(self) -> float | None:
-        """The prescribed mean pressure."""
+        """Return the prescribed mean pressure."""
         return self.value
 
 
@@ -72,7 +72,7 @@ class Problem:
 class Contact:
     """A contact, solved or given up. Maps have the shape (rows of this rank, nx).
 
-    `p` is the map that was given as the start. `u = A p` belongs to the solver and is valid until its next solve.
+    `p` is the array that was passed as the start. `u = A p` is an array of the solver, overwritten by the next solve.
     `failure` is empty, or states why the tolerance was not reached.
     """
 
@@ -94,13 +94,16 @@ LOOSE = 1e-5  # accuracy: least tolerance on a certificate with directions in si
 
 
 def precision_of_directions(tolerance: float, loose: float = LOOSE) -> type[np.floating]:
-    """Return the type of maps of directions for a solver with this tolerance."""
+    """Return the floating-point type of search directions for a solver with this tolerance."""
     return np.float32 if tolerance >= loose else np.float64
 
 
 def reachable_certificate(slab: Slab, lengths: Sequence[Array], p: Array, compliance: float, length: float) -> float:
-    """Return the smallest certificate, over `length`, that the rounding of maps of lengths and of p allows; collective.
-    An error in the last digit of p moves the body by this digit times the largest `compliance`."""
+    """Return the smallest certificate that rounding allows, with gaps divided by `length`; collective.
+
+    `lengths` are the maps of heights and displacements. A rounding error of p moves the body by this error times the
+    largest `compliance`.
+    """
     sizes = slab.reduce((), [float(np.abs(each).max(initial=0.0)) for each in (*lengths, p)])
     sizes[-1] *= compliance
     return ROUNDINGS * float(np.finfo(lengths[0].dtype).eps) * max(sizes) / length
@@ -109,11 +112,11 @@ def reachable_certificate(slab: Slab, lengths: Sequence[Array], p: Array, compli
 class Workspace:
     """A pressure, two displacements, a search direction, and one byte per point.
 
-    The scene makes one and passes it to all that need a map temporarily. A solve overwrites all maps and leaves `A p`
-    in `displacement`, valid until the next one. Read maps as attributes at each use: they may be swapped or replaced.
+    All solvers of a run share one workspace. A solve overwrites all maps and leaves `A p` in `displacement`, valid
+    until the next solve. Read maps as attributes at each use: they may be swapped or replaced.
 
-    Parameters: `kept`, the type of displacements, single precision if the operator has no more digits; `tolerance` of
-    solves, which decides the precision of directions.
+    Parameters: `kept`, the type of displacements, single precision if the operator is; `tolerance` of solves, which
+    decides the precision of directions.
     """
 
     def __init__(self, slab: Slab, tolerance: float, kept: type[np.floating] = np.float64) -> None:

@@ -6,17 +6,16 @@ squares of `C R (A x - h)` is smallest (R: restrict to c, C: subtract the mean o
 to 0, x is scaled to the load, and A is applied to it, so that the stored changes have exact images. A need not be
 symmetric. Convergence is not guaranteed: a solve is given up when its certificate no longer halves.
 
-In a free box (`FreeSteadySolver`) proximal points follow where these steps do not help. The symbol of a padded box has
-waves with a negative real part, so that its resolvents may not exist (`splitting`). There the contact is the limit of
-contacts with less loss: with S symmetric and positive, the contact p' of the operator `A + S` for heights `h + S p`
-satisfies
+In a free box (`FreeSteadySolver`) the method of proximal points follows where these steps do not help. The symbol of a
+padded box has waves with a negative real part, so that its resolvents may not exist (`splitting`). There the contact is
+the limit of contacts with less loss: with S symmetric and positive, the contact p' of the operator `A + S` for heights
+`h + S p` satisfies
 
     A p' - h - d = S (p - p') where there is pressure,
 
-which is the contact for A and h when p' = p. As A is positive, each step reduces the error of p, measured by S, also
-if p' is only accurate to a share of the change (proximal points: R. T. Rockafellar, SIAM J. Control Optim. 14 (1976)
-877). S is the smallest that limits the loss tangent of `A + S` to 1: `|Im A| - Re A` for waves whose tangent is
-larger, 0 for the others.
+which is the contact for A and h when p' = p. As A is positive, each step reduces the error of p in the norm of S, also
+if p' is inexact (R. T. Rockafellar, SIAM J. Control Optim. 14 (1976) 877). S is the smallest that limits the loss
+tangent of `A + S` to 1: `|Im A| - Re A` for waves whose tangent is larger, 0 for the others.
 """
 
 import math
@@ -40,10 +39,10 @@ DIRECTIONS = 3  # the residual and the last two changes
 
 
 class Projected:
-    """Projected steps on one grid. It holds DIRECTIONS maps t, their images w, the displacement, a byte per point, and
-    the maps of `ExtendedPreconditioner`.
+    """Solver by projected steps on one grid. It holds DIRECTIONS maps of steps, their images, the displacement, a byte
+    per point, and the maps of `ExtendedPreconditioner`.
 
-    `grids` are those of the extension (`preconditioner.grids_for`).
+    `grids` are the coarser grids of the extension (`preconditioner.grids_for`).
     """
 
     def __init__(self, judge: Judge, operator: Operator, preconditioner: Operator, grids: Grids = ALL) -> None:
@@ -82,7 +81,7 @@ class Projected:
         return self._certify(h, mean, p)
 
     def forget(self) -> None:
-        """Forget earlier changes."""
+        """Discard the stored changes of earlier steps."""
         for field in (*self.t, *self.w):
             field.fill(0.0)
 
@@ -179,7 +178,7 @@ def _move(working, along_a, along_b, along_c, a, b, c, x):
 
 @loop
 def gaps_on(working, u, h):
-    """Return the number of points of the set, and the sum of `u - h` over it."""
+    """Return the number of points in the set `working`, and the sum of `u - h` over them."""
     count, total = 0.0, 0.0
     for j in range(u.shape[0]):
         row_count, row_total = 0.0, 0.0
@@ -212,8 +211,9 @@ Symbol = NDArray[np.inexact]
 
 
 class FreeSteadySolver:
-    """Solver on one grid with the interface of `SteadySolver`. It holds the maps of `Projected`; where that fails, also
-    those of `_Points`."""
+    """Solver of steady sliding in a free box, with the methods of `SteadySolver`. It holds the maps of `Projected`; if
+    projected steps fail, also the maps of `_Points`.
+    """
 
     def __init__(
         self, judge: Judge, operator: Convolution, preconditioner: Convolution, tolerance: float, grids: Grids
@@ -223,7 +223,7 @@ class FreeSteadySolver:
         self._projected = Projected(judge, operator, preconditioner, grids)
 
     def hold_all(self) -> "_Points":
-        """Allocate all maps that a solve may need."""
+        """Allocate all maps that a solve may need, and return their solver."""
         return _Points(self._judge, self._operator, self._preconditioner, self._grids)
 
     def solve(self, h: Array, mean: float, start: Array) -> Contact:
@@ -247,7 +247,8 @@ class _Points:
         self._working: NDArray[Any] = judge.slab.zeros(np.bool_)
 
     def solve(self, h: Array, mean: float, start: Array, tolerance: float) -> Contact:
-        """Solve as `FreeSteadySolver.solve`; `steps` is the sum over all contacts. Collective."""
+        """Solve as `FreeSteadySolver.solve`, to `tolerance`. The result counts the steps of all contacts. Collective.
+        """
         worst, best, since, share, steps = 1.0, math.inf, 0, SHARE, 0
         while True:
             self._kept[...] = start

@@ -60,12 +60,12 @@ NOT_FINITE = "met numbers that are not finite"
 
 
 class ContactSolver:
-    """Solver for contacts on one grid.
+    """Conjugate-gradient solver of frictionless contacts on one grid.
 
-    Parameters: `workspace`, the maps it works in; `height` of the surface, from its lowest to its highest point
-    [unit of h]; `tolerance` on the certificate; `max_iterations`; `grids` of larger cells for the extension of
-    residuals (`preconditioner.grids_for`); `free`, True for a box with nothing around it; `long_waves` of a layer, for
-    which K is not stiff enough.
+    Parameters: `workspace`, the maps for all its intermediate results; `height` of the surface, from its lowest to its
+    highest point [unit of h]; `tolerance` on the certificate; `max_iterations`; `grids` of larger cells for the
+    extension of residuals (`preconditioner.grids_for`); `free`, True for a box that does not repeat; `long_waves`, the
+    compliance of a layer, for which K is too soft.
     """
 
     def __init__(
@@ -88,11 +88,12 @@ class ContactSolver:
         self._most_ratio = MAX_STEP_RATIO_FREE if free or long_waves is not None else MAX_STEP_RATIO
 
     def solve(self, problem: Problem, start: Array, tolerance: float | None = None) -> Contact:
-        """Solve from the admissible pressure `start`, which is overwritten by the solution; collective.
+        """Solve a contact problem from the admissible pressure `start`, which is overwritten by the solution;
+        collective.
 
         Under load control the start is scaled to the load, or replaced by a uniform pressure if it is 0 everywhere.
-        `tolerance` replaces the tolerance of the solver. If it is not reached, `failure` states why, and the maps
-        hold the last iterate.
+        `tolerance` replaces the tolerance of the solver. If the tolerance is not reached, `failure` of the contact
+        states why, and the maps hold the last iterate.
         """
         mean = problem.control.mean
         if mean is not None and 0.0 <= mean < LEAST_LOAD:
@@ -123,8 +124,9 @@ class ContactSolver:
                 slope = 0.0
 
     def check(self, problem: Problem, p: Array, otherwise: str) -> Contact:
-        """Scale the admissible pressure p to the load and certify it. The contact has the failure `otherwise` unless p
-        solves the problem; collective."""
+        """Scale the admissible pressure p to the load, and return the contact with its certificate; collective. If p
+        does not solve the problem, `otherwise` is the reason of failure.
+        """
         iterate = self._begin(problem, p)
         *_, certificate = self._certify(problem, p, iterate)
         failure = "" if certificate.worst <= self.tolerance else otherwise

@@ -8,8 +8,8 @@ mean P0, or (1 + gamma A)^-1 (x + gamma d), with J_c the pressure of `Constraint
 
 (J. Douglas, H. H. Rachford, Trans. Amer. Math. Soc. 82 (1956) 421; P.-L. Lions, B. Mercier, SIAM J. Numer. Anal. 16
 (1979) 964). It converges for every gamma > 0 and every A with a real part >= 0, also for very large loss tangents.
-gamma is a multiple of pressure over displacement of the start, and over its closing as well if the start is near the
-solution: in light contact the law is softer than the body. From the start
+gamma is a multiple of the pressure of the start divided by its displacement, or by the sum of its displacement and
+closing if the start is near the solution: in light contact the law is softer than the body. The first map is
 
     s = p + gamma c(p) - gamma h where there is pressure,    s = -gamma (A p - d) elsewhere.
 
@@ -19,11 +19,11 @@ Anderson acceleration takes the last changes ds_j of s and df_j of f into accoun
 
 with the relaxation R (D. G. Anderson, J. ACM 12 (1965) 547; H. F. Walker, P. Ni, SIAM J. Numer. Anal. 49 (2011) 1715).
 Without earlier changes this is the plain iteration, relaxed. Changes are stored in single precision: s is advanced by
-the change that is stored. Earlier changes are forgotten where f rises or stalls. The mean of p may be off the load by
-decades on the way; to return s to the load there, with or without earlier changes, makes solves fail.
+the change that is stored. Earlier changes are forgotten where f rises or stalls. The mean of p may differ from the load
+by decades before convergence; solves fail if s is then rescaled to the load.
 
-Only the certificate of an admissible pressure with the displacement `A p + c(p)` ends a solve. As it takes an
-application of A, it is made when the rms of f is small enough, judged by the last certificate over the rms of f.
+Only the certificate of an admissible pressure with the displacement `A p + c(p)` ends a solve. As a certificate takes
+an application of A, it is computed when the rms of f is small enough, judged by the last ratio of certificate to rms.
 
 For a lossy body sliding at constant velocity, seen from the rigid surface, A is positive but not symmetric, and there
 is no energy to minimize. `SteadySolver` solves this contact in a periodic box. In light contact, and from a start that
@@ -53,7 +53,8 @@ TRACE_SHARE = 1e-8  # accuracy: share of the mean square of changes that is adde
 
 
 class Acceleration:
-    """Acceleration on one grid. It holds the residual and, in single precision, DEPTH changes of s and of f."""
+    """Anderson acceleration on one grid. It holds the residual f and, in single precision, DEPTH changes of s and of f.
+    """
 
     def __init__(self, slab: Slab) -> None:
         self.slab, self.f = slab, slab.empty()
@@ -62,13 +63,13 @@ class Acceleration:
         self.forget()
 
     def forget(self) -> None:
-        """Forget all changes of s and f."""
+        """Discard the stored changes of s and f."""
         self._gram = np.zeros((DEPTH, DEPTH))
         self._count, self._last = 0, -1  # number of complete changes, and place of the last change of s
         self._against = np.zeros(DEPTH)
 
     def residual(self, y: Array, p: Array, shift: float) -> float:
-        """Put `y + shift - p` into the residual, and its change into the history. Return its rms; collective."""
+        """Compute the residual `f = y + shift - p` and store its change. Return its rms; collective."""
         if self._last < 0:
             square = self.slab.sum(_first(y, p, shift, self.f))[0]
             return math.sqrt(square / self.slab.points)
@@ -79,7 +80,7 @@ class Acceleration:
         return math.sqrt(square / self.slab.points)
 
     def advance(self, s: Array, plain: bool) -> None:
-        """Advance s, without earlier changes if `plain`."""
+        """Replace s by the next iterate; `plain` switches acceleration off."""
         theta = _smallest(self._gram, self._against, 0 if plain else self._count)
         self._last = (self._last + 1) % DEPTH
         _advance(s, self.f, self._ds, self._df, theta, self._last)
@@ -172,11 +173,12 @@ PLAIN, PLAIN_AFTER_STALL = 3, 25  # tuning: steps without acceleration that foll
 
 
 class Splitting:
-    """Solver on one grid.
+    """Solver of steady contact by accelerated splitting on one grid.
 
-    `operator` is A, not that of a free box, whose padded symbol has waves with a negative real part; `inverse` K is
-    near its inverse; `tolerance` on the certificate; `most` limits the steps. Laws and pressures are in the units of A.
-    It holds two maps, a byte per point, the maps of `Acceleration` and, during a solve, a symbol.
+    `operator` is A of a periodic box (the padded operator of a free box has waves with a negative real part), and
+    `inverse` K is near its inverse. `tolerance` limits the certificate, `most` the number of steps. Laws and pressures
+    are in the units of A. It holds two maps, a byte per point, the maps of `Acceleration` and, during a solve, a
+    symbol.
     """
 
     def __init__(self, judge: Judge, operator: Convolution, inverse: Operator, tolerance: float, most: int) -> None:
@@ -187,17 +189,17 @@ class Splitting:
         self._acceleration = Acceleration(self.slab)
 
     def resolvent(self, gamma: float) -> Convolution:
-        """Return `(1 + gamma A)^-1`."""
+        """Return the operator `(1 + gamma A)^-1`."""
         return self.operator.mapped(lambda symbol: 1.0 / (1.0 + gamma * symbol), self.operator.dtype)
 
     def solve(
         self, h: Array, control: Control, law: Constraint, start: Array, tolerance: float | None = None
     ) -> Contact:
-        """Solve for heights h from the pressure `start`, which is overwritten by the solution; collective. `tolerance`
-        replaces the tolerance of the solver.
+        """Solve for heights h from the pressure `start`, which is overwritten by the solution; collective.
 
-        A start that is 0 everywhere is replaced by the pressure of full contact, lowered to the load. A prescribed mean
-        pressure must be positive. The displacement `u = A p` of the contact is without the closing.
+        `tolerance` replaces the tolerance of the solver. A start that is 0 everywhere is replaced by the pressure of
+        full contact, lowered to the load. A prescribed mean pressure must be positive. The displacement of the result
+        is `u = A p`, without the closing.
         """
         given, p, steps = _Given(h, control, law, tolerance or self.tolerance), start, 0
         cold = self._begin(given, p)
@@ -295,8 +297,9 @@ class _Given(NamedTuple):
     tolerance: float
 
     def shift(self, by_approach: float, mean: float) -> float:
-        """Return what is added to `(1 + gamma A)^-1 (2 p - s)`, which has this `mean`, to make J_A; `by_approach` is
-        the result for `gamma d` with d = 1."""
+        """Return the constant that is added to `(1 + gamma A)^-1 (2 p - s)`, which has this `mean`, to make J_A.
+        `by_approach` is `(1 + gamma A)^-1 (gamma d)` for d = 1.
+        """
         return by_approach * self.control.value if self.control.mean is None else self.control.mean - mean
 
 
@@ -316,7 +319,7 @@ class _Guard:
         self._least, self._since, self.plain = math.inf, 0, 0
 
     def distrusts(self, rms: float) -> bool:
-        """Return whether earlier changes are to be forgotten: the rms has risen, or no longer falls."""
+        """Return True if earlier changes must be discarded: the rms of f has risen, or no longer falls."""
         self.plain -= 1
         self._since = 0 if rms < self._least else self._since + 1
         stalls = self._since > STALLED
@@ -333,12 +336,11 @@ PATIENCE = 5  # tuning: limit on projected steps in which the certificate must h
 
 
 class SteadySolver:
-    """Solver on one grid. It holds the maps of `Projected` while it makes projected steps, and those of `Splitting`
-    afterwards.
+    """Solver of steady sliding in a periodic box. It holds the maps of `Projected` while it makes projected steps, and
+    those of `Splitting` afterwards.
 
     Parameters: `operator` A; `preconditioner` K near its inverse; `tolerance` on the certificate; `most`, a limit on
-    steps of the splitting; `grids` of larger cells for projected steps
-    (`preconditioner.grids_for`).
+    the steps of `Splitting`; `grids`, the coarser grids of projected steps (`preconditioner.grids_for`).
     """
 
     def __init__(
@@ -354,7 +356,7 @@ class SteadySolver:
         self.tolerance, self.most, self.grids = tolerance, most, grids
 
     def hold_all(self) -> tuple[Splitting, Convolution]:
-        """Allocate all maps that a solve may need: projected steps need fewer."""
+        """Allocate and return all maps that a solve may need; projected steps alone need fewer."""
         splitting = Splitting(self.judge, self.operator, self.preconditioner, self.tolerance, self.most)
         return splitting, splitting.resolvent(1.0)
 

@@ -10,12 +10,12 @@ touch only if
 
     u - max(h) - d < MARGIN L,
 
-with L the length by which u varies within the contact (`measures.Certificate`). Tiles with such blocks, with blocks
-under pressure, or with neighbours of these are stacked to one map. There `ContactSolver` solves the same problem with
-operators on tiles (`physics.convolution`). These also give the displacement at all points of the grid, so that
-`ContactSolver.check` can check the pressure everywhere. For tolerances below FINEST, or if the check fails, the
-operator of the whole grid checks the pressure, and the solve continues on the whole grid. Root solves and sends the
-result to all ranks.
+with L the length by which u varies within the contact (`measures.Certificate`). Tiles of 32 x 32 points with such
+blocks, with blocks under pressure, or with neighbours of these blocks are stacked to one map. There `ContactSolver`
+solves the same problem with operators on tiles (`physics.convolution`). These also give the displacement at all points
+of the grid, so that `ContactSolver.check` can check the pressure everywhere. For tolerances below FINEST, or if the
+check fails, the operator of the whole grid checks the pressure, and the solve continues on the whole grid. Root solves
+and sends the result to all ranks.
 
 A failed solve is repeated with an operator in double precision, from a cold start on nested grids, and by an active set
 (`solve_by_sets`). A solve that succeeds neither calls nor allocates anything for this. The attempts depend on the
@@ -44,14 +44,14 @@ from .solver import ContactSolver
 
 @dataclass(frozen=True)
 class Level:
-    """One grid: its slab and the heights on it."""
+    """One grid of a sequence: its slab and the heights on it."""
 
     slab: Slab
     heights: Array
 
 
 def coarser_levels(slab: Slab, heights: Array) -> list[Level]:
-    """Return a grid and all coarser ones, the finest first; collective."""
+    """Return a grid with `heights` and all coarser grids, the finest first; collective."""
     levels = [Level(slab, heights)]
     while (coarse := regrid.coarser(levels[-1].slab)) is not None:
         levels.append(Level(coarse, regrid.restrict(levels[-1].slab, coarse, levels[-1].heights)))
@@ -59,7 +59,7 @@ def coarser_levels(slab: Slab, heights: Array) -> list[Level]:
 
 
 class OnGrid(Protocol):
-    """An object that belongs to a grid."""
+    """Object that belongs to a grid, given by its slab."""
 
     @property
     def slab(self) -> Slab: ...
@@ -69,10 +69,10 @@ L = TypeVar("L", bound=OnGrid)
 
 
 def descend(levels: Sequence[L], solve: Callable[[L, Array], Array], start: Array) -> None:
-    """Put a start for the finest grid into `start`: the solution on the next coarser grid, or 0 if there is none.
+    """Put a start for the first, finest of `levels` into `start`; collective.
 
-    `solve(level, start)` returns the pressure on a level. If it is not finite, the next level starts from 0.
-    Collective.
+    Levels are solved from the coarsest up to the second: `solve(level, start)` returns the pressure on a level from
+    that start. The next level starts from this pressure, or from 0 if there is none or if it is not finite.
     """
     below: tuple[L, Array] | None = None
     for level in reversed(levels):
@@ -102,7 +102,7 @@ SolverOnTiles = Callable[[Tiles, float], tuple[ContactSolver, TileOperator, Tile
 
 @dataclass(frozen=True)
 class Found:
-    """Contact on a grid: pressure on the rows of this rank, approach, and the length L of its certificate."""
+    """Contact found on a grid: pressure on the rows of this rank, approach, and the reference length of its gaps."""
 
     slab: Slab
     p: Array
@@ -111,7 +111,7 @@ class Found:
 
 
 def is_block_grid(slab: Slab, finest: Slab) -> bool:
-    """Return whether a grid is coarse enough for blocks, each within one tile of the finest grid."""
+    """Return True if a grid is coarse enough for blocks, each within one tile of the `finest` grid."""
     longest = max(slab.nx, slab.ny)
     return longest <= max(BLOCKS, max(finest.nx, finest.ny) // SIDE)
 
@@ -119,8 +119,9 @@ def is_block_grid(slab: Slab, finest: Slab) -> bool:
 def choose_tiles(
     blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array, box: Box
 ) -> Tiles | None:
-    """Return the tiles of a grid that may touch, given the contact `below` on the next coarser grid; collective. Return
-    None if there are none, or if they have more than LARGEST_SHARE of the points."""
+    """Return the tiles of a grid that may touch, given the contact `below` on the next coarser grid; None if no tile
+    may touch, or if the tiles hold more than LARGEST_SHARE of the points. Collective.
+    """
     most = LARGEST_SHARE * slab.points / SIDE**2
     p = below.p if below.slab is blocks else regrid.restrict(below.slab, blocks, below.p)
     touching = box.touches(p) != 0.0
@@ -165,7 +166,7 @@ class OnTheseTiles:
         self._stacked: Array = np.empty(0)
 
     def solve(self, tolerance: float, p: Array) -> Found:
-        """Solve from the pressure p, which is overwritten by the solution; collective."""
+        """Solve the contact on the tiles from the pressure p, which is overwritten by the solution; collective."""
         slab, tiles, problem = self._slab, self._tiles, self._problem
         lowest = -slab.reduce((), [-float(problem.heights.min(initial=np.inf))])[0]
         heights, start = (_stacked(slab, tiles, each) for each in (problem.heights, p))
@@ -184,8 +185,11 @@ class OnTheseTiles:
         return Found(slab, p, d, length)
 
     def check(self, solver: ContactSolver, p: Array) -> Contact | None:
-        """Return the contact of the solution p if it satisfies the solver's tolerance at all points, else None;
-        collective. Below the tolerance FINEST it is None, too: the operator of the whole grid is needed to check p."""
+        """Return the contact of the solution p if it meets the solver's tolerance at all points of the grid, else None;
+        collective.
+
+        For tolerances below FINEST the result is always None: p must be checked by the operator of the whole grid.
+        """
         if solver.tolerance < FINEST:
             return None
         self._displace(solver.workspace.displacement)
@@ -275,11 +279,11 @@ SolverOn = Callable[[Slab, float], tuple[ContactSolver, Operators]]  # makes a s
 def prepare_start(
     solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: SolverOnTiles | None = None
 ) -> Contact | None:
-    """Put a start into `start`, which is 0, on a grid of at least WORTHWHILE points; collective.
+    """Put a start into the map `start`, which is 0, if the grid has at least WORTHWHILE points; collective.
 
-    Operator calls on other grids and on tiles are counted by their share of the points. With operators `on_tiles` a
-    dilute contact is solved on these, to the solver's tolerance on the finest grid, and returned if it satisfies the
-    tolerance at all points. The constraint must then admit a pressure of 0.
+    Operator calls on other grids and on tiles are counted by their share of the points. With operators `on_tiles`, a
+    dilute contact is solved on tiles to the solver's tolerance, and returned if it meets the tolerance at all points;
+    otherwise the result is None. The constraint must then admit a pressure of 0.
     """
     if solver.slab.points < WORTHWHILE:
         return None
@@ -289,8 +293,9 @@ def prepare_start(
 def start_on_coarse_grids(
     solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: SolverOnTiles | None = None
 ) -> tuple[int, Contact | None]:
-    """Solve loosely on coarser grids and put the resulting start into `start`, 0 if there is none; collective. Return
-    the number of grids, and the contact if it was solved on tiles and satisfies the tolerance at all points."""
+    """Solve loosely on coarser grids and put the resulting start, or 0, into `start`; collective. Return the number of
+    grids, and the contact if it was solved on tiles and meets the tolerance at all points, else None.
+    """
     levels = coarser_levels(solver.slab, problem.heights)
     descent = _Descent(solver, problem, solver_on, on_tiles)
     descend(levels, descent.solve, start)
@@ -327,8 +332,9 @@ class _Descent:
         return contact.p
 
     def solve_finest(self, level: Level, p: Array) -> Contact | None:
-        """Solve on tiles of the finest grid, starting from p, if these are few. Return the contact if it satisfies the
-        tolerance at all points."""
+        """Solve on tiles of the finest grid, starting from p, if there are few tiles. Return the contact if it meets
+        the tolerance at all points, else None.
+        """
         if (chosen := self._tiles_of(level)) is None:
             return None
         solved = self._solve_on(chosen, level, max(SHARE * self._solver.tolerance, LEAST), p)
@@ -370,12 +376,12 @@ GAP_SHARE = 0.1  # tuning: largest gap on a set to which its linear problem is s
 def solve_by_sets(solver: ContactSolver, problem: Problem, start: Array) -> Contact:
     """Solve as `ContactSolver.solve` by a primal-dual active set, for a load that is not 0; collective.
 
-    On a set of points contact is a linear problem, `A x = h + d` with x at its bound elsewhere, solved by
-    preconditioned conjugate gradients. Then points with an x that is not admissible leave the set, and points whose
-    gap violates its condition enter it (M. Hintermueller, K. Ito and K. Kunisch, SIAM J. Optim. 13 (2003) 865). A few
-    sets are usual, but sets may cycle. `ContactSolver.solve` is cheaper where it works. It changes its set in every
-    step and never accumulates conjugate directions, and it is slow where the preconditioner is far from an inverse, as
-    on cells much longer than wide. `iterations` of the contact counts iterations of the linear problems.
+    On a known set of points contact is the linear problem `A x = h + d`, with x at its bound elsewhere, solved by
+    preconditioned conjugate gradients. Then points where x is not admissible leave the set, and points whose gap
+    violates its condition enter the set (M. Hintermueller, K. Ito and K. Kunisch, SIAM J. Optim. 13 (2003) 865). A few
+    sets are usual, but sets may cycle. `ContactSolver.solve` is cheaper where it works, but slow where the
+    preconditioner is far from an inverse, as on cells much longer than wide: it changes its set in every step.
+    `iterations` of the contact counts iterations of the linear problems.
     """
     search = _Search(solver, problem, start)
     contact, iterations = solver.check(problem, start, ""), 0
@@ -404,8 +410,9 @@ class _Search:
         self.members = 0.0
 
     def begin(self, contact: Contact) -> None:
-        """Mark the first set: contact and points that penetrate. If these are all points under a given approach, which
-        may have no solution, mark those that would penetrate the undeformed body."""
+        """Mark the first set: points in contact and points that penetrate. If these are all points under a given
+        approach, for which there may be no solution, mark the points that would penetrate the undeformed body.
+        """
         box = self.problem.constraint
         kernels.mark_working_set(self.x, contact.u, self.h, contact.d, box.lowest, box.highest, self.working)
         if self.load is None and self.slab.sum(float(np.count_nonzero(self.working)))[0] == self.slab.points:
@@ -437,7 +444,7 @@ class _Search:
         return iterations
 
     def next_set(self, u: Array) -> NDArray[np.bool_]:
-        """Return free points of the set, and other points whose gap violates its condition."""
+        """Return the next set: free points of the set, and other points whose gap violates its condition."""
         x, gap, box = self.x, u - self.h - self.d, self.problem.constraint
         free, below = (x > box.lowest) & (x < box.highest), x < box.highest
         return np.where(self.working, free, np.where(below, gap < 0.0, gap > 0.0))
@@ -474,9 +481,9 @@ def retry_solve(
     """Repeat a failed solve in other ways until one succeeds; collective. Return the last contact and the names of the
     attempts.
 
-    `solver_on(slab, tolerance)` makes a solver and operators of the body on another grid; `in_double()` makes those
-    in double precision, and is None if the problem has them. `most` limits the number of attempts. Each is counted
-    as `retry`; `iterations` includes all attempts.
+    `solver_on(slab, tolerance)` makes a solver and operators of the body on another grid. `in_double()` makes a solver
+    and operators in double precision, and is None if the problem already has them. `most` limits the number of
+    attempts. Each is counted as `retry`; `iterations` includes all attempts.
     """
     contact, tried, iterations = failed, list[str](), failed.iterations
     for name, contact in islice(_attempts(solver, problem, failed, solver_on, in_double), most):
