@@ -84,8 +84,7 @@ class Iterate:
 
     def length(self, height: float) -> float:
         """Return the length that gaps are divided by in `Certificate`; at least LEAST_HEIGHT times and at most
-        `height`.
-        """
+        `height`."""
         least = LEAST_HEIGHT * height
         if self.load <= 0.0:
             return least
@@ -141,8 +140,7 @@ def _approaches(slab: Slab, box: Box, p: Array, u: Array, h: Array) -> tuple[flo
 @dataclass(frozen=True)
 class Judge:
     """Certifies pressures on one grid. `height` is the height of the surface; `lines` are given for a body that is
-    stiffer along them, None otherwise.
-    """
+    stiffer along them, None otherwise."""
 
     slab: Slab
     height: float
@@ -152,8 +150,7 @@ class Judge:
         self, p: Array, u: Array, h: Array, control: Control, working: NDArray[np.bool_]
     ) -> tuple[float, Certificate]:
         """Mark the points that a solver changes under an admissible pressure p with displacement u. Return the approach
-        and the certificate of p; collective.
-        """
+        and the certificate of p; collective."""
         slab, given = self.slab, isinstance(control, Approach)
         iterate = form_iterate(slab, Box(), p, u, h, control.value if given else 0.0)
         iterate, mean = (iterate, None) if given else (iterate.settled(), control.value)

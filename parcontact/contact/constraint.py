@@ -43,8 +43,7 @@ class Constraint(Protocol):
 
     def resolve(self, s: Array, h: Array, gamma: float, p: Array, reflected: Array) -> float:
         """Solve `p + gamma c(p) = s + gamma h` at each point and limit p to its bounds; put `2 p - s` into `reflected`.
-        Return the sum of `reflected` on this rank.
-        """
+        Return the sum of `reflected` on this rank."""
 
     def add_closing(self, u: Array, p: Array) -> Array:
         """Return `u + c(p)`; the map u itself if there is no closing."""
@@ -69,8 +68,8 @@ class Box:
         np.clip(p, self.lowest, self.highest, out=p)
 
     def resolve(self, s: Array, h: Array, gamma: float, p: Array, reflected: Array) -> float:
-        """Put `s + gamma h`, limited to the bounds, into p, and `2 p - s` into `reflected`; see `Constraint.resolve`.
-        """
+        """Put `s + gamma h`, limited to the bounds, into p, and `2 p - s` into `reflected`; see
+        `Constraint.resolve`."""
         return float(_resolve_bounds(s, h, gamma, self.lowest, self.highest, p, reflected))
 
     def add_closing(self, u: Array, p: Array) -> Array:

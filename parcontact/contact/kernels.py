@@ -11,8 +11,7 @@ from ..compiled import loop
 @loop
 def contact_sums(p, u, h, d, lowest, highest):
     """Return the sums of p, p u, p g and p u^2 over all points, with `g = u - h - d`, then the sums of `p - lowest` and
-    `(p - lowest) g` over points with p below `highest`.
-    """
+    `(p - lowest) g` over points with p below `highest`."""
     load, work, gaps, squares, free_load, free_gaps = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(p.shape[0]):
         row_load, row_work, row_gaps, row_squares, row_free_load, row_free_gaps = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -72,8 +71,8 @@ def mark_working_set(p, u, h, d, lowest, highest, working):
 
 @loop
 def advance(p_old, t, step, lowest, highest, p):
-    """Put `p_old - step t`, limited to the bounds, into p. Return the sum of p and the sum of |change by the limits|.
-    """
+    """Put `p_old - step t`, limited to the bounds, into p. Return the sum of p and the sum of |change by the
+    limits|."""
     load, cut = 0.0, 0.0
     for j in range(p.shape[0]):
         row_load, row_cut = 0.0, 0.0
@@ -100,8 +99,7 @@ def gap_residual(working, u, h, d, r):
 @loop
 def step_products(working, u, h, d, u_old, z, t):
     """Return the sums over the working set of z, t, c, r z, c z and r t, where `c = u - u_old` and `r = u - h - d`,
-    rounded to the precision of z.
-    """
+    rounded to the precision of z."""
     sum_z, sum_t, sum_change, r_z, change_z, r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(z.shape[0]):
         row_z, row_t, row_change, row_r_z, row_change_z, row_r_t = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

@@ -50,8 +50,7 @@ from .problem import Operator
 @loop
 def row_of(own, neighbours, j):
     """Return row j of a map whose rows `own` are on this rank. `neighbours` holds the rows below row 0 first and the
-    rows above the last row last.
-    """
+    rows above the last row last."""
     if j < 0:
         return neighbours[neighbours.shape[0] + j]
     return own[j] if j < own.shape[0] else neighbours[j - own.shape[0]]
@@ -214,15 +213,13 @@ class CellLevel:
 
 def cell_levels(slab: Slab, pairs: int = 0) -> list[CellLevel]:
     """Return the steps from a grid to coarser ones up to a single cell, the finest first. The first `pairs` steps join
-    pairs of cells, all others two by two.
-    """
+    pairs of cells, all others two by two."""
     return [CellLevel(step) for step in regrid.pyramid_steps(slab, pairs)]
 
 
 def interpolate(levels: list[CellLevel], known: list[Map], maps: list[Map]) -> None:
     """Interpolate from the largest cells down to points, and add the result of each grid to the next finer one;
-    collective.
-    """
+    collective."""
     for k, level in reversed(list(enumerate(levels))):
         level.interpolate(maps[k + 1], known[k], maps[k])
 
@@ -240,8 +237,7 @@ Maps = list[NDArray[Any]]  # a map of points, followed by maps of cells on each 
 
 class Grids(NamedTuple):
     """Coarser grids for a preconditioner: at most `most`, or all if it is None. The first `pairs` of them double cells
-    along one side only (`cell_levels`).
-    """
+    along one side only (`cell_levels`)."""
 
     most: int | None = None
     pairs: int = 0
@@ -315,8 +311,7 @@ class ExtendedPreconditioner:
 
 def lengths(points: int, level: int) -> NDArray[np.float32]:
     """Return the number of grid points in each cell of a level along one direction with `points` points; the last cell
-    may have fewer.
-    """
+    may have fewer."""
     length = 1 << max(level, 0)
     return np.diff(np.minimum(np.arange(0, points + length, length), points)).astype(np.float32)
 

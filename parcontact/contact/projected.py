@@ -212,8 +212,7 @@ Symbol = NDArray[np.inexact]
 
 class FreeSteadySolver:
     """Solver of steady sliding in a free box, with the methods of `SteadySolver`. It holds the maps of `Projected`; if
-    projected steps fail, also the maps of `_Points`.
-    """
+    projected steps fail, also the maps of `_Points`."""
 
     def __init__(
         self, judge: Judge, operator: Convolution, preconditioner: Convolution, tolerance: float, grids: Grids
@@ -247,8 +246,8 @@ class _Points:
         self._working: NDArray[Any] = judge.slab.zeros(np.bool_)
 
     def solve(self, h: Array, mean: float, start: Array, tolerance: float) -> Contact:
-        """Solve as `FreeSteadySolver.solve`, to `tolerance`. The result counts the steps of all contacts. Collective.
-        """
+        """Solve as `FreeSteadySolver.solve`, to `tolerance`. The result counts the steps of all contacts.
+        Collective."""
         worst, best, since, share, steps = 1.0, math.inf, 0, SHARE, 0
         while True:
             self._kept[...] = start

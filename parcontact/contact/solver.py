@@ -125,8 +125,7 @@ class ContactSolver:
 
     def check(self, problem: Problem, p: Array, otherwise: str) -> Contact:
         """Scale the admissible pressure p to the load, and return the contact with its certificate; collective. If p
-        does not solve the problem, `otherwise` is the reason of failure.
-        """
+        does not solve the problem, `otherwise` is the reason of failure."""
         iterate = self._begin(problem, p)
         *_, certificate = self._certify(problem, p, iterate)
         failure = "" if certificate.worst <= self.tolerance else otherwise

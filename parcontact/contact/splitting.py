@@ -53,8 +53,8 @@ TRACE_SHARE = 1e-8  # accuracy: share of the mean square of changes that is adde
 
 
 class Acceleration:
-    """Anderson acceleration on one grid. It holds the residual f and, in single precision, DEPTH changes of s and of f.
-    """
+    """Anderson acceleration on one grid. It holds the residual f and, in single precision, DEPTH changes of s and of
+    f."""
 
     def __init__(self, slab: Slab) -> None:
         self.slab, self.f = slab, slab.empty()
@@ -298,8 +298,7 @@ class _Given(NamedTuple):
 
     def shift(self, by_approach: float, mean: float) -> float:
         """Return the constant that is added to `(1 + gamma A)^-1 (2 p - s)`, which has this `mean`, to make J_A.
-        `by_approach` is `(1 + gamma A)^-1 (gamma d)` for d = 1.
-        """
+        `by_approach` is `(1 + gamma A)^-1 (gamma d)` for d = 1."""
         return by_approach * self.control.value if self.control.mean is None else self.control.mean - mean
 
 

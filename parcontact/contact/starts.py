@@ -120,8 +120,7 @@ def choose_tiles(
     blocks: Slab, operators: Operators, below: Found, slab: Slab, heights: Array, box: Box
 ) -> Tiles | None:
     """Return the tiles of a grid that may touch, given the contact `below` on the next coarser grid; None if no tile
-    may touch, or if the tiles hold more than LARGEST_SHARE of the points. Collective.
-    """
+    may touch, or if the tiles hold more than LARGEST_SHARE of the points. Collective."""
     most = LARGEST_SHARE * slab.points / SIDE**2
     p = below.p if below.slab is blocks else regrid.restrict(below.slab, blocks, below.p)
     touching = box.touches(p) != 0.0
@@ -294,8 +293,7 @@ def start_on_coarse_grids(
     solver: ContactSolver, problem: Problem, start: Array, solver_on: SolverOn, on_tiles: SolverOnTiles | None = None
 ) -> tuple[int, Contact | None]:
     """Solve loosely on coarser grids and put the resulting start, or 0, into `start`; collective. Return the number of
-    grids, and the contact if it was solved on tiles and meets the tolerance at all points, else None.
-    """
+    grids, and the contact if it was solved on tiles and meets the tolerance at all points, else None."""
     levels = coarser_levels(solver.slab, problem.heights)
     descent = _Descent(solver, problem, solver_on, on_tiles)
     descend(levels, descent.solve, start)
@@ -333,8 +331,7 @@ class _Descent:
 
     def solve_finest(self, level: Level, p: Array) -> Contact | None:
         """Solve on tiles of the finest grid, starting from p, if there are few tiles. Return the contact if it meets
-        the tolerance at all points, else None.
-        """
+        the tolerance at all points, else None."""
         if (chosen := self._tiles_of(level)) is None:
             return None
         solved = self._solve_on(chosen, level, max(SHARE * self._solver.tolerance, LEAST), p)
@@ -411,8 +408,7 @@ class _Search:
 
     def begin(self, contact: Contact) -> None:
         """Mark the first set: points in contact and points that penetrate. If these are all points under a given
-        approach, for which there may be no solution, mark the points that would penetrate the undeformed body.
-        """
+        approach, for which there may be no solution, mark the points that would penetrate the undeformed body."""
         box = self.problem.constraint
         kernels.mark_working_set(self.x, contact.u, self.h, contact.d, box.lowest, box.highest, self.working)
         if self.load is None and self.slab.sum(float(np.count_nonzero(self.working)))[0] == self.slab.points:

@@ -1,1 +1,1 @@
-"""From a job to its steps: scene, choices, errors, steps in time, and steady sliding."""
+"""From a job to its steps in time or to steady sliding: objects of the calculation, decisions, and error estimates."""

@@ -1,42 +1,37 @@
-"""The error budget.
+"""The error budget: estimated errors of friction and contact area by source, of one step and of a whole run.
 
-Sources of error: estimates for the solver, time steps, folded branches and the mesh, of friction and contact area.
+The errors of all sources are added. They are calibrated estimates that hold in nearly all scenes; a true error may be
+much smaller. Each source estimates a relative error from numbers of a step, with constants fitted to true errors
+(`constants`). N is the number of spots of contact, and c is the relative excess of the counted over the corrected area.
 
-Each estimates a relative error from numbers of a step; its constants are fitted to true errors (`constants`). c is the
-counted minus the corrected area, over the latter, and N is the number of spots of contact.
+solver: for friction proportional to the `complementarity` C of the certificate (`physics.measures`), and smaller for
+many spots. Where friction is far below the slopes, it is a small difference of large forces: errors of pressures then
+count more, by the root of the ratio, and pressures with the error C may have tangential forces of NOISE C times the
+slopes. For the area: the points that penetrate without pressure, and a small part that varies as C^0.7.
 
-solver: proportional to the `complementarity` C of the certificate (`physics.measures`) for friction, and smaller
-for many
-    spots. Where friction is far below the slopes it is a small difference of large forces: errors of pressures then
-    count more, by the root of the ratio, and pressures with the error C may have tangential forces of this share of the
-    slopes (NOISE). For the area: the points that penetrate without pressure, and a small part that varies as C^0.7.
-time: from the distance by which spots of contact, or waves of the surface, pass in a step, and from the embedded
-pair
-    (`time_error`).
-folded: the bound for the branches without a map; for the area times the open share. mesh: for the area AREA
-c/N^(1/4) while the surface slides and errors of its positions average out, STILL at rest and in
-    steady sliding, at least one cell. For friction in a march VIEWS times the difference of friction by the slopes of
-    the rigid surface and of the body. For steady friction, a sum of squares without cancellation, the loss at edges in
-    waves shorter than the cells, and STEADY_AREA c/N^(1/4). Identical contacts have the same position on the grid:
-    their errors do not average out (N = 1), and those of the area and of steady friction are larger by IDENTICAL.
-    A map lacks waves on a grid with less than FEW_CELLS per shortest wave, with a further error of friction
-    WAVES (4/cells)^2.5.
+time: from the distance by which spots of contact, or waves of the surface, pass in a step, and from the embedded pair
+(`time_error`). folded: the bound for the branches without a map; for the area times the open share.
+
+mesh: for the area AREA c/N^(1/4) while the surface slides and errors of its positions average out; at rest and in
+steady sliding with STILL instead of AREA, and at least one cell. For friction in a march, VIEWS times the difference
+between friction by the slopes of the rigid surface and by the slopes of the body. For steady friction, a sum of squares
+without cancellation, the loss at edges in waves shorter than the cells, and STEADY_AREA c/N^(1/4). Identical contacts
+have the same position on the grid: their errors do not average out (N = 1), and are larger by IDENTICAL for the area
+and for steady friction. A map lacks waves on a grid with less than FEW_CELLS per shortest wave, with a further error of
+friction WAVES (4/cells)^2.5.
 
 Loss at edges: the pressure rises from an edge of contact as the root of the distance, so that the mean square of its
-waves of wavenumber q across the edge falls as q^-3. In steady sliding these lose power in proportion to q^-3 sin
-delta(q v), with the loss angle delta of the body at the frequency with which they pass. For Hertzian contacts of a body
-whose loss angle grows with the frequency, all waves together lose as much as this law gives from a wavenumber q0 on: q0
-= 2/(pi a) for a strip of half width a, q0 = 3/(pi a) for a circle of radius a, from the integrals of J1(x)^2/x and
-j1(x)^2. A mesh of cells of length dx has waves up to Q = pi/dx. The share of the loss in shorter waves is
+waves of wavenumber q across the edge falls as q^-3. In steady sliding at the speed v these waves lose power in
+proportion to q^-3 sin delta(q v), with the loss angle delta of the body at their frequency q v. For Hertzian contacts
+of a body whose loss angle grows with the frequency, all waves together lose as much as this law gives for all
+wavenumbers above q0: q0 = 2/(pi a) for a strip of half width a, q0 = 3/(pi a) for a circle of radius a, from the
+integrals of J1(x)^2/x and j1(x)^2. A mesh of cells of length dx has waves up to Q = pi/dx. The share of the loss in
+shorter waves is
 
     s m = (q0/Q)^2 M(Q v)/M(q0 v),      M(w) = int_0^1 2 t sin delta(w/t) dt,      s = q0/Q.
 
-Far below the frequencies of the body m is 1, and the share is of first order in the cell; far above m is s^2.
-
-The error budget: estimated errors of friction and contact area by source, of a step and of a whole run.
-
-The errors of the sources (`sources`) are added. They are calibrated estimates that hold in nearly all scenes; a true
-error may happen to be much smaller.
+Far below the relaxation frequencies of the body m is 1, and the share is of first order in the cell; far above m is
+s^2.
 """
 
 import math
@@ -97,7 +92,7 @@ class ErrorPair:
 
 @dataclass(frozen=True)
 class ErrorSource:
-    """A source of error: its name, a remedy, and a function that gives its errors for an observation."""
+    """A source of error: its name, a remedy, and a function that returns its errors of friction and area for a step."""
 
     name: str
     remedy: str
@@ -106,7 +101,7 @@ class ErrorSource:
 
 
 def solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the errors by the solve of a step."""
+    """Return the errors of friction and area that the tolerance of a step's solve causes."""
     certificate, ratio = observed.complementarity, observed.slope / observed.body if observed.body else 0.0
     friction = SOLVER.value * certificate * math.sqrt(max(1.0, ratio)) * mean_over_spots(run, observed)
     noise = NOISE.value * max(certificate, ROUNDING) * ratio / math.sqrt(count_spots(run, observed))
@@ -114,7 +109,7 @@ def solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 
 
 def steady_solver_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the errors by the solve of a state of steady sliding, whose friction is a sum of squares."""
+    """Return the errors that the solve of a state of steady sliding causes; its friction is a sum of squares."""
     friction = SOLVER.value * max(observed.complementarity, ROUNDING) * mean_over_spots(run, observed)
     return ErrorPair(friction, _solver_of_area(observed))
 
@@ -124,8 +119,8 @@ def _solver_of_area(observed: StepObservation) -> float:
 
 
 def steps_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the errors by the length of a step, including a rise of friction within it. The error that a body states
-    itself is also the one of the area."""
+    """Return the errors that the length of a step causes, including a rise of friction within the step. If the body
+    states its own error, the area has this error, too."""
     error = time_error(run, observed)
     if observed.own_error is not None:
         return ErrorPair(error, error)
@@ -133,18 +128,18 @@ def steps_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
 
 
 def folded_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the bound on the errors by folded branches."""
+    """Return the bound on the errors that folded branches cause."""
     return ErrorPair(run.folded, run.folded * (1.0 - observed.area))
 
 
 def mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the errors by the mesh in a step of a march."""
+    """Return the errors that the mesh causes in a step of a march."""
     friction = VIEWS.value * observed.friction_mismatch / observed.body if observed.body else 0.0
     return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(AREA if any(observed.way) else STILL, run, observed))
 
 
 def steady_mesh_error(run: RunProperties, observed: StepObservation) -> ErrorPair:
-    """Return the errors by the mesh of a state of steady sliding."""
+    """Return the errors that the mesh causes in a state of steady sliding."""
     correction = observed.correction * mean_over_spots(run, observed)
     friction = _grow_if_identical(run) * (lost_at_edges(run, observed) + STEADY_AREA.value * correction)
     return ErrorPair(friction + _lacking_waves(run), _mesh_of_area(STILL, run, observed))
@@ -168,8 +163,8 @@ def _grow_if_identical(run: RunProperties) -> float:
 
 
 def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
-    """Return an upper bound on the share of friction that edges of contact lose in waves shorter than the cells along
-    the sliding; 0 at rest, and for an elastic body."""
+    """Return an upper bound on the share of friction that is missing because the grid lacks waves at edges of contact
+    that are shorter than its cells; 0 at rest, and for an elastic body."""
     if run.prony is None or not any(observed.way):
         return 0.0
     cell = cell_along(run, observed.way)
@@ -181,8 +176,8 @@ def lost_at_edges(run: RunProperties, observed: StepObservation) -> float:
 
 
 def lost_in_short_waves(prony: Prony, radius: float, speed: float, edges_follow_grid: bool) -> tuple[float, float]:
-    """Return s and s m of the module for spots with a `radius` in cells, or straight ones of this half width, that
-    slide by `speed` cells per second; both at most 1, and 0 without edges or losses."""
+    """Return s and s m of the module for round spots with a `radius` in cells that slide by `speed` cells per second;
+    for strips of this half width if `edges_follow_grid`. Both are at most 1, and 0 without edges or losses."""
     if radius == math.inf or not prony.moduli.size:
         return 0.0, 0.0
     first = (STRIP if edges_follow_grid else CIRCLE) / radius if radius > 0.0 else math.inf
@@ -241,8 +236,8 @@ class ErrorParts(NamedTuple):
 
     @property
     def of_friction(self) -> float:
-        """The stated error of friction: at least 1 if it exceeds UNKNOWN. Such a friction is the small difference of
-        large forces, and its error is known to an order of magnitude only."""
+        """The stated error of friction: at least 1 if the sum exceeds UNKNOWN, since such a friction is the small
+        difference of large forces, and only the order of magnitude of its error is known."""
         return max(self.total, 1.0) if self.total > UNKNOWN else self.total
 
     def plain(self) -> dict[str, float]:
@@ -255,7 +250,7 @@ NAMES = ErrorParts._fields
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """Errors at one instant. `friction` is None without friction; its error may exceed 1. They are not stated unless
+    """Errors at one instant. `friction` is None without friction; its error may exceed 1. No errors are stated unless
     the mesh is `resolved`: spots of contact have more than a few cells."""
 
     friction: ErrorParts | None
@@ -263,23 +258,23 @@ class ErrorBudget:
     resolved: bool = True
 
     def take_from_time(self, error: float) -> "ErrorBudget":
-        """Return the budget with a smaller error of friction by the time steps."""
+        """Return the budget with `error` subtracted from the error of friction by the time steps."""
         friction = self.friction and self.friction._replace(time=self.friction.time - error)
         return replace(self, friction=friction)
 
     def with_rounds(self, friction: float, area: float) -> "ErrorBudget":
-        """Return the budget with relative errors by the rounds of a fixed point, as part of the solver's."""
+        """Return the budget with the relative errors by the rounds of a fixed point added to the solver's part."""
         own = self.friction and self.friction._replace(solver=self.friction.solver + friction)
         return ErrorBudget(own, self.area._replace(solver=self.area.solver + area))
 
 
 def estimate(run: RunProperties, observed: StepObservation) -> ErrorBudget:
-    """Return the budget of a step."""
+    """Return the error budget of a step."""
     return _estimate(MARCH_SOURCES, run, observed)
 
 
 def estimate_steady(run: RunProperties, observed: StepObservation) -> ErrorBudget:
-    """Return the budget of steady sliding, for friction by energy."""
+    """Return the error budget of steady sliding, whose friction follows from the dissipated power."""
     return _estimate(STEADY_SOURCES, run, observed)
 
 
@@ -300,11 +295,11 @@ def _estimate(sources: Sequence[ErrorSource], run: RunProperties, observed: Step
 def add_shear(
     budget: ErrorBudget, body: float, shear: float, whole: float, solver: float, share: float, time: float, mesh: float
 ) -> ErrorBudget:
-    """Return the budget of friction `whole`, the sum of the part of the `body`, with its `budget`, and of `shear` by
-    tractions.
+    """Return the error budget of a friction coefficient `whole` that is the sum of two parts: `body`, whose errors are
+    in `budget`, and `shear` by tractions.
 
     The tractions have the relative errors `solver` of their solve, `time` of the step and `mesh` of the stiffness of
-    spots, and a `share` of them has the error of the area.
+    spots; a `share` of the tractions has the error of the area.
     """
     if whole <= 0.0:
         return replace(budget, friction=None)
@@ -317,7 +312,8 @@ def add_shear(
 
 
 def weight_of(slid: float, seconds: float) -> float:
-    """Return the weight of a step in a mean: the distance slid, or a far smaller one for its duration at rest."""
+    """Return the weight of a step in a mean: the distance slid, or at rest a far smaller number proportional to
+    `seconds`."""
     return slid or seconds * AT_REST or AT_ONCE
 
 
@@ -325,9 +321,9 @@ def weight_of(slid: float, seconds: float) -> float:
 class ErrorSums:
     """Sums of the budgets of many steps, weighted by the distance slid; friction also by its value.
 
-    Without sliding the weight is the duration, and for steps without duration a still smaller one, so that rest does
-    not dilute the errors of a slide. `sums` has a row for friction and one for the area: the weight, and the
-    weighted sum of each part.
+    At rest the weight is proportional to the duration, and much smaller, so that rest does not dilute the errors of a
+    slide; it is still smaller for steps without duration. `sums` has a row for friction and one for the area: the
+    weight, and the weighted sum of each part.
     """
 
     sums: NDArray[np.float64] = field(default_factory=lambda: np.zeros((2, 1 + len(NAMES))))
@@ -341,7 +337,7 @@ class ErrorSums:
         return ErrorSums(sums)
 
     def entries(self) -> dict[str, Entry]:
-        """Return its entry, which is optional."""
+        """Return the checkpoint entry of the sums, which is optional."""
         return {SUMS: Entry(self.sums.ravel(), optional=True)}
 
     @classmethod
@@ -353,7 +349,7 @@ class ErrorSums:
 
     @property
     def friction(self) -> ErrorParts | None:
-        """Mean over the distance slid; None without sliding or friction."""
+        """Relative errors of friction by source, as a mean over the distance slid; None without sliding or friction."""
         return self._mean(0)
 
     @property
@@ -364,7 +360,8 @@ class ErrorSums:
 
     @property
     def area(self) -> ErrorParts | None:
-        """Mean over the distance slid, or over time without sliding; None without contact."""
+        """Relative errors of the area by source, as a mean over the distance slid, or over time without sliding; None
+        without contact."""
         return self._mean(1)
 
     def _mean(self, index: int) -> ErrorParts | None:
@@ -372,7 +369,7 @@ class ErrorSums:
         return ErrorParts(*(value / weight for value in sums)) if weight > 0.0 else None
 
     def facts(self, accuracy: Any) -> dict[str, Any]:
-        """Return the requested accuracy and the relative errors by part, and in total, as plain data."""
+        """Return the requested `accuracy` and the relative errors, by source and in total, as plain data."""
         found = {"friction": self.friction, "contact_area_corrected": self.area}
         parts = {name: each.plain() for name, each in found.items() if each is not None}
         if self.friction is not None:
@@ -380,8 +377,8 @@ class ErrorSums:
         return {"accuracy": accuracy, **parts}
 
     def lines(self, asked: tuple[float, float], chosen: Collection[str] = ()) -> list[str]:
-        """Return sentences for run.log, with remedies if friction or the area exceeds the `asked` accuracies. The
-        accuracy has `chosen` the settings of these parts."""
+        """Return sentences for run.log, with a remedy if the error of friction or area exceeds the requested accuracies
+        `asked`. `chosen` names the sources whose settings the program has chosen by the accuracy."""
         found = zip(("friction", "the corrected contact area"), (self.friction, self.area), asked, strict=True)
         way = "the distance slid" if self.sums[1, 0] > LEAST_WAY else "time"
         lines = [
@@ -395,7 +392,8 @@ class ErrorSums:
 
 
 def advice(parts: ErrorParts, accuracy: float, chosen: Collection[str] = ()) -> str:
-    """Return a text with a remedy if the error exceeds `accuracy`, or that it does not."""
+    """Return a sentence: a remedy if the error exceeds `accuracy`, else that the accuracy is met. `chosen` names the
+    sources whose settings the program has chosen."""
     if not exceeds(parts.total, accuracy):
         return f"; within the {100 * accuracy:g} % that numerics.accuracy asks for"
     worst = max(NAMES, key=lambda name: float(getattr(parts, name)))
@@ -404,12 +402,12 @@ def advice(parts: ErrorParts, accuracy: float, chosen: Collection[str] = ()) -> 
 
 
 def exceeds(error: float, accuracy: float) -> bool:
-    """Return whether an estimated error exceeds the requested accuracy, also as it is printed."""
+    """Return True if an estimated error exceeds the requested accuracy, also after both are rounded as printed."""
     return error > ROUNDED * accuracy
 
 
 def describe(parts: ErrorParts, name: str) -> str:
-    """Return the total error of "friction", or of another quantity, in per cent, and its parts."""
+    """Return a text with the total error in per cent of `name`, such as "friction", and its parts."""
     there = [part for part in NAMES if getattr(parts, part)]
     shares = ", ".join(f"{SHOWN[part]} {per_cent(getattr(parts, part))}" for part in there)
     total = parts.of_friction if name == "friction" else parts.total

@@ -1,9 +1,8 @@
 """Choices that follow from a job alone, each made once: which effects are on, why, and what they need.
 
-`scene.py` makes what is decided here, and `parcontact plan` prints it; rooms below do not see the job. An effect
-that is off allocates nothing, calls nothing and writes nothing.
-
-Decisions that follow from a job: methods of `choices.Choices` that return a verdict, each called once.
+`scene.py` makes the objects chosen here, and `parcontact plan` prints the choices; code in other rooms does not see the
+job. An effect that is off allocates nothing, calls nothing and writes nothing. Each decision is a method of `Choices`
+that returns a verdict, and is called once.
 """
 
 from collections.abc import Callable
@@ -30,12 +29,12 @@ class Decided(cached_property[Decision]):
 
 
 def decided(name: str) -> Callable[[Callable[[Any], Verdict]], Decided]:
-    """Turn a method that returns a verdict into a decision with this name."""
+    """Return a decorator that turns a method returning a verdict into a decision with this name."""
     return lambda method: Decided(lambda choices: Decision(name, *method(choices)))
 
 
 def choices(job: Job, until: float = 0.0) -> "Choices":
-    """Return the choices for a job whose last stage continues to `until` [s]."""
+    """Return the choices for a job whose last stage is extended to the time `until` [s] if that is later."""
     return Choices(job, job.grid, job.numerics, job.output, until)
 
 
@@ -43,7 +42,7 @@ def choices(job: Job, until: float = 0.0) -> "Choices":
 class Choices:
     """Choices that follow from a job alone: a `Decision` for each effect, and its parameters.
 
-    Only rooms above `scene`, and effects of other packages, read `job`.
+    Only modules that use `scene`, and effects of other packages, read `job`.
     """
 
     job: Job
@@ -66,7 +65,7 @@ class Choices:
 
     @cached_property
     def effects(self) -> dict[str, type[Effect[Any]]]:
-        """The effects of the job's further sections, by their names in checkpoints."""
+        """Effects that further sections of the job turn on, by their names in checkpoints."""
         known = listing.effects_of(type(self.job).model_fields)
         found = [guarded(section, effect) for section, effect in known.items()]
         return {effect.decide(self.job).name: effect for effect in found if effect.decide(self.job).on}
@@ -89,12 +88,13 @@ class Choices:
         return self.job.material.hardness
 
     def forbidden(self, what: str) -> str:
-        """Return why an effect forbids something (`effects.effect.Effect.forbids`); '' if none does."""
+        """Return the reason for which an effect of the job forbids `what` (`effects.effect.Effect.forbids`); '' if no
+        effect does."""
         return next((effect.forbids[what] for effect in self.effects.values() if what in effect.forbids), "")
 
     @cached_property
     def shears(self) -> tuple[Shear, ...]:
-        """Friction of the contact area itself, of each effect that adds some."""
+        """Shear friction of the contact area, one entry for each effect that adds some."""
         found = [effect.shear(self.job) for effect in self.effects.values()]
         return tuple(shear for shear in found if shear is not None)
 
@@ -110,14 +110,14 @@ class Choices:
 
     @decided("viscoelasticity")
     def viscoelasticity(self) -> Verdict:
-        """One map per relaxing branch, and the last displacement."""
+        """Decision on memory of a viscoelastic body: one map per relaxing branch, and the last displacement."""
         count = self.prony.moduli.size
         what = "a branch relaxes" if count == 1 else f"{count} branches relax"
         return count > 0, what if count else "the body has one modulus and no memory"
 
     @decided("folded branches")
     def folded_branches(self) -> Verdict:
-        """Branches far faster or slower than the history have no map."""
+        """Decision to store no map for branches far faster or slower than the history."""
         found = self.folded
         if not found.folded:
             return False, found.reason or "no branch is far faster or slower than the history"
@@ -126,19 +126,20 @@ class Choices:
 
     @decided("isolated contact")
     def isolated(self) -> Verdict:
-        """Padded transforms, four times as large."""
+        """Decision on a free box, whose padded transforms are four times as large."""
         free = not all(self.grid.cyclic)
         return free, f"the boundary is {listing.text(self.grid.boundary)}" + ": padded" * free
 
     @decided("layer")
     def layer(self) -> Verdict:
-        """A layer on a rigid base instead of the half space: another symbol of the operator, at the same cost."""
+        """Decision on a layer on a rigid base instead of the half space: another symbol of the operator, at the same
+        cost."""
         body = self.job.body
         return bool(body), f"{body.thickness:g} m, on a {body.base} base" if body else "no body section: a half space"
 
     @decided("yielding counterbody")
     def yielding(self) -> Verdict:
-        """Pressures bounded by the hardness: another constraint of the solver."""
+        """Decision to bound pressures by the hardness, by another constraint of the solver."""
         bound = self.hardness
         return bound is not None, "material.hardness is not set" if bound is None else f"at a pressure of {bound:g} Pa"
 
@@ -146,24 +147,24 @@ class Choices:
 
     @cached_property
     def timeline(self) -> Timeline:
-        """All steps of the job's history; steps that stages choose are estimated."""
+        """All steps of the job's history; the number of steps is an estimate for stages that choose their steps."""
         return Timeline.from_job(self.job)
 
     @cached_property
     def slides_along_x(self) -> bool:
-        """True if the surface slides along x on a periodic box; whole cells are then an index offset."""
+        """True if the surface slides along x on a periodic box, where a motion by whole cells is an index offset."""
         across = [span.stage.velocity[1] for span in self.timeline.spans if span.moves]
         return bool(across) and not self.isolated.on and not any(across)
 
     @decided("sliding")
     def sliding(self) -> Verdict:
-        """Motion of the surface."""
+        """Decision on a surface that moves along the body."""
         moves = self.timeline.moves
         return moves, "the surface moves" if moves else "the surface does not move in any stage"
 
     @decided("sub-cell or oblique sliding")
     def part_cells(self) -> Verdict:
-        """Heights computed again after each motion, except by whole cells along x on a periodic box."""
+        """Decision to compute heights again after each motion, except by whole cells along x on a periodic box."""
         if not self.sliding.on:
             return False, "the surface does not move"
         if self.isolated.on:
@@ -176,28 +177,28 @@ class Choices:
 
     @decided("extrapolated starts")
     def extrapolated_starts(self) -> Verdict:
-        """The pressure before the last one, for extrapolation to the next step."""
+        """Decision to store the pressure before the last one, for extrapolation to the next step."""
         if reason := self.forbidden(EXTRAPOLATION):
             return False, reason
         return (on := self.timeline.lasts), "stages have steps" if on else "every stage is a single solve"
 
     @decided("starts from a whole cell earlier")
     def further_starts(self) -> Verdict:
-        """Two earlier pressures: steps of a third or a quarter of a cell start from the pressure one whole cell
-        earlier."""
+        """Decision to store two earlier pressures: steps of a third or a quarter of a cell start from the pressure one
+        whole cell earlier."""
         moves = any(span.moves and span.stage.chooses for span in self.timeline.spans)
         on = self.extrapolated_starts.on and self.timeline.chooses and moves
         return on, f"the surface slides in {'' if on else 'no '}chosen steps"
 
     @decided("chosen time steps")
     def chosen_steps(self) -> Verdict:
-        """Time steps chosen from the error of the last step (`march.controller`)."""
+        """Decision to choose time steps from the error of the last step (`march.controller`)."""
         why = describe_steps(self.job)
         return bool(why) and self.job.remembers, why or "every stage gives its steps"
 
     @decided("rest cut short")
     def short_rest(self) -> Verdict:
-        """One step to the end of a stage at rest of a body without memory, when nothing changes any more."""
+        """Decision to make one step to the end of a stage at rest of a body without memory, once nothing changes."""
         if self.prony.moduli.size:
             return False, "the body relaxes"
         if (span := next((span for span in self.timeline.spans if span.rests), None)) is None:
@@ -206,12 +207,12 @@ class Choices:
 
     @decided("steady start")
     def steady_start(self) -> Verdict:
-        """A steady solve before the first step."""
+        """Decision to start the march from a solve of steady sliding."""
         return self.job.initial.state == "steady", f"the initial state is {self.job.initial.state}"
 
     @decided("displacement control")
     def approach(self) -> Verdict:
-        """The approach is given and the load is unknown."""
+        """Decision to prescribe the approach and solve for the load."""
         stage = next((stage.name for stage in self.job.history if stage.control == "approach"), None)
         return bool(stage), f"stage {stage!r} prescribes the approach" if stage else "every stage prescribes its load"
 
@@ -219,7 +220,8 @@ class Choices:
 
     @decided("preconditioner in single precision")
     def mixed_precision(self) -> Verdict:
-        """A preconditioner in single precision with its own transforms; it needs no further iterations."""
+        """Decision to use a preconditioner in single precision with its own transforms; it costs no further
+        iterations."""
         if reason := self.forbidden(SINGLE):
             return False, reason
         if self.numerics.precision != "double":
@@ -232,7 +234,7 @@ class Choices:
 
     @decided("operator in single precision")
     def single_operator(self) -> Verdict:
-        """The operator in single precision, too, with the transforms of the preconditioner."""
+        """Decision to use the operator in single precision, too, with the transforms of the preconditioner."""
         if reason := self.forbidden(SINGLE):
             return False, reason
         if self.numerics.precision != "mixed":
@@ -245,18 +247,19 @@ class Choices:
 
     @property
     def operator_type(self) -> type[np.floating]:
-        """Precision of the operator and of displacements."""
+        """Floating-point type of the operator and of displacements."""
         return np.float32 if self.single_operator.on else np.float64
 
     @decided("surface spectrum")
     def spectrum(self) -> Verdict:
-        """Waves of the surface: their transform is stored, moments are computed once, and forces are spectral sums."""
+        """Decision to store the transform of the surface: moments are then computed once, and forces are spectral
+        sums."""
         on = any(isinstance(shape, Spectral) for shape in self.job.surface)
         return on, "the surface has waves or heights from a file" if on else "all its shapes are in closed form"
 
     @property
     def transforms(self) -> list[Any]:
-        """Facts that, with the number of ranks, determine the transforms of a run."""
+        """Facts that, with the number of ranks, determine the transforms of a run; a restart compares them."""
         kinds = self.grid.points, self.grid.boundary, self.numerics.kernel, self.numerics.precision
         single, steady = [self.mixed_precision.on, self.single_operator.on], self.job.steady is not None
         return [*kinds, single, [self.job.initial.state, steady]]
@@ -265,14 +268,14 @@ class Choices:
 
     @decided("energies")
     def energies(self) -> Verdict:
-        """Work, stored and dissipated energy: one reduction per step, and one operator application in a viscoelastic
-        body."""
+        """Decision to compute work, stored and dissipated energy: one reduction per step, and one operator application
+        in a viscoelastic body."""
         asked = self.output.energy
         return asked, "output.energy asks for them" if asked else "output.energy is not set"
 
     @decided("energy memory")
     def energy_memory(self) -> Verdict:
-        """Branch maps of `A^-1 u`, if the inverse of the operator is not available."""
+        """Decision to store a map of `A^-1 u` for each branch, if the inverse of the operator is not available."""
         if not self._relaxing_energies:
             return False, "no energies of a viscoelastic body are asked for"
         known = self._inverse_is_known and self.numerics.precision == "double"
@@ -289,7 +292,7 @@ class Choices:
 
     @decided("dissipation per branch")
     def branch_dissipation(self) -> Verdict:
-        """A column of measures.csv per branch."""
+        """Decision to write the dissipated energy of each branch as a column of measures.csv."""
         asked = self.output.branch_dissipation
         if asked and not self.viscoelasticity.on:
             return False, "the body has no branch"
@@ -297,14 +300,14 @@ class Choices:
 
     @decided("fields")
     def fields(self) -> Verdict:
-        """Maps in fields.h5."""
+        """Decision to write maps to fields.h5."""
         names, every = self.output.fields, self.output.every
         when = "after every step" if every == 1 else f"every {every} steps"
         return bool(names), f"{', '.join(names)} {when}" if names else "output.fields names none"
 
     @decided("checkpoints")
     def checkpoints(self) -> Verdict:
-        """Files to restart from; one at the end is always written."""
+        """Decision to write files to restart from during the run; one at the end is always written."""
         rules = self.job.checkpoint
         when = f"every {rules.every} steps" if rules.every is not None else f"every {rules.minutes:g} minutes"
         return True, f"{when} and at the end; {rules.keep} are kept"

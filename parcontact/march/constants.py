@@ -1,8 +1,9 @@
 """The fitted constants of the error budget; the manual's page `coverage` shows how well they hold.
 
-Each was fitted to true errors by the script named, or is judged by it. `scatter` is the ratio of estimate to error:
-its median and the range of 90 % of the cases, or what is known. For friction and area it belongs to the sum of all
-sources, for the solver to its own part."""
+Each constant was fitted to true errors, or is tested, by the script `found_by`. `scatter` states the ratio of estimate
+to true error: its median and the range of 90 % of the cases, as far as known. Ratios for friction and area belong to
+the sum of all sources, ratios for the solver to its own part.
+"""
 
 from dataclasses import dataclass
 

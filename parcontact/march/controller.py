@@ -1,13 +1,13 @@
 """The tolerance of solves and the length of steps, both from the error budget of the steps made so far.
 
-**Tolerance.** `numerics.tolerance` suits the worst scene. If `numerics.accuracy` has chosen it, solves may have a
-larger one, as long as the error of the solver stays below its share (`shares`) of the accuracy, or of the other
-parts of the budget if these are larger. Errors are proportional to the certificate of a solve. The factor is a mean
-over the last steps, rounded to a power of the square root of two against rounding errors, and a part of the state,
-so that a restarted run continues identically. The last solve before a change of velocity or load is a close one, and
-so is a steady start: the body remembers the error of the displacement, and a much larger modulus may multiply it
-after the change. The last step of a stage seldom moves the surface by whole cells, so that its start is worse than
-those from which the factor was learnt.
+**Tolerance.** `numerics.tolerance` suits the worst scene. If `numerics.accuracy` has chosen it, solves may use a larger
+tolerance, as long as the error of the solver stays below its share (`shares`) of the accuracy, or of the other parts of
+the budget if these are larger. Errors are proportional to the certificate of a solve. The factor of the tolerance is a
+mean over the last steps, rounded to a power of the square root of two against rounding errors. It is a part of the
+state, so that a restarted run continues identically. The last solve before a change of velocity or load, and a steady
+start, have a small tolerance: the body remembers the error of the displacement, and a much larger modulus may multiply
+this error after the change. The last step of a stage has a worse start than the steps from which the factor was learnt,
+as it seldom moves the surface by whole cells.
 
 **Length.** The error E of a step of length dt is estimated from that step alone (`time_error`). E0 is the share of
 time steps in the accuracy. As E varies as dt^p (p = 3 for a displacement quadratic in time, 1.7 for a linear one, 1
@@ -17,11 +17,12 @@ for backward Euler), the next step is
 
 and a step with E > REJECTED E0 is repeated from the same state, `max((REJECTED E0/E)^(1/p), MOST_SHRINK)` times as
 long; the step after it does not grow (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I
-(1993), II.4). At rest steps are the shortest one times powers of the fourth root of two, against rounding errors.
-While the surface slides, steps end at multiples of their length, counted in cells from the first position of the
-surface (block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after a
-jump, parts of a cell, as large as E allows, lead back to whole cells, by which heights are moved without a
-transform. Halves, thirds and quarters start from the pressure one whole cell earlier (`march.laws`)."""
+(1993), II.4). At rest steps are the shortest one times powers of the fourth root of two, against rounding errors. While
+the surface slides, steps end at multiples of their length, counted in cells from the first position of the surface
+(block time steps; S. L. W. McMillan, in The Use of Supercomputers in Stellar Dynamics (1986) 156): after a jump, steps
+of parts of a cell, as long as E allows, lead back to multiples of whole cells, where heights are moved without a
+transform. Halves, thirds and quarters start from the pressure one whole cell earlier (`march.laws`).
+"""
 
 import math
 from dataclasses import dataclass
@@ -57,13 +58,13 @@ SAME_LEVEL = 1e-6  # rounding: relative tolerance on a length
 
 @dataclass(frozen=True)
 class StepTolerance:
-    """Memory of the tolerance of steps: mean over the last ones of log2 of the ratio to the tolerance of the job."""
+    """Memory of the tolerance of solves: log2 of the ratio to the job's tolerance, as a mean over the last steps."""
 
     mean: float = 0.0
 
 
 class TolerancePart:
-    """Tolerance of solves, an optional part of checkpoints."""
+    """The memory of the solver's tolerance, an optional part of checkpoints."""
 
     def at_rest(self) -> StepTolerance:
         return StepTolerance()
@@ -77,8 +78,11 @@ class TolerancePart:
 
 @dataclass(frozen=True)
 class Controller:
-    """Controller of a run: of a job with its stages and `body`; `energies` is True if the job asks for them, `exact`
-    if contacts are solved to the job's tolerance."""
+    """Controller of the tolerances and the lengths of steps in a run.
+
+    `timeline` has the stages of the `job`; `energies` is True if the job asks for energies, `exact` if contacts are
+    solved to the job's tolerance.
+    """
 
     job: Job
     timeline: Timeline
@@ -92,20 +96,20 @@ class Controller:
 
     @cached_property
     def asked(self) -> Accuracy:
-        """The accuracies that the job asks for."""
+        """The accuracies that the job requests."""
         return self.job.numerics.asked
 
     # -- tolerance ----------------------------------------------------------------------------------------------------
 
     @cached_property
     def follows(self) -> bool:
-        """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen the tolerance of the
-        job, and stages have steps."""
+        """True if the tolerance of steps follows the error budget: `numerics.accuracy` has chosen the job's tolerance,
+        and stages have steps."""
         return "tolerance" in self.job.numerics.chosen and self.timeline.lasts and not self.exact
 
     def tolerance(self, memory: StepTolerance, step: Step) -> float | None:
-        """Return the tolerance of the solve of a step, None for the tolerance of the job, as in a jump. It is smaller
-        before a change and in the first and last step of a stage."""
+        """Return the tolerance for the solve of a step; None means the job's tolerance, also in a jump. The tolerance
+        is smaller before a change and in the first and last step of a stage."""
         if step.dt == 0.0:
             return None
         own, most = self.job.numerics.tolerance, self.largest_tolerance(step)
@@ -114,8 +118,8 @@ class Controller:
         return float(min(own * 2.0 ** (0.5 * round(2.0 * memory.mean)), max(LOOSEST, own), most))
 
     def largest_tolerance(self, step: Step) -> float:
-        """Return a limit on the tolerance of a step before a change, and of the first and last step of a stage; else
-        infinite, as in a jump."""
+        """Return the limit on the tolerance of a step: finite before a change and for the first and last step of a
+        stage, infinite for other steps and jumps."""
         if step.dt == 0.0:
             return math.inf
         span = self.timeline.spans[step.stage]
@@ -124,7 +128,7 @@ class Controller:
         return min(most, FIRST) if (step.growth == 0.0 or ends) and self.relaxes else most
 
     def learn(self, memory: StepTolerance, certificate: float, budget: ErrorBudget | None) -> StepTolerance:
-        """Return the memory after a step with this budget, whose solve has reached `certificate`."""
+        """Return the memory after a step with this error budget, whose solve has reached `certificate`."""
         if not self.follows or budget is None or certificate <= 0.0:
             return memory
         room = _room(budget.area, AREA.solver, self.asked.area)
@@ -137,7 +141,7 @@ class Controller:
     # -- length of steps ----------------------------------------------------------------------------------------------
 
     def propose(self, chosen: ChosenSteps, span: Span, number: int) -> Step:
-        """Return step `number` of a stage that chooses its steps; `chosen` are those made."""
+        """Return step `number` of a stage that chooses its steps; `chosen` holds the steps made so far."""
         first = number == span.before + span.jumps + 1
         return self._step(chosen, span, number, self._first(chosen, span) if first else chosen.next)
 
@@ -152,13 +156,12 @@ class Controller:
         front: float = 0.0,
         begins: bool = False,
     ) -> Step | MadeStep:
-        """Return a shorter step to make instead of one with this error, or the record of the accepted step.
+        """Return a shorter step to try instead of a step with this error, or the record of the accepted step.
 
-        The step ends at `end` [s] of the stage; `rejected` is True if a longer one was tried before. In contacts
-        with attraction the edge has moved by `front` half process zones: one is allowed, unless it snaps. Steps in
-        which it snaps, `begins` or ends are limited to a share of the shortest relaxation time, so that a jump meets
-        the body before it relaxes. With energies this also applies to points that close; the square root of the
-        accuracy is then allowed.
+        The step ends at `end` [s] of the stage; `rejected` is True if a longer step was tried before. Under attraction
+        the edge of contact has moved by `front` half process zones; one is allowed, unless it snaps, and the square
+        root of the accuracy in a run with energies. Steps in which a contact snaps, `begins` or ends are limited to a
+        share of the shortest relaxation time, so that a jump meets the body before it relaxes.
         """
         order = order_of_time_error(self.job.numerics.integrator, step.growth > 0.0)
         ratio = error / (FRICTION.time * TIME_MEDIAN * self.asked.of_steps)
@@ -177,8 +180,8 @@ class Controller:
         return MadeStep(span.index, end, self._level(span, step.dt * min(max(wanted, 1.0), most)))
 
     def limit(self, made: MadeStep, dt: float, turned: float) -> MadeStep:
-        """Return the record of a step of length dt in which the mean traction has changed by the share `turned` of its
-        bound, with a next step in which it changes by the root of the accuracy at most, if it changes as fast."""
+        """Return the record of a step of length dt, with a next step that changes the mean traction by at most the root
+        of the accuracy times its bound. In the step the traction has changed by the share `turned` of its bound."""
         most = math.sqrt(self.asked.of_steps)
         if turned * made.next <= most * dt:
             return made
@@ -281,8 +284,8 @@ class Controller:
 
 
 def tolerance_before(job: Job, stage: int, relaxes: bool) -> float:
-    """Return the largest tolerance of the solve before a stage: CLOSE if velocity, control or load change there and the
-    body relaxes, else infinite."""
+    """Return the largest tolerance of the solve before a stage: CLOSE if velocity, control or load change at its start
+    and the body relaxes, else infinite."""
     history, start = job.history, job.initial
     if stage == len(history) or not relaxes:
         return math.inf
@@ -294,8 +297,8 @@ def tolerance_before(job: Job, stage: int, relaxes: bool) -> float:
 
 
 def cells_per_step(most: float) -> float:
-    """Return the longest distance of a step [cells], at most `most`, among 1, 2, 4, ... cells and 1/2, 1/3, ... 1/8,
-    1/10, ... of a cell."""
+    """Return the longest distance of a step in cells, at most `most`, out of 1, 2, 4, ... and 1/2, 1/3, ... 1/8, 1/10,
+    ..."""
     if most >= 1.0 - SAME_LEVEL:
         return 2.0 ** math.floor(math.log2(most) + SAME_LEVEL)
     count = (1.0 - SAME_LEVEL) / most

@@ -1,8 +1,7 @@
-"""Friction curves.
+"""Friction curves: steady sliding solved directly at many velocities and pressures.
 
-* Friction curves: steady sliding solved directly at many velocities and pressures, written to steady.csv and a
-  picture.
-* steady.csv and steady_waves.csv: a line for each point of a friction curve, and messages about it; on root.
+Each point is a line of steady.csv, and of steady_waves.csv for losses by wavelength; root writes them with messages and
+a picture.
 """
 
 import math
@@ -45,14 +44,15 @@ Draw = Callable[[], Path]  # draws the picture of a curve and returns its path
 
 
 class EarlierPoint(NamedTuple):
-    """A point solved by an earlier run, and its relative errors of friction and of the corrected area."""
+    """A point solved by an earlier run, with its relative errors of friction and of the corrected area."""
 
     at: Wanted
     errors: tuple[float, float]
 
 
 class CurveTable:
-    """The tables in a directory, continued or new; raises OSError, and InputError for a table that cannot be read."""
+    """The tables of a friction curve in a directory, continued or new. Raises OSError, and InputError for a table that
+    cannot be read."""
 
     def __init__(
         self, directory: Path, setup: Setup, further: tuple[str, Sequence[str]] | None, heated: bool, quiet: bool
@@ -106,7 +106,8 @@ class CurveTable:
         files.replace_file(path, "".join(f"{','.join(line)}\n" for line in [head, *kept]))
 
     def lacking(self, points: Sequence[Wanted], bare: Sequence[int] = ()) -> list[int]:
-        """Return the numbers of the missing points, and of those `bare` of requested maps."""
+        """Return the indices of the points that are not in the table, and the indices `bare` of points whose requested
+        maps are missing."""
         found = tables.lacking_points(points, self.known)
         if len(found) < len(points):
             self.say(f"{len(points) - len(found)} of {len(points)} points are there already")
@@ -122,7 +123,7 @@ class CurveTable:
         return len(self.known) + len(self._points)
 
     def pass_on(self) -> None:
-        """Count a point, solved or not."""
+        """Advance the progress bar by one point, solved or not."""
         self._bar.step()
 
     def say(self, text: str) -> None:
@@ -131,12 +132,12 @@ class CurveTable:
         self._console.log(text)
 
     def warn(self, doubts: Sequence[Doubt], shown: Callable[[Doubt], bool] = always) -> None:
-        """Write warnings to the log, and print those that are `shown`, also with --quiet."""
+        """Write warnings to the log, and print those for which `shown` returns True, also with --quiet."""
         for doubt in doubts:
             self._console.warn(str(doubt), shown(doubt))
 
     def write(self, point: Point, rows: Sequence[Sequence[float]]) -> None:
-        """Add a point, unless it exists and is solved for its maps only."""
+        """Add the lines of a point, unless the table has the point already, which was then solved for its maps only."""
         m, speed = point.measures, point.speed
         if not tables.lacking_points([Wanted(speed, m.pressure, point.temperature)], self.known):
             return
@@ -153,12 +154,14 @@ class CurveTable:
         )
 
     def lose(self, at: Wanted, why: str) -> None:
-        """Store a point that could not be solved, unless it exists; raises OSError."""
+        """Store a point that could not be solved and the reason `why`, unless the table has the point; raises
+        OSError."""
         self._lost = tables.without([*tables.without(self._lost, [at]), LostPoint(at, why)], self.known)
         tables.write(self.path.parent, self._lost)
 
     def conclude(self, failures: int, draw: Draw | None) -> None:
-        """Sort a curve that was solved in parts, `draw` it, and report failures; raises OSError."""
+        """Sort a curve whose points were solved in any order, `draw` it, and report the number of failures; raises
+        OSError."""
         self._bar.close()
         self._file.sync()
         if self.known:
@@ -207,8 +210,10 @@ WARN_INACCURATE_POINTS = Kind("inaccurate points", "estimated error of {of} {whe
 
 
 def describe_missed(points: Sequence[Point], job: Job, earlier: Sequence[EarlierPoint] = ()) -> Iterator[Doubt]:
-    """Yield warnings about friction and the corrected area of points whose error exceeds the accuracy of the job, also
-    of `earlier` ones, for which the parts of the error are not known."""
+    """Yield warnings about points whose error of friction or of the corrected area exceeds the accuracy of the job.
+
+    Points of `earlier` runs count, too, although the parts of their errors are not known.
+    """
     chosen = ["solver"] * ("tolerance" in job.numerics.chosen) + ["mesh"] * bool(job.origin.mesh)
     known = [point for point in points if point.errors.resolved]
     friction = [(point, point.errors.friction) for point in known if point.errors.friction is not None]
@@ -242,8 +247,11 @@ SAME = (*tables.SCENE, *tables.EFFECTS, *(f"numerics.{key}" for key in ("kernel"
 
 @dataclass(frozen=True)
 class Request:
-    """Request for steady states: speeds [m/s] along a unit `direction`, each under each of the mean pressures [Pa] and
-    at each of the temperatures [deg C], if there are any."""
+    """Request for steady states at each combination of velocity, pressure and temperature.
+
+    The surface moves along the unit vector `direction` with the speeds `velocities` [m/s] under the mean `pressures`
+    [Pa]. `temperatures` [deg C] may be empty; `waves` asks for the losses by wavelength.
+    """
 
     velocities: tuple[float, ...]
     pressures: tuple[float, ...]
@@ -263,7 +271,8 @@ class Request:
 def request(
     job: Job, velocities: Sequence[float] = (), pressures: Sequence[float] = (), temperatures: Sequence[float] = ()
 ) -> Request:
-    """Return the request of a job's `steady` section, or of the arguments; raises InputError for an incomplete one."""
+    """Return the request of a job's `steady` section, or of the other arguments; raises InputError if it is
+    incomplete."""
     section = job.steady
     speeds = tuple(velocities) or (section.velocities if section else ())
     loads = tuple(pressures) or (section.pressures if section and section.pressures else _pressures(job))
@@ -291,11 +300,11 @@ def _pressures(job: Job) -> tuple[float, ...]:
 
 
 class States(Protocol):
-    """Steady states of a job, one velocity and pressure after the other; collective.
+    """Solver of the steady states of a job, one velocity and pressure after the other; all methods are collective.
 
-    `setup` is the setup of the states. `table` is the name of an additional table with its columns, or None; `rows` are
-    its lines for the last state at a velocity [m/s]. Intermediate results may be stored by `keep_in` a directory,
-    until `forget` is called after the state is written.
+    `table` is the name of an additional table with its columns, or None; `rows` returns its lines for the last state at
+    a velocity [m/s]. After `keep_in(directory)` intermediate results may be stored there, until `forget` is called when
+    the state is written.
     """
 
     setup: Setup
@@ -319,12 +328,12 @@ class States(Protocol):
 
 
 def on_one_grid(job: Job, slab: Slab) -> States:
-    """Return the steady states of a job on its grid; collective."""
+    """Return the solver of steady states of a job on its grid; collective."""
     return SteadySliding(scene.set_up(job, slab))
 
 
 def transforms_of(job: Job) -> list[Any]:
-    """Return facts that, with the number of ranks, determine the transforms of a curve."""
+    """Return facts that, with the number of ranks, determine the transforms of a curve; a restart compares them."""
     return [*choices.choices(job).transforms, "curve"]
 
 
@@ -340,12 +349,12 @@ def run_curve(
     limit: float | None = None,
     draw: Draw | None = None,
 ) -> int:
-    """Solve all missing points, and write each at once; collective. Return the exit code.
+    """Solve all missing points of a friction curve, and write each at once; collective. Return the exit code.
 
-    If a point fails, the others are still solved, and the exit code is 1. `restart` is `auto` or `never`; warnings
-    are printed if `shows` returns True. `sweep_stop_file` is shared by all cases of a sweep; it is not removed.
-    `make` makes the steady states; `draw` draws the finished curve, on root. The last point must be solved by the time
-    `limit` (of `time.monotonic`), if any.
+    If a point fails, the others are still solved, and the exit code is 1. `restart` is `auto` or `never`; warnings are
+    printed if `shows` returns True. `sweep_stop_file` is shared by all cases of a sweep; it is not removed. `make`
+    makes the solver of the states; `draw` draws the finished curve, on root. The last point must be solved by the time
+    `limit` (of `time.monotonic`), if given.
     """
     directory = Directory(job.output.directory, slab, "steady")
     with directory.claimed():
@@ -432,7 +441,7 @@ class _Curve:
         self.watch = sanity.ContactWatch(chosen.numerics.strict, chosen.timeline, more=more_points(chosen.grid))
 
     def go(self, draw: Draw | None) -> int:
-        """Solve missing points; collective. Return the exit code."""
+        """Solve the missing points of the curve; collective. Return the exit code."""
         bare = self.maps.lacking() if self.maps and self.slab.root else []
         lacking = self.slab.agree(self.table.lacking(self.wanted.points, bare) if self.table else [])
         for count, index in enumerate(lacking):

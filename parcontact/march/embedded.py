@@ -1,7 +1,8 @@
-"""The embedded pair: the difference of a step to that by another integrator, from the same state and motion.
+"""The embedded pair: the difference between a step by one integrator and the same step by another.
 
-Integrators turn the branch maps h_k at the start of a step and the increments du of the displacement into `A p =
-G_inf u + sum_k h_k` at its end. The quadratic one is compared with the linear one, from which it differs by
+Both integrators start from the same state and assume the same motion. An integrator turns the branch maps h_k at the
+start of a step and the increments du of the displacement into `A p = G_inf u + sum_k h_k` at its end. The quadratic
+integrator is compared with the linear one, from which it differs by
 
     e = (sum_k G_k kappa q_k) (du - r du_before)                                               (`physics.body`),
 
@@ -9,9 +10,10 @@ and a linear step, as after a jump, with backward Euler, with z_k = dt/tau_k,
 
     e = sum_k (exp(-z_k) - 1/(1 + z_k)) h_k + sum_k G_k ((1 - exp(-z_k))/z_k - 1/(1 + z_k)) du.
 
-This takes no further solve. The rms of e over that of `A p`, both weighted by the pressure, measures the time error.
-A sample suffices: evenly spaced rows, SAMPLED_ROWS in full contact, more at smaller contact areas (by the square
-root of the ratio). If the sample misses the contact, as for a small sphere, all rows are used."""
+The comparison takes no further solve. The rms of e divided by the rms of `A p`, both weighted by the pressure, measures
+the time error. A sample suffices: evenly spaced rows, SAMPLED_ROWS in full contact, more at smaller contact areas (by
+the square root of the ratio). If the sample misses the contact, as for a small sphere, all rows are used.
+"""
 
 import math
 from dataclasses import dataclass
@@ -31,10 +33,12 @@ MISSED = 0.5  # accuracy: relative error of the load of a sample above which all
 
 @dataclass(frozen=True)
 class IntegratorDifference:
-    """Relative `difference` of the pair; rms `slope` along x of the surface under the pressure, in the unit of heights
-    over the unit of lengths; `order`, the power of the step length with which the difference grows; `angle`, the rms
-    change of the displacement in the step over the standard deviation of heights, both under the pressure: in full
-    contact the angle by which a wave turns."""
+    """Result of the embedded pair for one step. All rms values are weighted by the pressure.
+
+    `difference` is relative, and grows with the step length to the power `order`. `slope` is the rms slope of the
+    surface along x, in units of heights per unit of length. `angle` is the rms change of the displacement in the step
+    divided by the standard deviation of heights: in full contact the angle by which a wave turns.
+    """
 
     difference: float
     slope: float
@@ -69,12 +73,8 @@ class EmbeddedPair:
         share: float,
         growth: float = 0.0,
     ) -> IntegratorDifference:
-        """Compare the integrators in a step; `memory` is the memory of the body after it. One or two messages;
-        collective.
-
-        `pressure` has the sum `load` over all ranks, on a `share` of the points; `displacement` is `A p/alpha`.
-        `growth` is dt over the length of the step before.
-        """
+        """Compare the integrators in a step under load; `memory` is the memory of the body after the step. One or two
+        messages; collective."""
         weights = self._weights(dt, growth)
         seen, *sums = self._add(weights, trial, memory, pressure, displacement, self.stride(share))
         if abs(self.stride(share) * seen - load) > MISSED * load:
@@ -91,14 +91,14 @@ class EmbeddedPair:
     def compare_without_load(
         self, dt: float, trial: Trial, memory: BodyMemory, growth: float = 0.0
     ) -> IntegratorDifference:
-        """Compare the integrators in a step without load, with the `memory` of the body after it: the rms difference
-        over the rms displacement; collective."""
+        """Compare the integrators in a step without load; `memory` is the memory of the body after the step. The result
+        is the rms difference divided by the rms displacement; collective."""
         u, weights = surface_of(memory), self._weights(dt, growth)
         _, change, size, *_ = self._add(weights, trial, memory, np.ones_like(u), u, self.stride(1.0))
         return IntegratorDifference(math.sqrt(change / size) if size > 0.0 else 0.0, 0.0, weights.order)
 
     def stride(self, share: float) -> int:
-        """Return the distance of sampled rows if this share of the points is in contact."""
+        """Return the distance between sampled rows if a `share` of the points is in contact."""
         return max(1, int(self.slab.ny * math.sqrt(share) / SAMPLED_ROWS))
 
     def _add(

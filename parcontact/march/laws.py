@@ -1,29 +1,21 @@
-"""The contact laws of a step: its start, its solve and its failure.
+"""The contact laws of a step: start, solve, and errors of failed steps with their place, cause and remedies.
 
-Errors of failed steps: their place, their cause, and possible remedies.
+Start of a solve: pressures change with time and move with the surface. If the surface has moved by whole cells since
+one of the last steps, the pressure of that step is moved by as many cells, without rounding: in steady sliding it is
+already the solution. With steps of a whole cell this is the last pressure, extrapolated with the one before it; with
+steps of half a cell, the one before the last; with thirds and quarters, an earlier one that is stored in slides with
+chosen steps. Otherwise the last two pressures are extrapolated in the body's frame.
 
-Start of the solve of a step.
-
-Pressures change with time and move with the surface. If the surface has moved by whole cells since one of the last
-steps, the pressure of that step is moved by as many cells, without rounding: in steady sliding it is already the
-solution. With steps of a whole cell it is the last pressure, extrapolated with the one before it; with steps of half a
-cell it is the one before; with thirds and quarters it is an earlier one, stored in slides with chosen steps.
-
-Otherwise the last two pressures are extrapolated in the body's frame.
-
-Contact law of surfaces that do not attract: a constraint on pressures (`contact.constraint`), solved from the last
-pressures.
-
-Contact law of a surface whose finer roughness is a law of its interface (`contact.constraint`).
-
-Under pressure the mean planes of the finer roughness approach by the closing c. With the modulus alpha of a step, in
-which the pressure is `alpha p`,
+`DryLaw` is the law of surfaces that do not attract: a constraint on pressures (`contact.constraint`), solved from the
+last pressures. `ClosingLaw` is the law of a surface whose finer roughness is squeezed in the interface: under pressure
+the mean planes of this roughness approach by the closing c. With the modulus alpha of a step, in which the pressure is
+`alpha p`,
 
     p >= 0,    w = A p + c(alpha p) - h - d >= 0,    p w = 0.
 
-The gap `u - h - d` is measured to the highest points of the finer roughness, so that it is `-c` in contact. An
-effect provides this law (`effects.effect.Effect.law`); it is solved by splitting (`contact.splitting`).
-Energies of the run do not include the work on the finer roughness.
+The gap `u - h - d` is measured to the highest points of the finer roughness, so that it is `-c` in contact. An effect
+provides this law (`effects.effect.Effect.law`), which is solved by splitting (`contact.splitting`). Energies of the run
+do not include the work on the finer roughness.
 """
 
 import math
@@ -60,8 +52,8 @@ MANY_CELLS = 1.5  # tuning: least motion of the surface in a step [cells] for th
 
 
 class StepError(RunError):
-    """A step that failed; the run keeps the state before it. `beyond_precision` is True if its tolerance needs more
-    digits than numbers of its precision have."""
+    """Error of a failed step; the run keeps the state before the step. `beyond_precision` is True if the tolerance
+    needs more digits than the floating-point type has."""
 
     def __init__(self, text: str, beyond_precision: bool = False) -> None:
         super().__init__(text)
@@ -69,8 +61,8 @@ class StepError(RunError):
 
 
 class DetachedError(Exception):
-    """The surfaces have detached in a step that ends at `time` [s] under a `load`; the run keeps the state
-    before it."""
+    """The surfaces have detached in a step that ends at `time` [s] under a `load`; the run keeps the state before the
+    step."""
 
     def __init__(self, time: float, load: float) -> None:
         super().__init__(time, load)
@@ -78,12 +70,12 @@ class DetachedError(Exception):
 
 
 def accepts(scene: Scene, contact: Contact) -> bool:
-    """Return whether the job accepts a solve that did not reach the tolerance."""
+    """Return True if the job accepts a contact whose solve did not reach the tolerance."""
     return scene.choices.numerics.accept_unconverged and math.isfinite(contact.certificate.worst)
 
 
 def describe_place(scene: Scene, step: Step) -> str:
-    """Return number, time and stage of a step."""
+    """Return a text with the number, time and stage of a step."""
     return f"step {step.number} at t = {step.time:g} s (stage {scene.choices.timeline.history[step.stage].name!r})"
 
 
@@ -96,8 +88,11 @@ def not_finite(scene: Scene, step: Step, measures: Measures) -> StepError:
 def of_solve(
     scene: Scene, step: Step, failed: Contact, last: Contact, tried: list[str], h: Array, moved: float
 ) -> StepError:
-    """Return the error of a contact solve for heights h that has `failed`, and of the attempts `tried`, which end with
-    `last`; collective. In the step the surface moves by `moved` cells."""
+    """Return the error for a step whose contact solve has `failed`; collective.
+
+    `tried` names the further attempts, of which `last` is the result of the last one; h are the heights of the surface,
+    which moves by `moved` cells in the step.
+    """
     also = f", also with {', with '.join(tried)}" if tried else ""
     numerics, what = scene.choices.numerics, f"{describe_place(scene, step)}: the contact solve {failed.failure}{also}"
     if not np.isfinite(last.certificate.worst):
@@ -133,7 +128,7 @@ def refuse_beyond_full_contact(scene: Scene, step: Step, effective: Array) -> No
 
 
 def make_start(scene: Scene, pasts: Sequence[PreviousPressure], step: Step, alpha: float, out: Array) -> None:
-    """Put the start of a step, a map of p for the modulus `alpha`, into `out`. `pasts` are the last pressures, the
+    """Put the start of a step's solve, a map of p for the modulus `alpha`, into `out`. `pasts` are the last pressures,
     newest first."""
     if len(pasts) == 1:
         out[...] = pasts[0].pressure
@@ -180,15 +175,15 @@ def _travel(
 
 
 def choose_contact_law(scene: Scene) -> ContactLaw[Any]:
-    """Return the contact law that an effect of the scene provides, or the law of its constraint. A law that solves by
-    the law of the constraint takes it by its method `upon`."""
+    """Return the contact law that an effect of the scene provides, else the law of the scene's constraint. An effect's
+    law that extends the law of the constraint gets it by the method `upon`."""
     dry, law = DryLaw(scene), scene.law
     return dry if law is None else law.upon(dry) if hasattr(law, "upon") else law
 
 
 @dataclass(frozen=True)
 class DryLaw:
-    """Law of a scene's constraint. It has no memory of its own."""
+    """Contact law of a scene's bounds on the pressure. It has no memory of its own."""
 
     scene: Scene
     may_shorten = False
@@ -203,7 +198,7 @@ class DryLaw:
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[None]:
-        """Solve a step; see `effects.effect.ContactLaw.solve`. Raises StepError."""
+        """Solve the contact of a step; see `effects.effect.ContactLaw.solve`. Raises StepError."""
         scene, contact, remark = self.scene, None, ""
         most = control.value * scene.slab.points if isinstance(control, MeanPressure) else math.inf
         problem = Problem(*scene.operators, trial.effective, scene.constraint(trial.alpha, most), control)
@@ -237,7 +232,7 @@ class DryLaw:
         return EdgeMotion()
 
     def gap(self, memory: None) -> Array | None:
-        """Return None: the pressure is the unknown."""
+        """Return None: the pressure is the unknown of this law, not the gap."""
         return None
 
     def detached(self, memory: None) -> Detached | None:
@@ -263,8 +258,8 @@ MOST_STEPS = 20000  # tuning: limit on the steps of the splitting for one contac
 
 
 class ClosingLaw(DryLaw):
-    """Law of a scene with the closing c [m] as a function of the pressure [Pa], at the end of each step. It has no
-    memory of its own.
+    """Contact law with a closing c [m] that depends on the pressure [Pa] at the end of a step. It has no memory of its
+    own.
 
     Raises InputError for a body that moves in the mean, and for a hardness.
     """
@@ -290,7 +285,7 @@ class ClosingLaw(DryLaw):
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[None]:
-        """Solve a step; see `effects.effect.ContactLaw.solve`."""
+        """Solve the contact of a step; see `effects.effect.ContactLaw.solve`."""
         if isinstance(control, MeanPressure) and control.value == 0.0:
             return super().solve(trial, step, control, memory, past, before, tolerance)
         scene, p = self.scene, past.spare

@@ -1,4 +1,4 @@
-"""A march: a scene, its state, and the loop over the steps of a timeline with the tasks of a caller."""
+"""A march: a scene, its state, and the loop over the steps of a timeline with the tasks of a caller after each step."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ FIELDS_OF_EFFECTS = {part: need for name, need in FIELDS_NEED.items() for part i
 
 
 class March:
-    """A scene at an instant; it advances step by step."""
+    """A calculation in time: a scene and its state at an instant, which advances step by step."""
 
     def __init__(self, scene: Scene, state: State | None = None) -> None:
         self.scene = scene
@@ -35,7 +35,7 @@ class March:
 
     @property
     def detached(self) -> str:
-        """A sentence, if the surfaces have detached and no step follows; '' otherwise."""
+        """A sentence if the surfaces have detached and no step follows; '' otherwise."""
         row, end = self.row, choose_contact_law(self.scene).detached(self.state.law)
         if end is None:
             return ""
@@ -45,19 +45,19 @@ class March:
         return f"detached at t = {time:g} s: {lost}; {last}"
 
     def timeline(self, until: float = 0.0) -> Timeline:
-        """Return all steps of the history (`Timeline.from_job`), with those chosen so far."""
+        """Return all steps of the history (`Timeline.from_job`), including the steps chosen so far."""
         return Timeline.from_job(self.scene.job, until, self.state.chosen)
 
     def steps(self, timeline: Timeline | None = None, until: float | None = None) -> Iterator[Step]:
         """Yield the steps after the last one made, each decided on demand; collective. A step that replaces several
-        ends at the latest with the first step that reaches `until` [s]."""
+        steps ends at the latest with the first one that reaches `until` [s]."""
         timeline = self.timeline() if timeline is None else timeline
         stop = len(timeline) if until is None else timeline.first_reaching(until)
         while self.row.step < len(timeline) and not self.detached:
             yield next_step(self.scene, self.state, timeline, stop)
 
     def advance(self, step: Step) -> StepRow:
-        """Make the next state; collective. Raises StepError and keeps the state if that fails."""
+        """Make a step and return its record; collective. Raises StepError and keeps the state if the step fails."""
         try:
             self.state = self._weighed(make_step(self.scene, self.state, step), self.row)
         except DetachedError as end:
@@ -125,9 +125,9 @@ class March:
 def next_step(scene: Scene, state: State, timeline: Timeline, stop: int) -> Step:
     """Return the step after the last one made.
 
-    At rest under a constant load a body without memory does not change: one step then replaces all further steps of
-    a stage whose time steps grow. It ends at the next step after which fields are due, or at the step number `stop`.
-    The decision follows from the state, so that it is the same after a restart.
+    At rest under a constant load a body without memory does not change: one step then replaces all further steps of a
+    stage whose time steps grow. This step ends where fields are due next, or with the step number `stop`. The decision
+    follows from the state, so that it is the same after a restart.
     """
     number = state.row.step + 1
     span = timeline.span(number)
@@ -145,9 +145,9 @@ Task = Callable[[March], bool | None]
 
 
 def run_steps(march: March, tasks: Sequence[Task], steps: Iterable[Step] | None = None) -> bool:
-    """Advance and do the tasks in order after each step, until the steps end or a task returns True.
+    """Advance the march step by step, and do the tasks in order after each step, until a task returns True.
 
-    Without `steps` they are all steps of the job, and the tasks are also done before the first one. Return whether a
+    Without `steps` all steps of the job are made, and the tasks are also done before the first one. Return True if a
     task has ended the march.
     """
     if steps is None:
@@ -164,5 +164,5 @@ def run_steps(march: March, tasks: Sequence[Task], steps: Iterable[Step] | None 
 
 
 def run_tasks(march: March, tasks: Sequence[Task]) -> bool:
-    """Do all tasks. Return whether one of them ends the march."""
+    """Do all tasks. Return True if one of them ends the march."""
     return any([task(march) for task in tasks])  # noqa: C419  # all tasks run, also when one ends the march

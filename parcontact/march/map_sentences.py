@@ -1,4 +1,4 @@
-"""Sentences about measured maps: how they were prepared, and warnings."""
+"""Sentences about measured maps: how they were prepared, and warnings about them."""
 
 from collections.abc import Iterator
 
@@ -33,7 +33,7 @@ def describe_treatment(prepared: Prepared) -> list[str]:
 
 
 def describe_line(part: Topography, line: Map) -> str:
-    """Return a sentence on the random surface that is made from a line scan."""
+    """Return a sentence on the random surface that is made from the line scan `line`."""
     length = quantity(line.size[0], "m", 4)
     return (
         f"road: {part.path.name} is a line scan of {line.heights.size} points over {length}; the surface is a random "

@@ -14,9 +14,9 @@ NEAR = 0.5  # accuracy: decades beyond the measured band without a warning
 
 
 class ExcitedBand(NamedTuple):
-    """Frequencies [Hz] that a job excites at a temperature [deg C], and the shift factor a_T there.
+    """Frequency range [Hz] that a job excites at a temperature [deg C], and the shift factor a_T at this temperature.
 
-    The temperature is None if moduli do not depend on it.
+    The temperature is None if the moduli do not depend on it.
     """
 
     temperature: float | None
@@ -25,13 +25,13 @@ class ExcitedBand(NamedTuple):
 
     @property
     def reduced(self) -> tuple[float, float]:
-        """Frequencies [Hz] with the same moduli at the reference temperature."""
+        """Frequency range [Hz] with the same moduli at the reference temperature."""
         return self.band[0] * self.factor, self.band[1] * self.factor
 
 
 def excited_bands(job: Job, temperatures: Sequence[float] = ()) -> list[ExcitedBand]:
-    """Return the frequencies that a job excites at each temperature of a friction curve, or at the temperature of the
-    material; none if the surface does not move."""
+    """Return the frequency range that a job excites at each temperature of a friction curve, or at the temperature of
+    the material if there is no curve; an empty list if the surface does not move."""
     if (band := excited_band(job)) is None:
         return []
     body = _body(job)
@@ -54,7 +54,7 @@ WARN_FREQUENCIES = Kind(
 
 def doubt_band(job: Job, temperatures: Sequence[float] = ()) -> Iterator[Doubt]:
     """Yield warnings about frequencies and temperatures at which the material was not measured. `temperatures` [deg C]
-    belong to a friction curve; without them the temperature of the material counts."""
+    are those of a friction curve; without them the temperature of the material counts."""
     if (body := _body(job)) is None:
         return
     if job.steady is None or tuple(temperatures) != job.steady.temperatures:  # given apart from the job

@@ -1,26 +1,20 @@
-"""The grid of a job that is given by words.
-
-Jobs whose grid is given by words: `points: auto`, and `from surface` for points and size of a measured map.
+"""The grid of a job that gives words for it: `points: auto`, and `from surface` for points and size of a measured map.
 
 `load` and `load_cases` read a job like the functions of the same names in `job`, and replace these words by numbers.
 
-Words for numbers of the grid: `points: auto`, and `from surface` for points and size of a measured map.
+`auto` is the mesh with the fewest points for which the mesh error is within its share of `numerics.accuracy`
+(`job.calculation`). It follows from the shortest wave of the surface, the directions of sliding (`job.advice`) and a
+guess of the contact area before any solve.
 
-`auto` is the mesh with the fewest points for which the errors are those of `numerics.accuracy`. It follows from the
-shortest wave of the surface, the directions of sliding (`job.advice`) and a guess of the contact area
-(`march.mesh`). The mesh has its share of the error (`job.calculation`).
-
-A guess of the contact area before any solve, for the mesh that `points: auto` chooses.
-
-Persson's theory for frictionless contact of an elastic body (B. N. J. Persson, J. Chem. Phys. 115 (2001) 3840):
-under a mean pressure p on a surface of rms slope h' the share in contact is
+The guess is Persson's theory for frictionless contact of an elastic body (B. N. J. Persson, J. Chem. Phys. 115 (2001)
+3840): under a mean pressure p on a surface of rms slope h' the share in contact is
 
     A = erf(sqrt(2) p/(E h')),      E = 2 |G|/(1 - nu),
 
-here with the modulus G at FEW times the frequency with which the shortest wave passes. Sliding surfaces have the
-larger area 1 - (1 - A)^MORE. The phase of the modulus is taken at EDGES times this frequency. If the loss angle is
-still proportional to the frequency at FINEST times this frequency, sliding is slow, and edges lose power in waves
-shorter than the cells (`march.budget`).
+here with the modulus G at FEW times the frequency with which the shortest wave passes. Sliding surfaces have the larger
+area 1 - (1 - A)^MORE. The phase of the modulus is taken at EDGES times this frequency. If the loss angle is still
+proportional to the frequency at FINEST times this frequency, sliding is slow, and edges lose power in waves shorter
+than the cells (`march.budget`).
 """
 
 from __future__ import annotations
@@ -57,7 +51,7 @@ NODES = 400  # accuracy: nodes of integrals over the spectrum; their error is 1e
 
 
 class Loaded(Protocol):
-    """Sections of a job that determine the contact area."""
+    """The sections of a job that determine the contact area."""
 
     surface: tuple[Any, ...]
     material: AnyMaterial
@@ -67,8 +61,8 @@ class Loaded(Protocol):
 
 
 def guesses(job: Loaded, wave: float, area: float) -> list[Guess]:
-    """Return guesses for each load and speed of a job with this shortest wave [m] and area of the box [m^2]; slow
-    sliding only occurs in friction curves."""
+    """Return a guess of the contact for each load and speed of a job, whose shortest wave is `wave` [m] and whose box
+    has the `area` [m^2]. Slow sliding only occurs in friction curves."""
     from ..effects.relaxation import relaxation_of
 
     slope, series = _slope(job.surface), relaxation_of(job.material)
@@ -125,7 +119,7 @@ def _slope(surface: Sequence[Any]) -> float:
 
 
 def slope_of(shape: Rough) -> float:
-    """Return the rms slope of a rough surface in a large box."""
+    """Return the rms slope of a rough surface in a box much longer than its waves."""
     if shape.rms_slope is not None:
         return shape.rms_slope
     low, roll, high = (
@@ -170,7 +164,8 @@ def _of_any_stage(stage: Any) -> Any:
 
 
 def fill_grid(source: Source, origin: Origin) -> Origin:
-    """Replace all words of the grid in the source of a job by numbers. Return the origin with a sentence on them."""
+    """Replace all words for the grid in the source of a job by numbers. Return the origin with a sentence about
+    them."""
     _take_grid(source, origin)
     return _choose_points(source, origin)
 
@@ -208,7 +203,8 @@ def _with_changed_material(scenery: Scenery, data: dict[str, Any], origin: Origi
 
 
 def points_for(job: Job, accuracy: float) -> tuple[int, int]:
-    """Return the points along x and y that `auto` chooses for a job at another accuracy. Raises InputError."""
+    """Return the numbers of points along x and y that `points: auto` chooses for a job at another accuracy. Raises
+    InputError."""
     numerics = job.numerics.model_copy(update={"accuracy": accuracy})
     (nx, ny), _ = _choose(job.model_copy(update={"numerics": numerics}), job.grid, plain_data(job), job.origin)
     return nx, ny
@@ -298,8 +294,8 @@ def _take_grid(source: Source, origin: Origin) -> None:
 
 
 def extent_of(surface: Any, box: Any, origin: Origin) -> Extent:
-    """Return the points of the box along x and y, and its size [m]. The box is the whole map unless it is given; a
-    mirrored map is twice as long. Raises InputError, also for line scans."""
+    """Return the numbers of points along x and y and the size [m] of the whole map, or of the given box. A mirrored map
+    is twice as long. Raises InputError, also for line scans."""
     shapes = surface if isinstance(surface, list) else [surface]
     heights: list[Any] = [shape.get("heights") if isinstance(shape, dict) else shape for shape in shapes]
     arrays = [given for given in heights if is_array(given)]

@@ -1,11 +1,7 @@
-"""A steady state and its losses.
+"""A steady state of sliding as data, and the power lost in each branch of the body.
 
-A steady state as data: its parameters, its measures, and its cost.
-
-Branch maps of a body in a steady state, and the power lost in each branch.
-
-A wave u^ loses the power `|u^|^2/A |w| G_k''(|w|)` in branch k, with A its displacement over its pressure for a
-modulus of 1 and w the frequency with which it passes a point.
+A wave of amplitude u^ loses the power `|u^|^2/A |w| G_k''(|w|)` in branch k, with w the frequency with which it passes
+a point, and A its displacement divided by its pressure for a modulus of 1.
 """
 
 from __future__ import annotations
@@ -30,13 +26,14 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True)
 class Point:
-    """A steady state: velocity [m/s], pressure [Pa], temperature [deg C] (NaN if none is given), relaxation times over
-    those at the reference, measures, certificate, and cost.
+    """A steady state of sliding, with its measures, errors and cost.
 
-    `friction` is the dissipated power over load and velocity, plus that of an interface; `errors` is its budget. The
-    friction of `measures` is by the slopes of the rigid surface; the difference is a mesh error. `operator_calls`
-    count applications on the finest grid. `dissipated` is the power [W] of each branch (empty for a free scene, whose
-    wake continues outside the box). `effects` has what effects found in this state, by their sections.
+    `velocity` [m/s], `pressure` [Pa] and `temperature` [deg C] (NaN if none is given) are its parameters;
+    `shift_factor` is the ratio of relaxation times to those at the reference temperature. `friction` is the dissipated
+    power divided by load and speed, plus the friction of an interface; `errors` is its error budget. `measures` holds
+    friction by the slopes of the rigid surface, which differs by a mesh error. `operator_calls` are counted as
+    applications on the finest grid. `dissipated` is the power [W] of each branch (empty for a free box, whose wake
+    continues outside). `effects` holds the results of effects by section.
     """
 
     velocity: Vector
@@ -59,7 +56,7 @@ class Point:
 
     @property
     def error_friction(self) -> float:
-        """Relative error of friction, 1 or more if friction is smaller than its error; NaN without friction, and if
+        """Relative error of friction, 1 or more if the error exceeds friction itself; NaN without friction, and if
         spots may be smaller than a cell."""
         return self.errors.friction.of_friction if self.errors.friction and self.errors.resolved else math.nan
 
@@ -69,13 +66,13 @@ class Point:
         return self.errors.area.total if self.errors.resolved else math.nan
 
     def with_effect(self, section: str, found: Any) -> Point:
-        """Return the point with what the effect of a section found."""
+        """Return the point with the result `found` of the effect of a section."""
         return replace(self, effects={**self.effects, section: found})
 
 
 def in_rounds(points: Sequence[Point]) -> Point:
-    """Return the last round of a fixed point, with the cost of all rounds, and with the relative changes in the last
-    round as errors."""
+    """Return the last of the points that the rounds of a fixed point have given, with the cost of all rounds, and with
+    the relative changes in the last round as errors."""
     *_, before, last = [*points[-1:], *points]
     friction, area = (
         abs(one - other) / one if one > 0.0 else 0.0
@@ -92,9 +89,9 @@ ROUNDING = 1e-9  # accuracy: relative rounding of wavelengths at the limits of o
 
 
 def branch_powers(setup: Setup, contact: Contact, velocity: Vector) -> Array:
-    """Return the power [W] lost in each branch to waves of each octave, shape (branches, octaves); collective.
+    """Return the power [W] that waves of each octave lose in each branch, shape (branches, octaves); collective.
 
-    The first octave is from the longer side of the box to half of it. Scenes must be periodic, so that waves are
+    The first octave is from the longer side of the box to half of it. The box must be periodic, so that waves are
     independent.
     """
     fft, prony, grid, half_space = setup.fft, setup.prony, setup.grid, setup.half_space
@@ -123,7 +120,8 @@ def count_octaves(setup: Setup) -> int:
 
 
 def branch_maps(setup: Setup, contact: Contact, velocity: Vector, out: Array) -> Iterator[Array]:
-    """Yield the map h_k of each branch in a steady state at a velocity [m/s], each in `out`; collective."""
+    """Yield the map h_k of each branch in steady sliding at a velocity [m/s]; each overwrites the last in `out`.
+    Collective."""
     fft, half_space, speed = setup.fft, setup.half_space, setup.in_units(velocity)
     if half_space.free:
         for k in range(setup.prony.moduli.size):

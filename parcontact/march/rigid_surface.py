@@ -46,7 +46,7 @@ def make_surface(job: Job, fft: FFT) -> tuple[Surface, Remarks]:
 
 
 def outline_surface(job: Job, fft: FFT) -> Surface:
-    """Return the surface of a job for planning: its waves have no values."""
+    """Return the surface of a job for planning, with waves that have no values."""
     waves = None
     if any(isinstance(part, jobs.Spectral) for part in job.surface):
         waves = allocate(shape_of(highest_waves(job), (fft.mx, fft.my), fft.columns), fft.complex, fft.slab.tally)
@@ -68,9 +68,9 @@ def _indenter(part: jobs.Indenter, grid: Grid) -> Shape:
 def shortest_measured(job: Job, surface: Surface) -> float | None:
     """Return the shortest wave [m] of a measured surface, from its spectrum on the grid; collective.
 
-    It is None for a surface whose waves the job gives, or without slopes. A map that is not periodic is multiplied
-    by a window, as a jump or a crease at its edges has waves of any length. The window adds up to one wave to the
-    shortest, of which half is subtracted.
+    Return None for a surface whose waves the job gives, or without slopes. A map that is not periodic is multiplied by
+    a window, as a jump or a crease at its edges has waves of any length. The window raises the highest number of waves
+    in the box by up to 1, of which half is subtracted.
     """
     if surface.waves is None or not any(isinstance(part, meaning.READ) for part in job.surface):
         return None
@@ -92,13 +92,14 @@ def shortest_measured(job: Job, surface: Surface) -> float | None:
 
 
 def shortest_of(job: Job) -> float | None:
-    """Return `shortest_measured` of a job on its grid, on this rank alone."""
+    """Return `shortest_measured` for a job on its grid, computed on this rank alone."""
     slab = Slab.alone(*job.grid.points)
     return shortest_measured(job, make_surface(job, FFT(slab, measured=False))[0])
 
 
 def highest_waves(job: Job) -> tuple[int, int]:
-    """Return the largest numbers of waves in the box, along x and y, of the parts that are given by waves."""
+    """Return the largest numbers of waves in the box, along x and y, over the parts of the surface that are given by
+    waves."""
     grid, found = job.grid, [(0, 0)]
     for part in job.surface:
         if isinstance(part, jobs.Wave):
@@ -195,8 +196,8 @@ def _transform(heights: Array, fft: FFT) -> Spectrum:
 
 
 class HeightRange(NamedTuple):
-    """Heights [m] of a surface: from the lowest to the highest point (Sz, 0 if that is rounding), and the highest point
-    and the mean, relative to the datum of the surface."""
+    """Heights [m] of a surface: `span` from the lowest to the highest point (Sz; 0 if it is rounding), and the
+    `highest` point and the `mean`, relative to the datum of the surface."""
 
     span: float
     highest: float

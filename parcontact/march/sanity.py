@@ -65,13 +65,14 @@ def refuse_memory(job: Job) -> None:
 
 
 def is_quickly_made(job: Job) -> bool:
-    """Return whether the heights of a job decide about warnings, and are few enough to be computed for these."""
+    """Return True if warnings depend on the heights of a job, and the heights are few enough to be computed for
+    them."""
     return job.depends_on_heights and job.grid.nx * job.grid.ny <= FEW_POINTS
 
 
 def describe_waves(job: Job) -> list[str]:
-    """Return sentences of effects on the waves of a surface on one grid, which is made for it on one rank; none for a
-    flat surface, or for one of too many points."""
+    """Return the sentences of effects on the waves of a job's surface, computed on one grid on one rank; an empty list
+    for a flat surface, or for one with too many points."""
     if job.grid.nx * job.grid.ny > FEW_POINTS:
         return []
     setup = set_up(job, Slab.alone(*job.grid.points))
@@ -126,14 +127,14 @@ def _check_heights(setup: Setup) -> Iterator[Doubt]:
 
 
 def has_full_contact(setup: Setup) -> bool:
-    """Return whether there is a largest approach: on a periodic half space and on an incompressible layer, whose mean
-    level is fixed, unless the rigid surface yields."""
+    """Return True if the approach has an upper limit: on a periodic half space and on an incompressible layer, whose
+    mean level is fixed, unless the rigid surface yields."""
     return not setup.half_space.moves_in_the_mean and setup.choices.hardness is None
 
 
 def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
-    """Return a sentence on an approach [m] beyond full contact, or ''; `mean` [m] is the mean height relative to the
-    datum."""
+    """Return a sentence if an approach [m] is beyond full contact, else ''; `mean` [m] is the mean height relative to
+    the datum."""
     closed = -mean - setup.surface.datum
     rounding = FULL_CONTACT_ROUNDING * (abs(approach) + abs(setup.surface.datum) + setup.height)
     if approach - closed <= rounding:
@@ -145,7 +146,8 @@ def beyond_full_contact(setup: Setup, approach: float, mean: float) -> str:
 
 
 def below_rounding(setup: Setup, approach: float) -> str:
-    """Return a sentence on an approach [m] that is lost in the rounding of the heights, or ''; 0 is never lost."""
+    """Return a sentence if an approach [m] is lost in the rounding of the heights, else ''; an approach of 0 is never
+    lost."""
     heights = setup.heights.span + abs(setup.surface.datum)
     least = float(np.finfo(np.float64).eps) / RESOLVED * heights
     if not 0.0 < abs(approach) < least:
@@ -234,7 +236,7 @@ def _along_y(slab: Slab, heights: Array) -> tuple[float, float, float]:
 
 @dataclass
 class ContactWatch:
-    """Checks of the contact of each step; each kind of warning is given once. `further` are checks of effects; `mesh`
+    """Checks the contact of each step, and gives each kind of warning once. `further` are the checks of effects; `mesh`
     has the points of the grid."""
 
     strict: bool
@@ -246,18 +248,19 @@ class ContactWatch:
 
     @classmethod
     def of(cls, job: Job, timeline: Timeline) -> "ContactWatch":
-        """Return the checks of a job."""
+        """Return the checks of contacts for a job."""
         further = [partial(asked, job) for asked in job.asked("doubt_contact")]
         mesh = properties_of(job, None)
         return cls(job.numerics.strict, timeline, more=more_points(job.grid), further=further, mesh=mesh)
 
     def check_step(self, step: int, measures: Measures) -> list[Doubt]:
-        """Return warnings about a step; raises RunError if these are errors."""
+        """Return warnings about a step; raises RunError if warnings are errors."""
         ends_a_stage = 0 < step <= self.timeline.count and self.timeline.span(step).last == step
         return self.check_point(measures, f"step {step}", ends_a_stage)
 
     def check_point(self, measures: Measures, where: str, final: bool = True) -> list[Doubt]:
-        """Return warnings about a contact, about its cells if it is `final`; raises RunError if these are errors."""
+        """Return warnings about a contact, and about its cells if it is `final`; raises RunError if warnings are
+        errors."""
         found = [*doubt_edge(measures, where), *(doubt_cells(measures, self.mesh, where, self.more) if final else ())]
         found += [doubt for ask in self.further for doubt in ask(measures, where)]
         new = [doubt for doubt in found if doubt.kind not in self.seen]
@@ -293,8 +296,8 @@ WARN_CELLS = Kind(
 
 
 def doubt_cells(measures: Measures, mesh: RunProperties, where: str, more: str) -> Iterator[Doubt]:
-    """Yield a warning about contacts that consist mainly of edge cells, or of parts of a cell; `more` states how to
-    refine them."""
+    """Yield a warning about contacts that consist mainly of edge cells, or are smaller than a cell; `more` states how
+    to refine the grid."""
     area, corrected = measures.contact_area, measures.contact_area_corrected
     if not resolves(mesh, StepObservation(0.0, 0.0, area, corrected, spared=measures.spared)):
         yield WARN_BELOW_A_CELL("", {"where": where, "more": more})

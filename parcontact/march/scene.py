@@ -1,8 +1,7 @@
-"""The objects of a calculation, made from a job.
+"""The objects of a calculation, made from a job as `choices.py` decides.
 
-* Makes the bodies, solvers, energies, probes and effects of steps from a job, as `choices.py` decides.
-* Steady sliding takes the setup from here and has its own solver.
-* The parts of a calculation on a job: its choices, the rigid surface, the body and the solver.
+A setup has the rigid surface, the body and the units; steady sliding takes it and has its own solver. A scene adds the
+solver, energies, measures and effects of steps in time.
 """
 
 import math
@@ -46,11 +45,11 @@ from .time_error import RunProperties, properties_of
 
 @dataclass
 class Setup:
-    """Parts that every calculation on a job shares: its choices, slab, surface, units and body.
+    """The parts that every calculation on a job shares: choices, slab, surface, units and body.
 
-    `heights` [m] is the range of the surface, `height` its span (the shorter side of a cell if it is flat);
-    `shortest` [m] is the shortest measured wave, or None; `size` and `prony` are the box and the relaxation function
-    in the run's units (and seconds); `remarks` are those on measured maps; `factors` are those of softened rubber
+    `heights` [m] is the range of the surface, `height` its span (the shorter side of a cell if it is flat); `shortest`
+    [m] is the shortest measured wave, or None; `size` and `prony` are the box and the relaxation function in the run's
+    units (and seconds); `remarks` are notes on measured maps; `factors` computes the moduli of softened rubber
     (`physics.halfspace`).
     """
 
@@ -88,7 +87,7 @@ class Setup:
 
     @property
     def half_space(self) -> HalfSpace:
-        """The body with shear modulus 1, in the run's units."""
+        """The elastic half space of the body with shear modulus 1, in the run's units."""
         poisson, kernel = self.job.material.poisson, self.choices.numerics.kernel
         body = self.job.body
         layer = None if body is None else Layer(body.thickness / self.units.length, body.base, poisson)
@@ -100,13 +99,14 @@ class Setup:
         return velocity[0] / self.units.length, velocity[1] / self.units.length
 
     def probe(self) -> Probe:
-        """Make a probe with the shear that effects add, and the hardness if the job has one."""
+        """Return a new probe of measures, with the shear that effects add, and the hardness if the job has one."""
         return Probe(self.slab, self.surface, self.units, self.choices.shears, self.choices.hardness)
 
 
 @dataclass
 class Scene:
-    """Everything a march needs. `law` is the contact law of an effect, or None for the law of the constraint."""
+    """All objects of a calculation in time. `law` is the contact law of an effect, or None for the law of the
+    constraint."""
 
     setup: Setup
     motion: Motion
@@ -138,8 +138,8 @@ class Scene:
         return self.setup.units
 
     def relax(self, memories: Memories) -> None:
-        """Multiply the relaxation times of the body, its energies and its interface at the job's temperature by the
-        product of the factors of the effects, which follow from their memories. Raises RunError."""
+        """Multiply the relaxation times of body, energies and interface at the job's temperature by the product of the
+        effects' factors, which follow from their memories. Raises RunError."""
         factor = math.prod(effect.time_factor(memories[name]) for name, effect in self.effects.items())
         if factor == self.time_factor:
             return
@@ -154,8 +154,8 @@ class Scene:
             self.probe = replace(self.probe, shears=[shear.shifted(factor) for shear in shears])
 
     def body_for_shear(self, slab: Slab) -> tuple[ZenerBody, ElasticEnergy | ZenerEnergy | None]:
-        """Make a second body for displacements along the surface, on their slab, and its energies if the job asks for
-        them. Its relaxation follows this one."""
+        """Return a second body for displacements along the surface on the given slab, and its energies if the job asks
+        for them, else None. Its relaxation follows the scene's body."""
         chosen, folded, prony = self.choices, self.folded, self.setup.prony
         integrator = chosen.numerics.integrator
         body = ZenerBody(slab, prony, integrator, folded.memoryless, folded.frozen)
@@ -177,7 +177,7 @@ class Scene:
 
     @cached_property
     def properties(self) -> RunProperties:
-        """Properties of the run for its error budget, with the relaxation of the body in this step."""
+        """Properties of the run for its error budget, with the present relaxation of the body."""
         branches = self.material.branched
         prony = None if branches is None else branches.prony
         return properties_of(self.job, self.setup.shortest, self.folded.bound, prony)
@@ -190,29 +190,30 @@ class Scene:
 
     @cached_property
     def in_double(self) -> tuple[ContactSolver, Operators]:
-        """A solver and operators in double precision, made at the first use and kept; the first use is collective."""
+        """A solver and operators in double precision, made at the first use, which is collective."""
         return solver_on(self.setup, self.slab, self.choices.numerics.tolerance, np.float64)
 
     def heights(self, position: Vector) -> Array:
-        """Return the heights at a position, on the rows of this rank, in the run's units, as a new array."""
+        """Return the heights of the rigid surface at a position, on the rows of this rank, in the run's units, as a new
+        array."""
         base, offset = self.motion.at(position).parts
         return np.roll(base, offset, axis=1)
 
     def gap(self, displacement: Array, position: Vector, approach: float) -> Array:
-        """Return the gap [m] on the rows of this rank for a surface at a position; displacement and approach are in the
-        run's units."""
+        """Return the gap [m] on the rows of this rank for a rigid surface at a position; displacement and approach are
+        in the run's units."""
         return (displacement - self.heights(position) - approach) * self.units.height
 
     def constraint(self, alpha: float, most: float = math.inf) -> Box:
-        """Return the bounds of p in a step of modulus alpha, in which the pressure is `alpha p`. An upper bound of
-        `most` or more is left out."""
+        """Return the bounds of p in a step of modulus alpha, in which the pressure is `alpha p`. An upper bound of at
+        least `most` is omitted."""
         return effect.constraint_of(self.job, alpha * self.units.pressure, most)
 
 
 def set_up(job: Job, slab: Slab, until: float = 0.0, measured: bool = True) -> Setup:
     """Return the setup of a job for a march to the end of its history or, if later, to `until` [s]; collective. Raises
-    InputError for files that do not fit. If `measured`, the fastest transforms are chosen by
-    trials (`parallel.fft.FFT`)."""
+    InputError for files that do not fit. If `measured` is True, the fastest transforms are chosen by trials
+    (`parallel.fft.FFT`)."""
     chosen, fft = choices(job, until), FFT(slab, measured=measured)
     surface, remarks = make_surface(job, fft)
     roughness = moments(surface.waves, fft, job.grid.size) if surface.waves is not None else None
@@ -224,7 +225,8 @@ def set_up(job: Job, slab: Slab, until: float = 0.0, measured: bool = True) -> S
 
 
 def outline(job: Job, slab: Slab) -> Setup:
-    """Return the setup of a job on a slab that only counts: the surface has waves but no heights, and units are 1."""
+    """Return the setup of a job for planning: its slab only counts, the surface has waves but no heights, and units are
+    1."""
     slab.tally.purpose = "transforms"
     chosen, fft = choices(job), FFT(slab)
     slab.tally.purpose = "surface spectrum"
@@ -233,12 +235,12 @@ def outline(job: Job, slab: Slab) -> Setup:
 
 
 def build(job: Job, slab: Slab, until: float = 0.0) -> Scene:
-    """Make the scene of a job on the ranks of `slab`, by `set_up` and `build_on`."""
+    """Return the scene of a job on the ranks of `slab`, by `set_up` and `build_on`; collective."""
     return build_on(set_up(job, slab, until))
 
 
 def build_on(setup: Setup) -> Scene:
-    """Make the scene of a setup; collective."""
+    """Return the scene of a setup; collective."""
     chosen, tally, folded = setup.choices, setup.slab.tally, setup.slab.agree(setup.choices.folded)
     solver, operators = _solver(setup, chosen.numerics.tolerance, chosen.operator_type)
     inverse = AppliedInverse(operators.preconditioner, lambda: solver.workspace.other_displacement)
@@ -262,15 +264,15 @@ def build_on(setup: Setup) -> Scene:
 def solver_on(
     setup: Setup, slab: Slab, tolerance: float, operator_type: type[np.floating] | None = None
 ) -> tuple[ContactSolver, Operators]:
-    """Make a solver and the operators of the body of a setup on another grid, for a start or a retry; collective. Their
+    """Return a solver and the operators of a setup's body on another grid, for a start or a retry; collective. Their
     transforms are planned without measurement, so that a restarted run has the same rounding."""
     on_slab = replace(setup, slab=slab, fft=FFT(slab, measured=False))
     return _solver(on_slab, tolerance, operator_type or setup.choices.operator_type)
 
 
 def solver_on_tiles(setup: Setup) -> SolverOnTiles | None:
-    """Return a function that makes a solver and operators on tiles of a grid, on one rank; None if the body
-    has none."""
+    """Return a function that makes a solver and operators on tiles of a grid, on one rank; None if the body has no such
+    operators."""
     body, tally, limit = setup.half_space, setup.slab.tally, setup.choices.numerics.max_iterations
     height = setup.height / setup.units.height
 

@@ -1,7 +1,6 @@
-"""The state of a run, and the errors of a step.
+"""The state of a run, which holds all that one step passes to the next, and the error budget of a step.
 
-* The state of a run: all that one step passes to the next. A checkpoint is one loop over its parts.
-* Error budget of a step, from the step and from properties of the run.
+A checkpoint is one loop over the parts of the state.
 """
 
 import math
@@ -41,10 +40,10 @@ NO_DIFFERENCE = IntegratorDifference(0.0, 0.0)
 class StepErrors:
     """Errors of a step.
 
-    `budget`: errors of friction and area by their sources; None if nothing touches. `step`: the error by the length of
-    the step alone, which decides about chosen steps. `friction`: friction of the body, infinite after a jump; its
-    change in the next step is a source of error. `lasting`: the budget without the error that is there only while
-    friction rises; it sets the tolerance of the next solves.
+    `budget`: errors of friction and area by their sources; None without contact. `step`: the part of the step length
+    alone, which decides about chosen steps. `friction`: friction of the body, infinite after a jump, whose change in
+    the next step is a source of error. `lasting`: the budget without the error of a rise of friction; it sets the
+    tolerance of the next solves.
     """
 
     budget: ErrorBudget | None
@@ -70,7 +69,7 @@ class StepErrors:
 
 @dataclass(frozen=True)
 class SolvedStep:
-    """A solved step: the contact by its law, its measures, and the memory of the body after it."""
+    """A solved step: the contact found by the contact law, its measures, and the memory of the body after the step."""
 
     step: Step
     trial: Trial
@@ -84,14 +83,15 @@ class SolvedStep:
 
     @property
     def touches(self) -> bool:
-        """True if the surfaces touch, and there is pressure or tension."""
+        """True if the surfaces touch under pressure or tension."""
         return self.of_law.loaded and self.measures.contact_area > 0.0
 
 
 @dataclass(frozen=True)
 class ErrorMemory:
-    """Memory of errors: the friction of the body in the last step, infinite after a jump, the sums of the budget, and
-    the summed error of the energies that were dissipated and lost in slip [J], infinite if unknown."""
+    """Memory of errors. `friction` is the friction of the body in the last step, infinite after a jump; `sums` are the
+    sums of the error budget; `energy` [J] is the summed error of dissipated energy and of slip loss, infinite if
+    unknown."""
 
     friction: float = math.inf
     sums: ErrorSums = field(default_factory=ErrorSums)
@@ -100,8 +100,8 @@ class ErrorMemory:
 
 @dataclass(frozen=True)
 class BudgetPart:
-    """The errors of a run; `relaxes` is True for a viscoelastic body, `energies` if there are energies. Its entries are
-    optional."""
+    """The part of a run that remembers its errors. `relaxes` is True for a viscoelastic body, `energies` if the run has
+    energies. Its checkpoint entries are optional."""
 
     relaxes: bool
     energies: bool = False
@@ -120,8 +120,11 @@ class BudgetPart:
 
 
 def add_energy_error(summed: float, errors: StepErrors | None, sheared: Sheared | None, dissipated: float) -> float:
-    """Return the summed error of energies after a step in which the body has `dissipated` an energy [J], infinite
-    without `errors`: relative errors by the step and by the area, and of friction in what slip loses."""
+    """Return the summed error of energies [J] after a further step, infinite without `errors`.
+
+    The body has `dissipated` an energy [J] in the step. This energy has the relative errors of the step length and of
+    the area; energy lost in slip has the error of friction.
+    """
     if errors is None:
         return math.inf
     slip = 0.0 if sheared is None or not sheared.lost else sheared.lost * min(errors.of_friction, 1.0)
@@ -129,8 +132,8 @@ def add_energy_error(summed: float, errors: StepErrors | None, sheared: Sheared 
 
 
 def estimate_errors(scene: Scene, friction: float, solved: SolvedStep) -> StepErrors:
-    """Return the errors of a step; `friction` is the friction of the body in the step before, infinite if unknown or
-    after a jump. Collective."""
+    """Return the estimated errors of a step; collective. `friction` is the friction of the body in the step before,
+    infinite if unknown or after a jump."""
     if not states_errors(scene.material):
         return StepErrors(None, 0.0, math.inf, None)
     run, measures = scene.properties, solved.measures
@@ -228,17 +231,16 @@ FURTHER = 2  # tuning: number of pressures kept for starts, from three and four 
 
 @dataclass(frozen=True)
 class State:
-    """A run after a step. `make_step` returns a new one and leaves this one unchanged.
+    """A run after a step: the memories of its parts, by name (`parts_of`). `make_step` returns a new state.
 
-    `memories` has the memories of the parts of the run, by name (`parts_of`). A state shares most maps with its
-    successor, which reuses its oldest ones: it is valid until a step begins from the successor. Maps are in the
-    run's units.
+    Maps are in the run's units. A state shares most maps with its successor, and the successor's next step overwrites
+    the oldest maps of this state, which is then invalid.
     """
 
     memories: Memories
 
     def after(self, **changes: Any) -> "State":
-        """Return the state with new memories of some parts."""
+        """Return a copy of the state with new memories of some parts, given by name."""
         return State({**self.memories, **changes})
 
     @property
@@ -249,7 +251,7 @@ class State:
 
     @property
     def contact(self) -> PreviousContacts:
-        """The last pressures and the last approach."""
+        """The last pressures and the last approach, from which the next solve starts."""
         contact: PreviousContacts = self.memories["contact"]
         return contact
 
@@ -295,8 +297,8 @@ class State:
 
 
 def parts_of(scene: Scene) -> dict[str, RunPart[Any]]:
-    """Return all parts of a run with a memory, by their names in checkpoints. Raises InputError if an effect has the
-    name of another part."""
+    """Return all parts of a run that have a memory, by their names in checkpoints. Raises InputError if an effect has
+    the name of another part."""
     choices = scene.choices
     if taken := sorted(RESERVED & choices.effects.keys()):
         raise InputError(
@@ -326,7 +328,7 @@ class _RowPart:
     scene: Scene
 
     def at_rest(self) -> StepRow:
-        """Return the record of the initial state: without load the surface just touches the body."""
+        """Return the record of the initial state, in which the surface just touches the body without load."""
         setup = self.scene.setup
         highest = setup.heights.highest
         return StepRow(
@@ -356,8 +358,8 @@ class _ContactPart:
         return PreviousContacts(pressures, slab.zeros(), -setup.heights.highest / setup.units.height)
 
     def entries(self, memory: PreviousContacts, units: Units) -> dict[str, Entry]:
-        """Return the pressures with their moduli and positions, numbered by steps ago. All but the last are
-        optional."""
+        """Return checkpoint entries for the last pressures with their moduli and positions, numbered backwards in
+        steps. All but the last are optional."""
         found = {"approach": Entry(memory.approach, units.height, "m")}
         for ago, past in enumerate(memory.pressures):
             of_past = {
@@ -369,7 +371,7 @@ class _ContactPart:
         return found
 
     def restored(self, memory: PreviousContacts, saved: Saved) -> PreviousContacts:
-        """Return the pressures of a checkpoint, whose maps have been read; missing ones are unknown."""
+        """Return the pressures of a checkpoint, whose maps have been read; missing ones are marked as unknown."""
         pasts = []
         for ago, past in enumerate(memory.pressures):
             known = all(_name(name, ago) in saved for name in ("pressure", "modulus", "position"))
@@ -405,14 +407,14 @@ class _ChosenStepsPart:
 
 
 def first_state(scene: Scene, body: BodyMemory | None = None) -> State:
-    """Return the state before the first step; all maps are new, except the maps of a given `body`."""
+    """Return the state before the first step; its maps are new, except the maps of a given `body`."""
     parts = parts_of(scene)
     given = {} if body is None else {"material": body}
     return completed(scene, State({name: part.at_rest() for name, part in parts.items() if name not in given} | given))
 
 
 def pressed_state(scene: Scene, state: State, row: StepRow, pressure: Array, approach: float) -> State:
-    """Return a first state under a constant `pressure`, which is copied, with the friction of `row`."""
+    """Return the first state of a run under a constant `pressure`, which is copied, with the friction of `row`."""
     newest, others = state.contact.pressures[:2], state.contact.pressures[2:]
     for past in newest:
         past.pressure[...] = pressure
@@ -423,7 +425,7 @@ def pressed_state(scene: Scene, state: State, row: StepRow, pressure: Array, app
 
 
 def completed(scene: Scene, state: State) -> State:
-    """Return the state with energies [J] and the columns of effects in its row."""
+    """Return the state with the energies [J] and the columns of effects added to its row."""
     work, stored, lost, split = energies_of(scene, state.energy, state.memories)
     added = effect_values(scene.effects, state.memories)
     error = math.nan if state.row.step else error_of_energies(scene, 0.0, 0.0, state.memories)
@@ -435,8 +437,8 @@ def completed(scene: Scene, state: State) -> State:
 def energies_of(
     scene: Scene, memory: EnergyMemory | None, of_effects: Memories
 ) -> tuple[float, float, float, tuple[float, ...]]:
-    """Return work, stored and dissipated energy [J], and the dissipation of each branch; NaN without energies. It is
-    the work on the body, unless an effect computes the work of the load."""
+    """Return work, stored and dissipated energy [J], and the energy dissipated in each branch; NaN without energies.
+    The work is done on the body, unless an effect computes the work of the load."""
     if scene.energy is None or memory is None:
         return math.nan, math.nan, math.nan, ()
     unit, dissipated = scene.energy.unit, memory.dissipated
@@ -452,8 +454,8 @@ def energies_of(
 
 
 def error_of_energies(scene: Scene, summed: float, of_stored: float, of_effects: Memories) -> float:
-    """Return the error of the energies [J] since the start, NaN without energies or if unknown: the `summed` one, and
-    a share of the stored energy times the error of the area, `of_stored`; or the error that an effect computes."""
+    """Return the error of the energies [J] since the start, NaN without energies or if unknown: the error that an
+    effect computes, else `summed` plus ENERGY times `of_stored`, the stored energy times the error of the area."""
     if scene.energy is None:
         return math.nan
     found = (effect.error_energy(of_effects[name]) for name, effect in scene.effects.items())
@@ -479,7 +481,7 @@ def save_state(path: Path, scene: Scene, state: State, facts: Facts) -> None:
 
 
 def restored(scene: Scene, state: State, contents: Contents) -> State:
-    """Return the state of a checkpoint, in the maps of `state`; collective. Raises InputError for a checkpoint that
+    """Return the state that a checkpoint holds, in the maps of `state`; collective. Raises InputError if the checkpoint
     lacks an entry or belongs to another body."""
     _refuse_lost_branches(scene, contents)
     declared = entries(scene, state)

@@ -1,7 +1,6 @@
-"""Steady sliding, solved directly.
+"""Steady sliding of a job's surface, solved directly, for points of a friction curve and for starts of marches.
 
-* Steady sliding of a job's surface, solved directly: points of a friction curve, and starts of marches.
-* Start of a march from steady sliding: contact, displacement and branches of a surface that has always slid.
+A march that starts from steady sliding gets contact, displacement and branches of a surface that has always slid.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True)
 class SteadyLevel:
-    """One grid: the rows of each rank, its transform, and the heights."""
+    """One grid of a steady solve: the rows of each rank, the transform, and the heights."""
 
     slab: Slab
     fft: FFT
@@ -63,9 +62,9 @@ class SteadyLevel:
 
 
 class SteadySliding:
-    """Steady states of one job's surface and body; the constructor and the methods are collective.
+    """Solver of the steady states of one job's surface and body; the constructor and the methods are collective.
 
-    Solves start from coarser grids, or from the last state if its velocity is nearly the same. The tolerance on
+    Solves start from coarser grids, or from the last state if its velocity is nearly the same. The limit on
     certificates follows from the tolerance of the job and is at most `most`.
     """
 
@@ -84,26 +83,26 @@ class SteadySliding:
         self.loops = [loop for loops in answers("steady", "loops") for loop in loops(setup)]
 
     def hold(self, velocity: Vector) -> tuple[Any, ...]:
-        """Allocate and return all that a solve at a velocity [m/s] may hold on the finest grid."""
+        """Allocate and return all arrays that a solve at a velocity [m/s] may hold on the finest grid."""
         p, (solver, operator) = self.setup.slab.empty(), self._solver(self.levels[0], velocity)
         return p, solver, operator, solver.hold_all()
 
     def set_temperature(self, temperature: float) -> None:
-        """Set the temperature [deg C] of further solves; raises InputError if the material has no shift."""
+        """Set the temperature [deg C] for all further solves; raises InputError if the material has no shift."""
         if temperature != self.temperature:
             self.set_material(temperature)
             self.temperature = temperature
 
     def set_material(self, temperature: float) -> None:
-        """Set the material at this temperature [deg C] for the next solve."""
+        """Set the material to a temperature [deg C] for the next solve only."""
         self.setup = replace(self.setup, choices=choices(self.setup.job.at_temperature(temperature)))
         self.probe = self.setup.probe()
 
     def solve(self, velocity: Vector, pressure: float) -> Point:
-        """Return the steady state at a velocity [m/s] of the surface under a mean pressure [Pa], within the loops of
-        all effects that have one (`loops` of their modules `steady`).
+        """Return the steady state at a velocity [m/s] of the surface under a mean pressure [Pa].
 
-        Raises RunError, with the certificate reached, if no start leads to a solution, or if a loop does not settle.
+        Effects whose modules `steady` define `loops` repeat the solve within these loops. Raises RunError, with the
+        certificate reached, if no start leads to a solution, or if a loop does not settle.
         """
         solve = self._solve
         for loop in self.loops:
@@ -144,8 +143,8 @@ class SteadySliding:
         return ". Try a velocity nearer to one that works, a finer grid, or another numerics.tolerance."
 
     def field(self, name: str) -> Array:
-        """Return this rank's rows of `pressure` [Pa], `displacement`, `gap` or `height` [m], or of a map of an effect
-        in the last state."""
+        """Return this rank's rows of a map in the last state: `pressure` [Pa], `displacement`, `gap` or `height` [m],
+        or a map of an effect."""
         assert self.contact is not None
         for loop in self.loops:
             if name in loop.fields:
@@ -167,10 +166,10 @@ class SteadySliding:
         return []
 
     def keep_in(self, directory: Path) -> None:
-        """Do nothing: a point is one solve."""
+        """Do nothing: a point is one solve, without intermediate results."""
 
     def forget(self) -> None:
-        """Do nothing."""
+        """Do nothing: no intermediate results are stored."""
 
     def rows(self, velocity: Vector) -> list[list[float]]:
         """Return the lines of steady_waves.csv for the last state; collective."""
@@ -179,7 +178,7 @@ class SteadySliding:
         return [[*place, *pair] for pair in zip(*map(np.ndarray.tolist, self.shares(velocity)), strict=True)]
 
     def shares(self, velocity: Vector) -> tuple[Array, Array]:
-        """Return the wavelengths [m] of `branch_powers`, and the share of the friction power in the octave of each;
+        """Return the wavelengths [m] of the octaves of `branch_powers`, and the share of each in the friction power;
         collective."""
         assert self.contact is not None
         power = branch_powers(self.setup, self.contact, velocity)
@@ -245,7 +244,7 @@ class SteadySliding:
 def judge_state(
     setup: Setup, known: RunProperties, certificate: Certificate, by_energy: float, velocity: Vector, measures: Measures
 ) -> tuple[float, ErrorBudget]:
-    """Return friction by energy, including an interface, and the errors of friction and area."""
+    """Return friction from the dissipated power, including an interface, and the errors of friction and area."""
     friction = by_energy + measures.friction_interface
     seen = StepObservation(
         certificate.complementarity,
@@ -260,10 +259,9 @@ def judge_state(
 
 
 def stiffer_lines(setup: Setup, velocity: Vector) -> Lines | None:
-    """Return the lines along a velocity [m/s] and how much stiffer waves along them are: |G| of the longest one,
-    divided by G_inf, the modulus of waves that do not vary along them.
-
-    Return None for an elastic body, a line of points, a free box, and an oblique velocity."""
+    """Return the grid lines along a velocity [m/s], with the ratio of |G| for the longest wave along them to G_inf, the
+    modulus of waves that do not vary along them; None for an elastic body, a line of points, a free box, and an oblique
+    velocity."""
     grid = setup.grid
     if setup.half_space.free or 1 in (grid.nx, grid.ny) or np.count_nonzero(velocity) != 1:
         return None
@@ -276,7 +274,8 @@ def stiffer_lines(setup: Setup, velocity: Vector) -> Lines | None:
 
 
 def tolerance_of(asked: float, free: bool = False) -> float:
-    """Return the tolerance on the certificate of a steady state for the tolerance of a job, in a free box or not."""
+    """Return the limit on the certificate of a steady state for the tolerance `asked` by a job; `free` is True in a
+    free box."""
     return max((AS_RIGHT_FREE if free else AS_RIGHT) * asked, min(LOOSE, asked))
 
 
@@ -287,10 +286,10 @@ def _direction(velocity: Vector) -> tuple[float, float]:
 
 
 def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = None) -> March:
-    """Return a march before the first step of a job, or after the step of a checkpoint; collective.
+    """Return a march before the first step of a job, or after the step of a checkpoint `saved`; collective.
 
-    It can continue to the end of the history or, if later, to `until` [s]. Raises InputError for files that do not
-    fit, and for approaches beyond full contact.
+    The march can continue to the end of the history or, if later, to `until` [s]. Raises InputError for files that do
+    not fit, and for approaches beyond full contact.
     """
     setup = set_up(job, slab, until)
     sanity.refuse_approaches(setup)
@@ -303,8 +302,8 @@ def first(job: Job, slab: Slab, until: float = 0.0, saved: Contents | None = Non
 
 
 def start_march(scene: Scene, contact: Contact | None = None, **of_row: Any) -> March:
-    """Return a march on a scene from rest, or from a `contact` in steady sliding at the velocity of its job's `initial`
-    section, with the values `of_row` in the row of time 0; collective."""
+    """Return a march on a scene from rest, or from a `contact` in steady sliding at the velocity of the job's section
+    `initial`; collective. `of_row` are values for the record at time 0."""
     if contact is None:
         return March(scene)
     body, workspace = scene.material.at_rest(), scene.solver.workspace

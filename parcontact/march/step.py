@@ -43,7 +43,7 @@ class _Made:
 
 
 def make_step(scene: Scene, state: State, step: Step) -> State:
-    """Return the state after a step, or after a shorter one if its errors are too large; collective. Raises
+    """Return the state after a step, or after a shorter step if the errors are too large; collective. Raises
     StepError."""
     began, calls = time.perf_counter(), scene.slab.tally["operator"]
     made = _accepted(scene, state, step)

@@ -1,6 +1,4 @@
-"""The error of time steps, and what it is estimated from.
-
-Input of the error budget: properties of a run, and observations of a step or of a steady state.
+"""The error of time steps, and its input: properties of a run, and observations of a step or of a steady state.
 
 Spots of contact are taken as round. With S cell sides between points in contact and others, on n points of which a
 share A touches, their mean radius in cells is
@@ -10,18 +8,18 @@ share A touches, their mean radius in cells is
 or the radius of the gaps between them if these are smaller. Contacts of waves, cylinders and flats are identical: they
 have the same position on the grid and count as one.
 
-The error of friction by the length of a time step, estimated in two ways.
-
-A linear step takes the displacement as linear in time. For a harmonic wave that turns by an angle theta in a step, the
-force of a branch with z = dt/tau then has an error of theta^2/12 of its loss if the branch is slow, theta^2/6 if it is
-fast, and is delayed by L/2 of a step,
+The error of friction by the length of a time step is estimated in two ways. The first one is a formula. A linear step
+takes the displacement as linear in time. For a harmonic wave that turns by an angle theta in a step, the force of a
+branch with z = dt/tau then has an error of theta^2/12 of its loss if the branch is slow, theta^2/6 if it is fast, and
+is delayed by L/2 of a step,
 
     L(z) = coth(z/2) - 2/z,      z/6 for small z, 1 for large ones.
 
-In full contact friction is the loss, with the error theta^2 (1 + <L>)/12, where <L> = sum w L/sum w over the shares of
-friction of the branches, w = G omega tau/(1 + (omega tau)^2). theta is the angle of a wave with the height and the
-change of the surface; shorter waves contribute more to friction, so that the error of many waves is 1.5 times as large
-(LINEAR_TURNING). Where contact spots of radius a pass by x = (way of the step)/a, delayed forces move their edges:
+In full contact friction is the loss, with the error theta^2 (1 + <L>)/12, where <L> = sum w L/sum w is a mean over the
+branches with w = G omega tau/(1 + (omega tau)^2), their shares of friction. theta is the angle of a wave with the
+height and the change of the surface; as shorter waves contribute more to friction, the error of many waves is 1.5 times
+as large (LINEAR_TURNING). Where contact spots of radius a pass by x = (distance of the step)/a, delayed forces move
+their edges:
 
     E = LINEAR_PASSING (1 - A^4) x (<L> + PASSING_LOSS x),      omega = x/dt.
 
@@ -29,14 +27,15 @@ A quadratic step also follows the bend of the motion. In full contact the error 
 <L> plus theta^4/75 (`prony.discrete_modulus`); TURNING and TURNING_4 are 1.5 times as large. Edges leave an error of
 third order, PASSING x^3.
 
-The embedded pair (`embedded`) shows jumps, changes of load, and creep. The error of a quadratic step is its difference
-to a linear one. The pair of a linear step differs in second order if all branches are slow, and in first order if some
-are fast; the accumulated error of linear steps has the order 1.7. In a slide PAIR_SHARE of the pair counts, for errors
-not caused by edges. Backward Euler is of first order: its error varies as the root of the difference.
+The second estimate is the embedded pair (`embedded`), which shows jumps, changes of load, and creep. For a quadratic
+step it is the difference to a linear step. The pair of a linear step differs in second order if all branches are slow,
+and in first order if some are fast; the accumulated error of linear steps has the order 1.7. In a slide PAIR_SHARE of
+the pair counts, for errors not caused by edges. Backward Euler is of first order: its error varies as the root of the
+difference.
 
 Friction that changes from step to step is delayed by at most <L> of the change, CURVED_RISE of it in quadratic steps
 (`error_of_rise`). Right after a jump of the load friction is 0 up to mesh errors, as for an elastic body, so that the
-next change is unknown. The error of the area is a share of that of friction, which falls with the open area.
+next change is unknown. The error of the area is a share of the error of friction, and falls with the open area.
 """
 
 import math
@@ -80,10 +79,10 @@ class RunProperties:
 
     * `points`: number of points of the grid;
     * `cell`: sides of a cell [m];
-    * `cells_per_wave`: shortest wavelength of a rough surface, divided by the longer side of a cell; or None;
+    * `cells_per_wave`: shortest wavelength of a rough surface, divided by the longer side of a cell, or None;
     * `measured`: the surface has a map, which may lack waves on a coarse grid;
     * `edges_follow_grid`: edges of contact are parallel to lines of the grid;
-    * `identical_contacts`: all contacts are the same, as those of a single wave;
+    * `identical_contacts`: all contacts are equal, like the contacts of a single wave;
     * `free`: the box is free;
     * `prony`: relaxation function; None for an elastic body;
     * `folded`: bound on the error of folded branches;
@@ -103,29 +102,29 @@ class RunProperties:
 
     @cached_property
     def mean_cell(self) -> float:
-        """Mean of the sides of a cell, the unit of the radii of spots."""
+        """Mean of the two sides of a cell [m], the unit of the radii of spots."""
         return 0.5 * (self.cell[0] + self.cell[1])
 
     @cached_property
     def excess(self) -> float:
-        """Excess cells of the contact area per side of a cell on its edge."""
+        """Number of cells by which the counted contact area is too large, per cell side on the edge of contact."""
         return excess_of(*self.cell, self.edges_follow_grid)
 
 
 @dataclass(frozen=True)
 class StepObservation:
-    """Observation of a step, or of a steady state.
+    """Numbers of a step, or of a steady state, from which errors are estimated.
 
-    `complementarity` of the certificate; `penetrating`: points that penetrate without pressure, as a share of those
-    in contact; `slope`: rms slope of the surface under the pressure; `friction`, and the part of an `interface`;
-    `area`, counted, and `corrected`, as shares; `spared`: the correction not made at points on the edge that have
-    yielded; `friction_mismatch`: difference of friction by the slopes of the rigid surface and of the body; `way`:
-    direction of sliding, (0, 0) at rest.
+    `complementarity` of the certificate; `penetrating`: number of points that penetrate without pressure, over the
+    number in contact; `slope`: rms slope of the surface under the pressure; `friction`, and the part of an `interface`;
+    `area`, counted, and `corrected`, as shares; `spared`: correction not made at points on the edge that have yielded;
+    `friction_mismatch`: difference of friction by the slopes of the rigid surface and of the body; `way`: direction of
+    sliding, (0, 0) at rest.
 
-    For steps also: `difference` of the embedded pair, and its `order`; cells (of mean sides) `slid` in `seconds`;
-    the `angle` of the pair; `curved`: the displacement is quadratic in time; the `change` of friction since the step
-    before, infinite after a jump; `own_error`: error by the length of the step that a body without branches
-    states; `uneven`: largest minus mean pressure over the mean, at most 1.
+    For steps also: `difference` of the embedded pair, and its `order`; `slid`: cells (of mean sides) slid in `seconds`;
+    `angle` of the pair; `curved`: the displacement is quadratic in time; `change` of friction since the step before,
+    infinite after a jump; `own_error`: error of the step length that a body without branches states; `uneven`: (largest
+    - mean)/mean pressure, at most 1.
     """
 
     complementarity: float
@@ -155,13 +154,13 @@ class StepObservation:
 
     @cached_property
     def correction(self) -> float:
-        """The counted minus the corrected area, over the latter."""
+        """The counted minus the corrected area, divided by the corrected area."""
         return (self.area - self.corrected) / self.corrected if self.corrected > 0.0 else 0.0
 
 
 def properties_of(job: Job, shortest: float | None, folded: float = 0.0, prony: Prony | None = None) -> RunProperties:
-    """Return the properties of a job: `shortest` is the shortest wave of its map [m], `folded` the bound on the error
-    of its folded branches, and `prony` its relaxation function."""
+    """Return the properties of a run of a job. `shortest` is the shortest wave of its map [m], `folded` the bound on
+    the error of folded branches, and `prony` its relaxation function."""
     waves = [shape.short_wavelength for shape in job.surface if isinstance(shape, Rough)]
     waves += [shortest] if shortest is not None else []
     (nx, ny), (dx, dy) = job.grid.points, (job.grid.dx, job.grid.dy)
@@ -191,8 +190,8 @@ def _ridges(shapes: Sequence[Any]) -> bool:
 
 
 def radius_of(run: RunProperties, observed: StepObservation) -> float:
-    """Return the radius of round spots of contact, or of smaller gaps between them, in cells of mean sides; half the
-    width of straight ones; infinite without edges."""
+    """Return the radius of round spots of contact, or of the gaps between them if these are smaller, in cells of mean
+    sides; half the width of strips; infinite without edges."""
     sides = (observed.area - observed.corrected + observed.spared) * run.points / run.excess
     if sides <= 0.0:
         return math.inf
@@ -201,8 +200,8 @@ def radius_of(run: RunProperties, observed: StepObservation) -> float:
 
 
 def count_spots(run: RunProperties, observed: StepObservation) -> float:
-    """Return the number of spots of contact, or of smaller gaps between them; 1 for identical contacts; in full contact
-    the number of half waves of the shortest length."""
+    """Return the number of spots of contact, or of the gaps between them if these are smaller; 1 for identical
+    contacts; in full contact the number of half waves of the shortest length."""
     radius, share = radius_of(run, observed), min(observed.area, 1.0 - observed.area)
     if run.identical_contacts:
         return 1.0
@@ -214,20 +213,20 @@ def count_spots(run: RunProperties, observed: StepObservation) -> float:
 
 
 def resolves(run: RunProperties, observed: StepObservation) -> bool:
-    """Return False if the true spots of contact may be smaller than a cell, so that no error of their area is known.
-    Errors of many spots average out, except for single cells."""
+    """Return False if the true spots of contact may be smaller than a cell, so that the error of their area is unknown.
+    Errors of many spots average out, except for spots of single cells."""
     if not 0.0 < observed.area < 0.5:
         return True
     return radius_of(run, observed) >= (ONE_RADIUS if count_spots(run, observed) < 2.0 else MANY_RADIUS)
 
 
 def mean_over_spots(run: RunProperties, observed: StepObservation) -> float:
-    """Return the factor by which the error of the mean over all spots is smaller than that of one spot."""
+    """Return the error of the mean over all spots, divided by the error of one spot."""
     return count_spots(run, observed) ** -SPOTS_POWER
 
 
 def cell_along(run: RunProperties, way: Vector) -> float:
-    """Return the length of cells along a direction, in the unit of `run.cell`; the longer side at rest."""
+    """Return the length of a cell along a direction, in the unit of `run.cell`; the longer side at rest."""
     (dx, dy), (x, y) = run.cell, way
     length = math.hypot(x, y)
     return math.hypot(x * dx, y * dy) / length if length else max(dx, dy)
@@ -241,7 +240,7 @@ FIXED_EDGES = 0.9  # accuracy: share of the error of a linear pair that edges ca
 
 
 def time_error(run: RunProperties, observed: StepObservation) -> float:
-    """Return the error of friction by the length of a time step, also at rest; at most 1."""
+    """Return the relative error of friction by the length of a time step, also at rest; at most 1."""
     if observed.own_error is not None:
         return observed.own_error
     if not run.exponential:
@@ -273,8 +272,8 @@ def _error_by_pair(observed: StepObservation) -> float:
 
 
 def error_of_rise(run: RunProperties, observed: StepObservation) -> float:
-    """Return the error of a change of friction since the step before, as after rest: it is delayed by <L> of a step.
-    After a jump the change is the slope times the sine of the loss angle, times `uneven`."""
+    """Return the relative error that a change of friction since the step before causes, as after rest: friction is
+    delayed by <L> of a step. After a jump the change is the slope times the sine of the loss angle, times `uneven`."""
     if run.prony is None or not run.exponential or not observed.slid or observed.body <= 0.0:
         return 0.0
     x = max(_share_passed(run, observed), observed.angle)
@@ -289,7 +288,7 @@ def error_of_rise(run: RunProperties, observed: StepObservation) -> float:
 
 
 def share_of_area(run: RunProperties, observed: StepObservation) -> float:
-    """Return the error of area by the time steps over that of friction."""
+    """Return the error of the area by the time steps, divided by the error of friction by the time steps."""
     open_share = 1.0 - observed.area
     if run.exponential:
         return TIME_AREA.value * open_share**TIME_AREA.order
@@ -297,7 +296,8 @@ def share_of_area(run: RunProperties, observed: StepObservation) -> float:
 
 
 def order_of_time_error(integrator: str, curved: bool) -> float:
-    """Return the order of the error in the length of a step; `curved` if the displacement is quadratic in time."""
+    """Return the power of the step length with which the time error grows; `curved` is True if the displacement is
+    quadratic in time."""
     if integrator == "backward-euler":
         return 1.0
     return PASSING.order if integrator == "exponential" and curved else LINEAR_PAIR.order
