@@ -1,1 +1,1 @@
-"""Effects that a job may ask for, each in a folder of its own."""
+"""Physical effects that a job may turn on, each in a folder of its own."""

@@ -1,16 +1,12 @@
-"""Interfaces that an effect implements.
+"""Interfaces that an effect and a contact law implement.
 
-Interface of effects: a decision from the job alone, and what is made, remembered and written if the effect is on.
+An effect is one class, found by the section that it adds to a job (`job.listing`); no other file refers to it. It makes
+a decision from the job alone, and states what is made, remembered and written if it is on. An effect may provide the
+contact law, and it is called after each step.
 
-An effect is one class, found by the section that it adds to a job (`job.listing`); no other file refers to
-it. It may provide the contact law, and it is called after each step.
-
-The contact law of a job: admissible pressures, and where surfaces touch in saved maps.
-
-Interface of contact laws: how a step is solved, its memory, and where surfaces touch.
-
-`ContactLaw` is the interface that a march uses. By itself it is a constraint on pressures
-(`march.laws`). Effects may provide other laws, in which, say, the gap is the unknown.
+`ContactLaw` is the interface that a march uses: how a step is solved, its memory, and where surfaces touch in saved
+maps. Without an effect it is a constraint on pressures (`march.laws`). In the law of an effect, say, the gap may be the
+unknown.
 """
 
 from __future__ import annotations
@@ -48,8 +44,8 @@ End = Literal["equilibrium", "detached", "opened", "open"]
 
 
 class PreviousPressure(NamedTuple):
-    """The pressure after a step, a map of p with the pressure `alpha p`, and the position of the surface [m]; unknown
-    if alpha is 0."""
+    """The pressure after a step and the position of the surface [m]. The pressure is `alpha p`, with p the map
+    `pressure`, and is unknown if alpha is 0."""
 
     pressure: Array
     alpha: float = 0.0
@@ -60,7 +56,8 @@ class PreviousPressure(NamedTuple):
 class PreviousContacts:
     """Memory of earlier contacts: the last pressures, the newest first, and the last approach d.
 
-    A history of single solves stores one pressure, others two or more. The next pressure is written to the map `spare`.
+    A history of single solves stores one pressure, other histories two or more. The next pressure is written to the map
+    `spare`.
     """
 
     pressures: tuple[PreviousPressure, ...]
@@ -74,16 +71,17 @@ class PreviousContacts:
 
 @dataclass(frozen=True)
 class SolvedContact(Generic[Remembered]):
-    """The contact of a step, the memory of the law after it, and a map that is not 0 where the surfaces touch.
+    """The contact of a step, the memory of the contact law after it, and a map `touching`, not 0 where the surfaces
+    touch.
 
-    `numbers`: further results of the law, by name. `pull`: force of all tension [N]. `least_load`: load [N] up to
-    which a load is an error of the solver. `snapped`: the contact passed through states without equilibrium. `remark`:
-    a sentence for run.log, or ''. `end` is one of
+    `numbers`: further results of the law, by name. `pull`: force of all tension [N]. `least_load`: loads [N] up to this
+    one are errors of the solver. `snapped`: the contact passed through states without equilibrium. `remark`: a sentence
+    for run.log, or ''. `end` is one of
 
     * "equilibrium";
     * "detached": no equilibrium was left;
     * "opened": the run continues with the surfaces far from each other;
-    * "open": in the steps after that.
+    * "open": a step after the surfaces have opened.
     """
 
     contact: Contact
@@ -103,8 +101,9 @@ class SolvedContact(Generic[Remembered]):
 
 
 class EdgeMotion(NamedTuple):
-    """Motion of a contact in a step: of its edges [half process zones]; `untouched` if nothing touches or is under
-    tension before and after the step; `begins` if a contact that attracts begins or ends."""
+    """Motion of a contact in a step: `front` is the motion of its edges [half process zones], `untouched` is True if
+    nothing touches or is under tension before and after the step, and `begins` if a contact that attracts begins or
+    ends."""
 
     front: float = 0.0
     untouched: bool = False
@@ -122,14 +121,14 @@ NEVER = -1.0  # a time [s] in a checkpoint
 
 
 def entries_of_end(end: Detached | None, job: Any) -> dict[str, Entry]:
-    """Return the entries of a detachment, None before one, in checkpoints of a job."""
+    """Return the checkpoint entries of a detachment, which is None before one, for a job."""
     time, load = end or (NEVER, 0.0)
     return {"detached at": Entry(time, 1.0, "s"), "detached under": Entry(load), "history": Entry(_mark(job))}
 
 
 def end_in(job: Any, saved: Saved) -> Detached | None:
-    """Return time and load of the detachment from the entries of a law in a checkpoint; None before a detachment, or if
-    the job has another history."""
+    """Return time and load of the detachment that a checkpoint of a contact law holds; None if there is none, or if the
+    job has another history."""
     if "detached at" not in saved or saved["detached at"] == NEVER or float(saved["history"]) != _mark(job):
         return None
     return Detached(float(saved["detached at"]), float(saved["detached under"]))
@@ -144,15 +143,16 @@ UNITS_OF_LOADS = {"pressure": " Pa", "force": " N", "approach": " m"}
 
 
 def nothing_holds(control: str, load: float) -> str:
-    """Return the sentence on surfaces that detach under a prescribed load."""
+    """Return a sentence: the surfaces detach under a prescribed load."""
     return f"the surfaces detach under a {control} of {load:g}{UNITS_OF_LOADS[control]}"
 
 
 class ContactLaw(Protocol[Memory]):
     """A contact law, a part of the run. Methods are collective.
 
-    A law that builds on the usual contact, the bounds of pressure alone, may have a method `upon`. It takes the usual
-    law and returns the whole one."""
+    A law that extends the usual contact, which only bounds the pressure, may have a method `upon`, which takes the
+    usual law and returns the extended one.
+    """
 
     may_shorten: bool  # True if a failed chosen step is repeated with a shorter one
 
@@ -166,21 +166,21 @@ class ContactLaw(Protocol[Memory]):
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[Memory]:
-        """Solve a step of the body, with the memory, contacts and measures of the step before, and put the pressure
-        into the spare map. A `tolerance` of None means the tolerance of the job. A contact that was not solved has a
-        `failure`."""
+        """Solve the contact of a step, and put the pressure into the spare map of `past`. `memory`, `past` and `before`
+        are the law's memory, the contacts and the measures of the step before. A `tolerance` of None means the job's.
+        The result has a `failure` if the solve failed."""
 
     def motion(self, solved: SolvedContact[Memory], before: Measures, now: Measures) -> EdgeMotion:
         """Return the motion of the contact in a step from its measures before and after it."""
 
     def gap(self, memory: Memory) -> Array | None:
-        """Return the map of the gap if it is the unknown, else None."""
+        """Return the map of the gap if the gap is the unknown, else None."""
 
     def detached(self, memory: Memory) -> Detached | None:
-        """Return time and load of the detachment; None before."""
+        """Return time and load of the detachment; None before it."""
 
     def with_end(self, memory: Memory, end: Detached) -> Memory:
-        """Return the memory of a run whose surfaces have detached."""
+        """Return the memory with the detachment `end` added."""
 
     # -- as a part of the run ------------------------------------------------------------------------------------------
 
@@ -188,10 +188,10 @@ class ContactLaw(Protocol[Memory]):
         """Return the memory before the first step, in new maps."""
 
     def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:
-        """Return the entries of a memory in checkpoints."""
+        """Return the checkpoint entries of a memory, by name."""
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:
-        """Return the memory of a checkpoint."""
+        """Return the memory that a checkpoint holds."""
 
 
 EXTRAPOLATION, TOLERANCES = "extrapolated starts", "looser tolerances"  # see `Effect.forbids`
@@ -200,7 +200,7 @@ SINGLE, BY_THEORY = "single precision", "Persson's theory"
 
 @dataclass(frozen=True)
 class Decision:
-    """Decision about an effect: whether it is on, and the reason in a few words."""
+    """Decision about an effect: `on` or off, and the reason `why` in a few words."""
 
     name: str
     on: bool
@@ -209,11 +209,10 @@ class Decision:
 
 @dataclass(frozen=True)
 class Sheared:
-    """Effect of tractions along the surface in a step: the measures including them, their force [N] on the rigid
-    surface, and the energy lost in slip [J]. With heat the map `slipping` is in proportion to the power of slip;
-    at rest, or if nothing slips, to the bounds of tractions. `error` is the relative error of their solve, a `share` of
-    them has the error of the area, and `time` and `mesh` are their relative errors by the length of the step and by the
-    stiffness of spots on the mesh."""
+    """Effect of tractions along the surface in a step: the measures including tractions, their force [N] on the rigid
+    surface, and the energy lost in slip [J]. With heat the map `slipping` is proportional to the power of slip; at
+    rest, or if nothing slips, to the bounds of tractions. Tractions have the relative errors `error` of their solve,
+    `time` of the step length, and `mesh` of the stiffness of spots; a `share` of them has the error of the area."""
 
     measures: Measures
     force: Vector
@@ -227,14 +226,15 @@ class Sheared:
 
 @dataclass(frozen=True)
 class Instant:
-    """A step just made, in the run's units unless stated; maps are valid until the next step begins.
+    """A step just made, in the run's units unless stated; maps have the shape (ny_loc, nx) and are valid until the next
+    step.
 
-    The pressure on this rank's rows is `modulus pressure`, `displacement` is the displacement of the body, and
-    `touching` is not 0 where the surfaces touch; their shape is (ny_loc, nx). `before` and `measures` belong to the
-    step before and to this one. In this step the surface moved by `moved` [m], and the stored plus dissipated energy
-    of the body changed by `gained` [J], NaN without energies. Edges of a contact that attracts moved by `front` half
-    process zones; `untouched` if nothing touched or was under tension before and after the step. `error_friction` is
-    the estimated relative error of friction, infinite without friction.
+    The pressure is `modulus pressure`, `displacement` is the displacement of the body, and `touching` is not 0 where
+    the surfaces touch. `before` and `measures` are the measures of the step before and of this step. In the step the
+    surface moved by `moved` [m], and the stored plus dissipated energy of the body changed by `gained` [J], NaN without
+    energies. Edges of a contact that attracts moved by `front` half process zones; `untouched` is True if nothing
+    touched or was under tension before and after the step. `error_friction` is the estimated relative error of
+    friction, infinite without friction.
     """
 
     step: Step
@@ -262,14 +262,15 @@ class Instant:
 
     @property
     def slid(self) -> float:
-        """Distance by which the surface moved [m]."""
+        """Distance by which the surface moved in the step [m]."""
         return math.hypot(*self.moved)
 
 
 @dataclass(frozen=True)
 class Changes(Generic[Remembered]):
-    """Changes by an effect in a step: its memory, a sentence for run.log or '', and whether errors can be stated across
-    the step. `turned` is the change of the mean traction over the mean bound of traction."""
+    """Changes that an effect makes in a step: its memory, a sentence for run.log or '', and `states_errors`, False if
+    errors cannot be stated across the step. `turned` is the change of the mean traction over the mean bound of
+    traction."""
 
     memory: Remembered
     remark: str = ""
@@ -279,16 +280,16 @@ class Changes(Generic[Remembered]):
 
 
 class Effect(Protocol[Memory]):
-    """Class of an effect; made with a `Scene` only if the job asks for it, and a part of the run.
+    """Base class of effects, without memory. An object is made from a `Scene` only if the job asks for the effect, and
+    is a part of the run. Methods are collective unless stated.
 
-    It may have `rules` for the whole job, as sections have them; `lifts`, checks of jobs that do not apply with it; a
-    `stage`, the class of the stages of a history with keys that it adds; and functions of a job `doubts` and `facts`,
-    which give warnings (`doubts.Doubt`, or sentences) and sentences about the section. `describe_waves` of a job gives
-    sentences on the waves of its surface on one grid, from bins of wavenumbers [rad/m] and their mean square slopes.
-    `changed_material` of a job is in place of its material; `why_no_curve` and `why_no_theory` return why it has no
-    friction curve, and no prediction by Persson's theory, `why_not_folded` why all branches of the body need maps.
-    `curve_options` yields what its columns of friction curves require (`Column.when`). Methods are collective unless
-    stated. The base class has no memory.
+    Optional attributes: `rules`, checks of the whole job; `lifts`, checks of jobs that do not apply with the effect;
+    `stage`, a class of stages with further keys. Optional functions of a job: `doubts` and `facts` yield warnings
+    (`doubts.Doubt`, or sentences) and sentences about the section. `describe_waves` yields sentences on the waves of a
+    surface on one grid, from bins of wavenumbers [rad/m] and their mean square slopes. `changed_material` returns a
+    material that replaces the job's. `why_no_curve` and `why_no_theory` return the reason why a job has no friction
+    curve, or no prediction by Persson's theory, and `why_not_folded` why all branches need maps. `curve_options` yields
+    the requirements of the effect's columns of friction curves (`Column.when`).
     """
 
     section: ClassVar[type[Part]]  # section that it adds to a job
@@ -306,55 +307,56 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def decide(job: Any) -> Decision:
-        """Return whether the job asks for it, with its name in checkpoints; the same on every rank."""
+        """Return the decision whether the job turns the effect on, with its name in checkpoints; the same on every
+        rank."""
         ...
 
     @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
-        """Return the types of the maps that it has in checkpoints and in memory, for `parcontact plan`. For effects of
-        this package the plan counts allocations instead."""
+        """Return the types of the maps that the effect stores in checkpoints and in memory, for `parcontact plan`; the
+        plan counts allocations instead for effects of this package."""
         return ()
 
     @staticmethod
     def shear(job: Any) -> Shear | None:
-        """Return the friction of the contact area that it adds, in marches and in steady sliding, or None. Forces of
-        all effects are added."""
+        """Return the friction of the contact area that the effect adds, in marches and in steady sliding, or None.
+        Forces of all effects are added."""
         return None
 
     @staticmethod
     def touches(job: Any, pressure: Array, gap: Array) -> NDArray[Any] | None:
-        """Return a map that is not 0 where surfaces touch, from saved maps of the pressure [Pa] and of the gap [m]. It
-        is None without a law. Local."""
+        """Return a map that is not 0 where surfaces touch, from saved maps of the pressure [Pa] and of the gap [m];
+        None if the effect has no contact law. Local."""
         return None
 
     @staticmethod
     def remembers(job: Any) -> bool:
-        """Return True if the contact depends on its history, also that of an elastic body."""
+        """Return True if the contact depends on its history even for an elastic body."""
         return False
 
     @staticmethod
     def sheared_first(job: Any) -> bool:
-        """Return True if it shears the contact before it slides, within far less than a wave."""
+        """Return True if the effect shears the contact before it slides, over much less than a wave."""
         return False
 
     @staticmethod
     def compares_heights(job: Any) -> bool:
-        """Return True if warnings compare the heights of the surface with a length of the section."""
+        """Return True if warnings compare the heights of the surface with a length of the effect's section."""
         return False
 
     @staticmethod
     def chosen_values(job: Any) -> Mapping[str, float]:
-        """Return the lengths [m] that it chooses by the mesh, by their keys."""
+        """Return the lengths [m] that the effect chooses by the mesh, by their keys."""
         return {}
 
     @staticmethod
     def doubt_heights(job: Any, span: float) -> Iterator[Doubt]:
-        """Yield warnings about a rough surface by its height from the lowest to the highest point [m]."""
+        """Yield warnings about a rough surface with the height `span` from the lowest to the highest point [m]."""
         yield from ()
 
     @staticmethod
     def doubt_contact(job: Any, measures: Measures, where: str) -> Iterator[Doubt]:
-        """Yield warnings about the contact of a step, at a place in words."""
+        """Yield warnings about the contact of a step; `where` is the place of the step in words."""
         yield from ()
 
     @staticmethod
@@ -364,7 +366,7 @@ class Effect(Protocol[Memory]):
 
     @staticmethod
     def ended(job: Any, saved: Saved) -> Detached | None:
-        """Return the end of the run in the entries of its law in a checkpoint; None if the run goes on."""
+        """Return the detachment that ended the run, from the law's entries in a checkpoint; None if the run goes on."""
         return None
 
     def __init__(self, scene: Any) -> None: ...
@@ -382,42 +384,44 @@ class Effect(Protocol[Memory]):
         return None  # type: ignore[return-value]
 
     def follow(self, instant: Instant, memory: Memory) -> Changes[Memory]:
-        """Return the changes of a step that was made."""
+        """Return the changes that the effect makes after a step."""
         ...
 
     def values(self, memory: Memory) -> Sequence[float]:
-        """Return the values of its columns for the last step, the same on every rank; NaN leaves a column empty. Local
-        to this rank."""
+        """Return the values of the effect's columns for the last step, the same on every rank; NaN leaves a column
+        empty. Local."""
         ...
 
     def field(self, memory: Memory, name: str) -> Array:
-        """Return this rank's rows of one of its maps in SI units, a new array."""
+        """Return this rank's rows of the map `name` of the effect in SI units, as a new array."""
         ...
 
     def time_factor(self, memory: Memory) -> float:
-        """Return the relaxation times after a step over those at the job's temperature. Raises RunError."""
+        """Return the ratio of relaxation times after a step to those at the job's temperature. Raises RunError."""
         return 1.0
 
     def work(self, memory: Memory) -> float | None:
-        """Return the work of the load since the start [J]; None if it is that on the body."""
+        """Return the work of the load since the start [J]; None if it is the work on the body."""
         return None
 
     def error_energy(self, memory: Memory) -> float | None:
-        """Return the error of the energies since the start [J]; None if it is that of a body under pressure."""
+        """Return the error of the energies since the start [J]; None for the usual estimate of a body under
+        pressure."""
         return None
 
     def further_energies(self, memory: Memory) -> tuple[EnergyMemory, float] | None:
-        """Return energies of the body, in the unit of the scene, to be added to those under pressure, and further
+        """Return energies of the body to be added to its energies under pressure, in the unit of the scene, and further
         losses of work [J]; None without such energies."""
         return None
 
     def entries(self, memory: Memory, units: Units) -> dict[str, Entry]:
-        """Return the entries of a memory in checkpoints, by name; maps belong to it, or are made for a checkpoint."""
+        """Return the checkpoint entries of a memory, by name; maps belong to the memory, or are made for the
+        checkpoint."""
         return {}
 
     def restored(self, memory: Memory, saved: Saved) -> Memory:
-        """Return the memory of a checkpoint, in the run's units, numbers as arrays. Maps have been read into the maps
-        of `entries`."""
+        """Return the memory that a checkpoint holds, in the run's units, numbers as arrays. Maps have been read into
+        the maps of `entries`."""
         return memory
 
 
@@ -445,8 +449,8 @@ class _NamedLaw:
 
 
 def guarded(section: str, effect: type[Effect[Any]]) -> type[Effect[Any]]:
-    """Return the class of an effect. Errors in an effect of another package name it, and maps of an instant are
-    read-only for it."""
+    """Return an effect's class with checks: errors in an effect of another package name the effect, and maps of an
+    instant are read-only for it."""
     if listing.is_ours(section):
         return effect
 
@@ -475,7 +479,7 @@ def guarded(section: str, effect: type[Effect[Any]]) -> type[Effect[Any]]:
 
 
 def columns_of(effects: Effects) -> tuple[str, ...]:
-    """Return the columns that effects add to measures.csv."""
+    """Return the names of the columns that effects add to measures.csv."""
     return tuple(name for effect in effects.values() for name in effect.columns)
 
 
@@ -495,8 +499,8 @@ def _numbers(name: str, effect: Effect[Any], memory: Any) -> list[float]:
 
 
 def constraint_of(job: Job, unit: float = 1.0, most: float = math.inf) -> Box:
-    """Return the constraint of a job without a law of its own, for a `unit` of pressure [Pa]; pressures are at
-    most `most` units."""
+    """Return the bounds of the pressure in a job, unless an effect has a contact law, in the `unit` [Pa]; pressures are
+    at most `most` units."""
     hardness = job.material.hardness
     return Box() if hardness is None or hardness / unit >= most else Box(highest=hardness / unit)
 

@@ -17,7 +17,8 @@ modulus of a wave that does not pass is at least G(T).
                 of n stages begins with any phase of a wave
                 error = (|dM|(w = 0)/G(T) + the largest |dM|/G'' of 1/T <= w <= pi/dt, if the surface slides)
 
-A wave slower than 1/T does not pass within the history. A frozen branch can get a map at any time: it is G u."""
+A wave slower than 1/T does not pass within the history. A frozen branch can get a map at any time: it is G u.
+"""
 
 import math
 from dataclasses import dataclass
@@ -36,8 +37,8 @@ MEMORYLESS_SHARE = 0.5  # tuning: share of the error for memoryless branches, wh
 
 
 class TimeScales(NamedTuple):
-    """Time scales of a history: its duration and its shortest step [s], the number of stages with a duration, whether
-    the load jumps after the start, whether the surface slides, and whether the history starts in steady sliding."""
+    """Time scales of a history: duration and shortest step [s], number of stages with a duration, and whether the load
+    `jumps` after the start, the surface `slides`, and the history starts in `steady` sliding."""
 
     duration: float
     shortest: float
@@ -48,7 +49,7 @@ class TimeScales(NamedTuple):
 
 
 def time_scales(timeline: Timeline, steady: bool) -> TimeScales:
-    """Return the time scales of a history that starts in steady sliding or at rest."""
+    """Return the time scales of a history; `steady` is True if it starts in steady sliding, not at rest."""
     lasting = [span for span in timeline.spans if span.count]
     jumps = any(span.jumps and (span.before or steady) for span in timeline.spans)
     shortest = min((span.extremes[0] for span in lasting), default=0.0)
@@ -58,11 +59,11 @@ def time_scales(timeline: Timeline, steady: bool) -> TimeScales:
 
 @dataclass(frozen=True)
 class FoldedBranches:
-    """The role of each branch, by its number in the material.
+    """The branches with a map (`kept`) and without (`memoryless`, `frozen`), by their numbers in the material.
 
-    `bound` is the largest relative error of friction (of the modulus, if the body rests) by all folded branches, at
-    most `allowed`. `memoryless_errors` are the errors of each branch if it were memoryless. `reason` states why
-    folding is not allowed, or is ''.
+    `bound` is the largest relative error of friction (of the modulus, if the body rests) that all branches without a
+    map cause, at most `allowed`. `memoryless_errors` are the errors of each branch if it were memoryless. `reason`
+    states why all branches need maps, or is ''.
     """
 
     kept: tuple[int, ...]
@@ -82,8 +83,8 @@ class FoldedBranches:
 def fold_branches(
     prony: Prony, scales: TimeScales, integrator: Integrator, allowed: float, reason: str = ""
 ) -> FoldedBranches:
-    """Return the roles of the branches of a material (Pa, s, in normal form): all have maps if there is a `reason`;
-    otherwise the fastest and the slowest have none, as many as keep the sum of their errors at `allowed` or below."""
+    """Return which branches of a material [Pa, s; in normal form] have maps: all if there is a `reason`; otherwise all
+    but the fastest and the slowest, as many as keep the sum of their errors at `allowed` or below."""
     without_memory, as_spring = memoryless_errors(prony, scales, integrator), frozen_errors(prony, scales)
     fast = (np.cumsum(without_memory) <= MEMORYLESS_SHARE * allowed) & (not reason)
     left = allowed - float(without_memory[fast].sum())
@@ -118,14 +119,14 @@ def frozen_errors(prony: Prony, scales: TimeScales) -> Array:
 
 
 def bounded_error(found: FoldedBranches, slides: bool) -> str:
-    """Return a text with the bound on the error of folded branches, at least LEAST_BOUND."""
+    """Return a text with the bound on the error that folded branches cause, at least LEAST_BOUND."""
     what = "friction" if slides else "the modulus"
     return f"error of {what} at most {per_cent(max(found.bound, LEAST_BOUND))}"
 
 
 def describe_folded_branches(found: FoldedBranches, prony: Prony, slides: bool) -> list[str]:
-    """Return sentences on the branches of a material [Pa, s] under a surface that `slides` or not; none if no branch is
-    folded without a reason."""
+    """Return sentences on the branches of a material [Pa, s] without a map; an empty list if all have maps and there is
+    no reason to mention. `slides` is True if the surface moves."""
     count = prony.moduli.size
     if not found.folded:
         return [f"branches: all {count} are followed in time: {found.reason}"] if found.reason and count > 1 else []

@@ -74,7 +74,11 @@ class EmbeddedPair:
         growth: float = 0.0,
     ) -> IntegratorDifference:
         """Compare the integrators in a step under load; `memory` is the memory of the body after the step. One or two
-        messages; collective."""
+        messages; collective.
+
+        `pressure` has the sum `load` over all ranks, on a `share` of the points; `displacement` is `A p/alpha`.
+        `growth` is dt over the length of the step before.
+        """
         weights = self._weights(dt, growth)
         seen, *sums = self._add(weights, trial, memory, pressure, displacement, self.stride(share))
         if abs(self.stride(share) * seen - load) > MISSED * load:

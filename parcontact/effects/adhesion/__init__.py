@@ -1,7 +1,4 @@
-"""Adhesion: surfaces that attract each other.
-
-Columns of adhesion.
-"""
+"""Adhesion: surfaces that attract each other, and its columns in tables."""
 
 from ...column import Column, Table
 

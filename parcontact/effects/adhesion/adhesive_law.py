@@ -1,17 +1,17 @@
-"""Contact law with adhesion: the gap is the unknown, and a part of the state.
+"""Contact law with adhesion, whose unknown is the gap, and energies of contacts with adhesion.
 
 Under one load there are several equilibria, and the history decides which one is reached. A solve starts from the
 last two gaps, extrapolated in time and moved with the surface by whole cells.
 
-Energies of contacts with adhesion: work of the load, energy of the surfaces, and losses in snaps.
+Energies are the work of the load, the energy of the surfaces, and losses in snaps.
 
 In a step in which body and surfaces gain energy, the load does work along its path, by the trapezoidal rule, `F dd -
-F_t ds`. A difference is lost in a snap if the load could not have supplied it on any path between the two states.
-Otherwise it is an error of the rule, and the work is taken from the energies.
+F_t ds`. The difference between the gain and this work is lost in a snap if the load could not have supplied it on any
+path between the two states. Otherwise the difference is an error of the rule, and the work is set to the gain.
 
-Surfaces that detach under a load, or that a load closes again, pass through states without equilibrium. The work of
-the load on this path depends on inertia, which the model does not have. From the last equilibrium on it is taken as
-the least work that the change needs, and 0 if energy is released, which is lost. While surfaces are detached,
+Surfaces that detach under a load, or that a load closes again, pass through states without equilibrium. The work of the
+load on this path depends on inertia, which the model does not have. From the last equilibrium on, the work is taken as
+the least that the change needs, and as 0 if energy is released; this energy is lost. While surfaces are detached,
 neither work nor losses change.
 """
 
@@ -55,9 +55,11 @@ SURFACES, PUSHED, JUMPS = "surface_energy", "work_of_load", "leaves_equilibrium"
 
 
 class AdhesiveEnergies(NamedTuple):
-    """Energies [J] since the start: `work` of the rigid surface, energy of the `surfaces`, 0 at large gaps, energy
-    `lost` in snaps, and `error`, the difference between the work along the path of the load and the energies, summed
-    over all steps without a snap."""
+    """Energies [J] since the start of a run with adhesion.
+
+    `work` of the rigid surface; energy of the `surfaces`, 0 at large gaps; energy `lost` in snaps; `error`, the sum
+    over all steps without a snap of the difference between work and energies.
+    """
 
     work: float = 0.0
     surfaces: float = 0.0
@@ -69,14 +71,14 @@ NO_ENERGIES = AdhesiveEnergies()
 
 
 class PathWork:
-    """Work of the load along its path by the trapezoidal rule, for the modulus 1, in the unit of the scene's energies;
-    0 without energies."""
+    """Work of the load along its path by the trapezoidal rule, for a body of modulus 1, in the scene's unit of energy;
+    0 if the job asks for no energies."""
 
     def __init__(self, scene: Any, approach: float, pressure: float) -> None:
         self.scene, self.approach, self.pressure, self.total = scene, approach, pressure, 0.0
 
     def add(self, contact: Contact) -> None:
-        """Add the work up to a contact; collective."""
+        """Add the work between the last contact and this one; collective."""
         if (energy := self.scene.energy) is None:
             return
         pressure = self.scene.slab.sum(float(contact.p.sum()))[0] / self.scene.slab.points
@@ -86,7 +88,7 @@ class PathWork:
 
 
 def advance_energies(past: AdhesiveEnergies, instant: Instant, area: float) -> AdhesiveEnergies:
-    """Return the energies after a step, in a box of an area [m^2]."""
+    """Return the energies after a step, in a box with an `area` [m^2]."""
     numbers, before, measures = instant.solved.numbers, instant.before, instant.measures
     surfaces = numbers[SURFACES]
     gained = instant.gained + surfaces - past.surfaces
@@ -123,7 +125,7 @@ LEAST_TENSION = 1e-2  # physics: least tension over the strength in the area und
 
 
 class PastGap(NamedTuple):
-    """The gap after a step and the position of the surface [m]; not `known` before the first step."""
+    """The gap after a step and the position of the surface [m]; `known` is False before the first step."""
 
     gap: Array
     position: tuple[float, float] = (0.0, 0.0)
@@ -134,8 +136,8 @@ class PastGap(NamedTuple):
 class AdhesiveMemory:
     """Memory of a contact with adhesion: the last gaps, the newest first, a spare map and a backup of the gap.
 
-    `free_correction` is the correction for a free body (`adhesive_solver`) per pressure, for the modulus `modulus`,
-    None for a periodic one. `end` has time and load of the detachment, None before.
+    `free_correction` is the correction for a free body (`gap_solver`) over the pressure, for the modulus `modulus`;
+    None for a periodic body. `end` has time and load of the detachment, None before it.
     """
 
     pasts: tuple[PastGap, PastGap]
@@ -148,8 +150,11 @@ class AdhesiveMemory:
 
 @dataclass(frozen=True)
 class LoadPath:
-    """Path of the prescribed load from the last step to this one, with the last approach and mean pressure, in the
-    units of the solver. A compressive load on detached surfaces `closes_gap_first`."""
+    """Path of the prescribed load from the last step to the present one, in the units of the solver.
+
+    `before` is its value at the last step, `approach` and `pressure` are the last approach and mean pressure.
+    `closes_gap_first` is True for a compressive load on detached surfaces.
+    """
 
     before: float
     control: Control
@@ -158,7 +163,7 @@ class LoadPath:
     closes_gap_first: bool = False
 
     def at(self, share: float) -> Control:
-        """Return the prescribed load at a share of the path; exact at its end."""
+        """Return the prescribed load at a `share` of the path, 0 to 1; exact at its end."""
         if share == 1.0:
             return self.control
         return replace(self.control, value=self.before + share * (self.control.value - self.before))
@@ -174,7 +179,7 @@ class _Walk(NamedTuple):
 
 
 class AdhesiveLaw:
-    """The law `effects.adhesion.law` of the adhesion section, for the steps of a scene."""
+    """Contact law of the `adhesion` section, for the steps of a scene."""
 
     may_shorten = True
 
@@ -191,7 +196,7 @@ class AdhesiveLaw:
         self._attraction = law
 
     def law(self, alpha: float) -> Law:
-        """Return the law in a step with the modulus alpha, in the units of the solver."""
+        """Return the attraction in a step with the modulus alpha, in the units of the solver."""
         law = self._attraction
         kind, unit = DUGDALE if law.kind == "dugdale" else EXPONENTIAL, self.scene.units.height
         return Law(kind, law.strength / (alpha * self.scene.units.pressure), law.range / unit, law.ramp / unit)
@@ -208,8 +213,8 @@ class AdhesiveLaw:
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[AdhesiveMemory]:
-        """Solve a step from the last gap; see `effects.effect.ContactLaw.solve`. Solves have the tolerance of
-        the job. If the surfaces detach and the job continues, they are moved far from each other."""
+        """Solve the contact of a step from the last gap; see `effects.effect.ContactLaw.solve`. Solves use the job's
+        tolerance. If the surfaces detach and the job continues, they are moved far from each other."""
         law, path = self.law(trial.alpha), self._path(trial, control, past, before)
         walk = self._walk(law, memory, step, trial, path, past.spare)
         contact, gap = walk.contact, memory.spare
@@ -275,8 +280,8 @@ class AdhesiveLaw:
     def motion(self, solved: SolvedContact[AdhesiveMemory], before: Measures, now: Measures) -> EdgeMotion:
         """Return the mean motion of the edges of contact in a step [half process zones].
 
-        In cells it is the number of points that came into contact or left it over the length of the edge, pi/4 of
-        the cell sides along it. The remaining load of an `untouched` contact is an error of the solver.
+        The motion in cells is the number of points that entered or left contact, divided by the length of the edge,
+        pi/4 of the cell sides along it. A contact is `untouched` if its load is at most an error of the solver.
         """
         least = LEAST_LOAD * self._attraction.strength
         separate = not (before.contact_area or now.contact_area or solved.numbers["tensile_area"])
@@ -372,11 +377,11 @@ class AdhesiveLaw:
         return memory.pasts[0].gap if memory.pasts[0].known else None
 
     def detached(self, memory: AdhesiveMemory) -> Detached | None:
-        """Return time and load of the detachment; None before."""
+        """Return time and load of the detachment; None before it."""
         return memory.end
 
     def with_end(self, memory: AdhesiveMemory, end: Detached) -> AdhesiveMemory:
-        """Return the memory of a run whose surfaces have detached."""
+        """Return the memory with the detachment `end` added."""
         return replace(memory, end=end)
 
     def at_rest(self) -> AdhesiveMemory:
@@ -386,7 +391,7 @@ class AdhesiveLaw:
         return AdhesiveMemory(pasts, self.slab.zeros(), self.slab.zeros(), correction)
 
     def entries(self, memory: AdhesiveMemory, units: Units) -> dict[str, Entry]:
-        """Return the gaps, the positions of the surface, and the detachment."""
+        """Return the checkpoint entries: the gaps, the positions of the surface, and the detachment."""
         now, before = memory.pasts
         found = {
             "gap": Entry(now.gap, units.height, "m"),
@@ -413,8 +418,8 @@ class AdhesiveLaw:
 
 
 def end_of(job: Any, saved: Saved) -> Detached | None:
-    """Return time and load of the detachment from the entries of the law in a checkpoint; None before a detachment, or
-    if the job continues after it or has another history."""
+    """Return time and load of the detachment that a checkpoint holds; None if there is none, if the job continues after
+    a detachment, or if it has another history."""
     section = job.section("adhesion")
     return None if section is None or section.detached == "open" else end_in(job, saved)
 

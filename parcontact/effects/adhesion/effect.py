@@ -1,4 +1,4 @@
-"""Adhesion: surfaces that attract each other (`attraction`, `gap_solver`), its section, columns and warnings."""
+"""The effect of adhesion: the columns, rules and warnings of the section `adhesion`."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ def _kind(tabor: float) -> str:
 
 @dataclass(frozen=True)
 class AdhesionMemory:
-    """Memory of energies, of the number of steps in which the contact `snaps`, of the warning about fronts, and of the
-    values of the columns."""
+    """Memory of the columns: the energies, the number of steps in which the contact `snaps`, whether the warning about
+    fast fronts was given, and the values of the columns."""
 
     energies: AdhesiveEnergies = NO_ENERGIES
     snaps: int = 0
@@ -135,8 +135,8 @@ WARN_COARSE_PROCESS_ZONE = Kind(
 
 
 class AdhesionColumns(Effect[AdhesionMemory]):
-    """Columns: share of the area under tension, force of all tension [N], energy of the surfaces [J], and energy
-    lost in snaps [J]."""
+    """Columns of adhesion: share of the area under tension, force of all tension [N], energy of the surfaces [J], and
+    energy lost in snaps [J]."""
 
     section: ClassVar[type[Part]] = Adhesion
     columns: ClassVar[tuple[str, ...]] = added_by("adhesion")
@@ -159,7 +159,8 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     @staticmethod
     def chosen_values(job: Any) -> Mapping[str, float]:
-        """Return the range that `auto` has on the mesh of the job."""
+        """Return the range of attraction [m] that `auto` means on the mesh of the job, by its key; empty if it is
+        given."""
         reach = chosen_range(job)
         return {} if reach is None else {"adhesion.range": reach}
 
@@ -209,7 +210,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
 
     @staticmethod
     def facts(job: Any) -> Iterator[str]:
-        """Yield sentences on the process zone, Tabor's and Johnson's parameters."""
+        """Yield sentences on the process zone and on Tabor's and Johnson's parameters."""
         yield from _facts(job)
 
     def __init__(self, scene: Any) -> None:
@@ -224,8 +225,8 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         return AdhesionMemory()
 
     def follow(self, instant: Instant, memory: AdhesionMemory) -> Changes[AdhesionMemory]:
-        """Return the energies after a step. Errors are not stated across a snap. The first step in which edges of
-        contact of a viscoelastic body move too far gives a warning."""
+        """Return the energies after a step. No errors are stated across a snap. A warning is given for the first step
+        in which edges of contact of a viscoelastic body move too far."""
         solved, energies = instant.solved, memory.energies
         columns = solved.numbers["tensile_area"], solved.numbers["adhesive_force"], math.nan, math.nan
         if self._scene.energy is not None:
@@ -259,7 +260,7 @@ class AdhesionColumns(Effect[AdhesionMemory]):
         return memory.energies.error
 
     def entries(self, memory: AdhesionMemory, units: Units) -> dict[str, Entry]:
-        """Return the energies, and the number of steps in which the contact snapped."""
+        """Return the checkpoint entries: the energies, and the number of steps in which the contact snapped."""
         energies = {name: Entry(value, 1.0, "J") for name, value in memory.energies._asdict().items()}
         return energies | {"snaps": Entry(float(memory.snaps))}
 

@@ -5,53 +5,43 @@ Find the gap g >= 0 and the pressure p with the attraction sigma of a law, so th
     p = c - sigma(g),   c >= 0,   c g = 0,   A p = g + h + d,
 
 for an operator A, effective heights h, and the approach d or the mean pressure P. K is the inverse of A on fields of
-mean 0, a is the displacement over a uniform pressure, and `p = K (g + h) + m` with
+mean 0, a is the displacement per unit of uniform pressure, and `p = K (g + h) + m` with
 
     m = P                                  under a given load,
     m = (mean(g + h) + d)/a                under a given approach, a > 0,
     mean(g) = -mean(h) - d, which gives m  under a given approach, a = 0 (a periodic half space).
 
-The solution is a stationary point of `E = <g + h, K (g + h)>/2 - sum gamma(g)` and the energy of m, with `d gamma/dg
-= -sigma`. There are many. The solve starts at the gap of the last step, E falls in every iteration, and no barrier
-is crossed deliberately, so that the history decides the branch. One iteration:
+The solution is one of many stationary points of `E = <g + h, K (g + h)>/2 - sum gamma(g)` and the energy of m, with `d
+gamma/dg = -sigma`. The solve starts at the gap of the last step, E falls in every iteration, and no barrier is crossed
+deliberately, so that the history decides the branch. One iteration:
 
 1. The working set consists of open points (g > 0) and of points in contact under tension (c < 0).
 2. The residual is `c = K (g + h) + m + sigma(g)` there, preconditioned `z = A c`.
 3. The direction is `t = z + beta t` (Polak and Ribiere), or `t = z` where that is no descent.
-4. The way is `w = max(g - alpha t, 0) - g`, with the alpha that the last step should have had.
-5. `g <- g + theta w` with Newton's step, `theta = -<c, w>/(<w, K w> - <w, (-sigma') w>)`. Where this curvature is
-   not clearly positive, the majorized step `-<c, w>/<w, K w>` lowers E, as gamma is concave; under a load, K then
-   gets a small stiffness of mean values. theta is limited by the gaps. A way that closes gaps is made in full, theta
-   = 1, if Newton's step is at least WHOLE. If limiting has made a way that raises E, a shorter one is tried.
+4. The change of the gap is `w = max(g - alpha t, 0) - g`, with the alpha that would have been best for the last step.
+5. `g <- g + theta w` with Newton's step, `theta = -<c, w>/(<w, K w> - <w, (-sigma') w>)`. Where this curvature is not
+   clearly positive, the majorized step `-<c, w>/<w, K w>` lowers E, as gamma is concave; under a load, K then gets a
+   small stiffness of mean values. theta is limited by the gaps. A change that closes gaps is made in full, theta = 1,
+   if Newton's step is at least WHOLE. If limiting the gaps makes w raise E, a smaller alpha is tried.
 6. E must not rise. Otherwise the step is halved.
 
 An iteration applies two operators: `A c`, which also gives the certificate, and `K w`, as the pressure changes by
 `theta K w`.
 
-Where the mean gap is given, c, z and t are centred, and w is scaled to it. V. Rey, G. Anciaux, J.-F. Molinari,
-Comput. Mech. 60 (2017) 69 have these gradients without preconditioner; M. Bugnicourt, P. Sainsot, D. Dureisseix, C.
-Gauthier, A. A. Lubrecht, Tribol. Lett. 66 (2018) 29 have the working set. All numbers are dimensionless.
+Where the mean gap is given, c, z and t are centred, and w is scaled to keep this mean. V. Rey, G. Anciaux, J.-F.
+Molinari, Comput. Mech. 60 (2017) 69 have these gradients without preconditioner; M. Bugnicourt, P. Sainsot, D.
+Dureisseix, C. Gauthier, A. A. Lubrecht, Tribol. Lett. 66 (2018) 29 have the working set. All numbers are dimensionless.
 
-Data of the solver of gaps: its operators, its result, and an iterate with its errors.
-
-Inverse of the operator of a free body, by conjugate gradients preconditioned with the inverse for a periodic body.
-
-The periodic body has the same Green's function up to half the box (`HalfSpace.gap_operators`), so that a dozen steps
-give five digits.
-
-Contact with adhesion for the body of a run, periodic or free.
-
-The solver of gaps needs the inverse of its operator. For the operator A of a free body, the FFT does not
-give it. The
-operator B of a periodic body, with the same Green's function up to half the box, replaces it
-(`HalfSpace.gap_operators`), and the difference is lagged: the next pass has the heights `h - (A - B) p` of the last
-p. One or two passes are usual.
+`AdhesiveSolver` extends the solver, which needs the inverse of its operator, to a free body. The FFT does not invert
+the operator A of a free body. The operator B of a periodic body, with the same Green's function up to half the box,
+replaces it (`HalfSpace.gap_operators`), and the difference lags behind: each pass solves for the heights `h - (A - B)
+p` with the p of the pass before. One or two passes are usual.
 
 A contact that fills its box may be softer on B than on A, in its mean or in waves that continue across the edges. A
 state that is stable on A is then unstable on B, and passes alternate between two states. So if later passes jump or
-detach, or MAX_PASSES is reached, the solve restarts with A itself, whose inverse takes some iterations
-(`free_inverse`). Then E falls monotonically. Under a given mean pressure P, `p = K (g + h - P A 1) + P` with K the
-inverse of A on pressures of mean 0.
+detach, or MAX_PASSES is reached, the solve restarts with A itself, whose inverse takes some iterations (`FreeInverse`).
+Then E falls monotonically. Under a given mean pressure P, `p = K (g + h - P A 1) + P` with K the inverse of A on
+pressures of mean 0.
 """
 
 import math
@@ -77,8 +67,8 @@ LEAST_TRACTION = 1e-3  # load below which errors are not scaled by it, over the 
 class GapOperators(NamedTuple):
     """Operator of a body and its inverse K, which is 0 for mean values.
 
-    `mean` is the displacement over a uniform pressure, 0 if there is none; `least_mean` is a positive compliance of
-    mean values. Both are infinite if K also inverts mean values.
+    `mean` is the displacement per unit of uniform pressure, 0 if the mean does not move; `least_mean` is a positive
+    compliance for mean values. Both are infinite if K also inverts mean values.
     """
 
     operator: Operator
@@ -89,10 +79,10 @@ class GapOperators(NamedTuple):
 
 @dataclass(frozen=True)
 class GapSolution:
-    """Solved gap (the map of the start) and pressure (a map of the solver, valid until its next solve).
+    """A solved gap (in the map of the start) and its pressure (in a map of the solver, valid until the next solve).
 
-    `failure` is empty, or states why the solve failed. `detached`: no equilibrium exists under the load. `jumped`:
-    the solve passed through unstable states.
+    `failure` is empty, or states why the solve failed. `detached`: no equilibrium exists under the load. `jumped`: the
+    solve went through unstable states.
     """
 
     gap: Array
@@ -107,11 +97,11 @@ class GapSolution:
 
 @dataclass
 class GapIterate:
-    """Numbers of an iterate: mean and lowest gap, uniform part m of the pressure, approach d, the control, and the
-    operators; `given` is the prescribed mean gap or None.
+    """Numbers of an iterate of the solver: mean and lowest gap, uniform part m of the pressure, and approach d.
 
-    The last step went a `share` of its way, which changes the mean gap by `moved`, and m by `change`. It was a
-    Newton step if `stable`. The next way is first tried with the length `step`.
+    `given` is the prescribed mean gap or None. The last step made a `share` of its change of the gap, which changes the
+    mean gap by `moved`, and m by `change`; `stable` is True for a Newton step. The next change is first tried with the
+    length `step`.
     """
 
     law: Law
@@ -132,10 +122,11 @@ class GapIterate:
 
 
 def certify_gap(slab: Slab, it: GapIterate, working: Array, g: Array, q: Array, sigma: Array, z: Array) -> Certificate:
-    """Return the errors of the gap: z, weighted by the pressure, over a length, and the load; collective.
+    """Return the certificate of a gap: the errors z, weighted by the pressure and divided by a length, and the error of
+    the load; collective.
 
-    The length is the variation of the deformation in the contact, at most the range of the law and at least a tenth
-    of it. The error of the load consists of pressures that violate the law: their magnitudes count SPURIOUS times,
+    The length is the variation of the deformation in the contact, at most the range of the law and at least a tenth of
+    this range. The error of the load consists of pressures that violate the law: their magnitudes count SPURIOUS times,
     their sum NET times.
     """
     *sums, spurious, net = slab.sum(*gap_kernels.certificate_sums(working, g, it.heights, q, it.m, sigma, z))
@@ -183,8 +174,8 @@ class GapSolver:
         tolerance: float,
         operators: GapOperators | None = None,
     ) -> GapSolution:
-        """Solve from `gap`, which is overwritten by the solution. `operators` replace the operators of the solver;
-        collective."""
+        """Solve from the map `gap`, which is overwritten by the solution; collective. `operators` replace the operators
+        of the solver."""
         it = self._begin(law, heights, control, gap, operators or self.operators)
         g, other = gap, self._gap
         best, scale, iteration, no_descent, jumped = (math.inf, 0), 0.0, 0, False, False
@@ -360,10 +351,11 @@ MAX_STEPS = 100  # accuracy: limit on the steps; a dozen are usual
 
 @dataclass(frozen=True)
 class FreeInverse:
-    """Inverse of `free`, with the operators of the periodic body. The energy of the error is below `tolerance^2` times
-    that of the solution. It works in four `maps`.
+    """Inverse of the operator `free` of a free body, by conjugate gradients with the inverse for a `repeated` body,
+    which has the same Green's function up to half the box: a dozen steps give five digits. The energy of the error is
+    below `tolerance^2` times the energy of the solution. Four `maps` hold intermediate results.
 
-    If `means` is False, it is the inverse on pressures of mean 0 and ignores mean displacements.
+    If `means` is False, pressures have the mean 0, and mean displacements are ignored.
     """
 
     slab: Slab
@@ -412,7 +404,7 @@ LEAST_SHARE, MOST_SHARE = 0.1, 4.0  # tuning: limits on the share of a change of
 
 @dataclass
 class AdhesiveSolver:
-    """Solver of contacts with adhesion; `free` is the operator A of a free body, None for a periodic one."""
+    """Solver of contacts with adhesion; `free` is the operator A of a free body, None for a periodic body."""
 
     gaps: GapSolver
     workspace: Workspace
@@ -429,10 +421,10 @@ class AdhesiveSolver:
         out: Array,
         loose: float = 1.0,
     ) -> tuple[Contact, bool]:
-        """Solve from `gap`, which is overwritten by the solution, and put the pressure into `out`; collective.
+        """Solve from the map `gap`, which is overwritten by the solution, and put the pressure into `out`; collective.
 
-        `free_correction` is `(A - B) p` of a free body and is updated. The tolerance is `loose` times the tolerance
-        of the run. Return the contact, and whether the surfaces have detached.
+        `free_correction` is `(A - B) p` of a free body and is updated. `loose` multiplies the tolerance. Return the
+        contact, and True if the surfaces have detached.
         """
         tolerance = loose * self.tolerance
         if self.free is None or free_correction is None:

@@ -28,9 +28,8 @@ and Johnson's parameters classify adhesive contacts,
 of a sphere of radius R (D. Tabor, J. Colloid Interface Sci. 58 (1977) 2), and of a wave of length lambda whose
 crests are 2 h above its troughs (K. L. Johnson, Int. J. Solids Struct. 32 (1995) 423).
 
-Fused loops for contact with adhesion, over the rows of this rank; each returns partial sums for one Allreduce.
-
-The attraction sigma follows a `Law`; q is the pressure K (g + h), to which a mean is added.
+The fused loops run over the rows of this rank, and each returns partial sums for one Allreduce. In them the attraction
+sigma follows a `Law`, and q is the pressure K (g + h), to which a mean is added.
 """
 
 import math
@@ -52,7 +51,7 @@ POWERS = 2.0 ** -np.arange(FARTHEST / LOG_TWO + 2.0)
 
 
 class Law(NamedTuple):
-    """Law in the units of a solve. Only DUGDALE has a ramp."""
+    """Law of attraction in the units of a solve. Only the kind DUGDALE has a ramp."""
 
     kind: int
     strength: float
@@ -61,7 +60,7 @@ class Law(NamedTuple):
 
     @staticmethod
     def touches(gap: Array) -> Mask:
-        """Return True where the gap is 0: surfaces touch there under pressure and under tension."""
+        """Return a map that is True where the gap is 0: surfaces touch there under pressure or tension."""
         return gap == 0.0
 
 
@@ -79,7 +78,7 @@ def decay(x):
 
 @loop
 def attraction(law, g):
-    """Return sigma at the gap g."""
+    """Return the attraction sigma of a law at the gap g."""
     if law.kind == EXPONENTIAL:
         return law.strength * decay(g / law.range)
     return law.strength * min(max((law.range - g) / law.ramp + 0.5, 0.0), 1.0)
@@ -87,7 +86,7 @@ def attraction(law, g):
 
 @loop
 def energy(law, g, sigma):
-    """Return gamma(g), the energy per area that opens the gap from g to infinity; sigma is the attraction at g."""
+    """Return gamma(g), the energy per area needed to open the gap from g to infinity; sigma is the attraction at g."""
     if law.kind == EXPONENTIAL:
         return law.range * sigma
     end = law.range + 0.5 * law.ramp
@@ -96,7 +95,7 @@ def energy(law, g, sigma):
 
 @loop
 def softening(law, sigma):
-    """Return `-d sigma/dg` where the attraction is sigma."""
+    """Return the slope `-d sigma/dg` of a law where the attraction is sigma."""
     if law.kind == EXPONENTIAL:
         return sigma / law.range
     return law.strength / law.ramp if 0.0 < sigma < law.strength else 0.0
@@ -120,26 +119,25 @@ class AdhesionLaw:
         return self.work / self.range
 
     def process_zone(self, modulus: float) -> float:
-        """Return the length l of the process zone [m] for E* [Pa]."""
+        """Return the length l of the process zone [m] for the `modulus` E* [Pa]."""
         return modulus * self.range**2 / self.work
 
     def tabor(self, modulus: float, radius: float) -> float:
-        """Return Tabor's parameter for E* [Pa] and the radius of a sphere [m]."""
+        """Return Tabor's parameter for the `modulus` E* [Pa] and the radius of a sphere [m]."""
         return (radius * self.work**2 / (modulus**2 * self.range**3)) ** (1.0 / 3.0)
 
     def johnson(self, modulus: float, length: float, amplitude: float) -> float:
-        """Return Johnson's parameter for E* [Pa], the length of a wave [m] and its amplitude [m]."""
+        """Return Johnson's parameter for the `modulus` E* [Pa] and a wave of this length [m] and amplitude [m]."""
         return math.sqrt(2.0 * self.work * length / (math.pi**2 * modulus)) / abs(amplitude)
 
 
 def ramp_of(law: AdhesionLaw, modulus: float, cell: float) -> float:
-    """Return the ramp of Dugdale's law [m], 2 rho h/l and at most 2 rho, for E* [Pa] and the side of a cell [m]."""
+    """Return the ramp of Dugdale's law [m], 2 rho h/l and at most 2 rho, for E* [Pa] and the side h of a cell [m]."""
     return 2.0 * law.range * cell / max(law.process_zone(modulus), cell)
 
 
 def smallest_range(work: float, modulus: float, cell: float, cells: float) -> float:
-    """Return the range [m] whose process zone has the length of `cells` cells, for E* [Pa] and the side of
-    a cell [m]."""
+    """Return the range [m] whose process zone is as long as `cells` cells with the side `cell` [m], for E* [Pa]."""
     return math.sqrt(cells * cell * work / modulus)
 
 
@@ -158,7 +156,7 @@ SHORT = 1e-3  # accuracy: longest way over the range for which the trapezoidal e
 
 @loop
 def attract(law, g, sigma):
-    """Put sigma(g) into `sigma`."""
+    """Put the attraction sigma(g) of a law into the map `sigma`."""
     for j in range(g.shape[0]):
         for i in range(g.shape[1]):
             sigma[j, i] = attraction(law, g[j, i])
@@ -166,7 +164,7 @@ def attract(law, g, sigma):
 
 @loop
 def press(g, q, sigma, step, image):
-    """Add `step image` to q. Return the number of open points and their sum of `q + sigma`."""
+    """Add `step image` to the pressure q. Return the number of open points and their sum of `q + sigma`."""
     count, total = 0.0, 0.0
     for j in range(g.shape[0]):
         row_count, row_total = 0.0, 0.0
@@ -182,9 +180,8 @@ def press(g, q, sigma, step, image):
 
 @loop
 def pressure_residual(g, q, sigma, mean, working, c):
-    """Mark the working set (open points, and closed points under tension) and put `q + mean + sigma` there, 0
-    elsewhere, into c. Return the size of the set, the sum of c, the sum of sigma over all points, and the largest
-    -g."""
+    """Put `q + mean + sigma` into c on the working set (open points, and closed points under tension), 0 elsewhere.
+    Return the size of the set, the sum of c, the sum of sigma over all points, and the largest -g."""
     count, total, attracted = 0.0, 0.0, 0.0
     lowest, deepest = np.empty(g.shape[1]), -np.inf
     for i in range(lowest.size):
@@ -210,8 +207,7 @@ def pressure_residual(g, q, sigma, mean, working, c):
 
 @loop
 def certificate_sums(working, g, h, q, mean, sigma, z):
-    """Return the sums for `certify_gap`: of w, w u, w u^2 over all points, of w |z| over the working set, of |c| and of
-    c.
+    """Return the sums of `certify_gap`: over all points of w, w u and w u^2, over the working set of w |z|, |c| and c.
 
     Here `p = q + mean`, `c = p + sigma` on the working set and 0 elsewhere, `u = g + h`, and the weight `w = |p| +
     |c|`.
@@ -240,7 +236,7 @@ def certificate_sums(working, g, h, q, mean, sigma, z):
 
 @loop
 def gap_products(working, q, mean, sigma, step, image, sigma_old, shift, z, t):
-    """Return sums over the working set of z, t, c z, e z and c t, with `c = q + mean + sigma` and its change in the
+    """Return the sums over the working set of z, t, c z, e z and c t, with `c = q + mean + sigma` and its change in the
     last step, `e = step image + sigma - sigma_old + shift`."""
     sum_z, sum_t, c_z, e_z, c_t = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(z.shape[0]):
@@ -264,8 +260,8 @@ def gap_products(working, q, mean, sigma, step, image, sigma_old, shift, z, t):
 
 @loop
 def lead(g, t, step, way):
-    """Put the way `max(g - step t, 0) - g` of a step into `way`. Return the sum of the gaps at its end, and how much
-    limiting has raised it."""
+    """Put the change of the gap `max(g - step t, 0) - g` into `way`. Return the sum of the gaps after it, and by how
+    much the limit 0 has raised this sum."""
     total, cut = 0.0, 0.0
     for j in range(t.shape[0]):
         row_total, row_cut = 0.0, 0.0
@@ -282,7 +278,7 @@ def lead(g, t, step, way):
 
 @loop
 def rescale(g, factor, way):
-    """Change the way so that it leads to `factor` times the gap at its end."""
+    """Change the gap after the step, to which `way` leads, by a `factor`: replace `way` accordingly."""
     for j in range(g.shape[0]):
         for i in range(g.shape[1]):
             way[j, i] = factor * (g[j, i] + way[j, i]) - g[j, i]
@@ -290,8 +286,8 @@ def rescale(g, factor, way):
 
 @loop
 def curvature(law, g, q, mean, sigma, way, image):
-    """Return sums over a way w of `-c w`, of `w K w` (K w is `image`), of `w^2 (-d sigma/dg)` and of w; and the largest
-    -w/g."""
+    """Return the sums of `-c w`, `w K w`, `w^2 (-d sigma/dg)` and w, and the largest -w/g, for the change w of the gap
+    (`way`) with the image K w (`image`)."""
     slope, stiff, soft, total = 0.0, 0.0, 0.0, 0.0
     fastest, most = np.empty(g.shape[1]), 0.0
     for i in range(fastest.size):
@@ -316,9 +312,9 @@ def curvature(law, g, q, mean, sigma, way, image):
 
 @loop
 def move(law, g, q, mean, sigma, step, way, image, g_new, sigma_new):
-    """Put `g + step way`, limited to 0, into `g_new`, and its attraction into `sigma_new`. Return the change of energy,
-    the sum of `d (q + mean + step image/2) + gamma(g) - gamma(g_new)` with `d = g_new - g`, and the sum of the
-    magnitudes of its terms. For short ways the change of gamma is d times the mean attraction, which rounds less."""
+    """Put `g + step way`, at least 0, into `g_new`, and the attraction there into `sigma_new`. Return the change of
+    energy, the sum of `d (q + mean + step image/2) + gamma(g) - gamma(g_new)` with `d = g_new - g`, and the sum of the
+    terms' magnitudes. For short ways the change of gamma is d times the mean attraction, which rounds less."""
     total, size = 0.0, 0.0
     for j in range(g.shape[0]):
         row_total, row_size = 0.0, 0.0
@@ -355,7 +351,7 @@ def weighted_sums(p, a):
 
 @loop
 def weigh_off(p, a, level):
-    """Return the sum of |p (a - level)|."""
+    """Return the sum of |p (a - level)| over the map a, weighted by p."""
     total = 0.0
     for j in range(p.shape[0]):
         row = 0.0
@@ -367,7 +363,7 @@ def weigh_off(p, a, level):
 
 @loop
 def surface_energy(law, g):
-    """Return the sum of `-gamma(g)`."""
+    """Return the sum of `-gamma(g)`, the energy of the surfaces."""
     total = 0.0
     for j in range(g.shape[0]):
         row = 0.0

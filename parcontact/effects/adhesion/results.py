@@ -1,19 +1,18 @@
-"""Results of adhesion in texts and tables: pull-offs (`pull_off`).
+"""Results of adhesion in texts and tables: pull-offs, the loads at which adhesive contacts detach, from the rows of a
+run.
 
-Pull-offs: the loads at which adhesive contacts detach, from the rows of a run.
-
-The largest tension lies between steps. With loads higher by a and b at the times s before and t after the row of the
-lowest load, the vertex of the parabola through the three points is lower than that row by
+The largest tension lies between steps. If the load is higher by a at the time s before the row of the lowest load, and
+by b at the time t after it, the vertex of the parabola through the three points is below the lowest load by
 
     e = (b s/t - a t/s)^2/(4 (s + t) (a/s + b/t)).
 
 The vertex is the load of the pull-off. Its error is the sum of e, of SOLVER times the tolerance of the solves, and of
-PULL_OFF times the median relative error of the contact area up to that row, by the mesh. Spheres were pulled off at
-seven rates with chosen steps, at accuracies from 0.1 to 0.005: all pull-offs differed from those with 1500 equal steps
-by less than this error without the part of the mesh.
+PULL_OFF times the median relative mesh error of the contact area up to this row. In tests, spheres were pulled off at
+seven rates with chosen steps, at accuracies from 0.1 to 0.005: all loads differed from runs with 1500 equal steps by
+less than this error without the part of the mesh.
 
 The pull-off is the lowest load itself if the pull has no later row, if the contact snaps, or if it still holds. The
-error then has the difference to the load of the row before in place of e.
+difference to the load of the row before then replaces e in the error.
 """
 
 import math
@@ -37,8 +36,9 @@ Values = NDArray[np.float64]
 
 
 class PullOff(NamedTuple):
-    """A pull-off: the row of its lowest load, the lowest load and its error by steps as mean pressures [Pa], and the
-    first row without contact (one after the last row if the run ended with it, None if the contact holds)."""
+    """A pull-off. `row` is the row of the lowest load, `pressure` is the load and `between` its error by steps, as mean
+    pressures [Pa]. `lost` is the first row without contact: one after the last row if the run ended with the
+    detachment, None if the contact holds. `mesh` is the relative error by the mesh."""
 
     row: int
     pressure: float
@@ -53,10 +53,10 @@ class PullOff(NamedTuple):
 
 def find(columns: Columns, detached: bool = False) -> list[PullOff]:
     """Return the pull-offs of a run in order, from its columns `time`, `pressure`, `max_pressure`, `approach` and
-    `contact_area`; the run may have ended because its surfaces `detached`.
+    `contact_area`; `detached` is True if the run ended because its surfaces detached.
 
     A pull begins at the smallest separation, or at the last approach before contact is lost; earlier pulls that the
-    contact survived do not count. It ends when the separation stops growing, as detached surfaces may later attract
+    contact survived do not count. A pull ends when the separation stops growing, as detached surfaces may later attract
     each other more strongly.
     """
     names = "time", "pressure", "approach", "contact_area"
@@ -107,8 +107,8 @@ def _below(steps: Values, loads: Values) -> float:
 
 
 def describe_pull_off(columns: Columns, area: float, tolerance: float, detached: bool = False) -> Iterator[str]:
-    """Yield a sentence for each pull-off, and for the largest pull of a contact that holds; `area` of the box [m^2],
-    `tolerance` of the solves."""
+    """Yield a sentence for each pull-off, and for the largest pull of a contact that holds. `area` is the area of the
+    box [m^2], `tolerance` the tolerance of the solves."""
     pulls = find(columns, detached)
     many = sum(pull.lost is not None for pull in pulls) > 1
     for number, pull in enumerate(pulls, 1):
@@ -141,7 +141,7 @@ said_at_end = sentences  # also at the end of a run
 
 
 def headline(run: Results) -> Iterator[str]:
-    """Yield the force of the last pull-off and its error, where that is known."""
+    """Yield a line with the force of the last pull-off and its error, if a pull-off was found."""
     lost = [pull for pull in find(run.table, bool(run.detached)) if pull.lost is not None]
     if lost and run.job is not None:
         box = _box(run.job)
@@ -151,8 +151,8 @@ def headline(run: Results) -> Iterator[str]:
 
 
 def swept(run: Results) -> Iterator[tuple[str, float]]:
-    """Yield the last pull-off of a case of a sweep and its error [N], and its approach [m]; nothing if the contact
-    holds."""
+    """Yield names and values of the last pull-off of a sweep's case: force and error [N], approach [m]; nothing if the
+    contact holds."""
     if run.job is None or run.job.section("adhesion") is None:
         return
     if lost := [each for each in find(run.table, bool(run.detached)) if each.lost]:
@@ -163,7 +163,7 @@ def swept(run: Results) -> Iterator[tuple[str, float]]:
 
 
 def telling_row(run: Results) -> Iterator[int]:
-    """Yield the row of the last pull-off."""
+    """Yield the row of the last pull-off, which the summary of the run shows."""
     yield from (pull.row for pull in find(run.table, bool(run.detached))[-1:])
 
 

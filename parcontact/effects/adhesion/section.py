@@ -1,6 +1,4 @@
-"""The `adhesion` section of a job, and the law of attraction that it asks for.
-
-Warnings about magnitudes of adhesion: work and range compared with those of solids, body, surface, mesh and box.
+"""The `adhesion` section of a job, the law of attraction that it defines, and warnings about implausible magnitudes.
 
 A sphere attracts a flat body at the gap d with `2 pi R gamma(d)`, of which the share `gamma(d + r^2/(2 R))/gamma(d)`
 comes from points further than r from its axis. Summed over the points of a mesh with cells h, the force of the
@@ -47,7 +45,8 @@ class Adhesion(Part):
 
 
 def adhesion_law(section: Adhesion | None, grid: Grid, material: Any) -> AdhesionLaw | None:
-    """Return the law of a section; the range `auto` is the smallest that the cells of the grid resolve."""
+    """Return the law of a section, None without one; the range `auto` is the smallest that the cells of the grid
+    resolve."""
     if section is None:
         return None
     reach = section.range
@@ -58,7 +57,7 @@ def adhesion_law(section: Adhesion | None, grid: Grid, material: Any) -> Adhesio
 
 
 def chosen_range(job: Any) -> float | None:
-    """Return the range [m] that `auto` has on the mesh of a job; None if it is given, or without adhesion."""
+    """Return the range [m] that `auto` means on the mesh of a job; None without adhesion, or if the range is given."""
     section = job.section("adhesion")
     law = None if section is None or section.range != AUTO else adhesion_law(section, job.grid, job.material)
     return None if law is None else law.range
@@ -91,8 +90,8 @@ WARN_LONG_RANGE = Kind(
 
 
 def doubts_of_adhesion(job: Any, law: AdhesionLaw, modulus: float, cell: float) -> Iterator[Doubt]:
-    """Yield warnings about an implausible work or range, or one outside the model, with E* of the relaxed body [Pa] and
-    the side of a cell [m]."""
+    """Yield warnings about a work of adhesion or a range that is implausible or outside the model. `modulus` is E* of
+    the relaxed body [Pa], `cell` the side of a cell [m]."""
     given = {"work": law.work, "range": law.range}
     if law.work > MOST_WORK:
         yield WARN_WORK("adhesion", {**given, "most": MOST_WORK})
@@ -162,7 +161,8 @@ WARN_RANGE_BEYOND_HEIGHTS = Kind(
 
 
 def doubt_range(job: Any, law: AdhesionLaw, span: float) -> Iterator[Doubt]:
-    """Yield a warning about a range above the height of a rough surface, from its lowest to its highest point [m]."""
+    """Yield a warning if the range of attraction exceeds the height `span` of a rough surface, from its lowest to its
+    highest point [m]."""
     if law.range > span > 0.0:
         yield WARN_RANGE_BEYOND_HEIGHTS("adhesion", {"range": law.range, "span": span, "remedy": _shorten(job)})
 

@@ -1,4 +1,5 @@
-"""A counterbody that deforms: the job has the pair of both bodies in place of its material, and steps are as ever."""
+"""A counterbody that deforms: the pair of both bodies replaces the material of a job, and steps are made as without
+it."""
 
 from __future__ import annotations
 
@@ -79,7 +80,7 @@ def _has_relaxed(job: Any) -> bool:
 
 
 class CounterbodyThatDeforms(Effect[None]):
-    """A counterbody that deforms."""
+    """Effect of a counterbody that deforms."""
 
     section: ClassVar[type[Part]] = Counterbody
     in_curves: ClassVar[bool] = True
@@ -89,7 +90,8 @@ class CounterbodyThatDeforms(Effect[None]):
 
     @staticmethod
     def changed_material(job: Any) -> Any:
-        """Return the pair in place of the material of a job; the counterbody of a steady state has relaxed."""
+        """Return the pair of both bodies, which replaces the material of a job; in a steady state the counterbody has
+        relaxed."""
         relaxed = _has_relaxed(job)
         if isinstance(job.material, Pair) or (relaxed and job.counterbody.fitted.long_modulus == 0.0):  # refused
             return job.material
@@ -97,7 +99,7 @@ class CounterbodyThatDeforms(Effect[None]):
 
     @staticmethod
     def why_no_curve(job: Any) -> str:
-        """Return why a job has no friction curve, '' if it has one."""
+        """Return the reason why a job has no friction curve; '' if it has one."""
         if job.steady is not None or not job.counterbody.fitted.remembers:
             return ""
         return f"with a counterbody that relaxes the job needs a steady section in place of its history: {AT_REST}"
@@ -112,7 +114,7 @@ class CounterbodyThatDeforms(Effect[None]):
 
     @staticmethod
     def doubts(job: Any) -> Iterator[Any]:
-        """Yield the warnings of a fit, and one about different Poisson's ratios."""
+        """Yield warnings about the fit of the counterbody's moduli and about different Poisson's ratios."""
         first, second = job.material, job.counterbody
         if isinstance(second, Dma):
             yield from map(str, second.doubts)
@@ -141,8 +143,8 @@ class CounterbodyThatDeforms(Effect[None]):
 
 
 def frequencies(job: Any) -> list[float]:
-    """Return at most SHOWN frequencies of a job [Hz]: of its sliding, or of the relaxation of the pair; none if nothing
-    relaxes."""
+    """Return at most SHOWN frequencies [Hz] at which moduli are shown: those of the job's sliding, else those of the
+    relaxation of the pair; an empty list if nothing relaxes."""
     times = relaxation_of(job.material).relaxation_times
     if not times.size:
         return []

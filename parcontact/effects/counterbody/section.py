@@ -1,15 +1,13 @@
-"""The `counterbody` section, any material, and both bodies as one material.
+"""The `counterbody` section, which may be any material, and both bodies as one viscoelastic material.
 
-Two bodies in contact as one viscoelastic body.
-
-Under one pressure the displacements of both bodies add up, so that with the moduli G(s) = s Gbar(s), where Gbar is the
-Laplace transform of the relaxation function, the pair has the modulus M of
+Let G(s) = s Gbar(s) be the modulus of a body, where Gbar is the Laplace transform of its relaxation function. Under one
+pressure the displacements of both bodies add up, so that the pair has the modulus M,
 
     1/M(s) = 1/G1(s) + 1/G2(s)
 
 M is a Prony series again, with M_inf = G1_inf G2_inf/(G1_inf + G2_inf). Its relaxation times are the retardation times
-lambda of S = G1 + G2, with the moduli |G1 G2|/(lambda dS/dlambda) at s = -1/lambda. A relaxation time of both
-bodies, with the moduli a and b, stays, with a b/(a + b).
+lambda of S = G1 + G2, with the moduli |G1 G2|/(lambda dS/dlambda) at s = -1/lambda. A relaxation time that both bodies
+have, with the moduli a and b, remains with the modulus a b/(a + b).
 """
 
 from __future__ import annotations
@@ -27,10 +25,10 @@ from ..relaxation import relaxation_of
 
 
 def pair(first: Moduli, second: Moduli) -> Prony:
-    """Return the relaxation function of two bodies that touch, from both relaxation functions [Pa, s].
+    """Return the relaxation function of two bodies in contact [Pa, s], from the moduli of both.
 
-    The moduli agree with 1/(1/G1 + 1/G2) to rounding. Raises ValueError for numbers that do not define a relaxation
-    function.
+    The moduli of the result agree with 1/(1/G1 + 1/G2) to rounding. Raises ValueError for numbers that do not define a
+    relaxation function.
     """
     one, other = normal_form(*first), normal_form(*second)
     terms, times = np.append(one.moduli, other.moduli), np.append(one.relaxation_times, other.relaxation_times)
@@ -60,8 +58,8 @@ def _at(zero: Zero, body: Prony, moduli: Array, whole: Prony) -> float:
 
 
 class Counterbody(Part):
-    """The rough body deforms, too: any section that `material` may be, such as `{model: elastic, shear_modulus: 5.0e6}`
-    or `{include: NAME}`. By default it is rigid ({doc}`limits`)."""
+    """The rough body if it deforms, too: any section that `material` may be, such as `{model: elastic, shear_modulus:
+    5.0e6}` or `{include: NAME}`. Without this section the rough body is rigid ({doc}`limits`)."""
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -71,8 +69,8 @@ class Counterbody(Part):
 class Pair(Zener):
     """A rubber and its counterbody as one body, with Poisson's ratio, hardness, shift and measured range of the rubber.
 
-    Both are at their temperatures before they become one. `branches` and `modulus_inf` are reduced by the shift of the
-    rubber, which the base class applies. A `relaxed` counterbody has its long-term modulus.
+    Each body is shifted to its temperature before both are joined. `branches` and `modulus_inf` are divided by the
+    shift of the rubber, which the base class applies again. A relaxed counterbody has its long-term modulus.
     """
 
     _first: AnyMaterial = PrivateAttr()
@@ -81,8 +79,8 @@ class Pair(Zener):
 
     @classmethod
     def of(cls, first: AnyMaterial, second: AnyMaterial, relaxed: bool) -> Pair:
-        """Return two bodies as one. The modulus of the second is scaled so that compliances, which are in proportion to
-        1 - nu, add up."""
+        """Return two bodies as one. The modulus of the second is scaled by its 1 - nu, so that compliances add up. A
+        counterbody that is `relaxed` has its long-term modulus."""
         own, scale = first.fitted, (1.0 - first.poisson) / (1.0 - second.poisson)
         other = Prony(second.fitted.long_modulus, np.zeros(0), np.zeros(0)) if relaxed else relaxation_of(second)
         both = pair(relaxation_of(first), (scale * other.modulus_inf, scale * other.moduli, other.relaxation_times))
@@ -100,11 +98,11 @@ class Pair(Zener):
 
     @property
     def given(self) -> AnyMaterial:
-        """Return the rubber."""
+        """Return the rubber without its counterbody."""
         return self._first
 
     def at(self, temperature: float) -> Pair:
-        """Return the pair with both bodies at another temperature [deg C], but for a body without a shift."""
+        """Return the pair with both bodies at another temperature [deg C]; a body without a shift does not change."""
         bodies = (self._first, self._second)
         first, second = (heated(one, temperature) if getattr(one.fitted, "shift", None) else one for one in bodies)
         return Pair.of(first, second, self._relaxed)
