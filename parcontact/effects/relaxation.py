@@ -29,13 +29,14 @@ def relaxation_of(material: Material) -> Prony:
 
 
 def time_factor_of(material: Material) -> float:
-    """Return relaxation times at a material's temperature over those at the reference, a_T [-]."""
+    """Return the shift factor a_T [-]: relaxation times at the material's temperature divided by those at the reference
+    temperature."""
     return material.fitted.time_factor
 
 
 def temperature_of(material: Material) -> float:
-    """Return the temperature of a material [deg C]: the given one, or the reference of its shift; NaN
-    without a shift."""
+    """Return the temperature of a material [deg C], by default the reference temperature of its shift; NaN without a
+    shift."""
     body = material.fitted
     if not isinstance(body, job.Zener) or body.shift is None:
         return math.nan
@@ -49,6 +50,6 @@ def highest_temperature_of(material: Material) -> float:
 
 
 def factor_at(material: Material, rise: float) -> float:
-    """Return relaxation times of a material after a temperature rise [K] over those at its own temperature [-]. Raises
+    """Return the ratio of a material's relaxation times after a temperature rise [K] to those before it [-]. Raises
     InputError outside the range of its shift."""
     return time_factor_of(heated(material, temperature_of(material) + rise)) / time_factor_of(material)

@@ -1,4 +1,4 @@
-"""Panels of adhesion."""
+"""Panels of a run with adhesion."""
 
 from ...results.panels import Axis, ColumnPanel
 

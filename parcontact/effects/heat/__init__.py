@@ -1,7 +1,4 @@
-"""Heat of sliding: temperatures of the rubber below the contact.
-
-Columns of heat.
-"""
+"""Heat of sliding: temperatures of the rubber below the contact, and their columns in tables."""
 
 import math
 from collections.abc import Callable

@@ -1,17 +1,18 @@
-"""Temperatures of bands: the rise in each band by its own heat and by that of all others.
+"""Temperatures of bands: the rise in each band that its own heat and the heat of all other bands cause.
 
-Heat of a band lies where its waves strain the rubber, and is distributed over the contact in proportion to the
-pressure. With waves cos(m z) along the depth, in which the heat of band i and the temperature of band k have the
+The heat of a band is released where its waves strain the rubber, and is distributed over the contact in proportion to
+the pressure. With waves cos(m z) along the depth, in which the heat of band i and the temperature of band k have the
 shares g_i(m) and g_k(m) of `effects.heat.solver`, 1 on the surface, the rise of band k is
 
     T_k = sum_i h_i 2/pi int g_i g_k (S(m) + sum_(j <= i, k) S_j(m)) dm,
 
-with the heat h_i [W/m^2] of band i, the uniform part `S = (1 - exp(-m^2 D t))/(kappa m^2)` after the sliding time t,
-and for the waves of the pressure of band j, of power P(q) relative to the square of its mean,
+with the heat h_i [W/m^2] of band i, a uniform part `S = (1 - exp(-m^2 D t))/(kappa m^2)` after the sliding time t, and
+for the waves of the pressure of band j, of power P(q) relative to the square of its mean,
 
     S_j(m) = sum_q P(q) Re (1 - exp(-(beta^2 + m^2) D t))/(beta^2 + m^2)/kappa.
 
-Waves of band j modulate only bands as fine as j or finer. Heat of the interface is on the surface and the finest.
+Waves of band j modulate only the heat of bands as fine as j or finer. Heat of the interface is released on the surface
+and counts as the finest band.
 """
 
 import math
@@ -43,7 +44,8 @@ SPACING, LOWEST, HIGHEST = 0.3, 1e-4, 30.0  # accuracy: spacing of ln m; limits 
 
 
 def waves_along_depth(low: float, high: float) -> tuple[Array, Array]:
-    """Return waves m [1/m] for bands between two wavenumbers [1/m], and their weights in `2/pi int ... dm`."""
+    """Return wavenumbers m [1/m] along the depth for bands between two wavenumbers [1/m], and their weights in `2/pi
+    int ... dm`."""
     ends = np.log(LOWEST * low), np.log(HIGHEST * high)
     m = np.exp(np.linspace(*ends, 2 + int((ends[1] - ends[0]) / SPACING)))
     step = float(np.log(m[1] / m[0]))
@@ -53,25 +55,25 @@ def waves_along_depth(low: float, high: float) -> tuple[Array, Array]:
 
 
 def uniform(body: Conductor, m: Array, time: float) -> Array:
-    """Return S(m) [K m^2/W 1/m] after a time [s]."""
+    """Return the uniform part S(m) [K m^2/W 1/m] of the rise after a sliding time [s]."""
     return np.asarray(-np.expm1(-(m**2) * body.diffusivity * time) / m**2 / body.conductivity)
 
 
 @dataclass(frozen=True)
 class Warming:
-    """S_j(m) of one band for each wave of its half spectrum, shape (m, waves), with the multiplicity of these."""
+    """The factors of S_j(m) for each wave of a band's half spectrum, shape (m, waves), times the number of equal
+    waves."""
 
     symbols: Array
 
     def apply(self, setup: Setup, pressure: Array) -> Array:
-        """Return S_j(m), shape (m,), for a map of pressure."""
+        """Return S_j(m), shape (m,), for a map of the pressure of band j."""
         spectrum, total = setup.fft.forward(pressure), float(pressure.sum())
         return np.asarray(self.symbols @ ((spectrum.real**2 + spectrum.imag**2) / total**2).ravel())
 
 
 def warming_of(setup: Setup, body: Conductor, time: float, velocity: Vector, m: Array) -> Warming:
-    """Return the warming S_j(m) by the waves of pressure of a band, after it has slid at `velocity` [m/s] for a
-    `time` [s]."""
+    """Return the factors of S_j(m) for a band that has slid at `velocity` [m/s] for a `time` [s]."""
     fft, size = setup.fft, setup.grid.size
     q = np.hypot(*wavenumbers(fft, size))
     along_x, along_y = travelling_wavenumbers(fft, size)
@@ -85,7 +87,7 @@ def warming_of(setup: Setup, body: Conductor, time: float, velocity: Vector, m: 
 
 
 def shares_of_depth(setup: Setup, pressure: Array, velocity: Vector, m: Array) -> Array:
-    """Return the shares g(m) of the depths of the heat of a band, under this map of pressure."""
+    """Return the shares g(m) of waves along the depth in the heat of a band under this map of pressure."""
     depths = depths_of(
         setup.fft.forward(pressure), setup.fft, setup.half_space, setup.units.length, velocity, setup.prony
     )
@@ -100,8 +102,11 @@ def rises_of(
     heats: Sequence[float],
     rubbed: float,
 ) -> list[float]:
-    """Return the rise [K] of each band, from the coarsest, from the weights of m, S, and g, S_j and the heat [W/m^2] of
-    each band; `rubbed` is the heat of the interface."""
+    """Return the temperature rise [K] of each band, from the coarsest.
+
+    `weights` belong to the waves m; `uniform` is S(m); `shares` g(m), `warmings` S_j(m) and `heats` [W/m^2] have one
+    item per band; `rubbed` [W/m^2] is the heat of the interface.
+    """
     sums = uniform + np.cumsum(warmings, axis=0)  # S and all S_j down to a band
     sources = [*zip(shares, heats, strict=True), (np.ones_like(weights), rubbed)]
     return [
@@ -113,7 +118,8 @@ def rises_of(
 def flash_of_bands(
     rises: Sequence[float], heats: Sequence[float], rounds: int = 1, friction_cold: float = math.nan
 ) -> Flash:
-    """Return the temperatures of a contact in bands: the mean over the heat, the highest of a band, and quartiles."""
+    """Return the temperatures of a contact in bands: the mean weighted by heat, the highest of a band, and
+    quartiles."""
     order = np.argsort(rises)
     values, weights = np.asarray(rises)[order], np.asarray(heats)[order]
     whole = float(weights.sum())
@@ -126,13 +132,13 @@ def flash_of_bands(
 
 
 def seconds_of(job: Job, cut: Cut, velocity: Vector) -> float:
-    """Return the time for which the rubber has slid [s]: over the distance of `thermal`, or over the box of the
-    coarsest band."""
+    """Return the time [s] in which the rubber slides the distance of the section `thermal`, or the length of the
+    coarsest band's box."""
     return float((job.section("thermal").distance or cut.box) / (math.hypot(*velocity) or math.inf))
 
 
 class HeatProbe:
-    """S_j and g of the heat in the contacts of a band."""
+    """Measures S_j(m) and g(m) of the heat in the contacts of a band."""
 
     means: ClassVar[Means] = {"depths": by_load, "warming": by_square}
 
@@ -141,26 +147,29 @@ class HeatProbe:
         self._waves, _ = waves_along_depth(float(cut.edges[0]), float(cut.edges[-1]))
 
     def slide(self, setup: Setup, velocity: Vector) -> None:
-        """Make S_j for a velocity [m/s]."""
+        """Prepare S_j(m) for a velocity [m/s]."""
         if velocity != self._velocity:
             body, seconds = self._job.section("thermal").conductor, seconds_of(self._job, self._cut, velocity)
             self._warming, self._velocity = warming_of(setup, body, seconds, velocity, self._waves), velocity
 
     def measure(self, setup: Setup, contact: Contact, velocity: Vector) -> dict[str, Array]:
-        """Return g and S_j of a contact."""
+        """Return g(m) and S_j(m) of a contact."""
         depths = shares_of_depth(setup, contact.p, velocity, self._waves)
         return {"depths": depths, "warming": self._warming.apply(setup, contact.p)}
 
 
 def probes(job: Job, cut: Cut) -> Iterator[HeatProbe]:
-    """Yield the probe of a job with heat."""
+    """Yield the measure of heat if the job has heat."""
     if job.section("thermal") is not None:
         yield HeatProbe(job, cut)
 
 
 class HeatOfBands:
-    """Temperatures of bands; with feedback each band has its own, a fixed point found by Aitken's relaxation. No
-    temperature above the range of the material's shift is tried; the first round is for cold bands."""
+    """The loop that finds the temperatures of bands.
+
+    With feedback each band has its own temperature, a fixed point found by Aitken's relaxation. No temperature above
+    the range of the material's shift is tried. The first round is for cold bands.
+    """
 
     words: ClassVar[tuple[str, str]] = ("temperatures", "feedback: none")
 
@@ -180,8 +189,8 @@ class HeatOfBands:
             raise no_material(road.speed, road.place[1], road.own_temperature, error) from None
 
     def settles(self, road: RoadSliding, results: Results, changes: tuple[float, float], others: bool) -> bool:
-        """Return True if the rises are those that the bands have; there is no heat before all else has settled for
-        cold rubber."""
+        """Return True if the bands have the rises that their heat causes. There is no heat until everything else has
+        settled for cold rubber."""
         rubbed = road.rub(results) * road.speed
         self._over = np.array(self._rises_of(road, results, rubbed)) - self._rises
         if math.isnan(self._cold):
@@ -192,7 +201,8 @@ class HeatOfBands:
         return bool(np.all(self._settled))
 
     def move(self, road: RoadSliding, results: Results) -> None:
-        """Set the rises of the next round; raises RunError if they are beyond the material's shift."""
+        """Set the temperature rises of the next round; raises RunError if they exceed the range of the material's
+        shift."""
         over, last, most = self._over, self._last, self._highest - road.own_temperature
         at_most = (self._rises == most) & (over > 0.0)
         if not np.all(self._settled) and np.all(self._settled | at_most):
@@ -205,7 +215,7 @@ class HeatOfBands:
         self._rises, self._last = np.clip(self._rises + self._relax * over, 0.0, most), over
 
     def found(self, road: RoadSliding, point: Point, results: Results, changes: tuple[float, float]) -> Point:
-        """Return the point with the temperatures of its contact."""
+        """Return the point with the temperatures of its contact added."""
         heats = [result.friction for result in results]
         heats[-1] += point.measures.friction_interface
         self._of_bands = self._rises_of(road, results, road.rub(results) * road.speed)
@@ -225,6 +235,6 @@ class HeatOfBands:
 
 
 def loops(job: Job, cut: Cut) -> Iterator[HeatOfBands]:
-    """Yield the loop of a job with heat."""
+    """Yield the loop over temperatures if the job has heat."""
     if job.section("thermal") is not None:
         yield HeatOfBands(job, cut)

@@ -1,4 +1,4 @@
-"""Heat of sliding: temperatures of the rubber below the contact (`effects.heat.solver`, `effects.heat.solver`)."""
+"""The effect of heat: columns, map and memory of the temperatures below the contact (`effects.heat.solver`)."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _no_strip_of_heat(thermal: Thermal | None, grid: Grid) -> Iterator[Fault]:
 
 
 class Counterbody(Part):
-    """The rigid body as a conductor of heat."""
+    """Section of the rigid body as a conductor of heat."""
 
     label: ClassVar[str] = "counterbody"
     conductivity: Positive = Field(description="a positive conductivity of the rigid body [W/(m K)]")
@@ -73,7 +73,7 @@ class Counterbody(Part):
 
     @property
     def conductor(self) -> Conductor:
-        """The rigid body as a conductor."""
+        """The rigid body as a conductor of heat."""
         return Conductor(self.conductivity, self.diffusivity)
 
 
@@ -89,19 +89,19 @@ class Thermal(Part):
 
     @property
     def conductor(self) -> Conductor:
-        """The rubber as a conductor."""
+        """The rubber as a conductor of heat."""
         return Conductor(self.conductivity, self.diffusivity)
 
     def sliding_time(self, grid: Grid, speed: float) -> float:
-        """Return the time [s] for which steady sliding has warmed the rubber: over the distance, or once through a
-        periodic box; infinite in a free one."""
+        """Return the time [s] for which steady sliding has warmed the rubber: along `distance`, by default once through
+        a periodic box; infinite in a free box without a distance."""
         free = grid.boundary == "free"
         return (self.distance or (math.inf if free else max(grid.size))) / speed
 
 
 def exponentials_of(job: Any) -> Exponentials:
-    """Return the sum of exponentials of a job, from its shortest sliding step to the diffusion time of the longest
-    wave."""
+    """Return the sum of exponentials that approximates conduction in a job, from its shortest sliding step to the
+    diffusion time of the longest wave."""
     body = job.section("thermal").conductor
     longest = DECAYED / (body.diffusivity * (2.0 * np.pi / max(job.grid.size)) ** 2)
     steps, slides = [longest / 10.0], False
@@ -116,10 +116,13 @@ def exponentials_of(job: Any) -> Exponentials:
 
 @dataclass(frozen=True)
 class ThermalMemory:
-    """Memory of heat: the waves of `heat`; the map `rise` of the surface [K]; the flash temperature and the highest
-    rise [K]; the force of the body [N] and the contact area at the end of the last step; whether there was any heat;
-    the depths of the last heat and the share of it in the body; and the relative error of friction, infinite if
-    unknown."""
+    """Memory of heat: waves, temperatures, and what the next step needs.
+
+    `heat` holds the waves; `rise` is the map of the surface [K]; `flash` and `highest` are the flash temperature and
+    the highest rise [K]; `force` [N] of the body and contact `area` belong to the end of the last step; `warmed` is
+    True after any heat; `share` of the last heat was released in the body, at `depths`; `error` is the relative error
+    of friction, infinite if unknown.
+    """
 
     heat: HeatMemory
     rise: Array
@@ -146,15 +149,16 @@ def _pulls(job: Any) -> bool:
 
 
 def feeds_back(job: Any) -> bool:
-    """Return whether the heat of sliding changes the relaxation times of a job's material."""
+    """Return True if the heat of sliding changes the relaxation times of a job's material."""
     section = job.section("thermal")
     return section is not None and section.feedback != "none"
 
 
 class ThermalColumns(Effect[ThermalMemory]):
-    """Columns: the mean temperature rise of the contact, weighted by heat, and the highest rise of the surface [K].
+    """Columns of heat: the mean temperature rise of the contact, weighted by heat, and the highest rise of the surface
+    [K].
 
-    At rest the weights are taken from the last sliding.
+    At rest the weights of the last sliding are used.
     """
 
     section: ClassVar[type[Part]] = Thermal
@@ -174,17 +178,17 @@ class ThermalColumns(Effect[ThermalMemory]):
 
     @staticmethod
     def curve_options(job: Any) -> Iterator[str]:
-        """Yield what columns of friction curves require."""
+        """Yield the requirements of columns of friction curves that the job meets."""
         yield from ("thermal", *["feedback"] * feeds_back(job))
 
     @staticmethod
     def why_not_folded(job: Any) -> str:
-        """Return why all branches of the material must have maps; '' if they need not."""
+        """Return the reason why all branches of the material must have maps; '' if there is none."""
         return "heat changes them" if feeds_back(job) else ""
 
     @staticmethod
     def facts(job: Any) -> Iterator[str]:
-        """Yield a sentence on the distance of steady sliding if the job gives none."""
+        """Yield a sentence on the distance of steady sliding that is used if the job gives none."""
         if job.section("thermal").distance is None:
             free = job.grid.boundary == "free"
             way = "without end" if free else f"{max(job.grid.size):g} m, the longer side of the box, since it was cold"
@@ -193,7 +197,7 @@ class ThermalColumns(Effect[ThermalMemory]):
 
     @staticmethod
     def maps(job: Any) -> Sequence[DTypeLike]:
-        """Return the types of the map of temperatures, and of those that hold its spectra in a checkpoint."""
+        """Return the types of the map of temperatures, and of the maps that hold its spectra in a checkpoint."""
         count = 2 + exponentials_of(job).kept
         return [np.float64] * (count + _rubs(job) + math.ceil(count / fft.per_map(job.grid.nx)))
 
@@ -244,7 +248,7 @@ class ThermalColumns(Effect[ThermalMemory]):
         return cold._replace(relaxation_times=cold.relaxation_times * self.time_factor(memory))
 
     def time_factor(self, memory: ThermalMemory) -> float:
-        """Return relaxation times at the flash temperature over the relaxation times of the job, if the job has
+        """Return the ratio of relaxation times at the flash temperature to the job's relaxation times; 1 without
         feedback. Raises RunError."""
         if not (self._feeds_back and memory.warmed):
             return 1.0
@@ -275,13 +279,14 @@ class ThermalColumns(Effect[ThermalMemory]):
         return memory.flash, memory.highest, ERROR * memory.error if known else math.nan
 
     def field(self, memory: ThermalMemory, name: str) -> Array:
-        """Return this rank's rows of the temperature rise [K]."""
+        """Return this rank's rows of the map of temperature rises [K]."""
         return memory.rise.copy()
 
     # -- checkpoints --------------------------------------------------------------------------------------------------
 
     def entries(self, memory: ThermalMemory, units: Units) -> dict[str, Entry]:
-        """Return the map, all spectra as maps, and their columns without room there; collective."""
+        """Return the checkpoint entries: the map of temperatures, all spectra as maps, and the columns of spectra that
+        do not fit into these; collective."""
         known, depths = memory.heat.sum, memory.depths
         found = {
             "rise": Entry(memory.rise, 1.0, "K"),
@@ -313,7 +318,8 @@ class ThermalColumns(Effect[ThermalMemory]):
         yield from ((2 + number, f"wave {number}", wave) for number, wave in enumerate(memory.heat.waves))
 
     def restored(self, memory: ThermalMemory, saved: Saved) -> ThermalMemory:
-        """Return the memory of a checkpoint; collective. Missing waves, of shorter steps than before, start at 0."""
+        """Return the memory that a checkpoint holds; collective. Missing waves, of shorter steps than before, start at
+        0."""
         per, columns = fft.per_map(self._slab.nx), fft.edges(self._slab.nx)
         for number, name, spectrum in self._spectra(memory):
             if name in saved:

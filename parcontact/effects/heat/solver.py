@@ -1,21 +1,20 @@
-"""Temperatures by the heat of sliding.
+"""Temperatures that the heat of sliding causes: steady, in time steps, and below a free box.
 
-Heat of sliding: temperature rise of the surface of a conducting half space under moving heat.
-
-Heat q [W/m^2] on the surface of a body of conductivity kappa and diffusivity D, below a contact that slides at the
-velocity v, causes the steady temperature rise, in the frame of the contact,
+Steady sliding: heat q [W/m^2] on the surface of a half space of conductivity kappa and diffusivity D, below a contact
+that slides at the velocity v, causes the steady temperature rise, in the frame of the contact,
 
     T^(k) = q^(k)/(kappa beta),     beta(k) = sqrt(k^2 - i k.v/D),     Re beta > 0                                (1)
 
 (H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.7). The rest of the surface is insulated.
 Heat from the depth z arrives with the factor exp(-beta z). A wave of the wavenumber q on an incompressible half space
-has strains whose squares add up to a constant times `(q z)^2 exp(-2 q z)`, the same under crests and troughs. So its
-heat has the distribution `4 q (q z)^2 exp(-2 q z) dz`, the mean depth `3/(2 q)`, and arrives with
+has strains whose squares add up to a constant times `(q z)^2 exp(-2 q z)`, the same under crests and troughs. So the
+heat of the wave has the distribution `4 q (q z)^2 exp(-2 q z) dz`, the mean depth `3/(2 q)`, and arrives with the
+factor
 
     int 4 q^3 z^2 exp(-(2 q + beta) z) dz = (1 + beta/(2 q))^-3.                                                  (2)
 
-The rubber that dissipates lies at these depths, too, and has their mean temperature. With waves cos(m z) along the
-depth, of which this distribution has the share
+The rubber that dissipates is at these depths, too, and has their mean temperature. With waves cos(m z) along the depth,
+whose share in this distribution is
 
     g(m) = int 4 q^3 z^2 exp(-2 q z) cos(m z) dz = Re (1 - i m/(2 q))^-3,                                         (3)
 
@@ -25,39 +24,33 @@ A uniform heat has no steady state: after a sliding time t it has warmed a cold 
 effusivity `e = kappa/sqrt(D)`, and each wave by `erf(beta sqrt(D t))` times (1). For an infinite time, temperatures in
 a periodic box are relative to its mean.
 
-Temperature of the surface of a conducting half space under heat that changes with time: `effects.heat.solver` in time
-steps.
-
-Each wave (j, k) of the sum of exponentials (`physics.prony`), along the depth and along the surface, satisfies
+Time steps: each wave (j, k) of the sum of exponentials (`physics.prony`), along the depth and along the surface,
+satisfies
 
     dc/dt = -(m_j^2 + D k^2) c + q^(k, t) g_j,     T^(k) = sum_j w_j c_j/e,                                       (1)
 
 with the effusivity e. q is linear in time within a step, over which (1) is solved exactly. For heat on the surface g =
-1; for heat of the body it is the share (3) of `heat` of the wave m_j/sqrt(D) along the depth. The temperature
-at the depths where this heat is released is `sum_j w_j g_j c_j/e`.
+1; for heat of the body g is the share (3) of the wave m_j/sqrt(D) along the depth. The temperature at the depths where
+this heat is released is `sum_j w_j g_j c_j/e`.
 
-The mean of the box (k = 0) has its own sum, of numbers, exact to 1e-9 at any time, so that no heat is lost.
+The mean of the box (k = 0) has a sum of its own, exact to 1e-9 at any time, so that no heat is lost.
 
-Heat that slides over a free half space: influence coefficients for `effects.heat.solver`.
-
-A uniform heat on one cell of `dx x dy`, while the body passes below it with the velocity -v, warms the distance (x,
-y) from the cell by the heat of all earlier times t,
+Free box: a uniform heat on one cell of `dx x dy`, while the body passes below it with the velocity -v, causes at the
+distance (x, y) from the cell the rise
 
     K(x, y) = 1/e int_0^inf W(t) P(x + v_x t, dx, t) P(y + v_y t, dy, t) dt/sqrt(pi t),                           (1)
     P(x, dx, t) = (erf((x + dx/2)/sqrt(4 D t)) - erf((x - dx/2)/sqrt(4 D t)))/2,
 
-with the effusivity e (H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.4). W is 1 for
-heat on the surface. For heat that waves of the wavenumber q dissipate it is, with tau = D t and s = 2 q sqrt(tau),
+with the effusivity e (H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 10.4). W is 1 for heat
+on the surface. For heat that waves of the wavenumber q dissipate, with tau = D t and s = 2 q sqrt(tau),
 
     W(t) = sqrt(pi) s^3 erfcx''(s)/2,     erfcx''(s) = (2 + 4 s^2) erfcx(s) - 4 s/sqrt(pi),                  (2)
 
-which tends to 1 - 3/s^2. For the temperature at the depths where heat is released it is `sqrt(pi tau)` times
+which tends to 1 - 3/s^2. For the temperature at the depths where heat is released, W is `sqrt(pi tau)` times
 `Depths.staying`. Panels of the integral resolve the passage of a cell and the spreading of heat.
 
-Temperatures of a contact: where its heat is released, and the distribution of the temperature rise over the contact.
-
-The heat of the interface is its shear stress times the sliding speed, on all points in contact. The heat of the
-body, dissipated by its branches, is distributed in proportion to the pressure.
+Distribution over the contact: the heat of the interface is its shear stress times the sliding speed, on all points in
+contact. The heat of the body, dissipated by its branches, is distributed in proportion to the pressure.
 """
 
 import math
@@ -96,28 +89,29 @@ class Conductor:
 
     @property
     def effusivity(self) -> float:
-        """The conductivity over the root of the diffusivity [W s^(1/2)/(m^2 K)]."""
+        """The conductivity divided by the root of the diffusivity [W s^(1/2)/(m^2 K)]."""
         return float(self.conductivity / np.sqrt(self.diffusivity))
 
 
 @dataclass(frozen=True)
 class Depths:
-    """Depths of the heat of the body: the share of it that waves of each wavenumber [1/m] dissipate.
+    """Depths at which the body releases heat, given by the share that waves of each wavenumber [1/m] dissipate.
 
-    Integrals over waves along the depth replace (2), as they also hold for a finite time and for heat felt at depth.
+    Integrals over waves along the depth replace (2), as they also hold for a finite time and for the temperature at
+    depth.
     """
 
     wavenumbers: Array
     shares: Array
 
     def cosines(self, m: Array) -> Array:
-        """Return the shares (3) of waves m [1/m] along the depth, averaged over the waves."""
+        """Return the shares (3) of waves cos(m z) along the depth, averaged over the dissipating waves."""
         square = (0.5 * m / self.wavenumbers[:, None]) ** 2
         return np.asarray(self.shares @ ((1.0 - 3.0 * square) / (1.0 + square) ** 3))
 
     def warmed(self, beta: Spectrum, felt: bool, reach: float = np.inf) -> Spectrum:
-        """Return the temperature over heat, times kappa [m], after diffusion over `reach = D t` [m^2]: that of the
-        surface or, if `felt`, that at the depths where heat is released; to 1e-5."""
+        """Return kappa times the temperature rise per heat [m] after diffusion over `reach = D t` [m^2], to 1e-5: on
+        the surface or, if `felt`, at the depths where heat is released."""
         total = np.zeros_like(beta)
         for m, weight in zip(*self._waves(felt), strict=True):
             square = beta**2 + m**2
@@ -125,7 +119,8 @@ class Depths:
         return total
 
     def staying(self, tau: Array) -> Array:
-        """Return the rest after diffusion over `tau = D t` [m^2], `2/pi int g^2 exp(-m^2 tau) dm` [1/m]."""
+        """Return `2/pi int g^2 exp(-m^2 tau) dm` [1/m], the heat that remains at its depths after diffusion over `tau =
+        D t` [m^2]."""
         total = np.zeros_like(tau)
         for m, weight in zip(*self._waves(True), strict=True):
             total += weight * np.exp(-(m**2) * tau)
@@ -155,8 +150,8 @@ def sliding_heat(
     """Return the operator from heat [W/m^2] to temperature rise [K] in a periodic box of `size` [m] below a contact
     that has slid steadily at `velocity` [m/s] for a `time` [s].
 
-    The heat is on the surface or at `depths`. The temperature is that of the surface or, if `felt`, that at the
-    depths where the heat is released. It is exact for each wave except those of Nyquist.
+    The heat is released on the surface or at `depths`. The temperature is taken on the surface or, if `felt`, at the
+    depths where heat is released. The operator is exact for each wave except the Nyquist waves.
     """
     reach = body.diffusivity * time
 
@@ -186,12 +181,12 @@ def _beta(fft: FFT, size: Vector, body: Conductor, velocity: Vector, rows: slice
 
 
 def depths_of(spectrum: Spectrum, fft: FFT, body: HalfSpace, unit: float, velocity: Vector, prony: Prony) -> Depths:
-    """Return the depths at which a body dissipates under a pressure of this spectrum, sliding at `velocity` [m/s];
+    """Return the depths at which a body sliding at `velocity` [m/s] dissipates under a pressure with this spectrum;
     collective.
 
     `unit` [m] is the length unit of the body. A wave loses `|p^|^2 A w Im(-1/G*(w))` with its compliance A and
-    frequency w. Waves are combined in BINS per octave, each with its mean wavenumber. On a layer the heat lies at
-    most half its thickness deep.
+    frequency w. Waves are combined in BINS per octave, each with its mean wavenumber. In a layer the heat is at most
+    half the thickness deep.
     """
     longest = max(body.size)
     bins = 1 + int(BINS * (1.0 + np.log2(np.hypot(fft.mx, fft.my))))
@@ -222,8 +217,8 @@ MEAN_TIMES, MEAN_ERROR = (
 
 @dataclass(frozen=True)
 class Heating:
-    """Heat in one step [W/m^2, mean over the box], at its beginning and end: on `rubbed` points, and in the body in
-    proportion to the pressure, at `depths`."""
+    """Heat in one step [W/m^2, mean over the box], each a pair for begin and end of the step: `rubbed` on points that
+    slip, and `pressed` in the body in proportion to the pressure, at `depths`."""
 
     rubbed: tuple[float, float] = (0.0, 0.0)
     pressed: tuple[float, float] = (0.0, 0.0)
@@ -231,17 +226,18 @@ class Heating:
 
     @property
     def whole(self) -> tuple[float, float]:
-        """The sum of both."""
+        """The sum of both heats at the begin and at the end of the step [W/m^2]."""
         return self.rubbed[0] + self.pressed[0], self.rubbed[1] + self.pressed[1]
 
 
 def along_depth(rates: Array, body: Conductor, depths: Depths | None) -> Array:
-    """Return g of (1) for waves along the depth, averaged over the dissipating waves; 1 without depths."""
+    """Return g of the time steps (1) for waves along the depth with these `rates`, averaged over the dissipating waves;
+    1 without depths."""
     return np.ones_like(rates) if depths is None else depths.cosines(np.sqrt(rates / body.diffusivity))
 
 
 class MeanMemory:
-    """Mean temperature of a box [K], as `waves` along the depth; the same on every rank."""
+    """Mean temperature of a box [K], as a sum of waves along the depth; the same on every rank."""
 
     def __init__(self, body: Conductor) -> None:
         self.body, self.sum = body, fit_exponentials(*MEAN_TIMES, MEAN_ERROR)
@@ -249,12 +245,12 @@ class MeanMemory:
 
     @property
     def stored(self) -> float:
-        """Heat in the body [J/m^2, mean over the box]: the longest wave along the depth, which never decays."""
+        """Heat stored in the body [J/m^2, mean over the box]: the longest wave along the depth, which never decays."""
         return float(self.waves[0])
 
     def advance(self, dt: float, heating: Heating) -> tuple[float, float]:
-        """Advance by a step dt [s]. Return the mean temperature rises [K] of the surface and where the body releases
-        heat."""
+        """Advance by a step dt [s]. Return the mean temperature rise [K] of the surface, and the rise at the depths
+        where the body releases heat."""
         known, deep = self.sum, along_depth(self.sum.rates, self.body, heating.depths)
         before, after = shares_of_step(known.rates * dt)
         start, end = (one + deep * other for one, other in zip(heating.rubbed, heating.pressed, strict=True))
@@ -265,10 +261,11 @@ class MeanMemory:
 
 
 class HeatMemory:
-    """The waves (1) of a box of `size` [m], and the spectra of rubbing and pressure at the end of the last step.
+    """The waves of temperature (1) below a box of `size` [m], and the spectra of rubbing and pressure at the end of the
+    last step.
 
-    Parameters: `fft`, a transform of the size of maps; `rubs`, True if there is heat on the surface in addition to
-    that of the body. The constructor and the methods are collective.
+    Parameters: `fft`, a transform of the size of maps; `rubs`, True if heat is released on the surface, too, not only
+    in the body. The constructor and the methods are collective.
     """
 
     def __init__(self, fft: FFT, size: Vector, body: Conductor, known: Exponentials, rubs: bool) -> None:
@@ -284,7 +281,7 @@ class HeatMemory:
         self.mean = MeanMemory(body)
 
     def set_heating(self, rubbed: Array | None, pressed: Array, scales: Vector) -> None:
-        """Set the maps of rubbing and pressure before the next step, times their scales."""
+        """Set the maps of rubbing and pressure before the next step, multiplied by `scales`."""
         if rubbed is not None:
             np.multiply(self.fft.forward(rubbed), scales[0], out=self.rubbed)
         np.multiply(self.fft.forward(pressed), scales[1], out=self.pressed)
@@ -292,10 +289,12 @@ class HeatMemory:
     def advance(
         self, dt: float, heating: Heating, rubbed: Array | None, pressed: Spectrum, scales: Vector, out: Array
     ) -> float:
-        """Advance by a step dt [s] to these maps of rubbing and pressure, and put the temperature rise of the surface
-        [K] into `out`. Return the mean rise [K] at the depths where the body releases heat, weighted by this heat.
+        """Advance by a step dt [s], at whose end the heat is distributed as `rubbed` and `pressed`. Put the temperature
+        rise of the surface [K] into `out`, and return the mean rise [K] where the body releases heat, weighted by this
+        heat.
 
-        `pressed` is a spectrum, the buffer of the transform or a copy; `scales` give both maps the mean 1.
+        `pressed` is a spectrum, the buffer of the transform or a copy; `scales` are factors that give both maps the
+        mean 1.
         """
         known, fft = self.sum, self.fft
         now, fresh = pressed, np.zeros((0, fft.shape[1]), fft.complex)
@@ -340,8 +339,8 @@ def sliding_heat_unbounded(
     time: float = np.inf,
 ) -> Convolution:
     """Return the operator from heat [W/m^2] to temperature rise [K] below a contact that has slid steadily at
-    `velocity` [m/s] for a `time` [s] and fits into a free box of `size` [m]; collective. Other parameters are those
-    of `sliding_heat`."""
+    `velocity` [m/s] for a `time` [s] and fits into a free box of `size` [m]; collective. Other arguments are as in
+    `sliding_heat`."""
     slab = fft.slab
     padded = FFT(slab, padded_lengths(slab.nx, slab.ny), np.float64, measured=False)
 
@@ -404,10 +403,12 @@ SLIP_BINS = 512  # accuracy: bins of the histogram for quartiles, whose error is
 
 @dataclass(frozen=True)
 class Flash:
-    """Temperature rises [K] of a contact, weighted by the heat where it is released, on the surface and in the body:
-    their mean (the flash temperature), the highest on the surface, and the lower and upper quartile. `of_rubber` is the
-    highest rise at which rubber relaxes: the mean, and in bands, each at its own temperature, that of the hottest. With
-    feedback, found in `rounds`, `friction_cold` is friction without feedback."""
+    """Temperature rises [K] of a contact, weighted by the heat where it is released, on the surface and in the body.
+
+    `mean` is the flash temperature, `highest` the highest rise on the surface, `lower` and `upper` are the quartiles.
+    `of_rubber` is the highest rise at which rubber relaxes: the mean, or in bands, each at its own temperature, the
+    rise of the hottest band. With feedback, found in `rounds`, `friction_cold` is friction without feedback.
+    """
 
     mean: float = 0.0
     highest: float = 0.0
@@ -423,18 +424,18 @@ class Flash:
 
 
 def spread_over(slab: Slab, weights: Array, total: float) -> Array:
-    """Return `total` [W/m^2, mean over the box] distributed in proportion to a map of weights; 0 if all weights are 0.
-    Collective."""
+    """Return the heat `total` [W/m^2, mean over the box] distributed in proportion to the map `weights`; 0 if all
+    weights are 0. Collective."""
     whole = slab.sum(float(weights.sum(dtype=np.float64)))[0]
     return weights * (total * slab.points / whole if whole > 0.0 else 0.0)
 
 
 def share_of(slab: Slab, rubbed: Array, own: Array, other: Array, counterbody: Array) -> float:
-    """Return the share of the heat of the interface that goes into the rubber, so that both surfaces have the same mean
+    """Return the share of the heat of the interface that enters the rubber, so that both surfaces have the same mean
     temperature over the contact (H. Blok, Proc. Inst. Mech. Engrs. 2 (1937) 222); collective.
 
-    `own` and `counterbody` are the rises [K] that all of this heat would cause on either side, `other` is the rise
-    of the rubber by other heat. The mean is weighted by `rubbed`.
+    `own` and `counterbody` are the rises [K] that all of this heat would cause in the rubber and in the counterbody;
+    `other` is the rise of the rubber by other heat. The mean is weighted by `rubbed`.
     """
     sums = slab.sum(*(float((rise * rubbed).sum()) for rise in (own, other, counterbody)))
     whole = sums[0] + sums[2]
@@ -442,8 +443,8 @@ def share_of(slab: Slab, rubbed: Array, own: Array, other: Array, counterbody: A
 
 
 def flash_of(slab: Slab, surface: Array, pairs: Sequence[tuple[Array, Array]]) -> Flash:
-    """Return the temperatures of a contact; collective. `surface` has the rises [K] of the surface; `pairs` are maps of
-    a rise [K] and of the heat released there."""
+    """Return the temperatures of a contact; collective. `surface` is the map of the surface's rise [K]; `pairs` are
+    maps of a rise [K] and of the heat released there."""
     sums = [(float((rise * heat).sum()), float(heat.sum())) for rise, heat in pairs]
     warmed, whole = slab.sum(*(math.fsum(each) for each in zip(*sums, strict=True))) if sums else (0.0, 0.0)
     highest = float(surface.max(initial=-math.inf))

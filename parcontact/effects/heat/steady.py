@@ -1,6 +1,6 @@
-"""Temperatures of steady sliding: the map below the contact, and the one temperature of the rubber that follows.
+"""Temperatures of steady sliding: the map below the contact, and the one temperature at which all rubber relaxes.
 
-The map is exact for its heat (`heat`, `flash`). With feedback all rubber relaxes as at the flash
+The map is exact for the given heat (`effects.heat.solver`). With feedback all rubber relaxes as at the flash
 temperature, `T = T_0 + F(T)`: a fixed point, found by secants within a bracket. Each round is a steady state.
 """
 
@@ -73,8 +73,8 @@ def find_temperatures(
 
 
 class Feedback:
-    """The fixed point of the temperature. The first round is for the cold body; the second starts from the last
-    fixed point if only the velocity differs."""
+    """Finds the fixed point of the flash temperature. The first round is for the cold body; a later search starts from
+    the last fixed point if only the velocity differs."""
 
     def __init__(self) -> None:
         self._speed, self._rise, self._place = 1.0, 0.0, (math.nan, math.nan)
@@ -83,10 +83,10 @@ class Feedback:
         self, warmed: Callable[[float], Point], speed: float, place: Vector, tolerance: float, most: float = math.inf
     ) -> Point:
         """Return the point `warmed(rise)` whose flash temperature is `rise` [K], to the relative `tolerance`, limited
-        to FINEST and COARSEST. `place` is pressure and temperature of the body.
+        to FINEST and COARSEST. `place` is the pressure and the temperature of the body.
 
         No rise above `most` [K], where the material's shift ends, is tried. Raises RunError if the fixed point is above
-        it, or is not found in MOST_ROUNDS rounds.
+        `most`, or is not found in MOST_ROUNDS rounds.
         """
         relative = min(max(tolerance, FINEST), COARSEST)
         guess = self._rise * math.sqrt(speed / self._speed) if place == self._place else 0.0
@@ -118,7 +118,8 @@ class Feedback:
 
 
 class HeatLoop:
-    """Temperatures of steady states on one grid; with feedback all rubber has the flash temperature, a fixed point."""
+    """Loop that finds the temperatures of steady states on one grid; with feedback all rubber has the flash
+    temperature."""
 
     def __init__(self, setup: Setup) -> None:
         self._section, self._own = setup.job.section("thermal"), temperature_of(setup.job.material)
@@ -127,8 +128,8 @@ class HeatLoop:
         self.fields: dict[str, Array] = {}
 
     def solve(self, sliding: Any, solve: Callable[[Vector, float], Point], velocity: Vector, pressure: float) -> Point:
-        """Return the steady state with its temperatures; collective. `solve` solves one with the `setup` of `sliding`,
-        a `march.steady.SteadySliding`. Raises RunError."""
+        """Return the steady state with its temperatures; collective. `solve` returns a state for the present `setup` of
+        `sliding`, a `march.steady.SteadySliding`. Raises RunError."""
         if self._section.feedback == "none":
             return self._heat(sliding, solve(velocity, pressure))
         cold = self._own if math.isnan(sliding.temperature) else sliding.temperature
@@ -152,25 +153,25 @@ class HeatLoop:
 
 
 def loops(setup: Setup) -> Iterator[HeatLoop]:
-    """Yield the loop around steady states of a job with heat."""
+    """Yield the loop over temperatures around steady states if the job has heat."""
     if setup.job.section("thermal") is not None:
         yield HeatLoop(setup)
 
 
 def no_material(speed: float, pressure: float, temperature: float, error: InputError) -> UnsolvedError:
-    """Return the error of a state at whose flash temperature the material is not known."""
+    """Return the error of a state whose flash temperature is outside the known range of the material."""
     place = describe_cold_state(speed, pressure, temperature)
     return UnsolvedError(place, f"no material at the flash temperature: {error}")
 
 
 def describe_cold_state(speed: float, pressure: float, temperature: float) -> str:
-    """Return a text on a state: its velocity [m/s], pressure [Pa] and the temperature of the cold body [deg C]."""
+    """Return a text that names a state: velocity [m/s], pressure [Pa] and temperature of the cold body [deg C]."""
     return f"steady sliding at {speed:.4g} m/s under {pressure:.4g} Pa and {temperature:.4g} C"
 
 
 def beyond_shift(speed: float, pressure: float, temperature: float, most: float, rise: float) -> UnsolvedError:
-    """Return the error of a fixed point above the `most` [K] that the shift of the material allows, where sliding warms
-    the rubber by `rise` [K]."""
+    """Return the error of a fixed point above the rise `most` [K] at which the shift of the material ends, where
+    sliding warms the rubber by `rise` [K]."""
     return UnsolvedError(
         describe_cold_state(speed, pressure, temperature),
         f"the flash temperature is above {temperature + most:.4g} C, where the shift factors end; rubber of that "
@@ -187,7 +188,7 @@ WARN_DECOMPOSES = Kind(
 
 
 def describe_hot(points: Sequence[Point]) -> Iterator[Doubt]:
-    """Yield a warning if rubber, in bands that of the hottest one, would be so hot that it decomposes."""
+    """Yield a warning if the rubber, or the rubber of the hottest band, would be so hot that it decomposes."""
     known = ((point.effects.get("thermal"), point.speed) for point in points)
     hot = [(rise, speed) for flash, speed in known if flash and (rise := flash.of_rubber) > HOTTEST]
     if hot:
@@ -204,7 +205,7 @@ WARN_FLASH_TEMPERATURES = Kind(
 
 
 def describe_unmeasured(points: Sequence[Point], job: Job) -> Iterator[Doubt]:
-    """Yield a warning if the flash temperature of relaxing rubber, in bands of the hottest one, is outside its measured
+    """Yield a warning if relaxing rubber has a flash temperature, in bands the highest one, outside its measured
     range."""
     body = job.material.fitted
     if not feeds_back(job) or not isinstance(body, Zener) or body.temperatures is None:

@@ -1,7 +1,4 @@
-"""Friction of the contact area itself: a shear stress or a coefficient.
-
-Columns of friction of the contact area itself.
-"""
+"""Friction of the contact area itself, by a shear stress or a coefficient, and its columns in tables."""
 
 from operator import attrgetter
 

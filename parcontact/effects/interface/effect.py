@@ -1,4 +1,4 @@
-"""Interface friction: a shear stress on the area in contact (`physics.motion`)."""
+"""The effect of interface friction: a shear stress on the area in contact (`physics.motion`)."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from .section import Interface, InterfaceEffect
 
 
 def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, float]:
-    """Return the parts of friction of the body and of the interface: their forces along the total force, over the
-    normal force. A part is negative if its force opposes the total, as that of the interface may after a reversal."""
+    """Return the parts of the friction coefficient by the body and by the interface: the components of both forces
+    along the total force, divided by the normal force. A part is negative if its force opposes the total force, as the
+    force of the interface may after a reversal."""
     scale = math.hypot(measures.force_x, measures.force_y) * math.hypot(*velocity)
     along = -(measures.force_x * velocity[0] + measures.force_y * velocity[1]) / scale if scale else 0.0
     own = along * measures.friction_interface
@@ -23,7 +24,7 @@ def shares(measures: Measures, velocity: tuple[float, float]) -> tuple[float, fl
 
 
 class InterfaceColumns(InterfaceEffect[tuple[float, float]]):
-    """Columns of the parts of friction of the body and of the interface; they add up to friction."""
+    """Columns of the two parts of friction, by the body and by the interface, whose sum is friction."""
 
     columns: ClassVar[tuple[str, ...]] = added_by("interface")
 
@@ -37,7 +38,7 @@ class InterfaceColumns(InterfaceEffect[tuple[float, float]]):
 
     @staticmethod
     def shear(job: Any) -> InterfaceFriction | None:
-        """Return the stress of the section, shifted to the temperature of the material; None with `stick`."""
+        """Return the shear stress of the section, shifted to the temperature of the material; None with `stick`."""
         law: Interface = job.section("interface")
         return None if law.stick else law.friction(job.material)
 

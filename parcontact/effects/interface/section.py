@@ -109,8 +109,8 @@ def _needs_its_folder(stick: bool, coefficient: float | None) -> Iterator[Fault]
 
 
 class Interface(Part):
-    """The `interface` section: a shear stress, constant or a bell over the logarithm of the velocity, or a coefficient
-    of friction; with `stick` points stick until the traction reaches it."""
+    """The `interface` section: friction by a shear stress, constant or a bell curve of the logarithm of the velocity,
+    or by a coefficient; with `stick: true` points stick until the traction reaches this bound."""
 
     label: ClassVar[str] = "interface"
     shear_stress: Positive | None = Field(
@@ -139,7 +139,7 @@ WARN_WHOLE_BOX_STICKS = Kind(
 
 
 class InterfaceEffect(Effect[Memory]):
-    """An effect of the section."""
+    """Base class of the two effects of the `interface` section."""
 
     section: ClassVar[type[Part]] = Interface
     in_curves: ClassVar[bool] = True
@@ -159,7 +159,7 @@ class InterfaceEffect(Effect[Memory]):
 
     @staticmethod
     def doubt_contact(job: Any, measures: Measures, where: str) -> Iterator[Doubt]:
-        """Yield a warning about a periodic box that is full of a contact that sticks."""
+        """Yield a warning about full contact of a periodic box in which points may stick."""
         if job.section("interface").stick and all(job.grid.cyclic) and measures.contact_area == 1.0:
             yield WARN_WHOLE_BOX_STICKS("", {"where": where})
 

@@ -1,7 +1,4 @@
-"""Leakage through the gap of a contact.
-
-Columns of leakage.
-"""
+"""Leakage through the gap of a contact, and its columns in tables."""
 
 from ...column import COUNTED, Column, Table
 

@@ -25,12 +25,12 @@ NOTHING = (math.nan, math.nan, math.nan)
 
 
 def compile_loops() -> None:
-    """Solve for a small flow, which compiles the loops."""
+    """Solve for the flow through a small map, which compiles the loops."""
     leak(np.random.default_rng(1).random((16, 16)), (1.0, 1.0))
 
 
 class LeakageColumns(Effect[tuple[float, ...]]):
-    """The conductivity K [m^3] of the gap along x and along y, and its critical constriction [m].
+    """Columns of leakage: the conductivity K [m^3] of the gap along x and along y, and the critical constriction [m].
 
     The gap is gathered on root, which solves for the flow.
     """
@@ -96,8 +96,8 @@ class LeakageColumns(Effect[tuple[float, ...]]):
 
 @dataclass(frozen=True)
 class SealColumns:
-    """Memory of a seal: its columns, the map of the fluid's pressure over the ambient one [Pa], and whether a warning
-    about inertia was given."""
+    """Memory of a seal: the values of its columns, the map of the fluid's pressure above ambient [Pa], and whether a
+    warning about inertia was given."""
 
     columns: tuple[float, ...]
     pressure: Array
@@ -105,7 +105,7 @@ class SealColumns:
 
 
 class Seal(LeakageColumns):
-    """The flow of a fluid that carries a part of the load (`seal_law`)."""
+    """Columns and map of a fluid that flows through a seal and carries a part of the load (`seal_law`)."""
 
     columns: ClassVar[tuple[str, ...]] = ("flow_x", "constriction", *added_by("leakage.load"))
     fields: ClassVar[tuple[str, ...]] = ("fluid_pressure",)

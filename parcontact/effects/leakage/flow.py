@@ -10,18 +10,17 @@ periodic or closed. Contact is impermeable. Only cells on a path from end to end
 directly, as g^3 spans many decades and iterations stall. The flow follows from its dissipation, `sum c (p -
 p_neighbour)^2`, which is minimal for the exact pressures, so that their errors enter squared.
 
-Direct solution of the flow between cells: half of the cells are eliminated at once, the rest by sparse factors.
+Half of the cells are eliminated at once, the rest by sparse factors.
 
-The flows out of each wet cell balance: with the conductances c of its faces, `sum c (p - p_neighbour) = given`.
-White cells of a checkerboard touch black ones only, so that each is eliminated on its own:
+In each wet cell with the conductances c of its faces, `sum c (p - p_neighbour) = given`. White cells of a checkerboard
+touch only black cells, so that each is eliminated on its own:
 
     p_white = (given + sum c p_black)/sum c,
 
-which leaves a symmetric matrix of the black cells, with up to eight neighbours each. It is factorized directly.
+which leaves a symmetric matrix for the black cells, with up to eight neighbours each. This matrix is factorized
+directly.
 
-Paths of a fluid through a map of gaps, from the first row to the last.
-
-Fluids that flow through a gap: liquids, described by their viscosity, and gases, which expand and slip.
+Fluids are liquids, described by their viscosity, and gases, which expand and slip.
 
 A pressure that falls from p1 to p2 over the length L of a gap of conductivity K drives through a width W the flow
 
@@ -33,12 +32,13 @@ Maxwell, Phil. Trans. R. Soc. 170 (1879) 231)
 
     lambda = (eta/p) sqrt(pi R T/(2 M)).
 
-At walls that reflect all molecules diffusely it slips, and a gap g conducts like one of `g^3 (1 + 6 lambda/g)`, here
-with lambda at the mean pressure (p1 + p2)/2, which is exact for an even gap. The error is about 10 % for gaps above
-ten mean free paths; in smaller gaps the true flow is larger.
+At walls that reflect all molecules diffusely a gas slips: `g^3 (1 + 6 lambda/g)` replaces g^3 for a gap g, here with
+lambda at the mean pressure (p1 + p2)/2, which is exact for an even gap. The error is about 10 % for gaps above ten mean
+free paths; in smaller gaps the true flow is larger.
 
-Both flows are viscous. A gas has inertia too: through an open section A no more flows than by the isentropic law of
-A. Barre de Saint-Venant and L. Wantzel, J. Ecole Polytechnique 16 (1839) 85, with the ratio kappa of its heats,
+Both flows are viscous. A gas has inertia, too, which limits its mass flow through an open section A by the isentropic
+law of A. Barre de Saint-Venant and L. Wantzel, J. Ecole Polytechnique 16 (1839) 85. With the ratio kappa of heat
+capacities the limit is
 
     A p1 sqrt(M/(R T)) sqrt(2 kappa/(kappa - 1) (r^(2/kappa) - r^((kappa + 1)/kappa))),
 
@@ -65,11 +65,12 @@ PANEL = 1  # tuning: columns per panel of SuperLU
 
 
 class Balance:
-    """Balance of the flows in a map.
+    """Balance of the flows into and out of each cell of a map.
 
-    `resistances` are 1/g^3, infinite in dry cells; `aspect` is the side of a cell across the flow over that along
-    it. Flow is along y, from the first to the last row; the other sides are `periodic` or closed. The pressure is
-    prescribed half a cell from these rows: `first` and `last` are the conductances from there, shape (nx,).
+    `resistances` are 1/g^3, infinite in dry cells; `aspect` is the side of a cell across the flow divided by its side
+    along the flow. The flow is along y, from the first to the last row; the other sides are `periodic` or closed. The
+    pressure is prescribed half a cell outside these rows: `first` and `last` are the conductances to these ends, shape
+    (nx,).
     """
 
     def __init__(self, resistances: Map, aspect: float, periodic: bool) -> None:
@@ -98,7 +99,7 @@ class Balance:
         return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=PANEL, options=options)
 
     def solve(self, given: Map) -> Map:
-        """Return the pressures for the sources `given` in each cell, both of the shape of the map; 0 in dry cells."""
+        """Return the map of pressures for the sources `given` in each cell; 0 in dry cells."""
         black, pressure = self._number >= 0, np.zeros_like(self._sum)
         if self._factors is not None:
             total = given.copy()
@@ -245,11 +246,11 @@ def connected_from_end_to_end(open_cells: Mask, periodic_sides: bool) -> Mask:
 
 
 def critical_constriction(gap: NDArray[np.float64], periodic_sides: bool) -> tuple[float, tuple[int, int] | None]:
-    """Return the smallest gap on the widest path from end to end, and its row and column; the widest path is that with
-    the largest smallest gap.
+    """Return the smallest gap on the widest path from end to end, and its row and column. The widest path is the one
+    whose smallest gap is largest.
 
     Returns 0 and None if contact closes all paths. Cells are opened in the order of falling gaps until both ends are
-    connected: the last one is the constriction.
+    connected: the last cell opened is the constriction.
     """
     open_, (ny, nx) = np.flatnonzero(gap > 0.0), gap.shape
     cell = int(_open_until_connected(open_[np.argsort(-gap.ravel()[open_])], ny, nx, periodic_sides))
@@ -302,11 +303,11 @@ MOST_OF_CONSTRICTION = 1e3  # accuracy: largest gap over the critical constricti
 
 @dataclass(frozen=True)
 class Flow:
-    """Flow along one direction: `conductivity` is K [m^3], 0 if no path leads from end to end.
+    """Flow along one direction; `conductivity` is K [m^3], 0 if no path leads from end to end.
 
     `constriction` [m] is the smallest gap on the widest path and `position` its row and column; `imbalance` is the
-    difference of outflow and of the inflow by dissipation, over the flow, a rounding error; `pressure` is the map of
-    the fluid's pressure, 1 at the first and 0 at the last end, NaN where no fluid flows.
+    relative difference between the outflow and the flow by dissipation, a rounding error; `pressure` is the map of the
+    fluid's pressure, 1 at the first and 0 at the last end, NaN where no fluid flows.
     """
 
     conductivity: float
@@ -321,7 +322,7 @@ class Flow:
 
 
 def solve_flow(gap: FloatMap, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True) -> Flow:
-    """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m] along `axis`."""
+    """Return the flow along `axis` through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m]."""
     if axis == "x":
         turned = solve_flow(gap.T, size[::-1], "y", periodic_sides)
         place = None if turned.position is None else (turned.position[1], turned.position[0])
@@ -349,8 +350,8 @@ def _resistances(gap: FloatMap, constriction: float, periodic_sides: bool) -> Fl
 
 
 def least_section(gap: FloatMap, flow: Flow, size: tuple[float, float], axis: str = "x") -> float:
-    """Return the smallest open section [m^2] across a flow along `axis`, over cells in which fluid flows; 0 if contact
-    closes the gap. `gap` [m] has the shape (ny, nx), and `size` is (lx, ly) [m]."""
+    """Return the smallest open section [m^2] across a flow along `axis`, counting cells in which fluid flows; 0 if
+    contact closes the gap. `gap` [m] has the shape (ny, nx), and `size` is (lx, ly) [m]."""
     across, width = (0, size[1]) if axis == "x" else (1, size[0])
     wet = np.where(np.isfinite(flow.pressure), gap, 0.0)
     return float(wet.mean(axis=across).min()) * width
@@ -359,8 +360,8 @@ def least_section(gap: FloatMap, flow: Flow, size: tuple[float, float], axis: st
 def flow_mesh_error(
     gap: FloatMap, flow: Flow, size: tuple[float, float], axis: str = "x", periodic_sides: bool = True
 ) -> float:
-    """Return the relative change of K if only every second point of its gap is used, starting with the first or the
-    second, whichever changes it more; NaN if contact closes the gap. The other arguments are as in `solve_flow`."""
+    """Return the relative change of K if only every second point of the gap is used, starting with the first or the
+    second, whichever changes K more; NaN if contact closes the gap. The other arguments are as in `solve_flow`."""
     if not flow.percolates:
         return math.nan
     found = []
@@ -398,8 +399,8 @@ class Leak:
 def leak(gap: ArrayLike, size: Sequence[float], periodic: bool | tuple[bool, bool] = True) -> Leak:
     """Return the flow through a map of gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m], along x and along y.
 
-    A gap of 0 or less is contact. Sides along the flow are `periodic`, or closed. Raises InputError for maps or
-    sizes of another kind, and for gaps that are not finite.
+    Points with a gap of 0 or less are in contact. Sides along the flow are `periodic`, or closed. Raises InputError for
+    other shapes or sizes, and for gaps that are not finite.
     """
     try:
         given = np.asanyarray(gap)
@@ -440,8 +441,8 @@ ROOM = 293.15  # physics: temperature of the table [K]
 
 @dataclass(frozen=True)
 class Fluid:
-    """A fluid at 20 C: its viscosity [Pa s], and the density of a liquid [kg/m^3], NaN if unknown, or the molar mass
-    [kg/mol] and the ratio of heats of a gas."""
+    """A fluid at 20 C: `viscosity` [Pa s], the `density` of a liquid [kg/m^3], NaN if unknown, or the `molar_mass`
+    [kg/mol] and the ratio of heat capacities of a gas."""
 
     name: str
     viscosity: float
@@ -457,7 +458,7 @@ class Fluid:
 
     @property
     def choking_ratio(self) -> float:
-        """Ratio of the low to the high pressure below which the flow of a gas is choked."""
+        """Ratio of low to high pressure below which the flow of a gas is choked."""
         kappa = self.heat_ratio
         return float((2.0 / (kappa + 1.0)) ** (kappa / (kappa - 1.0)))
 
@@ -478,7 +479,8 @@ FLUIDS = {  # at 20 C and 1 bar: CRC Handbook of Chemistry and Physics, 97th edi
 class PressureDrop:
     """A fluid under a pressure that falls from `high` to `low` [Pa], absolute pressures for a gas.
 
-    With `total` it carries its part of the load, which is measured over the pressure `ambient` [Pa] (default: `low`).
+    If `total` is True, the fluid carries its part of the load, and loads are measured above the pressure `ambient` [Pa]
+    (default: `low`).
     """
 
     fluid: Fluid
@@ -489,48 +491,49 @@ class PressureDrop:
 
     @property
     def mean_free_path(self) -> float:
-        """Mean free path at the mean pressure [m]."""
+        """Mean free path [m] at the mean of both pressures."""
         return self.fluid.mean_free_path(0.5 * (self.high + self.low))
 
     @property
     def outside(self) -> float:
-        """Pressure [Pa] over which the load is measured."""
+        """Ambient pressure [Pa], above which the load is measured."""
         return self.low if self.ambient is None else self.ambient
 
     @property
     def pressures(self) -> tuple[float, ...]:
-        """Pressures [Pa] at which the conductivity for the fluid is calculated: the mean one, and both ends if a gas
-        carries a part of the load."""
+        """Pressures [Pa] of the fluid at which the conductivity is calculated: the mean, and both ends if a gas carries
+        a part of the load."""
         ends = (self.low, self.high) if self.total and self.mean_free_path else ()
         return (0.5 * (self.low + self.high), *ends)
 
     def local_loads(self, load: float) -> tuple[float, float]:
-        """Return the loads [Pa] that contact carries at the high and at the low side, if the fluid carries its part."""
+        """Return the loads [Pa] that contact carries at the high and at the low side if the fluid carries its part of
+        `load`."""
         return load + self.outside - self.high, load + self.outside - self.low
 
     def conducting_gap(self, gap: NDArray[np.float64], pressure: float) -> NDArray[np.float64]:
-        """Return the gaps [m] that pass as much mass of a fluid without slip at the mean pressure as `gap` does with
-        slip at a pressure [Pa]."""
+        """Return the gaps [m] through which, without slip at the mean pressure, as much mass flows as through `gap`
+        with slip at a `pressure` [Pa]."""
         if not (path := self.mean_free_path):
             return gap
         return np.cbrt(gap**2 * (pressure / self.pressures[0] * gap + 6.0 * path))
 
     def flow_rate(self, conductivity: float, length: float, width: float) -> float:
-        """Return the flow [m^3/s] at the low side through a conductivity [m^3] over a length and a width [m]; NaN for a
-        gas that flows into a vacuum."""
+        """Return the volume flow [m^3/s] at the low side for a conductivity [m^3], a length along and a width across
+        the flow [m]; NaN for a gas that flows into a vacuum."""
         drive = self.high - self.low
         if self.fluid.molar_mass is not None:
             drive = drive * 0.5 * (self.high + self.low) / self.low if self.low else math.nan
         return conductivity / (12.0 * self.fluid.viscosity) * drive * width / length
 
     def mass_flow(self, conductivity: float, length: float, width: float) -> float:
-        """Return the flow [kg/s] through a conductivity [m^3] over a length and a width [m]; NaN for an unknown
-        density."""
+        """Return the mass flow [kg/s] for a conductivity [m^3], a length along and a width across the flow [m]; NaN if
+        the density is unknown."""
         mean = self.fluid.density_at(0.5 * (self.high + self.low))
         return conductivity / (12.0 * self.fluid.viscosity) * (self.high - self.low) * mean * width / length
 
     def inertial_bound(self, section: float) -> float:
-        """Return the largest flow [kg/s] of a gas through an open section [m^2]; inf for a liquid."""
+        """Return the largest mass flow [kg/s] of a gas through an open section [m^2]; inf for a liquid."""
         if self.fluid.molar_mass is None:
             return math.inf
         kappa, ratio = self.fluid.heat_ratio, max(self.low / self.high, self.fluid.choking_ratio)
@@ -538,8 +541,8 @@ class PressureDrop:
         return section * self.high * math.sqrt(square * self.fluid.molar_mass / (GAS_CONSTANT * ROOM))
 
     def describe_inertia(self, axis: str, viscous: float, bound: float) -> str:
-        """Return a warning if the viscous flow of a gas [kg/s] along an axis is close to its bound by inertia [kg/s],
-        or above; '' otherwise."""
+        """Return a warning if the viscous flow of a gas [kg/s] along an axis is near or above the bound by inertia
+        [kg/s]; '' otherwise."""
         if not viscous > INERTIA * bound:
             return ""
         both = 1.0 / (1.0 / viscous + 1.0 / bound)
@@ -551,8 +554,8 @@ class PressureDrop:
         )
 
     def describe_rate(self, conductivity: float, length: float, width: float) -> str:
-        """Return a text on the flow through a conductivity [m^3] over a length and a width [m]: in ml/h at the low
-        side, for a gas also at 1 bar, and in mg/s if the density is known."""
+        """Return a text on the flow for a conductivity [m^3], a length along and a width across the flow [m]: in ml/h
+        at the low side, for a gas also at 1 bar, and in mg/s if the density is known."""
         rate, mass = (flow(conductivity, length, width) for flow in (self.flow_rate, self.mass_flow))
         said = [] if math.isnan(rate) else [f"{rate:.3g} m³/s ({3.6e9 * rate:.3g} ml/h) at the low side"]
         said += [] if math.isnan(mass) else [f"{1e6 * mass:.3g} mg/s"]

@@ -1,18 +1,19 @@
-"""Pressure of a fluid in a whole map of gaps, along x, and the rounds in which it settles with the contact.
+"""Pressure of a fluid that flows along x through a map of gaps, and the rounds in which it settles with the contact.
 
-A small leak eps, SMALL of the mean of g^3, continues the pressure into contact and closed pools, where it is not
-determined otherwise:
+In contact and in closed pools the flow does not determine the pressure. There a small leak eps, SMALL of the mean of
+g^3, determines it:
 
     div((g^3 + eps) grad p) = 0;    of a gas div((g^3 + 6 lambda g^2 + eps) grad p^2) = 0.
 
-The unknown of the rounds is the share s of the drive, 1 at the high and 0 at the low end,
+The unknown of the rounds is the share s of the pressure drop, 1 at the high and 0 at the low end,
 
     p = p2 + s (p1 - p2)    of a liquid,    p^2 = p2^2 + s (p1^2 - p2^2)    of a gas.
 
-A round presses the contact under the fluid's pressure, and gets another share from its gap. The next share is that of
-Anderson's method (D. G. Anderson, J. ACM 12 (1965) 547) from the last DEPTH rounds. Near percolation, pools open and
-close again: after ANDERSON rounds each cell makes a part of its change, half as large whenever it turns
-back. Rounds that have not settled after EACH go on with a small leak GROWTH times as large."""
+A round solves the contact under the fluid's pressure, and gets another share from the gap. Anderson's method (D. G.
+Anderson, J. ACM 12 (1965) 547) gives the next share from the last DEPTH rounds. Near percolation, pools open and close
+again: after ANDERSON rounds each cell makes a part of its change, which is halved whenever the change turns back. If
+EACH rounds have not settled, rounds go on with eps GROWTH times as large.
+"""
 
 import math
 from dataclasses import dataclass
@@ -34,20 +35,20 @@ SETTLED = 1e-4  # accuracy: estimated relative error of the flow by the rounds, 
 
 
 def pressure_of(drop: PressureDrop, share: Map) -> Map:
-    """Return the fluid's pressure over the ambient one [Pa] for a share of the drive."""
+    """Return the fluid's pressure above ambient [Pa], a map, for a map of the share s."""
     if drop.fluid.molar_mass is None:
         return drop.low + share * (drop.high - drop.low) - drop.outside
     return np.sqrt(drop.low**2 + share * (drop.high**2 - drop.low**2)) - drop.outside
 
 
 def linear_share(shape: tuple[int, int]) -> Map:
-    """Return the share in an even gap, a map of `shape` (ny, nx)."""
+    """Return the share s in an even gap, a map of `shape` (ny, nx)."""
     row = 1.0 - (np.arange(shape[1]) + 0.5) / shape[1]
     return np.broadcast_to(row, shape).copy()
 
 
 def conducting(gap: Map, drop: PressureDrop, share: Map) -> Map:
-    """Return the gaps that pass as much without slip as `gap` [m] does with slip at the local pressure."""
+    """Return the gaps through which as much flows without slip as through `gap` [m] with slip at the local pressure."""
     if not drop.mean_free_path:
         return gap
     local = np.maximum(pressure_of(drop, share) + drop.outside, 0.0)
@@ -57,14 +58,15 @@ def conducting(gap: Map, drop: PressureDrop, share: Map) -> Map:
 
 @dataclass(frozen=True)
 class Filled:
-    """The share of the drive in all cells, and the conductivity with the small leak [m^3]."""
+    """The share s in all cells, and the conductivity including the small leak [m^3]."""
 
     share: Map
     conductivity: float
 
 
 def fill_share(gap: Map, size: tuple[float, float], small: float = SMALL) -> Filled:
-    """Return the share in a map of conducting gaps [m], shape (ny, nx), on a box of `size` (lx, ly) [m]."""
+    """Return the share s in all cells of a map of conducting gaps [m], shape (ny, nx), on a box of `size` (lx, ly)
+    [m]."""
     cubes = gap.T**3
     mean = float(cubes.mean())
     resistances = 1.0 / (cubes / mean + small) if mean > 0.0 else np.ones(cubes.shape)
@@ -75,7 +77,8 @@ def fill_share(gap: Map, size: tuple[float, float], small: float = SMALL) -> Fil
 
 
 class Rounds:
-    """The shares of earlier rounds in a step with a pressure drop of a fluid, on a box of `size` [m]; on root."""
+    """The rounds of one step, with the shares of earlier rounds, for a pressure drop on a box of `size` [m]; on
+    root."""
 
     def __init__(self, drop: PressureDrop, size: tuple[float, float]) -> None:
         self._drop, self._size, self.count = drop, size, 0
@@ -85,9 +88,11 @@ class Rounds:
         self._last: tuple[Map, Map] | None = None
 
     def advance(self, gap: Map, share: Map, most: float) -> tuple[tuple[bool, bool, float], Map]:
-        """Return whether the rounds have settled, whether the fluid lifts the seal off, and the change of the flow, for
-        the gap [m] under the fluid's pressure of a share; and the share of the next round. The mean pressure is
-        at most `most` [Pa]."""
+        """Make a round with the gap [m] of the contact under the fluid's pressure of a `share`.
+
+        Return whether the rounds have settled, whether the fluid lifts the seal off, and the relative change of the
+        flow; and the share of the next round. The mean pressure is at most `most` [Pa].
+        """
         if self.count and self.count % EACH == 0:
             self._restart()
         self.count += 1
@@ -157,8 +162,9 @@ class Rounds:
 def seal_flow(
     gap: Map, drop: PressureDrop, share: Map, size: tuple[float, float], rounds: Rounds | None
 ) -> dict[str, float]:
-    """Return the columns of a seal with the gap [m] after rounds, None if the fluid has no pressure, and the bound of
-    its mass flow by inertia [kg/s]. A gap through which less flows than by SMALL is closed."""
+    """Return the values of a seal's columns by name, and the bound of the mass flow by inertia [kg/s], for the gap [m]
+    after all rounds. `rounds` is None if the fluid has no pressure. A gap with less flow than the small leak is
+    closed."""
     filled = 0.0 if rounds is None else rounds.conductivity
     through = conducting(gap, drop, share).astype(np.float64, copy=False)
     flow = solve_flow(through, size, "x", True)

@@ -1,18 +1,16 @@
-"""`parcontact leak`: the flow through the gaps of a run.
+"""`parcontact leak`: the flow through the saved gaps of a run, as leak.csv and a picture.
 
-Leakage of a run: the flow through its saved gaps, as leak.csv and a picture.
-
-Flow through a seal whose fluid carries a part of the load.
-
-Contact carries the load p0 less the pressure p of the fluid over the ambient one, p_a. In a long seal the contact at a
-place is that under the local load, whose conductivity K is known from loads that a run has saved. The flow per width is
+If the fluid carries a part of the load p0, contact carries p0 - (p - p_a), with the pressure p of the fluid and the
+ambient pressure p_a. In a long seal the conductivity K at a place belongs to this local load, and is known from loads
+that a run has saved. The flow per width is
 
     liquid     1/(12 eta L) int K(p0 + p_a - p) dp,
     gas        M/(12 eta R T L) int K(p0 + p_a - p) p dp    [kg/(m s)],
 
-from the low to the high pressure, where K of a gas has the slip at p (`fluids`). K p of a gas over the mean pressure
-takes the place of K of a liquid below. Its logarithm is interpolated over the load without new extrema (F. N. Fritsch
-and R. E. Carlson, SIAM J. Numer. Anal. 17 (1980) 238), and its value over p by a parabola, as it is almost linear.
+from the low to the high pressure, where K of a gas has the slip at p (`flow`). Below, K of a gas is multiplied by p and
+divided by the mean pressure. The logarithm of K is interpolated between loads without new extrema (F. N. Fritsch and R.
+E. Carlson, SIAM J. Numer. Anal. 17 (1980) 238). Between pressures K is interpolated by a parabola, as it is almost
+linear in p.
 """
 
 import math
@@ -54,14 +52,17 @@ NOTABLE = 1.1  # ratio of both flows above which a sentence tells them apart
 
 @dataclass(frozen=True)
 class LoadCurve:
-    """Conductivities of a gap over the load: `loads` [Pa] rise, shape (n,), and `flows` [m^3], shape (n, m), are the
-    conductivities at the m pressures of a fluid (`PressureDrop.pressures`), 0 where contact closes the gap."""
+    """Conductivities of a gap as a function of the load.
+
+    `loads` [Pa] rise, shape (n,), and `flows` [m^3], shape (n, m), are the conductivities at the m pressures of a fluid
+    (`PressureDrop.pressures`), 0 where contact closes the gap.
+    """
 
     loads: Array
     flows: Array
 
     def covers(self, least: float, most: float) -> bool:
-        """Return whether the saved loads include this range [Pa]."""
+        """Return True if the range of saved loads includes this range [Pa]."""
         slack = SAME * most
         return bool(least > 0.0 and self.loads[0] <= least + slack and most <= self.loads[-1] + slack)
 
@@ -70,8 +71,8 @@ class LoadCurve:
         return int(np.count_nonzero((self.loads >= least - SAME * most) & (self.loads <= most + SAME * most)))
 
     def conductivity(self, drop: PressureDrop, load: float) -> float:
-        """Return the conductivity [m^3] that gives the flow of a fluid under a load [Pa] of which it carries its part;
-        NaN if K is not known at all local loads."""
+        """Return the conductivity [m^3] that gives the flow of a fluid which carries its part of a `load` [Pa]; NaN if
+        K is not known at all local loads."""
         least, most = drop.local_loads(load)
         if not self.covers(least, most):
             return np.nan
@@ -92,10 +93,8 @@ class LoadCurve:
 
 
 def load_curve(loads: ArrayLike, flows: ArrayLike) -> LoadCurve:
-    """Return the curve through conductivities [m^3], shape (n, m), at saved loads [Pa], of which those above 0 count.
-
-    Raises InputError if K is no function of the load.
-    """
+    """Return the curve through conductivities [m^3], shape (n, m), at saved loads [Pa]; only loads above 0 are used.
+    Raises InputError if K is no function of the load."""
     given = np.asarray(loads, dtype=float)
     kept = np.flatnonzero(given > 0.0)
     order = kept[np.argsort(given[kept], kind="stable")]
@@ -116,7 +115,7 @@ def load_curve(loads: ArrayLike, flows: ArrayLike) -> LoadCurve:
 
 
 def refuse_uncovered(curve: LoadCurve, drop: PressureDrop, loads: Sequence[float]) -> None:
-    """Raise InputError if the saved loads cover the local loads of no row."""
+    """Raise InputError if the saved loads do not cover the local loads of any row."""
     if not any(curve.covers(*drop.local_loads(load)) for load in loads):
         highest = float(curve.loads[-1])
         least, most = drop.local_loads(highest)
@@ -132,8 +131,8 @@ def refuse_uncovered(curve: LoadCurve, drop: PressureDrop, loads: Sequence[float
 
 
 def describe_cover(curve: LoadCurve, drop: PressureDrop, loads: Sequence[float], shown: float) -> Iterator[str]:
-    """Yield sentences on rows, under `loads` [Pa], whose local loads are not all saved, and on too few loads for the
-    row under the load `shown`."""
+    """Yield sentences on rows, under `loads` [Pa], whose local loads are not all saved, and on too few saved loads for
+    the row under the load `shown`."""
     ends = [drop.local_loads(load) for load in loads if load > 0.0]
     empty = [end for end in ends if not curve.covers(*end)]
     if empty:
@@ -159,8 +158,8 @@ def _advice(least: float, most: float) -> str:
 
 
 def describe_part(axis: str, net: float, total: float) -> str:
-    """Return a sentence on what the pressure of the fluid does to the flow along an axis, from the conductivities [m^3]
-    if contact carries all of the load, and if the fluid carries its part."""
+    """Return a sentence on the effect of the fluid's pressure on the flow along an axis: `net` is the conductivity
+    [m^3] if contact carries all of the load, `total` if the fluid carries its part."""
     if not total:
         return f"along {axis} contact closes the gap, also if the fluid carries its part of the load"
     if not net:
@@ -187,11 +186,11 @@ class LeakInstant(NamedTuple):
     """One row of leak.csv.
 
     `flow_x` and `flow_y` are the conductivities K [m^3], `share_x` and `share_y` their ratios to K of the surface that
-    just touches, NaN if unknown; `constriction` [m] is the smallest gap on the widest path of the direction that leaks
-    more; `error_x` and `error_y` are the relative changes of K on half the mesh (`flow.flow_mesh_error`); `flow_rate`
-    [m^3/s] and `mass_flow` [kg/s] are those of a fluid in this direction (`fluids`), NaN without a fluid, and those of
-    `total` the same if the fluid carries its part of the load. `parts` are, along x and along y, the conductivities for
-    the fluid [m^3] without and with its part; empty unless asked for.
+    just touches, NaN if unknown. `constriction` [m] is the smallest gap on the widest path of the direction that leaks
+    more; `flow_rate` [m^3/s] and `mass_flow` [kg/s] are the flow of a fluid in this direction, NaN without a fluid;
+    names with `total` are the same if the fluid carries its part of the load. `error_x` and `error_y` are the relative
+    changes of K on half the mesh (`flow.flow_mesh_error`). `parts` are, along x and along y, the conductivities for the
+    fluid [m^3] without and with its part; empty if not needed.
     """
 
     time: float
@@ -216,8 +215,8 @@ class LeakInstant(NamedTuple):
 
 
 class SolvedLeak(NamedTuple):
-    """The flow at an instant, without maps, and along x and y its mesh errors, the conductivities [m^3] for a fluid
-    with slip at `PressureDrop.pressures`, and the smallest open sections [m^2]."""
+    """The flow at an instant, without maps. Pairs along x and y: the mesh `errors`, the conductivities [m^3] for a
+    fluid with slip at `PressureDrop.pressures`, and the smallest open `sections` [m^2]."""
 
     leak: Leak
     errors: tuple[float, float]
@@ -226,7 +225,7 @@ class SolvedLeak(NamedTuple):
 
 
 class Gaps:
-    """Saved gaps of a run, 0 in contact, of all instants or one; `drop` is the pressure drop of a fluid."""
+    """The saved gaps of a run at all instants or at one, 0 in contact; `drop` is the pressure drop of a fluid."""
 
     def __init__(self, directory: Path, at: str = "", drop: PressureDrop | None = None) -> None:
         self.drop = drop
@@ -253,7 +252,7 @@ class Gaps:
             raise InputError(f"{directory}: no map is saved yet")
 
     def read(self, index: int) -> FloatMap:
-        """Return the gap [m] at a saved instant; raises InputError if the maps are incomplete."""
+        """Return the map of the gap [m] at a saved instant; raises InputError if the saved maps are incomplete."""
         with self.results.open_maps() as file:
             gap, pressure = file["gap"][index], file["pressure"][index]
         if gap.shape != pressure.shape or not (np.isfinite(gap).all() and np.isfinite(pressure).all()):
@@ -262,8 +261,8 @@ class Gaps:
         return np.where(touching_of(self.job, pressure, gap), 0.0, np.maximum(gap, 0.0))
 
     def bare(self) -> FloatMap:
-        """Return the gap [m] of the undeformed surface that just touches; raises InputError if its heights no longer
-        exist."""
+        """Return the map of the gap [m] of the undeformed surface that just touches; raises InputError if its heights
+        no longer exist."""
         job = reading.load(self.directory / RESOLVED)
         setup = scene.set_up(job, Slab.alone(*job.grid.points))
         heights = setup.surface.heights((0.0, 0.0), setup.slab.empty()) * setup.units.height
@@ -295,8 +294,8 @@ class Gaps:
         return tuple(solve_flow(slipping, self.size, axis, self._sides(axis)).conductivity for slipping in gaps)
 
     def refuse_memory(self, at: str) -> None:
-        """Raise InputError if K depends on more than the load, if only the instant `at` is asked for, or if the fluid
-        carries its part of the load already."""
+        """Raise InputError unless K is a function of the load alone: for a contact with memory, for a single instant
+        `at`, and if the fluid already carries its part of the load."""
         if (section := self.job.section("leakage")) is not None and section.total:
             raise InputError(
                 "--load total is for runs whose contact carries all of the load: the fluid of "
@@ -324,7 +323,8 @@ class Gaps:
         return self._measured(index, "pressure")
 
     def row(self, index: int, solved: SolvedLeak, bare: Leak | None, curves: Sequence[LoadCurve] = ()) -> LeakInstant:
-        """Return the row of an instant; `curves`, along x and y, are for a fluid that carries a part of the load."""
+        """Return the row of leak.csv for an instant; `curves`, along x and y, are given if the fluid carries a part of
+        the load."""
         found, row = solved.leak, {name: self._measured(index, name) for name in LeakInstant._fields[1:3]}
         totals = [curve.conductivity(self.drop, row["pressure"]) for curve in curves if self.drop]
         along = list(zip((found.along_x.constriction, found.along_y.constriction), totals or (0.0, 0.0), strict=True))
@@ -361,11 +361,11 @@ def write_leakage(
     directory: Path, at: str, over: str, comm: MPI.Intracomm, drop: PressureDrop | None = None
 ) -> Iterator[str]:
     """Solve for the flow at the saved instants and write leak.csv and leak.png, or leak.STEP.csv and leak.STEP.png for
-    one instant; collective. Each rank takes an instant at a time.
+    one instant; collective. Ranks share the instants.
 
-    K is drawn `over` pressure or time, "" for an automatic choice; `drop` adds the flow of a fluid. Yields sentences
-    on root. Raises InputError for a directory without gaps, and if the fluid carries a part of the load also for rows
-    that are no function of the load, or too few.
+    `over` is the axis on which K is drawn: pressure, time, or "" for an automatic choice; `drop` adds the flow of a
+    fluid. Yields sentences on root. Raises InputError for a directory without gaps, and, if the fluid carries a part of
+    the load, for rows that are too few or no function of the load.
     """
     gaps = Gaps(directory, at, drop)
     total = drop is not None and drop.total

@@ -1,7 +1,6 @@
-"""Picture of leakage: the flow through the gap, and conductivity over load or time.
+"""Pictures of leakage: the flow through the gap, and conductivity as a function of load or time.
 
-Panel of the conductivity of a gap over pressure or time, with marks where contact closes, or where the constriction
-is too narrow for continuum flow.
+Marks show where contact closes the gap, or where the constriction is too narrow for continuum flow.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,7 +24,8 @@ THIN_LOOK: dict[str, Any] = {"color": style.GREY, "linestyle": "none", "marker":
 
 
 def is_thin(constriction: Any) -> Any:
-    """Return True if a constriction [m] (or each of several) is open but too narrow for continuum flow."""
+    """Return True if a constriction [m] is open but too narrow for continuum flow; an array for several
+    constrictions."""
     return (constriction > 0.0) & (constriction < CONTINUUM)
 
 
@@ -37,9 +37,12 @@ def conductivity_panel(
     log_x: bool = False,
     dotted: Mapping[str, Array] = MappingProxyType({}),
 ) -> Panel:
-    """Draw conductivities K [m^3], by their names, over an axis, all of shape (n,), with their critical constrictions
-    [m]; K is 0 where contact closes, and NaN where it is not known. The conductivities in `dotted` are drawn as
-    dotted lines in the same colours."""
+    """Return a panel of conductivities K [m^3] on the axis `over`, all of shape (n,), with marks for their critical
+    constrictions [m].
+
+    K is 0 where contact closes the gap, and NaN where it is not known. Conductivities named in `dotted` are drawn as
+    dotted lines in the same colours.
+    """
     lines, thin = list[Line](), list[Line]()
     for number, (name, flow) in enumerate(flows.items()):
         known = np.isfinite(flow)
@@ -67,8 +70,8 @@ LONG = 100.0  # ratio of times above which their axis is logarithmic
 
 
 def panels(run: PlottedRun, along: Abscissa) -> Iterator[Panel]:
-    """Yield the panel of conductivities of a run over an axis, if the gap is open at any time, and that of the leak
-    over the pressure of a fluid that carries a part of the load."""
+    """Yield the panel of a run's conductivities if the gap is open at any time, and the panel of the leak against the
+    pressure of a fluid that carries a part of the load."""
     columns = run.columns
     names = {name: label for name, label in FLOWS.items() if name in columns}
     if names and max(np.nanmax(columns[name], initial=0.0) for name in names) > 0.0:
@@ -112,7 +115,8 @@ def draw_leakage(
     rows: Sequence[Any],
     over: str = "",
 ) -> Path:
-    """Draw the flow along x and along y on the map of the gap at an instant, and K of all instants."""
+    """Draw the flow along x and along y on the map of the gap at an instant, and K of all instants. Return the file's
+    path."""
 
     circled = ", constriction circled" * any(flow.percolates for flow in flows)
     title = f"flow through the gap, {instant}\ncontact black{circled}"
@@ -123,9 +127,10 @@ def draw_leakage(
 
 
 def panel_of(rows: Sequence[Any], over: str) -> Panel:
-    """Return the panel of K `over` pressure or time (default: time if a pressure occurs more than once).
+    """Return the panel of K against pressure or time, as `over` says (default: time if a pressure occurs more than
+    once).
 
-    Over pressure, the last of consecutive instants at one pressure is drawn.
+    Against pressure, only the last of consecutive instants at one pressure is drawn.
     """
     columns = {name: np.array([getattr(row, name) for row in rows]) for name in rows[0]._fields}
     pressure, time = columns["pressure"], columns["time"]
@@ -163,7 +168,8 @@ def _place(cell: tuple[int, int], size: tuple[float, float], shape: tuple[int, .
 
 
 def flux(gap: FloatMap, pressure: FloatMap, size: tuple[float, float]) -> FloatMap:
-    """Return the magnitude of g^3 grad p in open cells over the largest, NaN elsewhere; in single precision."""
+    """Return the map of |g^3 grad p| in open cells, divided by its largest value, NaN elsewhere; in single
+    precision."""
     slopes = []
     for axis, length in ((0, size[1]), (1, size[0])):
         faces = np.nan_to_num(np.diff(pressure, axis=axis)) * (pressure.shape[axis] / length)  # no flow into walls

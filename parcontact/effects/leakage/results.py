@@ -1,6 +1,7 @@
 """Results of leakage in texts: conductivities, and the loads between which contact closes the gap along x and along y.
 
-Conductivities K are read from `leak.csv`, which is made from saved gaps, else from measures.csv."""
+Conductivities K are read from `leak.csv`, which `parcontact leak` makes from saved gaps, else from measures.csv.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +21,7 @@ Columns = Mapping[str, Sequence[float]]
 
 
 def headline(run: Results) -> Iterator[str]:
-    """Yield the last conductivities, from `leak.csv` with their errors, else from the run."""
+    """Yield a line with the last conductivities, from `leak.csv` with their errors, else from measures.csv."""
     columns = run.read(TABLE) or run.table
     stops = [text for text in describe_leak_stop(run) if " between " in text]
     known = [row for row, flow in enumerate(columns.get("flow_x", ())) if flow == flow]
@@ -97,7 +98,8 @@ def _describe_leak(columns: Columns, row: int) -> str:
 
 
 def exported(run: Results) -> list[ExportedTable]:
-    """Return the conductivities over the load for other programs, of equal loads the last; none without leak.csv."""
+    """Return tables of the conductivities at each load for other programs; the last row counts if a load occurs twice.
+    Empty without leak.csv."""
     columns = run.read(TABLE)
     names = [name for name in EXPORTED if name in columns]
     loads = [float(f"{load:.9g}") for load in columns.get("pressure", ())]  # without rounding errors
@@ -116,8 +118,8 @@ PARTS = {TABLE: _describe_table}  # descriptions of files of a run, by their nam
 def describe_leak_stop(run: Results) -> list[str]:
     """Return a sentence on leakage for each direction with known conductivity; one sentence if both agree.
 
-    A sentence has the pressures of the last instant with a flow and of the first one without, or their times if the
-    pressure is constant. Raises InputError for an unreadable table.
+    A sentence states the pressure at the last instant with a flow and at the first instant without, or both times if
+    the pressure is constant. Raises InputError for an unreadable table.
     """
     columns = run.read(TABLE) or run.table
     found = [(axis, said) for axis in "xy" if (said := describe_axis(columns, axis))]
@@ -127,8 +129,8 @@ def describe_leak_stop(run: Results) -> list[str]:
 
 
 def describe_axis(columns: Columns, axis: str) -> str:
-    """Return how leakage along an axis changes over the rows of a table: `stops between 1.05 and 1.10 MPa`; '' if
-    unknown."""
+    """Return a text on how leakage along an axis changes from row to row, such as `stops between 1.05 and 1.10 MPa`; ''
+    if unknown."""
     flows, pressures = (columns.get(name, ()) for name in (f"flow_{axis}", "pressure"))
     pairs = enumerate(zip(flows, pressures, strict=False))
     known = [row for row, pair in pairs if not any(map(math.isnan, pair))]

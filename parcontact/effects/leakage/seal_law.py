@@ -1,12 +1,13 @@
 """Contact law of a seal whose fluid carries a part of the load.
 
-With the contact pressure q >= 0 and the pressure p~ of the fluid over the ambient one, continued into contact
+With the contact pressure q >= 0 and the pressure p~ of the fluid above ambient, continued into contact
 (`fluid_pressure`),
 
     g = A (q + p~) - h - d >= 0,    q g = 0,    <q> = p0 - <p~>.
 
-A round solves the contact of the heights `h - A p~` under the load `p0 - <p~>` by the law of the constraint, and the
-flow through its gap. Rounds end when flow and pressure no longer change. The body remembers q + p~."""
+A round solves the contact of the heights `h - A p~` under the load `p0 - <p~>` by the usual contact law, and then the
+flow through its gap. Rounds end when flow and pressure no longer change. The body remembers q + p~.
+"""
 
 from __future__ import annotations
 
@@ -48,9 +49,9 @@ OPEN = 1e-30  # rounding: least open gap [m], as contact has the gap 0
 
 @dataclass(frozen=True)
 class SealMemory:
-    """Memory of a seal: the share of the drive and the gap [m], 0 in contact, and two spare maps for the next step; the
-    pressures of the fluid [Pa] and the modulus of the last step, 0 before the first one. The fluid `flows` if the share
-    is known. `end` has time and load of the lift-off."""
+    """Memory of a seal. `share` is the fluid's share of the pressure drop, `gap` the gap [m], 0 in contact, and `spare`
+    holds two maps for the next step. `pressures` of the fluid [Pa] and the `modulus` belong to the last step, and are 0
+    before the first one. `flows` is True if the share is known. `end` has time and load of the lift-off."""
 
     share: Array
     gap: Array
@@ -70,7 +71,7 @@ class _Verdict(NamedTuple):
 
 
 class SealLaw:
-    """Law of a scene with `leakage: {load: total}`; contacts are solved by the law of its constraint."""
+    """Contact law of a scene with `leakage: {load: total}`; contacts are solved by the usual law of the scene."""
 
     may_shorten = False
 
@@ -80,7 +81,7 @@ class SealLaw:
         self._dry: ContactLaw[Any] | None = None
 
     def upon(self, dry: ContactLaw[Any]) -> SealLaw:
-        """Return this law, which solves by that of the constraint."""
+        """Take the usual law `dry` for the solves of contacts, and return this law."""
         self._dry = dry
         return self
 
@@ -94,8 +95,8 @@ class SealLaw:
         before: Measures,
         tolerance: float | None,
     ) -> SolvedContact[SealMemory]:
-        """Solve a step; see `effects.effect.ContactLaw.solve`. With a pressure of the fluid, solves have the
-        tolerance of the job, at most SHARP."""
+        """Solve the contact and the flow of a step; see `effects.effect.ContactLaw.solve`. If the fluid has a pressure,
+        solves use the job's tolerance, at most SHARP."""
         assert self._dry is not None
         drop, (share, gap) = drop_at(self.scene.job, step.stage, step.time), memory.spare
         flows = memory.flows or drop.high > drop.low
@@ -215,11 +216,11 @@ class SealLaw:
         return memory.gap / self.scene.units.height if memory.modulus else None
 
     def detached(self, memory: SealMemory) -> Detached | None:
-        """Return time and load of the lift-off; None before."""
+        """Return time and load of the lift-off; None before it."""
         return memory.end
 
     def with_end(self, memory: SealMemory, end: Detached) -> SealMemory:
-        """Return the memory of a run whose seal has lifted off."""
+        """Return the memory with the lift-off `end` added."""
         return replace(memory, end=end)
 
     def at_rest(self) -> SealMemory:
@@ -228,7 +229,7 @@ class SealLaw:
         return SealMemory(share, gap, (spare[0], spare[1]))
 
     def entries(self, memory: SealMemory, units: Units) -> dict[str, Entry]:
-        """Return the share, the gap, the pressures of the fluid, and the lift-off."""
+        """Return the checkpoint entries: the share, the gap, the pressures of the fluid, and the lift-off."""
         return {
             "share": Entry(memory.share),
             "gap": Entry(memory.gap, 1.0, "m"),
@@ -239,7 +240,7 @@ class SealLaw:
         }
 
     def restored(self, memory: SealMemory, saved: Saved) -> SealMemory:
-        """Return the memory of a checkpoint, whose maps have been read into `memory`."""
+        """Return the memory that a checkpoint holds, whose maps have been read into `memory`."""
         high, low = saved["pressures"].tolist()
         known, flows = float(saved["modulus"]), bool(saved["flows"])
         end = end_in(self.scene.job, saved)

@@ -88,7 +88,7 @@ def _whole(load: str, every: int, pressures: Pair | None) -> Iterator[Fault]:
 
 
 class Leakage(Part):
-    """The `leakage` section: the number of steps between two calculations of the flow, and the fluid.
+    """The `leakage` section: the fluid, and the number of steps between two calculations of the flow.
 
     With `load: total` the fluid carries its part of the load.
     """
@@ -131,7 +131,7 @@ class Leakage(Part):
 
 
 def drop_at(job: Any, stage: int, time: float) -> PressureDrop:
-    """Return the pressure drop of the fluid at a time [s] in a stage, by its number."""
+    """Return the pressure drop of the fluid at a time [s] of the job, in the stage with this number."""
     section, started = job.section("leakage"), sum(each.seconds for each in job.history[:stage])
     lasts, given = job.history[stage].seconds, job.history[stage].fluid_pressures
     if given is None:

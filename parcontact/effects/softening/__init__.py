@@ -1,7 +1,4 @@
-"""Strain softening of filled rubber in steady sliding (the Payne effect).
-
-Columns of softening.
-"""
+"""Strain softening of filled rubber in steady sliding (the Payne effect), and its columns in tables."""
 
 from ...column import Column, Table
 

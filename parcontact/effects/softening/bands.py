@@ -1,4 +1,4 @@
-"""Strains of bands: their squares and weights in each contact, and the fixed point of the strains of all bands."""
+"""Strains of bands in steady sliding, by all bands together, and the fixed point on which they settle."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +20,8 @@ from .steady import SHARE, Vector, depths_between, strains_of
 
 
 class StrainProbe:
-    """Squares of the strain in the contacts of a band at all depths, and their weights in its strain."""
+    """Measures the squares S(z) of the strain in the contacts of a band at all depths, and their weights in the band's
+    strain."""
 
     means: ClassVar[Means] = {"squares": by_power, "strain_weights": by_power}
 
@@ -28,7 +29,7 @@ class StrainProbe:
         self._depths = depths_between(float(cut.edges[0]), float(cut.edges[-1]))
 
     def slide(self, setup: Setup, velocity: Vector) -> None:
-        """Do nothing."""
+        """Do nothing: the measure does not depend on the velocity."""
 
     def measure(self, setup: Setup, contact: Contact, velocity: Vector) -> dict[str, Array]:
         """Return the squares and weights of a contact."""
@@ -38,14 +39,17 @@ class StrainProbe:
 
 
 def probes(job: Job, cut: Cut) -> Iterator[StrainProbe]:
-    """Yield the probe of a job with softening."""
+    """Yield the measure of strains if the job has softening."""
     if job.section("softening") is not None:
         yield StrainProbe(job, cut)
 
 
 class StrainsOfBands:
-    """Strains of bands. A round replaces each by a power mean of the old one and the one found. The first round of a
-    state takes the strains of the last state."""
+    """The loop that finds the strains of bands.
+
+    A round replaces each strain by a power mean of the old and the new one. The first round of a state starts from the
+    strains of the last state.
+    """
 
     moves = True
     words: ClassVar[tuple[str, str]] = ("strains", "")
@@ -56,7 +60,7 @@ class StrainsOfBands:
         self._enough = SHARE * job.numerics.asked.both[0]
 
     def begin(self, road: RoadSliding) -> None:
-        """Do nothing."""
+        """Do nothing: a state starts from the strains of the last state."""
 
     def act(self, road: RoadSliding) -> None:
         road.set_factors(self._table.at, self._strains.tolist())
@@ -68,8 +72,8 @@ class StrainsOfBands:
         self._strains = self._table.mixed(_strains_in(results), self._strains)
 
     def found(self, road: RoadSliding, point: Point, results: Results, changes: tuple[float, float]) -> Point:
-        """Return the point with the root of the mean square strain of all bands, weighted by friction; NaN without
-        friction."""
+        """Return the point with its strain amplitude added: the root of the mean square strain of all bands, weighted
+        by friction; NaN without friction."""
         weights = np.maximum([result.friction for result in results], 0.0)
         whole = math.sqrt(np.average(_strains_in(results) ** 2, weights=weights)) if weights.any() else math.nan
         return replace(point, errors=point.errors.with_rounds(*changes)).with_effect("softening", whole)
@@ -85,6 +89,6 @@ def _strains_in(results: Results) -> Array:
 
 
 def loops(job: Job, cut: Cut) -> Iterator[StrainsOfBands]:
-    """Yield the loop of a job with softening."""
+    """Yield the loop over strains if the job has softening."""
     if job.section("softening") is not None:
         yield StrainsOfBands(job, cut)

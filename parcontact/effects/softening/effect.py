@@ -1,4 +1,4 @@
-"""Softening as an effect: its section and its decision. It acts in steady sliding only (`steady`)."""
+"""The effect of softening: its section and its decision. It acts only in steady sliding (`steady`)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .strain_table import octave_of, strains_in_full_contact
 
 
 class SofteningEffect(Effect[None]):
-    """Strain softening; histories are refused, so that no march makes it."""
+    """Effect of strain softening. Jobs with a history are refused, so that no march creates it."""
 
     section: ClassVar[type[Part]] = Softening
     in_curves: ClassVar[bool] = True
@@ -28,18 +28,18 @@ class SofteningEffect(Effect[None]):
 
     @staticmethod
     def facts(job: Any) -> Iterator[str]:
-        """Yield a sentence on the strain at which moduli are those of the material."""
+        """Yield a sentence on the strain at which the material's moduli were measured."""
         if text := job.section("softening").fact:
             yield text
 
     @staticmethod
     def curve_options(job: Any) -> Iterator[str]:
-        """Yield what columns of friction curves require."""
+        """Yield the requirements of columns of friction curves that the job meets."""
         yield "softening"
 
     @staticmethod
     def describe_waves(job: Any, q: Array, slopes: Array) -> Iterator[str]:
-        """Yield a sentence with the strain and the factors f and g of each octave in full contact."""
+        """Yield a sentence with the strain and the factors f and g of each octave of waves in full contact."""
         longest = max(job.grid.size)
         octave = octave_of(q, longest)
         strains = strains_in_full_contact(q, slopes, octave, int(octave.max()) + 1)

@@ -1,4 +1,5 @@
-"""Panels of softening: strain by band, and the moduli over strain with the strains of a friction curve."""
+"""Panels of softening: strain by band, and factors of the moduli against strain, with the strains of a friction
+curve."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -15,8 +16,8 @@ NAMES = ("G' storage", "G'' loss")
 
 
 def curve_panels(job: Any, columns: Mapping[str, Array]) -> Iterator[Panel]:
-    """Yield the panel of the factors of both moduli over strain, with marks at the strains in columns of a friction
-    curve, for jobs with softening."""
+    """Yield the panel of the factors of both moduli against strain, with marks at the strains of a friction curve
+    (`columns`), for jobs with softening."""
     section = job.section("softening")
     if section is None:
         return

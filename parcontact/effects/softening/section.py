@@ -1,4 +1,4 @@
-"""The `softening` section: how the moduli of filled rubber fall with the strain."""
+"""The `softening` section: how the moduli of filled rubber decrease with the strain."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _of_a_file(path: Path | None, reference: float | None) -> Iterator[Fault]:
 
 
 class Softening(Part):
-    """Factors of the storage and the loss modulus over the amplitude of the shear strain."""
+    """Section with factors of the storage and the loss modulus as functions of the shear strain amplitude."""
 
     label: ClassVar[str] = "softening"
     table: tuple[Row, ...] | None = Field(
@@ -69,12 +69,12 @@ class Softening(Part):
 
     @property
     def fact(self) -> str:
-        """Return a sentence on the strain at which the factors are 1; '' for given factors."""
+        """Return a sentence on the strain at which the factors are 1; '' if the job gives the factors."""
         return self._made[1]
 
 
 def only_in_steady_sliding(softening: Softening | None, history: Any, initial: Any) -> Iterator[Fault]:
-    """Refuse histories: `f G' + i g G''` is no Prony series, so that it has no memory in time."""
+    """Yield an error for jobs with a history: `f G' + i g G''` is no Prony series, so that it has no memory in time."""
     if softening is None:
         return
     if history:
@@ -87,7 +87,7 @@ def only_in_steady_sliding(softening: Softening | None, history: Any, initial: A
 
 
 def on_a_periodic_half_space(softening: Softening | None, grid: Any, body: Any) -> Iterator[Fault]:
-    """Refuse free boxes and layers, for whose waves the strain is not known."""
+    """Yield an error for free boxes and layers, for whose waves the strain is not known."""
     if softening is None:
         return
     if not all(grid.cyclic):
@@ -99,7 +99,7 @@ def on_a_periodic_half_space(softening: Softening | None, grid: Any, body: Any) 
 
 
 def of_rubber(softening: Softening | None, material: Any) -> Iterator[Fault]:
-    """Refuse bodies that dissipate nothing or that are compressible."""
+    """Yield an error for bodies that dissipate nothing or are compressible."""
     if softening is None:
         return
     if not material.fitted.branches:

@@ -17,12 +17,10 @@ contact S is the sum of gamma^2 over all waves. The strain of a wave is a mean o
 which for one wave is 3/8 (q A)^2. The strain of an octave, or of a band, is the mean of (3) over its waves, weighted by
 their power. S(z) of bands add up.
 
-The strains of a steady state and its softened moduli, which depend on each other: a fixed point.
+Strains and softened moduli of a steady state depend on each other, and are found as a fixed point.
 
-A round solves the state with the factors of the last strains, and finds its strains (`strain`). Strains change by a
-power mean, `gamma <- gamma_new^0.7 gamma^0.3`, until friction changes by less than a share of the accuracy.
-
-Strains and factors of bands in full contact, from the spectrum alone.
+A round solves the state with the factors of the last strains, and finds its new strains. Strains change by a power
+mean, `gamma <- gamma_new^0.7 gamma^0.3`, until friction changes by less than a share of the accuracy.
 """
 
 import math
@@ -52,22 +50,22 @@ Vector = tuple[float, float]
 
 @dataclass(frozen=True)
 class StrainsAtDepth:
-    """Strains of a map of displacements: the `squares` S(z) [-] at given depths z, shape (depths,); the `weights` of
-    S(z) in the strain of each octave (3), shape (octaves, depths); and the `power` of each octave, to a common factor.
-    """
+    """Strains under a map of displacements. `squares` are S(z) [-] at given depths z, shape (depths,); `weights` are
+    the weights of S(z) in the strain of each octave (3), shape (octaves, depths); `power` is the power of each octave,
+    up to a common factor."""
 
     squares: Array
     weights: Array
     power: Array
 
     def of_octaves(self, otherwise: Array) -> Array:
-        """Return the strain [-] of each octave; that of `otherwise` for an octave without power."""
+        """Return the strain [-] of each octave; for an octave without power its value in `otherwise`."""
         found = np.sqrt(self.weights @ self.squares)
         return np.where(found > 0.0, found, otherwise)
 
 
 def depths_between(low: float, high: float) -> Array:
-    """Return depths for waves between two wavenumbers, in the unit of their inverse."""
+    """Return depths for the strains of waves between two wavenumbers, in the inverse of their unit."""
     ends = np.log(SHALLOW / BEYOND / high), np.log(DEEP * BEYOND / low)
     return np.exp(np.linspace(*ends, 2 + int((ends[1] - ends[0]) / math.log(SPACING))))
 
@@ -81,7 +79,8 @@ def ends_of(setup: Setup) -> Vector:
 def strains_of(
     setup: Setup, u: Array, velocity: Vector, depths: Array, octave: NDArray[np.int64], count: int
 ) -> StrainsAtDepth:
-    """Return the strains at these depths [unit of length] under a surface of this velocity [m/s]; collective.
+    """Return the strains at these depths [unit of length] under a surface that slides at this velocity [m/s];
+    collective.
 
     The displacement u is in the run's units. `octave` is the number of the octave of each wave, below `count`.
     """
@@ -180,7 +179,7 @@ def _of_independent_waves(setup: Setup, waves: Spectrum, heavy: Spectrum) -> flo
 
 
 def strains_at_octaves(setup: Setup, softened: Softened, u: Array, velocity: Vector) -> StrainsAtDepth:
-    """Return the strains of the octaves of softened rubber on one grid, as `strains_of`; collective."""
+    """Return the strains of the octaves of softened rubber on one grid, like `strains_of`; collective."""
     octave = softened.octave(np.hypot(*wavenumbers(setup.fft, setup.size)))
     return strains_of(setup, u, velocity, depths_between(*ends_of(setup)), octave, len(softened.strains))
 
@@ -191,7 +190,7 @@ MOST_ROUNDS = 40  # tuning: limit on rounds
 
 @dataclass(frozen=True)
 class Round:
-    """Friction of a round, and the strains of its octaves with their power."""
+    """Result of one round: friction, and the strains of the octaves with their power."""
 
     friction: float
     strains: Array
@@ -205,8 +204,8 @@ class Round:
 
 
 def settle(first: Softened, solve: Callable[[Softened], Round], accuracy: float) -> None:
-    """Solve rounds until friction changes by less than SHARE of `accuracy`, or factors do not change. Raises RunError
-    if friction does not settle."""
+    """Solve rounds, beginning with the factors of `first`, until friction changes by less than SHARE of `accuracy`, or
+    factors do not change. Raises RunError if friction does not settle."""
     softened, last = first, math.nan
     for _ in range(MOST_ROUNDS):
         found = solve(softened)
@@ -220,7 +219,7 @@ def settle(first: Softened, solve: Callable[[Softened], Round], accuracy: float)
 
 
 class StrainLoop:
-    """The fixed point of the strains of the octaves on one grid; the next state starts from those of the last."""
+    """Loop that finds the strains of the octaves on one grid; each state starts from the strains of the last state."""
 
     fields: ClassVar[Mapping[str, Array]] = {}
 
@@ -229,8 +228,8 @@ class StrainLoop:
         self.softened = Softened(section.made, max(setup.size), (section.made.start,) * count_octaves(setup))
 
     def solve(self, sliding: Any, solve: Callable[[Vector, float], Point], velocity: Vector, pressure: float) -> Point:
-        """Return the steady state with the moduli at its strain; collective. `solve` solves one with the `setup` of
-        `sliding`, a `march.steady.SteadySliding`. Raises RunError."""
+        """Return the steady state with the moduli at its strains; collective. `solve` returns a state for the present
+        `setup` of `sliding`, a `march.steady.SteadySliding`. Raises RunError."""
         points, rounds = list[Point](), list[Round]()
 
         def once(softened: Softened) -> Round:
@@ -246,7 +245,7 @@ class StrainLoop:
 
 
 def loops(setup: Setup) -> Iterator[StrainLoop]:
-    """Yield the loop around steady states of a job with softening."""
+    """Yield the loop over strains around steady states if the job has softening."""
     if setup.job.section("softening") is not None:
         yield StrainLoop(setup)
 
@@ -259,7 +258,7 @@ WARN_STRAINS_BEYOND_THE_SWEEP = Kind(
 
 
 def doubts_of_points(points: Sequence[Point], job: Any) -> Iterator[Doubt]:
-    """Yield a warning if strains of a curve are outside of the table."""
+    """Yield a warning if strains of a friction curve are outside the table of factors."""
     section = job.section("softening")
     strained = [(point.effects["softening"], point.speed) for point in points if section]
     beyond = [each for each in strained if each[0] > 0.0 and not section.made.reaches(each[0])]  # NaN without friction

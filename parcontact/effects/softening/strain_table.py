@@ -1,8 +1,8 @@
-"""Factors of the moduli of filled rubber over the amplitude of the shear strain.
+"""Factors of the moduli of filled rubber as functions of the shear strain amplitude, and files that contain them.
 
-* The softened body is equivalent linear, `G*(omega, gamma) = f(gamma) G'(omega) + i g(gamma) G''(omega)`: f and g
-  come from a sweep of the strain and depend on gamma alone.
-* Files of strain sweeps: factors of both moduli, or moduli, over the amplitude of the strain.
+The softened body is equivalent linear, `G*(omega, gamma) = f(gamma) G'(omega) + i g(gamma) G''(omega)`: f and g come
+from a sweep of the strain and depend on gamma alone. A file has these factors, or both moduli, at each strain
+amplitude.
 """
 
 from collections.abc import Callable
@@ -23,8 +23,8 @@ MIXED = 0.7  # tuning: exponent of the new strain in that of the next round
 
 @dataclass(frozen=True)
 class StrainTable:
-    """Factors `storage` (f) and `loss` (g) [-] at rising amplitudes of the shear `strain` [-]; between them they are
-    linear in the logarithm of the strain, outside they have the values of the ends."""
+    """Factors `storage` (f) and `loss` (g) [-] at rising amplitudes of the shear `strain` [-]. Between strains they are
+    linear in the logarithm of the strain; outside, they are constant."""
 
     start: ClassVar[float] = 0.02  # tuning: strain of the first round of a fixed point
 
@@ -33,29 +33,30 @@ class StrainTable:
     loss: tuple[float, ...]
 
     def factors(self, strain: Array | float) -> tuple[Array, Array]:
-        """Return the factors f of the storage modulus and g of the loss modulus at strains above 0, any shape."""
+        """Return the factors f of the storage modulus and g of the loss modulus at strains above 0, in their shape."""
         place = np.log(strain)
         known = np.log(self.strain)
         return np.interp(place, known, self.storage), np.interp(place, known, self.loss)
 
     @staticmethod
     def mixed(found: ArrayLike, before: ArrayLike) -> Array:
-        """Return the strains of the next round of a fixed point; a strain that was not found (NaN or 0) stays."""
+        """Return the strains of the next round of a fixed point from those `found` and those `before`; a strain that
+        was not found (NaN or 0) remains."""
         new, old = np.asarray(found, float), np.asarray(before, float)
         return np.where(new > 0.0, new**MIXED * old ** (1.0 - MIXED), old)
 
     def at(self, strain: float) -> Callable[[Array], tuple[Array, Array]]:
-        """Return the factors of all waves at one strain, as a function of their wavenumbers."""
+        """Return a function of wavenumbers that returns the factors of one strain for all of them."""
         return Softened(self, 1.0, (strain,)).factors
 
     def reaches(self, strain: float) -> bool:
-        """Return True if a strain is within the table."""
+        """Return True if a strain is within the range of the table."""
         return self.strain[0] <= strain <= self.strain[-1]
 
 
 @dataclass(frozen=True)
 class Softened:
-    """Factors of the moduli of each wave, from the strain of each octave of wavenumbers.
+    """Factors of the moduli for each wave, by the strain of the wave's octave.
 
     The first octave begins at the wavelength `longest` [any unit of length]; the last one contains all shorter waves.
     """
@@ -69,7 +70,7 @@ class Softened:
         return np.minimum(octave_of(q, self.longest), len(self.strains) - 1)
 
     def same_factors(self, other: "Softened") -> bool:
-        """Return True if the octaves have the factors of other strains."""
+        """Return True if the factors of all octaves equal those of `other`."""
         own, others = (self.table.factors(np.array(one.strains)) for one in (self, other))
         return bool(np.array_equal(own, others))
 
@@ -81,7 +82,7 @@ class Softened:
 
 
 def octave_of(q: Array, longest: float) -> NDArray[np.int64]:
-    """Return the number of the octave of each wavenumber [1/length], from the wavelength `longest` on."""
+    """Return the number of the octave of each wavenumber [1/length], counted from the wavelength `longest`."""
     ratio = np.maximum(q * longest / (2.0 * np.pi), 1.0)
     return np.floor(np.log2(ratio * (1.0 + ROUNDING))).astype(np.int64)
 
@@ -90,7 +91,8 @@ def strains_in_full_contact(q: Array, slopes: Array, group: NDArray[np.int64], c
     """Return the strain [-] of each group of waves in full contact, from the mean square slopes of waves with the
     wavenumbers q, shape (n,), and the number of their group, below `count`; NaN for a group without waves.
 
-    With r = k_j/q it is `gamma_q^2 = sum_j 12 (k_j A_j)^2 r^2/(1 + r)^5`; `(k A)^2` is twice the mean square slope.
+    A wave has, with r = k_j/q, `gamma_q^2 = sum_j 12 (k_j A_j)^2 r^2/(1 + r)^5`; `(k A)^2` is twice the mean square
+    slope.
     """
     ratio = q / q[:, None]
     squares = (24.0 * slopes * ratio**2 / (1.0 + ratio) ** 5).sum(axis=1)
@@ -109,10 +111,11 @@ EXAMPLE = "strain,f,g or strain[%],G'[MPa],G''[MPa]"
 
 
 def read_sweep(path: Path, reference: float | None) -> tuple[StrainTable, str]:
-    """Return the factors in a file, and a sentence on the strain at which they are 1; '' for factors.
+    """Return the factors in a file of a strain sweep, and a sentence on the strain at which they are 1; '' if the file
+    has factors.
 
-    Moduli are divided by those at the strain `reference` [-], by default the first row. Raises InputError with the file
-    and what was expected.
+    Moduli are divided by their values at the strain `reference` [-], by default in the first row. Raises InputError
+    with the file and what was expected.
     """
     table = read_named_columns(path, f"a strain sweep ({EXAMPLE})", EXAMPLE, NAMES, _is_header, PLAIN)
     pair = next((pair for pair in (FACTORS, *PAIRS) if {"strain", *pair} <= table.columns.keys()), None)

@@ -1,7 +1,4 @@
-"""Stick and slip: points of the contact stick until the traction reaches its bound.
-
-Columns of stick and slip.
-"""
+"""Stick and slip: points of the contact stick until the traction reaches its bound; columns in tables."""
 
 from ...column import Column, Table
 

@@ -4,9 +4,9 @@ The rigid surface moves by D along itself, the points of the body by u under tra
 
     |t| <= f,    f = mu p (Coulomb) or a shear strength at all points in contact.
 
-A shear strength that depends on velocity is that of the velocity of the surface along itself in each step, at all
-points, so that a step has one solution. While the surface rests the last strength stays. Before the surface has moved
-there are no tractions, and the highest strength bounds them.
+A shear strength that depends on velocity is taken at the velocity of the surface along itself in each step, at all
+points, so that a step has one solution. While the surface rests, the last strength holds. Before the surface has moved,
+there are no tractions, and the highest strength is the bound.
 
 A point in contact slips by `s = D - u`: its slip grows along t where `|t| = f`, and is constant where `|t| < f`. In an
 incompressible half space tractions and pressures move the surface independently of each other
@@ -15,18 +15,18 @@ incompressible half space tractions and pressures move the surface independently
 
     A t = G_inf u + sum_k h_k,
 
-so that a step to the tractions `alpha t` is the problem of `solver`. A point that sticks ends at its `target`
-g, its last displacement plus the increment of D, and
+so that a step to the tractions `alpha t` is the problem of `solver`. A point that sticks ends at the displacement g,
+its last displacement plus the increment of D (its `target`), and
 
     e = g + r/alpha,    w = e - A t = g - u.
 
 Points of the body keep their positions on the grid, as in a march without stick: u, t and the branches belong to them,
 and nothing is shifted. The surface moves over them and carries the bounds f, which follow from the pressure of each
 step. A point without contact has g = u, so that its slip counts from its first contact. Targets of points that stick
-are not reset to u, and those of points that slip keep what the tractions lack of their bounds, so that residuals of
-solves do not add up over many steps.
+are not reset to u, and targets of points that slip remember the difference between tractions and bounds, so that
+residuals of solves do not add up over many steps.
 
-A surface that rolls moves as a shape, while its points move along the body by a share of that way, the creep (F. W.
+A surface that rolls moves as a shape, while its points move along the body by a share of this motion, the creep (F. W.
 Carter, Proc. R. Soc. Lond. A 112 (1926) 151): D grows by the creep times the motion of the shape. Sliding has the creep
 1, free rolling the creep 0.
 
@@ -34,8 +34,9 @@ With output.energy the work of the tractions on the body is added to the work of
 
     sum max(0, (t_old + t)/2 (s - s_old)),
 
-so that work = stored + dissipated + slip_loss. At each point slip loses energy. If the motion turns back within a
-step, the trapezoidal rule may give less than 0, and then 0 is closer to the loss."""
+so that work = stored + dissipated + slip_loss. At each point slip loses energy. If the motion turns back within a step,
+the trapezoidal rule may give less than 0, which is then replaced by 0.
+"""
 
 from __future__ import annotations
 
@@ -80,7 +81,7 @@ STICKING = Fit(
 
 
 class BoundedTraction(NamedTuple):
-    """Tractions `alpha traction`, stacked, and their bounds, `alpha bound`."""
+    """Tractions `alpha traction`, two stacked components, and their bounds `alpha bound`."""
 
     traction: Array
     bound: Array
@@ -101,11 +102,11 @@ class _Settled(NamedTuple):
 class StickMemory:
     """Memory of stick and slip. Maps are in the run's units; all but bounds have two stacked components.
 
-    `body` is the memory of the displacements along the surface, `last` the tractions of the last step, with the
-    modulus `alpha`; `spare` receives the next ones. `target` is where points that stick end. `strength` is the shear
-    strength of the last step in which the surface moved [Pa]. `share` is the mean traction over the mean bound.
-    `energy` is the memory of the energies, None without them; `lost` is the energy lost in slip [J]. `columns` are the
-    columns of the last row without `slip_loss`.
+    `body` is the memory of the displacements along the surface, `last` the tractions of the last step, with the modulus
+    `alpha`; `spare` receives the next tractions. `target` is the displacement at which points that stick end.
+    `strength` is the shear strength of the last step in which the surface moved [Pa]. `share` is the mean traction
+    divided by the mean bound. `energy` is the memory of the energies, None without energies; `lost` is the energy lost
+    in slip [J]. `columns` are the columns of the last row without `slip_loss`.
     """
 
     body: BodyMemory
@@ -121,7 +122,7 @@ class StickMemory:
 
 
 class StickSlip(InterfaceEffect[StickMemory]):
-    """Tractions of a contact that sticks and slips, and the columns that follow from them."""
+    """Effect of stick and slip: tractions of the contact, and the columns that follow from them."""
 
     columns: ClassVar[tuple[str, ...]] = (*added_by("interface"), *added_by("interface.stick"))
     fields: ClassVar[tuple[str, ...]] = ("traction_x", "traction_y")
@@ -147,7 +148,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return StickMemory(self._body.at_rest(), last, spare, self._both.zeros(), strength, energy=energy)
 
     def follow(self, instant: Instant, memory: StickMemory) -> Changes[StickMemory]:
-        """Return the tractions after a step, in the maps of a memory; collective."""
+        """Return the tractions after a step, in the maps of `memory`; collective."""
         step, alpha, target = instant.step, instant.modulus, memory.target
         (x, y), (along, across) = instant.moved, self._scene.job.history[step.stage].creep
         way = along * x - across * y, along * y + across * x
@@ -245,12 +246,12 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return Sheared(measures, settled.force, settled.lost, slipping, error, share, time, mesh)
 
     def values(self, memory: StickMemory) -> Sequence[float]:
-        """Return the parts of friction, the share of the box that sticks, and the energy lost in slip [J], NaN without
-        energies."""
+        """Return the two parts of friction, the share of the box that sticks, and the energy lost in slip [J], NaN
+        without energies."""
         return *memory.columns, math.nan if memory.energy is None else memory.lost
 
     def field(self, memory: StickMemory, name: str) -> Array:
-        """Return this rank's rows of a component of the tractions on the body [Pa]."""
+        """Return this rank's rows of the traction on the body [Pa], one component."""
         traction = components(memory.last.traction)[self.fields.index(name)]
         return traction * (memory.alpha * self._scene.units.pressure)
 
@@ -260,7 +261,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
     # -- checkpoints --------------------------------------------------------------------------------------------------
 
     def entries(self, memory: StickMemory, units: Units) -> dict[str, Entry]:
-        """Return the maps of both components, and the sums that the energies go on from."""
+        """Return the checkpoint entries: the maps of both components, and the sums of energies."""
         pressure = units.height / units.length
         both = {
             "traction": Entry(memory.last.traction, pressure),
@@ -280,7 +281,7 @@ class StickSlip(InterfaceEffect[StickMemory]):
         return found
 
     def restored(self, memory: StickMemory, saved: Saved) -> StickMemory:
-        """Return the memory of a checkpoint, whose maps have been read into `memory`."""
+        """Return the memory that a checkpoint holds, whose maps have been read into `memory`."""
         joined = {name.removesuffix(" x"): value for name, value in saved.items()}
         energy = memory.energy
         if self._energy is not None and energy is not None:
@@ -321,8 +322,8 @@ def _with_force(instant: Instant, force: Vector) -> Measures:
 
 
 def parts_of_friction(sheared: Sheared) -> tuple[float, float]:
-    """Return what the body and the interface make of friction: their forces in the direction of both together, over
-    the normal force."""
+    """Return the parts of the friction coefficient by the body and by the interface: the components of both forces
+    along the total force, divided by the normal force."""
     measures, (x, y) = sheared.measures, sheared.force
     whole = math.hypot(measures.force_x, measures.force_y)
     along = x * measures.force_x + y * measures.force_y

@@ -7,51 +7,47 @@ With A the operator of the body, from tractions to displacements, and bounds f o
 w is the slip in a step in which a point that sticks ends at the displacement e. The solution minimizes the convex
 function `J(t) = <t, A t>/2 - <t, e>` over the product of discs |t| <= f. One iteration:
 
-1. Points slip where t was shortened to its disc and w is not against it; the others stick. A traction that slips can
+1. Points slip where t was shortened to its disc and w is not opposite to t; the others stick. A traction that slips can
    only turn. Turning it by an angle is resisted by the body, and by its slip: to A, `|w|/f` is added.
 2. The residual r is w where points stick, and the part of w across t where they slip. The direction z is `S E' K E S r
    + (1 - S^2)/(1/kappa + |w|/f) r + k <w>`. K is close to the inverse of A, E extends each component beyond the points
    that move along it (`preconditioner.extension`), and S, 1 where points stick, is small where slip resists more than
-   the shortest waves. K is left out for a component along which there is little to correct. <w> is the mean slip of
-   the points that stick. In a periodic box, whose mean traction does not move the surface, these resist it with about
-   `k = kappa/(1 - m)`, where m is their share of the box: much more than K assumes.
+   the shortest waves. K is left out for a component with a small residual. <w> is the mean slip of the points that
+   stick. In a periodic box a mean traction does not move the surface, and these points resist mean slip with about `k =
+   kappa/(1 - m)`, where m is their share of the box: much more than K assumes.
 3. With d the last change of t, t moves by `STEP (z + beta d) + gamma d`. beta makes z conjugate to d, and gamma
-   minimizes J along d: both follow from A d, which is known. Then tractions that slip get the length f, and others are
-   shortened to it.
+   minimizes J along d: both follow from A d, which is known. Then tractions that slip get the length f, and longer ones
+   are shortened to f.
 4. Discs are convex, so that all tractions between the old and the new ones are admissible. t becomes the one with the
-   least J of them, and A t follows without another application of A. So J never rises. If all points stick and J is
-   least far beyond the new ones, K is much smaller than the inverse of A, as in a free row of long cells: STEP grows.
-5. If this is a small part of the way, the next iteration takes `t + kappa w`, shortened to its disc, for the new
-   tractions. It always descends.
+   least J, and A t follows without another application of A. So J never rises. If all points stick and J would be least
+   far beyond the new tractions, K is much smaller than the inverse of A, as in a free row of long cells: STEP grows.
+5. If t has moved by a small part of the change, the next iteration takes `t + kappa w`, shortened to its disc, for the
+   new tractions, which always descends.
 
-kappa is a stiffness of the contact as a whole. The certificate is the larger of two measures of what t lacks, over the
-sum of |t|: of the traction that the slip w gives, `sum |P(t + kappa w) - t|` with P(t) = t shortened to its disc, and
-of the change in step 3, where K measures residuals of all wavelengths. It is 0 for the solution alone, and the
-relative error of tractions where K is close. Over many small steps errors of each would add up, as points slip by
-them. So it must also be below a share of the change of t since the last step, but for a tenth of the tolerance. For
-the related constraint p >= 0 the method is that of `contact.solver`.
+kappa is a stiffness of the contact as a whole. The certificate is the larger of two errors of t, divided by the sum of
+|t|: `sum |P(t + kappa w) - t|` with P(t) = t shortened to its disc, and the change in step 3, where K measures
+residuals of all wavelengths. The certificate is 0 only for the solution, and equals the relative error of tractions
+where K is close to the inverse of A. Errors of many small steps would add up, as points slip by them. So the
+certificate must also be below a share of the change of t since the last step, unless it is below a tenth of the
+tolerance. `contact.solver` uses the same method for the constraint p >= 0.
 
-Fused loops over tractions that are bounded at each point; each returns partial sums for one reduction.
-
-Operator from tractions along the surface of a half space to the displacements along it.
+The operator A takes tractions along the surface of a half space to displacements along the surface.
 
 A wave of tractions t, two components, moves the surface of an elastic half space of shear modulus 1 by
 
     u^(q) = 1/|q| (I - nu q q^T/q^2) t^(q).
 
 Tractions along q have the compliance of a pressure, `(1 - nu)/|q|`, tractions across q the compliance `1/|q|`. In an
-incompressible half space (nu = 1/2) tractions do not move the surface along its normal, and pressures do not move it
-along itself (K. L. Johnson, Contact Mechanics, 1985, section 3.6).
+incompressible half space (nu = 1/2) tractions do not move the surface along its normal, and pressures do not move the
+surface along itself (K. L. Johnson, Contact Mechanics, 1985, section 3.6).
 
 The mean displacement of a periodic half space is 0. In a free box tractions are constant on each cell, and the
 displacement at a distance (x, y) from the centre of a cell is the integral over it of Cerruti's solution
 
     u_x = t_x ((1 - nu)/r + nu x^2/r^3)/(2 pi) + t_y nu x y/r^3/(2 pi),
 
-and u_y with x and y exchanged. It follows from the integrals over the cell of 1/r (`love.over_cell`), of `x^2/r^3`,
-with the primitive `y asinh(x/|y|)`, and of `x y/r^3`, with the primitive -r.
-
-Fused loop over the points of a contact that sticks and slips.
+and u_y with x and y exchanged. The displacement follows from the integrals over the cell of 1/r (`love.over_cell`), of
+`x^2/r^3`, with the primitive `y asinh(x/|y|)`, and of `x y/r^3`, with the primitive -r.
 """
 
 import math
@@ -90,10 +86,10 @@ def shorten_to_bounds(bound, x, y, hit):
 
 @loop
 def extrapolate_tractions(last_x, last_y, last_bound, factor, growth, bound, mean_x, mean_y, x, y):
-    """Make a start in the place of the tractions (x, y) of two steps ago, from the last ones.
+    """Replace the tractions (x, y) of two steps ago by a start for this step, extrapolated from the last tractions.
 
-    Tractions that slipped stay at their bounds, others are `factor` times what they were, both with `growth` times
-    their last change; new ones have the mean share (mean_x, mean_y) of their bounds.
+    Tractions that slipped stay at their bounds, others are multiplied by `factor`; both get `growth` times their last
+    change. Points new in contact get the mean share (mean_x, mean_y) of their bounds.
     """
     for j in range(bound.shape[0]):
         for i in range(bound.shape[1]):
@@ -110,9 +106,10 @@ def extrapolate_tractions(last_x, last_y, last_bound, factor, growth, bound, mea
 
 @loop
 def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
-    """Divide points in contact into those that stick (`free`) and those that slip: their traction was shortened to its
-    bound (`hit`), or `t + kappa w` exceeds it, and the slip `w = e - u` is not against t. `turn` receives |w|/f of
-    points that slip, along t.
+    """Divide points in contact into those that stick (marked in `free`) and those that slip.
+
+    A point slips if its traction was shortened to its bound (`hit`), or `t + kappa w` exceeds the bound, and the slip
+    `w = e - u` is not opposite to t. `turn` receives |w|/f of points that slip, along t.
 
     Return sums of |t|, of |P(t + kappa w)| and of `|P(t + kappa w) - t|`, with P(t) the traction shortened to its
     bound; of the components of `P(t + kappa w) - t`; of both components of w over points that stick, and their number.
@@ -153,7 +150,7 @@ def examine(bound, hit, x, y, u_x, u_y, e_x, e_y, kappa, free, turn):
 
 @loop
 def residual(bound, free, turn, x, y, u_x, u_y, e_x, e_y, short, along_x, moves, r):
-    """Put one component of the residual into r: the slip w of points that stick; of others, the part of w across the
+    """Put one component of the residual into r: for points that stick, the slip w; for others, the part of w across the
     traction, times the root of `short/(short + turn)`.
 
     A point `moves` along this component if it sticks, or if its traction is sufficiently across it; r is 0 elsewhere.
@@ -176,12 +173,12 @@ def residual(bound, free, turn, x, y, u_x, u_y, e_x, e_y, short, along_x, moves,
 def complete(
     bound, free, turn, x, y, u_x, u_y, e_x, e_y, old_x, old_y, old_u_x, old_u_y, short, long, mean_x, mean_y, z_x, z_y
 ):
-    """Complete the direction z, of which the preconditioned residual is given. Points that stick add a mean. Points
-    that slip keep the part across the traction, times the root of `short/(short + turn)`, and add the rest of the
-    residual over `long + turn`.
+    """Complete the direction z, which holds the preconditioned residual. Points that stick get a mean added. Points
+    that slip keep the part across the traction, times the root of `short/(short + turn)`, and get the rest of the
+    residual divided by `long + turn`.
 
     With the residual r, the last change d of the tractions, and c = A d + turn d, all of them across the traction where
-    points slip, return the sums of r z, r d, z c and d c.
+    points slip, return the sums of r z, d r, z c and d c.
     """
     r_z, r_d, z_c, d_c = 0.0, 0.0, 0.0, 0.0
     for j in range(bound.shape[0]):
@@ -217,8 +214,9 @@ def complete(
 
 @loop
 def move_tractions(bound, free, x, y, z_x, z_y, step, again, new_x, new_y, hit):
-    """Replace the tractions before (x, y), in (new_x, new_y), by the next ones: `step z` and `again` times the last
-    change further. Those that slip keep their bounds; others are shortened to them. Return the sum of the changes."""
+    """Put the next tractions into (new_x, new_y), which hold the tractions before (x, y): `step z` and `again` times
+    the last change are added to (x, y). Tractions that slip keep their bounds; others are shortened to them. Return the
+    sum of the changes."""
     change = 0.0
     for j in range(bound.shape[0]):
         row_change = 0.0
@@ -244,8 +242,8 @@ def move_tractions(bound, free, x, y, z_x, z_y, step, again, new_x, new_y, hit):
 
 @loop
 def change_since(bound, x, y, last_x, last_y, factor):
-    """Sums of the changes of tractions in contact since the last step, whose tractions are multiplied by a factor, and
-    of these."""
+    """Return the sum of |change of the tractions in contact| since the last step, whose tractions are multiplied by
+    `factor`, and the sum of the magnitudes of the last tractions."""
     change, size = 0.0, 0.0
     for j in range(bound.shape[0]):
         row_change, row_size = 0.0, 0.0
@@ -260,8 +258,8 @@ def change_since(bound, x, y, last_x, last_y, factor):
 
 @loop
 def slope_and_curvature(t, new_t, u, new_u, e):
-    """Sums of d w, of d A d, and of |t w|, for the change d of the tractions in both components, with the slip
-    `w = e - u`."""
+    """Return the sums of d w, of d A d, and of |t w|, for the change d of the tractions in both components, with the
+    slip `w = e - u`."""
     slope, curvature, size = 0.0, 0.0, 0.0
     for j in range(t.shape[0]):
         row_slope, row_curvature, row_size = 0.0, 0.0, 0.0
@@ -276,7 +274,7 @@ def slope_and_curvature(t, new_t, u, new_u, e):
 
 @loop
 def shorten_change(t, share, new_t):
-    """Replace the change of a map by a share of it."""
+    """Move the map `new_t` towards t, so that only a `share` of its difference to t remains."""
     for j in range(t.shape[0]):
         for i in range(t.shape[1]):
             new_t[j, i] = t[j, i] + share * (new_t[j, i] - t[j, i])
@@ -286,7 +284,8 @@ Vector = tuple[float, float]
 
 
 def stacked(slab: Slab) -> Slab:
-    """Return the slab of maps with two components: on each rank the rows of the first, then those of the second."""
+    """Return the slab of maps with two components: each rank holds the rows of the first component, then those of the
+    second."""
     return Slab(slab.comm, slab.nx, 2 * slab.ny, slab.tally, lambda rank: _twice(slab.rows_of(rank)))
 
 
@@ -295,15 +294,18 @@ def _twice(rows: slice) -> slice:
 
 
 def components(field: Array) -> tuple[Array, Array]:
-    """Return the maps of both components of a stacked map, in its memory."""
+    """Return views on the two components of a stacked map."""
     rows = len(field) // 2
     return field[:rows], field[rows:]
 
 
 class ShearOperator:
     """Operator from tractions to displacements on a half space of shear modulus 1, loaded inside a box of `size` [any
-    unit of length]; with `free`, nothing surrounds the box. `short` is the compliance of the shortest waves across
-    their direction. The constructor and `apply` are collective."""
+    unit of length].
+
+    The box is periodic unless `free`. `short` is the compliance of the shortest waves across their direction. The
+    constructor and `apply` are collective.
+    """
 
     def __init__(self, fft: FFT, size: Vector, poisson: float, free: bool) -> None:
         slab = fft.slab
@@ -329,7 +331,7 @@ class ShearOperator:
             symbol += 1.0 / q
 
     def apply(self, field: Array, out: Array) -> Array:
-        """Put the displacements of stacked tractions into `out`; collective. It counts as two operators."""
+        """Put the displacements of stacked tractions into `out`; collective. A call counts as two operator calls."""
         self.fft.slab.tally["operator"] += 2
         (t_x, t_y), (u_x, u_y) = components(field), components(out)
         first: Spectrum = self._other
@@ -392,8 +394,8 @@ Components = tuple[Array, Array, Array, Array, Array, Array]  # those of t, A t 
 
 
 class TractionProblem(NamedTuple):
-    """Bounds f; stacked displacements e of points that stick; a stiffness kappa of the contact, in the unit of t over
-    the unit of e; and the tolerance of the certificate."""
+    """Input of a solve: bounds f, stacked displacements e at which points that stick end (`aim`), a stiffness kappa of
+    the contact, in the unit of t divided by the unit of e, and the tolerance of the certificate."""
 
     bound: Array
     aim: Array
@@ -403,11 +405,8 @@ class TractionProblem(NamedTuple):
 
 @dataclass(frozen=True)
 class Tractions:
-    """Solved tractions, in the caller's map. `displacement = A t` belongs to the solver and is valid until its next
-    solve.
-
-    `failure` is empty, or states why the tolerance was not reached.
-    """
+    """Solved tractions, in the map of the start. `displacement = A t` belongs to the solver and is valid until the next
+    solve. `failure` is empty, or states why the tolerance was not reached."""
 
     displacement: Array
     certificate: float
@@ -416,8 +415,8 @@ class Tractions:
 
 
 class TangentialSolver:
-    """Solver on one grid, with the `operator` of the body for stacked tractions and a `preconditioner` for one
-    component."""
+    """Solver of tractions on one grid, with the `operator` of the body for stacked tractions and a `preconditioner` for
+    one component."""
 
     def __init__(self, slab: Slab, operator: ShearOperator, preconditioner: Operator, grids: Grids, limit: int) -> None:
         self.slab, self._limit = slab, limit
@@ -429,8 +428,8 @@ class TangentialSolver:
         self._free, self._hit, self._moves = (slab.zeros(np.bool_) for _ in range(3))
 
     def solve(self, problem: TractionProblem, t: Array, last: Array, factor: float = 1.0) -> Tractions:
-        """Solve from the tractions t, which are overwritten by the solution; collective. `factor` times `last` are the
-        tractions of the step before."""
+        """Solve from the tractions t, which are overwritten by the solution; collective. The tractions of the step
+        before are `factor` times `last`."""
         bound, aim, kappa, asked = problem
         shorten_to_bounds(bound, *components(t), self._hit)
         if self._is_at_rest(bound, aim, t):
@@ -536,11 +535,11 @@ def _step_along_last(step: float, r_z: float, r_d: float, z_c: float, d_c: float
 def settle_slips(bound, stiffness, alpha, t_x, t_y, alpha_old, old_x, old_y, u_x, u_y, target_x, target_y, slipping):
     """Find the points that stick after a step, and move the targets of all others.
 
-    With `s = target - u` and k the stiffness a point sticks if `|t + k s|` is below its bound. Every other point slips
-    by `s - r`, and its target is `u + r`, where `k r` is what t lacks of `t + k s` shortened to its bound. Exact
-    tractions lack nothing. Otherwise r is not lost: it adds up over steps until a solve corrects t. A point that slips
-    loses `(alpha t + alpha_old t_old)/2 (s - r)`, or 0 if this is negative. Put the powers at the end of the step, in
-    proportion to `t (s - r)`, into the map `slipping`, unless it is empty. Return the sums of losses, of t along x, of
+    With `s = target - u` and the stiffness k, a point sticks if `|t + k s|` is below its bound. Every other point slips
+    by `s - r`, and its target is `u + r`, where `k r` is the difference between t and `t + k s` shortened to its bound.
+    This r is 0 for exact tractions; otherwise it adds up over steps until a solve corrects t. A point that slips loses
+    `(alpha t + alpha_old t_old)/2 (s - r)`, or 0 if this is negative. The map `slipping`, unless it is empty, receives
+    `t (s - r)`, which is proportional to the power at the end of the step. Return the sums of losses, of t along x, of
     t along y and of bounds, the number of points that stick, and the sum of `t (s - r)`.
     """
     writes = slipping.size > 0
