@@ -5,7 +5,9 @@ the closing of all finer bands at each instant as the law of its interface (`roa
 over the bands at each instant as in steady sliding (`cascade`, `road_sliding`), with errors of the same kind: half of
 the rungs are marched on hard walls, too, for the error of the method.
 
-The nominal pressure is constant, so that rungs keep their pressures."""
+The nominal pressure is constant, and rungs keep their pressures. But the mean pressure on a fine band rises when the
+rubber stiffens, as smaller contacts carry the load. The rungs then remember contact under a pressure that the rubber
+did not have before. This is a part of the error of the method (`RoadHistory._error_by_memory`)."""
 
 import copy
 import math
@@ -29,13 +31,14 @@ from ..parallel.slab import Array, Slab
 from ..physics.measures import Measures
 from .band import NODES, PressureLadder, Rung
 from .band_steps import BEFORE, SETTLED, BandClock, Place, rest_step
-from .cascade import Cascade
+from .cascade import Cascade, Results, mean_rungs
 from .choice import FEWEST
 from .road_march import BandMarch, instant_of
-from .road_sliding import RoadSliding, _sums
+from .road_sliding import BandOutcome, RoadSliding, _sums
 
 T = TypeVar("T")
 INSTANTS = 50  # accuracy: instants of a stage with a row, equally spaced in the logarithm of slip or time
+MEMORY = 0.5  # fitted: remembered share of a change of pressure (`scripts/band_history_errors.py`)
 EARLIEST = 0.5  # accuracy: cells of the finest band below which the mesh decides
 
 
@@ -102,6 +105,7 @@ class RoadHistory(RoadSliding):
         self._tracks = dict[tuple[int, int], list[Rung]]()
         self._on_walls = list[list[Rung]]()
         self._closings: Closings = {}
+        self._ends = dict[int, tuple[list[float], list[Array]]]()
         self._marches = dict[tuple[int, int], BandMarch]()
         self._cell = bands[-1].setup.grid.dx
 
@@ -247,8 +251,7 @@ class RoadHistory(RoadSliding):
     def _point_at(self, instant: Instant, way: float) -> Point:
         """Return the state at an instant, with friction along `way` times x."""
         began, place = time.perf_counter(), instant.place
-        at = [clock.between(place) for clock in self._clocks]
-        rungs = {key: [instant_of(track, *at[key[0]], way) for track in tracks] for key, tracks in self._tracks.items()}
+        at, rungs = [clock.between(place) for clock in self._clocks], self._rungs_at(place, way)
         for sample, closing in self._closings.items():
             touching = closing.find(place)[1] if closing else 0.0
             rungs[0, sample] = [replace(rung, approach=rung.approach + touching) for rung in rungs[0, sample]]
@@ -256,8 +259,55 @@ class RoadHistory(RoadSliding):
         self._cascade.velocity = instant.velocity, 0.0
         hard = _sums(self._hard.fall(lambda band, _: walls[band]))
         outcome = self._outcome(rungs, self.samples, hard)
+        outcome = replace(outcome, memory=self._error_by_memory(place.stage, outcome, way))
         self._results = outcome.results
         return self._to_point(outcome, (way, 0.0), self.pressure, time.perf_counter() - began)
+
+    def _rungs_at(self, place: Place, way: float) -> dict[tuple[int, int], list[Rung]]:
+        """Return the rungs by band and sample at a place, with friction along `way` times x."""
+        at = [clock.between(place) for clock in self._clocks]
+        return {key: [instant_of(track, *at[key[0]], way) for track in tracks] for key, tracks in self._tracks.items()}
+
+    def _error_by_memory(self, stage: int, outcome: BandOutcome, way: float) -> float:
+        """Return the error of friction by the pressures that rungs keep, to first order.
+
+        The difference of the friction of a band from its value at the end of the stage is memory of the start, when the
+        band had another mean pressure. All friction of a band that does not settle may be memory.
+        """
+        start, end = self._ends_of(stage)
+        error = 0.0
+        for number, before in enumerate(start):
+            loads, now = self._loads(outcome.results, number)
+            remembered = loads @ (np.array([rung.friction for rung in outcome.rungs[number]]) - way * end[number])
+            error += MEMORY * (1.0 - min(before, now) / max(before, now)) * abs(float(remembered))
+        return error / self.pressure
+
+    def _ends_of(self, stage: int) -> tuple[list[float], list[Array]]:
+        """Return the mean pressure [Pa] of each band at the start of a stage, and the friction of its rungs along +x at
+        the end, or 0 for a band that does not settle."""
+        if stage not in self._ends:
+            start, end = (self._means_at(Place(stage, t)) for t in (0.0, self.job.history[stage].seconds))
+            results = self._cascade.fall(lambda band, _: start[band])
+            pressures = [self._loads(results, number)[1] for number in range(self.cut.count)]
+            settled = [self._settles(number, stage) for number in range(self.cut.count)]
+            friction = [np.array([rung.friction for rung in of_band]) for of_band in end]
+            self._ends[stage] = pressures, [one * last for one, last in zip(settled, friction, strict=True)]
+        return self._ends[stage]
+
+    def _means_at(self, place: Place) -> list[list[Rung]]:
+        rungs = self._rungs_at(place, 1.0)
+        return [mean_rungs(rungs, band, self.samples) for band in range(self.cut.count)]
+
+    def _loads(self, results: Results, number: int) -> tuple[Array, float]:
+        """Return the loads of the rungs of a band [Pa], and their mean pressure [Pa]."""
+        rungs = self._cascade.ladders[number].rungs
+        loads = results[number].weights * rungs
+        return loads, float(loads @ rungs / loads.sum())
+
+    def _settles(self, number: int, stage: int) -> bool:
+        """Return True if a band slides steadily, or rests, at the end of a stage."""
+        made = self.job.history[stage]
+        return not made.speed or made.seconds * made.speed >= SETTLED * self.cut.wavelengths(number)[0]
 
 
 def halved(rungs: Sequence[T]) -> Sequence[T]:

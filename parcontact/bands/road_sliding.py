@@ -41,7 +41,7 @@ class BandOutcome:
 
     `results` with laws from all samples; friction and area of the first sample with laws, and without (`hard`);
     standard errors of friction and area by the `scatter` of surfaces; the rungs of each band; `line`: these are
-    profiles.
+    profiles; error of friction by the `memory` of rungs in a history.
     """
 
     results: Results
@@ -50,6 +50,7 @@ class BandOutcome:
     scatter: tuple[float, float]
     rungs: Sequence[Sequence[Rung]]
     line: bool = False
+    memory: float = 0.0
 
     @property
     def friction(self) -> float:
@@ -58,14 +59,16 @@ class BandOutcome:
     @property
     def method(self) -> list[float]:
         """Error of the method in friction and in the corrected area: a share of the difference between hard walls and
-        laws, at least LEAST_METHOD, or LEAST_OF_AREA, less near full contact; 0 for one band."""
+        laws, at least LEAST_METHOD, or LEAST_OF_AREA, less near full contact; and the memory of rungs. 0 for one
+        band."""
         if len(self.results) == 1:
             return [0.0, 0.0]
         open_share = 1.0 - self.results[-1].contact_area_corrected
         least = LEAST_METHOD * min(1.0, open_share / NEARLY_ALL)
         ends = zip(self.hard, self.with_laws, (least, max(least, LEAST_OF_AREA * open_share)), strict=True)
         share = 1.0 if self.line else HARD_SHARE
-        return [max(share * abs(hard - law), lowest * law) for hard, law, lowest in ends]
+        friction, area = (max(share * abs(hard - law), lowest * law) for hard, law, lowest in ends)
+        return [friction + self.memory, area]
 
 
 class BandLoop(Protocol):

@@ -11,11 +11,11 @@ from mpi4py import MPI
 
 from parcontact import job as jobs
 from parcontact.__main__ import main
-from parcontact.bands import band
+from parcontact.bands import band, road_history
 from parcontact.bands.band import Band
 from parcontact.bands.road_history import RoadHistory, RungTask
 from parcontact.bands.road_sliding import RoadSliding
-from parcontact.files import tables
+from parcontact.files import run, tables
 from parcontact.files.recorder import StepRow
 from parcontact.files.road_run import ended, sum_up_errors
 from parcontact.job.yaml_text import dump
@@ -114,6 +114,31 @@ def test_a_slide_comes_to_the_steady_bands() -> None:
     assert np.mean(road.track(0, 0)[0].operator_calls) <= 15.0
 
 
+@pytest.mark.usefixtures("few_rungs")
+def test_rungs_that_remember_another_pressure_state_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It fades with the imprint of a rest: rubber stiffens, and the mean pressure on the fine band rises. Steady
+    sliding has none. A slide that ends before the fine band settles states at least what a longer one does."""
+
+    def memory(**changes: Any) -> tuple[Array, Array]:
+        road = history(**changes)
+        slips = [row.distance for row in rows_of(road)]
+        each = []
+        for share in (0.5, 0.0):
+            monkeypatch.setattr(road_history, "MEMORY", share)
+            parts = [row.errors.friction if row.errors else None for row, _ in road.records()]
+            each.append([part.method if part and slip else 0.0 for part, slip in zip(parts, slips, strict=True)])
+        return np.array(slips), np.subtract(*each)
+
+    rest, slide = JOB["history"]
+    start = {"state": "steady", "velocity": 1.0, "pressure": 1e5}
+    slips, from_rest = memory()
+    assert from_rest.max() > 0.03
+    assert from_rest[-1] == pytest.approx(0.0, abs=1e-12)
+    assert memory(initial=start, history=[slide])[1].max() < 0.1 * from_rest.max()
+    short_slips, short = memory(history=[rest, {**slide, "distance": LONG / 8}])
+    assert (short - np.interp(short_slips, slips, from_rest)).min() > -1e-3
+
+
 STEADY = {"velocities": [1.0], "pressures": [1e5]}
 
 
@@ -193,6 +218,7 @@ def test_files_and_a_shorter_history(tmp_path: Path, monkeypatch: pytest.MonkeyP
     """Frictions of bands add up to that of measures.csv; a second run does nothing; `--until` ends the history; another
     velocity does not replace the results; `info` counts the marches of a run that was stopped."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(run, "age", lambda: 0.0)  # of this process, from which --wall counts
     Path("job.yaml").write_text(dump({**JOB, "history": [{"pressure": 1e5}, SLIDE]}))
     assert main(["job.yaml", "--quiet", "--wall", "00:01:00"]) == 0  # of which 5 s are reserved
     table, bands = (tables.read_columns(Path("out/job") / name) for name in ("measures.csv", "bands.csv"))
